@@ -1,0 +1,1 @@
+"""Data that ships with kinarm: arms (URDF), trained policies and recorded results."""

@@ -1,0 +1,1 @@
+"""Trained policies, produced by ``kinarm-train``."""

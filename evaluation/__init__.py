@@ -1,0 +1,1 @@
+"""Evaluation: trials, statistics, figures and command lines."""

@@ -1,0 +1,82 @@
+"""kinarm: learn to reach with a simulated six-axis arm, and know how good the result is."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from kinarm._exports import lazy_exports
+
+if TYPE_CHECKING:
+    from kinarm.arm import Arm, arm_names
+    from kinarm.env import ReachEnv, ReachVectorEnv
+    from kinarm.errors import (
+        ArmError,
+        InvalidInputError,
+        KinarmError,
+        PolicyFileError,
+        SceneError,
+        StartInContactError,
+        UnknownNameError,
+    )
+    from kinarm.networks import CompiledPolicy, Networks
+    from kinarm.reference import ReferenceSimulator
+    from kinarm.rollouts import Rollouts
+    from kinarm.scene import Bench, Scene
+    from kinarm.simulator import Simulator, StepResult
+    from kinarm.task import TASKS, ReachTask, RewardWeights, load_task
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "TASKS",
+    "Arm",
+    "ArmError",
+    "Bench",
+    "CompiledPolicy",
+    "InvalidInputError",
+    "KinarmError",
+    "Networks",
+    "PolicyFileError",
+    "ReachEnv",
+    "ReachTask",
+    "ReachVectorEnv",
+    "ReferenceSimulator",
+    "RewardWeights",
+    "Rollouts",
+    "Scene",
+    "SceneError",
+    "Simulator",
+    "StartInContactError",
+    "StepResult",
+    "UnknownNameError",
+    "__version__",
+    "arm_names",
+    "load_task",
+]
+
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "arm": ("Arm", "arm_names"),
+        "env": ("ReachEnv", "ReachVectorEnv"),
+        "errors": (
+            "ArmError",
+            "InvalidInputError",
+            "KinarmError",
+            "PolicyFileError",
+            "SceneError",
+            "StartInContactError",
+            "UnknownNameError",
+        ),
+        "networks": ("CompiledPolicy", "Networks"),
+        "reference": ("ReferenceSimulator",),
+        "rollouts": ("Rollouts",),
+        "scene": ("Bench", "Scene"),
+        "simulator": ("Simulator", "StepResult"),
+        "task": ("TASKS", "ReachTask", "RewardWeights", "load_task"),
+    },
+)
+
+_root = Path(__file__).resolve().parent.parent
+if (_root / "pyproject.toml").is_file():
+    # In a clone the sub-packages lie beside this folder, whatever is installed.
+    __path__.append(str(_root))

@@ -1,0 +1,85 @@
+"""A serial chain as flat arrays: what the compiled kernels know of an arm."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+
+class Chain(NamedTuple):
+    """Kinematics of n joints in series, in the order base to tool.
+
+    Attributes
+    ----------
+    prismatic : ndarray of bool, shape (n,)
+        Whether a joint slides; else it turns.
+    translation : ndarray, shape (n, 3)
+        Origin of a joint frame in its parent joint frame [m].
+    rotation : ndarray, shape (n, 4)
+        Orientation of a joint frame at zero in its parent: quaternion (w, x, y, z).
+    axis : ndarray, shape (n, 3)
+        Unit vector of a joint's axis in its own frame.
+    tool : ndarray, shape (3,)
+        Tool point in the last joint frame [m].
+    lower, upper : ndarray, shape (n,)
+        Limits [rad or m].
+    speed : ndarray, shape (n,)
+        Rated speeds [rad/s or m/s].
+    """
+
+    prismatic: NDArray[np.bool_]
+    translation: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+    axis: NDArray[np.float64]
+    tool: NDArray[np.float64]
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+    speed: NDArray[np.float64]
+
+    @property
+    def n_axes(self) -> int:
+        """Number of joints."""
+        return len(self.lower)
+
+    @classmethod
+    def from_model(cls, model: pin.Model, tool_frame_id: int) -> "Chain":
+        """Extract the arrays from a Pinocchio model of a serial chain.
+
+        Parameters
+        ----------
+        model : pinocchio.Model
+            Joints of one degree of freedom, each the child of the one before.
+        tool_frame_id : int
+            Frame on the last link whose origin is the tool point.
+        """
+        frame = model.frames[tool_frame_id]
+        placements = [model.jointPlacements[i] for i in range(1, model.njoints)]
+        subspaces = np.array([_motion_subspace(model.joints[i]) for i in range(1, model.njoints)])
+        prismatic = ~subspaces[:, 3:].any(axis=1)
+        chain = cls(
+            prismatic=prismatic,
+            translation=np.array([placement.translation for placement in placements]),
+            rotation=np.array([_quaternion(placement.rotation) for placement in placements]),
+            axis=np.where(prismatic[:, None], subspaces[:, :3], subspaces[:, 3:]),
+            tool=np.array(frame.placement.translation),
+            lower=np.array(model.lowerPositionLimit),
+            upper=np.array(model.upperPositionLimit),
+            speed=np.array(model.velocityLimit),
+        )
+        for array in chain:
+            array.flags.writeable = False
+        return chain
+
+
+def _motion_subspace(joint: pin.JointModel) -> NDArray[np.float64]:
+    """Direction of a joint's motion in its own frame: linear part, then angular, shape (6,)."""
+    data = joint.createData()
+    joint.calc(data, np.zeros(1))
+    return np.array(data.S).reshape(6)
+
+
+def _quaternion(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit quaternion (w, x, y, z) of a rotation matrix, shape (4,)."""
+    x, y, z, w = pin.Quaternion(rotation).coeffs()
+    return np.array([w, x, y, z])

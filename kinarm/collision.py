@@ -1,0 +1,338 @@
+"""Contact between the arm, the scene and itself: Coal decides, capsules prove freedom.
+
+`ContactModel` holds one list of pairs twice: as a Pinocchio/Coal geometry model, which judges a
+configuration, and as flat arrays of capsules, boxes and motion bounds (`ContactShapes`), from
+which the compiled simulator proves that most configurations need no judge.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from kinarm.arm import Arm
+from kinarm.chain import Chain
+from kinarm.errors import ArmError
+from kinarm.scene import Scene
+
+BETWEEN_CAPSULES, WITH_BOX, WITH_GROUND = range(3)
+"""Kinds of pairs in `ContactShapes.pairs`."""
+
+MOUNT_SAMPLES = 721
+
+
+class ContactShapes(NamedTuple):
+    """What the compiled kernels know of the shapes that may touch.
+
+    Attributes
+    ----------
+    link : ndarray of int, shape (n_shapes,)
+        Joint frame that carries a shape: 0 is the world, k the k-th joint.
+    capsules : ndarray, shape (n_shapes, 7)
+        The capsule that is or encloses the shape: its end points (3 + 3) in the joint frame and
+        its radius [m].
+    boxes : ndarray, shape (n_boxes, 2, 3)
+        Lower and upper corners of the benches [m].
+    pairs : ndarray of int, shape (n_pairs, 3)
+        Kind of the pair, index of a shape, and index of the other shape or box.
+    travel : ndarray, shape (n_actuated, n_pairs)
+        Bound on how far an axis moves the two bodies of a pair relative to each other
+        [m/rad, or m/m].
+    """
+
+    link: NDArray[np.int64]
+    capsules: NDArray[np.float64]
+    boxes: NDArray[np.float64]
+    pairs: NDArray[np.int64]
+    travel: NDArray[np.float64]
+
+
+class Capsule(NamedTuple):
+    """A segment with a radius, in the frame of the joint that carries it."""
+
+    start: NDArray[np.float64]
+    end: NDArray[np.float64]
+    radius: float
+
+
+@dataclass(frozen=True, eq=False)
+class ContactModel:
+    """An arm in a scene, with the pairs of bodies that are tested for contact.
+
+    Pairs that can tell nothing are left out: neighbours in the chain, bodies that overlap at the
+    home pose, and the mounting, that is the base and the first link against a world that they
+    never touch or always touch.
+
+    Attributes
+    ----------
+    arm : Arm
+        The arm.
+    geometry : pinocchio.GeometryModel
+        Shapes of arm and scene, and the pairs.
+    body_names : tuple of str
+        Readable name of each shape in `geometry`.
+    """
+
+    arm: Arm
+    geometry: pin.GeometryModel
+    body_names: tuple[str, ...]
+    shapes: ContactShapes
+
+    @classmethod
+    def build(cls, arm: Arm, scene: Scene) -> "ContactModel":
+        """Place an arm in a scene and choose the pairs to test."""
+        geometry = arm.geometry.copy()
+        n_shapes = geometry.ngeoms
+        obstacles = _add_scene(geometry, scene)
+        candidates = _candidate_pairs(geometry, n_shapes, len(scene.benches))
+        geometry.removeAllCollisionPairs()
+        for first, second, _ in candidates:
+            geometry.addCollisionPair(pin.CollisionPair(first, second))
+        dropped = _resting_overlaps(arm, geometry) | _mounting_pairs(arm, geometry, n_shapes)
+        kept = [pair for index, pair in enumerate(candidates) if index not in dropped]
+        geometry.removeAllCollisionPairs()
+        for first, second, _ in kept:
+            geometry.addCollisionPair(pin.CollisionPair(first, second))
+        return cls(
+            arm=arm,
+            geometry=geometry,
+            body_names=(*_body_names(arm), *obstacles),
+            shapes=_contact_shapes(arm, scene, kept, n_shapes),
+        )
+
+    @cached_property
+    def _judge(self) -> pin.TreeBroadPhaseManagerPool_DynamicAABBTreeCollisionManager:
+        return pin.TreeBroadPhaseManagerPool_DynamicAABBTreeCollisionManager(
+            self.arm.model, self.geometry, 1
+        )
+
+    @property
+    def pair_names(self) -> tuple[tuple[str, str], ...]:
+        """Names of the two bodies of each tested pair."""
+        return tuple(
+            (self.body_names[pair.first], self.body_names[pair.second])
+            for pair in self.geometry.collisionPairs
+        )
+
+    def in_contact(self, configurations: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Ask Coal which configurations touch something, in one call.
+
+        Parameters
+        ----------
+        configurations : ndarray, shape (n, n_axes)
+            Axis positions [rad or m].
+
+        Returns
+        -------
+        ndarray of bool, shape (n,)
+        """
+        if len(configurations) == 0:
+            return np.zeros(0, dtype=bool)
+        columns = np.asfortranarray(configurations.T)
+        verdicts = pin.computeCollisionsInParallel(1, self._judge, columns, True)
+        return np.array(verdicts, dtype=bool).reshape(-1)
+
+    def contact_pair(self, configuration: NDArray[np.float64]) -> tuple[str, str] | None:
+        """Name the first tested pair that is in contact, or None.
+
+        Parameters
+        ----------
+        configuration : ndarray, shape (n_axes,)
+            Axis positions [rad or m].
+        """
+        model, data = self.arm.model, self.arm.model.createData()
+        geometry_data = self.geometry.createData()
+        pin.updateGeometryPlacements(model, data, self.geometry, geometry_data, configuration)
+        for index, names in enumerate(self.pair_names):
+            if pin.computeCollision(self.geometry, geometry_data, index):
+                return names
+        return None
+
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]:
+        return type(self), (self.arm, self.geometry, self.body_names, self.shapes)
+
+
+def _add_scene(geometry: pin.GeometryModel, scene: Scene) -> tuple[str, ...]:
+    """Add benches, then the ground, to a geometry model; return their names."""
+    names = []
+    for bench in scene.benches:
+        placement = pin.SE3(np.eye(3), (bench.lower + bench.upper) / 2)
+        box = coal.Box(*(bench.upper - bench.lower))
+        names.append(f"{bench.name} bench")
+        geometry.addGeometryObject(pin.GeometryObject(names[-1], 0, placement, box))
+    if scene.ground:
+        names.append("ground")
+        halfspace = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
+        geometry.addGeometryObject(pin.GeometryObject("ground", 0, pin.SE3.Identity(), halfspace))
+    return tuple(names)
+
+
+def _body_names(arm: Arm) -> tuple[str, ...]:
+    """Name each collision shape after its link, numbered only where a link has several."""
+    names = [shape.name for shape in arm.geometry.geometryObjects]
+    links = [name.rsplit("_", 1)[0] for name in names]
+    return tuple(
+        link if links.count(link) == 1 else name for link, name in zip(links, names, strict=True)
+    )
+
+
+def _candidate_pairs(
+    geometry: pin.GeometryModel, n_shapes: int, n_boxes: int
+) -> list[tuple[int, int, int]]:
+    """All pairs (first, second, kind) that move against each other, neighbours excepted."""
+    parent = [shape.parentJoint for shape in geometry.geometryObjects]
+    pairs = []
+    for first in range(n_shapes):
+        for second in range(first + 1, n_shapes):
+            if abs(parent[first] - parent[second]) > 1:
+                a, b = sorted((first, second), key=lambda shape: parent[shape])
+                pairs.append((a, b, BETWEEN_CAPSULES))
+        if parent[first] > 0:
+            for second in range(n_shapes, geometry.ngeoms):
+                kind = WITH_BOX if second < n_shapes + n_boxes else WITH_GROUND
+                pairs.append((first, second, kind))
+    return pairs
+
+
+def _touching(arm: Arm, geometry: pin.GeometryModel, q: NDArray[np.float64]) -> set[int]:
+    """Indices of the pairs in contact at a configuration."""
+    data, geometry_data = arm.model.createData(), geometry.createData()
+    pin.updateGeometryPlacements(arm.model, data, geometry, geometry_data, q)
+    pairs = range(len(geometry.collisionPairs))
+    return {index for index in pairs if pin.computeCollision(geometry, geometry_data, index)}
+
+
+def _resting_overlaps(arm: Arm, geometry: pin.GeometryModel) -> set[int]:
+    """Pairs within the arm that touch at the home pose."""
+    n_shapes = arm.geometry.ngeoms
+    resting = _touching(arm, geometry, arm.home)
+    return {index for index in resting if geometry.collisionPairs[index].second < n_shapes}
+
+
+def _mounting_pairs(arm: Arm, geometry: pin.GeometryModel, n_shapes: int) -> set[int]:
+    """Pairs of the first link and the world whose state the first axis never changes."""
+    objects = geometry.geometryObjects
+    mounting = {
+        index
+        for index, pair in enumerate(geometry.collisionPairs)
+        if pair.second >= n_shapes and objects[pair.first].parentJoint == 1
+    }
+    touching, free = set(mounting), set(mounting)
+    for position in np.linspace(arm.lower[0], arm.upper[0], MOUNT_SAMPLES):
+        q = arm.home.copy()
+        q[0] = position
+        now = _touching(arm, geometry, q) & mounting
+        touching &= now
+        free -= now
+    return touching | free
+
+
+def _contact_shapes(
+    arm: Arm, scene: Scene, pairs: list[tuple[int, int, int]], n_shapes: int
+) -> ContactShapes:
+    """Flatten shapes, pairs and motion bounds for the kernels."""
+    objects = list(arm.geometry.geometryObjects)
+    capsules = [enclosing_capsule(shape) for shape in objects]
+    rows = [
+        (kind, first, second if kind == BETWEEN_CAPSULES else second - n_shapes)
+        for first, second, kind in pairs
+    ]
+    link = np.array([shape.parentJoint for shape in objects], dtype=np.int64)
+    travel = np.zeros((arm.n_actuated, len(rows)))
+    for column, (kind, first, second) in enumerate(rows):
+        mover, base = (second, int(link[first])) if kind == BETWEEN_CAPSULES else (first, 0)
+        for axis in range(base, min(int(link[mover]), arm.n_actuated)):
+            if kind == WITH_GROUND and _keeps_height(arm.chain, axis):
+                continue
+            travel[axis, column] = _travel_bound(arm.chain, axis, int(link[mover]), capsules[mover])
+    arrays = ContactShapes(
+        link=link,
+        capsules=np.array([np.hstack(capsule) for capsule in capsules]).reshape(-1, 7),
+        boxes=np.array([(bench.lower, bench.upper) for bench in scene.benches]).reshape(-1, 2, 3),
+        pairs=np.array(rows, dtype=np.int64).reshape(-1, 3),
+        travel=travel,
+    )
+    for array in arrays:
+        array.flags.writeable = False
+    return arrays
+
+
+def _keeps_height(chain: Chain, axis: int) -> bool:
+    """Whether an axis is a vertical revolute one at the base, which leaves heights unchanged."""
+    if axis != 0 or chain.prismatic[0]:
+        return False
+    w, x, y, z = chain.rotation[0]
+    world_axis = pin.Quaternion(w, x, y, z).matrix() @ chain.axis[0]
+    return bool(np.hypot(world_axis[0], world_axis[1]) < 1e-12)
+
+
+def _travel_bound(chain: Chain, axis: int, link: int, capsule: Capsule) -> float:
+    """Bound on the speed of any point of a capsule's segment per unit speed of an axis.
+
+    A revolute axis moves a point by its distance from the axis. For the link that the axis
+    carries itself that is a constant; for a later link it is at most the distance from the
+    joint's origin, hence at most the length of the chain between them.
+    """
+    if chain.prismatic[axis]:
+        return 1.0
+    ends = np.array([capsule.start, capsule.end])
+    if link == axis + 1:
+        return float(np.linalg.norm(np.cross(chain.axis[axis], ends), axis=1).max())
+    between = slice(axis + 1, link)
+    length = np.linalg.norm(chain.translation[between], axis=1).sum()
+    slide = np.where(chain.prismatic, np.fmax(np.abs(chain.lower), np.abs(chain.upper)), 0.0)
+    return float(length + slide[between].sum() + np.linalg.norm(ends, axis=1).max())
+
+
+def enclosing_capsule(shape: pin.GeometryObject) -> Capsule:
+    """Capsule that equals a capsule or sphere, or encloses any other shape.
+
+    Parameters
+    ----------
+    shape : pinocchio.GeometryObject
+        Capsule, sphere, cylinder, box or convex hull.
+
+    Returns
+    -------
+    Capsule
+        In the frame of the shape's parent joint.
+
+    Raises
+    ------
+    ArmError
+        For any other kind of shape.
+    """
+    body = shape.geometry
+    if isinstance(body, coal.Sphere):
+        local = Capsule(np.zeros(3), np.zeros(3), float(body.radius))
+    elif isinstance(body, coal.Capsule | coal.Cylinder):
+        half = np.array([0.0, 0.0, float(body.halfLength)])
+        local = Capsule(-half, half, float(body.radius))
+    elif isinstance(body, coal.Box):
+        signs = np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T
+        local = _capsule_around(signs * body.halfSide)
+    elif isinstance(body, coal.ConvexBase):
+        local = _capsule_around(np.array(body.points()))
+    else:
+        raise ArmError(f"collision shape {shape.name!r} is a {type(body).__name__}: not supported")
+    placement = shape.placement
+    return Capsule(placement.act(local.start), placement.act(local.end), local.radius)
+
+
+def _capsule_around(points: NDArray[np.float64]) -> Capsule:
+    """Capsule along the longest principal direction of a set of points, shape (n, 3)."""
+    centre = (points.min(axis=0) + points.max(axis=0)) / 2
+    _, _, directions = np.linalg.svd(points - centre)
+    direction = directions[0]
+    along = (points - centre) @ direction
+    across = np.linalg.norm(points - centre - along[:, None] * direction, axis=1)
+    radius = float(across.max()) * (1 + 1e-9)
+    cap = np.sqrt(np.maximum(radius**2 - across**2, 0.0))
+    low, high = float((along + cap).min()), float((along - cap).max())
+    if low > high:
+        low = high = (low + high) / 2
+    return Capsule(centre + low * direction, centre + high * direction, radius)

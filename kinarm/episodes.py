@@ -1,0 +1,148 @@
+"""Arrays that the simulator hands to the compiled kernels: rules, actions and episodes."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+RUNNING, PAUSED, SUCCESS, COLLISION, TRUNCATED = range(5)
+"""States of an episode."""
+
+
+class Rules(NamedTuple):
+    """Task and motion limits as the kernels need them."""
+
+    step_limit: NDArray[np.float64]
+    tolerance: float
+    horizon: int
+    progress: float
+    collision: float
+    success: float
+    step: float
+
+
+class Control(NamedTuple):
+    """Where actions come from: dense networks, or a table if ``layers`` is empty.
+
+    Attributes
+    ----------
+    layers : ndarray of int, shape (n_layers + 1,)
+        Widths, from the observation to the action.
+    weights : ndarray, shape (n_policies, n_parameters)
+        Layer after layer, the weights (inputs x outputs) and then the bias.
+    policy : ndarray of int, shape (n_episodes,)
+        Which row of ``weights`` an episode uses.
+    actions : ndarray, shape (n_episodes, n_steps, n_actuated)
+        The table; a table of one step serves every step.
+    """
+
+    layers: NDArray[np.int64]
+    weights: NDArray[np.float64]
+    policy: NDArray[np.int64]
+    actions: NDArray[np.float64]
+
+
+class Episodes(NamedTuple):
+    """State of n episodes; the kernels change it in place.
+
+    Attributes
+    ----------
+    status : ndarray of int, shape (n,)
+        `RUNNING`, `PAUSED`, `SUCCESS`, `COLLISION` or `TRUNCATED`.
+    steps : ndarray of int, shape (n,)
+        Steps taken.
+    stop : ndarray of int, shape (n,)
+        Step count at which to hand an episode back.
+    q : ndarray, shape (n, n_axes)
+        Configuration [rad or m].
+    target : ndarray, shape (n, n_axes)
+        Where the step under way leads.
+    doubt : ndarray of int, shape (n,)
+        Bit k - 1 set: configuration k of the step under way is not proven free.
+    cleared : ndarray of bool, shape (n,)
+        The step under way was judged free.
+    slack : ndarray, shape (n, n_pairs)
+        Lower bound of each pair's distance at ``q`` [m].
+    goal : ndarray, shape (n, 3)
+        Goal position [m].
+    observation : ndarray, shape (n, n_observations)
+        Observation of the current state.
+    distance, previous_distance : ndarray, shape (n,)
+        From the tool to the goal, now and before the last step [m].
+    total : ndarray, shape (n,)
+        Return: sum of rewards.
+    moments : ndarray, shape (n, 2, n_observations) or (0, 2, n_observations)
+        Sums of the observations acted upon, less ``shift``, and of their squares.
+    shift : ndarray, shape (n_observations,)
+        Subtracted before summing, for accuracy.
+    path : ndarray, shape (n, horizon + 1, n_axes) or (0, 0, n_axes)
+        Configurations visited.
+    """
+
+    status: NDArray[np.int64]
+    steps: NDArray[np.int64]
+    stop: NDArray[np.int64]
+    q: NDArray[np.float64]
+    target: NDArray[np.float64]
+    doubt: NDArray[np.int64]
+    cleared: NDArray[np.bool_]
+    slack: NDArray[np.float64]
+    goal: NDArray[np.float64]
+    observation: NDArray[np.float64]
+    distance: NDArray[np.float64]
+    previous_distance: NDArray[np.float64]
+    total: NDArray[np.float64]
+    moments: NDArray[np.float64]
+    shift: NDArray[np.float64]
+    path: NDArray[np.float64]
+
+    @classmethod
+    def allocate(
+        cls,
+        starts: NDArray[np.float64],
+        goals: NDArray[np.float64],
+        *,
+        n_pairs: int,
+        horizon: int,
+        record: bool = False,
+        shift: NDArray[np.float64] | None = None,
+    ) -> "Episodes":
+        """Allocate episodes at their starts; the kernel ``begin`` fills in the rest.
+
+        Parameters
+        ----------
+        starts : ndarray, shape (n, n_axes)
+            Start configurations [rad or m].
+        goals : ndarray, shape (n, 3)
+            Goal positions [m].
+        n_pairs : int
+            Number of contact pairs.
+        horizon : int
+            Steps of a whole episode.
+        record : bool
+            Keep the configurations visited.
+        shift : ndarray, shape (n_observations,), optional
+            Collect sums of the observations about this point.
+        """
+        n, n_axes = starts.shape
+        n_observations = 6 + 7 * n_axes
+        collected = 0 if shift is None else n
+        recorded = (n, horizon + 1) if record else (0, 0)
+        return cls(
+            status=np.zeros(n, dtype=np.int64),
+            steps=np.zeros(n, dtype=np.int64),
+            stop=np.full(n, horizon, dtype=np.int64),
+            q=np.array(starts),
+            target=np.array(starts),
+            doubt=np.zeros(n, dtype=np.int64),
+            cleared=np.zeros(n, dtype=bool),
+            slack=np.zeros((n, n_pairs)),
+            goal=np.array(goals),
+            observation=np.zeros((n, n_observations)),
+            distance=np.zeros(n),
+            previous_distance=np.zeros(n),
+            total=np.zeros(n),
+            moments=np.zeros((collected, 2, n_observations)),
+            shift=np.zeros(n_observations) if shift is None else np.array(shift),
+            path=np.full((*recorded, n_axes), np.nan),
+        )

@@ -1,0 +1,79 @@
+"""Every error that kinarm raises on purpose.
+
+::
+
+    KinarmError
+    ├── ArmError            a robot description is missing, malformed or not supported
+    ├── SceneError          a scene or task that cannot be built, or offers no legal start
+    ├── InvalidInputError   an argument with the wrong shape, range or a non-finite entry
+    │   └── UnknownNameError    a name that does not exist; lists the ones that do
+    ├── StartInContactError a start configuration that touches something
+    └── PolicyFileError     a policy file that cannot be read, written or used here
+
+Command lines turn any of them into one line on standard error and exit status 2.
+"""
+
+from collections.abc import Iterable
+
+
+class KinarmError(Exception):
+    """Base of all errors that kinarm raises on purpose."""
+
+
+class ArmError(KinarmError):
+    """A robot description is missing, malformed or describes what kinarm cannot simulate."""
+
+
+class SceneError(KinarmError):
+    """A scene or task is inconsistent, or no contact-free start exists in it."""
+
+
+class InvalidInputError(KinarmError, ValueError):
+    """An argument has the wrong shape or range, or is not finite."""
+
+
+class UnknownNameError(InvalidInputError):
+    """A name that does not exist.
+
+    Parameters
+    ----------
+    kind : str
+        What was looked up, such as ``"task"``.
+    given : str
+        The name as given.
+    available : iterable of str
+        The names that exist.
+    """
+
+    def __init__(self, kind: str, given: str, available: Iterable[str]) -> None:
+        self.kind = kind
+        self.given = given
+        self.available = tuple(available)
+        super().__init__(f"unknown {kind} {given!r}; available: {', '.join(self.available)}")
+
+    def __reduce__(self) -> tuple[type, tuple[str, str, tuple[str, ...]]]:
+        return type(self), (self.kind, self.given, self.available)
+
+
+class StartInContactError(KinarmError):
+    """A start configuration touches the ground, a bench or the arm itself.
+
+    Parameters
+    ----------
+    index : int
+        Position of the start in the given batch.
+    pair : tuple of str
+        Names of the two bodies in contact.
+    """
+
+    def __init__(self, index: int, pair: tuple[str, str]) -> None:
+        self.index = index
+        self.pair = pair
+        super().__init__(f"start {index} is in contact: {pair[0]} touches {pair[1]}")
+
+    def __reduce__(self) -> tuple[type, tuple[int, tuple[str, str]]]:
+        return type(self), (self.index, self.pair)
+
+
+class PolicyFileError(KinarmError):
+    """A policy file is missing, truncated, foreign, too new, or made for something else."""

@@ -1,0 +1,149 @@
+"""The slow reference: the simulator's semantics in plain Pinocchio and Coal, one step at a time.
+
+It shares no kernel with `kinarm.simulator` and asks Coal about every tested configuration. Tests
+and ``kinarm-bench`` hold the compiled rollouts against it.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from kinarm.arm import Arm
+from kinarm.simulator import Simulator
+
+
+class ReferenceEpisode(NamedTuple):
+    """One episode of the reference.
+
+    Attributes
+    ----------
+    path : ndarray, shape (steps + 1, n_axes)
+        Configurations visited [rad or m].
+    observations : ndarray, shape (steps + 1, n_observations)
+        Observations of them.
+    rewards : ndarray, shape (steps,)
+        Rewards.
+    success, collision : bool
+        How it ended; neither means that the horizon was reached.
+    distance : float
+        Final distance from the tool to the goal [m].
+    contact : tuple of str or None
+        The first pair in contact, if the episode ended in one.
+    """
+
+    path: NDArray[np.float64]
+    observations: NDArray[np.float64]
+    rewards: NDArray[np.float64]
+    success: bool
+    collision: bool
+    distance: float
+    contact: tuple[str, str] | None
+
+
+class ReferenceSimulator:
+    """Steps one episode at a time with Pinocchio's kinematics and Coal's verdict.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        Whose arm, scene, task and time step to use.
+    """
+
+    def __init__(self, simulator: Simulator) -> None:
+        self.arm: Arm = simulator.arm
+        self.task = simulator.task
+        self.step_limit = simulator.step_limit
+        self.contact_model = simulator.contact_model
+        self._data = self.arm.model.createData()
+        self._geometry_data = self.contact_model.geometry.createData()
+
+    def rollout(
+        self,
+        policy: Callable[[NDArray[np.float64]], ArrayLike],
+        start: NDArray[np.float64],
+        goal: NDArray[np.float64],
+    ) -> ReferenceEpisode:
+        """Run one episode.
+
+        Parameters
+        ----------
+        policy : callable
+            Maps an observation, shape (n_observations,), to an action, shape (n_actions,).
+        start : ndarray, shape (n_axes,)
+            Start configuration [rad or m].
+        goal : ndarray, shape (3,)
+            Goal position [m].
+        """
+        q, reward = np.array(start), self.task.reward
+        observation, distance = self.observe(q, goal)
+        path, observations, rewards = [q], [observation], []
+        success, contact = False, None
+        while not success and contact is None and len(rewards) < self.task.horizon:
+            action = np.clip(np.asarray(policy(observation), dtype=float), -1.0, 1.0)
+            target = q.copy()
+            target[: self.step_limit.size] += action * self.step_limit
+            target = np.clip(target, self.arm.lower, self.arm.upper)
+            contact = self.first_contact(q, target)
+            before = distance
+            if contact is None:
+                q = target
+                observation, distance = self.observe(q, goal)
+                success = distance <= self.task.tolerance
+            rewards.append(
+                reward.progress * (before - distance)
+                + reward.step
+                + reward.collision * (contact is not None)
+                + reward.success * success
+            )
+            path.append(q)
+            observations.append(observation)
+        return ReferenceEpisode(
+            path=np.array(path),
+            observations=np.array(observations),
+            rewards=np.array(rewards),
+            success=success,
+            collision=contact is not None,
+            distance=distance,
+            contact=contact,
+        )
+
+    def observe(
+        self, q: NDArray[np.float64], goal: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], float]:
+        """Observation of a configuration and its distance to the goal [m]."""
+        model, data = self.arm.model, self._data
+        pin.framesForwardKinematics(model, data, q)
+        tool = data.oMf[model.getFrameId(self.arm.tool_frame, pin.FrameType.BODY)].translation
+        offset = goal - tool
+        positions = [data.oMi[i].translation for i in range(1, model.njoints)]
+        parts = [goal, offset, *self._quaternions(q), *positions]
+        return np.concatenate(parts), float(np.linalg.norm(offset))
+
+    def _quaternions(self, q: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        """World orientations of the joint frames as quaternions composed along the chain."""
+        world = pin.Quaternion.Identity()
+        quaternions = []
+        for k in range(self.arm.n_axes):
+            world = world * pin.Quaternion(self.arm.model.jointPlacements[k + 1].rotation)
+            if not self.arm.chain.prismatic[k]:
+                turn = np.sin(q[k] / 2) * self.arm.chain.axis[k]
+                world = world * pin.Quaternion(float(np.cos(q[k] / 2)), *turn)
+            x, y, z, w = world.coeffs()
+            quaternions.append(np.array([w, x, y, z]))
+        return quaternions
+
+    def first_contact(
+        self, q: NDArray[np.float64], target: NDArray[np.float64]
+    ) -> tuple[str, str] | None:
+        """First pair that touches at the four tested configurations of a step, or None."""
+        model, geometry = self.arm.model, self.contact_model.geometry
+        for k in (1, 2, 3, 4):
+            tested = target if k == 4 else q + k / 4 * (target - q)
+            if pin.computeCollisions(
+                model, self._data, geometry, self._geometry_data, tested, True
+            ):
+                return self.contact_model.contact_pair(tested)
+        return None
