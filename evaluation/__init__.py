@@ -1,1 +1,33 @@
-"""Evaluation: trials, statistics, figures and command lines."""
+"""Evaluation: trials that every policy faces alike, statistics, figures and command lines."""
+
+from typing import TYPE_CHECKING
+
+from kinarm._exports import lazy_exports
+
+if TYPE_CHECKING:
+    from kinarm.evaluation.entrants import Entrant, find_entrants
+    from kinarm.evaluation.evaluate import Evaluation, PooledEvaluation, evaluate, pool
+    from kinarm.evaluation.statistics import DistanceStatistics, Share
+    from kinarm.evaluation.trials import TrialSet
+
+__all__ = [
+    "DistanceStatistics",
+    "Entrant",
+    "Evaluation",
+    "PooledEvaluation",
+    "Share",
+    "TrialSet",
+    "evaluate",
+    "find_entrants",
+    "pool",
+]
+
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "entrants": ("Entrant", "find_entrants"),
+        "evaluate": ("Evaluation", "PooledEvaluation", "evaluate", "pool"),
+        "statistics": ("DistanceStatistics", "Share"),
+        "trials": ("TrialSet",),
+    },
+)

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinarm._exports import lazy_exports
+from kinarm.registration import register_environments
 
 if TYPE_CHECKING:
     from kinarm.arm import Arm, arm_names
@@ -75,6 +76,8 @@ __getattr__ = lazy_exports(
         "task": ("TASKS", "ReachTask", "RewardWeights", "load_task"),
     },
 )
+
+register_environments()
 
 _root = Path(__file__).resolve().parent.parent
 if (_root / "pyproject.toml").is_file():

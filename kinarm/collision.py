@@ -92,7 +92,7 @@ class ContactModel:
         geometry.removeAllCollisionPairs()
         for first, second, _ in candidates:
             geometry.addCollisionPair(pin.CollisionPair(first, second))
-        dropped = _resting_overlaps(arm, geometry) | _mounting_pairs(arm, geometry, n_shapes)
+        dropped = _uninformative_pairs(arm, geometry, n_shapes)
         kept = [pair for index, pair in enumerate(candidates) if index not in dropped]
         geometry.removeAllCollisionPairs()
         for first, second, _ in kept:
@@ -110,7 +110,11 @@ class ContactModel:
             self.arm.model, self.geometry, 1
         )
 
-    @property
+    @cached_property
+    def _workspace(self) -> tuple[pin.Data, pin.GeometryData]:
+        return self.arm.model.createData(), self.geometry.createData()
+
+    @cached_property
     def pair_names(self) -> tuple[tuple[str, str], ...]:
         """Names of the two bodies of each tested pair."""
         return tuple(
@@ -144,13 +148,9 @@ class ContactModel:
         configuration : ndarray, shape (n_axes,)
             Axis positions [rad or m].
         """
-        model, data = self.arm.model, self.arm.model.createData()
-        geometry_data = self.geometry.createData()
-        pin.updateGeometryPlacements(model, data, self.geometry, geometry_data, configuration)
-        for index, names in enumerate(self.pair_names):
-            if pin.computeCollision(self.geometry, geometry_data, index):
-                return names
-        return None
+        data, geometry_data = self._workspace
+        touching = _touching(self.arm, self.geometry, configuration, data, geometry_data)
+        return self.pair_names[touching[0]] if touching else None
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
         return type(self), (self.arm, self.geometry, self.body_names, self.shapes)
@@ -198,37 +198,41 @@ def _candidate_pairs(
     return pairs
 
 
-def _touching(arm: Arm, geometry: pin.GeometryModel, q: NDArray[np.float64]) -> set[int]:
-    """Indices of the pairs in contact at a configuration."""
-    data, geometry_data = arm.model.createData(), geometry.createData()
+def _touching(
+    arm: Arm,
+    geometry: pin.GeometryModel,
+    q: NDArray[np.float64],
+    data: pin.Data,
+    geometry_data: pin.GeometryData,
+) -> list[int]:
+    """Indices of the pairs in contact at a configuration, in order."""
     pin.updateGeometryPlacements(arm.model, data, geometry, geometry_data, q)
     pairs = range(len(geometry.collisionPairs))
-    return {index for index in pairs if pin.computeCollision(geometry, geometry_data, index)}
+    return [index for index in pairs if pin.computeCollision(geometry, geometry_data, index)]
 
 
-def _resting_overlaps(arm: Arm, geometry: pin.GeometryModel) -> set[int]:
-    """Pairs within the arm that touch at the home pose."""
-    n_shapes = arm.geometry.ngeoms
-    resting = _touching(arm, geometry, arm.home)
-    return {index for index in resting if geometry.collisionPairs[index].second < n_shapes}
+def _uninformative_pairs(arm: Arm, geometry: pin.GeometryModel, n_shapes: int) -> set[int]:
+    """Pairs within the arm that touch at home, and pairs of the mounting.
 
-
-def _mounting_pairs(arm: Arm, geometry: pin.GeometryModel, n_shapes: int) -> set[int]:
-    """Pairs of the first link and the world whose state the first axis never changes."""
-    objects = geometry.geometryObjects
+    The mounting is the first link against the world, where turning the first axis changes
+    nothing: it touches everywhere or nowhere.
+    """
+    data, geometry_data = arm.model.createData(), geometry.createData()
+    pairs, objects = list(geometry.collisionPairs), geometry.geometryObjects
+    resting = _touching(arm, geometry, arm.home, data, geometry_data)
     mounting = {
         index
-        for index, pair in enumerate(geometry.collisionPairs)
+        for index, pair in enumerate(pairs)
         if pair.second >= n_shapes and objects[pair.first].parentJoint == 1
     }
-    touching, free = set(mounting), set(mounting)
-    for position in np.linspace(arm.lower[0], arm.upper[0], MOUNT_SAMPLES):
-        q = arm.home.copy()
+    always, never = set(mounting), set(mounting)
+    q = arm.home.copy()
+    for position in np.linspace(arm.lower[0], arm.upper[0], MOUNT_SAMPLES if mounting else 0):
         q[0] = position
-        now = _touching(arm, geometry, q) & mounting
-        touching &= now
-        free -= now
-    return touching | free
+        now = set(_touching(arm, geometry, q, data, geometry_data))
+        always &= now
+        never -= now
+    return always | never | {index for index in resting if pairs[index].second < n_shapes}
 
 
 def _contact_shapes(

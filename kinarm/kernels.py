@@ -473,9 +473,14 @@ def screen(
 
 @kernel
 def begin(
-    first: int, last: int, chain: Chain, shapes: ContactShapes, episodes: Episodes
+    first: int,
+    last: int,
+    rows: NDArray[np.int64],
+    chain: Chain,
+    shapes: ContactShapes,
+    episodes: Episodes,
 ) -> None:
-    """Start episodes ``first`` to ``last - 1`` at their ``q`` and ``goal``.
+    """Start episodes ``rows[first]`` to ``rows[last - 1]`` at their ``q`` and ``goal``.
 
     An episode whose start is not proven contact-free is left paused.
     """
@@ -483,7 +488,8 @@ def begin(
     link, capsules, boxes, pairs = shapes[:4]
     q, slack, path = episodes.q, episodes.slack, episodes.path
     poses = np.empty((q.shape[1] + 1, POSE))
-    for e in range(first, last):
+    for index in range(first, last):
+        e = rows[index]
         forward_kinematics(prismatic, translation, rotation, axes, q, e, poses)
         distance = observe(tool, poses, episodes.goal, e, episodes.observation)
         episodes.distance[e] = distance

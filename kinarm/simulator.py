@@ -25,6 +25,7 @@ TIME_STEP = 0.02
 
 START_ATTEMPTS = 2000
 PARALLEL_STEPS = 1024
+BALANCED_BATCH = 256
 
 PolicyFunction = Callable[[NDArray[np.float64]], ArrayLike]
 """Maps observations, shape (n, n_observations), to actions, shape (n, n_actuated)."""
@@ -189,7 +190,7 @@ class Simulator:
         StartInContactError
             If a start touches something.
         """
-        return self._begin(*self._check_scenarios(starts, goals), record, None)
+        return self._begin(*self.check_scenarios(starts, goals), record, None)
 
     def step(self, episodes: Episodes, actions: ArrayLike) -> StepResult:
         """Advance every running episode by one step, in place.
@@ -259,7 +260,7 @@ class Simulator:
         StartInContactError
             If a start touches something.
         """
-        q, goal = self._check_scenarios(starts, goals)
+        q, goal = self.check_scenarios(starts, goals)
         if shift is not None:
             shift = finite_array("shift", shift, (self.n_observations,))
         episodes = self._begin(q, goal, record, shift)
@@ -282,7 +283,7 @@ class Simulator:
         starts, goals, record
             As for `rollout`.
         """
-        q, goal = self._check_scenarios(starts, goals)
+        q, goal = self.check_scenarios(starts, goals)
         table = finite_array("actions", actions, (len(q), self.task.horizon, self.n_actions))
         episodes = self._begin(q, goal, record, None)
         self._advance(_table_control(table), episodes, len(q) * self.task.horizon)
@@ -311,17 +312,24 @@ class Simulator:
             for i, collided in enumerate(rollouts.collision)
         )
 
-    def begin(self, episodes: Episodes) -> None:
-        """Start allocated episodes at their ``q`` and ``goal``; Coal judges doubtful starts.
+    def begin(self, episodes: Episodes, rows: NDArray[np.int64]) -> None:
+        """Start some episodes at their ``q`` and ``goal``; Coal judges doubtful starts.
+
+        Parameters
+        ----------
+        episodes : Episodes
+            What `reset` returned; changed in place.
+        rows : ndarray of int
+            Which episodes.
 
         Raises
         ------
         StartInContactError
             If a start touches something.
         """
-        n = len(episodes.status)
-        self._run(kernels.begin, n, n, self.arm.chain, self.contact_model.shapes, episodes)
-        paused = np.flatnonzero(episodes.status == PAUSED)
+        shapes = self.contact_model.shapes
+        self._run(kernels.begin, len(rows), len(rows), rows, self.arm.chain, shapes, episodes)
+        paused = rows[episodes.status[rows] == PAUSED]
         touching = self.contact_model.in_contact(episodes.q[paused])
         if touching.any():
             index = int(paused[touching.argmax()])
@@ -329,7 +337,7 @@ class Simulator:
             raise StartInContactError(index, pair or ("arm", "scene"))
         episodes.status[paused] = RUNNING
 
-    def _check_scenarios(
+    def check_scenarios(
         self, starts: ArrayLike, goals: ArrayLike
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Validate starts and goals."""
@@ -353,7 +361,7 @@ class Simulator:
         episodes = Episodes.allocate(
             starts, goals, n_pairs=n_pairs, horizon=self.task.horizon, record=record, shift=shift
         )
-        self.begin(episodes)
+        self.begin(episodes, np.arange(len(starts)))
         return episodes
 
     def _advance(self, control: Control, episodes: Episodes, work: int) -> None:
@@ -439,7 +447,8 @@ class Simulator:
         if self.threads == 1 or work < PARALLEL_STEPS:
             kernel(0, n, *arrays)
             return
-        size = max(1, -(-n // (4 * self.threads)))
+        chunks_each = 1 if n < BALANCED_BATCH else 4
+        size = -(-n // (chunks_each * self.threads))
         pool = _thread_pool(os.getpid(), self.threads)
         chunks = [
             pool.submit(kernel, first, min(first + size, n), *arrays) for first in range(0, n, size)

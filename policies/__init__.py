@@ -1,1 +1,39 @@
 """Policies and the learners that train them."""
+
+from typing import TYPE_CHECKING
+
+from kinarm._exports import lazy_exports
+
+if TYPE_CHECKING:
+    from kinarm.policies.ars import ARSConfig, ARSResult, train_ars
+    from kinarm.policies.library import load_policy, policy_names
+    from kinarm.policies.normalizer import Normalizer
+    from kinarm.policies.policy import Layer, Policy
+    from kinarm.policies.provenance import Provenance
+    from kinarm.policies.recipes import ARS_RECIPES, ars_recipe
+
+__all__ = [
+    "ARS_RECIPES",
+    "ARSConfig",
+    "ARSResult",
+    "Layer",
+    "Normalizer",
+    "Policy",
+    "Provenance",
+    "ars_recipe",
+    "load_policy",
+    "policy_names",
+    "train_ars",
+]
+
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "ars": ("ARSConfig", "ARSResult", "train_ars"),
+        "library": ("load_policy", "policy_names"),
+        "normalizer": ("Normalizer",),
+        "policy": ("Layer", "Policy"),
+        "provenance": ("Provenance",),
+        "recipes": ("ARS_RECIPES", "ars_recipe"),
+    },
+)

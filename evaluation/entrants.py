@@ -1,0 +1,128 @@
+"""Who takes part in an evaluation: trained policies and baselines."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from kinarm.arm import Arm
+from kinarm.evaluation.trials import TrialSet, trial_generator
+from kinarm.networks import Networks
+from kinarm.policies.library import group_of, policy_files, policy_names
+from kinarm.policies.policy import Policy
+from kinarm.rollouts import Rollouts
+from kinarm.simulator import PolicyFunction
+
+
+@dataclass(frozen=True, eq=False)
+class Entrant:
+    """Something that can be put to the trials.
+
+    Attributes
+    ----------
+    name : str
+        Name in tables.
+    run : callable
+        Runs all trials of a set.
+    algorithm, recipe : str
+        How it was made.
+    group : str
+        What it shares with other training seeds of the same recipe and task.
+    seed : int or None
+        Training seed.
+    trained_on : str or None
+        Task that it was trained on; None for baselines.
+    policy : Policy or None
+        The trained policy, if it is one.
+    """
+
+    name: str
+    run: Callable[[TrialSet], Rollouts]
+    algorithm: str
+    recipe: str
+    group: str
+    seed: int | None = None
+    trained_on: str | None = None
+    policy: Policy | None = None
+
+    @classmethod
+    def from_policy(cls, name: str, policy: Policy) -> "Entrant":
+        """Enter a trained policy."""
+        made = policy.provenance
+        return cls(
+            name=name,
+            run=lambda trials: trials.simulator.rollout(policy, trials.starts, trials.goals),
+            algorithm=made.algorithm,
+            recipe=made.recipe,
+            group=group_of(name),
+            seed=made.seed,
+            trained_on=made.task,
+            policy=policy,
+        )
+
+    @classmethod
+    def from_function(cls, name: str, function: PolicyFunction) -> "Entrant":
+        """Enter a function from observations (n, n_observations) to actions (n, n_actions)."""
+        return cls(
+            name=name,
+            run=lambda trials: trials.simulator.rollout(function, trials.starts, trials.goals),
+            algorithm="function",
+            recipe="",
+            group=name,
+        )
+
+
+def _run_zero(trials: TrialSet) -> Rollouts:
+    simulator = trials.simulator
+    still = Networks.linear(
+        np.zeros((1, simulator.n_actions, simulator.n_observations)),
+        np.zeros((1, simulator.n_actions)),
+    )
+    return simulator.rollout(still, trials.starts, trials.goals)
+
+
+def _run_random(trials: TrialSet) -> Rollouts:
+    simulator = trials.simulator
+    shape = (simulator.task.horizon, simulator.n_actions)
+    actions = [
+        trial_generator(trials.seed, trial, stream=1).uniform(-1, 1, shape)
+        for trial in range(len(trials))
+    ]
+    return simulator.replay(np.array(actions), trials.starts, trials.goals)
+
+
+BASELINES = {
+    "random": Entrant("random", _run_random, "baseline", "random", "random"),
+    "zero": Entrant("zero", _run_zero, "baseline", "zero", "zero"),
+}
+"""Uniformly random actions, and no motion at all."""
+
+
+def find_entrants(name_or_file: str | Path) -> tuple[Entrant, ...]:
+    """Find what a name stands for.
+
+    Parameters
+    ----------
+    name_or_file : str or Path
+        A baseline, a shipped policy, a group of them (all training seeds), or a policy file.
+
+    Raises
+    ------
+    UnknownNameError
+        If it is none of these.
+    PolicyFileError
+        If a file cannot be used.
+    """
+    if name_or_file in BASELINES:
+        return (BASELINES[str(name_or_file)],)
+    return tuple(
+        Entrant.from_policy(path.stem, Policy.load(path)) for path in policy_files(name_or_file)
+    )
+
+
+def shipped_entrants(arm: Arm) -> tuple[Entrant, ...]:
+    """All shipped policies that were trained for an arm, then the baselines."""
+    shipped = [entrant for name in policy_names() for entrant in find_entrants(name)]
+    fitting = [e for e in shipped if e.policy and e.policy.provenance.arm_digest == arm.digest]
+    return (*fitting, *BASELINES.values())

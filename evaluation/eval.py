@@ -1,0 +1,184 @@
+"""``kinarm-eval``: put policies to the trials and report how they did."""
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from kinarm.command_line import Parser, command_text, run_command, whole_number
+from kinarm.errors import InvalidInputError, KinarmError
+
+if TYPE_CHECKING:
+    from kinarm.evaluation.entrants import Entrant
+    from kinarm.evaluation.evaluate import Evaluation
+
+PROG = "kinarm-eval"
+
+EPILOG = """
+examples:
+  kinarm-eval --trials 200                              all shipped policies and baselines
+  kinarm-eval --policy ars-tuned-right --task right     one recipe, all its training seeds
+  kinarm-eval --policy my_policy.npz --out results      your own, with figures and every trial
+"""
+
+
+def build_parser() -> Parser:
+    """The options of the command."""
+    parser = Parser(
+        prog=PROG,
+        description="Put policies to random reaching trials and report how they did.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "--task", action="append", metavar="NAME", help="left, right or both; repeatable"
+    )
+    parser.add_argument(
+        "--policy",
+        action="append",
+        metavar="NAME_OR_FILE",
+        help="shipped policy, recipe (all its seeds), baseline (random, zero) or .npz file; "
+        "repeatable; default: all shipped ones and the baselines",
+    )
+    parser.add_argument(
+        "--trials", type=whole_number(1), default=200, metavar="N", help="trials a task (200)"
+    )
+    parser.add_argument(
+        "--seed", type=whole_number(0), default=0, metavar="N", help="seed of the trials (0)"
+    )
+    parser.add_argument(
+        "--arm", default="paper", metavar="NAME_OR_URDF", help="arm to use (paper)"
+    )
+    parser.add_argument(
+        "--allow-other-arm",
+        action="store_true",
+        help="let policies face an arm that they were not trained for",
+    )
+    parser.add_argument(
+        "--matrix", action="store_true", help="every policy on every task, not only on its own"
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="write evaluation.json and histograms there"
+    )
+    parser.add_argument(
+        "--json", action="store_true", help="print the JSON document alone on standard output"
+    )
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line."""
+    options = build_parser().parse_args(arguments)
+    run_command(PROG, lambda: _evaluate(options, command_text(PROG, arguments)))
+
+
+def _evaluate(options: argparse.Namespace, command: str) -> None:
+    """From options to table, document and figures."""
+    if options.out is not None:
+        _make_folder(options.out)
+    evaluations = evaluate_all(options)
+    from kinarm.evaluation.report import evaluation_document, evaluation_table
+
+    document = evaluation_document(evaluations, command)
+    if options.out is not None:
+        _write(options.out, document, evaluations)
+    if options.json:
+        json.dump(document, sys.stdout)
+        sys.stdout.write("\n")
+        return
+    from rich.console import Console
+
+    console = Console(width=None if sys.stdout.isatty() else 140, highlight=False)
+    console.print(evaluation_table(document))
+    for task, entry in document["protocol"]["tasks"].items():
+        console.print(f"trial set {task}: {entry['trial_set_hash']}", style="dim")
+    if options.out is not None:
+        console.print(f"written: {options.out / 'evaluation.json'} and histograms", style="dim")
+
+
+def evaluate_all(options: argparse.Namespace) -> "list[Evaluation]":
+    """Let every chosen policy face the trials of its tasks."""
+    from kinarm.arm import Arm
+    from kinarm.evaluation.evaluate import run_trials
+    from kinarm.evaluation.trials import TrialSet
+    from kinarm.simulator import Simulator
+    from kinarm.task import load_task
+
+    tasks = [load_task(name).name for name in options.task or ()]
+    arm = Arm.load(options.arm)
+    entrants = choose_entrants(options, arm)
+    trial_sets: dict[str, TrialSet] = {}
+    evaluations = []
+    for entrant, task in pair_with_tasks(entrants, tasks, options):
+        if task not in trial_sets:
+            simulator = Simulator(arm, task)
+            trial_sets[task] = TrialSet.draw(simulator, options.trials, options.seed)
+        evaluations.append(run_trials(entrant, trial_sets[task], options.allow_other_arm))
+    return evaluations
+
+
+def choose_entrants(options: argparse.Namespace, arm: Any) -> "list[Entrant]":
+    """Entrants named on the command line, or all that fit the arm, without repetition."""
+    from kinarm.evaluation.entrants import find_entrants, shipped_entrants
+
+    if not options.policy:
+        return list(shipped_entrants(arm))
+    named = [entrant for name in options.policy for entrant in find_entrants(name)]
+    entrants = {entrant.name: entrant for entrant in named}
+    if len(entrants) < len({id(entrant.policy) for entrant in named if entrant.policy}):
+        raise InvalidInputError("two policy files share a name: rename one of them")
+    return list(entrants.values())
+
+
+def pair_with_tasks(
+    entrants: "list[Entrant]", tasks: list[str], options: argparse.Namespace
+) -> "list[tuple[Entrant, str]]":
+    """Decide who faces which task.
+
+    By default a trained policy faces the task that it was trained on and a baseline all tasks in
+    play. ``--task`` restricts the default selection; together with ``--policy`` or ``--matrix``
+    it says what they face.
+    """
+    from kinarm.task import TASKS
+
+    trained = list(dict.fromkeys(e.trained_on for e in entrants if e.trained_on))
+    played = tasks or [task for task in TASKS if task in trained] or list(TASKS)
+    if options.matrix:
+        played = tasks or list(TASKS)
+    named = bool(options.policy and tasks)
+    return [
+        (entrant, task)
+        for task in played
+        for entrant in entrants
+        if options.matrix or named or entrant.trained_on in (None, task)
+    ]
+
+
+def _make_folder(folder: Path) -> None:
+    """Create the output folder before any work is done, and see that it can be written."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / ".kinarm-probe"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise KinarmError(f"cannot write to {str(folder)!r}: {error.strerror}") from error
+
+
+def _write(folder: Path, document: dict[str, Any], evaluations: "list[Evaluation]") -> None:
+    """Write the document and the figures."""
+    from kinarm.evaluation.plots import distance_histograms, save_figure
+    from kinarm.files import write_atomically
+
+    text = json.dumps(document, indent=1).encode()
+    try:
+        write_atomically(folder / "evaluation.json", lambda file: file.write(text))
+        save_figure(distance_histograms(evaluations), folder, "final_distance")
+    except OSError as error:
+        raise KinarmError(f"cannot write to {str(folder)!r}: {error.strerror}") from error
+
+
+if __name__ == "__main__":
+    main()

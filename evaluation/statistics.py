@@ -1,0 +1,130 @@
+"""Figures of merit with 95 % intervals."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+RESAMPLES = 1000
+BOOTSTRAP_SEED = 0
+
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Share:
+    """A share of trials.
+
+    Attributes
+    ----------
+    rate : float
+        The share.
+    ci95 : tuple of float
+        Wilson interval.
+    """
+
+    rate: float
+    ci95: Interval
+
+    @classmethod
+    def of(cls, hits: NDArray[np.bool_]) -> "Share":
+        """Share of hits.
+
+        Parameters
+        ----------
+        hits : ndarray of bool, shape (n_trials,) or (n_seeds, n_trials)
+            Whether a trial hit. Several seeds face the same trials, so they are no independent
+            evidence about them: their interval is that of n_trials trials, widened to whole hits.
+        """
+        from scipy.stats import binomtest
+
+        rate, trials = float(hits.mean()), hits.shape[-1]
+        expected = hits.sum() / (hits.size // trials)
+        few, many = int(np.floor(expected)), int(np.ceil(expected))
+        low = binomtest(few, trials).proportion_ci(method="wilson").low
+        high = binomtest(many, trials).proportion_ci(method="wilson").high
+        return cls(rate, (float(low), float(high)))
+
+    def to_json(self) -> dict[str, Any]:
+        """As a dictionary that JSON can hold."""
+        return {"rate": self.rate, "ci95": list(self.ci95)}
+
+
+@dataclass(frozen=True)
+class DistanceStatistics:
+    """Statistics of final distances [m].
+
+    Attributes
+    ----------
+    mean, median, iqm, p95, max : float
+        Mean, median, interquartile mean, 95th percentile and maximum.
+    ci95 : dict
+        Seeded bootstrap intervals of all but the maximum.
+    """
+
+    mean: float
+    median: float
+    iqm: float
+    p95: float
+    max: float
+    ci95: dict[str, Interval]
+
+    @classmethod
+    def of(cls, distances: NDArray[np.float64]) -> "DistanceStatistics":
+        """Summarise final distances.
+
+        Parameters
+        ----------
+        distances : ndarray, shape (n_trials,) or (n_seeds, n_trials)
+            Final distances [m]. Trials are resampled for all seeds alike.
+        """
+        from scipy.stats import bootstrap
+
+        samples = tuple(np.atleast_2d(distances))
+        estimates = _estimates(*samples)
+        intervals = np.stack([estimates, estimates])
+        if len(samples[0]) > 1:
+            intervals = np.stack(
+                bootstrap(
+                    samples,
+                    _estimates,
+                    n_resamples=RESAMPLES,
+                    method="percentile",
+                    paired=len(samples) > 1,
+                    vectorized=True,
+                    rng=np.random.default_rng(BOOTSTRAP_SEED),
+                ).confidence_interval
+            )
+        return cls(
+            **dict(zip(ESTIMATES, estimates.tolist(), strict=True)),
+            max=float(np.max(distances)),
+            ci95={
+                name: (float(low), float(high))
+                for name, low, high in zip(ESTIMATES, *intervals, strict=True)
+            },
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """As a dictionary that JSON can hold."""
+        figures = {name: getattr(self, name) for name in (*ESTIMATES, "max")}
+        return {**figures, "ci95": {name: list(ci) for name, ci in self.ci95.items()}}
+
+
+ESTIMATES = ("mean", "median", "iqm", "p95")
+"""Statistics that get an interval."""
+
+
+def _estimates(*samples: NDArray[np.float64], axis: int = -1) -> NDArray[np.float64]:
+    """Pool samples along an axis and estimate `ESTIMATES`, stacked along the first axis."""
+    from scipy.stats import trim_mean
+
+    pooled = np.concatenate(samples, axis=axis)
+    return np.stack(
+        [
+            pooled.mean(axis=axis),
+            np.median(pooled, axis=axis),
+            trim_mean(pooled, 0.25, axis=axis),
+            np.quantile(pooled, 0.95, axis=axis),
+        ]
+    )

@@ -1,0 +1,81 @@
+"""The trials: starts and goals that every policy faces alike."""
+
+import hashlib
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.errors import InvalidInputError
+from kinarm.simulator import Simulator
+
+
+def trial_generator(seed: int, trial: int, stream: int = 0) -> np.random.Generator:
+    """Random generator of one trial, independent of all other trials.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of the trial set.
+    trial : int
+        Number of the trial.
+    stream : int
+        0 draws the trial itself; others are for entrants that act at random.
+    """
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(trial, stream)))
+
+
+@dataclass(frozen=True, eq=False)
+class TrialSet:
+    """Starts and goals, a function of task, arm, scene and seed alone.
+
+    The first n trials of a set are the same for every size of the set.
+
+    Attributes
+    ----------
+    simulator : Simulator
+        Arm, scene and task.
+    seed : int
+        Seed of the set.
+    starts : ndarray, shape (n, n_axes)
+        Start configurations [rad or m].
+    goals : ndarray, shape (n, 3)
+        Goal positions [m].
+    """
+
+    simulator: Simulator
+    seed: int
+    starts: NDArray[np.float64]
+    goals: NDArray[np.float64]
+
+    @classmethod
+    def draw(cls, simulator: Simulator, trials: int, seed: int) -> "TrialSet":
+        """Draw a set of trials.
+
+        Raises
+        ------
+        InvalidInputError
+            If there is no trial or the seed is negative.
+        SceneError
+            If no contact-free start exists.
+        """
+        if trials < 1:
+            raise InvalidInputError(f"trials must be at least 1, got {trials}")
+        if seed < 0:
+            raise InvalidInputError(f"seed must be at least 0, got {seed}")
+        drawn = [simulator.sample(trial_generator(seed, trial), 1) for trial in range(trials)]
+        starts, goals = (np.concatenate(part) for part in zip(*drawn, strict=True))
+        starts.flags.writeable = goals.flags.writeable = False
+        return cls(simulator, seed, starts, goals)
+
+    def __len__(self) -> int:
+        return len(self.starts)
+
+    @property
+    def digest(self) -> str:
+        """Hash of the starts and goals and of the rules under which they are faced."""
+        simulator, task = self.simulator, self.simulator.task
+        rules = (simulator.arm.digest, repr(simulator.scene), simulator.time_step)
+        text = repr((*rules, task.tolerance, task.horizon))
+        numbers = np.round(np.concatenate([self.starts, self.goals], axis=1), 12) + 0.0
+        return hashlib.sha256(text.encode() + numbers.tobytes()).hexdigest()[:16]

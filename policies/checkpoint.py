@@ -1,0 +1,71 @@
+"""Checkpoints of a training, from which it resumes exactly."""
+
+import json
+import zipfile
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from kinarm.errors import InvalidInputError, PolicyFileError
+from kinarm.files import write_atomically
+from kinarm.policies.ars import ARSConfig, ARSState, CurvePoint
+from kinarm.policies.normalizer import Normalizer
+
+FILE_FORMAT = "kinarm-ars-checkpoint"
+
+
+def save_checkpoint(path: str | Path, config: ARSConfig, state: ARSState) -> None:
+    """Write the state of a training, replacing an earlier checkpoint only when complete.
+
+    Raises
+    ------
+    PolicyFileError
+        If the file cannot be written.
+    """
+    arrays = {
+        "format": np.array(FILE_FORMAT),
+        "config": np.array(json.dumps(asdict(config), sort_keys=True)),
+        "generator": np.array(json.dumps(state.generator, sort_keys=True)),
+        "theta": state.theta,
+        "count": np.array(state.normalizer.count),
+        "mean": state.normalizer.mean,
+        "squares": state.normalizer.squares,
+        "curve": np.array(state.curve, dtype=float).reshape(-1, len(CurvePoint._fields)),
+    }
+    try:
+        write_atomically(path, lambda file: np.savez(file, **arrays))
+    except OSError as error:
+        raise PolicyFileError(f"cannot write {str(path)!r}: {error.strerror}") from error
+
+
+def load_checkpoint(path: str | Path) -> tuple[ARSConfig, ARSState]:
+    """Read what `save_checkpoint` wrote.
+
+    Raises
+    ------
+    PolicyFileError
+        If the file is missing, truncated or not a checkpoint.
+    """
+    try:
+        with np.load(Path(path), allow_pickle=False) as content:
+            if str(content["format"]) != FILE_FORMAT:
+                raise PolicyFileError(f"{str(path)!r} is not a checkpoint of a training")
+            state = ARSState(
+                theta=content["theta"],
+                normalizer=Normalizer(
+                    int(content["count"]), content["mean"], content["squares"]
+                ),
+                generator=json.loads(str(content["generator"])),
+                curve=tuple(
+                    CurvePoint(*row[:3].tolist(), int(row[3]), float(row[4]))
+                    for row in content["curve"]
+                ),
+            )
+            return ARSConfig(**json.loads(str(content["config"]))), state
+    except OSError as error:
+        raise PolicyFileError(f"cannot read checkpoint {str(path)!r}: {error.strerror}") from error
+    except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        if isinstance(error, InvalidInputError):
+            raise
+        raise PolicyFileError(f"{str(path)!r} is not a complete checkpoint") from error

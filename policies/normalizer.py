@@ -1,0 +1,73 @@
+"""Running mean and standard deviation of observations."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+CONSTANT_BELOW = 1e-6
+"""An input whose standard deviation is smaller counts as constant and gets weight zero."""
+
+
+def input_scale(std: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Factors that normalise inputs: 1 / std, and 0 for constant ones.
+
+    Parameters
+    ----------
+    std : ndarray, shape (n_observations,)
+        Standard deviations.
+    """
+    constant = std < CONSTANT_BELOW
+    return np.where(constant, 0.0, 1.0 / np.where(constant, 1.0, std))
+
+
+@dataclass(frozen=True, eq=False)
+class Normalizer:
+    """Statistics of all observations seen so far: the paper's mu and diag(Sigma).
+
+    Attributes
+    ----------
+    count : int
+        Number of observations.
+    mean : ndarray, shape (n_observations,)
+        Their mean; zero before the first one.
+    squares : ndarray, shape (n_observations,)
+        Sum of their squared deviations from the mean.
+    """
+
+    count: int
+    mean: NDArray[np.float64]
+    squares: NDArray[np.float64]
+
+    @classmethod
+    def empty(cls, n_observations: int) -> "Normalizer":
+        """Statistics before the first observation: mean 0 and standard deviation 1."""
+        return cls(0, np.zeros(n_observations), np.zeros(n_observations))
+
+    @property
+    def std(self) -> NDArray[np.float64]:
+        """Population standard deviation, shape (n_observations,)."""
+        if self.count == 0:
+            return np.ones_like(self.mean)
+        return np.sqrt(self.squares / self.count)
+
+    def updated(self, moments: NDArray[np.float64], counts: NDArray[np.int64]) -> "Normalizer":
+        """Add the observations of a batch of episodes (Chan's parallel update).
+
+        Parameters
+        ----------
+        moments : ndarray, shape (n, 2, n_observations)
+            Per episode, the sums of the observations less `mean` and of the squares of these.
+        counts : ndarray of int, shape (n,)
+            Observations per episode.
+        """
+        added = int(counts.sum())
+        if added == 0:
+            return self
+        total = self.count + added
+        first, second = moments.sum(axis=0)
+        return Normalizer(
+            count=total,
+            mean=self.mean + first / total,
+            squares=np.maximum(self.squares + second - first**2 / total, 0.0),
+        )

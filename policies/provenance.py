@@ -1,0 +1,95 @@
+"""Where a policy comes from."""
+
+import platform
+import subprocess
+from dataclasses import asdict, dataclass, field, fields
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from kinarm.errors import PolicyFileError
+
+RECORDED_PACKAGES = ("kinarm", "numpy", "numba", "pin", "coal", "gymnasium", "scipy")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Provenance:
+    """How a policy was made; stored with it as JSON.
+
+    Parameters
+    ----------
+    algorithm : str
+        Such as ``"ars"``.
+    recipe : str
+        Name of the settings that it was trained with.
+    task : str
+        Task that it was trained on.
+    arm, arm_digest : str
+        Arm that it was trained for: name, and hash of what the simulator uses of it.
+    seed : int
+        Seed of the training.
+    environment_steps : int
+        Steps that the training took.
+    config : dict
+        All settings of the learner.
+    versions : dict
+        Versions of the packages that matter.
+    commit : str
+        Commit of kinarm's source, with ``-dirty`` if it was changed; empty if unknown.
+    """
+
+    algorithm: str
+    recipe: str
+    task: str
+    arm: str
+    arm_digest: str
+    seed: int
+    environment_steps: int
+    config: dict[str, Any] = field(default_factory=dict)
+    versions: dict[str, str] = field(default_factory=dict)
+    commit: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """As a dictionary that JSON can hold."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, entries: dict[str, Any]) -> "Provenance":
+        """Rebuild what `to_json` returned.
+
+        Raises
+        ------
+        PolicyFileError
+            If an entry is missing or unknown.
+        """
+        expected = {item.name for item in fields(cls)}
+        if set(entries) != expected:
+            wrong = ", ".join(sorted(expected ^ set(entries)))
+            raise PolicyFileError(f"the provenance has missing or unknown entries: {wrong}")
+        return cls(**entries)
+
+
+def package_versions() -> dict[str, str]:
+    """Versions of Python and of the packages that results depend on."""
+    versions = {"python": platform.python_version()}
+    for package in RECORDED_PACKAGES:
+        try:
+            versions[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            continue
+    return versions
+
+
+@cache
+def source_commit() -> str:
+    """Commit of the clone that this runs from, or an empty string outside of a clone."""
+    root = Path(__file__).resolve().parent.parent
+    command = ["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=12"]
+    if not (root / ".git").exists():
+        return ""
+    try:
+        answer = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    return answer.stdout.strip()

@@ -1,0 +1,224 @@
+"""``kinarm-train``: train a policy."""
+
+import argparse
+import csv
+import io
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from kinarm.command_line import Parser, finite_number, run_command, whole_number
+from kinarm.errors import InvalidInputError, PolicyFileError
+
+if TYPE_CHECKING:
+    from kinarm.policies.ars import ARSConfig, ARSResult, ARSState, CurvePoint
+
+PROG = "kinarm-train"
+CHECKPOINT_SECONDS = 5.0
+
+EPILOG = """
+examples:
+  kinarm-train ars --task right --out right.npz                      the paper's Table 1
+  kinarm-train ars --task both --recipe tuned --seed 3 --out b.npz   our best linear policy
+  kinarm-train ars --out b.npz --resume                              go on where it stopped
+"""
+
+
+def build_parser() -> Parser:
+    """The options of the command."""
+    parser = Parser(prog=PROG, description="Train a policy.")
+    learners = parser.add_subparsers(dest="learner", required=True, metavar="LEARNER")
+    ars = learners.add_parser(
+        "ars",
+        help="Augmented Random Search",
+        description="Train a linear policy with Augmented Random Search.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    ars.add_argument("--task", metavar="NAME", help="left, right (default) or both")
+    ars.add_argument("--recipe", default="paper", metavar="NAME", help="named settings (paper)")
+    ars.add_argument("--seed", type=whole_number(0), metavar="N", help="seed of all randomness (0)")
+    ars.add_argument("--arm", metavar="NAME_OR_URDF", help="arm to train (paper)")
+    ars.add_argument("--out", type=Path, required=True, metavar="FILE.npz", help="the policy")
+    ars.add_argument(
+        "--resume", action="store_true", help="go on from the checkpoint beside --out"
+    )
+    settings = ars.add_argument_group("settings that replace those of the recipe")
+    for name in ("iterations", "directions", "top-directions", "episodes"):
+        settings.add_argument(f"--{name}", type=whole_number(1), metavar="N")
+    for name in ("step-size", "noise", "success-bonus", "collision-penalty", "start-spread"):
+        settings.add_argument(f"--{name}", type=finite_number, metavar="X")
+    settings.add_argument("--sharing", choices=("none", "pair", "iteration"))
+    settings.add_argument("--step-size-schedule", choices=("constant", "linear"))
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line."""
+    options = build_parser().parse_args(arguments)
+    run_command(PROG, lambda: _train(options))
+
+
+def _train(options: argparse.Namespace) -> None:
+    """From options to a policy file and its learning curve."""
+    from kinarm.policies.ars import train_ars
+
+    out: Path = options.out
+    if out.suffix != ".npz":
+        raise InvalidInputError(f"--out must end in .npz, got {str(out)!r}")
+    if not out.parent.is_dir():
+        raise PolicyFileError(f"cannot write {str(out)!r}: folder {str(out.parent)!r} is missing")
+    config, state = _beginning(options)
+    keeper = CheckpointKeeper(config, checkpoint_path(out))
+    with TrainingProgress(config) as progress:
+
+        def on_iteration(state: "ARSState") -> None:
+            progress.update(state)
+            keeper.update(state)
+
+        try:
+            result = train_ars(config, state=state, on_iteration=on_iteration)
+        except KeyboardInterrupt:
+            keeper.save()
+            raise
+    result.policy.save(out)
+    write_curve(curve_path(out), result.curve)
+    checkpoint_path(out).unlink(missing_ok=True)
+    sys.stdout.write(f"{_summary(result)}; written: {out}, {curve_path(out)}\n")
+
+
+def _beginning(options: argparse.Namespace) -> "tuple[ARSConfig, ARSState | None]":
+    """Settings and state to begin with: from the command line, or from a checkpoint."""
+    from kinarm.policies.checkpoint import load_checkpoint
+    from kinarm.policies.recipes import ars_recipe
+    from kinarm.task import load_task
+
+    settings = given_settings(options)
+    checkpoint = checkpoint_path(options.out)
+    if not options.resume:
+        config = ars_recipe(options.recipe, **settings)
+        load_task(config.task)
+        return config, None
+    if not checkpoint.exists():
+        raise PolicyFileError(f"nothing to resume: there is no {str(checkpoint)!r}")
+    config, state = load_checkpoint(checkpoint)
+    if replace(config, **settings) != config:
+        changed = [name for name, value in settings.items() if getattr(config, name) != value]
+        raise InvalidInputError(
+            f"the checkpoint was made with another {', '.join(changed)}: "
+            "leave it out, or train anew without --resume"
+        )
+    return config, state
+
+
+def given_settings(options: argparse.Namespace) -> dict[str, Any]:
+    """Settings of the learner that the command line sets."""
+    ours = ("learner", "recipe", "out", "resume")
+    return {
+        name: value
+        for name, value in vars(options).items()
+        if name not in ours and value is not None
+    }
+
+
+def checkpoint_path(out: Path) -> Path:
+    """Where the checkpoint of a training lies until it is finished."""
+    return out.with_suffix(".checkpoint.npz")
+
+
+def curve_path(out: Path) -> Path:
+    """Where the learning curve of a policy lies."""
+    return out.with_suffix(".curve.csv")
+
+
+class CheckpointKeeper:
+    """Saves the latest state every few seconds and on demand."""
+
+    def __init__(self, config: "ARSConfig", path: Path) -> None:
+        self._config, self._path = config, path
+        self._saved_at = time.monotonic()
+        self._state: ARSState | None = None
+
+    def update(self, state: "ARSState") -> None:
+        """Take note of a state, and save it if the last checkpoint is old."""
+        self._state = state
+        if time.monotonic() - self._saved_at > CHECKPOINT_SECONDS:
+            self.save()
+
+    def save(self) -> None:
+        """Save the latest state."""
+        from kinarm.policies.checkpoint import save_checkpoint
+
+        if self._state is not None:
+            save_checkpoint(self._path, self._config, self._state)
+            self._saved_at = time.monotonic()
+
+
+class TrainingProgress:
+    """A progress bar on standard error: return, success, steps per second, remaining time."""
+
+    def __init__(self, config: "ARSConfig") -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+        self._progress = Progress(
+            TextColumn(f"ars {config.recipe} {config.task} seed {config.seed}"),
+            BarColumn(),
+            TextColumn("{task.completed:.0f}/{task.total:.0f}"),
+            TextColumn("return {task.fields[mean_return]:+.3f}"),
+            TextColumn("success {task.fields[success]:.0%}"),
+            TextColumn("{task.fields[speed]:.2f} M steps/s"),
+            TimeRemainingColumn(),
+            console=Console(stderr=True),
+        )
+        self._task = self._progress.add_task(
+            "", total=config.iterations, mean_return=0.0, success=0.0, speed=0.0
+        )
+
+    def __enter__(self) -> "TrainingProgress":
+        self._progress.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._progress.stop()
+
+    def update(self, state: "ARSState") -> None:
+        """Show the latest iteration."""
+        point = state.curve[-1]
+        self._progress.update(
+            self._task,
+            completed=state.iteration,
+            mean_return=point.mean_return,
+            success=point.success,
+            speed=point.environment_steps / max(point.wall_time, 1e-9) / 1e6,
+        )
+
+
+def write_curve(path: Path, curve: "Sequence[CurvePoint]") -> None:
+    """Write a learning curve as CSV, one line per iteration."""
+    from kinarm.files import write_atomically
+
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("iteration", *curve[0]._fields))
+    writer.writerows((number, *point) for number, point in enumerate(curve, start=1))
+    try:
+        write_atomically(path, lambda file: file.write(text.getvalue().encode()))
+    except OSError as error:
+        raise PolicyFileError(f"cannot write {str(path)!r}: {error.strerror}") from error
+
+
+def _summary(result: "ARSResult") -> str:
+    last = result.curve[-1]
+    return (
+        f"{len(result.curve)} iterations, {last.environment_steps / 1e6:.2f} million steps in "
+        f"{last.wall_time:.1f} s; last iteration: mean return {last.mean_return:+.3f}, "
+        f"success {last.success:.0%}"
+    )
+
+
+if __name__ == "__main__":
+    main()
