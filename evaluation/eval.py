@@ -48,9 +48,7 @@ def build_parser() -> Parser:
     parser.add_argument(
         "--seed", type=whole_number(0), default=0, metavar="N", help="seed of the trials (0)"
     )
-    parser.add_argument(
-        "--arm", default="paper", metavar="NAME_OR_URDF", help="arm to use (paper)"
-    )
+    parser.add_argument("--arm", default="paper", metavar="NAME_OR_URDF", help="arm to use (paper)")
     parser.add_argument(
         "--allow-other-arm",
         action="store_true",
@@ -100,9 +98,10 @@ def _evaluate(options: argparse.Namespace, command: str) -> None:
 
 def evaluate_all(options: argparse.Namespace) -> "list[Evaluation]":
     """Let every chosen policy face the trials of its tasks."""
-    from kinarm.arm import Arm
     from kinarm.evaluation.evaluate import run_trials
     from kinarm.evaluation.trials import TrialSet
+
+    from kinarm.arm import Arm
     from kinarm.simulator import Simulator
     from kinarm.task import load_task
 
@@ -170,6 +169,7 @@ def _make_folder(folder: Path) -> None:
 def _write(folder: Path, document: dict[str, Any], evaluations: "list[Evaluation]") -> None:
     """Write the document and the figures."""
     from kinarm.evaluation.plots import distance_histograms, save_figure
+
     from kinarm.files import write_atomically
 
     text = json.dumps(document, indent=1).encode()

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-
 from kinarm.evaluation.evaluate import Evaluation
 
 if TYPE_CHECKING:

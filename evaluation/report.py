@@ -105,11 +105,12 @@ def evaluation_table(document: dict[str, Any]) -> "Table":
 def _cells(row: dict[str, Any]) -> list[str]:
     distance, spread = row["final_distance"], row.get("spread")
     name = row["policy"] + (f" x{len(row['training_seeds'])}" if spread else "")
-    low, high = (spread["success"]["min"], spread["success"]["max"]) if spread else (None, None)
     return [
         f"  {name}",
         _percent(row["success"]),
-        "" if low is None else f"{100 * low:.1f}..{100 * high:.1f}",
+        "{:.1f}..{:.1f}".format(*(100 * spread["success"][end] for end in ("min", "max")))
+        if spread
+        else "",
         f"{100 * row['within']['0.1']['rate']:.1f}",
         f"{100 * row['within']['0.2']['rate']:.1f}",
         "{:.3f} [{:.3f}, {:.3f}]".format(distance["median"], *distance["ci95"]["median"]),

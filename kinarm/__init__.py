@@ -8,7 +8,7 @@ from kinarm.registration import register_environments
 
 if TYPE_CHECKING:
     from kinarm.arm import Arm, arm_names
-    from kinarm.env import ReachEnv, ReachVectorEnv
+    from kinarm.env import ReachEnv
     from kinarm.errors import (
         ArmError,
         InvalidInputError,
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from kinarm.scene import Bench, Scene
     from kinarm.simulator import Simulator, StepResult
     from kinarm.task import TASKS, ReachTask, RewardWeights, load_task
+    from kinarm.vector_env import ReachVectorEnv
 
 __version__ = "0.1.0"
 
@@ -58,7 +59,7 @@ __getattr__ = lazy_exports(
     __name__,
     {
         "arm": ("Arm", "arm_names"),
-        "env": ("ReachEnv", "ReachVectorEnv"),
+        "env": ("ReachEnv",),
         "errors": (
             "ArmError",
             "InvalidInputError",
@@ -74,6 +75,7 @@ __getattr__ = lazy_exports(
         "scene": ("Bench", "Scene"),
         "simulator": ("Simulator", "StepResult"),
         "task": ("TASKS", "ReachTask", "RewardWeights", "load_task"),
+        "vector_env": ("ReachVectorEnv",),
     },
 )
 

@@ -16,9 +16,9 @@ def lazy_exports(package: str, exports: Mapping[str, Sequence[str]]) -> Callable
     """
     module_of = {name: module for module, names in exports.items() for name in names}
 
-    def __getattr__(name: str) -> object:
+    def import_export(name: str) -> object:
         if name not in module_of:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         return getattr(import_module(f"{package}.{module_of[name]}"), name)
 
-    return __getattr__
+    return import_export

@@ -179,7 +179,9 @@ class Arm:
             )
         data = self.model.createData()
         pin.framesForwardKinematics(self.model, data, q)
-        return np.array(data.oMf[self.model.getFrameId(self.tool_frame, pin.FrameType.BODY)].translation)
+        return np.array(
+            data.oMf[self.model.getFrameId(self.tool_frame, pin.FrameType.BODY)].translation
+        )
 
     def __repr__(self) -> str:
         return f"Arm({self.name!r}, {self.n_axes} axes, {self.n_actuated} actuated)"
@@ -284,7 +286,7 @@ def _home(home: ArrayLike | None, chain: Chain) -> NDArray[np.float64]:
     given = np.zeros(chain.n_axes) if home is None else np.array(home, dtype=float)
     if given.shape != (chain.n_axes,) or not np.isfinite(given).all():
         raise ArmError(f"home must hold {chain.n_axes} finite numbers, got {home!r}")
-    clipped = np.clip(given, chain.lower, chain.upper)
+    clipped: NDArray[np.float64] = np.clip(given, chain.lower, chain.upper)
     if home is not None and not np.array_equal(given, clipped):
         raise ArmError(f"home {given.tolist()} lies outside the limits")
     clipped.flags.writeable = False

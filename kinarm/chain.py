@@ -56,7 +56,7 @@ class Chain(NamedTuple):
         frame = model.frames[tool_frame_id]
         placements = [model.jointPlacements[i] for i in range(1, model.njoints)]
         subspaces = np.array([_motion_subspace(model.joints[i]) for i in range(1, model.njoints)])
-        prismatic = ~subspaces[:, 3:].any(axis=1)
+        prismatic = np.logical_not(np.any(subspaces[:, 3:], axis=1))
         chain = cls(
             prismatic=prismatic,
             translation=np.array([placement.translation for placement in placements]),

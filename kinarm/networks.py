@@ -1,12 +1,13 @@
-"""Batches of dense networks in the form in which the compiled simulator runs them."""
+"""Sources of actions for the compiled simulator: batches of dense networks, and tables."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol, Union, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from kinarm.episodes import Control
 from kinarm.errors import InvalidInputError
 
 
@@ -70,3 +71,54 @@ class Networks:
         if len(shapes) > 1:
             raise InvalidInputError(f"policies of one rollout must share layers, got {shapes}")
         return cls(batch[0].layers, np.concatenate([networks.weights for networks in batch]))
+
+
+def network_control(
+    policies: Networks | CompiledPolicy | Sequence[CompiledPolicy],
+    policy_index: ArrayLike | None,
+    n: int,
+    widths: tuple[int, int],
+) -> Control:
+    """Arrange networks for the kernels.
+
+    Parameters
+    ----------
+    policies : Networks, policy or sequence of policies
+        One for all episodes, or one for each, or as many as `policy_index` refers to.
+    policy_index : array_like of int, shape (n,), optional
+        Which network drives which episode.
+    n : int
+        Number of episodes.
+    widths : tuple of int
+        Length of an observation and of an action.
+
+    Raises
+    ------
+    InvalidInputError
+        If the networks do not fit the widths, or the index does not fit the networks.
+    """
+    networks = Networks.collect(policies)
+    given = (int(networks.layers[0]), int(networks.layers[-1]))
+    if given != widths:
+        raise InvalidInputError(
+            f"the policy maps {given[0]} observations to {given[1]} actions; the arm has "
+            f"{widths[0]} and {widths[1]}"
+        )
+    count = len(networks.weights)
+    if policy_index is None:
+        if count not in (1, n):
+            raise InvalidInputError(f"{count} policies for {n} episodes: give policy_index")
+        index = np.arange(n) if count == n else np.zeros(n, dtype=np.int64)
+    else:
+        index = np.array(policy_index)
+        whole = index.shape == (n,) and np.issubdtype(index.dtype, np.integer)
+        if not whole or (n and not 0 <= index.min() <= index.max() < count):
+            raise InvalidInputError(f"policy_index must hold {n} whole numbers in 0..{count - 1}")
+    layers = networks.layers.astype(np.int64)
+    return Control(layers, networks.weights, index.astype(np.int64), np.zeros((0, 0, 0)))
+
+
+def table_control(actions: NDArray[np.float64]) -> Control:
+    """Take actions from a table, shape (n, n_steps, n_actions); one step serves every step."""
+    nothing = np.zeros(0, dtype=np.int64)
+    return Control(nothing, np.zeros((0, 0)), nothing, actions)

@@ -79,7 +79,8 @@ class ReferenceSimulator:
         """
         q, reward = np.array(start), self.task.reward
         observation, distance = self.observe(q, goal)
-        path, observations, rewards = [q], [observation], []
+        path, observations = [q], [observation]
+        rewards: list[float] = []
         success, contact = False, None
         while not success and contact is None and len(rewards) < self.task.horizon:
             action = np.clip(np.asarray(policy(observation), dtype=float), -1.0, 1.0)

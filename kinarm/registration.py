@@ -17,6 +17,6 @@ def register_environments() -> None:
             register(
                 id=name,
                 entry_point="kinarm.env:ReachEnv",
-                vector_entry_point="kinarm.env:ReachVectorEnv",
+                vector_entry_point="kinarm.vector_env:ReachVectorEnv",
                 kwargs={"task": task},
             )

@@ -1,10 +1,7 @@
 """The simulator: an arm in a scene with a task, stepped in batches of episodes."""
 
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,19 +10,17 @@ from kinarm import kernels
 from kinarm.arm import Arm
 from kinarm.collision import ContactModel
 from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Control, Episodes, Rules
-from kinarm.errors import InvalidInputError, SceneError, StartInContactError
-from kinarm.networks import CompiledPolicy, Networks
+from kinarm.errors import InvalidInputError, StartInContactError
+from kinarm.networks import CompiledPolicy, Networks, network_control, table_control
+from kinarm.parallel import available_threads, run_rows
 from kinarm.rollouts import Rollouts
+from kinarm.scenarios import draw_scenarios
 from kinarm.scene import Scene
 from kinarm.task import ReachTask, RewardTerms, load_task, reward_terms
 from kinarm.validation import finite_array
 
 TIME_STEP = 0.02
 """Duration of a step [s]."""
-
-START_ATTEMPTS = 2000
-PARALLEL_STEPS = 1024
-BALANCED_BATCH = 256
 
 PolicyFunction = Callable[[NDArray[np.float64]], ArrayLike]
 """Maps observations, shape (n, n_observations), to actions, shape (n, n_actuated)."""
@@ -70,6 +65,11 @@ class Simulator:
         Duration of a step [s].
     threads : int, optional
         Threads for large batches; as many as the processors that this process may use by default.
+
+    Attributes
+    ----------
+    judged : int
+        Configurations that rollouts and steps have asked Coal about so far.
     """
 
     def __init__(
@@ -89,8 +89,9 @@ class Simulator:
         self.task = load_task(task)
         self.scene = scene or Scene()
         self.time_step = time_step
-        self.threads = threads or len(os.sched_getaffinity(0))
+        self.threads = threads or available_threads()
         self.contact_model = ContactModel.build(self.arm, self.scene)
+        self.judged = 0
         for bench in self.task.benches:
             self.scene.bench(bench)
         reward = self.task.reward
@@ -147,29 +148,7 @@ class Simulator:
         SceneError
             If no acceptable start is found for some goal in 2000 attempts.
         """
-        arm, spread, moved = self.arm, self.task.start_spread, slice(self.arm.n_actuated)
-        lower = arm.home + spread * (arm.lower - arm.home)
-        extent = spread * (arm.upper - arm.lower)
-        goals = self.task.goals(self.scene, rng.random((count, 3)))
-        starts = np.tile(arm.home, (count, 1))
-        pending = np.arange(count)
-        for _ in range(START_ATTEMPTS):
-            candidates = starts[pending]
-            uniforms = rng.random((pending.size, arm.n_actuated))
-            candidates[:, moved] = lower[moved] + uniforms * extent[moved]
-            tools, touching = self._screen(candidates)
-            far = np.linalg.norm(tools - goals[pending], axis=1) > self.task.tolerance
-            accepted = far & ~touching
-            starts[pending[accepted]] = candidates[accepted]
-            pending = pending[~accepted]
-            if pending.size == 0:
-                return starts, goals
-        pair = self.contact_model.contact_pair(candidates[0])
-        reason = f"{pair[0]} touches {pair[1]}" if pair else "the tool already is at the goal"
-        raise SceneError(
-            f"no contact-free start away from the goal found in {START_ATTEMPTS} attempts for arm "
-            f"{arm.name!r} with start_spread {spread}; in the last one {reason}"
-        )
+        return draw_scenarios(self, rng, count)
 
     def reset(self, starts: ArrayLike, goals: ArrayLike, *, record: bool = False) -> Episodes:
         """Begin a batch of episodes, to be driven by `step`.
@@ -210,7 +189,7 @@ class Simulator:
         table = finite_array("actions", actions, (len(episodes.status), self.n_actions))
         running = episodes.status == RUNNING
         np.copyto(episodes.stop, episodes.steps + 1)
-        self._advance(_table_control(table[:, None, :]), episodes, len(table))
+        self._advance(table_control(table[:, None, :]), episodes, len(table))
         success = running & (episodes.status == SUCCESS)
         collision = running & (episodes.status == COLLISION)
         terms = reward_terms(
@@ -267,7 +246,8 @@ class Simulator:
         if callable(policies) and not isinstance(policies, CompiledPolicy):
             self._follow(policies, episodes)
         else:
-            control = self._network_control(policies, policy_index, len(q))
+            widths = (self.n_observations, self.n_actions)
+            control = network_control(policies, policy_index, len(q), widths)
             self._advance(control, episodes, len(q) * self.task.horizon)
         return Rollouts.from_episodes(q, episodes)
 
@@ -286,7 +266,7 @@ class Simulator:
         q, goal = self.check_scenarios(starts, goals)
         table = finite_array("actions", actions, (len(q), self.task.horizon, self.n_actions))
         episodes = self._begin(q, goal, record, None)
-        self._advance(_table_control(table), episodes, len(q) * self.task.horizon)
+        self._advance(table_control(table), episodes, len(q) * self.task.horizon)
         return Rollouts.from_episodes(q, episodes)
 
     def contact_pair(
@@ -328,7 +308,8 @@ class Simulator:
             If a start touches something.
         """
         shapes = self.contact_model.shapes
-        self._run(kernels.begin, len(rows), len(rows), rows, self.arm.chain, shapes, episodes)
+        arrays = (rows, self.arm.chain, shapes, episodes)
+        run_rows(kernels.begin, len(rows), len(rows), self.threads, *arrays)
         paused = rows[episodes.status[rows] == PAUSED]
         touching = self.contact_model.in_contact(episodes.q[paused])
         if touching.any():
@@ -368,7 +349,7 @@ class Simulator:
         """Advance episodes to their stop, asking Coal about every step that is in doubt."""
         arrays = (self.arm.chain, self.contact_model.shapes, self._rules, control, episodes)
         while True:
-            self._run(kernels.advance, len(episodes.status), work, *arrays)
+            run_rows(kernels.advance, len(episodes.status), work, self.threads, *arrays)
             paused = np.flatnonzero(episodes.status == PAUSED)
             if paused.size == 0:
                 return
@@ -385,6 +366,7 @@ class Simulator:
         for k in range(kernels.SUBSTEPS):
             rows = np.flatnonzero((episodes.doubt[paused] >> k & 1).astype(bool) & ~refused)
             refused[rows] = self.contact_model.in_contact(tested[rows, k])
+            self.judged += len(rows)
         episodes.status[paused] = np.where(refused, COLLISION, RUNNING)
         episodes.cleared[paused] = ~refused
         ended = paused[refused]
@@ -403,64 +385,31 @@ class Simulator:
             )
             actions[running] = chosen
             np.copyto(episodes.stop, episodes.steps + 1)
-            self._advance(_table_control(actions[:, None, :]), episodes, len(actions))
+            self._advance(table_control(actions[:, None, :]), episodes, len(actions))
 
-    def _network_control(
-        self,
-        policies: "Networks | CompiledPolicy | Sequence[CompiledPolicy]",
-        policy_index: ArrayLike | None,
-        n: int,
-    ) -> Control:
-        """Arrange networks for the kernels and check that they fit."""
-        networks = Networks.collect(policies)
-        widths = (int(networks.layers[0]), int(networks.layers[-1]))
-        if widths != (self.n_observations, self.n_actions):
-            raise InvalidInputError(
-                f"the policy maps {widths[0]} observations to {widths[1]} actions; arm "
-                f"{self.arm.name!r} has {self.n_observations} and {self.n_actions}"
-            )
-        count = len(networks.weights)
-        if policy_index is None:
-            if count not in (1, n):
-                raise InvalidInputError(f"{count} policies for {n} episodes: give policy_index")
-            index = np.arange(n) if count == n else np.zeros(n, dtype=np.int64)
-        else:
-            index = np.array(policy_index, dtype=np.int64)
-            if index.shape != (n,) or (n and not 0 <= index.min() <= index.max() < count):
-                raise InvalidInputError(f"policy_index must hold {n} numbers in 0..{count - 1}")
-        return Control(networks.layers, networks.weights, index, np.zeros((0, 0, 0)))
-
-    def _screen(
+    def screen(
         self, configurations: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Tool points of configurations, and which of them touch something."""
+        """Find tool points, and which configurations touch something.
+
+        Parameters
+        ----------
+        configurations : ndarray, shape (n, n_axes)
+            Axis positions [rad or m].
+
+        Returns
+        -------
+        tools : ndarray, shape (n, 3)
+            Tool points [m].
+        touching : ndarray of bool, shape (n,)
+        """
         n = len(configurations)
         tools, proven = np.empty((n, 3)), np.empty(n, dtype=bool)
-        shapes = self.contact_model.shapes
-        self._run(kernels.screen, n, n, self.arm.chain, shapes, configurations, tools, proven)
+        arrays = (self.arm.chain, self.contact_model.shapes, configurations, tools, proven)
+        run_rows(kernels.screen, n, n, self.threads, *arrays)
         touching = ~proven
         touching[touching] = self.contact_model.in_contact(configurations[touching])
         return tools, touching
-
-    def _run(self, kernel: Callable[..., None], n: int, work: int, *arrays: Any) -> None:
-        """Run a kernel over n rows, on several threads if the work is worth it."""
-        if self.threads == 1 or work < PARALLEL_STEPS:
-            kernel(0, n, *arrays)
-            return
-        chunks_each = 1 if n < BALANCED_BATCH else 4
-        size = -(-n // (chunks_each * self.threads))
-        pool = _thread_pool(os.getpid(), self.threads)
-        chunks = [
-            pool.submit(kernel, first, min(first + size, n), *arrays) for first in range(0, n, size)
-        ]
-        for chunk in chunks:
-            chunk.result()
-
-
-@cache
-def _thread_pool(process: int, threads: int) -> ThreadPoolExecutor:
-    """A pool per process, since threads do not survive a fork."""
-    return ThreadPoolExecutor(threads, thread_name_prefix=f"kinarm-{process}")
 
 
 def substeps(
@@ -481,9 +430,3 @@ def substeps(
     shares = np.arange(1, kernels.SUBSTEPS) / kernels.SUBSTEPS
     inner = configurations[:, None] + shares[:, None] * (targets - configurations)[:, None]
     return np.concatenate([inner, targets[:, None]], axis=1)
-
-
-def _table_control(actions: NDArray[np.float64]) -> Control:
-    """Actions from a table, shape (n, n_steps, n_actions)."""
-    no_index = np.zeros(0, dtype=np.int64)
-    return Control(no_index, np.zeros((0, 0)), no_index, actions)

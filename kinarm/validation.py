@@ -6,9 +6,7 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm.errors import InvalidInputError
 
 
-def finite_array(
-    name: str, value: ArrayLike, shape: tuple[int | None, ...]
-) -> NDArray[np.float64]:
+def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
     """Copy an argument into a contiguous float64 array, or refuse it.
 
     Parameters

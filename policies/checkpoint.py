@@ -4,13 +4,14 @@ import json
 import zipfile
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from kinarm.policies.ars import ARSConfig, ARSState, CurvePoint
+from kinarm.policies.normalizer import Normalizer
 
 from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.files import write_atomically
-from kinarm.policies.ars import ARSConfig, ARSState, CurvePoint
-from kinarm.policies.normalizer import Normalizer
 
 FILE_FORMAT = "kinarm-ars-checkpoint"
 
@@ -23,7 +24,7 @@ def save_checkpoint(path: str | Path, config: ARSConfig, state: ARSState) -> Non
     PolicyFileError
         If the file cannot be written.
     """
-    arrays = {
+    arrays: dict[str, Any] = {
         "format": np.array(FILE_FORMAT),
         "config": np.array(json.dumps(asdict(config), sort_keys=True)),
         "generator": np.array(json.dumps(state.generator, sort_keys=True)),
@@ -53,12 +54,16 @@ def load_checkpoint(path: str | Path) -> tuple[ARSConfig, ARSState]:
                 raise PolicyFileError(f"{str(path)!r} is not a checkpoint of a training")
             state = ARSState(
                 theta=content["theta"],
-                normalizer=Normalizer(
-                    int(content["count"]), content["mean"], content["squares"]
-                ),
+                normalizer=Normalizer(int(content["count"]), content["mean"], content["squares"]),
                 generator=json.loads(str(content["generator"])),
                 curve=tuple(
-                    CurvePoint(*row[:3].tolist(), int(row[3]), float(row[4]))
+                    CurvePoint(
+                        mean_return=float(row[0]),
+                        std_return=float(row[1]),
+                        success=float(row[2]),
+                        environment_steps=int(row[3]),
+                        wall_time=float(row[4]),
+                    )
                     for row in content["curve"]
                 ),
             )

@@ -5,17 +5,17 @@ import zipfile
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import IO, Any, NamedTuple
 
 import numpy as np
+from kinarm.policies.normalizer import input_scale
+from kinarm.policies.provenance import Provenance
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.files import write_atomically
 from kinarm.networks import Networks
-from kinarm.policies.normalizer import input_scale
-from kinarm.policies.provenance import Provenance
 from kinarm.validation import finite_array
 
 FILE_FORMAT = "kinarm-policy"
@@ -72,7 +72,9 @@ class Policy:
         for number, layer in enumerate(self.layers):
             weights = finite_array(f"weights of layer {number}", layer.weights, (None, width))
             width = len(weights)
-            layers.append(Layer(weights, finite_array(f"bias of layer {number}", layer.bias, (width,))))
+            layers.append(
+                Layer(weights, finite_array(f"bias of layer {number}", layer.bias, (width,)))
+            )
         for array in (mean, std, *(array for layer in layers for array in layer)):
             array.flags.writeable = False
         object.__setattr__(self, "mean", mean)
@@ -145,7 +147,7 @@ class Policy:
         PolicyFileError
             If the file cannot be written; an existing file is then left as it was.
         """
-        arrays = {
+        arrays: dict[str, Any] = {
             "format": np.array(FILE_FORMAT),
             "version": np.array(FILE_VERSION),
             "provenance": np.array(json.dumps(self.provenance.to_json(), sort_keys=True)),

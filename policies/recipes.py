@@ -3,8 +3,9 @@
 from dataclasses import replace
 from typing import Any
 
-from kinarm.errors import UnknownNameError
 from kinarm.policies.ars import ARSConfig
+
+from kinarm.errors import UnknownNameError
 
 ARS_RECIPES = {
     config.recipe: config

@@ -43,9 +43,7 @@ def build_parser() -> Parser:
     ars.add_argument("--seed", type=whole_number(0), metavar="N", help="seed of all randomness (0)")
     ars.add_argument("--arm", metavar="NAME_OR_URDF", help="arm to train (paper)")
     ars.add_argument("--out", type=Path, required=True, metavar="FILE.npz", help="the policy")
-    ars.add_argument(
-        "--resume", action="store_true", help="go on from the checkpoint beside --out"
-    )
+    ars.add_argument("--resume", action="store_true", help="go on from the checkpoint beside --out")
     settings = ars.add_argument_group("settings that replace those of the recipe")
     for name in ("iterations", "directions", "top-directions", "episodes"):
         settings.add_argument(f"--{name}", type=whole_number(1), metavar="N")
@@ -94,6 +92,7 @@ def _beginning(options: argparse.Namespace) -> "tuple[ARSConfig, ARSState | None
     """Settings and state to begin with: from the command line, or from a checkpoint."""
     from kinarm.policies.checkpoint import load_checkpoint
     from kinarm.policies.recipes import ars_recipe
+
     from kinarm.task import load_task
 
     settings = given_settings(options)

@@ -1,0 +1,42 @@
+# Everything runs in .venv, installed with the pinned versions of constraints.txt.
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
+
+# An editable install links the modules that exist: a new one, or new metadata, calls for another.
+MODULES := $(shell ls kinarm/*.py policies/*.py evaluation/*.py data/*/* | cksum | cut -d' ' -f1)
+INSTALLED = $(VENV)/.installed-$(1)-$(MODULES)
+
+.PHONY: eval test lint docs clean
+
+eval: $(call INSTALLED,core) ## evaluate all shipped policies on 200 trials a task
+	$(BIN)/kinarm-eval --trials 200
+
+test: $(call INSTALLED,test) ## run the tests
+	$(BIN)/python -m pytest --cov --cov-report=term
+
+lint: $(call INSTALLED,dev) ## check style, format and types
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+docs: $(call INSTALLED,docs) ## build the site into docs/_build/html
+	$(BIN)/sphinx-build -n -W --keep-going -b html docs docs/_build/html
+
+clean: ## remove what the other targets made
+	rm -rf $(VENV) build dist *.egg-info .coverage .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf docs/_build docs/gallery docs/sg_execution_times.rst
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(BIN)/python:
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.installed-core-%: pyproject.toml setup.cfg constraints.txt | $(BIN)/python
+	$(PIP_INSTALL) -e .
+	touch $@
+
+# $* is the extra and the checksum of the module list.
+$(VENV)/.installed-%: pyproject.toml setup.cfg constraints.txt | $(BIN)/python
+	$(PIP_INSTALL) -e '.[$(firstword $(subst -, ,$*))]'
+	touch $@

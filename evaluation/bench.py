@@ -1,0 +1,277 @@
+"""``kinarm-bench``: how fast everything is on this machine."""
+
+import argparse
+import json
+import platform
+import statistics
+import sys
+import time
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from kinarm.command_line import Parser, run_command, whole_number
+from kinarm.parallel import available_threads
+
+if TYPE_CHECKING:
+    from kinarm.policies.policy import Policy
+
+    from kinarm.simulator import Simulator
+
+PROG = "kinarm-bench"
+BATCHES = (48, 512, 4096)
+VECTOR_ENVS = 64
+
+
+class Timing(NamedTuple):
+    """Rates over several repetitions [1/s]."""
+
+    median: float
+    best: float
+
+    def to_json(self) -> dict[str, float]:
+        """As a dictionary that JSON can hold."""
+        return {"median": self.median, "best": self.best}
+
+
+def build_parser() -> Parser:
+    """The options of the command."""
+    parser = Parser(prog=PROG, description="Measure how fast kinarm is on this machine.")
+    parser.add_argument(
+        "--repetitions", type=whole_number(1), default=7, metavar="N", help="per figure (7)"
+    )
+    parser.add_argument(
+        "--policy",
+        default="ars-tuned-right",
+        metavar="NAME_OR_FILE",
+        help="trained policy to run (ars-tuned-right)",
+    )
+    parser.add_argument("--json", action="store_true", help="print JSON on standard output")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line."""
+    options = build_parser().parse_args(arguments)
+    run_command(PROG, lambda: _bench(options))
+
+
+def _bench(options: argparse.Namespace) -> None:
+    """From options to figures."""
+    document = measure(options.policy, options.repetitions)
+    if options.json:
+        json.dump(document, sys.stdout)
+        sys.stdout.write("\n")
+        return
+    from rich.console import Console
+
+    console = Console(width=None if sys.stdout.isatty() else 110, highlight=False)
+    console.print(_table(document))
+
+
+def measure(policy_name: str, repetitions: int) -> dict[str, Any]:
+    """Measure everything.
+
+    Parameters
+    ----------
+    policy_name : str
+        Trained policy to run.
+    repetitions : int
+        How often each figure is measured.
+
+    Returns
+    -------
+    dict
+        Figures that JSON can hold: rates [steps/s], shares, and times [s].
+    """
+    from kinarm.policies.library import load_policy
+    from kinarm.policies.provenance import package_versions, source_commit
+
+    from kinarm.simulator import Simulator
+
+    policy = load_policy(policy_name)
+    simulator = Simulator(task=policy.provenance.task)
+    policy.check_arm(simulator.arm)
+    rollouts = measure_rollouts(simulator, policy, repetitions)
+    reference = measure_reference(simulator, policy, repetitions)
+    fast = next(row for row in rollouts if _is_headline(row))
+    return {
+        "machine": {"processor": platform.machine(), "threads": simulator.threads},
+        "versions": package_versions(),
+        "commit": source_commit(),
+        "policy": policy_name,
+        "repetitions": repetitions,
+        "rollouts": rollouts,
+        "reference": reference.to_json(),
+        "speed_up_over_reference": fast["steps_per_second"]["median"] / reference.median,
+        "vector_environment": measure_vector_env(policy, repetitions).to_json(),
+        "single_environment": measure_single_env(policy, repetitions).to_json(),
+        "table_1_training": measure_training(policy.provenance.task, min(repetitions, 3)),
+    }
+
+
+def _is_headline(row: dict[str, Any]) -> bool:
+    """The figure that others are compared with: 512 trained episodes on all threads."""
+    return bool(
+        row["batch"] == 512
+        and row["actions"] == "trained"
+        and row["threads"] == available_threads()
+    )
+
+
+def timed(run: Callable[[], int], repetitions: int) -> Timing:
+    """Time something that returns how many steps it took; the first run is not counted."""
+    run()
+    rates = []
+    for _ in range(repetitions):
+        began = time.perf_counter()
+        steps = run()
+        rates.append(steps / (time.perf_counter() - began))
+    return Timing(statistics.median(rates), max(rates))
+
+
+def measure_rollouts(
+    simulator: "Simulator", policy: "Policy", repetitions: int
+) -> list[dict[str, Any]]:
+    """Steps per second of whole episodes: batch sizes, random and trained, 1 and all threads."""
+    import numpy as np
+
+    rows = []
+    for batch in BATCHES:
+        rng = np.random.default_rng(batch)
+        starts, goals = simulator.sample(rng, batch)
+        actions = rng.uniform(-1, 1, (batch, simulator.task.horizon, simulator.n_actions))
+        runs: dict[str, Callable[[], int]] = {
+            "random": lambda a=actions, s=starts, g=goals: int(  # type: ignore[misc]
+                simulator.replay(a, s, g).steps.sum()
+            ),
+            "trained": lambda s=starts, g=goals: int(  # type: ignore[misc]
+                simulator.rollout(policy, s, g).steps.sum()
+            ),
+        }
+        for actions_name, run in runs.items():
+            judged = simulator.judged
+            asked = run()
+            judged = simulator.judged - judged
+            for threads in sorted({1, available_threads()}):
+                simulator.threads = threads
+                rows.append(
+                    {
+                        "batch": batch,
+                        "actions": actions_name,
+                        "threads": threads,
+                        "steps_per_second": timed(run, repetitions).to_json(),
+                        "judged_per_step": judged / asked,
+                    }
+                )
+    return rows
+
+
+def measure_reference(simulator: "Simulator", policy: "Policy", repetitions: int) -> Timing:
+    """Steps per second of the slow reference path, on the trained policy."""
+    import numpy as np
+
+    from kinarm.reference import ReferenceSimulator
+
+    reference = ReferenceSimulator(simulator)
+    starts, goals = simulator.sample(np.random.default_rng(0), 24)
+
+    def run() -> int:
+        episodes = [reference.rollout(policy, *pair) for pair in zip(starts, goals, strict=True)]
+        return sum(len(episode.rewards) for episode in episodes)
+
+    return timed(run, repetitions)
+
+
+def measure_vector_env(policy: "Policy", repetitions: int) -> Timing:
+    """Steps per second of the native batch environment, on random actions."""
+    import gymnasium
+    import numpy as np
+
+    name = f"kinarm/Reach{policy.provenance.task.title()}-v0"
+    env = gymnasium.make_vec(name, num_envs=VECTOR_ENVS)
+    env.reset(seed=0)
+    shape = (200, *(env.action_space.shape or ()))
+    actions = np.random.default_rng(0).uniform(-1, 1, shape)
+
+    def run() -> int:
+        for action in actions:
+            env.step(action)
+        return len(actions) * VECTOR_ENVS
+
+    return timed(run, repetitions)
+
+
+def measure_single_env(policy: "Policy", repetitions: int) -> Timing:
+    """Steps per second of the single environment without wrappers, on random actions."""
+    import numpy as np
+
+    from kinarm.env import ReachEnv
+
+    env = ReachEnv(policy.provenance.task)
+    env.reset(seed=0)
+    actions = np.random.default_rng(0).uniform(-1, 1, (2000, env.simulator.n_actions))
+
+    def run() -> int:
+        for action in actions:
+            _, _, terminated, truncated, _ = env.step(action)
+            if terminated or truncated:
+                env.reset()
+        return len(actions)
+
+    return timed(run, repetitions)
+
+
+def measure_training(task: str, repetitions: int) -> dict[str, Any]:
+    """Time and steps of a training with Table 1's settings."""
+    from kinarm.policies.ars import train_ars
+    from kinarm.policies.recipes import ars_recipe
+
+    seconds, steps = [], 0
+    for _ in range(repetitions):
+        result = train_ars(ars_recipe("paper", task=task))
+        seconds.append(result.curve[-1].wall_time)
+        steps = result.curve[-1].environment_steps
+    return {
+        "seconds": {"median": statistics.median(seconds), "best": min(seconds)},
+        "environment_steps": steps,
+    }
+
+
+def _table(document: dict[str, Any]) -> Any:
+    """The figures as a table."""
+    from rich.table import Table
+
+    table = Table(title=f"kinarm-bench, policy {document['policy']}", title_justify="left")
+    table.add_column("what")
+    table.add_column("median", justify="right")
+    table.add_column("best", justify="right")
+    table.add_column("judged by Coal", justify="right")
+    for row in document["rollouts"]:
+        plural = "s" if row["threads"] > 1 else ""
+        table.add_row(
+            f"rollouts, {row['batch']} {row['actions']} episodes, {row['threads']} thread{plural}",
+            *_rates(row["steps_per_second"]),
+            f"{100 * row['judged_per_step']:.2f} per 100 steps",
+        )
+    table.add_section()
+    table.add_row(f"batch environment, {VECTOR_ENVS} arms", *_rates(document["vector_environment"]))
+    table.add_row("single environment", *_rates(document["single_environment"]))
+    table.add_row("reference path (Pinocchio + Coal)", *_rates(document["reference"]))
+    table.add_row(
+        "speed-up over the reference (512 trained)", f"{document['speed_up_over_reference']:.0f} x"
+    )
+    training = document["table_1_training"]
+    table.add_section()
+    table.add_row(
+        f"training of Table 1 ({training['environment_steps'] / 1e6:.1f} million steps)",
+        *(f"{training['seconds'][name]:.2f} s" for name in ("median", "best")),
+    )
+    return table
+
+
+def _rates(timing: dict[str, float]) -> list[str]:
+    return [f"{timing[name]:,.0f} steps/s" for name in ("median", "best")]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,53 @@
+"""Running a kernel over the rows of a batch on several threads."""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from typing import Any
+
+PARALLEL_STEPS = 1024
+BALANCED_BATCH = 256
+
+
+def available_threads() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def run_rows(kernel: Callable[..., None], n: int, work: int, threads: int, *arrays: Any) -> None:
+    """Call ``kernel(first, last, *arrays)`` for ranges that cover n rows.
+
+    Kernels release the GIL and treat rows independently, so the result depends neither on the
+    number of threads nor on the ranges.
+
+    Parameters
+    ----------
+    kernel : callable
+        A compiled kernel.
+    n : int
+        Number of rows.
+    work : int
+        Estimate of the work in episode steps; little work is done by the calling thread.
+    threads : int
+        Threads to use.
+    *arrays
+        Further arguments of the kernel.
+    """
+    if threads == 1 or work < PARALLEL_STEPS:
+        kernel(0, n, *arrays)
+        return
+    ranges_each = 1 if n < BALANCED_BATCH else 4
+    size = -(-n // (ranges_each * threads))
+    pool = _thread_pool(os.getpid(), threads)
+    ranges = [
+        pool.submit(kernel, first, min(first + size, n), *arrays) for first in range(0, n, size)
+    ]
+    for done in ranges:
+        done.result()
+
+
+@cache
+def _thread_pool(process: int, threads: int) -> ThreadPoolExecutor:
+    """A pool per process, since threads do not survive a fork."""
+    return ThreadPoolExecutor(threads, thread_name_prefix=f"kinarm-{process}")

@@ -1,0 +1,211 @@
+"""The Gymnasium environment for many arms, stepped as one batch."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from kinarm.env import (
+    Array,
+    action_space,
+    chosen_scenario,
+    make_simulator,
+    observation_space,
+)
+from kinarm.episodes import RUNNING, Episodes
+from kinarm.errors import InvalidInputError
+from kinarm.scenarios import ScenarioStream
+from kinarm.simulator import StepResult
+
+
+class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
+    """A native batch of `ReachEnv`: all arms are stepped by one call of the compiled simulator.
+
+    Sub-environment i behaves like a `ReachEnv` reset with ``seed + i``. Spaces, rewards, endings
+    and infos are those of `ReachEnv`, batched as Gymnasium batches them.
+
+    Parameters
+    ----------
+    num_envs : int
+        Number of arms.
+    autoreset_mode : AutoresetMode or str
+        ``SameStep`` (default): an episode that ends is replaced at once; its last observation and
+        info are in ``final_obs`` and ``final_info``. ``NextStep``: the next call of `step`
+        resets it and ignores its action. ``Disabled``: reset it by
+        ``reset(options={"reset_mask": mask})``.
+    **settings
+        ``task``, ``arm``, ``scene``, ``reward``, ``tolerance``, ``horizon`` and ``start_spread``
+        as for `ReachEnv`; ``threads`` as for `Simulator`.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012  (as Gymnasium declares it)
+        "render_modes": [],
+        "autoreset_mode": AutoresetMode.SAME_STEP,
+    }
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
+        **settings: Any,
+    ) -> None:
+        if num_envs < 1:
+            raise InvalidInputError(f"num_envs must be at least 1, got {num_envs}")
+        try:
+            self.autoreset_mode = AutoresetMode(autoreset_mode)
+        except ValueError as error:
+            raise InvalidInputError(
+                f"autoreset_mode must be one of {[mode.value for mode in AutoresetMode]}, "
+                f"got {autoreset_mode!r}"
+            ) from error
+        self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
+        self.simulator = make_simulator(**settings)
+        self.num_envs = num_envs
+        self.single_observation_space = observation_space(self.simulator)
+        self.single_action_space = action_space(self.simulator)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._streams: list[ScenarioStream] = []
+        self._episodes: Episodes | None = None
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Array, dict[str, Any]]:
+        """Begin episodes; see `ReachEnv.reset`.
+
+        ``options`` may hold ``reset_mask``, a boolean array of shape (num_envs,), to reset only
+        some, and one ``start`` or ``goal`` for all.
+        """
+        chosen = dict(options or {})
+        rows = self._masked_rows(chosen.pop("reset_mask", None))
+        seeds = self._seeds(seed)
+        if not self._streams:
+            first = [np.random.SeedSequence().entropy if s is None else s for s in seeds]
+            self._streams = [self._stream(s) for s in first]
+        else:
+            for row in rows:
+                if seeds[row] is not None:
+                    self._streams[row] = self._stream(seeds[row])
+        scenarios = [chosen_scenario(self._streams[row], chosen) for row in rows]
+        starts, goals = (np.array(part) for part in zip(*scenarios, strict=True))
+        if self._episodes is None:
+            self._episodes = self.simulator.reset(starts, goals)
+        else:
+            self._restart(self._episodes, rows, starts, goals)
+        distance = np.zeros(self.num_envs)
+        distance[rows] = self._episodes.distance[rows]
+        mask = np.zeros(self.num_envs, dtype=bool)
+        mask[rows] = True
+        return self._episodes.observation.copy(), {"distance": distance, "_distance": mask}
+
+    def step(
+        self, actions: Array
+    ) -> tuple[Array, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
+        """Move every arm for one time step."""
+        episodes = self._episodes
+        if episodes is None:
+            raise InvalidInputError("the environment was never begun: call reset()")
+        before = episodes.status == RUNNING
+        if self.autoreset_mode is AutoresetMode.DISABLED and not before.all():
+            over = np.flatnonzero(~before).tolist()
+            raise InvalidInputError(f"episodes {over} are over: reset them with reset_mask")
+        result = self.simulator.step(episodes, actions)
+        infos = self._step_infos(episodes, result, before)
+        reward = np.where(before, result.reward, 0.0)
+        ended = np.flatnonzero(before & (episodes.status != RUNNING))
+        if self.autoreset_mode is AutoresetMode.NEXT_STEP and not before.all():
+            self._renew(episodes, np.flatnonzero(~before), infos)
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and ended.size:
+            self._keep_final(episodes, ended, infos)
+            self._renew(episodes, ended, infos)
+        return episodes.observation.copy(), reward, result.terminated, result.truncated, infos
+
+    def _step_infos(
+        self, episodes: Episodes, result: StepResult, stepped: NDArray[np.bool_]
+    ) -> dict[str, Any]:
+        """Infos of the arms that moved, with their masks."""
+        contact = np.full(self.num_envs, None, dtype=object)
+        for row in np.flatnonzero(result.collision):
+            contact[row] = self.simulator.contact_pair(episodes.q[row], episodes.target[row])
+        infos: dict[str, Any] = {
+            "distance": episodes.distance.copy(),
+            "success": result.success.copy(),
+            "collision": result.collision.copy(),
+            "contact": contact,
+            **{
+                f"reward_{name}": np.where(stepped, term, 0.0)
+                for name, term in result.terms._asdict().items()
+            },
+        }
+        for key in tuple(infos):
+            infos[f"_{key}"] = stepped.copy()
+        return infos
+
+    def _keep_final(
+        self, episodes: Episodes, ended: NDArray[np.int64], infos: dict[str, Any]
+    ) -> None:
+        """Move the infos of ended episodes to ``final_obs`` and ``final_info``."""
+        mask = np.zeros(self.num_envs, dtype=bool)
+        mask[ended] = True
+        final_obs = np.full(self.num_envs, None, dtype=object)
+        for row in ended:
+            final_obs[row] = episodes.observation[row].copy()
+        final_info: dict[str, Any] = {}
+        for key in [key for key in infos if not key.startswith("_")]:
+            kept = np.zeros_like(infos[key])
+            if kept.dtype == object:
+                kept[:] = None
+            kept[ended] = infos[key][ended]
+            infos[key][ended] = None if kept.dtype == object else 0
+            infos[f"_{key}"][ended] = False
+            final_info[key], final_info[f"_{key}"] = kept, mask.copy()
+        infos.update(
+            final_obs=final_obs, _final_obs=mask.copy(), final_info=final_info, _final_info=mask
+        )
+
+    def _renew(self, episodes: Episodes, rows: NDArray[np.int64], infos: dict[str, Any]) -> None:
+        """Begin new episodes from the streams and report their distance."""
+        scenarios = [self._streams[row].next() for row in rows]
+        starts, goals = (np.array(part) for part in zip(*scenarios, strict=True))
+        self._restart(episodes, rows, starts, goals)
+        infos["distance"][rows] = episodes.distance[rows]
+        infos["_distance"][rows] = True
+
+    def _restart(
+        self, episodes: Episodes, rows: NDArray[np.int64], starts: Array, goals: Array
+    ) -> None:
+        """Put new starts and goals into some rows of the batch."""
+        checked = self.simulator.check_scenarios(starts, goals)
+        episodes.q[rows], episodes.goal[rows] = checked
+        self.simulator.begin(episodes, rows)
+
+    def _masked_rows(self, mask: object) -> NDArray[np.int64]:
+        """Rows to reset."""
+        if mask is None or self._episodes is None:
+            return np.arange(self.num_envs)
+        array = np.asarray(mask)
+        if array.shape != (self.num_envs,) or array.dtype != bool or not array.any():
+            raise InvalidInputError(
+                f"reset_mask must hold {self.num_envs} booleans, one of them true, got {mask!r}"
+            )
+        return np.flatnonzero(array)
+
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
+        """Seeds of the sub-environments."""
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, int | np.integer):
+            return [int(seed) + row for row in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise InvalidInputError(f"seed must hold {self.num_envs} numbers, got {len(seed)}")
+        return list(seed)
+
+    def _stream(self, seed: Any) -> ScenarioStream:
+        return ScenarioStream(self.simulator, np.random.default_rng(seed))
