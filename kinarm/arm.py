@@ -149,15 +149,17 @@ class Arm:
     @cached_property
     def digest(self) -> str:
         """Hash of everything that the simulator uses, to tell whether two arms behave alike."""
-        text = hashlib.sha256()
-        for array in (*self.chain, self.home, np.array(self.n_actuated)):
-            text.update(np.round(np.asarray(array, dtype=float), 12).tobytes())
+        arrays = [*self.chain, self.home, np.array(self.n_actuated)]
+        names = []
         for shape in self.geometry.geometryObjects:
-            text.update(f"{shape.name} {shape.parentJoint} {type(shape.geometry)}".encode())
-            text.update(np.round(shape.placement.homogeneous, 12).tobytes())
-            corners = (shape.geometry.aabb_local.min_, shape.geometry.aabb_local.max_)
-            text.update(np.round(np.array(corners), 12).tobytes())
-        return text.hexdigest()[:16]
+            names.append(f"{shape.name} {shape.parentJoint} {type(shape.geometry).__name__}")
+            box = shape.geometry.aabb_local
+            arrays += [shape.placement.homogeneous, np.array([box.min_, box.max_])]
+        content = hashlib.sha256("\n".join(names).encode())
+        for array in arrays:
+            # Adding zero removes the sign of zeros.
+            content.update((np.round(np.asarray(array, dtype=float), 12) + 0.0).tobytes())
+        return content.hexdigest()[:16]
 
     def tool_position(self, configuration: ArrayLike) -> NDArray[np.float64]:
         """Forward kinematics of the tool point, through Pinocchio.

@@ -5,6 +5,7 @@ configuration, and as flat arrays of capsules, boxes and motion bounds (`Contact
 which the compiled simulator proves that most configurations need no judge.
 """
 
+import warnings
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -106,13 +107,15 @@ class ContactModel:
 
     @cached_property
     def _judge(self) -> pin.TreeBroadPhaseManagerPool_DynamicAABBTreeCollisionManager:
-        return pin.TreeBroadPhaseManagerPool_DynamicAABBTreeCollisionManager(
+        pool = pin.TreeBroadPhaseManagerPool_DynamicAABBTreeCollisionManager(
             self.arm.model, self.geometry, 1
         )
+        forget_history(pool.getBroadPhaseManager(0).getGeometryData())
+        return pool
 
     @cached_property
     def _workspace(self) -> tuple[pin.Data, pin.GeometryData]:
-        return self.arm.model.createData(), self.geometry.createData()
+        return self.arm.model.createData(), forget_history(self.geometry.createData())
 
     @cached_property
     def pair_names(self) -> tuple[tuple[str, str], ...]:
@@ -154,6 +157,19 @@ class ContactModel:
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
         return type(self), (self.arm, self.geometry, self.body_names, self.shapes)
+
+
+def forget_history(data: pin.GeometryData) -> pin.GeometryData:
+    """Make verdicts of Coal a function of the configuration alone, and return the data.
+
+    By default Coal starts its iteration for convex hulls where the last call on the same pair
+    ended, and verdicts close to contact then depend on what was asked before.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        for request in data.collisionRequests:
+            request.enable_cached_gjk_guess = False
+    return data
 
 
 def _add_scene(geometry: pin.GeometryModel, scene: Scene) -> tuple[str, ...]:
@@ -217,7 +233,7 @@ def _uninformative_pairs(arm: Arm, geometry: pin.GeometryModel, n_shapes: int) -
     The mounting is the first link against the world, where turning the first axis changes
     nothing: it touches everywhere or nowhere.
     """
-    data, geometry_data = arm.model.createData(), geometry.createData()
+    data, geometry_data = arm.model.createData(), forget_history(geometry.createData())
     pairs, objects = list(geometry.collisionPairs), geometry.geometryObjects
     resting = _touching(arm, geometry, arm.home, data, geometry_data)
     mounting = {

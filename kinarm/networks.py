@@ -58,15 +58,18 @@ class Networks:
         Raises
         ------
         InvalidInputError
-            If there is none, or their layers differ.
+            If there is none, one cannot run compiled, or their layers differ.
         """
         if isinstance(policies, Networks):
             return policies
         if isinstance(policies, CompiledPolicy):
             return policies.networks()
+        if not policies or not all(isinstance(policy, CompiledPolicy) for policy in policies):
+            raise InvalidInputError(
+                "expected Networks, a policy that offers networks(), a sequence of such policies "
+                f"or a function, got {policies!r}"
+            )
         batch = [policy.networks() for policy in policies]
-        if not batch:
-            raise InvalidInputError("no policy was given")
         shapes = {tuple(networks.layers.tolist()) for networks in batch}
         if len(shapes) > 1:
             raise InvalidInputError(f"policies of one rollout must share layers, got {shapes}")

@@ -14,9 +14,10 @@ ARS_RECIPES = {
         ARSConfig(
             recipe="tuned",
             step_size_schedule="linear",
-            iterations=4000,
+            iterations=8000,
             sharing="iteration",
-            episodes=4,
+            episodes=8,
+            collision_penalty=-2.0,
             success_bonus=0.5,
         ),
         ARSConfig(recipe="v1", normalize=False, top_directions=24),
