@@ -14,7 +14,6 @@ from kinarm.parallel import available_threads
 
 if TYPE_CHECKING:
     from kinarm.policies.policy import Policy
-
     from kinarm.simulator import Simulator
 
 PROG = "kinarm-bench"
@@ -85,7 +84,6 @@ def measure(policy_name: str, repetitions: int) -> dict[str, Any]:
     """
     from kinarm.policies.library import load_policy
     from kinarm.policies.provenance import package_versions, source_commit
-
     from kinarm.simulator import Simulator
 
     policy = load_policy(policy_name)

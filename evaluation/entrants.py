@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from kinarm.evaluation.trials import TrialSet, trial_generator
-from kinarm.policies.library import group_of, policy_files, policy_names
-from kinarm.policies.policy import Policy
 
 from kinarm.arm import Arm
+from kinarm.evaluation.trials import TrialSet, trial_generator
 from kinarm.networks import Networks
+from kinarm.policies.library import group_of, policy_files, policy_names
+from kinarm.policies.policy import Policy
 from kinarm.rollouts import Rollouts
 from kinarm.simulator import PolicyFunction
 

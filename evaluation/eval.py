@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kinarm.command_line import Parser, command_text, run_command, whole_number
-from kinarm.errors import InvalidInputError, KinarmError
+from kinarm.errors import InvalidInputError
+from kinarm.files import check_folder, write_atomically
 
 if TYPE_CHECKING:
     from kinarm.evaluation.entrants import Entrant
@@ -75,7 +76,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _evaluate(options: argparse.Namespace, command: str) -> None:
     """From options to table, document and figures."""
     if options.out is not None:
-        _make_folder(options.out)
+        check_folder(options.out, create=True)
     evaluations = evaluate_all(options)
     from kinarm.evaluation.report import evaluation_document, evaluation_table
 
@@ -98,10 +99,9 @@ def _evaluate(options: argparse.Namespace, command: str) -> None:
 
 def evaluate_all(options: argparse.Namespace) -> "list[Evaluation]":
     """Let every chosen policy face the trials of its tasks."""
+    from kinarm.arm import Arm
     from kinarm.evaluation.evaluate import run_trials
     from kinarm.evaluation.trials import TrialSet
-
-    from kinarm.arm import Arm
     from kinarm.simulator import Simulator
     from kinarm.task import load_task
 
@@ -115,6 +115,8 @@ def evaluate_all(options: argparse.Namespace) -> "list[Evaluation]":
             simulator = Simulator(arm, task)
             trial_sets[task] = TrialSet.draw(simulator, options.trials, options.seed)
         evaluations.append(run_trials(entrant, trial_sets[task], options.allow_other_arm))
+    if not evaluations:
+        raise InvalidInputError("no chosen policy was trained on a task that exists: name a --task")
     return evaluations
 
 
@@ -155,29 +157,13 @@ def pair_with_tasks(
     ]
 
 
-def _make_folder(folder: Path) -> None:
-    """Create the output folder before any work is done, and see that it can be written."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        probe = folder / ".kinarm-probe"
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise KinarmError(f"cannot write to {str(folder)!r}: {error.strerror}") from error
-
-
 def _write(folder: Path, document: dict[str, Any], evaluations: "list[Evaluation]") -> None:
     """Write the document and the figures."""
     from kinarm.evaluation.plots import distance_histograms, save_figure
 
-    from kinarm.files import write_atomically
-
     text = json.dumps(document, indent=1).encode()
-    try:
-        write_atomically(folder / "evaluation.json", lambda file: file.write(text))
-        save_figure(distance_histograms(evaluations), folder, "final_distance")
-    except OSError as error:
-        raise KinarmError(f"cannot write to {str(folder)!r}: {error.strerror}") from error
+    write_atomically(folder / "evaluation.json", lambda file: file.write(text))
+    save_figure(distance_histograms(evaluations), folder, "final_distance")
 
 
 if __name__ == "__main__":

@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from kinarm.evaluation.entrants import Entrant, find_entrants
-from kinarm.evaluation.statistics import DistanceStatistics, Share
-from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.policy import Policy
 from numpy.typing import NDArray
 
 from kinarm.arm import DEFAULT_ARM, Arm
 from kinarm.errors import InvalidInputError
+from kinarm.evaluation.entrants import Entrant, find_entrants
+from kinarm.evaluation.statistics import DistanceStatistics, Share
+from kinarm.evaluation.trials import TrialSet
+from kinarm.policies.policy import Policy
 from kinarm.rollouts import Rollouts
 from kinarm.simulator import PolicyFunction, Simulator
 from kinarm.task import ReachTask

@@ -1,11 +1,14 @@
 """Figures of an evaluation."""
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+
 from kinarm.evaluation.evaluate import Evaluation
+from kinarm.files import write_atomically
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -82,7 +85,11 @@ def save_figure(figure: "Figure", folder: Path, name: str) -> tuple[Path, ...]:
     import matplotlib
 
     paths = (folder / f"{name}.png", folder / f"{name}.svg")
+    metadata = ({"Software": None}, {"Date": None, "Creator": None})
     with matplotlib.rc_context({"svg.hashsalt": "kinarm"}):
-        figure.savefig(paths[0], dpi=150, metadata={"Software": None})
-        figure.savefig(paths[1], metadata={"Date": None, "Creator": None})
+        for path, entries in zip(paths, metadata, strict=True):
+            write_atomically(
+                path,
+                partial(figure.savefig, format=path.suffix[1:], dpi=150, metadata=entries),
+            )
     return paths

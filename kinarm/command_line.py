@@ -30,8 +30,8 @@ def run_command(prog: str, command: Callable[[], None]) -> NoReturn:
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(0)
-    except KeyboardInterrupt:
-        sys.exit(_report(prog, "interrupted", 130))
+    except KeyboardInterrupt as interruption:
+        sys.exit(_report(prog, str(interruption) or "interrupted", 130))
     sys.exit(0)
 
 

@@ -8,7 +8,8 @@
     ├── InvalidInputError   an argument with the wrong shape, range or a non-finite entry
     │   └── UnknownNameError    a name that does not exist; lists the ones that do
     ├── StartInContactError a start configuration that touches something
-    └── PolicyFileError     a policy file that cannot be read, written or used here
+    ├── PolicyFileError     a policy file or checkpoint that cannot be read or used here
+    └── OutputError         a file or folder that cannot be written
 
 Command lines turn any of them into one line on standard error and exit status 2.
 """
@@ -77,3 +78,7 @@ class StartInContactError(KinarmError):
 
 class PolicyFileError(KinarmError):
     """A policy file is missing, truncated, foreign, too new, or made for something else."""
+
+
+class OutputError(KinarmError):
+    """A file or folder cannot be written."""

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO
 
+from kinarm.errors import OutputError
+
 
 def write_atomically(path: str | Path, write: Callable[[IO[bytes]], object]) -> None:
     """Write a file beside its place and move it there when it is complete.
@@ -19,10 +21,16 @@ def write_atomically(path: str | Path, write: Callable[[IO[bytes]], object]) -> 
 
     Raises
     ------
-    OSError
+    OutputError
         If the file cannot be written.
     """
-    target = Path(path)
+    try:
+        _write_and_move(Path(path), write)
+    except OSError as error:
+        raise OutputError(f"cannot write {str(path)!r}: {error.strerror}") from error
+
+
+def _write_and_move(target: Path, write: Callable[[IO[bytes]], object]) -> None:
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
@@ -33,6 +41,30 @@ def write_atomically(path: str | Path, write: Callable[[IO[bytes]], object]) -> 
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
+
+
+def check_folder(folder: str | Path, *, create: bool = False) -> None:
+    """See that files can be written to a folder, before any work is done for them.
+
+    Parameters
+    ----------
+    folder : str or Path
+        The folder.
+    create : bool
+        Whether to create it if it is missing.
+
+    Raises
+    ------
+    OutputError
+        If it is missing or cannot be written to.
+    """
+    try:
+        if create:
+            Path(folder).mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise OutputError(f"cannot write to {str(folder)!r}: {error.strerror}") from error
 
 
 def _umask() -> int:

@@ -7,14 +7,14 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
-from kinarm.policies.normalizer import Normalizer, input_scale
-from kinarm.policies.policy import Layer, Policy
-from kinarm.policies.provenance import Provenance, package_versions, source_commit
 from numpy.typing import NDArray
 
 from kinarm.arm import DEFAULT_ARM, Arm
 from kinarm.errors import InvalidInputError
 from kinarm.networks import Networks
+from kinarm.policies.normalizer import Normalizer, input_scale
+from kinarm.policies.policy import Layer, Policy
+from kinarm.policies.provenance import Provenance, package_versions, source_commit
 from kinarm.simulator import Simulator
 from kinarm.task import RewardWeights, load_task
 

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from kinarm.policies.ars import ARSConfig, ARSState, CurvePoint
-from kinarm.policies.normalizer import Normalizer
 
 from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.files import write_atomically
+from kinarm.policies.ars import ARSConfig, ARSState, CurvePoint
+from kinarm.policies.normalizer import Normalizer
 
 FILE_FORMAT = "kinarm-ars-checkpoint"
 
@@ -21,7 +21,7 @@ def save_checkpoint(path: str | Path, config: ARSConfig, state: ARSState) -> Non
 
     Raises
     ------
-    PolicyFileError
+    OutputError
         If the file cannot be written.
     """
     arrays: dict[str, Any] = {
@@ -34,10 +34,7 @@ def save_checkpoint(path: str | Path, config: ARSConfig, state: ARSState) -> Non
         "squares": state.normalizer.squares,
         "curve": np.array(state.curve, dtype=float).reshape(-1, len(CurvePoint._fields)),
     }
-    try:
-        write_atomically(path, lambda file: np.savez(file, **arrays))
-    except OSError as error:
-        raise PolicyFileError(f"cannot write {str(path)!r}: {error.strerror}") from error
+    write_atomically(path, lambda file: np.savez(file, **arrays))
 
 
 def load_checkpoint(path: str | Path) -> tuple[ARSConfig, ARSState]:

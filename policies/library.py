@@ -5,9 +5,8 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 
-from kinarm.policies.policy import Policy
-
 from kinarm.errors import UnknownNameError
+from kinarm.policies.policy import Policy
 
 _SEED_SUFFIX = re.compile(r"-seed\d+$")
 

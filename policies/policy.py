@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 import numpy as np
-from kinarm.policies.normalizer import input_scale
-from kinarm.policies.provenance import Provenance
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.files import write_atomically
 from kinarm.networks import Networks
+from kinarm.policies.normalizer import input_scale
+from kinarm.policies.provenance import Provenance
 from kinarm.validation import finite_array
 
 FILE_FORMAT = "kinarm-policy"
@@ -144,7 +144,7 @@ class Policy:
 
         Raises
         ------
-        PolicyFileError
+        OutputError
             If the file cannot be written; an existing file is then left as it was.
         """
         arrays: dict[str, Any] = {
@@ -157,10 +157,7 @@ class Policy:
         for number, layer in enumerate(self.layers):
             arrays[f"weights_{number}"] = layer.weights
             arrays[f"bias_{number}"] = layer.bias
-        try:
-            write_atomically(path, lambda file: np.savez(file, **arrays))
-        except OSError as error:
-            raise PolicyFileError(f"cannot write policy {str(path)!r}: {error.strerror}") from error
+        write_atomically(path, lambda file: np.savez(file, **arrays))
 
     @classmethod
     def load(cls, path: str | Path) -> "Policy":

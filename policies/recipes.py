@@ -3,9 +3,8 @@
 from dataclasses import replace
 from typing import Any
 
-from kinarm.policies.ars import ARSConfig
-
 from kinarm.errors import UnknownNameError
+from kinarm.policies.ars import ARSConfig
 
 ARS_RECIPES = {
     config.recipe: config

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from kinarm.command_line import Parser, finite_number, run_command, whole_number
 from kinarm.errors import InvalidInputError, PolicyFileError
+from kinarm.files import check_folder, write_atomically
 
 if TYPE_CHECKING:
     from kinarm.policies.ars import ARSConfig, ARSResult, ARSState, CurvePoint
@@ -67,8 +68,7 @@ def _train(options: argparse.Namespace) -> None:
     out: Path = options.out
     if out.suffix != ".npz":
         raise InvalidInputError(f"--out must end in .npz, got {str(out)!r}")
-    if not out.parent.is_dir():
-        raise PolicyFileError(f"cannot write {str(out)!r}: folder {str(out.parent)!r} is missing")
+    check_folder(out.parent)
     config, state = _beginning(options)
     keeper = CheckpointKeeper(config, checkpoint_path(out))
     with TrainingProgress(config) as progress:
@@ -80,8 +80,7 @@ def _train(options: argparse.Namespace) -> None:
         try:
             result = train_ars(config, state=state, on_iteration=on_iteration)
         except KeyboardInterrupt:
-            keeper.save()
-            raise
+            raise KeyboardInterrupt(keeper.save_on_interrupt()) from None
     result.policy.save(out)
     write_curve(curve_path(out), result.curve)
     checkpoint_path(out).unlink(missing_ok=True)
@@ -92,12 +91,16 @@ def _beginning(options: argparse.Namespace) -> "tuple[ARSConfig, ARSState | None
     """Settings and state to begin with: from the command line, or from a checkpoint."""
     from kinarm.policies.checkpoint import load_checkpoint
     from kinarm.policies.recipes import ars_recipe
-
     from kinarm.task import load_task
 
     settings = given_settings(options)
     checkpoint = checkpoint_path(options.out)
     if not options.resume:
+        if checkpoint.exists():
+            raise InvalidInputError(
+                f"{str(checkpoint)!r} holds an unfinished training: go on with --resume, "
+                "or delete it"
+            )
         config = ars_recipe(options.recipe, **settings)
         load_task(config.task)
         return config, None
@@ -146,6 +149,14 @@ class CheckpointKeeper:
         self._state = state
         if time.monotonic() - self._saved_at > CHECKPOINT_SECONDS:
             self.save()
+
+    def save_on_interrupt(self) -> str:
+        """Save the latest state, and say how to go on."""
+        if self._state is None:
+            return "interrupted before the first iteration"
+        self.save()
+        done, all_of_them = self._state.iteration, self._config.iterations
+        return f"interrupted after {done} of {all_of_them} iterations; go on with --resume"
 
     def save(self) -> None:
         """Save the latest state."""
@@ -198,16 +209,11 @@ class TrainingProgress:
 
 def write_curve(path: Path, curve: "Sequence[CurvePoint]") -> None:
     """Write a learning curve as CSV, one line per iteration."""
-    from kinarm.files import write_atomically
-
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(("iteration", *curve[0]._fields))
     writer.writerows((number, *point) for number, point in enumerate(curve, start=1))
-    try:
-        write_atomically(path, lambda file: file.write(text.getvalue().encode()))
-    except OSError as error:
-        raise PolicyFileError(f"cannot write {str(path)!r}: {error.strerror}") from error
+    write_atomically(path, lambda file: file.write(text.getvalue().encode()))
 
 
 def _summary(result: "ARSResult") -> str:
