@@ -6,7 +6,7 @@ from kinarm._exports import lazy_exports
 
 if TYPE_CHECKING:
     from kinarm.evaluation.entrants import Entrant, find_entrants
-    from kinarm.evaluation.evaluate import Evaluation, PooledEvaluation, evaluate, pool
+    from kinarm.evaluation.evaluations import Evaluation, PooledEvaluation, evaluate, pool
     from kinarm.evaluation.statistics import DistanceStatistics, Share
     from kinarm.evaluation.trials import TrialSet
 
@@ -26,7 +26,7 @@ __getattr__ = lazy_exports(
     __name__,
     {
         "entrants": ("Entrant", "find_entrants"),
-        "evaluate": ("Evaluation", "PooledEvaluation", "evaluate", "pool"),
+        "evaluations": ("Evaluation", "PooledEvaluation", "evaluate", "pool"),
         "statistics": ("DistanceStatistics", "Share"),
         "trials": ("TrialSet",),
     },

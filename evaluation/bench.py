@@ -50,8 +50,7 @@ def build_parser() -> Parser:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line."""
-    options = build_parser().parse_args(arguments)
-    run_command(PROG, lambda: _bench(options))
+    run_command(PROG, lambda: _bench(build_parser().parse_args(arguments)))
 
 
 def _bench(options: argparse.Namespace) -> None:

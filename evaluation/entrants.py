@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from kinarm.arm import Arm
+from kinarm.errors import UnknownNameError
 from kinarm.evaluation.trials import TrialSet, trial_generator
 from kinarm.networks import Networks
 from kinarm.policies.library import group_of, policy_files, policy_names
@@ -35,6 +36,8 @@ class Entrant:
         Task that it was trained on; None for baselines.
     policy : Policy or None
         The trained policy, if it is one.
+    source : Path or None
+        The file that it was read from, if it was.
     """
 
     name: str
@@ -45,9 +48,10 @@ class Entrant:
     seed: int | None = None
     trained_on: str | None = None
     policy: Policy | None = None
+    source: Path | None = None
 
     @classmethod
-    def from_policy(cls, name: str, policy: Policy) -> "Entrant":
+    def from_policy(cls, name: str, policy: Policy, source: Path | None = None) -> "Entrant":
         """Enter a trained policy."""
         made = policy.provenance
         return cls(
@@ -59,6 +63,7 @@ class Entrant:
             seed=made.seed,
             trained_on=made.task,
             policy=policy,
+            source=source,
         )
 
     @classmethod
@@ -116,8 +121,13 @@ def find_entrants(name_or_file: str | Path) -> tuple[Entrant, ...]:
     """
     if name_or_file in BASELINES:
         return (BASELINES[str(name_or_file)],)
+    try:
+        paths = policy_files(name_or_file)
+    except UnknownNameError as error:
+        available = (*BASELINES, *error.available)
+        raise UnknownNameError(error.kind, error.given, available) from None
     return tuple(
-        Entrant.from_policy(path.stem, Policy.load(path)) for path in policy_files(name_or_file)
+        Entrant.from_policy(path.stem, Policy.load(path), path.resolve()) for path in paths
     )
 
 

@@ -13,7 +13,7 @@ from kinarm.files import check_folder, write_atomically
 
 if TYPE_CHECKING:
     from kinarm.evaluation.entrants import Entrant
-    from kinarm.evaluation.evaluate import Evaluation
+    from kinarm.evaluation.evaluations import Evaluation
 
 PROG = "kinarm-eval"
 
@@ -64,13 +64,15 @@ def build_parser() -> Parser:
     parser.add_argument(
         "--json", action="store_true", help="print the JSON document alone on standard output"
     )
+    parser.add_argument("--markdown", action="store_true", help="print the table as Markdown")
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line."""
-    options = build_parser().parse_args(arguments)
-    run_command(PROG, lambda: _evaluate(options, command_text(PROG, arguments)))
+    run_command(
+        PROG, lambda: _evaluate(build_parser().parse_args(arguments), command_text(PROG, arguments))
+    )
 
 
 def _evaluate(options: argparse.Namespace, command: str) -> None:
@@ -78,7 +80,7 @@ def _evaluate(options: argparse.Namespace, command: str) -> None:
     if options.out is not None:
         check_folder(options.out, create=True)
     evaluations = evaluate_all(options)
-    from kinarm.evaluation.report import evaluation_document, evaluation_table
+    from kinarm.evaluation.report import evaluation_document, print_table
 
     document = evaluation_document(evaluations, command)
     if options.out is not None:
@@ -89,23 +91,34 @@ def _evaluate(options: argparse.Namespace, command: str) -> None:
         return
     from rich.console import Console
 
-    console = Console(width=None if sys.stdout.isatty() else 140, highlight=False)
-    console.print(evaluation_table(document))
-    for task, entry in document["protocol"]["tasks"].items():
-        console.print(f"trial set {task}: {entry['trial_set_hash']}", style="dim")
+    wide_enough = 200 if options.markdown or not sys.stdout.isatty() else None
+    console = Console(width=wide_enough, highlight=False)
+    print_table(document, console, markdown=options.markdown)
+    if not options.markdown:
+        console.print(_footnote(document), style="dim")
     if options.out is not None:
         console.print(f"written: {options.out / 'evaluation.json'} and histograms", style="dim")
+
+
+def _footnote(document: dict[str, Any]) -> str:
+    """What the figures in the table stand on."""
+    protocol = document["protocol"]
+    hashes = (f"{task} {entry['trial_set_hash']}" for task, entry in protocol["tasks"].items())
+    return (
+        f"{protocol['trials']} trials a task, seed {protocol['seed']}, arm {protocol['arm']}; "
+        f"95 % intervals in brackets\ntrial sets: {', '.join(hashes)}"
+    )
 
 
 def evaluate_all(options: argparse.Namespace) -> "list[Evaluation]":
     """Let every chosen policy face the trials of its tasks."""
     from kinarm.arm import Arm
-    from kinarm.evaluation.evaluate import run_trials
+    from kinarm.evaluation.evaluations import run_trials
     from kinarm.evaluation.trials import TrialSet
     from kinarm.simulator import Simulator
     from kinarm.task import load_task
 
-    tasks = [load_task(name).name for name in options.task or ()]
+    tasks = list(dict.fromkeys(load_task(name).name for name in options.task or ()))
     arm = Arm.load(options.arm)
     entrants = choose_entrants(options, arm)
     trial_sets: dict[str, TrialSet] = {}
@@ -126,10 +139,14 @@ def choose_entrants(options: argparse.Namespace, arm: Any) -> "list[Entrant]":
 
     if not options.policy:
         return list(shipped_entrants(arm))
-    named = [entrant for name in options.policy for entrant in find_entrants(name)]
-    entrants = {entrant.name: entrant for entrant in named}
-    if len(entrants) < len({id(entrant.policy) for entrant in named if entrant.policy}):
-        raise InvalidInputError("two policy files share a name: rename one of them")
+    entrants: dict[str, Entrant] = {}
+    for entrant in (entrant for name in options.policy for entrant in find_entrants(name)):
+        known = entrants.setdefault(entrant.name, entrant)
+        if known.source != entrant.source:
+            raise InvalidInputError(
+                f"two policies are called {entrant.name!r}: {known.source or 'the baseline'} and "
+                f"{entrant.source or 'the baseline'}; rename a file"
+            )
     return list(entrants.values())
 
 

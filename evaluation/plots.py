@@ -6,15 +6,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-from kinarm.evaluation.evaluate import Evaluation
+from kinarm.evaluation.evaluations import Evaluation
 from kinarm.files import write_atomically
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#999999", "#000000")
 """Distinguishable with any colour vision (Okabe and Ito)."""
+
+DASHES = ("solid", "dashed", "dotted", "dashdot")
 
 BIN_WIDTH = 0.05
 
@@ -32,26 +36,18 @@ def distance_histograms(evaluations: Sequence[Evaluation]) -> "Figure":
     from matplotlib.figure import Figure
 
     tasks = list(dict.fromkeys(evaluation.task for evaluation in evaluations))
-    groups = list(dict.fromkeys(evaluation.entrant.group for evaluation in evaluations))
-    colours = _group_colours(groups)
+    labels = list(dict.fromkeys(_label(evaluation) for evaluation in evaluations))
     furthest = max(float(evaluation.rollouts.distance.max()) for evaluation in evaluations)
     edges = np.arange(0.0, furthest + BIN_WIDTH, BIN_WIDTH)
     figure = Figure(figsize=(4.2 * len(tasks), 3.6), layout="constrained")
     for axes, task in zip(figure.subplots(1, len(tasks), squeeze=False)[0], tasks, strict=True):
-        for group in groups:
-            members = [e for e in evaluations if (e.entrant.group, e.task) == (group, task)]
-            if not members:
-                continue
-            shares = np.array(
-                [np.histogram(e.rollouts.distance, edges)[0] / len(e.trials) for e in members]
-            )
-            label, colour = _label(members[0]), colours[group]
-            for share in shares if len(shares) > 1 else ():
-                axes.stairs(share, edges, color=colour, alpha=0.3, linewidth=0.8)
-            axes.stairs(shares.mean(axis=0), edges, color=colour, linewidth=2, label=label)
-        axes.axvline(
-            members_tolerance(evaluations, task), color="#444444", linestyle=":", linewidth=1
-        )
+        on_task = [evaluation for evaluation in evaluations if evaluation.task == task]
+        for number, label in enumerate(labels):
+            distances = [e.rollouts.distance for e in on_task if _label(e) == label]
+            if distances:
+                _stairs(axes, distances, edges, label, number)
+        tolerance = on_task[0].trials.simulator.task.tolerance
+        axes.axvline(tolerance, color="#444444", linestyle=":", linewidth=1)
         axes.set(title=f"task {task}", xlabel="final distance to the goal [m]", xlim=(0, None))
         axes.set_ylim(0, None)
         axes.spines[["top", "right"]].set_visible(False)
@@ -60,24 +56,28 @@ def distance_histograms(evaluations: Sequence[Evaluation]) -> "Figure":
     return figure
 
 
-def members_tolerance(evaluations: Sequence[Evaluation], task: str) -> float:
-    """Distance at which a task counts as done [m]."""
-    return next(e.trials.simulator.task.tolerance for e in evaluations if e.task == task)
+def _stairs(
+    axes: "Axes",
+    distances: Sequence[NDArray[np.float64]],
+    edges: NDArray[np.float64],
+    label: str,
+    number: int,
+) -> None:
+    """Draw the histogram of each training seed faintly and their mean boldly."""
+    colour, dash = COLOURS[number % len(COLOURS)], DASHES[number // len(COLOURS) % len(DASHES)]
+    shares = np.array([np.histogram(d, edges)[0] / len(d) for d in distances])
+    for share in shares if len(shares) > 1 else ():
+        axes.stairs(share, edges, color=colour, alpha=0.3, linewidth=0.8)
+    axes.stairs(shares.mean(axis=0), edges, color=colour, linestyle=dash, linewidth=2, label=label)
 
 
 def _label(evaluation: Evaluation) -> str:
+    """Name of what the training seeds of one recipe share, and the task if it is another one."""
     entrant = evaluation.entrant
-    return entrant.name if entrant.policy is None else f"{entrant.algorithm} {entrant.recipe}"
-
-
-def _group_colours(groups: Sequence[str]) -> dict[str, str]:
-    """One colour per recipe, the same in every task."""
-    kinds = list(dict.fromkeys(_kind(group) for group in groups))
-    return {group: COLOURS[kinds.index(_kind(group)) % len(COLOURS)] for group in groups}
-
-
-def _kind(group: str) -> str:
-    return group.rsplit("-", 1)[0]
+    if entrant.policy is None:
+        return entrant.name
+    origin = "" if entrant.trained_on == evaluation.task else f" (trained on {entrant.trained_on})"
+    return entrant.group.removesuffix(f"-{entrant.trained_on}") + origin
 
 
 def save_figure(figure: "Figure", folder: Path, name: str) -> tuple[Path, ...]:

@@ -1,13 +1,15 @@
 """An evaluation as a whole: JSON document and table."""
 
+import io
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
-from kinarm.evaluation.evaluate import Evaluation, pool
+from kinarm.evaluation.evaluations import Evaluation, pool
 from kinarm.evaluation.statistics import BOOTSTRAP_SEED, RESAMPLES
 from kinarm.policies.provenance import package_versions, source_commit
 
 if TYPE_CHECKING:
+    from rich.console import Console
     from rich.table import Table
 
 FORMAT_VERSION = 1
@@ -66,54 +68,104 @@ def evaluation_document(evaluations: Sequence[Evaluation], command: str) -> dict
     }
 
 
-def evaluation_table(document: dict[str, Any]) -> "Table":
-    """The figures of a document as a table; several training seeds share a row."""
+def print_table(document: dict[str, Any], console: "Console", *, markdown: bool = False) -> None:
+    """Print the figures of a document, without the less important columns if space is scarce.
+
+    Parameters
+    ----------
+    document : dict
+        What `evaluation_document` returned.
+    console : rich.console.Console
+        Where to print.
+    markdown : bool
+        Whether to print Markdown, always with all columns.
+    """
+    if markdown:
+        from rich.console import Console
+
+        text = io.StringIO()
+        Console(file=text, width=1000).print(evaluation_table(document, markdown=True))
+        console.out(text.getvalue().strip(), highlight=False)
+        return
+    unbounded = console.options.update(width=1000)
+    for dropped in range(len(EXPENDABLE) + 1):
+        table = evaluation_table(document, without=EXPENDABLE[:dropped])
+        if console.measure(table, options=unbounded).maximum <= console.width:
+            break
+    console.print(table)
+
+
+def evaluation_table(
+    document: dict[str, Any], *, without: Sequence[str] = (), markdown: bool = False
+) -> "Table":
+    """The figures of a document as a table; several training seeds share a row.
+
+    Parameters
+    ----------
+    document : dict
+        What `evaluation_document` returned.
+    without : sequence of str
+        Columns to leave out.
+    markdown : bool
+        Whether the table is to be printed as Markdown.
+    """
+    from rich import box
     from rich.table import Table
 
-    protocol = document["protocol"]
-    table = Table(
-        title=f"{protocol['trials']} trials a task, seed {protocol['seed']}, "
-        f"arm {protocol['arm']}; 95 % intervals in brackets",
-        title_justify="left",
-        header_style="bold",
-    )
-    table.add_column("policy", no_wrap=True)
-    for heading in ("success %", "over seeds", "<= 0.1 m", "<= 0.2 m", "median m"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    for heading in ("mean m", "p95 m", "collision %", "steps"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    pooled = {(row["policy"], row["task"]): row for row in document["pooled"]}
-    members = {
-        (result["algorithm"], result["recipe"], result["trained_on"], result["task"])
-        for result in pooled.values()
-    }
-    for task in protocol["tasks"]:
-        rows = [row for row in pooled.values() if row["task"] == task]
-        rows += [
-            row
-            for row in document["results"]
-            if row["task"] == task
-            and (row["algorithm"], row["recipe"], row["trained_on"], task) not in members
-        ]
-        table.add_section()
-        table.add_row(f"[bold]task {task}[/bold]")
-        for row in sorted(rows, key=lambda row: -row["success"]["rate"]):
-            table.add_row(*_cells(row))
+    table = Table(box=box.MARKDOWN if markdown else box.HEAVY_HEAD, header_style="bold")
+    kept = [heading for heading in COLUMNS if heading not in without]
+    for heading in kept:
+        side: Literal["left", "right"] = "left" if heading in ("task", "policy") else "right"
+        table.add_column(heading, justify=side, no_wrap=True)
+    for task in document["protocol"]["tasks"]:
+        if not markdown:
+            table.add_section()
+        for row in sorted(_rows(document, task), key=lambda row: -row["success"]["rate"]):
+            cells = dict(zip(COLUMNS, _cells(row), strict=True))
+            table.add_row(*(cells[heading] for heading in kept))
     return table
+
+
+COLUMNS = (
+    "task",
+    "policy",
+    "success %",
+    "over seeds",
+    "<= 0.1 m",
+    "<= 0.2 m",
+    "median m",
+    "mean m",
+    "p95 m",
+    "contact %",
+    "steps",
+)
+
+
+EXPENDABLE = ("<= 0.1 m", "mean m", "p95 m", "steps", "over seeds", "<= 0.2 m", "contact %")
+
+
+def _rows(document: dict[str, Any], task: str) -> list[dict[str, Any]]:
+    """Pooled results of a task, and the results that are not part of them."""
+    pooled = [row for row in document["pooled"] if row["task"] == task]
+    members = {name for row in pooled for name in row["members"]}
+    single = [row for row in document["results"] if row["task"] == task]
+    return pooled + [row for row in single if row["policy"] not in members]
 
 
 def _cells(row: dict[str, Any]) -> list[str]:
     distance, spread = row["final_distance"], row.get("spread")
-    name = row["policy"] + (f" x{len(row['training_seeds'])}" if spread else "")
+    over_seeds = ""
+    if spread:
+        low, high = (100 * spread["success"][end] for end in ("min", "max"))
+        over_seeds = f"{len(row['members'])}: {low:.1f}..{high:.1f}"
     return [
-        f"  {name}",
+        row["task"],
+        row["policy"],
         _percent(row["success"]),
-        "{:.1f}..{:.1f}".format(*(100 * spread["success"][end] for end in ("min", "max")))
-        if spread
-        else "",
+        over_seeds,
         f"{100 * row['within']['0.1']['rate']:.1f}",
         f"{100 * row['within']['0.2']['rate']:.1f}",
-        "{:.3f} [{:.3f}, {:.3f}]".format(distance["median"], *distance["ci95"]["median"]),
+        "{:.3f} ({:.3f}..{:.3f})".format(distance["median"], *distance["ci95"]["median"]),
         f"{distance['mean']:.3f}",
         f"{distance['p95']:.3f}",
         f"{100 * row['collision']['rate']:.1f}",
@@ -123,4 +175,4 @@ def _cells(row: dict[str, Any]) -> list[str]:
 
 def _percent(share: dict[str, Any]) -> str:
     low, high = share["ci95"]
-    return f"{100 * share['rate']:.1f} [{100 * low:.1f}, {100 * high:.1f}]"
+    return f"{100 * share['rate']:.1f} ({100 * low:.1f}..{100 * high:.1f})"

@@ -59,10 +59,11 @@ class TrialSet:
         SceneError
             If no contact-free start exists.
         """
-        if trials < 1:
-            raise InvalidInputError(f"trials must be at least 1, got {trials}")
-        if seed < 0:
-            raise InvalidInputError(f"seed must be at least 0, got {seed}")
+        for name, value, least in (("trials", trials, 1), ("seed", seed, 0)):
+            if not isinstance(value, int | np.integer) or value < least:
+                raise InvalidInputError(
+                    f"{name} must be a whole number of at least {least}, got {value}"
+                )
         drawn = [simulator.sample(trial_generator(seed, trial), 1) for trial in range(trials)]
         starts, goals = (np.concatenate(part) for part in zip(*drawn, strict=True))
         starts.flags.writeable = goals.flags.writeable = False

@@ -2,6 +2,7 @@
 
 import argparse
 import math
+import os
 import sys
 from collections.abc import Callable, Sequence
 from typing import NoReturn
@@ -20,19 +21,36 @@ class Parser(argparse.ArgumentParser):
 def run_command(prog: str, command: Callable[[], None]) -> NoReturn:
     """Run a command line and turn its outcome into an exit status.
 
-    Status 0 is success, 2 bad input (one line on standard error), 130 an interruption.
+    Status 0 is success, 1 a failure of the machine, 2 bad input, 130 an interruption; all but
+    success come with one line on standard error. A reader that closes the pipe is no failure.
     """
+    sys.exit(_status(prog, command))
+
+
+def _status(prog: str, command: Callable[[], None]) -> int:
+    """Run a command and flush what it printed."""
     try:
-        command()
+        try:
+            command()
+        except SystemExit as leaving:
+            sys.stdout.flush()
+            return leaving.code if isinstance(leaving.code, int) else 0
         sys.stdout.flush()
     except KinarmError as error:
-        sys.exit(_report(prog, str(error), 2))
+        return _report(prog, str(error), 2)
     except BrokenPipeError:
-        sys.stderr.close()
-        sys.exit(0)
+        _discard_output()
+    except OSError as error:
+        _discard_output()
+        return _report(prog, f"cannot write the output: {error.strerror}", 1)
     except KeyboardInterrupt as interruption:
-        sys.exit(_report(prog, str(interruption) or "interrupted", 130))
-    sys.exit(0)
+        return _report(prog, str(interruption) or "interrupted", 130)
+    return 0
+
+
+def _discard_output() -> None:
+    """Let what is still buffered for standard output go nowhere, so that exiting is quiet."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _report(prog: str, message: str, status: int) -> int:

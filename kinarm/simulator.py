@@ -387,6 +387,32 @@ class Simulator:
             np.copyto(episodes.stop, episodes.steps + 1)
             self._advance(table_control(actions[:, None, :]), episodes, len(actions))
 
+    def observe(
+        self, configurations: NDArray[np.float64], goals: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Observations of configurations, whether or not they touch something.
+
+        Parameters
+        ----------
+        configurations : ndarray, shape (n, n_axes)
+            Axis positions [rad or m].
+        goals : ndarray, shape (n, 3)
+            Goal positions [m].
+
+        Returns
+        -------
+        ndarray, shape (n, n_observations)
+        """
+        episodes = Episodes.allocate(
+            finite_array("configurations", configurations, (None, self.arm.n_axes)),
+            finite_array("goals", goals, (len(configurations), 3)),
+            n_pairs=len(self.contact_model.shapes.pairs),
+            horizon=self.task.horizon,
+        )
+        arrays = (np.arange(len(configurations)), self.arm.chain, self.contact_model.shapes)
+        kernels.begin(0, len(configurations), *arrays, episodes)
+        return episodes.observation
+
     def screen(
         self, configurations: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:

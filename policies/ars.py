@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from kinarm.arm import DEFAULT_ARM, Arm
 from kinarm.errors import InvalidInputError
 from kinarm.networks import Networks
+from kinarm.policies.mirror import Mirror, is_symmetric
 from kinarm.policies.normalizer import Normalizer, input_scale
 from kinarm.policies.policy import Layer, Policy
 from kinarm.policies.provenance import Provenance, package_versions, source_commit
@@ -50,6 +51,9 @@ class ARSConfig:
         Updates of the parameters.
     horizon : int
         Steps of an episode.
+    symmetric : bool
+        Whether the policy is to treat mirror images alike, where the task is its own mirror
+        image (``both``); see `kinarm.policies.mirror`. It halves the parameters.
     normalize : bool
         Whether observations are normalised (V2) or not (BRS, V1).
     scale_by_deviation : bool
@@ -80,6 +84,7 @@ class ARSConfig:
     top_directions: int = 12
     iterations: int = 800
     horizon: int = 64
+    symmetric: bool = False
     normalize: bool = True
     scale_by_deviation: bool = True
     sharing: Sharing = "none"
@@ -226,12 +231,13 @@ def train_ars(
     """
     simulator = config.simulator(threads)
     state = state or initial_state(config, simulator)
+    mirror = task_mirror(config, simulator)
     began = time.perf_counter() - state.wall_time
     while state.iteration < config.iterations:
-        state = ars_iteration(config, simulator, state, began)
+        state = ars_iteration(config, simulator, state, began, mirror)
         if on_iteration is not None:
             on_iteration(state)
-    return ARSResult(state_policy(config, simulator.arm, state), state.curve)
+    return ARSResult(state_policy(config, simulator.arm, state, mirror), state.curve)
 
 
 def initial_state(config: ARSConfig, simulator: Simulator) -> ARSState:
@@ -244,7 +250,11 @@ def initial_state(config: ARSConfig, simulator: Simulator) -> ARSState:
 
 
 def ars_iteration(
-    config: ARSConfig, simulator: Simulator, state: ARSState, began: float
+    config: ARSConfig,
+    simulator: Simulator,
+    state: ARSState,
+    began: float,
+    mirror: Mirror | None = None,
 ) -> ARSState:
     """One pass through the loop of Algorithm 1.
 
@@ -258,6 +268,8 @@ def ars_iteration(
         State before the iteration.
     began : float
         Reading of ``time.perf_counter`` when the training began [s].
+    mirror : Mirror, optional
+        Reflection that the policy has to commute with.
 
     Returns
     -------
@@ -269,10 +281,12 @@ def ars_iteration(
     rng.bit_generator.state = state.generator
     N, theta, normalizer = config.directions, state.theta, state.normalizer
     delta = rng.standard_normal((N, *theta.shape))
+    if mirror is not None:
+        delta *= mirror.weights
     candidates = np.concatenate([theta + config.noise * delta, theta - config.noise * delta])
     starts, goals = draw_scenarios(config, simulator, rng)
     rollouts = simulator.rollout(
-        linear_networks(candidates, normalizer if config.normalize else None),
+        linear_networks(candidates, policy_normalizer(config, normalizer, mirror)),
         starts,
         goals,
         policy_index=np.repeat(np.arange(2 * N), config.episodes),
@@ -308,6 +322,21 @@ def draw_scenarios(
     copies = {"none": 1, "pair": 2, "iteration": 2 * config.directions}[config.sharing]
     starts, goals = simulator.sample(rng, 2 * config.directions * config.episodes // copies)
     return np.tile(starts, (copies, 1)), np.tile(goals, (copies, 1))
+
+
+def task_mirror(config: ARSConfig, simulator: Simulator) -> Mirror | None:
+    """Reflection that the policy has to commute with, if any."""
+    symmetric = config.symmetric and is_symmetric(simulator.scene, simulator.task.benches)
+    return Mirror.of(simulator) if symmetric else None
+
+
+def policy_normalizer(
+    config: ARSConfig, seen: Normalizer, mirror: Mirror | None
+) -> Normalizer | None:
+    """Statistics by which the policy normalises its inputs, if it does."""
+    if not config.normalize:
+        return None
+    return seen if mirror is None else seen.mirrored(mirror.observations)
 
 
 def linear_networks(theta: NDArray[np.float64], normalizer: Normalizer | None) -> Networks:
@@ -370,10 +399,13 @@ def ars_step(
     return step_size / (b * sigma) * step
 
 
-def state_policy(config: ARSConfig, arm: Arm, state: ARSState) -> Policy:
+def state_policy(
+    config: ARSConfig, arm: Arm, state: ARSState, mirror: Mirror | None = None
+) -> Policy:
     """Freeze a state of the training into a policy."""
     n_actions, n_observations = state.theta.shape
-    normalizer = state.normalizer if config.normalize else Normalizer.empty(n_observations)
+    normalizer = policy_normalizer(config, state.normalizer, mirror)
+    normalizer = normalizer or Normalizer.empty(n_observations)
     return Policy(
         mean=normalizer.mean,
         std=normalizer.std,

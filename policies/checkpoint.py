@@ -1,7 +1,6 @@
 """Checkpoints of a training, from which it resumes exactly."""
 
 import json
-import zipfile
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.files import write_atomically
 from kinarm.policies.ars import ARSConfig, ARSState, CurvePoint
 from kinarm.policies.normalizer import Normalizer
+from kinarm.policies.policy import CORRUPT
 
 FILE_FORMAT = "kinarm-ars-checkpoint"
 
@@ -46,7 +46,8 @@ def load_checkpoint(path: str | Path) -> tuple[ARSConfig, ARSState]:
         If the file is missing, truncated or not a checkpoint.
     """
     try:
-        with np.load(Path(path), allow_pickle=False) as content:
+        with Path(path).open("rb") as file:
+            content = np.load(file, allow_pickle=False)
             if str(content["format"]) != FILE_FORMAT:
                 raise PolicyFileError(f"{str(path)!r} is not a checkpoint of a training")
             state = ARSState(
@@ -67,7 +68,7 @@ def load_checkpoint(path: str | Path) -> tuple[ARSConfig, ARSState]:
             return ARSConfig(**json.loads(str(content["config"]))), state
     except OSError as error:
         raise PolicyFileError(f"cannot read checkpoint {str(path)!r}: {error.strerror}") from error
-    except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+    except (ValueError, KeyError, TypeError, EOFError, *CORRUPT) as error:
         if isinstance(error, InvalidInputError):
             raise
         raise PolicyFileError(f"{str(path)!r} is not a complete checkpoint") from error

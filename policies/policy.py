@@ -2,6 +2,7 @@
 
 import json
 import zipfile
+import zlib
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -20,6 +21,8 @@ from kinarm.validation import finite_array
 
 FILE_FORMAT = "kinarm-policy"
 FILE_VERSION = 1
+CORRUPT = (zipfile.BadZipFile, zlib.error)
+"""What numpy raises for a damaged ``.npz``, beside the errors of Python itself."""
 
 
 class Layer(NamedTuple):
@@ -174,7 +177,7 @@ class Policy:
                 return cls._read(name, file)
         except OSError as error:
             raise PolicyFileError(f"cannot read policy {name!r}: {error.strerror}") from error
-        except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        except (ValueError, KeyError, TypeError, EOFError, *CORRUPT) as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise PolicyFileError(f"{name!r} is not a complete kinarm policy: {reason}") from error
 

@@ -8,7 +8,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from kinarm.errors import PolicyFileError
+from kinarm.errors import InvalidInputError
 
 RECORDED_PACKAGES = ("kinarm", "numpy", "numba", "pin", "coal", "gymnasium", "scipy")
 
@@ -60,13 +60,13 @@ class Provenance:
 
         Raises
         ------
-        PolicyFileError
+        InvalidInputError
             If an entry is missing or unknown.
         """
         expected = {item.name for item in fields(cls)}
         if set(entries) != expected:
             wrong = ", ".join(sorted(expected ^ set(entries)))
-            raise PolicyFileError(f"the provenance has missing or unknown entries: {wrong}")
+            raise InvalidInputError(f"the provenance has missing or unknown entries: {wrong}")
         return cls(**entries)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kinarm.command_line import Parser, finite_number, run_command, whole_number
-from kinarm.errors import InvalidInputError, PolicyFileError
+from kinarm.errors import InvalidInputError, KinarmError, PolicyFileError
 from kinarm.files import check_folder, write_atomically
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def build_parser() -> Parser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     ars.add_argument("--task", metavar="NAME", help="left, right (default) or both")
-    ars.add_argument("--recipe", default="paper", metavar="NAME", help="named settings (paper)")
+    ars.add_argument("--recipe", metavar="NAME", help="named settings (paper)")
     ars.add_argument("--seed", type=whole_number(0), metavar="N", help="seed of all randomness (0)")
     ars.add_argument("--arm", metavar="NAME_OR_URDF", help="arm to train (paper)")
     ars.add_argument("--out", type=Path, required=True, metavar="FILE.npz", help="the policy")
@@ -57,8 +57,7 @@ def build_parser() -> Parser:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line."""
-    options = build_parser().parse_args(arguments)
-    run_command(PROG, lambda: _train(options))
+    run_command(PROG, lambda: _train(build_parser().parse_args(arguments)))
 
 
 def _train(options: argparse.Namespace) -> None:
@@ -66,8 +65,8 @@ def _train(options: argparse.Namespace) -> None:
     from kinarm.policies.ars import train_ars
 
     out: Path = options.out
-    if out.suffix != ".npz":
-        raise InvalidInputError(f"--out must end in .npz, got {str(out)!r}")
+    if out.suffix != ".npz" or out.is_dir():
+        raise InvalidInputError(f"--out must be a file that ends in .npz, got {str(out)!r}")
     check_folder(out.parent)
     config, state = _beginning(options)
     keeper = CheckpointKeeper(config, checkpoint_path(out))
@@ -81,7 +80,11 @@ def _train(options: argparse.Namespace) -> None:
             result = train_ars(config, state=state, on_iteration=on_iteration)
         except KeyboardInterrupt:
             raise KeyboardInterrupt(keeper.save_on_interrupt()) from None
-    result.policy.save(out)
+    try:
+        result.policy.save(out)
+    except KinarmError:
+        keeper.save()
+        raise
     write_curve(curve_path(out), result.curve)
     checkpoint_path(out).unlink(missing_ok=True)
     sys.stdout.write(f"{_summary(result)}; written: {out}, {curve_path(out)}\n")
@@ -91,7 +94,6 @@ def _beginning(options: argparse.Namespace) -> "tuple[ARSConfig, ARSState | None
     """Settings and state to begin with: from the command line, or from a checkpoint."""
     from kinarm.policies.checkpoint import load_checkpoint
     from kinarm.policies.recipes import ars_recipe
-    from kinarm.task import load_task
 
     settings = given_settings(options)
     checkpoint = checkpoint_path(options.out)
@@ -101,8 +103,8 @@ def _beginning(options: argparse.Namespace) -> "tuple[ARSConfig, ARSState | None
                 f"{str(checkpoint)!r} holds an unfinished training: go on with --resume, "
                 "or delete it"
             )
-        config = ars_recipe(options.recipe, **settings)
-        load_task(config.task)
+        config = ars_recipe(settings.pop("recipe", "paper"), **settings)
+        config.simulator()  # refuses what cannot be simulated before any output is made
         return config, None
     if not checkpoint.exists():
         raise PolicyFileError(f"nothing to resume: there is no {str(checkpoint)!r}")
@@ -118,7 +120,7 @@ def _beginning(options: argparse.Namespace) -> "tuple[ARSConfig, ARSState | None
 
 def given_settings(options: argparse.Namespace) -> dict[str, Any]:
     """Settings of the learner that the command line sets."""
-    ours = ("learner", "recipe", "out", "resume")
+    ours = ("learner", "out", "resume")
     return {
         name: value
         for name, value in vars(options).items()

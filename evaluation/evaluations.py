@@ -122,6 +122,7 @@ class PooledEvaluation:
         medians = np.array([member.distance.median for member in self.members])
         return {
             **_identity(self.name, self.members[0].entrant, self.task),
+            "members": [member.entrant.name for member in self.members],
             "training_seeds": [member.entrant.seed for member in self.members],
             **_figures(self.members),
             "spread": {"success": _spread(rates), "median_final_distance": _spread(medians)},
@@ -236,11 +237,13 @@ def run_trials(entrant: Entrant, trials: TrialSet, allow_other_arm: bool = False
 
 def pool(evaluations: Sequence[Evaluation]) -> tuple[PooledEvaluation, ...]:
     """Pool the training seeds of each group and task, where there are several."""
-    groups: dict[tuple[str, str], list[Evaluation]] = {}
+    groups: dict[tuple[str | None, ...], list[Evaluation]] = {}
     for evaluation in evaluations:
-        groups.setdefault((evaluation.entrant.group, evaluation.task), []).append(evaluation)
+        made = evaluation.entrant
+        key = (made.group, made.algorithm, made.recipe, made.trained_on, evaluation.task)
+        groups.setdefault(key, []).append(evaluation)
     return tuple(
-        PooledEvaluation(name, tuple(members))
-        for (name, _), members in groups.items()
+        PooledEvaluation(members[0].entrant.group, tuple(members))
+        for members in groups.values()
         if len(members) > 1
     )
