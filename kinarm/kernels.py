@@ -232,12 +232,12 @@ def box_gap(
         else:
             low = t
         step = t - slope / curvature
+        if abs(step - t) < 1e-12:
+            break
         if step <= low:
             step = 0.0 if low == 0.0 else 0.5 * (low + high)
         elif step >= high:
             step = 1.0 if high == 1.0 else 0.5 * (low + high)
-        if abs(step - t) < 1e-12:
-            break
         t = step
     norm = math.sqrt(nx * nx + ny * ny + nz * nz)
     if norm < 1e-12:
@@ -290,6 +290,12 @@ def clearance(
 
 
 @inlined
+def is_apart(bound: float) -> bool:
+    """Whether a lower bound of a distance proves freedom from contact; NaN proves nothing."""
+    return bound > MARGIN
+
+
+@inlined
 def spend_slack(
     row: int,
     travel: NDArray[np.float64],
@@ -324,7 +330,7 @@ def spend_slack(
     for pair in range(n_pairs):
         slack[row, pair] -= motion[pair]
         least = min(least, slack[row, pair])
-    return least <= MARGIN
+    return not is_apart(least)
 
 
 @inlined
@@ -365,20 +371,20 @@ def prove_step(
     n_pairs, n_axes = slack.shape[1], q.shape[1]
     doubt, open_between = 0, 0
     for pair in range(n_pairs):
-        if slack[row, pair] > MARGIN:
+        if is_apart(slack[row, pair]):
             motion[pair] = 0.0
             continue
         before = slack[row, pair] + motion[pair]
         after = clearance(pair, pairs, capsules, link, boxes, poses)
         slack[row, pair] = after
-        if after <= MARGIN:
+        if not is_apart(after):
             doubt |= 1 << (SUBSTEPS - 1)
         unproven = 0
         for k in range(1, SUBSTEPS):
             share = k / SUBSTEPS
             left = before - share * motion[pair]
             right = after - (1.0 - share) * motion[pair]
-            if max(left, right) <= MARGIN:
+            if not is_apart(max(left, right)):
                 unproven |= 1 << (k - 1)
         motion[pair] = unproven
         open_between |= unproven
@@ -389,9 +395,8 @@ def prove_step(
                 middle[0, axis] = q[row, axis] + k / SUBSTEPS * (target[row, axis] - q[row, axis])
             forward_kinematics(prismatic, translation, rotation, axes, middle, 0, between)
             for pair in range(n_pairs):
-                if (
-                    int(motion[pair]) & bit
-                    and clearance(pair, pairs, capsules, link, boxes, between) <= MARGIN
+                if int(motion[pair]) & bit and not is_apart(
+                    clearance(pair, pairs, capsules, link, boxes, between)
                 ):
                     doubt |= bit
                     break
@@ -482,7 +487,7 @@ def screen(
         tools[i, 0], tools[i, 1], tools[i, 2] = to_world(poses, n_axes, tool[0], tool[1], tool[2])
         proven[i] = True
         for pair in range(pairs.shape[0]):
-            if clearance(pair, pairs, capsules, link, boxes, poses) <= MARGIN:
+            if not is_apart(clearance(pair, pairs, capsules, link, boxes, poses)):
                 proven[i] = False
                 break
 
@@ -516,7 +521,7 @@ def begin(
         episodes.status[e] = RUNNING
         for pair in range(pairs.shape[0]):
             slack[e, pair] = clearance(pair, pairs, capsules, link, boxes, poses)
-            if slack[e, pair] <= MARGIN:
+            if not is_apart(slack[e, pair]):
                 episodes.status[e] = PAUSED
         for axis in range(q.shape[1]):
             if path.shape[0] > 0:
