@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.errors import InvalidInputError
 from kinarm.simulator import Simulator
+from kinarm.validation import whole_number
 
 
 def trial_generator(seed: int, trial: int, stream: int = 0) -> np.random.Generator:
@@ -59,11 +59,8 @@ class TrialSet:
         SceneError
             If no contact-free start exists.
         """
-        for name, value, least in (("trials", trials, 1), ("seed", seed, 0)):
-            if not isinstance(value, int | np.integer) or value < least:
-                raise InvalidInputError(
-                    f"{name} must be a whole number of at least {least}, got {value}"
-                )
+        whole_number("trials", trials, 1)
+        whole_number("seed", seed, 0)
         drawn = [simulator.sample(trial_generator(seed, trial), 1) for trial in range(trials)]
         starts, goals = (np.concatenate(part) for part in zip(*drawn, strict=True))
         starts.flags.writeable = goals.flags.writeable = False

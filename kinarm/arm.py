@@ -6,13 +6,16 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
+from xml.etree import ElementTree
 
+import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm.chain import Chain
-from kinarm.errors import ArmError, InvalidInputError, UnknownNameError
+from kinarm.errors import ArmError, UnknownNameError
+from kinarm.validation import finite_array
 
 DEFAULT_ARM = "paper"
 TOOL_FRAME = "tool0"
@@ -99,8 +102,12 @@ class Arm:
         chain = Chain.from_model(model, tool_id)
         if n_actuated is None:
             n_actuated = chain.n_axes - _trailing_idle_axes(model, chain)
-        if not 1 <= n_actuated <= chain.n_axes:
-            raise ArmError(f"n_actuated must lie in 1..{chain.n_axes}, got {n_actuated}")
+            if n_actuated == 0:
+                raise ArmError(f"no axis of {path.name} moves the tool frame {tool_frame!r}")
+        if n_actuated not in range(1, chain.n_axes + 1) or not isinstance(n_actuated, int):
+            raise ArmError(
+                f"n_actuated must be a whole number in 1..{chain.n_axes}, got {n_actuated}"
+            )
         return cls(
             name=name or model.name,
             urdf_path=path,
@@ -155,6 +162,8 @@ class Arm:
             names.append(f"{shape.name} {shape.parentJoint} {type(shape.geometry).__name__}")
             box = shape.geometry.aabb_local
             arrays += [shape.placement.homogeneous, np.array([box.min_, box.max_])]
+            if isinstance(shape.geometry, coal.ConvexBase):
+                arrays.append(np.array(shape.geometry.points()))
         content = hashlib.sha256("\n".join(names).encode())
         for array in arrays:
             # Adding zero removes the sign of zeros.
@@ -174,11 +183,7 @@ class Arm:
         ndarray, shape (3,)
             Tool point in the world frame [m].
         """
-        q = np.asarray(configuration, dtype=float)
-        if q.shape != (self.n_axes,) or not np.isfinite(q).all():
-            raise InvalidInputError(
-                f"configuration must hold {self.n_axes} finite numbers, got {configuration!r}"
-            )
+        q = finite_array("configuration", configuration, (self.n_axes,))
         data = self.model.createData()
         pin.framesForwardKinematics(self.model, data, q)
         return np.array(
@@ -197,6 +202,8 @@ def _find_urdf(name_or_urdf: str | Path) -> tuple[Path, str | None]:
     path = Path(name_or_urdf)
     if path.is_file():
         return path.resolve(), None
+    if path.is_dir():
+        raise ArmError(f"{str(path)!r} is a folder, not a URDF")
     if path.suffix == ".urdf" or path.parent != Path():
         raise ArmError(f"URDF {str(path)!r} does not exist")
     raise UnknownNameError("arm", str(name_or_urdf), (*arm_names(), "path/to/robot.urdf"))
@@ -204,6 +211,7 @@ def _find_urdf(name_or_urdf: str | Path) -> tuple[Path, str | None]:
 
 def _read_urdf(path: Path, package_dirs: list[str]) -> tuple[pin.Model, pin.GeometryModel]:
     """Parse kinematics and collision shapes; meshes become convex hulls."""
+    robot = _check_xml(path)
     try:
         model = pin.buildModelFromUrdf(str(path))
     except (ValueError, RuntimeError) as error:
@@ -217,7 +225,7 @@ def _read_urdf(path: Path, package_dirs: list[str]) -> tuple[pin.Model, pin.Geom
             f"collision shapes of {path.name} cannot be loaded: {_first_line(error)}; "
             "package_dirs names the folders of package:// meshes"
         ) from error
-    declared = path.read_text(encoding="utf-8").count("<collision")
+    declared = len(robot.findall("link/collision"))
     if geometry.ngeoms != declared:
         raise ArmError(
             f"{path.name} declares {declared} collision shapes but {geometry.ngeoms} were read; "
@@ -229,6 +237,21 @@ def _read_urdf(path: Path, package_dirs: list[str]) -> tuple[pin.Model, pin.Geom
             shape.geometry = shape.geometry.convex
         shape.geometry.computeLocalAABB()
     return model, geometry
+
+
+def _check_xml(path: Path) -> ElementTree.Element:
+    """Parse the file and refuse joints that Pinocchio would drop or take for independent."""
+    try:
+        robot = ElementTree.parse(path).getroot()
+    except (ElementTree.ParseError, OSError, UnicodeError) as error:
+        raise ArmError(f"{path.name} is not a readable URDF: {error}") from error
+    for joint in robot.findall("joint"):
+        name, kind = joint.get("name"), joint.get("type")
+        if joint.find("mimic") is not None:
+            raise ArmError(f"joint {name!r} of {path.name} mimics another one: not supported")
+        if kind in ("revolute", "prismatic") and joint.find("limit") is None:
+            raise ArmError(f"joint {name!r} of {path.name} has no limits")
+    return robot
 
 
 def _first_line(error: Exception) -> str:
@@ -285,9 +308,7 @@ def _trailing_idle_axes(model: pin.Model, chain: Chain) -> int:
 
 def _home(home: ArrayLike | None, chain: Chain) -> NDArray[np.float64]:
     """Check a home configuration, or take zero clipped to the limits."""
-    given = np.zeros(chain.n_axes) if home is None else np.array(home, dtype=float)
-    if given.shape != (chain.n_axes,) or not np.isfinite(given).all():
-        raise ArmError(f"home must hold {chain.n_axes} finite numbers, got {home!r}")
+    given = finite_array("home", np.zeros(chain.n_axes) if home is None else home, (chain.n_axes,))
     clipped: NDArray[np.float64] = np.clip(given, chain.lower, chain.upper)
     if home is not None and not np.array_equal(given, clipped):
         raise ArmError(f"home {given.tolist()} lies outside the limits")

@@ -346,7 +346,7 @@ def enclosing_capsule(shape: pin.GeometryObject) -> Capsule:
 def _capsule_around(points: NDArray[np.float64]) -> Capsule:
     """Capsule along the longest principal direction of a set of points, shape (n, 3)."""
     centre = (points.min(axis=0) + points.max(axis=0)) / 2
-    _, _, directions = np.linalg.svd(points - centre)
+    _, _, directions = np.linalg.svd(points - centre, full_matrices=False)
     direction = directions[0]
     along = (points - centre) @ direction
     across = np.linalg.norm(points - centre - along[:, None] * direction, axis=1)

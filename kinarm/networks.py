@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm.episodes import Control
 from kinarm.errors import InvalidInputError
+from kinarm.validation import finite_array
 
 
 @runtime_checkable
@@ -29,10 +30,24 @@ class Networks:
         Widths, from the observation to the action.
     weights : ndarray, shape (n_networks, n_parameters)
         Per network, layer after layer: weights (inputs x outputs, row by row), then the bias.
+
+    Raises
+    ------
+    InvalidInputError
+        If the number of parameters does not fit the widths, or one is not finite.
     """
 
     layers: NDArray[np.int64]
     weights: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        widths = np.asarray(self.layers)
+        if widths.ndim != 1 or len(widths) < 2 or (widths < 1).any():
+            raise InvalidInputError(f"layers must hold at least two widths, got {self.layers}")
+        n_parameters = int(((widths[:-1] + 1) * widths[1:]).sum())
+        object.__setattr__(self, "layers", widths.astype(np.int64))
+        weights = finite_array("weights", self.weights, (None, n_parameters))
+        object.__setattr__(self, "weights", weights)
 
     @classmethod
     def linear(cls, matrices: NDArray[np.float64], biases: NDArray[np.float64]) -> "Networks":
@@ -117,8 +132,8 @@ def network_control(
         whole = index.shape == (n,) and np.issubdtype(index.dtype, np.integer)
         if not whole or (n and not 0 <= index.min() <= index.max() < count):
             raise InvalidInputError(f"policy_index must hold {n} whole numbers in 0..{count - 1}")
-    layers = networks.layers.astype(np.int64)
-    return Control(layers, networks.weights, index.astype(np.int64), np.zeros((0, 0, 0)))
+    no_table = np.zeros((0, 0, 0))
+    return Control(networks.layers, networks.weights, index.astype(np.int64), no_table)
 
 
 def table_control(actions: NDArray[np.float64]) -> Control:

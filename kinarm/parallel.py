@@ -34,7 +34,7 @@ def run_rows(kernel: Callable[..., None], n: int, work: int, threads: int, *arra
     *arrays
         Further arguments of the kernel.
     """
-    if threads == 1 or work < PARALLEL_STEPS:
+    if threads == 1 or n == 0 or work < PARALLEL_STEPS:
         kernel(0, n, *arrays)
         return
     ranges_each = 1 if n < BALANCED_BATCH else 4

@@ -17,7 +17,7 @@ from kinarm.rollouts import Rollouts
 from kinarm.scenarios import draw_scenarios
 from kinarm.scene import Scene
 from kinarm.task import ReachTask, RewardTerms, load_task, reward_terms
-from kinarm.validation import finite_array
+from kinarm.validation import finite_array, whole_number
 
 TIME_STEP = 0.02
 """Duration of a step [s]."""
@@ -27,7 +27,17 @@ PolicyFunction = Callable[[NDArray[np.float64]], ArrayLike]
 
 
 class StepResult(NamedTuple):
-    """Outcome of one step of n episodes; arrays of shape (n,)."""
+    """Outcome of one step of n episodes; arrays of shape (n,).
+
+    Attributes
+    ----------
+    reward : ndarray
+        Sum of the terms; zero for episodes that were over before.
+    terms : RewardTerms
+        The weighted terms.
+    success, collision, truncated : ndarray of bool
+        How the step ended; all false for episodes that go on or were over before.
+    """
 
     reward: NDArray[np.float64]
     terms: RewardTerms
@@ -81,10 +91,10 @@ class Simulator:
         time_step: float = TIME_STEP,
         threads: int | None = None,
     ) -> None:
-        if not time_step > 0:
-            raise InvalidInputError(f"time_step must be greater than 0 s, got {time_step}")
-        if threads is not None and threads < 1:
-            raise InvalidInputError(f"threads must be at least 1, got {threads}")
+        if not 0 < time_step < float("inf"):
+            raise InvalidInputError(f"time_step must be finite and above 0 s, got {time_step}")
+        if threads is not None:
+            whole_number("threads", threads, 1)
         self.arm = arm if isinstance(arm, Arm) else Arm.load(arm)
         self.task = load_task(task)
         self.scene = scene or Scene()
@@ -192,9 +202,10 @@ class Simulator:
         self._advance(table_control(table[:, None, :]), episodes, len(table))
         success = running & (episodes.status == SUCCESS)
         collision = running & (episodes.status == COLLISION)
-        terms = reward_terms(
-            self.task.reward, episodes.previous_distance, episodes.distance, collision, success
-        )
+        before = np.where(running, episodes.previous_distance, episodes.distance)
+        terms = reward_terms(self.task.reward, before, episodes.distance, collision, success)
+        if self.task.reward.step:
+            terms = terms._replace(step=np.where(running, terms.step, 0.0))
         return StepResult(
             reward=terms.total,
             terms=terms,
@@ -226,7 +237,7 @@ class Simulator:
         goals : array_like, shape (n, 3)
             Goal positions [m].
         policy_index : array_like of int, shape (n,), optional
-            Which policy drives which episode, where there are several.
+            Which compiled policy drives which episode, where there are several.
         record : bool
             Keep the configurations visited.
         shift : ndarray, shape (n_observations,), optional
@@ -244,6 +255,8 @@ class Simulator:
             shift = finite_array("shift", shift, (self.n_observations,))
         episodes = self._begin(q, goal, record, shift)
         if callable(policies) and not isinstance(policies, CompiledPolicy):
+            if policy_index is not None:
+                raise InvalidInputError("policy_index does not apply to a function")
             self._follow(policies, episodes)
         else:
             widths = (self.n_observations, self.n_actions)
@@ -321,7 +334,20 @@ class Simulator:
     def check_scenarios(
         self, starts: ArrayLike, goals: ArrayLike
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Validate starts and goals."""
+        """Validate starts and goals.
+
+        Returns
+        -------
+        starts : ndarray, shape (n, n_axes)
+            Configurations [rad or m].
+        goals : ndarray, shape (n, 3)
+            Goal positions [m].
+
+        Raises
+        ------
+        InvalidInputError
+            If a shape is wrong, an entry is not finite or a start is beyond the limits.
+        """
         q = finite_array("starts", starts, (None, self.arm.n_axes))
         goal = finite_array("goals", goals, (len(q), 3))
         outside = ((q < self.arm.lower) | (q > self.arm.upper)).any(axis=1)

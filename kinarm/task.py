@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from kinarm.errors import SceneError, UnknownNameError
 from kinarm.scene import Scene
+from kinarm.validation import whole_number
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +41,13 @@ class RewardWeights:
 
 
 class RewardTerms(NamedTuple):
-    """Weighted terms of a reward, each of shape (n,) or scalar; their sum is the reward."""
+    """Weighted terms of a reward; their sum is the reward.
+
+    Attributes
+    ----------
+    progress, collision, success, step : ndarray, shape (n,)
+        See `RewardWeights`.
+    """
 
     progress: NDArray[np.float64]
     collision: NDArray[np.float64]
@@ -118,8 +125,7 @@ class ReachTask:
             raise SceneError(f"task {self.name!r} names no bench")
         if not (math.isfinite(self.tolerance) and self.tolerance > 0):
             raise SceneError(f"tolerance must be greater than 0 m, got {self.tolerance}")
-        if self.horizon < 1:
-            raise SceneError(f"horizon must be at least 1 step, got {self.horizon}")
+        whole_number("horizon", self.horizon, 1)
         if not 0 <= self.start_spread <= 1:
             raise SceneError(f"start_spread must lie in [0, 1], got {self.start_spread}")
 

@@ -37,3 +37,18 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> 
         where = np.argwhere(~np.isfinite(array))[0].tolist()
         raise InvalidInputError(f"{name} must be finite, got {array[tuple(where)]} at {where}")
     return array
+
+
+def whole_number(name: str, value: object, at_least: int) -> int:
+    """Return a whole number that is large enough, or refuse it.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is not an integer, or too small.
+    """
+    if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < at_least:
+        raise InvalidInputError(
+            f"{name} must be a whole number of at least {at_least}, got {value!r}"
+        )
+    return int(value)

@@ -19,6 +19,7 @@ from kinarm.episodes import RUNNING, Episodes
 from kinarm.errors import InvalidInputError
 from kinarm.scenarios import ScenarioStream
 from kinarm.simulator import StepResult
+from kinarm.validation import whole_number
 
 
 class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
@@ -98,6 +99,8 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         if self._episodes is None:
             self._episodes = self.simulator.reset(starts, goals)
         else:
+            if chosen:
+                self.simulator.reset(starts, goals)  # refuses a bad choice before any change
             self._restart(self._episodes, rows, starts, goals)
         distance = np.zeros(self.num_envs)
         distance[rows] = self._episodes.distance[rows]
@@ -118,14 +121,19 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
             raise InvalidInputError(f"episodes {over} are over: reset them with reset_mask")
         result = self.simulator.step(episodes, actions)
         infos = self._step_infos(episodes, result, before)
-        reward = np.where(before, result.reward, 0.0)
         ended = np.flatnonzero(before & (episodes.status != RUNNING))
         if self.autoreset_mode is AutoresetMode.NEXT_STEP and not before.all():
             self._renew(episodes, np.flatnonzero(~before), infos)
         if self.autoreset_mode is AutoresetMode.SAME_STEP and ended.size:
             self._keep_final(episodes, ended, infos)
             self._renew(episodes, ended, infos)
-        return episodes.observation.copy(), reward, result.terminated, result.truncated, infos
+        return (
+            episodes.observation.copy(),
+            result.reward,
+            result.terminated,
+            result.truncated,
+            infos,
+        )
 
     def _step_infos(
         self, episodes: Episodes, result: StepResult, stepped: NDArray[np.bool_]
@@ -139,10 +147,7 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
             "success": result.success.copy(),
             "collision": result.collision.copy(),
             "contact": contact,
-            **{
-                f"reward_{name}": np.where(stepped, term, 0.0)
-                for name, term in result.terms._asdict().items()
-            },
+            **{f"reward_{name}": term.copy() for name, term in result.terms._asdict().items()},
         }
         for key in tuple(infos):
             infos[f"_{key}"] = stepped.copy()
@@ -182,8 +187,7 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         self, episodes: Episodes, rows: NDArray[np.int64], starts: Array, goals: Array
     ) -> None:
         """Put new starts and goals into some rows of the batch."""
-        checked = self.simulator.check_scenarios(starts, goals)
-        episodes.q[rows], episodes.goal[rows] = checked
+        episodes.q[rows], episodes.goal[rows] = starts, goals
         self.simulator.begin(episodes, rows)
 
     def _masked_rows(self, mask: object) -> NDArray[np.int64]:
@@ -202,10 +206,10 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         if seed is None:
             return [None] * self.num_envs
         if isinstance(seed, int | np.integer):
-            return [int(seed) + row for row in range(self.num_envs)]
+            return [whole_number("seed", seed, 0) + row for row in range(self.num_envs)]
         if len(seed) != self.num_envs:
             raise InvalidInputError(f"seed must hold {self.num_envs} numbers, got {len(seed)}")
-        return list(seed)
+        return [None if one is None else whole_number("seed", one, 0) for one in seed]
 
     def _stream(self, seed: Any) -> ScenarioStream:
         return ScenarioStream(self.simulator, np.random.default_rng(seed))

@@ -18,6 +18,7 @@ from kinarm.policies.policy import Layer, Policy
 from kinarm.policies.provenance import Provenance, package_versions, source_commit
 from kinarm.simulator import Simulator
 from kinarm.task import RewardWeights, load_task
+from kinarm.validation import whole_number
 
 Sharing = Literal["none", "pair", "iteration"]
 Schedule = Literal["constant", "linear"]
@@ -96,8 +97,8 @@ class ARSConfig:
 
     def __post_init__(self) -> None:
         for name in ("directions", "top_directions", "iterations", "episodes", "horizon"):
-            if getattr(self, name) < 1:
-                raise InvalidInputError(f"{name} must be at least 1, got {getattr(self, name)}")
+            whole_number(name, getattr(self, name), 1)
+        whole_number("seed", self.seed, 0)
         for name in ("step_size", "noise"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
@@ -107,8 +108,6 @@ class ARSConfig:
                 f"top_directions must be at most directions ({self.directions}), "
                 f"got {self.top_directions}"
             )
-        if self.seed < 0:
-            raise InvalidInputError(f"seed must be at least 0, got {self.seed}")
         for name, choices in (
             ("sharing", get_args(Sharing)),
             ("step_size_schedule", get_args(Schedule)),
@@ -231,6 +230,9 @@ def train_ars(
     """
     simulator = config.simulator(threads)
     state = state or initial_state(config, simulator)
+    shape = (simulator.n_actions, simulator.n_observations)
+    if state.theta.shape != shape:
+        raise InvalidInputError(f"the state to resume has shape {state.theta.shape}, not {shape}")
     mirror = task_mirror(config, simulator)
     began = time.perf_counter() - state.wall_time
     while state.iteration < config.iterations:

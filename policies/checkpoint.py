@@ -14,6 +14,7 @@ from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.policy import CORRUPT
 
 FILE_FORMAT = "kinarm-ars-checkpoint"
+FILE_VERSION = 1
 
 
 def save_checkpoint(path: str | Path, config: ARSConfig, state: ARSState) -> None:
@@ -26,6 +27,7 @@ def save_checkpoint(path: str | Path, config: ARSConfig, state: ARSState) -> Non
     """
     arrays: dict[str, Any] = {
         "format": np.array(FILE_FORMAT),
+        "version": np.array(FILE_VERSION),
         "config": np.array(json.dumps(asdict(config), sort_keys=True)),
         "generator": np.array(json.dumps(state.generator, sort_keys=True)),
         "theta": state.theta,
@@ -50,6 +52,8 @@ def load_checkpoint(path: str | Path) -> tuple[ARSConfig, ARSState]:
             content = np.load(file, allow_pickle=False)
             if str(content["format"]) != FILE_FORMAT:
                 raise PolicyFileError(f"{str(path)!r} is not a checkpoint of a training")
+            if int(content["version"]) > FILE_VERSION:
+                raise PolicyFileError(f"{str(path)!r} was written by a later version of kinarm")
             state = ARSState(
                 theta=content["theta"],
                 normalizer=Normalizer(int(content["count"]), content["mean"], content["squares"]),
@@ -65,10 +69,20 @@ def load_checkpoint(path: str | Path) -> tuple[ARSConfig, ARSState]:
                     for row in content["curve"]
                 ),
             )
+            _check_state(state)
             return ARSConfig(**json.loads(str(content["config"]))), state
     except OSError as error:
         raise PolicyFileError(f"cannot read checkpoint {str(path)!r}: {error.strerror}") from error
-    except (ValueError, KeyError, TypeError, EOFError, *CORRUPT) as error:
+    except (ValueError, IndexError, KeyError, TypeError, EOFError, *CORRUPT) as error:
         if isinstance(error, InvalidInputError):
             raise
         raise PolicyFileError(f"{str(path)!r} is not a complete checkpoint") from error
+
+
+def _check_state(state: ARSState) -> None:
+    """Raise ValueError or TypeError if a training could not go on from a state."""
+    n_actions, n_observations = state.theta.shape
+    for statistic in (state.normalizer.mean, state.normalizer.squares):
+        if statistic.shape != (n_observations,):
+            raise ValueError(f"statistics of {statistic.shape} for {n_actions, n_observations}")
+    np.random.default_rng().bit_generator.state = state.generator

@@ -46,7 +46,7 @@ class Normalizer:
 
     @property
     def std(self) -> NDArray[np.float64]:
-        """Population standard deviation, shape (n_observations,)."""
+        """Population standard deviation, shape (n_observations,); 1 before any observation."""
         if self.count == 0:
             return np.ones_like(self.mean)
         return np.sqrt(self.squares / self.count)

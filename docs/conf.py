@@ -1,0 +1,112 @@
+"""Sphinx configuration: the site builds offline, and a warning fails it."""
+
+import re
+import sys
+import warnings
+from pathlib import Path
+
+import matplotlib as mpl
+from docutils import nodes
+from sphinx import addnodes
+from sphinx.application import Sphinx
+
+mpl.use("Agg")  # examples run without a display
+sys.path.insert(0, str(Path(__file__).parent))  # tables.py, and drawing.py for the examples
+
+import kinarm
+
+# sphinx-autodoc-typehints calls what Sphinx 10 will rename.
+warnings.filterwarnings("ignore", message=".*set_application.*is deprecated")
+
+project = "kinarm"
+author = "The kinarm developers"
+copyright = "The kinarm developers"  # noqa: A001  (Sphinx's name)
+version = release = kinarm.__version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_autodoc_typehints",
+    "sphinx_gallery.gen_gallery",
+    "tables",
+]
+# examples: read by sphinx-gallery, which writes its pages to gallery.
+exclude_patterns = ["_build", "examples"]
+nitpicky = True
+# Docstrings put names of ours between single backticks.
+default_role = "py:obj"
+
+myst_enable_extensions = ["colon_fence", "deflist"]
+myst_heading_anchors = 3
+
+napoleon_google_docstring = False
+napoleon_use_param = False  # types such as "ndarray, shape (n, 3)" are text and not names
+napoleon_use_rtype = False
+autodoc_member_order = "bysource"
+autodoc_class_signature = "mixed"
+typehints_use_signature_return = True
+typehints_document_rtype = False
+always_use_bars_union = True
+
+# Types of other projects: their inventories would have to be fetched.
+nitpick_ignore_regex = [
+    (r"py:.*", r"(numpy|pinocchio|gymnasium|pathlib|collections|typing)\..*"),
+    (r"py:data", r"Ellipsis"),
+]
+
+sphinx_gallery_conf = {
+    "examples_dirs": "examples",
+    "gallery_dirs": "gallery",
+    "abort_on_example_error": True,
+    "image_scrapers": ("matplotlib",),
+    "matplotlib_animations": False,
+    "capture_repr": (),
+    "remove_config_comments": True,
+    "show_memory": False,
+    "show_signature": False,
+    "min_reported_time": 1e9,
+    "write_computation_times": False,
+    "download_all_examples": False,
+    "doc_module": ("kinarm",),
+    "reference_url": {"kinarm": None},
+    "backreferences_dir": None,
+}
+
+html_theme = "furo"
+html_title = f"kinarm {release}"
+html_static_path = ["_static"]
+html_copy_source = False
+html_show_sphinx = False
+
+
+def _attribute_types_as_text(
+    _app: object, _what: str, _name: str, _obj: object, _options: object, lines: list[str]
+) -> None:
+    """Put an attribute's type before its description, as text: its words are not all names."""
+    description = 0
+    for number, line in enumerate(lines):
+        if line.lstrip().startswith(".. attribute::"):
+            description = number + 2
+        elif match := re.match(r"^(\s+):type: (.*)$", line):
+            indent, words = match.groups()
+            lines[description] = f"{indent}*{words}*: {lines[description].lstrip()}"
+            lines[number] = ""
+
+
+def _shorten_annotations(_app: object, doctree: nodes.document) -> None:
+    """Write array types as their names, and leave out that something returns None."""
+    kinds = (addnodes.desc_annotation, addnodes.desc_returns)
+    for node in list(doctree.findall(lambda node: isinstance(node, kinds))):
+        text = "".join(child.astext() for child in node.children)
+        short = re.sub(r"ndarray\[tuple\[Any, \.\.\.\], dtype\[\w+\]\]", "ndarray", text)
+        if isinstance(node, addnodes.desc_returns) and text == "None":
+            node.parent.remove(node)
+        elif short != text:
+            node.children = [nodes.Text(short)]
+
+
+def setup(app: Sphinx) -> None:
+    """Mend what napoleon and autodoc write."""
+    app.connect("autodoc-process-docstring", _attribute_types_as_text, priority=900)
+    app.connect("doctree-read", _shorten_annotations)

@@ -1,0 +1,92 @@
+"""Running the command lines, in this process and in others."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from kinarm.evaluation import bench, eval  # noqa: A004
+from kinarm.policies import Policy, ars_recipe, train, train_ars
+
+ROOT = Path(__file__).resolve().parents[2]
+MODULES = {
+    "kinarm-eval": "kinarm.evaluation.eval",
+    "kinarm-train": "kinarm.policies.train",
+    "kinarm-bench": "kinarm.evaluation.bench",
+}
+MAINS = {"kinarm-eval": eval.main, "kinarm-train": train.main, "kinarm-bench": bench.main}
+
+
+class Answer(NamedTuple):
+    """What a command line left behind."""
+
+    status: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., Answer]:
+    """Run a command line in this process; an error that it does not catch fails the test."""
+
+    def call(program: str, *arguments: object) -> Answer:
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as stopped:
+            MAINS[program]([str(argument) for argument in arguments])
+        return Answer(stopped.value.code or 0, *capsys.readouterr())
+
+    return call
+
+
+@pytest.fixture(scope="session")
+def command() -> Callable[..., list[str]]:
+    """Spell a command line out for a process of its own."""
+
+    def spell(program: str, *arguments: object) -> list[str]:
+        return [sys.executable, "-m", MODULES[program], *map(str, arguments)]
+
+    return spell
+
+
+@pytest.fixture(scope="session")
+def run_outside(command: Callable[..., list[str]]) -> Callable[..., Answer]:
+    """Run a command line in a process of its own."""
+
+    def call(program: str, *arguments: object, **settings: object) -> Answer:
+        done = subprocess.run(
+            command(program, *arguments),
+            **{"cwd": ROOT, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **settings},
+            text=True,
+            timeout=120,
+            check=False,
+            env={**os.environ, "COLUMNS": "100"},
+        )
+        return Answer(done.returncode, done.stdout or "", done.stderr or "")
+
+    return call
+
+
+@pytest.fixture(scope="session")
+def policy() -> Policy:
+    """A policy for ``right``, hardly trained."""
+    return train_ars(ars_recipe("paper", task="right", iterations=5)).policy
+
+
+@pytest.fixture(scope="session")
+def policy_folder(policy: Policy, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Policy files: two seeds for ``right``, one for ``left``, one for another arm."""
+    folder = tmp_path_factory.mktemp("policies")
+    policy.save(folder / "mine-seed0.npz")
+    others = {
+        "mine-seed1": {"task": "right", "seed": 1},
+        "lefty": {"task": "left"},
+        "flange": {"task": "right", "arm": "paper_flange"},
+    }
+    for name, settings in others.items():
+        config = ars_recipe("paper", iterations=2, **settings)
+        train_ars(config).policy.save(folder / f"{name}.npz")
+    return folder

@@ -1,0 +1,338 @@
+"""Bad input: one line on standard error, exit status 2, nothing else printed, nothing lost."""
+
+import io
+import json
+import os
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from kinarm.arm import arm_names
+from kinarm.policies import Layer
+
+ARMS = ", ".join(arm_names())
+LIMITS = '<limit lower="-1" upper="1" velocity="1" effort="0"/>'
+
+
+def check_refused(answer, *words: str) -> None:
+    """One line that names what is wrong, and status 2."""
+    assert answer.status == 2, answer
+    assert answer.out == ""
+    assert answer.err.endswith("\n")
+    assert len(answer.err.splitlines()) == 1, answer.err
+    assert answer.err.startswith("kinarm-")
+    for word in words:
+        assert word in answer.err, answer.err
+
+
+def robot(joint: str, tool: str = "tool0") -> str:
+    """A robot with one interesting joint and a tool."""
+    return (
+        '<robot name="made" version="1.2"><link name="base"/><link name="a"/>'
+        f'<link name="{tool}"/>{joint}<joint name="mount" type="fixed"><parent link="a"/>'
+        f'<child link="{tool}"/><origin xyz="0.1 0 0"/></joint></robot>'
+    )
+
+
+def joint(kind: str, limits: str = LIMITS) -> str:
+    return (
+        f'<joint name="turn" type="{kind}"><parent link="base"/><child link="a"/>'
+        f'<origin xyz="0 0 0.5"/><axis xyz="0 0 1"/>{limits}</joint>'
+    )
+
+
+UNUSABLE_ROBOTS = {
+    "malformed": ("<robot", "urdf"),
+    "empty": ("", "urdf"),
+    "no xml": ("hello", "urdf"),
+    "no tool frame": (robot(joint("revolute"), tool="hand"), "tool0"),
+    "floating base": (robot(joint("floating", "")), "fixed"),
+    "continuous joint": (robot(joint("continuous", "")), "limits"),
+    "no limits": (robot(joint("revolute", "")), "urdf"),
+    "no rated speed": (robot(joint("revolute", LIMITS.replace('velocity="1"', ""))), "urdf"),
+    "no joint": (robot(joint("fixed", "")), "urdf"),
+}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--task", "upwards"], ["'upwards'", "left, right, both"]),
+        (["--arm", "nobody"], ["'nobody'", ARMS]),
+        (["--arm", "missing.urdf"], ["missing.urdf"]),
+        (["--arm", ""], []),
+        (["--policy", "nobody"], ["'nobody'", "random, zero"]),
+        (["--policy", "nobody.npz"], ["nobody.npz", "No such file"]),
+        (["--policy", ""], []),
+        (["--trials", "0"], ["--trials", "'0'", "at least 1"]),
+        (["--trials", "-3"], ["--trials"]),
+        (["--trials", "many"], ["--trials", "'many'"]),
+        (["--trials", "2.5"], ["--trials"]),
+        (["--seed", "-1"], ["--seed", "'-1'", "at least 0"]),
+        (["--upwards"], ["--upwards"]),
+        (["stray"], ["stray"]),
+    ],
+)
+def test_eval_refuses(run, arguments, words):
+    check_refused(run("kinarm-eval", "--policy", "zero", "--trials", "2", *arguments), *words)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--task", "upwards"], ["'upwards'", "left, right, both"]),
+        (["--recipe", "nothing"], ["'nothing'", "paper, tuned"]),
+        (["--arm", "nobody"], ["'nobody'", ARMS]),
+        (["--arm", "missing.urdf"], ["missing.urdf"]),
+        (["--seed", "-1"], ["--seed", "'-1'"]),
+        (["--iterations", "0"], ["--iterations"]),
+        (["--directions", "many"], ["--directions", "'many'"]),
+        (["--top-directions", "25"], ["top_directions", "24"]),
+        (["--noise", "0"], ["noise", "greater than 0"]),
+        (["--noise", "nan"], ["--noise", "finite"]),
+        (["--step-size", "-1"], ["step_size"]),
+        (["--success-bonus", "inf"], ["--success-bonus"]),
+        (["--start-spread", "1.5"], ["start_spread", "1.5"]),
+        (["--sharing", "all"], ["--sharing", "'all'"]),
+        (["--resume"], ["nothing to resume"]),
+        (["--upwards"], ["--upwards"]),
+    ],
+)
+def test_train_refuses(run, tmp_path, arguments, words):
+    answer = run("kinarm-train", "ars", "--out", tmp_path / "p.npz", *arguments)
+    check_refused(answer, *words)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("arguments", [[], ["nobody"], ["ars"]])
+def test_train_needs_a_learner_and_a_file(run, arguments):
+    check_refused(run("kinarm-train", *arguments))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--policy", "nobody"], ["'nobody'"]),
+        (["--policy", "nobody.npz"], ["nobody.npz"]),
+        (["--repetitions", "0"], ["--repetitions"]),
+        (["--upwards"], ["--upwards"]),
+    ],
+)
+def test_bench_refuses(run, arguments, words):
+    check_refused(run("kinarm-bench", *arguments), *words)
+
+
+@pytest.mark.parametrize("case", UNUSABLE_ROBOTS)
+@pytest.mark.parametrize("program", ["kinarm-eval", "kinarm-train"])
+def test_unusable_robots_are_refused(run, tmp_path, program, case):
+    content, word = UNUSABLE_ROBOTS[case]
+    path = tmp_path / "robot.urdf"
+    path.write_text(content)
+    others = ["ars", "--out", tmp_path / "p.npz"] if program == "kinarm-train" else []
+    check_refused(run(program, *others, "--arm", path), word)
+
+
+def test_a_robot_that_always_touches_the_ground_is_refused(run, tmp_path):
+    ball = '<collision><geometry><sphere radius="1"/></geometry></collision>'
+    content = (
+        '<robot name="made" version="1.2"><link name="base"/><link name="a"/>'
+        f'<link name="b">{ball}</link><link name="tool0"/>{joint("revolute")}'
+        f'<joint name="tip" type="revolute"><parent link="a"/><child link="b"/>'
+        f'<axis xyz="0 1 0"/>{LIMITS}</joint><joint name="mount" type="fixed">'
+        '<parent link="b"/><child link="tool0"/><origin xyz="0.1 0 0"/></joint></robot>'
+    )
+    path = tmp_path / "robot.urdf"
+    path.write_text(content)
+    answer = run("kinarm-eval", "--policy", "random", "--arm", path)
+    check_refused(answer, "no contact-free start", "b touches")
+
+
+def archive(**changes) -> bytes:
+    """A file as Policy.save writes it, with some arrays replaced; None leaves one out."""
+    arrays = {"format": np.array("kinarm-policy"), "version": np.array(1), **changes}
+    file = io.BytesIO()
+    np.savez(file, **{key: value for key, value in arrays.items() if value is not None})
+    return file.getvalue()
+
+
+def single_array() -> bytes:
+    file = io.BytesIO()
+    np.save(file, np.zeros(3))
+    return file.getvalue()
+
+
+@pytest.fixture
+def valid(policy_folder) -> dict[str, np.ndarray]:
+    with np.load(policy_folder / "mine-seed0.npz") as content:
+        return dict(content)
+
+
+@pytest.mark.parametrize("program", ["kinarm-eval", "kinarm-bench"])
+@pytest.mark.parametrize(
+    "case", ["empty", "text", "array", "foreign", "future", "bare", "nan", "provenance", "pickle"]
+)
+def test_unusable_policy_files_are_refused(run, tmp_path, valid, program, case):
+    entries = json.loads(str(valid["provenance"]))
+    contents = {
+        "empty": b"",
+        "text": b"hello",
+        "array": single_array(),
+        "foreign": archive(format=np.array("other-policy")),
+        "future": archive(**{**valid, "version": np.array(2)}),
+        "bare": archive(),
+        "nan": archive(**{**valid, "mean": np.full(48, np.nan)}),
+        "provenance": archive(**{**valid, "provenance": np.array(json.dumps({"task": "left"}))}),
+        "pickle": archive(**{**valid, "mean": np.array([entries], dtype=object)}),
+    }
+    path = tmp_path / "bad.npz"
+    path.write_bytes(contents[case])
+    words = {"future": ["version 2"], "foreign": ["other-policy"]}.get(case, [])
+    check_refused(run(program, "--policy", path), "bad.npz", *words)
+
+
+@pytest.mark.parametrize("share", [0.01, 0.3, 0.6, 0.9, 0.999])
+def test_truncated_policy_files_are_refused(run, tmp_path, policy_folder, share):
+    whole = (policy_folder / "mine-seed0.npz").read_bytes()
+    path = tmp_path / "short.npz"
+    path.write_bytes(whole[: int(share * len(whole))])
+    check_refused(run("kinarm-eval", "--policy", path), "short.npz")
+
+
+@given(st.data())
+@settings(
+    max_examples=60,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+def test_damaged_policy_files_are_refused_or_harmless(run, tmp_path, policy_folder, data):
+    """Whatever byte is wrong: an answer, no traceback."""
+    content = bytearray((policy_folder / "mine-seed0.npz").read_bytes())
+    place = data.draw(st.integers(0, len(content) - 1))
+    content[place] ^= data.draw(st.integers(1, 255))
+    path = tmp_path / "damaged.npz"
+    path.write_bytes(content)
+    answer = run("kinarm-eval", "--policy", path, "--task", "right", "--trials", 1)
+    if answer.status != 0:
+        check_refused(answer, "damaged.npz")
+
+
+@pytest.mark.parametrize("content", [b"\x50\x4b\x03\x04", b"\x93NUMPY", b"\x80\x04]"])
+def test_files_that_only_begin_well_are_refused(run, tmp_path, content):
+    path = tmp_path / "short.npz"
+    path.write_bytes(content)
+    check_refused(run("kinarm-eval", "--policy", path), "short.npz")
+
+
+def test_a_compressed_and_damaged_archive_is_refused(run, tmp_path):
+    file = io.BytesIO()
+    np.savez_compressed(file, format=np.array("kinarm-policy"), version=np.zeros(500))
+    content = bytearray(file.getvalue())
+    content[60:90] = b"\xff" * 30
+    path = tmp_path / "damaged.npz"
+    path.write_bytes(content)
+    check_refused(run("kinarm-eval", "--policy", path), "damaged.npz")
+
+
+def test_a_policy_of_the_wrong_size_is_refused(run, tmp_path, policy):
+    small = replace(
+        policy, mean=np.zeros(41), std=np.ones(41), layers=(Layer(np.zeros((5, 41)), np.zeros(5)),)
+    )
+    small.save(tmp_path / "small.npz")
+    answer = run("kinarm-eval", "--policy", tmp_path / "small.npz", "--trials", 2)
+    check_refused(answer, "41", "48")
+
+
+def test_a_policy_of_another_arm_is_refused(run, policy_folder):
+    answer = run("kinarm-eval", "--policy", policy_folder / "flange.npz", "--trials", 2)
+    check_refused(answer, "'paper_flange'", "'paper'")
+    answer = run("kinarm-bench", "--policy", policy_folder / "flange.npz")
+    check_refused(answer, "'paper_flange'", "'paper'")
+
+
+def test_a_folder_is_no_policy(run, tmp_path):
+    check_refused(run("kinarm-eval", "--policy", tmp_path), str(tmp_path))
+
+
+def test_an_output_folder_that_cannot_be_made_is_refused(run, tmp_path):
+    (tmp_path / "file").write_text("mine")
+    for out in (tmp_path / "file", tmp_path / "file" / "deep"):
+        answer = run("kinarm-eval", "--policy", "zero", "--trials", 1, "--out", out)
+        check_refused(answer, "file")
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", ["evaluation.json", "final_distance.png", "final_distance.svg"])
+def test_results_that_cannot_be_written_are_refused(run, tmp_path, name):
+    (tmp_path / name).mkdir()
+    arguments = ("--policy", "zero", "--task", "left", "--trials", 1, "--out", tmp_path)
+    check_refused(run("kinarm-eval", *arguments), str(tmp_path))
+
+
+def test_a_failed_evaluation_leaves_earlier_results_alone(run, tmp_path, policy_folder):
+    files = ("evaluation.json", "final_distance.png", "final_distance.svg")
+    for name in files:
+        (tmp_path / name).write_text("mine")
+    for bad in (
+        ["--policy", "nobody"],
+        ["--task", "upwards"],
+        ["--policy", policy_folder / "flange.npz"],
+        ["--trials", "0"],
+    ):
+        check_refused(run("kinarm-eval", "--out", tmp_path, *bad))
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(files)
+    assert all((tmp_path / name).read_text() == "mine" for name in files)
+
+
+@pytest.mark.parametrize("out", ["missing/p.npz", "p.txt", "p", "file/p.npz"])
+def test_a_policy_that_cannot_be_written_is_refused_before_training(run, tmp_path, out):
+    (tmp_path / "file").write_text("mine")
+    answer = run("kinarm-train", "ars", "--iterations", 1, "--out", tmp_path / out)
+    check_refused(answer, out.split("/")[0])
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize("name", ["p.npz", "p.curve.csv"])
+def test_a_folder_in_the_way_of_a_result_costs_no_training(run, tmp_path, name):
+    """Either it is noticed before the training, or the training can be had without another one."""
+    (tmp_path / name).mkdir()
+    arguments = ("kinarm-train", "ars", "--iterations", 3, "--out", tmp_path / "p.npz")
+    answer = run(*arguments)
+    assert answer.status == 2
+    kept = {path.name for path in tmp_path.iterdir() if path.is_file()}
+    begun = "/3 " in answer.err
+    assert not begun or kept & {"p.npz", "p.checkpoint.npz"}
+
+
+def test_an_earlier_policy_survives_a_failed_training(run, tmp_path, policy_folder):
+    path = tmp_path / "p.npz"
+    path.write_bytes((policy_folder / "lefty.npz").read_bytes())
+    for bad in (["--task", "upwards"], ["--arm", "nobody"], ["--resume"], ["--noise", "0"]):
+        check_refused(run("kinarm-train", "ars", "--out", path, *bad))
+    assert path.read_bytes() == (policy_folder / "lefty.npz").read_bytes()
+    assert [item.name for item in tmp_path.iterdir()] == ["p.npz"]
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")  # noqa: PTH110
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("extra", [(), ("--json",)])
+def test_a_full_disk_is_reported_in_one_line(run_outside, extra, unbuffered, monkeypatch):
+    monkeypatch.setenv("PYTHONUNBUFFERED", unbuffered)
+    arguments = ("--policy", "zero", "--task", "left", "--trials", 1, *extra)
+    with open("/dev/full", "w") as full:  # noqa: PTH123
+        answer = run_outside("kinarm-eval", *arguments, stdout=full)
+    assert answer.status in (1, 2)
+    assert len(answer.err.splitlines()) == 1, answer.err
+
+
+def test_a_refusal_is_the_same_in_a_process_of_its_own(run_outside, tmp_path):
+    path = tmp_path / "bad.npz"
+    path.write_bytes(b"PK")
+    for program, arguments in (
+        ("kinarm-eval", ["--policy", path]),
+        ("kinarm-train", ["ars", "--arm", "nobody", "--out", tmp_path / "p.npz"]),
+        ("kinarm-bench", ["--policy", path]),
+    ):
+        check_refused(run_outside(program, *arguments))

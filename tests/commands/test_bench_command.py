@@ -1,0 +1,53 @@
+"""``kinarm-bench``: JSON alone, or a table, from the same figures."""
+
+import json
+
+import pytest
+
+from kinarm.evaluation import bench
+from kinarm.policies import recipes
+
+
+@pytest.fixture(autouse=True)
+def small(monkeypatch):
+    """Sizes for a test."""
+    whole = recipes.ars_recipe
+    monkeypatch.setattr(bench, "BATCHES", (512,))
+    monkeypatch.setattr(recipes, "ars_recipe", lambda name, **kw: whole(name, iterations=2, **kw))
+
+
+def test_json_alone_is_printed(run, policy_folder):
+    path = policy_folder / "mine-seed0.npz"
+    answer = run("kinarm-bench", "--json", "--repetitions", 1, "--policy", path)
+    document = json.loads(answer.out)
+    assert (answer.status, answer.err) == (0, "")
+    assert {
+        "rollouts",
+        "vector_environment",
+        "single_environment",
+        "reference",
+        "speed_up_over_reference",
+        "table_1_training",
+    } <= set(document)
+    assert document["policy"] == str(path)
+
+
+def test_table_shows_every_figure(run, monkeypatch, policy_folder):
+    row = {"batch": 512, "actions": "trained", "threads": 2, "judged_per_step": 0.0125}
+    rate = {"median": 1234567.0, "best": 2345678.0}
+    document = {
+        "policy": "mine",
+        "rollouts": [{**row, "steps_per_second": rate}],
+        "vector_environment": {"median": 400001.0, "best": 400002.0},
+        "single_environment": {"median": 20001.0, "best": 20002.0},
+        "reference": {"median": 5001.0, "best": 5002.0},
+        "speed_up_over_reference": 246.8,
+        "table_1_training": {
+            "seconds": {"median": 1.52, "best": 1.41},
+            "environment_steps": 2_300_000,
+        },
+    }
+    monkeypatch.setattr(bench, "measure", lambda *_: document)
+    answer = run("kinarm-bench")
+    for figure in ("1,234,567", "2,345,678", "400,001", "20,001", "5,001", "247 x", "1.25", "1.52"):
+        assert figure in answer.out, figure

@@ -1,0 +1,99 @@
+"""``--help`` is complete, quick and works everywhere."""
+
+import os
+import subprocess
+import sys
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PROGRAMS = {
+    "kinarm-eval": "kinarm.evaluation.eval",
+    "kinarm-train": "kinarm.policies.train",
+    "kinarm-bench": "kinarm.evaluation.bench",
+}
+HEAVY = ("torch", "numba", "matplotlib", "pinocchio", "coal", "scipy", "stable_baselines3")
+
+SHOW_HELP = """
+import contextlib, importlib, io, sys
+module = importlib.import_module({module!r})
+module.build_parser()
+with contextlib.redirect_stdout(io.StringIO()) as text:
+    try:
+        module.main(["--help"])
+    except SystemExit as stopped:
+        assert stopped.code == 0, stopped.code
+assert "usage: {program}" in text.getvalue()
+loaded = [name for name in {heavy!r} if name in sys.modules]
+assert not loaded, loaded
+"""
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_help_loads_nothing_heavy(program):
+    code = SHOW_HELP.format(program=program, module=PROGRAMS[program], heavy=HEAVY)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_learners_have_help_of_their_own(run):
+    answer = run("kinarm-train", "ars", "--help")
+    assert (answer.status, answer.err) == (0, "")
+    assert "--recipe" in answer.out
+
+
+@pytest.mark.parametrize(
+    ("program", "options"),
+    [
+        (
+            "kinarm-eval",
+            "--task --policy --trials --seed --arm --out --json --matrix --allow-other-arm",
+        ),
+        ("kinarm-bench", "--repetitions --policy --json"),
+    ],
+)
+def test_help_names_every_option(run, program, options):
+    text = run(program, "--help").out
+    assert [option for option in options.split() if option not in text] == []
+
+
+def test_training_help_names_every_option(run):
+    text = run("kinarm-train", "ars", "--help").out
+    options = "--task --recipe --seed --arm --out --resume --iterations --sharing --step-size"
+    assert [option for option in options.split() if option not in text] == []
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_commands_are_installed(program):
+    (entry,) = metadata.entry_points(group="console_scripts", name=program)
+    assert entry.value == f"{PROGRAMS[program]}:main"
+    assert callable(entry.load())
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_help_into_a_closed_pipe_shows_no_error(command, program, unbuffered):
+    assert write_into_closed_pipe(command(program, "--help"), unbuffered) == ""
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("extra", [(), ("--json",)])
+def test_results_into_a_closed_pipe_show_no_error(command, extra, unbuffered):
+    arguments = ("--policy", "zero", "--task", "left", "--trials", 40, *extra)
+    assert write_into_closed_pipe(command("kinarm-eval", *arguments), unbuffered) == ""
+
+
+def write_into_closed_pipe(arguments: list[str], unbuffered: str) -> str:
+    """Run a command whose reader has gone, and return what it says on standard error."""
+    with subprocess.Popen(
+        arguments,
+        cwd=ROOT,
+        env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        process.stdout.close()
+        return process.stderr.read()

@@ -1,0 +1,260 @@
+"""``kinarm-train``: what it writes, and that an interrupted training loses nothing."""
+
+import csv
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kinarm.evaluation.evaluations import evaluate
+from kinarm.policies import Policy, ars_recipe, train_ars
+from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
+
+ROOT = Path(__file__).resolve().parents[2]
+LONG = {"iterations": 2000, "directions": 2, "top_directions": 2}
+LONG_OPTIONS = ["--iterations", "2000", "--directions", "2", "--top-directions", "2"]
+TRAIN_WITH_FREQUENT_CHECKPOINTS = """
+import signal, sys
+from kinarm.policies import train
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job may inherit "ignore"
+train.CHECKPOINT_SECONDS = 0.1
+train.main(sys.argv[1:])
+"""
+
+
+class StoppedError(Exception):
+    """Raised to leave a training."""
+
+
+def arrays(policy: Policy) -> list[np.ndarray]:
+    return [policy.mean, policy.std, *(array for layer in policy.layers for array in layer)]
+
+
+def check_equal(one: Policy, other: Policy) -> None:
+    """Bit for bit."""
+    for first, second in zip(arrays(one), arrays(other), strict=True):
+        assert first.tobytes() == second.tobytes()
+    assert one.provenance.config == other.provenance.config
+    assert one.provenance.environment_steps == other.provenance.environment_steps
+
+
+def read_curve(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def stop_after(iteration: int, config, path: Path) -> None:
+    """Leave the checkpoint of a training that was stopped after some iterations."""
+
+    def stop(state):
+        if state.iteration == iteration:
+            save_checkpoint(path, config, state)
+            raise StoppedError
+
+    with pytest.raises(StoppedError):
+        train_ars(config, on_iteration=stop)
+
+
+def test_policy_and_curve_are_those_of_the_library(run, tmp_path):
+    out = tmp_path / "p.npz"
+    answer = run(
+        *("kinarm-train", "ars", "--task", "left", "--seed", 3, "--iterations", 6, "--out", out)
+    )
+    assert answer.status == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["p.curve.csv", "p.npz"]
+    expected = train_ars(ars_recipe("paper", task="left", seed=3, iterations=6))
+    check_equal(Policy.load(out), expected.policy)
+    rows = read_curve(tmp_path / "p.curve.csv")
+    assert [int(row["iteration"]) for row in rows] == [1, 2, 3, 4, 5, 6]
+    for row, point in zip(rows, expected.curve, strict=True):
+        assert float(row["mean_return"]) == point.mean_return
+        assert float(row["std_return"]) == point.std_return
+        assert float(row["success"]) == point.success
+        assert int(row["environment_steps"]) == point.environment_steps
+        assert float(row["wall_time"]) > 0
+
+
+def test_summary_says_where_the_policy_is(run, tmp_path):
+    answer = run("kinarm-train", "ars", "--iterations", 2, "--out", tmp_path / "p.npz")
+    assert len(answer.out.splitlines()) == 1
+    assert str(tmp_path / "p.npz") in answer.out
+    assert "2 iterations" in answer.out
+
+
+def test_every_setting_reaches_the_training(run, tmp_path):
+    settings = {
+        "task": "both",
+        "arm": "paper_flange",
+        "seed": 7,
+        "iterations": 2,
+        "directions": 5,
+        "top_directions": 3,
+        "episodes": 2,
+        "step_size": 0.03,
+        "noise": 0.02,
+        "success_bonus": 0.25,
+        "collision_penalty": -2.0,
+        "start_spread": 0.5,
+        "sharing": "pair",
+        "step_size_schedule": "linear",
+    }
+    options = [word for k, v in settings.items() for word in (f"--{k.replace('_', '-')}", v)]
+    out = tmp_path / "p.npz"
+    assert run("kinarm-train", "ars", "--recipe", "brs", *options, "--out", out).status == 0
+    made = Policy.load(out).provenance
+    assert {name: made.config[name] for name in settings} == settings
+    assert (made.recipe, made.task, made.arm, made.seed) == ("brs", "both", "paper_flange", 7)
+    assert (made.config["normalize"], made.config["scale_by_deviation"]) == (False, False)
+
+
+def test_a_trained_policy_can_be_evaluated(run, tmp_path):
+    out = tmp_path / "p.npz"
+    run("kinarm-train", "ars", "--task", "left", "--iterations", 2, "--out", out)
+    evaluation = evaluate(out, trials=3)
+    assert (evaluation.task, len(evaluation.rollouts)) == ("left", 3)
+
+
+def test_an_earlier_policy_is_replaced(run, tmp_path):
+    out = tmp_path / "p.npz"
+    for seed in (0, 1):
+        run("kinarm-train", "ars", "--seed", seed, "--iterations", 2, "--out", out)
+    assert Policy.load(out).provenance.seed == 1
+
+
+@pytest.mark.parametrize("recipe", ["paper", "tuned", "v1"])
+@pytest.mark.parametrize("stopped_after", [1, 7])
+def test_resumed_is_uninterrupted(run, tmp_path, recipe, stopped_after):
+    config = ars_recipe(recipe, iterations=9, directions=4, top_directions=4, episodes=2)
+    out = tmp_path / "p.npz"
+    stop_after(stopped_after, config, tmp_path / "p.checkpoint.npz")
+    assert run("kinarm-train", "ars", "--out", out, "--resume").status == 0
+    expected = train_ars(config)
+    check_equal(Policy.load(out), expected.policy)
+    rows = read_curve(tmp_path / "p.curve.csv")
+    assert [float(row["mean_return"]) for row in rows] == [p.mean_return for p in expected.curve]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["p.curve.csv", "p.npz"]
+
+
+def test_the_clock_goes_on_when_resumed(run, tmp_path):
+    config = ars_recipe("paper", iterations=5)
+    stop_after(3, config, tmp_path / "p.checkpoint.npz")
+    run("kinarm-train", "ars", "--out", tmp_path / "p.npz", "--resume")
+    times = [float(row["wall_time"]) for row in read_curve(tmp_path / "p.curve.csv")]
+    assert times == sorted(times)
+
+
+def test_naming_the_same_settings_again_is_fine(run, tmp_path):
+    stop_after(2, ars_recipe("tuned", iterations=3, seed=5), tmp_path / "p.checkpoint.npz")
+    arguments = ("--recipe", "tuned", "--seed", 5, "--iterations", 3, "--resume")
+    assert run("kinarm-train", "ars", "--out", tmp_path / "p.npz", *arguments).status == 0
+    assert Policy.load(tmp_path / "p.npz").provenance.recipe == "tuned"
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        ("--task", "left"),
+        ("--seed", 1),
+        ("--iterations", 99),
+        ("--noise", 0.5),
+        ("--arm", "paper_flange"),
+        ("--sharing", "pair"),
+        ("--recipe", "tuned"),
+    ],
+)
+def test_other_settings_are_refused_when_resuming(run, tmp_path, option, value):
+    """A setting that would be ignored is an error, and the checkpoint stays as it is."""
+    checkpoint = tmp_path / "p.checkpoint.npz"
+    stop_after(2, ars_recipe("paper", iterations=4), checkpoint)
+    before = checkpoint.read_bytes()
+    answer = run("kinarm-train", "ars", "--out", tmp_path / "p.npz", "--resume", option, value)
+    assert (answer.status, answer.out) == (2, "")
+    assert len(answer.err.splitlines()) == 1
+    assert option.strip("-") in answer.err
+    assert checkpoint.read_bytes() == before
+    assert not (tmp_path / "p.npz").exists()
+
+
+@pytest.mark.parametrize("damage", ["truncated", "policy", "text"])
+def test_an_unusable_checkpoint_is_refused(run, tmp_path, policy, damage):
+    checkpoint = tmp_path / "p.checkpoint.npz"
+    stop_after(2, ars_recipe("paper", iterations=4), checkpoint)
+    whole = checkpoint.read_bytes()
+    if damage == "policy":
+        policy.save(checkpoint)
+    else:
+        checkpoint.write_bytes(whole[: len(whole) // 2] if damage == "truncated" else b"hello")
+    before = checkpoint.read_bytes()
+    answer = run("kinarm-train", "ars", "--out", tmp_path / "p.npz", "--resume")
+    assert (answer.status, answer.out, len(answer.err.splitlines())) == (2, "", 1)
+    assert str(checkpoint) in answer.err
+    assert checkpoint.read_bytes() == before
+
+
+def test_checkpoints_are_kept_while_training(run, tmp_path, monkeypatch):
+    """Even a process that is killed leaves one behind."""
+    from kinarm.policies import train
+
+    seen = []
+    monkeypatch.setattr(train, "CHECKPOINT_SECONDS", 0.0)
+    whole = train.TrainingProgress.update
+    monkeypatch.setattr(
+        train.TrainingProgress,
+        "update",
+        lambda self, state: (
+            whole(self, state) or seen.append((tmp_path / "p.checkpoint.npz").exists())
+        ),
+    )
+    run("kinarm-train", "ars", "--iterations", 4, "--out", tmp_path / "p.npz")
+    assert seen == [False, True, True, True]
+
+
+def interrupt(process: subprocess.Popen, checkpoint: Path) -> str:
+    """Send Ctrl-C once a training has got somewhere; return what it says on standard error."""
+    while not (checkpoint.exists() and load_checkpoint(checkpoint)[1].iteration >= 300):
+        assert process.poll() is None, process.stderr.read()
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    return process.communicate(timeout=60)[1]
+
+
+def test_ctrl_c_and_resume_give_the_uninterrupted_policy(run, tmp_path):
+    out, checkpoint = tmp_path / "p.npz", tmp_path / "p.checkpoint.npz"
+    process = subprocess.Popen(
+        [
+            *(sys.executable, "-c", TRAIN_WITH_FREQUENT_CHECKPOINTS, "ars", "--out", str(out)),
+            *LONG_OPTIONS,
+        ],
+        cwd=ROOT,
+        env={**os.environ, "COLUMNS": "100"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    errors = interrupt(process, checkpoint)
+    assert process.returncode == 130
+    assert "Traceback" not in errors
+    assert errors.splitlines()[-1].startswith("kinarm-train: interrupted")
+    _, state = load_checkpoint(checkpoint)
+    assert 300 <= state.iteration < LONG["iterations"]
+    assert not out.exists()
+
+    assert run("kinarm-train", "ars", "--out", out, "--resume").status == 0
+    assert not checkpoint.exists()
+    check_equal(Policy.load(out), train_ars(ars_recipe("paper", **LONG)).policy)
+
+
+def test_an_unfinished_training_is_not_overwritten(run, tmp_path):
+    checkpoint = tmp_path / "p.checkpoint.npz"
+    stop_after(2, ars_recipe("paper", iterations=4), checkpoint)
+    before = checkpoint.read_bytes()
+    answer = run("kinarm-train", "ars", "--iterations", 2, "--out", tmp_path / "p.npz")
+    assert (answer.status, answer.out, len(answer.err.splitlines())) == (2, "", 1)
+    assert "--resume" in answer.err
+    assert [path.name for path in tmp_path.iterdir()] == ["p.checkpoint.npz"]
+    assert checkpoint.read_bytes() == before

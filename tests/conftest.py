@@ -1,0 +1,192 @@
+"""Shared fixtures: the shipped arms, robots written on the spot, and simulators of both."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import settings
+
+from kinarm.arm import Arm
+from kinarm.simulator import Simulator
+
+settings.register_profile("repeatable", derandomize=True, database=None, deadline=None)
+settings.load_profile("repeatable")
+
+SHIPPED_ARMS = ("lrmate200ic_5l", "paper", "paper_flange")
+
+LIMITED = '<limit lower="-2" upper="2" velocity="3" effort="0"/>'
+
+CUBE_CORNERS = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
+CUBE_FACES = [
+    *[(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1)],
+    *[(2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)],
+]
+
+
+def joint(
+    kind: str = "revolute",
+    xyz: str = "0 0 0.2",
+    rpy: str = "0 0 0",
+    axis: str = "0 0 1",
+    limit: str = LIMITED,
+) -> dict[str, str]:
+    """Describe the joint of a chain."""
+    return {"kind": kind, "xyz": xyz, "rpy": rpy, "axis": axis, "limit": limit}
+
+
+def collision(geometry: str, xyz: str = "0 0 0", rpy: str = "0 0 0") -> str:
+    """Describe a collision shape."""
+    origin = f'<origin xyz="{xyz}" rpy="{rpy}"/>'
+    return f"<collision>{origin}<geometry>{geometry}</geometry></collision>"
+
+
+def robot_xml(
+    joints: Sequence[dict[str, str]],
+    shapes: dict[int, str] | None = None,
+    *,
+    tool: str | None = "0.1 0 0.05",
+    version: str = 'version="1.2"',
+    extra: str = "",
+) -> str:
+    """Write a chain of links, link_0 to link_n, with collision shapes and a tool frame."""
+    parts = [
+        f'<link name="link_{i}">{(shapes or {}).get(i, "")}</link>' for i in range(len(joints) + 1)
+    ]
+    for i, item in enumerate(joints):
+        parts.append(
+            f'<joint name="joint_{i + 1}" type="{item["kind"]}">'
+            f'<parent link="link_{i}"/><child link="link_{i + 1}"/>'
+            f'<origin xyz="{item["xyz"]}" rpy="{item["rpy"]}"/>'
+            f'<axis xyz="{item["axis"]}"/>{item["limit"]}</joint>'
+        )
+    if tool is not None:
+        parts.append(
+            '<link name="tool0"/><joint name="mount" type="fixed">'
+            f'<parent link="link_{len(joints)}"/><child link="tool0"/>'
+            f'<origin xyz="{tool}"/></joint>'
+        )
+    return f'<robot name="made" {version}>{"".join(parts)}{extra}</robot>'
+
+
+def write_stl(path: Path, corners: np.ndarray) -> None:
+    """Write a box of triangles as ASCII STL."""
+    facets = "".join(
+        "facet normal 0 0 0\nouter loop\n"
+        + "".join("vertex {} {} {}\n".format(*corners[i]) for i in face)
+        + "endloop\nendfacet\n"
+        for face in CUBE_FACES
+    )
+    path.write_text(f"solid box\n{facets}endsolid box\n")
+
+
+def write_obj(path: Path, corners: np.ndarray) -> None:
+    """Write a box of triangles as OBJ."""
+    vertices = "".join("v {} {} {}\n".format(*corner) for corner in corners)
+    faces = "".join("f {} {} {}\n".format(*(i + 1 for i in face)) for face in CUBE_FACES)
+    path.write_text(vertices + faces)
+
+
+@pytest.fixture(scope="session")
+def make_joint() -> Callable[..., dict[str, str]]:
+    return joint
+
+
+@pytest.fixture(scope="session")
+def make_collision() -> Callable[..., str]:
+    return collision
+
+
+@pytest.fixture(scope="session")
+def write_robot(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Write a robot description to a new file and return its path."""
+
+    def write(*args: object, **settings: object) -> Path:
+        path = tmp_path_factory.mktemp("robot") / "made.urdf"
+        path.write_text(robot_xml(*args, **settings))
+        return path
+
+    return write
+
+
+@pytest.fixture(scope="session")
+def shipped_arms() -> dict[str, Arm]:
+    return {name: Arm.load(name) for name in SHIPPED_ARMS}
+
+
+@pytest.fixture(scope="session")
+def sliding_arm(write_robot: Callable[..., Path]) -> Arm:
+    """Five skewed axes, two of them prismatic, with a primitive of every kind."""
+    joints = [
+        joint(xyz="0.02 0.03 0.45", rpy="0.1 0 0.2"),
+        joint(
+            "prismatic",
+            xyz="0.15 0 0.05",
+            rpy="0.3 0.9 -0.4",
+            axis="0.6 0 0.8",
+            limit='<limit lower="-0.1" upper="0.3" velocity="0.9" effort="0"/>',
+        ),
+        joint(xyz="0.2 0.02 0.1", rpy="1 0.4 0", axis="0.36 0.48 0.8"),
+        joint(
+            "prismatic",
+            xyz="0 0 0.15",
+            axis="0 -1 0",
+            limit='<limit lower="-0.2" upper="0.2" velocity="0.7" effort="0"/>',
+        ),
+        joint(xyz="0.15 0 0.05", rpy="-0.7 0 0.9", axis="0 1 0"),
+    ]
+    shapes = {
+        0: collision('<cylinder radius="0.08" length="0.1"/>', xyz="0 0 0.06"),
+        2: collision('<box size="0.1 0.06 0.08"/>', xyz="0.02 0 0.03", rpy="0.2 0.1 0.4"),
+        3: collision('<sphere radius="0.05"/>', xyz="0 0 0.05")
+        + collision('<capsule radius="0.03" length="0.1"/>', rpy="0.5 0 0"),
+        5: collision('<cylinder radius="0.03" length="0.12"/>', xyz="0.03 0 0.02", rpy="0.4 1 0"),
+    }
+    return Arm.load(write_robot(joints, shapes))
+
+
+@pytest.fixture(scope="session")
+def mesh_arm(tmp_path_factory: pytest.TempPathFactory) -> Arm:
+    """Four axes whose links are meshes (STL and OBJ), boxes and cylinders."""
+    folder = tmp_path_factory.mktemp("meshes")
+    write_stl(folder / "bar.stl", (CUBE_CORNERS - [0.5, 0.5, 0]) * [0.08, 0.1, 0.28])
+    wedge = (CUBE_CORNERS - 0.5) * [0.3, 0.08, 0.06]
+    wedge[CUBE_CORNERS[:, 0] == 1] *= [1, 0.4, 0.4]
+    write_obj(folder / "wedge.obj", wedge)
+    joints = [
+        joint(xyz="0 0 0.3", limit=LIMITED.replace("2", "3")),
+        joint(xyz="0.05 0 0.1", axis="0 1 0"),
+        joint(xyz="0 0 0.3", axis="0 -1 0"),
+        joint(xyz="0.3 0 0", axis="0 1 0"),
+    ]
+    shapes = {
+        0: collision('<box size="0.1 0.12 0.08"/>', xyz="0 0 0.04"),
+        2: collision('<mesh filename="package://made/bar.stl"/>'),
+        3: collision('<mesh filename="package://made/wedge.obj"/>', xyz="0.15 0 0"),
+        4: collision('<cylinder radius="0.02" length="0.1"/>', xyz="0.08 0 0", rpy="0 1.5708 0"),
+    }
+    path = folder / "mesh.urdf"
+    path.write_text(robot_xml(joints, shapes, tool="0.14 0 0"))
+    xml = path.read_text().replace("package://made/", f"{folder}/")
+    path.write_text(xml)
+    return Arm.load(path)
+
+
+@pytest.fixture(scope="session")
+def simulators(
+    shipped_arms: dict[str, Arm], sliding_arm: Arm, mesh_arm: Arm
+) -> dict[str, Simulator]:
+    """One single-threaded simulator per arm, task ``both``."""
+    arms = {**shipped_arms, "sliding": sliding_arm, "mesh": mesh_arm}
+    return {name: Simulator(arm, "both", threads=1) for name, arm in arms.items()}
+
+
+@pytest.fixture(scope="session")
+def simulator(simulators: dict[str, Simulator]) -> Simulator:
+    """The default arm, task ``both``."""
+    return simulators["paper"]
+
+
+@pytest.fixture(params=[*SHIPPED_ARMS, "sliding", "mesh"])
+def any_simulator(request: pytest.FixtureRequest, simulators: dict[str, Simulator]) -> Simulator:
+    return simulators[request.param]

@@ -1,0 +1,68 @@
+"""Trained policies and evaluations of them."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from kinarm.evaluation.entrants import BASELINES, Entrant
+from kinarm.evaluation.evaluations import Evaluation, run_trials
+from kinarm.evaluation.trials import TrialSet
+from kinarm.policies import Policy, ars_recipe, train_ars
+from kinarm.simulator import Simulator
+
+
+@pytest.fixture(scope="session")
+def skilled() -> Policy:
+    """A policy for ``right`` that succeeds, collides and times out, each in some trials."""
+    return train_ars(ars_recipe("tuned", task="right", seed=1, iterations=800, episodes=1)).policy
+
+
+@pytest.fixture(scope="session")
+def train_novice() -> Callable[..., Policy]:
+    """Train a policy for a few iterations only."""
+
+    @cache
+    def train(task: str = "right", seed: int = 0, recipe: str = "tuned") -> Policy:
+        return train_ars(ars_recipe(recipe, task=task, seed=seed, iterations=4)).policy
+
+    return train
+
+
+@pytest.fixture(scope="session")
+def trials() -> TrialSet:
+    return TrialSet.draw(Simulator(task="right"), 60, seed=5)
+
+
+@pytest.fixture(scope="session")
+def skilled_evaluation(skilled: Policy, trials: TrialSet) -> Evaluation:
+    return run_trials(Entrant.from_policy("skilled", skilled), trials)
+
+
+@pytest.fixture(scope="session")
+def evaluations(
+    skilled: Policy, train_novice: Callable[..., Policy], trials: TrialSet
+) -> list[Evaluation]:
+    """Three training seeds of a recipe and a baseline on ``right``; one policy on ``left``."""
+    left = TrialSet.draw(Simulator(task="left"), 40, seed=5)
+    made = {"made-right-seed0": train_novice("right", 0), "made-right-seed1": skilled}
+    made["made-right-seed2"] = train_novice("right", 2)
+    return [
+        *(run_trials(Entrant.from_policy(name, policy), trials) for name, policy in made.items()),
+        run_trials(BASELINES["zero"], trials),
+        run_trials(Entrant.from_policy("made-left-seed0", train_novice("left")), left),
+    ]
+
+
+@pytest.fixture(scope="session")
+def made_up(skilled_evaluation: Evaluation) -> Callable[[Sequence[float]], Evaluation]:
+    """Make an evaluation with final distances of one's own choice."""
+
+    def make(distances: Sequence[float]) -> Evaluation:
+        chosen = np.resize(np.asarray(distances, dtype=float), len(skilled_evaluation.trials))
+        rollouts = replace(skilled_evaluation.rollouts, distance=chosen)
+        return Evaluation(skilled_evaluation.entrant, skilled_evaluation.trials, rollouts)
+
+    return make

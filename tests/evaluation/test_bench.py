@@ -1,0 +1,115 @@
+"""The benchmark measures what it says, on sizes small enough for a test."""
+
+import json
+import time
+
+import gymnasium
+import numpy as np
+import pytest
+
+from kinarm.evaluation import bench
+from kinarm.policies import recipes
+from kinarm.simulator import Simulator
+
+
+@pytest.fixture(scope="module")
+def document(train_novice, tmp_path_factory):
+    path = tmp_path_factory.mktemp("bench") / "mine.npz"
+    train_novice("left").save(path)
+    with pytest.MonkeyPatch.context() as patch:
+        shrink(patch)
+        return bench.measure(str(path), 1)
+
+
+def shrink(patch: pytest.MonkeyPatch) -> None:
+    """Fewer batch sizes and a short training."""
+    whole = recipes.ars_recipe
+    patch.setattr(bench, "BATCHES", (6, 512))
+    patch.setattr(recipes, "ars_recipe", lambda name, **kw: whole(name, iterations=3, **kw))
+
+
+def rates(document) -> list[dict[str, float]]:
+    return [
+        *(row["steps_per_second"] for row in document["rollouts"]),
+        document["reference"],
+        document["vector_environment"],
+        document["single_environment"],
+    ]
+
+
+def test_document_is_plain_json(document):
+    assert json.loads(json.dumps(document, allow_nan=False)) == document
+
+
+def test_rates_are_positive(document):
+    for rate in rates(document):
+        assert 0 < rate["median"] <= rate["best"]
+
+
+def test_rollouts_are_measured_in_every_combination(document):
+    threads = {1, bench.available_threads()}
+    seen = {(row["batch"], row["actions"], row["threads"]) for row in document["rollouts"]}
+    assert seen == {(b, a, t) for b in (6, 512) for a in ("random", "trained") for t in threads}
+    assert len(document["rollouts"]) == len(seen)
+
+
+def test_share_of_judged_configurations_is_a_share_of_four_a_step(document):
+    assert all(0 <= row["judged_per_step"] <= 4 for row in document["rollouts"])
+    assert any(row["judged_per_step"] > 0 for row in document["rollouts"])
+
+
+def test_training_of_table_1_is_measured(document):
+    training = document["table_1_training"]
+    assert 0 < training["seconds"]["best"] <= training["seconds"]["median"]
+    assert 3 * 48 <= training["environment_steps"] <= 3 * 48 * 64
+
+
+def test_speed_up_is_the_ratio_of_two_figures(document):
+    fast = [
+        row["steps_per_second"]["median"]
+        for row in document["rollouts"]
+        if (row["batch"], row["actions"]) == (512, "trained")
+    ]
+    expected = fast[-1] / document["reference"]["median"]
+    assert document["speed_up_over_reference"] == pytest.approx(expected)
+
+
+def test_machine_and_versions_are_told(document):
+    assert document["machine"]["threads"] == bench.available_threads()
+    assert {"python", "numpy", "numba"} <= set(document["versions"])
+    assert document["repetitions"] == 1
+
+
+def test_timing_divides_steps_by_time_and_leaves_out_the_first_run(monkeypatch):
+    clock = iter([0.0, 2.0, 10.0, 11.0, 20.0, 24.0])
+    runs = []
+    monkeypatch.setattr(time, "perf_counter", lambda: next(clock))
+    timing = bench.timed(lambda: runs.append(1) or 8, 3)
+    assert timing == (4.0, 8.0)
+    assert len(runs) == 4
+
+
+def test_measured_steps_are_steps_taken(monkeypatch, train_novice):
+    """The rate of trained rollouts counts the steps of the episodes, not their horizon."""
+    counted = []
+    monkeypatch.setattr(bench, "BATCHES", (32,))
+    monkeypatch.setattr(bench, "timed", lambda run, _: counted.append(run()) or bench.Timing(1, 1))
+    simulator, policy = Simulator(task="right", threads=1), train_novice("right")
+    bench.measure_rollouts(simulator, policy, 1)
+    starts, goals = simulator.sample(np.random.default_rng(32), 32)
+    steps = int(simulator.rollout(policy, starts, goals).steps.sum())
+    assert steps < 32 * 64
+    assert counted[-1] == steps
+
+
+def test_environments_are_measured_with_all_their_arms(monkeypatch, train_novice):
+    counted = []
+    monkeypatch.setattr(bench, "timed", lambda run, _: counted.append(run()) or bench.Timing(1, 1))
+    made = []
+    whole = gymnasium.make_vec
+    monkeypatch.setattr(
+        gymnasium, "make_vec", lambda *a, **kw: made.append(whole(*a, **kw)) or made[-1]
+    )
+    bench.measure_vector_env(train_novice("right"), 1)
+    assert made[0].num_envs == 64
+    assert counted[0] % 64 == 0

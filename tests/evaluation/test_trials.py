@@ -1,0 +1,160 @@
+"""Trial sets: what they depend on, what they do not, and that they are legal."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from kinarm.errors import InvalidInputError, SceneError
+from kinarm.evaluation.trials import TrialSet, trial_generator
+from kinarm.scene import Bench, Scene
+from kinarm.simulator import Simulator
+from kinarm.task import RewardWeights, load_task
+
+PRINT_DIGEST = """
+from kinarm.evaluation import TrialSet
+from kinarm.simulator import Simulator
+print(TrialSet.draw(Simulator(task="both"), 7, seed=3).digest)
+"""
+
+
+def draw(task="both", trials=7, seed=3, arm="paper", **settings):
+    return TrialSet.draw(Simulator(arm, load_task(task, **settings)), trials, seed)
+
+
+def same(one: TrialSet, other: TrialSet) -> bool:
+    return np.array_equal(one.starts, other.starts) and np.array_equal(one.goals, other.goals)
+
+
+def test_equal_arguments_give_equal_trials():
+    assert same(draw(), draw())
+
+
+def test_other_randomness_and_threads_do_not_matter():
+    expected = draw()
+    np.random.default_rng().random(10)
+    alone = TrialSet.draw(Simulator(task="both", threads=1), 7, 3)
+    used = Simulator(task="both", threads=2)
+    used.sample(np.random.default_rng(8), 5)
+    assert same(expected, alone)
+    assert same(expected, TrialSet.draw(used, 7, 3))
+
+
+def test_rewards_and_horizon_do_not_move_the_trials():
+    assert same(draw(), draw(horizon=9, reward=RewardWeights(success=4)))
+
+
+@pytest.mark.parametrize("other", [{"seed": 4}, {"task": "left"}])
+def test_other_arguments_give_other_trials(other):
+    assert not same(draw(), draw(**other))
+
+
+def test_a_small_set_is_the_beginning_of_a_large_one():
+    few, many = draw(trials=3), draw(trials=11)
+    np.testing.assert_array_equal(many.starts[:3], few.starts)
+    np.testing.assert_array_equal(many.goals[:3], few.goals)
+
+
+def test_trials_differ_from_each_other():
+    trials = draw(trials=50)
+    assert len(np.unique(trials.starts, axis=0)) == len(np.unique(trials.goals, axis=0)) == 50
+
+
+def test_streams_of_randomness_are_independent_of_each_other():
+    numbers = [
+        trial_generator(seed, trial, stream).random()
+        for seed in (0, 1)
+        for trial in (0, 1, 2)
+        for stream in (0, 1)
+    ]
+    assert len(set(numbers)) == len(numbers)
+
+
+@pytest.mark.parametrize("arm", ["paper", "paper_flange", "lrmate200ic_5l"])
+def test_starts_are_legal(arm):
+    trials = draw(trials=60, arm=arm)
+    loaded = trials.simulator.arm
+    assert (loaded.lower <= trials.starts).all()
+    assert (trials.starts <= loaded.upper).all()
+    assert (trials.starts[:, loaded.n_actuated :] == 0).all()
+    assert not trials.simulator.contact_model.in_contact(trials.starts).any()
+    tools = np.array([loaded.tool_position(start) for start in trials.starts])
+    assert (np.linalg.norm(tools - trials.goals, axis=1) > 0.05).all()
+
+
+@pytest.mark.parametrize(("task", "side"), [("right", -1), ("left", 1)])
+def test_goals_lie_on_the_bench_of_the_task(task, side):
+    x, y, z = draw(task, trials=100).goals.T
+    assert (np.abs(x) <= 0.5).all()
+    assert ((side * y >= 0.55) & (side * y <= 0.75)).all()
+    np.testing.assert_allclose(z, 0.325, atol=1e-12)
+    assert x.min() < -0.4
+    assert x.max() > 0.4
+
+
+def test_task_both_draws_both_sides_about_equally_often():
+    right = int((draw("both", trials=200, seed=0).goals[:, 1] < 0).sum())
+    assert abs(right - 100) < 4 * np.sqrt(200 / 4)
+
+
+def test_trials_cannot_be_changed():
+    trials = draw()
+    with pytest.raises(ValueError, match="read-only"):
+        trials.starts[0, 0] = 0
+    with pytest.raises(ValueError, match="read-only"):
+        trials.goals[0, 0] = 0
+
+
+def test_digest_is_the_same_in_every_process():
+    digests = {
+        subprocess.run(
+            [sys.executable, "-c", PRINT_DIGEST],
+            env={"PYTHONHASHSEED": seed, "PATH": ""},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout.strip()
+        for seed in ("1", "2")
+    }
+    assert digests == {draw().digest}
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"seed": 4},
+        {"task": "left"},
+        {"arm": "lrmate200ic_5l"},
+        {"trials": 8},
+        {"tolerance": 0.04},
+        {"horizon": 65},
+    ],
+)
+def test_digest_tells_different_trials_apart(other):
+    assert draw().digest != draw(**other).digest
+
+
+def test_digest_depends_on_obstacles_that_the_starts_do_not_show():
+    far = Bench(name="far", x=(5, 6), y=(5, 6), height=1)
+    scene = Scene(benches=(*Scene().benches, far))
+    other = TrialSet.draw(Simulator(task="both", scene=scene), 7, 3)
+    assert same(draw(), other)
+    assert draw().digest != other.digest
+
+
+def test_digest_does_not_depend_on_the_reward():
+    assert draw().digest == draw(reward=RewardWeights(success=4)).digest
+
+
+@pytest.mark.parametrize(("trials", "seed"), [(0, 0), (-1, 0), (1, -1)])
+def test_numbers_out_of_range_are_refused(trials, seed):
+    with pytest.raises(InvalidInputError, match=r"must be a whole number of at least ., got"):
+        draw(trials=trials, seed=seed)
+
+
+def test_a_scene_without_free_starts_is_refused():
+    block = Bench(name="right", x=(-2, 2), y=(-2, 2), height=2)
+    simulator = Simulator(task="right", scene=Scene(benches=(block,)))
+    with pytest.raises(SceneError, match=r"no contact-free start .* touches"):
+        TrialSet.draw(simulator, 1, 0)

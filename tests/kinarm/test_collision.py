@@ -1,0 +1,431 @@
+"""Contact pairs, enclosing capsules, motion bounds, and the proof of freedom held against Coal."""
+
+import pickle
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kinarm import kernels
+from kinarm.arm import Arm
+from kinarm.collision import (
+    BETWEEN_CAPSULES,
+    WITH_GROUND,
+    ContactModel,
+    enclosing_capsule,
+    forget_history,
+)
+from kinarm.errors import ArmError
+from kinarm.scene import Bench, Scene
+from kinarm.simulator import substeps
+
+CAPSULE_ARMS = ("lrmate200ic_5l", "paper", "paper_flange")
+
+
+def random_configurations(simulator, seed, count):
+    arm = simulator.arm
+    return np.random.default_rng(seed).uniform(arm.lower, arm.upper, (count, arm.n_axes))
+
+
+def proven_free(simulator, configurations):
+    n = len(configurations)
+    tools, proven = np.empty((n, 3)), np.empty(n, dtype=bool)
+    shapes = simulator.contact_model.shapes
+    kernels.screen(0, n, simulator.arm.chain, shapes, configurations, tools, proven)
+    return proven
+
+
+def in_contact(simulator, configurations):
+    """Ask Coal one configuration at a time, without a broad phase."""
+    model, geometry = simulator.arm.model, simulator.contact_model.geometry
+    data, geometry_data = model.createData(), forget_history(geometry.createData())
+    return np.array(
+        [
+            pin.computeCollisions(model, data, geometry, geometry_data, q, True)
+            for q in configurations
+        ]
+    )
+
+
+def contact_boundary(simulator, seed, count):
+    """Pairs of configurations, free and touching, that are closer than 1e-9 to each other."""
+    judge = simulator.contact_model.in_contact
+    candidates = random_configurations(simulator, seed, 8 * count)
+    touching = judge(candidates)
+    n = min(count, touching.sum(), (~touching).sum())
+    free, hit = candidates[~touching][:n], candidates[touching][:n]
+    for _ in range(34):
+        middle = (free + hit) / 2
+        touches = judge(middle)[:, None]
+        free, hit = np.where(touches, free, middle), np.where(touches, middle, hit)
+    return free, hit
+
+
+def jittered(configurations, seed):
+    rng = np.random.default_rng(seed)
+    size = 10.0 ** rng.uniform(-10, -2, (len(configurations), 1))
+    return configurations + size * rng.normal(size=configurations.shape)
+
+
+class TestPairs:
+    def test_shipped_arms_have_28(self, simulators):
+        for name in CAPSULE_ARMS:
+            assert len(simulators[name].contact_model.pair_names) == 28
+
+    def test_names_of_the_default_arm(self, simulator):
+        links = ["base", "shoulder", "upper_arm", "elbow", "forearm", "wrist", "hand"]
+        skipped = {("upper_arm", "forearm"), ("forearm", "hand")}
+        expected = {(links[i], links[j]) for i in range(7) for j in range(i + 2, 7)} - skipped
+        expected |= {
+            (link, world) for link in links[2:] for world in ("right bench", "left bench", "ground")
+        }
+        assert set(simulator.contact_model.pair_names) == expected
+
+    def test_scene_without_obstacles_leaves_the_arm_alone(self):
+        model = ContactModel.build(Arm.load("paper"), Scene(benches=(), ground=False))
+        assert len(model.pair_names) == 13
+        assert not any(
+            "bench" in name or name == "ground" for pair in model.pair_names for name in pair
+        )
+
+    def test_first_link_is_tested_where_turning_it_can_touch(
+        self, make_joint, make_collision, write_robot
+    ):
+        bar = make_collision(
+            '<capsule radius="0.02" length="0.6"/>', xyz="0.3 0 0", rpy="0 1.5708 0"
+        )
+        arm = Arm.load(write_robot([make_joint(), make_joint(axis="0 1 0")], {1: bar}))
+        assert ("link_1", "left bench") in ContactModel.build(arm, Scene()).pair_names
+
+    def test_contact_pair_names_what_touches(self, simulator):
+        model = simulator.contact_model
+        assert model.contact_pair(np.zeros(6)) is None
+        down = np.deg2rad([0, 140, -72, 0, 0, 0])
+        first, second = model.contact_pair(down)
+        assert second in ("ground", "wrist", "hand", "forearm", "elbow", "upper_arm")
+        assert (first, second) in model.pair_names
+
+    def test_hand_that_reaches_down_touches_the_ground(self):
+        # Leaning forward by 90 degrees with the forearm pointing down lowers the tool below z = 0.
+        model = ContactModel.build(Arm.load("paper"), Scene(benches=()))
+        q = np.deg2rad([0, 60, -30, 0, 0, 0])
+        assert Arm.load("paper").tool_position(q)[2] < 0
+        assert model.contact_pair(q)[1] == "ground"
+
+    def test_judge_equals_single_queries(self, any_simulator):
+        configurations = random_configurations(any_simulator, 1, 2000)
+        verdicts = any_simulator.contact_model.in_contact(configurations)
+        np.testing.assert_array_equal(verdicts, in_contact(any_simulator, configurations))
+        assert 0.05 < verdicts.mean() < 0.95
+
+    def test_verdicts_do_not_depend_on_earlier_questions(self, any_simulator):
+        free, hit = contact_boundary(any_simulator, 16, 1000)
+        near = jittered(np.concatenate([free, hit]), 17)
+        order = np.random.default_rng(18).permutation(len(near))
+        judge = any_simulator.contact_model.in_contact
+        verdicts = judge(near)
+        np.testing.assert_array_equal(judge(near[order]), verdicts[order])
+        np.testing.assert_array_equal(in_contact(any_simulator, near), verdicts)
+
+    def test_no_configurations(self, simulator):
+        assert simulator.contact_model.in_contact(np.zeros((0, 6))).shape == (0,)
+
+    def test_contact_pair_agrees_with_the_judge(self, any_simulator):
+        model = any_simulator.contact_model
+        configurations = random_configurations(any_simulator, 2, 500)
+        verdicts = model.in_contact(configurations)
+        pairs = [model.contact_pair(q) for q in configurations]
+        assert [pair is not None for pair in pairs] == verdicts.tolist()
+
+    def test_pickles(self, simulator):
+        copy = pickle.loads(pickle.dumps(simulator.contact_model))
+        configurations = random_configurations(simulator, 3, 200)
+        assert copy.pair_names == simulator.contact_model.pair_names
+        np.testing.assert_array_equal(
+            copy.in_contact(configurations), simulator.contact_model.in_contact(configurations)
+        )
+
+    def test_mirror_image_has_the_same_verdict(self, simulator):
+        configurations = random_configurations(simulator, 4, 2000)
+        mirrored = configurations * [-1, 1, 1, -1, 1, -1]
+        verdicts = simulator.contact_model.in_contact(configurations)
+        np.testing.assert_array_equal(verdicts, simulator.contact_model.in_contact(mirrored))
+
+
+def surface_points(geometry, rng, count):
+    """Points of a shape's surface, in its own frame."""
+    directions = rng.normal(size=(count, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    if isinstance(geometry, coal.Sphere):
+        return geometry.radius * directions
+    if isinstance(geometry, coal.Box):
+        corners = rng.choice([-1.0, 1.0], size=(count, 3))
+        return corners * geometry.halfSide
+    along = rng.choice([-1.0, 1.0], size=(count, 1)) * [[0, 0, geometry.halfLength]]
+    if isinstance(geometry, coal.Capsule):
+        return geometry.radius * directions + along
+    flat = directions * [1, 1, 0]
+    return geometry.radius * flat / np.linalg.norm(flat, axis=1, keepdims=True) + along
+
+
+def distance_from_segment(points, capsule):
+    along = capsule.end - capsule.start
+    t = (points - capsule.start) @ along / max(along @ along, 1e-300)
+    nearest = capsule.start + np.clip(t, 0, 1)[:, None] * along
+    return np.linalg.norm(points - nearest, axis=1)
+
+
+def placed(geometry, seed):
+    return pin.GeometryObject("shape", 1, pin.SE3.Random(), geometry)
+
+
+class TestEnclosingCapsule:
+    @pytest.mark.parametrize(
+        "geometry",
+        [
+            coal.Sphere(0.1),
+            coal.Capsule(0.1, 0.5),
+            coal.Cylinder(0.1, 0.5),
+            coal.Cylinder(0.5, 0.1),
+            coal.Box(0.1, 0.2, 0.7),
+            coal.Box(0.3, 0.3, 0.3),
+            coal.Box(0.5, 0.5, 0.01),
+        ],
+        ids=lambda geometry: type(geometry).__name__,
+    )
+    def test_encloses_the_surface(self, geometry):
+        pin.seed(0)
+        for seed in range(5):
+            shape = placed(geometry, seed)
+            points = surface_points(geometry, np.random.default_rng(seed), 2000)
+            world = points @ shape.placement.rotation.T + shape.placement.translation
+            capsule = enclosing_capsule(shape)
+            assert (distance_from_segment(world, capsule) <= capsule.radius + 1e-12).all()
+
+    def test_equals_capsules_and_spheres(self):
+        capsule = enclosing_capsule(
+            pin.GeometryObject("shape", 1, pin.SE3.Identity(), coal.Capsule(0.1, 0.5))
+        )
+        np.testing.assert_allclose([capsule.start, capsule.end], [[0, 0, -0.25], [0, 0, 0.25]])
+        assert capsule.radius == 0.1
+        ball = enclosing_capsule(
+            pin.GeometryObject("shape", 1, pin.SE3.Identity(), coal.Sphere(0.2))
+        )
+        np.testing.assert_array_equal([ball.start, ball.end], np.zeros((2, 3)))
+        assert ball.radius == 0.2
+
+    def test_encloses_random_hulls_without_waste(self):
+        rng = np.random.default_rng(0)
+        for _ in range(30):
+            points = rng.normal(size=(40, 3)) * rng.uniform(0.01, 1, 3)
+            vertices = coal.StdVec_Vec3s()
+            vertices.extend(list(points))
+            hull = coal.Convex.convexHull(vertices, False, "Qt")
+            capsule = enclosing_capsule(pin.GeometryObject("hull", 1, pin.SE3.Identity(), hull))
+            distances = distance_from_segment(points, capsule)
+            assert distances.max() <= capsule.radius + 1e-9
+            assert capsule.radius <= np.ptp(points, axis=0).max()
+
+    def test_meshes_of_an_arm_are_enclosed(self, mesh_arm):
+        for shape in mesh_arm.geometry.geometryObjects:
+            if isinstance(shape.geometry, coal.ConvexBase):
+                points = np.array([shape.placement.act(p) for p in shape.geometry.points()])
+                capsule = enclosing_capsule(shape)
+                assert (distance_from_segment(points, capsule) <= capsule.radius + 1e-12).all()
+
+    def test_unsupported_shape_is_refused(self):
+        shape = pin.GeometryObject("cone_0", 1, pin.SE3.Identity(), coal.Cone(0.1, 0.2))
+        with pytest.raises(ArmError, match="'cone_0' is a Cone"):
+            enclosing_capsule(shape)
+
+
+def capsule_points(simulator, shape, poses):
+    """Points of a capsule's segment in the world, shape (n, 5, 3)."""
+    shapes = simulator.contact_model.shapes
+    ends = shapes.capsules[shape, :6].reshape(2, 3)
+    points = ends[0] + np.linspace(0, 1, 5)[:, None] * (ends[1] - ends[0])
+    return np.array([[pose.act(point) for point in points] for pose in poses[shapes.link[shape]]])
+
+
+def link_poses(simulator, configurations):
+    """World poses of the joint frames, by frame and then configuration."""
+    model = simulator.arm.model
+    data, poses = model.createData(), []
+    for q in configurations:
+        pin.forwardKinematics(model, data, q)
+        poses.append([pin.SE3(data.oMi[k]) for k in range(model.njoints)])
+    return list(zip(*poses, strict=True))
+
+
+class TestTravel:
+    def test_bounds_the_relative_motion_of_every_pair(self, any_simulator):
+        arm, shapes = any_simulator.arm, any_simulator.contact_model.shapes
+        moved = arm.n_actuated
+        rng = np.random.default_rng(5)
+        before = random_configurations(any_simulator, 6, 150)
+        after = before.copy()
+        size = 10.0 ** rng.uniform(-4, 0, (150, 1))
+        single = rng.integers(0, moved, 150)[:, None] == np.arange(moved)
+        mask = np.where(np.arange(150)[:, None] < 100, single, True)
+        after[:, :moved] += size * mask * rng.choice([-1, 1], (150, moved))
+        after = np.clip(after, arm.lower, arm.upper)
+        turn = np.abs(after - before)[:, :moved]
+        old, new = link_poses(any_simulator, before), link_poses(any_simulator, after)
+        tightest = 0.0
+        for column, (kind, first, second) in enumerate(shapes.pairs):
+            mover = second if kind == BETWEEN_CAPSULES else first
+            base = shapes.link[first] if kind == BETWEEN_CAPSULES else 0
+            points = []
+            for poses in (old, new):
+                world = capsule_points(any_simulator, mover, poses)
+                local = [
+                    [pose.actInv(point) for point in row]
+                    for pose, row in zip(poses[base], world, strict=True)
+                ]
+                points.append(np.array(local))
+            change = points[1] - points[0]
+            if kind == WITH_GROUND:
+                change = change[..., 2:]
+            motion = np.linalg.norm(change, axis=2).max(axis=1)
+            bound = turn @ shapes.travel[:, column]
+            assert (motion <= bound + 1e-12).all()
+            tightest = max(tightest, (motion / np.fmax(bound, 1e-9)).max())
+        assert tightest > 0.9
+
+    def test_turning_the_base_leaves_heights_alone(self, simulator):
+        shapes = simulator.contact_model.shapes
+        ground = shapes.pairs[:, 0] == WITH_GROUND
+        np.testing.assert_array_equal(shapes.travel[0, ground], 0)
+        assert (shapes.travel[0, ~ground & (shapes.link[shapes.pairs[:, 1]] > 1)] >= 0).all()
+
+
+class TestProof:
+    def test_never_clears_a_random_configuration_that_touches(self, any_simulator):
+        configurations = random_configurations(any_simulator, 7, 60_000)
+        proven = proven_free(any_simulator, configurations)
+        touching = any_simulator.contact_model.in_contact(configurations)
+        assert not (proven & touching).any()
+        assert proven.sum() > 0.3 * (~touching).sum()
+
+    def test_never_clears_a_near_contact_that_touches(self, any_simulator):
+        for end in contact_boundary(any_simulator, 8, 4000):
+            near = np.concatenate([end, *(jittered(end, seed) for seed in range(4))])
+            proven = proven_free(any_simulator, near)
+            touching = any_simulator.contact_model.in_contact(near)
+            assert 0.05 < touching.mean() <= 1
+            assert not (proven & touching).any()
+
+    def test_proves_capsule_arms_free_up_to_the_margin(self, simulators):
+        for name in CAPSULE_ARMS:
+            simulator = simulators[name]
+            free, _ = contact_boundary(simulator, 9, 1500)
+            near = jittered(free, 10)
+            model, geometry = simulator.arm.model, simulator.contact_model.geometry
+            data, geometry_data = model.createData(), geometry.createData()
+            apart = np.array(
+                [
+                    pin.computeDistances(model, data, geometry, geometry_data, q) is not None
+                    and min(result.min_distance for result in geometry_data.distanceResults)
+                    for q in near
+                ]
+            )
+            proven = proven_free(simulator, near)
+            clear = apart > 1e-4
+            assert clear.sum() > 100
+            assert proven[clear].all()
+
+    @pytest.mark.parametrize("bad", [np.nan, np.inf])
+    def test_claims_nothing_about_numbers_that_are_not_finite(self, simulator, bad):
+        configurations = np.where(np.eye(6, dtype=bool)[:5], bad, 0.0)
+        assert not proven_free(simulator, configurations).any()
+
+    @settings(max_examples=40)
+    @given(st.integers(0, 2**32 - 1), st.sampled_from([*CAPSULE_ARMS, "sliding", "mesh"]))
+    def test_holds_along_random_lines_through_configuration_space(self, simulators, seed, name):
+        simulator = simulators[name]
+        ends = random_configurations(simulator, seed, 2)
+        line = ends[0] + np.linspace(0, 1, 500)[:, None] * (ends[1] - ends[0])
+        proven = proven_free(simulator, line)
+        assert not (proven & simulator.contact_model.in_contact(line)).any()
+
+
+def doubted_steps(simulator, starts, actions):
+    """Advance by one step without asking Coal: episodes and the doubt about their substeps."""
+    episodes = simulator.reset(starts, np.tile([0.0, 0.0, 5.0], (len(starts), 1)))
+    np.copyto(episodes.stop, 1)
+    no_index = np.zeros(0, dtype=np.int64)
+    from kinarm.episodes import PAUSED, Control
+
+    control = Control(no_index, np.zeros((0, 0)), no_index, actions[:, None])
+    shapes, rules = simulator.contact_model.shapes, simulator._rules
+    kernels.advance(0, len(starts), simulator.arm.chain, shapes, rules, control, episodes)
+    paused = episodes.status == PAUSED
+    bits = episodes.doubt[:, None] >> np.arange(4) & 1
+    return episodes, paused[:, None] & bits.astype(bool)
+
+
+def steps_near_contact(simulator, seed, count):
+    """Free starts close to contact, and actions of every size."""
+    free, _ = contact_boundary(simulator, seed, count)
+    rng = np.random.default_rng(seed)
+    arm = simulator.arm
+    near = np.clip(jittered(free, seed), arm.lower, arm.upper)
+    starts = np.concatenate([free, near])
+    starts = starts[~simulator.contact_model.in_contact(starts)]
+    actions = rng.normal(size=(len(starts), arm.n_actuated))
+    return starts, actions * 10.0 ** rng.uniform(-3, 0.5, (len(starts), 1))
+
+
+class TestStepProof:
+    def test_flags_every_tested_configuration_that_touches(self, any_simulator):
+        starts, actions = steps_near_contact(any_simulator, 11, 8000)
+        episodes, doubted = doubted_steps(any_simulator, starts, actions)
+        tested = substeps(starts, episodes.target)
+        for k in range(4):
+            touching = any_simulator.contact_model.in_contact(tested[:, k])
+            assert not (touching & ~doubted[:, k]).any()
+        assert doubted.any(axis=1).sum() > 100
+
+    def test_clears_steps_far_from_contact(self, simulator):
+        starts, _ = simulator.sample(np.random.default_rng(12), 2000)
+        actions = np.random.default_rng(13).uniform(-1, 1, (2000, 5))
+        _, doubted = doubted_steps(simulator, starts, actions)
+        assert doubted.any(axis=1).mean() < 0.1
+
+    def test_agrees_with_the_reference_on_the_first_contact(self, any_simulator):
+        from kinarm.reference import ReferenceSimulator
+
+        reference = ReferenceSimulator(any_simulator)
+        starts, actions = steps_near_contact(any_simulator, 14, 400)
+        episodes, doubted = doubted_steps(any_simulator, starts, actions)
+        contacts = 0
+        for start, target, doubt in zip(starts, episodes.target, doubted, strict=True):
+            if reference.first_contact(start, target) is not None:
+                contacts += 1
+                assert doubt.any()
+        assert contacts > 20
+
+    def test_no_accepted_step_of_whole_episodes_touches(self, any_simulator):
+        rng = np.random.default_rng(15)
+        starts, goals = any_simulator.sample(rng, 600)
+        actions = np.repeat(rng.uniform(-1, 1, (600, 8, any_simulator.n_actions)), 8, axis=1)
+        rollouts = any_simulator.replay(actions, starts, goals, record=True)
+        judge = any_simulator.contact_model.in_contact
+        moves = rollouts.steps - rollouts.collision
+        for path, count in zip(rollouts.paths, moves, strict=True):
+            if count:
+                assert not judge(
+                    substeps(path[:count], path[1 : count + 1]).reshape(-1, path.shape[1])
+                ).any()
+        refused = substeps(rollouts.configurations, rollouts.targets)[rollouts.collision]
+        assert rollouts.collision.sum() > 20
+        assert all(judge(tested).any() for tested in refused)
+
+
+def test_bench_in_the_way_is_an_obstacle(simulator):
+    wall = Bench(name="wall", x=(0.3, 0.6), y=(-0.2, 0.2), height=1.0)
+    model = ContactModel.build(simulator.arm, Scene(benches=(wall,)))
+    assert "wall bench" in model.contact_pair(np.zeros(6))

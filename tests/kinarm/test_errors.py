@@ -1,0 +1,63 @@
+"""The tree of errors."""
+
+import pickle
+
+import pytest
+
+from kinarm import errors
+from kinarm.errors import (
+    ArmError,
+    InvalidInputError,
+    KinarmError,
+    OutputError,
+    PolicyFileError,
+    SceneError,
+    StartInContactError,
+    UnknownNameError,
+)
+
+EXAMPLES = [
+    ArmError("no arm"),
+    SceneError("no scene"),
+    InvalidInputError("no input"),
+    UnknownNameError("task", "up", ("left", "right")),
+    StartInContactError(3, ("hand", "ground")),
+    PolicyFileError("no file"),
+    OutputError("no space"),
+]
+
+
+def test_one_handler_catches_them_all():
+    raised = [value for value in vars(errors).values() if isinstance(value, type)]
+    exceptions = [value for value in raised if issubclass(value, Exception)]
+    assert len(exceptions) == len(EXAMPLES) + 1
+    assert all(issubclass(value, KinarmError) for value in exceptions)
+
+
+@pytest.mark.parametrize("error", EXAMPLES, ids=lambda error: type(error).__name__)
+def test_pickle_keeps_everything(error):
+    copy = pickle.loads(pickle.dumps(error))
+    assert type(copy) is type(error)
+    assert str(copy) == str(error)
+    assert vars(copy) == vars(error)
+
+
+def test_unknown_name_says_what_exists():
+    error = UnknownNameError("task", "up", iter(["left", "right"]))
+    assert str(error) == "unknown task 'up'; available: left, right"
+    assert (error.kind, error.given, error.available) == ("task", "up", ("left", "right"))
+
+
+def test_start_in_contact_says_which_and_what():
+    error = StartInContactError(3, ("hand", "ground"))
+    assert str(error) == "start 3 is in contact: hand touches ground"
+
+
+def test_bad_input_is_a_value_error():
+    assert issubclass(InvalidInputError, ValueError)
+    assert issubclass(UnknownNameError, InvalidInputError)
+
+
+@pytest.mark.parametrize("error", EXAMPLES, ids=lambda error: type(error).__name__)
+def test_messages_are_one_line(error):
+    assert "\n" not in str(error)

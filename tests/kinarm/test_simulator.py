@@ -1,0 +1,545 @@
+"""Rollouts, steps, sampling: semantics, determinism and refusals."""
+
+import copy
+import math
+import pickle
+
+import numpy as np
+import pytest
+
+from kinarm.episodes import COLLISION, RUNNING
+from kinarm.errors import InvalidInputError, SceneError, StartInContactError, UnknownNameError
+from kinarm.networks import Networks
+from kinarm.reference import ReferenceSimulator
+from kinarm.scene import Bench, Scene
+from kinarm.simulator import Simulator, substeps
+from kinarm.task import ReachTask, RewardWeights
+
+HOME = np.zeros((1, 6))
+FAR_GOAL = np.array([[0.0, 5.0, 5.0]])
+RESULTS = ("success", "collision", "steps", "distance", "returns", "configurations", "targets")
+
+
+def linear_policies(simulator, count, seed):
+    rng = np.random.default_rng(seed)
+    matrices = rng.normal(size=(count, simulator.n_actions, simulator.n_observations)) / 3
+    return Networks.linear(matrices, rng.normal(size=(count, simulator.n_actions)) / 10)
+
+
+def in_numpy(networks):
+    """A linear network as a Python function."""
+    n_in, n_out = networks.layers
+    weights = networks.weights[0, :-n_out].reshape(n_in, n_out)
+    return lambda x: x @ weights + networks.weights[0, -n_out:]
+
+
+def assert_identical(first, second, rows=slice(None)):
+    optional = [name for name in ("moments", "paths") if len(getattr(second, name))]
+    for name in (*RESULTS, *optional):
+        np.testing.assert_array_equal(getattr(first, name)[rows], getattr(second, name))
+
+
+def with_reward(simulator, **weights):
+    task = ReachTask(name="test", benches=("right",), reward=RewardWeights(**weights))
+    return Simulator(simulator.arm, task, threads=1)
+
+
+@pytest.fixture(scope="module")
+def scenarios(simulator):
+    return simulator.sample(np.random.default_rng(0), 600)
+
+
+@pytest.fixture(scope="module")
+def rewarded(simulator):
+    """A simulator in which each reward term is non-zero."""
+    return with_reward(simulator, progress=2.0, collision=-3.0, success=5.0, step=-0.25)
+
+
+class TestDeterminism:
+    def test_threads_do_not_matter(self, simulator, scenarios):
+        networks = linear_policies(simulator, 600, 1)
+        results = [
+            Simulator(simulator.arm, "both", threads=threads).rollout(
+                networks, *scenarios, record=True, shift=np.ones(48)
+            )
+            for threads in (1, 2, 3)
+        ]
+        assert_identical(results[0], results[1])
+        assert_identical(results[0], results[2])
+        assert results[0].collision.any()
+
+    def test_batch_split_does_not_matter(self, simulator, scenarios):
+        networks, (starts, goals) = linear_policies(simulator, 600, 2), scenarios
+        settings = {"record": True, "shift": np.zeros(48)}
+        whole = simulator.rollout(networks, starts, goals, **settings)
+        for rows in (slice(0, 1), slice(1, 100), slice(100, 600)):
+            part = Networks(networks.layers, networks.weights[rows])
+            split = simulator.rollout(part, starts[rows], goals[rows], **settings)
+            assert_identical(whole, split, rows)
+
+    def test_order_does_not_matter(self, simulator, scenarios):
+        networks, (starts, goals) = linear_policies(simulator, 600, 3), scenarios
+        order = np.random.default_rng(4).permutation(600)
+        whole = simulator.rollout(networks, starts, goals, record=True)
+        shuffled = simulator.rollout(
+            networks, starts[order], goals[order], policy_index=order, record=True
+        )
+        assert_identical(whole, shuffled, order)
+
+    def test_threads_do_not_change_what_is_drawn(self, simulator):
+        draws = [
+            Simulator(simulator.arm, "both", threads=threads).sample(np.random.default_rng(5), 3000)
+            for threads in (1, 2)
+        ]
+        np.testing.assert_array_equal(draws[0][0], draws[1][0])
+        np.testing.assert_array_equal(draws[0][1], draws[1][1])
+
+    def test_copies_behave_alike(self, simulator, scenarios):
+        networks = linear_policies(simulator, 1, 6)
+        expected = simulator.rollout(networks, *scenarios)
+        for other in (pickle.loads(pickle.dumps(simulator)), copy.deepcopy(simulator)):
+            assert_identical(expected, other.rollout(networks, *scenarios))
+
+    def test_inputs_are_left_alone(self, simulator, scenarios):
+        starts, goals = (part.copy() for part in scenarios)
+        result = simulator.rollout(linear_policies(simulator, 1, 7), starts, goals)
+        np.testing.assert_array_equal(starts, scenarios[0])
+        np.testing.assert_array_equal(goals, scenarios[1])
+        starts[:] = 9
+        np.testing.assert_array_equal(result.starts, scenarios[0])
+
+
+class TestAgreement:
+    def test_step_loop_equals_replay(self, simulator, scenarios):
+        starts, goals = (part[:200] for part in scenarios)
+        actions = np.random.default_rng(8).uniform(-1.5, 1.5, (200, 64, 5))
+        replayed = simulator.replay(actions, starts, goals, record=True)
+        episodes = simulator.reset(starts, goals, record=True)
+        total, terminated = np.zeros(200), np.zeros(200, dtype=bool)
+        for step in range(64):
+            running = episodes.status == RUNNING
+            result = simulator.step(episodes, actions[:, step])
+            total[running] += result.reward[running]
+            terminated |= result.terminated
+        np.testing.assert_array_equal(episodes.path, replayed.paths)
+        np.testing.assert_array_equal(episodes.steps, replayed.steps)
+        np.testing.assert_array_equal(episodes.distance, replayed.distance)
+        np.testing.assert_array_equal(terminated, replayed.success | replayed.collision)
+        np.testing.assert_allclose(total, replayed.returns, rtol=0, atol=1e-12)
+
+    def test_function_equals_compiled_policy(self, simulator, scenarios):
+        networks = linear_policies(simulator, 1, 9)
+        compiled = simulator.rollout(networks, *scenarios, record=True)
+        followed = simulator.rollout(in_numpy(networks), *scenarios, record=True)
+        for name in ("success", "collision", "steps"):
+            np.testing.assert_array_equal(getattr(compiled, name), getattr(followed, name))
+        for name in ("paths", "distance", "returns", "configurations"):
+            np.testing.assert_allclose(
+                getattr(compiled, name), getattr(followed, name), rtol=0, atol=1e-12
+            )
+
+    def test_policy_index_chooses_the_policy(self, simulator, scenarios):
+        networks = linear_policies(simulator, 3, 10)
+        index = np.arange(600) % 3
+        mixed = simulator.rollout(networks, *scenarios, policy_index=index)
+        for k in range(3):
+            alone = Networks(networks.layers, networks.weights[k : k + 1])
+            expected = simulator.rollout(alone, *scenarios)
+            np.testing.assert_array_equal(mixed.returns[k::3], expected.returns[k::3])
+
+    def test_moments_are_sums_over_the_observations_acted_upon(self, simulator, scenarios):
+        starts, goals = (part[:60] for part in scenarios)
+        shift = np.random.default_rng(11).normal(size=48)
+        rollouts = simulator.rollout(
+            linear_policies(simulator, 60, 12), starts, goals, record=True, shift=shift
+        )
+        reference = ReferenceSimulator(simulator)
+        assert rollouts.collision.any()
+        for i in range(60):
+            visited = rollouts.paths[i, : rollouts.steps[i]]
+            seen = np.array([reference.observe(q, goals[i])[0] for q in visited]) - shift
+            np.testing.assert_allclose(rollouts.moments[i, 0], seen.sum(axis=0), atol=1e-10)
+            np.testing.assert_allclose(rollouts.moments[i, 1], (seen**2).sum(axis=0), atol=1e-10)
+
+    def test_observe_equals_the_reference(self, simulator):
+        rng = np.random.default_rng(26)
+        q = rng.uniform(simulator.arm.lower, simulator.arm.upper, (50, 6))
+        goals = rng.normal(size=(50, 3))
+        reference = ReferenceSimulator(simulator)
+        expected = [reference.observe(*pair)[0] for pair in zip(q, goals, strict=True)]
+        np.testing.assert_allclose(simulator.observe(q, goals), expected, rtol=0, atol=1e-12)
+
+    def test_rewards_sum_to_the_return(self, rewarded):
+        rng = np.random.default_rng(13)
+        starts, goals = rewarded.sample(rng, 100)
+        episodes = rewarded.reset(starts, goals)
+        total = np.zeros(100)
+        for _ in range(64):
+            running = episodes.status == RUNNING
+            result = rewarded.step(episodes, rng.uniform(-1, 1, (100, 5)))
+            terms = result.terms
+            np.testing.assert_allclose(
+                result.reward, terms.progress + terms.collision + terms.success + terms.step
+            )
+            total += np.where(running, result.reward, 0)
+        np.testing.assert_allclose(total, episodes.total, atol=1e-12)
+
+    def test_contact_pairs_name_what_was_hit(self, simulator, scenarios):
+        rollouts = simulator.rollout(linear_policies(simulator, 600, 14), *scenarios)
+        pairs = simulator.contact_pairs(rollouts)
+        assert [pair is not None for pair in pairs] == rollouts.collision.tolist()
+        assert set(pairs) - {None} <= set(simulator.contact_model.pair_names)
+
+
+class TestStep:
+    def test_reward_by_hand(self, rewarded):
+        goal = np.array([[0.625, 1.0, 0.705]])
+        episodes = rewarded.reset(HOME, goal)
+        result = rewarded.step(episodes, [[1, 0, 0, 0, 0]])
+        angle = math.radians(7)
+        tool = 0.625 * np.array([math.cos(angle), math.sin(angle)])
+        after = math.hypot(0.625 - tool[0], 1.0 - tool[1])
+        assert result.terms.progress[0] == pytest.approx(2 * (1.0 - after))
+        assert result.terms.step[0] == -0.25
+        assert result.terms.success[0] == 0
+        assert result.terms.collision[0] == 0
+        assert result.reward[0] == pytest.approx(2 * (1.0 - after) - 0.25)
+
+    def test_success_by_hand(self, rewarded):
+        angle = math.radians(7)
+        goal = np.array([[0.625 * math.cos(angle), 0.625 * math.sin(angle) + 0.01, 0.705]])
+        episodes = rewarded.reset(HOME, goal)
+        before = episodes.distance[0]
+        result = rewarded.step(episodes, [[1, 0, 0, 0, 0]])
+        assert result.success[0]
+        assert result.terminated[0]
+        assert not result.truncated[0]
+        assert result.reward[0] == pytest.approx(2 * (before - 0.01) + 5 - 0.25)
+
+    def test_refused_move_leaves_the_arm_in_place(self, rewarded):
+        episodes = rewarded.reset(HOME, FAR_GOAL)
+        while episodes.status[0] != COLLISION:
+            q, seen = episodes.q.copy(), episodes.observation.copy()
+            result = rewarded.step(episodes, [[0, 1, 0, 0, 0]])
+        np.testing.assert_array_equal(episodes.q, q)
+        np.testing.assert_array_equal(episodes.observation, seen)
+        assert result.collision[0]
+        assert result.terminated[0]
+        assert result.reward[0] == -3.25
+        assert result.terms.progress[0] == 0
+
+    def test_contact_beats_success(self, simulator):
+        # The first refused move of a fall would end at this goal.
+        path = simulator.reset(HOME, FAR_GOAL)
+        while path.status[0] != COLLISION:
+            simulator.step(path, [[0, 1, 0, 0, 0]])
+        goal = simulator.arm.tool_position(path.target[0])
+        assert np.linalg.norm(goal - simulator.arm.tool_position(path.q[0])) > 0.05
+        episodes = simulator.reset(path.q, goal[None])
+        result = simulator.step(episodes, [[0, 1, 0, 0, 0]])
+        assert result.collision[0]
+        assert not result.success[0]
+
+    def test_actions_are_clipped(self, simulator):
+        ends = []
+        for action in ([1, -1, 1, 0.5, 0], [7, -3, 1e9, 0.5, 0]):
+            episodes = simulator.reset(HOME, FAR_GOAL)
+            simulator.step(episodes, [action])
+            ends.append(episodes.q[0])
+        np.testing.assert_array_equal(ends[0], ends[1])
+        np.testing.assert_allclose(np.rad2deg(ends[0]), [7, -7, 8, 4.5, 0, 0], atol=1e-12)
+
+    def test_axes_stop_at_their_limits(self, simulator):
+        start = HOME.copy()
+        start[0, 0] = simulator.arm.upper[0] - 0.01
+        start[0, 3] = simulator.arm.lower[3] + 0.02
+        episodes = simulator.reset(start, FAR_GOAL)
+        simulator.step(episodes, [[1, 0, 0, -1, 0]])
+        assert episodes.q[0, 0] == simulator.arm.upper[0]
+        assert episodes.q[0, 3] == simulator.arm.lower[3]
+
+    def test_held_axis_stays_where_it_starts(self, simulator):
+        start = HOME.copy()
+        start[0, 5] = 1.25
+        rollouts = simulator.replay(np.ones((1, 64, 5)), start, FAR_GOAL, record=True)
+        np.testing.assert_array_equal(rollouts.paths[0, : rollouts.steps[0] + 1, 5], 1.25)
+
+    def test_horizon_truncates(self, simulator):
+        for horizon in (1, 3):
+            task = ReachTask(name="short", benches=("right",), horizon=horizon)
+            short = Simulator(simulator.arm, task, threads=1)
+            episodes = short.reset(HOME, FAR_GOAL)
+            flags = [
+                bool(short.step(episodes, np.zeros((1, 5))).truncated[0]) for _ in range(horizon)
+            ]
+            assert flags == [False] * (horizon - 1) + [True]
+            rollouts = short.rollout(lambda x: np.zeros((len(x), 5)), HOME, FAR_GOAL)
+            assert rollouts.steps[0] == horizon
+            assert not rollouts.success[0]
+            assert not rollouts.collision[0]
+
+    def test_success_at_the_horizon_is_no_truncation(self, simulator):
+        task = ReachTask(name="short", benches=("right",), horizon=1, tolerance=0.5)
+        short = Simulator(simulator.arm, task, threads=1)
+        result = short.step(short.reset(HOME, [[0.6, 0, 0.7]]), np.zeros((1, 5)))
+        assert result.success[0]
+        assert not result.truncated[0]
+
+    def test_ended_episodes_neither_move_nor_earn(self, rewarded):
+        starts = np.zeros((2, 6))
+        goals = np.array([[0.625, 0.08, 0.705], [0, 5, 5]])
+        episodes = rewarded.reset(starts, goals)
+        actions = np.array([[1.0, 0, 0, 0, 0]] * 2)
+        assert rewarded.step(episodes, actions).success.tolist() == [True, False]
+        resting = episodes.q[0].copy()
+        result = rewarded.step(episodes, actions)
+        np.testing.assert_array_equal(episodes.q[0], resting)
+        assert not result.terminated[0]
+        assert episodes.steps.tolist() == [1, 2]
+        assert result.reward[0] == 0
+
+    def test_time_step_scales_the_motion(self, simulator):
+        slow = Simulator(simulator.arm, "right", time_step=0.01, threads=1)
+        np.testing.assert_allclose(slow.step_limit, simulator.step_limit / 2)
+        np.testing.assert_allclose(np.rad2deg(simulator.step_limit), [7, 7, 8, 9, 9])
+
+    def test_substeps_are_evenly_spaced_and_end_at_the_target(self):
+        q, target = np.array([[0.0, 1.0]]), np.array([[0.4, 0.2]])
+        tested = substeps(q, target)
+        np.testing.assert_allclose(tested[0], [[0.1, 0.8], [0.2, 0.6], [0.3, 0.4], [0.4, 0.2]])
+        np.testing.assert_array_equal(tested[:, 3], target)
+
+
+class TestSample:
+    def test_starts_are_free_and_away_from_the_goal(self, any_simulator):
+        starts, goals = any_simulator.sample(np.random.default_rng(15), 1500)
+        assert not any_simulator.contact_model.in_contact(starts).any()
+        tools = np.array([any_simulator.arm.tool_position(q) for q in starts[:300]])
+        distances = np.linalg.norm(tools - goals[:300], axis=1)
+        assert (distances > any_simulator.task.tolerance).all()
+        assert ((starts >= any_simulator.arm.lower) & (starts <= any_simulator.arm.upper)).all()
+
+    def test_starts_near_the_goal_are_rejected(self, simulator):
+        task = ReachTask(name="wide", benches=("right",), tolerance=0.8)
+        wide = Simulator(simulator.arm, task, threads=1)
+        starts, goals = wide.sample(np.random.default_rng(16), 200)
+        tools = np.array([wide.arm.tool_position(q) for q in starts])
+        assert (np.linalg.norm(tools - goals, axis=1) > 0.8).all()
+
+    def test_same_seed_same_scenarios(self, simulator):
+        first, second, other = (
+            simulator.sample(np.random.default_rng(seed), 20) for seed in (1, 1, 2)
+        )
+        np.testing.assert_array_equal(first[0], second[0])
+        np.testing.assert_array_equal(first[1], second[1])
+        assert (first[0][:, 0] != other[0][:, 0]).all()
+
+    def test_goals_lie_on_the_benches_half_on_each(self, simulator):
+        _, goals = simulator.sample(np.random.default_rng(17), 8000)
+        assert (goals[:, 2] == 0.325).all()
+        assert (np.abs(goals[:, 0]) <= 0.5).all()
+        assert ((np.abs(goals[:, 1]) >= 0.55) & (np.abs(goals[:, 1]) <= 0.75)).all()
+        # Six standard deviations of a fair coin.
+        assert abs((goals[:, 1] > 0).mean() - 0.5) < 6 * 0.5 / math.sqrt(8000)
+
+    @pytest.mark.parametrize(("name", "side"), [("left", 1), ("right", -1)])
+    def test_goals_are_uniform_over_a_bench(self, simulator, name, side):
+        from scipy import stats
+
+        _, goals = Simulator(simulator.arm, name, threads=1).sample(np.random.default_rng(18), 4000)
+        across = side * goals[:, 1]
+        assert stats.kstest(goals[:, 0], stats.uniform(-0.5, 1).cdf).pvalue > 1e-4
+        assert stats.kstest(across, stats.uniform(0.55, 0.2).cdf).pvalue > 1e-4
+
+    def test_starts_fill_the_limits(self, simulator):
+        starts, _ = simulator.sample(np.random.default_rng(19), 4000)
+        share = (starts - simulator.arm.lower) / (simulator.arm.upper - simulator.arm.lower)
+        assert (share[:, :5].min(axis=0) < 0.05).all()
+        assert (share[:, [0, 3, 4]].max(axis=0) > 0.98).all()
+        np.testing.assert_array_equal(starts[:, 5], 0)
+
+    def test_start_spread_scales_the_range_about_home(self, simulator):
+        home = np.array([0.3, 0.1, 0.2, -0.4, 0.5, 0])
+        from kinarm.arm import Arm
+
+        task = ReachTask(name="near", benches=("right",), start_spread=0.1)
+        near = Simulator(Arm.load("paper", home=home), task, threads=1)
+        starts, _ = near.sample(np.random.default_rng(20), 3000)
+        low = home + 0.1 * (near.arm.lower - home)
+        high = home + 0.1 * (near.arm.upper - home)
+        moved = slice(0, 5)
+        assert (starts[:, moved] >= low[moved]).all()
+        assert (starts[:, moved] <= high[moved]).all()
+        np.testing.assert_allclose(starts[:, moved].min(axis=0), low[moved], atol=0.01)
+        np.testing.assert_allclose(starts[:, moved].max(axis=0), high[moved], atol=0.01)
+
+    def test_no_spread_starts_at_home(self, simulator):
+        task = ReachTask(name="home", benches=("right",), start_spread=0)
+        starts, goals = Simulator(simulator.arm, task).sample(np.random.default_rng(21), 50)
+        np.testing.assert_array_equal(starts, np.zeros((50, 6)))
+        assert len(np.unique(goals, axis=0)) == 50
+
+    def test_nothing_to_draw(self, simulator):
+        starts, goals = simulator.sample(np.random.default_rng(22), 0)
+        assert starts.shape == (0, 6)
+        assert goals.shape == (0, 3)
+
+    def test_bench_around_the_arm_leaves_no_start(self, simulator):
+        block = Bench(name="block", x=(-1, 1), y=(-1, 1), height=2)
+        task = ReachTask(name="buried", benches=("block",))
+        buried = Simulator(simulator.arm, task, Scene(benches=(block,)))
+        with pytest.raises(SceneError, match="no contact-free start .* block bench"):
+            buried.sample(np.random.default_rng(23), 3)
+
+    def test_goal_at_the_only_start_is_refused(self, simulator):
+        task = ReachTask(name="there", benches=("right",), start_spread=0, tolerance=5)
+        with pytest.raises(SceneError, match="the tool already is at the goal"):
+            Simulator(simulator.arm, task).sample(np.random.default_rng(24), 1)
+
+
+class TestRefusals:
+    def test_start_in_contact_names_the_pair(self, simulator):
+        starts = np.zeros((3, 6))
+        starts[1] = np.deg2rad([0, 110, -60, 0, 0, 0])
+        pair = simulator.contact_model.contact_pair(starts[1])
+        with pytest.raises(StartInContactError) as caught:
+            simulator.rollout(linear_policies(simulator, 1, 0), starts, np.tile(FAR_GOAL, (3, 1)))
+        assert caught.value.index == 1
+        assert caught.value.pair == pair
+        assert f"start 1 is in contact: {pair[0]} touches {pair[1]}" in str(caught.value)
+
+    @pytest.mark.parametrize("axis", range(6))
+    def test_start_beyond_the_limits(self, simulator, axis):
+        starts = np.zeros((2, 6))
+        starts[1, axis] = simulator.arm.upper[axis] + 1e-9
+        with pytest.raises(InvalidInputError, match="start 1 lies outside the limits"):
+            simulator.reset(starts, np.tile(FAR_GOAL, (2, 1)))
+
+    @pytest.mark.parametrize(
+        ("starts", "goals", "message"),
+        [
+            (np.zeros((2, 5)), np.ones((2, 3)), r"starts must have shape \(n, 6\), got \(2, 5\)"),
+            (np.zeros(6), np.ones((1, 3)), r"starts must have shape"),
+            (np.zeros((2, 6)), np.ones((3, 3)), r"goals must have shape \(2, 3\), got \(3, 3\)"),
+            (np.zeros((2, 6)), np.ones((2, 2)), r"goals must have shape"),
+            (
+                np.full((1, 6), np.nan),
+                np.ones((1, 3)),
+                r"starts must be finite, got nan at",
+            ),
+            (np.zeros((1, 6)), [[0, np.inf, 0]], r"goals must be finite, got inf at \[0, 1\]"),
+            ([["a"] * 6], np.ones((1, 3)), "starts must be numbers"),
+        ],
+    )
+    def test_bad_starts_and_goals(self, simulator, starts, goals, message):
+        with pytest.raises(InvalidInputError, match=message):
+            simulator.rollout(linear_policies(simulator, 1, 0), starts, goals)
+        with pytest.raises(InvalidInputError, match=message):
+            simulator.reset(starts, goals)
+        with pytest.raises(InvalidInputError, match=message):
+            simulator.replay(np.zeros((len(starts), 64, 5)), starts, goals)
+
+    @pytest.mark.parametrize("bad", [np.nan, np.inf])
+    def test_actions_that_are_not_finite(self, simulator, bad):
+        actions = np.zeros((1, 5))
+        actions[0, 2] = bad
+        with pytest.raises(InvalidInputError, match="actions must be finite"):
+            simulator.step(simulator.reset(HOME, FAR_GOAL), actions)
+        with pytest.raises(InvalidInputError, match="actions must be finite"):
+            simulator.replay(np.tile(actions, (1, 64, 1)), HOME, FAR_GOAL)
+        with pytest.raises(InvalidInputError, match="actions must be finite"):
+            simulator.rollout(lambda x: actions, HOME, FAR_GOAL)
+
+    @pytest.mark.parametrize("shape", [(5,), (1, 6), (2, 5), (1, 1, 5)])
+    def test_actions_of_the_wrong_shape(self, simulator, shape):
+        with pytest.raises(InvalidInputError, match=r"actions must have shape \(1, 5\)"):
+            simulator.step(simulator.reset(HOME, FAR_GOAL), np.zeros(shape))
+
+    def test_action_table_of_the_wrong_length(self, simulator):
+        with pytest.raises(InvalidInputError, match=r"actions must have shape \(1, 64, 5\)"):
+            simulator.replay(np.zeros((1, 63, 5)), HOME, FAR_GOAL)
+
+    @pytest.mark.parametrize("index", [[0, 3], [-1, 0], [0], [[0, 1]], [0.5, 1.0], ["a", "b"]])
+    def test_bad_policy_index(self, simulator, index):
+        networks = linear_policies(simulator, 3, 0)
+        with pytest.raises(InvalidInputError, match=r"policy_index must hold 2 .*0\.\.2"):
+            simulator.rollout(
+                networks, np.zeros((2, 6)), np.tile(FAR_GOAL, (2, 1)), policy_index=index
+            )
+
+    def test_ambiguous_number_of_policies(self, simulator):
+        with pytest.raises(InvalidInputError, match="3 policies for 2 episodes: give policy_index"):
+            simulator.rollout(
+                linear_policies(simulator, 3, 0), np.zeros((2, 6)), np.tile(FAR_GOAL, (2, 1))
+            )
+
+    def test_policy_of_another_size(self, simulator):
+        networks = Networks.linear(np.zeros((1, 5, 41)), np.zeros((1, 5)))
+        with pytest.raises(InvalidInputError, match="41 observations to 5 actions"):
+            simulator.rollout(networks, HOME, FAR_GOAL)
+
+    def test_parameters_that_do_not_fit_the_layers(self, simulator):
+        with pytest.raises(InvalidInputError):
+            simulator.rollout(Networks(np.array([48, 5]), np.zeros((1, 100))), HOME, FAR_GOAL)
+
+    def test_parameters_that_are_not_finite(self, simulator):
+        with pytest.raises(InvalidInputError):
+            simulator.rollout(
+                Networks(np.array([48, 5]), np.full((1, 245), np.nan)), HOME, FAR_GOAL
+            )
+
+    @pytest.mark.parametrize("shift", [np.zeros(47), np.full(48, np.nan)])
+    def test_bad_shift(self, simulator, shift):
+        with pytest.raises(InvalidInputError, match="shift"):
+            simulator.rollout(linear_policies(simulator, 1, 0), HOME, FAR_GOAL, shift=shift)
+
+    @pytest.mark.parametrize("time_step", [0, -0.02, np.nan, np.inf])
+    def test_bad_time_step(self, simulator, time_step):
+        with pytest.raises(InvalidInputError, match="time_step"):
+            Simulator(simulator.arm, time_step=time_step)
+
+    @pytest.mark.parametrize("threads", [0, -1])
+    def test_bad_threads(self, simulator, threads):
+        with pytest.raises(InvalidInputError, match="threads must be a whole number of at least 1"):
+            Simulator(simulator.arm, threads=threads)
+
+    def test_task_on_a_bench_that_the_scene_lacks(self, simulator):
+        with pytest.raises(UnknownNameError, match="bench 'right'"):
+            Simulator(simulator.arm, "right", Scene(benches=()))
+
+    def test_unknown_names(self):
+        with pytest.raises(UnknownNameError, match="'nope'"):
+            Simulator("nope")
+        with pytest.raises(UnknownNameError, match="'up'.*left, right, both"):
+            Simulator("paper", "up")
+
+
+def test_coal_is_asked_only_where_freedom_is_not_proven(simulator):
+    idle = Simulator(simulator.arm, "right", threads=1)
+    idle.replay(np.zeros((1, 64, 5)), HOME, FAR_GOAL)
+    assert idle.judged == 0
+    idle.replay(np.tile([0.0, 1, 0, 0, 0], (1, 64, 1)), HOME, FAR_GOAL)
+    assert 0 < idle.judged < 4 * 64
+
+
+def test_rollouts_know_their_length(simulator, scenarios):
+    starts, goals = scenarios
+    assert len(simulator.rollout(linear_policies(simulator, 1, 0), starts[:7], goals[:7])) == 7
+
+
+def test_no_episodes(simulator):
+    empty = simulator.rollout(linear_policies(simulator, 1, 0), np.zeros((0, 6)), np.zeros((0, 3)))
+    assert len(empty) == 0
+
+
+def test_list_of_policies(simulator, scenarios):
+    class Wrapped:
+        def __init__(self, networks):
+            self._networks = networks
+
+        def networks(self):
+            return self._networks
+
+    networks = linear_policies(simulator, 600, 25)
+    listed = [Wrapped(Networks(networks.layers, row[None])) for row in networks.weights]
+    assert_identical(simulator.rollout(networks, *scenarios), simulator.rollout(listed, *scenarios))

@@ -1,0 +1,178 @@
+"""The wheel holds all that is needed, and works away from the clone."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.slow
+
+ROOT = Path(__file__).resolve().parents[2]
+
+USE_IT = """
+import json, pathlib, sys
+import numpy as np
+import kinarm, kinarm.data, kinarm.evaluation, kinarm.policies
+from kinarm.arm import Arm, arm_names
+from kinarm.policies import policy_names
+from kinarm.simulator import Simulator
+simulator = Simulator(task="both", threads=1)
+starts, goals = simulator.sample(np.random.default_rng(0), 3)
+rollouts = simulator.replay(np.ones((3, 64, 5)), starts, goals)
+json.dump({
+    "files": [m.__file__ for m in (kinarm, kinarm.data, kinarm.evaluation, kinarm.policies)],
+    "path": list(kinarm.__path__),
+    "arms": {name: Arm.load(name).digest for name in arm_names()},
+    "policies": list(policy_names()),
+    "steps": rollouts.steps.tolist(),
+    "distance": rollouts.distance.tolist(),
+}, sys.stdout)
+"""
+
+
+def call(*arguments: object, **settings: object) -> str:
+    done = subprocess.run(
+        [str(argument) for argument in arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+        **settings,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def sources() -> list[str]:
+    """Files of the project: what is recorded, and what is new and not ignored."""
+    names = call("git", "ls-files", "-co", "--exclude-standard", cwd=ROOT).splitlines()
+    return [name for name in names if (ROOT / name).is_file()]
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build a wheel without network, from a copy, so that the clone stays as it is."""
+    copy, out = (tmp_path_factory.mktemp(name) for name in ("copy", "wheel"))
+    for name in sources():
+        (copy / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(ROOT / name, copy / name)
+    pip = (sys.executable, "-m", "pip", "--disable-pip-version-check")
+    build = ("wheel", copy, "--no-deps", "--no-build-isolation", "--no-index", "-w", out)
+    call(*pip, *build, cwd=out)
+    (path,) = out.iterdir()
+    return path
+
+
+@pytest.fixture(scope="module")
+def target(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Install the wheel into a folder of its own."""
+    folder = tmp_path_factory.mktemp("target")
+    pip = (sys.executable, "-m", "pip", "--disable-pip-version-check")
+    call(*pip, "install", "--no-deps", "--no-index", "--target", folder, wheel, cwd=folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def used(target: Path, tmp_path_factory: pytest.TempPathFactory) -> dict:
+    """What a program elsewhere gets out of it."""
+    elsewhere = tmp_path_factory.mktemp("elsewhere")
+    out = call(sys.executable, "-c", USE_IT, cwd=elsewhere, env=environment(target))
+    return json.loads(out)
+
+
+def environment(target: Path) -> dict[str, str]:
+    return {**os.environ, "PYTHONPATH": str(target)}
+
+
+def names(wheel: Path) -> list[str]:
+    with zipfile.ZipFile(wheel) as archive:
+        return archive.namelist()
+
+
+def test_only_one_name_is_put_into_site_packages(wheel):
+    top = {name.split("/")[0] for name in names(wheel)}
+    assert {name for name in top if not name.endswith(".dist-info")} == {"kinarm"}
+
+
+def test_every_module_and_data_file_is_in_the_wheel(wheel):
+    folders = {"kinarm": "kinarm", **{n: f"kinarm/{n}" for n in ("policies", "evaluation", "data")}}
+    expected = {
+        "/".join([folders[name.split("/")[0]], *name.split("/")[1:]])
+        for name in sources()
+        if name.split("/")[0] in folders and not name.endswith(".md")
+    }
+    assert expected
+    assert expected <= set(names(wheel))
+
+
+def test_types_are_declared(wheel):
+    for package in ("kinarm", "kinarm/policies", "kinarm/evaluation"):
+        assert f"{package}/py.typed" in names(wheel)
+
+
+def test_nothing_else_is_in_the_wheel(wheel):
+    strange = [name for name in names(wheel) if "__pycache__" in name or "/tests/" in name]
+    assert strange == []
+
+
+def test_metadata_name_the_commands_the_licence_and_no_torch(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        info = next(name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
+        folder = info.removesuffix("METADATA")
+        metadata = archive.read(info).decode()
+        commands = archive.read(f"{folder}entry_points.txt").decode()
+        assert f"{folder}licenses/LICENSE" in archive.namelist()
+    for line in (
+        "kinarm-eval = kinarm.evaluation.eval:main",
+        "kinarm-train = kinarm.policies.train:main",
+        "kinarm-bench = kinarm.evaluation.bench:main",
+    ):
+        assert line in commands
+    assert "License-Expression: BSD-2-Clause" in metadata
+    required = [line for line in metadata.splitlines() if line.startswith("Requires-Dist")]
+    core = [line for line in required if "extra ==" not in line]
+    assert any("numba" in line for line in core)
+    assert not any("torch" in line or "stable" in line for line in core)
+
+
+def test_it_is_used_from_where_it_was_installed(used, target):
+    assert all(Path(file).is_relative_to(target) for file in used["files"])
+    assert used["path"] == [str(target / "kinarm")]
+
+
+def test_arms_and_policies_came_along(used):
+    from kinarm.arm import Arm, arm_names
+    from kinarm.policies import policy_names
+
+    assert used["arms"] == {name: Arm.load(name).digest for name in arm_names()}
+    assert used["policies"] == list(policy_names())
+
+
+def test_it_simulates_as_the_clone_does(used):
+    import numpy as np
+
+    from kinarm.simulator import Simulator
+
+    simulator = Simulator(task="both")
+    starts, goals = simulator.sample(np.random.default_rng(0), 3)
+    rollouts = simulator.replay(np.ones((3, 64, 5)), starts, goals)
+    assert used["steps"] == rollouts.steps.tolist()
+    assert used["distance"] == rollouts.distance.tolist()
+
+
+def test_commands_work_from_elsewhere(target, tmp_path):
+    options = ("--policy", "zero", "--task", "left", "--trials", "2", "--out", "results")
+    command = (sys.executable, "-m", "kinarm.evaluation.eval", *options)
+    call(*command, cwd=tmp_path, env=environment(target))
+    assert (tmp_path / "results" / "evaluation.json").is_file()
+
+
+def test_the_root_of_a_clone_uses_the_clone_beside_an_installed_wheel(target):
+    code = "import kinarm.policies, kinarm.evaluation; print(kinarm.policies.__file__)"
+    out = call(sys.executable, "-c", code, cwd=ROOT, env=environment(target))
+    assert Path(out.strip()) == ROOT / "policies" / "__init__.py"

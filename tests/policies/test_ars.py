@@ -1,0 +1,423 @@
+"""Augmented Random Search: the update by hand, its known traps, and exact resuming."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinarm.errors import InvalidInputError, KinarmError, UnknownNameError
+from kinarm.policies import ARSConfig, Policy, train_ars
+from kinarm.policies.ars import (
+    ars_iteration,
+    ars_step,
+    draw_scenarios,
+    initial_state,
+    linear_networks,
+    state_policy,
+    top_directions,
+)
+from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
+from kinarm.policies.normalizer import Normalizer
+from kinarm.reference import ReferenceSimulator
+
+TINY = ARSConfig(directions=4, top_directions=2, iterations=6, horizon=8, seed=5)
+
+
+@pytest.fixture(scope="module")
+def tiny_simulator():
+    return TINY.simulator(threads=1)
+
+
+def random_round(seed, directions=6):
+    rng = np.random.default_rng(seed)
+    return rng.normal(size=(directions, 5, 48)), rng.normal(size=(2, directions))
+
+
+def run(config, simulator, iterations, state=None):
+    states = [state or initial_state(config, simulator)]
+    for _ in range(iterations):
+        states.append(ars_iteration(config, simulator, states[-1], 0.0))
+    return states
+
+
+def assert_same_state(first, second):
+    assert first.theta.tobytes() == second.theta.tobytes()
+    assert first.normalizer.count == second.normalizer.count
+    assert first.normalizer.mean.tobytes() == second.normalizer.mean.tobytes()
+    assert first.normalizer.squares.tobytes() == second.normalizer.squares.tobytes()
+    assert first.generator == second.generator
+    for a, b in zip(first.curve, second.curve, strict=True):
+        assert a[:4] == b[:4]
+
+
+def assert_same_policy(first, second):
+    assert first.mean.tobytes() == second.mean.tobytes()
+    assert first.std.tobytes() == second.std.tobytes()
+    assert first.layers[0].weights.tobytes() == second.layers[0].weights.tobytes()
+    assert first.provenance.environment_steps == second.provenance.environment_steps
+
+
+class TestStep:
+    def test_by_hand(self):
+        config = ARSConfig(directions=3, top_directions=2)
+        delta = np.array([[[1.0, 0.0]], [[0.0, 1.0]], [[1.0, 1.0]]])
+        returns = np.array([[1.0, 0.0, 0.2], [0.0, 3.0, 0.1]])
+        # Directions 2 and 1 lead; sigma is the population's over all six returns.
+        sigma = np.sqrt(np.mean((np.array([1, 0, 0.2, 0, 3, 0.1]) - 4.3 / 6) ** 2))
+        expected = 0.5 / (2 * sigma) * np.array([[1.0, -3.0]])
+        np.testing.assert_allclose(ars_step(config, delta, returns, 0.5), expected)
+
+    @pytest.mark.parametrize("b", [1, 3, 6])
+    def test_equals_algorithm_1(self, b):
+        config = ARSConfig(directions=6, top_directions=b)
+        delta, returns = random_round(b)
+        best = sorted(range(6), key=lambda k: -max(returns[0, k], returns[1, k]))[:b]
+        total = sum((returns[0, k] - returns[1, k]) * delta[k] for k in best)
+        expected = 0.02 / (b * np.std(returns, ddof=0)) * total
+        np.testing.assert_allclose(ars_step(config, delta, returns, 0.02), expected, rtol=1e-12)
+
+    def test_basic_random_search_is_equations_2_and_3(self):
+        config = ARSConfig(directions=6, top_directions=6, scale_by_deviation=False)
+        delta, returns = random_round(7)
+        gradient = np.mean([(returns[0, n] - returns[1, n]) * delta[n] for n in range(6)], axis=0)
+        np.testing.assert_allclose(ars_step(config, delta, returns, 0.1), 0.1 * gradient)
+
+    @pytest.mark.parametrize("value", [0.0, 3.7, -1e3])
+    def test_tied_returns_move_nothing(self, value):
+        config = ARSConfig(directions=6, top_directions=3)
+        delta, _ = random_round(8)
+        step = ars_step(config, delta, np.full((2, 6), value), 0.02)
+        np.testing.assert_array_equal(step, np.zeros((5, 48)))
+
+    def test_step_does_not_depend_on_offset_or_scale_of_the_returns(self):
+        config = ARSConfig(directions=6, top_directions=3)
+        delta, returns = random_round(9)
+        expected = ars_step(config, delta, returns, 0.02)
+        np.testing.assert_allclose(ars_step(config, delta, 7 * returns + 3, 0.02), expected)
+
+
+class TestTopDirections:
+    def test_by_hand(self):
+        returns = np.array([[0, 5, 1, 2.0], [4, 0, 1, 3]])
+        np.testing.assert_array_equal(top_directions(returns, 2), [1, 0])
+
+    def test_exactly_b_with_ties_in_their_order(self):
+        returns = np.array([[1, 2, 1, 2, 1, 0.0], [0, 0, 1, 2, 0, 1]])
+        np.testing.assert_array_equal(top_directions(returns, 3), [1, 3, 0])
+        np.testing.assert_array_equal(top_directions(returns, 4), [1, 3, 0, 2])
+
+    def test_many_ties_keep_their_order(self):
+        returns = np.random.default_rng(15).integers(0, 3, (2, 500)).astype(float)
+        expected = sorted(range(500), key=lambda k: -returns[:, k].max())
+        for b in (1, 77, 500):
+            np.testing.assert_array_equal(top_directions(returns, b), expected[:b])
+
+    def test_all_tied(self):
+        for b in range(1, 31):
+            np.testing.assert_array_equal(top_directions(np.ones((2, 30)), b), np.arange(b))
+
+
+class TestNetworks:
+    def test_are_theta_times_the_normalised_observation(self):
+        rng = np.random.default_rng(10)
+        theta = rng.normal(size=(3, 5, 48))
+        data = rng.normal(size=(1000, 48)) * rng.uniform(0.1, 2, 48) + rng.normal(size=48)
+        data[:, :2] = 0.325
+        normalizer = Normalizer(1000, data.mean(axis=0), 1000 * data.var(axis=0))
+        networks = linear_networks(theta, normalizer)
+        seen = rng.normal(size=48)
+        for k in range(3):
+            weights = networks.weights[k, :240].reshape(48, 5)
+            action = seen @ weights + networks.weights[k, 240:]
+            scaled = (seen - data.mean(axis=0))[2:] / data.std(axis=0)[2:]
+            np.testing.assert_allclose(action, theta[k, :, 2:] @ scaled, rtol=1e-10)
+
+    def test_without_normaliser_are_theta_itself(self):
+        theta = np.random.default_rng(11).normal(size=(2, 5, 48))
+        networks = linear_networks(theta, None)
+        np.testing.assert_array_equal(networks.weights[:, 240:], 0)
+        np.testing.assert_array_equal(networks.weights[1, :240].reshape(48, 5), theta[1].T)
+
+
+class TestIteration:
+    @pytest.mark.parametrize("normalize", [True, False])
+    @pytest.mark.parametrize("sharing", ["none", "iteration"])
+    def test_by_hand_with_the_reference_simulator(self, normalize, sharing):
+        config = replace(TINY, normalize=normalize, sharing=sharing, episodes=2)
+        simulator = config.simulator(threads=1)
+        reference = ReferenceSimulator(simulator)
+        state = run(config, simulator, 2)[-1]
+        after = ars_iteration(config, simulator, state, 0.0)
+
+        rng = np.random.default_rng()
+        rng.bit_generator.state = state.generator
+        delta = rng.standard_normal((4, 5, 48))
+        starts, goals = draw_scenarios(config, simulator, rng)
+        mean, std = state.normalizer.mean, state.normalizer.std
+        scale = np.where(std < 1e-6, 0, 1 / np.where(std < 1e-6, 1, std))
+        if not normalize:
+            mean, scale = np.zeros(48), np.ones(48)
+        returns, seen, row = np.zeros((2, 4)), [], 0
+        for sign in (0, 1):
+            for k in range(4):
+                theta = state.theta + (0.03, -0.03)[sign] * delta[k]
+                for _ in range(2):
+                    episode = reference.rollout(
+                        lambda x, theta=theta: theta @ (scale * (x - mean)), starts[row], goals[row]
+                    )
+                    returns[sign, k] += episode.rewards.sum() / 2
+                    seen.append(episode.observations[:-1])
+                    row += 1
+        expected = state.theta + ars_step(config, delta, returns, config.step_size)
+        np.testing.assert_allclose(after.theta, expected, rtol=0, atol=1e-9)
+
+        seen = np.concatenate(seen)
+        assert after.normalizer.count == state.normalizer.count + len(seen)
+        old, count = state.normalizer, after.normalizer.count
+        combined = (old.count * old.mean + seen.sum(axis=0)) / count
+        np.testing.assert_allclose(after.normalizer.mean, combined, atol=1e-12)
+        second = old.count * (old.std**2 + old.mean**2) + (seen**2).sum(axis=0)
+        variance = np.maximum(second / count - combined**2, 0)
+        np.testing.assert_allclose(after.normalizer.std**2, variance, atol=1e-10)
+
+    def test_first_state_is_zero(self, tiny_simulator):
+        state = initial_state(TINY, tiny_simulator)
+        np.testing.assert_array_equal(state.theta, np.zeros((5, 48)))
+        np.testing.assert_array_equal(state.normalizer.std, np.ones(48))
+        assert (state.iteration, state.environment_steps, state.wall_time) == (0, 0, 0.0)
+
+    def test_statistics_are_frozen_within_an_iteration(self, tiny_simulator, monkeypatch):
+        state = run(TINY, tiny_simulator, 1)[-1]
+        used = []
+        original = tiny_simulator.rollout
+
+        def spy(networks, *args, **settings):
+            used.append((networks, settings["shift"].copy()))
+            return original(networks, *args, **settings)
+
+        monkeypatch.setattr(tiny_simulator, "rollout", spy)
+        ars_iteration(TINY, tiny_simulator, state, 0.0)
+        assert len(used) == 1
+        networks, _ = used[0]
+        rng = np.random.default_rng()
+        rng.bit_generator.state = state.generator
+        delta = rng.standard_normal((4, 5, 48))
+        candidates = np.concatenate([state.theta + 0.03 * delta, state.theta - 0.03 * delta])
+        expected = linear_networks(candidates, state.normalizer)
+        np.testing.assert_array_equal(networks.weights, expected.weights)
+
+    def test_does_not_change_the_old_state(self, tiny_simulator):
+        state = run(TINY, tiny_simulator, 2)[-1]
+        theta, generator = state.theta.copy(), dict(state.generator)
+        ars_iteration(TINY, tiny_simulator, state, 0.0)
+        np.testing.assert_array_equal(state.theta, theta)
+        assert state.generator == generator
+
+    def test_curve(self, tiny_simulator):
+        states = run(TINY, tiny_simulator, 4)
+        curve = states[-1].curve
+        assert [state.iteration for state in states] == [0, 1, 2, 3, 4]
+        steps = [point.environment_steps for point in curve]
+        assert all(8 <= b - a <= 8 * 8 for a, b in zip([0, *steps], steps, strict=False))
+        assert steps[-1] == states[-1].normalizer.count
+        assert all(np.isfinite(point).all() and point.std_return > 0 for point in curve)
+        assert all(0 <= point.success <= 1 for point in curve)
+
+
+class TestScenarios:
+    def draw(self, sharing, simulator, **settings):
+        config = replace(TINY, sharing=sharing, **settings)
+        starts, goals = draw_scenarios(config, simulator, np.random.default_rng(12))
+        table = np.concatenate([starts, goals], axis=1)
+        return table.reshape(2, config.directions, config.episodes, 9)
+
+    def test_none_shares_nothing(self, tiny_simulator):
+        table = self.draw("none", tiny_simulator, episodes=3)
+        assert len(np.unique(table.reshape(-1, 9), axis=0)) == 24
+
+    def test_pair_shares_between_the_signs(self, tiny_simulator):
+        table = self.draw("pair", tiny_simulator, episodes=3)
+        np.testing.assert_array_equal(table[0], table[1])
+        assert len(np.unique(table.reshape(-1, 9), axis=0)) == 12
+
+    def test_iteration_shares_among_all(self, tiny_simulator):
+        table = self.draw("iteration", tiny_simulator, episodes=3)
+        assert (table == table[:1, :1]).all()
+        assert len(np.unique(table.reshape(-1, 9), axis=0)) == 3
+
+    def test_iterations_draw_anew(self, tiny_simulator):
+        config = replace(TINY, sharing="iteration")
+        rng = np.random.default_rng(13)
+        first, second = (draw_scenarios(config, tiny_simulator, rng)[1] for _ in range(2))
+        assert not np.array_equal(first, second)
+
+
+class TestTraining:
+    def test_same_seed_same_policy(self):
+        assert_same_policy(train_ars(TINY).policy, train_ars(TINY).policy)
+
+    def test_other_seed_other_policy(self):
+        first, second = train_ars(TINY).policy, train_ars(replace(TINY, seed=6)).policy
+        assert not np.array_equal(first.layers[0].weights, second.layers[0].weights)
+
+    def test_threads_do_not_matter(self):
+        config = replace(TINY, directions=24, horizon=64, iterations=4)
+        assert_same_policy(train_ars(config, threads=1).policy, train_ars(config, threads=2).policy)
+
+    def test_equals_its_iterations(self, tiny_simulator):
+        states = run(TINY, tiny_simulator, TINY.iterations)
+        seen = []
+        result = train_ars(TINY, on_iteration=seen.append)
+        assert [state.iteration for state in seen] == [1, 2, 3, 4, 5, 6]
+        assert_same_state(seen[-1], states[-1])
+        assert_same_policy(result.policy, state_policy(TINY, tiny_simulator.arm, states[-1]))
+        assert len(result.curve) == 6
+
+    def test_policy_behaves_like_the_last_parameters(self, tiny_simulator):
+        state = run(TINY, tiny_simulator, 3)[-1]
+        policy = state_policy(TINY, tiny_simulator.arm, state)
+        trained = linear_networks(state.theta[None], state.normalizer)
+        np.testing.assert_allclose(
+            policy.networks().weights, trained.weights, rtol=1e-12, atol=1e-15
+        )
+
+    def test_policy_without_normaliser(self):
+        config = replace(TINY, normalize=False)
+        policy = train_ars(config).policy
+        np.testing.assert_array_equal(policy.mean, np.zeros(48))
+        np.testing.assert_array_equal(policy.std, np.ones(48))
+
+    def test_constant_inputs_of_the_training_have_weight_zero(self):
+        # On one bench the height of the goal never changes, nor does the place of axis 1.
+        policy = train_ars(TINY).policy
+        weights = policy.networks().weights[0, :240].reshape(48, 5)
+        np.testing.assert_array_equal(weights[[2, 30, 31, 32]], 0)
+        assert (weights[[0, 1, 3]] != 0).all()
+
+    def test_provenance_says_how(self, shipped_arms):
+        result = train_ars(replace(TINY, recipe="mine"))
+        trained = result.policy.provenance
+        assert (trained.algorithm, trained.recipe, trained.task) == ("ars", "mine", "right")
+        assert (trained.arm, trained.seed) == ("paper", 5)
+        assert trained.arm_digest == shipped_arms["paper"].digest
+        assert trained.environment_steps == result.curve[-1].environment_steps
+        assert ARSConfig(**trained.config) == replace(TINY, recipe="mine")
+        assert "numpy" in trained.versions
+
+    def test_linear_schedule_falls_to_zero(self):
+        config = ARSConfig(step_size=0.4, step_size_schedule="linear", iterations=4)
+        assert [config.step_size_at(k) for k in range(5)] == pytest.approx([0.4, 0.3, 0.2, 0.1, 0])
+        assert ARSConfig(step_size=0.4).step_size_at(700) == 0.4
+
+    def test_weights_reach_the_simulator(self):
+        config = replace(
+            TINY, collision_penalty=-3, success_bonus=2, step_reward=-0.1, start_spread=0.5
+        )
+        task = config.simulator().task
+        assert (task.reward.collision, task.reward.success, task.reward.step) == (-3, 2, -0.1)
+        assert (task.horizon, task.start_spread) == (8, 0.5)
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize(
+        "settings", [{}, {"step_size_schedule": "linear", "success_bonus": 0.5}]
+    )
+    def test_short_training_beats_standing_still_by_far(self, settings):
+        config = ARSConfig(
+            sharing="iteration", episodes=2, iterations=300, step_size=0.05, **settings
+        )
+        result = train_ars(config)
+        simulator = ARSConfig().simulator()
+        starts, goals = simulator.sample(np.random.default_rng(14), 1000)
+        trained = simulator.rollout(result.policy, starts, goals)
+        idle = simulator.rollout(lambda seen: np.zeros((len(seen), 5)), starts, goals)
+        assert np.median(trained.distance) < 0.4 * np.median(idle.distance)
+        assert trained.returns.mean() > idle.returns.mean() + 0.2
+        assert trained.success.mean() > 0.04
+        assert not idle.success.any()
+
+
+class TestResume:
+    @pytest.mark.parametrize("stop", [1, 3, 5])
+    def test_equals_an_uninterrupted_training(self, tmp_path, stop):
+        seen = []
+        whole = train_ars(TINY, on_iteration=seen.append)
+        save_checkpoint(tmp_path / "run.ckpt", TINY, seen[stop - 1])
+        config, state = load_checkpoint(tmp_path / "run.ckpt")
+        assert config == TINY
+        assert state.iteration == stop
+        rest = []
+        resumed = train_ars(config, state=state, on_iteration=rest.append)
+        assert len(rest) == 6 - stop
+        assert_same_state(rest[-1], seen[-1])
+        assert_same_policy(resumed.policy, whole.policy)
+
+    def test_equals_with_shared_scenarios_and_a_schedule(self, tmp_path):
+        config = replace(TINY, sharing="pair", step_size_schedule="linear", episodes=2, task="both")
+        seen = []
+        whole = train_ars(config, on_iteration=seen.append)
+        save_checkpoint(tmp_path / "run.ckpt", config, seen[2])
+        resumed = train_ars(config, state=load_checkpoint(tmp_path / "run.ckpt")[1])
+        assert_same_policy(resumed.policy, whole.policy)
+
+    def test_wall_time_goes_on(self, tiny_simulator):
+        state = run(TINY, tiny_simulator, 2)[-1]
+        late = replace(state, curve=(*state.curve[:-1], state.curve[-1]._replace(wall_time=1000.0)))
+        result = train_ars(TINY, state=late)
+        assert result.curve[-1].wall_time >= 1000
+
+    def test_finished_training_stays_as_it_is(self):
+        seen = []
+        whole = train_ars(TINY, on_iteration=seen.append)
+        again = train_ars(TINY, state=seen[-1])
+        assert_same_policy(again.policy, whole.policy)
+
+
+class TestConfig:
+    @pytest.mark.parametrize(
+        ("settings", "message"),
+        [
+            ({"directions": 0}, "directions must be a whole number of at least 1, got 0"),
+            ({"top_directions": 0}, "top_directions must be a whole number of at least 1"),
+            ({"top_directions": 25}, r"top_directions must be at most directions \(24\), got 25"),
+            ({"iterations": 0}, "iterations"),
+            ({"iterations": 1.5}, "iterations"),
+            ({"directions": 24.5}, "directions"),
+            ({"episodes": 0}, "episodes"),
+            ({"horizon": -1}, "horizon"),
+            ({"step_size": 0}, "step_size must be greater than 0, got 0"),
+            ({"step_size": float("nan")}, "step_size"),
+            ({"noise": -0.1}, "noise"),
+            ({"noise": float("inf")}, "noise"),
+            ({"seed": -1}, "seed must be a whole number of at least 0, got -1"),
+            ({"sharing": "all"}, "sharing must be one of none, pair, iteration, got 'all'"),
+            ({"step_size_schedule": "cosine"}, "step_size_schedule must be one of"),
+        ],
+    )
+    def test_impossible_settings_are_refused(self, settings, message):
+        with pytest.raises(InvalidInputError, match=message):
+            ARSConfig(**settings)
+
+    def test_unknown_task_and_arm(self):
+        with pytest.raises(UnknownNameError, match="task 'up'.*left, right, both"):
+            train_ars(replace(TINY, task="up"))
+        with pytest.raises(UnknownNameError, match="arm 'nope'"):
+            train_ars(replace(TINY, arm="nope"))
+
+    @pytest.mark.parametrize(
+        "name", ["collision_penalty", "success_bonus", "step_reward", "start_spread"]
+    )
+    def test_settings_that_are_not_finite(self, name):
+        with pytest.raises(KinarmError, match="nan"):
+            train_ars(replace(TINY, **{name: float("nan")}))
+
+    def test_other_arm(self):
+        result = train_ars(replace(TINY, arm="paper_flange", iterations=1))
+        assert result.policy.provenance.arm == "paper_flange"
+
+    def test_trained_policy_survives_its_file(self, tmp_path):
+        policy = train_ars(TINY).policy
+        policy.save(tmp_path / "policy.npz")
+        loaded = Policy.load(tmp_path / "policy.npz")
+        assert_same_policy(policy, loaded)
+        assert loaded.provenance == policy.provenance
+        np.testing.assert_array_equal(policy.networks().weights, loaded.networks().weights)

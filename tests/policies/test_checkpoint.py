@@ -1,0 +1,179 @@
+"""Checkpoint files; that they resume exactly is tested with the training."""
+
+import gc
+import json
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinarm.errors import InvalidInputError, OutputError, PolicyFileError
+from kinarm.policies import ARSConfig, train_ars
+from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
+
+TINY = ARSConfig(directions=2, top_directions=1, iterations=3, horizon=4, task="left")
+
+
+@pytest.fixture(scope="module")
+def state():
+    states = []
+    train_ars(TINY, on_iteration=states.append)
+    return states[1]
+
+
+@pytest.fixture
+def saved(state, tmp_path):
+    path = tmp_path / "run.ckpt"
+    save_checkpoint(path, TINY, state)
+    return path
+
+
+def contents(path):
+    with np.load(path) as file:
+        return dict(file)
+
+
+def refused(path):
+    with pytest.raises(PolicyFileError) as caught:
+        load_checkpoint(path)
+    gc.collect()  # a file left open is reported here, not in a later test
+    assert path.name in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_round_trip(saved, state):
+    config, loaded = load_checkpoint(saved)
+    assert config == TINY
+    assert loaded.theta.tobytes() == state.theta.tobytes()
+    assert loaded.normalizer.count == state.normalizer.count
+    assert loaded.normalizer.mean.tobytes() == state.normalizer.mean.tobytes()
+    assert loaded.normalizer.squares.tobytes() == state.normalizer.squares.tobytes()
+    assert loaded.generator == state.generator
+    assert loaded.curve == state.curve
+    assert [type(value) for value in loaded.curve[0]] == [type(value) for value in state.curve[0]]
+
+
+def test_generator_continues(saved, state):
+    _, loaded = load_checkpoint(saved)
+    draws = []
+    for content in (loaded, state):
+        rng = np.random.default_rng()
+        rng.bit_generator.state = content.generator
+        draws.append(rng.standard_normal(5))
+    np.testing.assert_array_equal(*draws)
+
+
+def test_before_the_first_iteration(state, tmp_path):
+    save_checkpoint(tmp_path / "new.ckpt", TINY, replace(state, curve=()))
+    assert load_checkpoint(tmp_path / "new.ckpt")[1].iteration == 0
+
+
+def test_replaces_an_earlier_one_only_when_complete(saved, state, monkeypatch):
+    before = saved.read_bytes()
+
+    def fail(file, **_):
+        file.write(b"half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(np, "savez", fail)
+    with pytest.raises(KeyboardInterrupt):
+        save_checkpoint(saved, TINY, state)
+    assert saved.read_bytes() == before
+    assert list(saved.parent.iterdir()) == [saved]
+
+
+def test_unwritable(state, tmp_path):
+    with pytest.raises(OutputError, match="cannot write.*No such file"):
+        save_checkpoint(tmp_path / "gone" / "run.ckpt", TINY, state)
+
+
+def test_missing(tmp_path):
+    refused(tmp_path / "gone.ckpt")
+
+
+def test_folder(tmp_path):
+    refused(tmp_path)
+
+
+@pytest.mark.parametrize("share", [0, 0.05, 0.5, 0.99])
+def test_truncated(saved, share):
+    content = saved.read_bytes()
+    saved.write_bytes(content[: int(share * len(content))])
+    refused(saved)
+
+
+@pytest.mark.parametrize("content", [b"hello\n", b"PK\x03\x04junk", pickle.dumps({"theta": 1})])
+def test_other_content(saved, content):
+    saved.write_bytes(content)
+    refused(saved)
+
+
+def test_npy(saved):
+    with saved.open("wb") as file:
+        np.save(file, np.zeros(3))
+    refused(saved)
+
+
+def test_policy_is_no_checkpoint(saved, make_policy):
+    make_policy().save(saved)
+    refused(saved)
+
+
+@pytest.mark.parametrize(
+    "key", ["config", "generator", "theta", "count", "mean", "squares", "curve"]
+)
+def test_missing_entry(saved, key):
+    kept = contents(saved)
+    del kept[key]
+    with saved.open("wb") as file:
+        np.savez(file, **kept)
+    refused(saved)
+
+
+def resume(path):
+    config, state = load_checkpoint(path)
+    return train_ars(config, state=state)
+
+
+def spoil(path, **entries):
+    kept = contents(path)
+    with path.open("wb") as file:
+        np.savez(file, **{**kept, **entries})
+
+
+@pytest.mark.parametrize(
+    "entries", [{"config": "{"}, {"generator": "["}, {"theta": np.array([{}], dtype=object)}]
+)
+def test_bad_entry(saved, entries):
+    spoil(saved, **entries)
+    refused(saved)
+
+
+def test_unknown_setting(saved):
+    config = json.loads(str(contents(saved)["config"]))
+    spoil(saved, config=json.dumps({**config, "momentum": 0.9}))
+    refused(saved)
+
+
+def test_impossible_setting_is_named(saved):
+    config = json.loads(str(contents(saved)["config"]))
+    spoil(saved, config=json.dumps({**config, "directions": 0}))
+    with pytest.raises((InvalidInputError, PolicyFileError), match="directions"):
+        load_checkpoint(saved)
+
+
+@pytest.mark.parametrize(
+    "entries",
+    [
+        {"theta": np.zeros((3, 3))},
+        {"mean": np.zeros(3)},
+        {"theta": np.full((5, 48), np.nan)},
+        {"generator": '{"bit_generator": "MT19937"}'},
+    ],
+    ids=["theta", "mean", "nan", "generator"],
+)
+def test_state_that_does_not_fit_is_refused_before_training(saved, entries):
+    spoil(saved, **entries)
+    with pytest.raises((InvalidInputError, PolicyFileError)):
+        resume(saved)

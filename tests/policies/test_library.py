@@ -1,0 +1,87 @@
+"""The shipped policies, and loading by name, group or file."""
+
+import pytest
+
+from kinarm.errors import PolicyFileError, UnknownNameError
+from kinarm.policies import library, load_policy, policy_names
+from kinarm.policies.library import group_of, policy_files
+
+NAMES = ("ars-paper-left-seed0", "ars-tuned-right-seed0", "ars-tuned-right-seed10", "ppo-both")
+
+
+@pytest.fixture
+def shipped(monkeypatch, tmp_path, make_policy):
+    """A library of four policies."""
+    (tmp_path / "policies").mkdir()
+    for seed, name in enumerate(NAMES):
+        make_policy(seed=seed).save(tmp_path / "policies" / f"{name}.npz")
+    (tmp_path / "policies" / "notes.txt").write_text("no policy")
+    monkeypatch.setattr(library.resources, "files", lambda _: tmp_path)
+    policy_names.cache_clear()
+    yield tmp_path / "policies"
+    monkeypatch.undo()
+    policy_names.cache_clear()
+
+
+def test_names_are_those_of_the_files(shipped):
+    assert policy_names() == NAMES
+
+
+def test_load_by_name(shipped, make_policy):
+    loaded = load_policy("ars-tuned-right-seed0")
+    assert loaded.mean.tobytes() == make_policy(seed=1).mean.tobytes()
+
+
+def test_load_by_group_takes_the_first_seed(shipped, make_policy):
+    assert load_policy("ars-tuned-right").mean.tobytes() == make_policy(seed=1).mean.tobytes()
+
+
+def test_group_has_the_files_of_all_its_seeds(shipped):
+    files = policy_files("ars-tuned-right")
+    assert [file.stem for file in files] == ["ars-tuned-right-seed0", "ars-tuned-right-seed10"]
+
+
+def test_load_by_path(shipped, make_policy, tmp_path):
+    path = tmp_path / "mine"
+    make_policy(seed=8).save(path)
+    for given in (path, str(path)):
+        assert load_policy(given).mean.tobytes() == make_policy(seed=8).mean.tobytes()
+
+
+def test_unknown_name_lists_the_groups(shipped):
+    with pytest.raises(UnknownNameError) as caught:
+        load_policy("ars-best")
+    message = str(caught.value)
+    assert "unknown policy 'ars-best'" in message
+    assert "ars-paper-left, ars-tuned-right, ppo-both, path/to/policy.npz" in message
+
+
+def test_missing_file_is_no_unknown_name(shipped, tmp_path):
+    with pytest.raises(PolicyFileError, match="cannot read policy"):
+        load_policy(tmp_path / "gone.npz")
+    with pytest.raises(PolicyFileError, match="cannot read policy"):
+        load_policy("gone.npz")
+
+
+@pytest.mark.parametrize(
+    ("name", "group"),
+    [
+        ("ars-tuned-right-seed0", "ars-tuned-right"),
+        ("ars-tuned-right-seed123", "ars-tuned-right"),
+        ("ppo-both", "ppo-both"),
+        ("seed0-policy", "seed0-policy"),
+    ],
+)
+def test_group_is_the_name_without_the_seed(name, group):
+    assert group_of(name) == group
+
+
+def test_every_shipped_policy_loads_and_fits_its_arm(shipped_arms):
+    policy_names.cache_clear()
+    for name in policy_names():
+        policy = load_policy(name)
+        trained = policy.provenance
+        policy.check_arm(shipped_arms[trained.arm])
+        assert trained.task in name
+        assert trained.recipe in name
+        assert name.endswith(f"seed{trained.seed}")

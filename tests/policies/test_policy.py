@@ -1,0 +1,320 @@
+"""Policies: what they compute, and their files."""
+
+import gc
+import json
+import pickle
+
+import numpy as np
+import pytest
+
+from kinarm.errors import InvalidInputError, OutputError, PolicyFileError
+from kinarm.policies import Layer, Policy, Provenance
+
+
+def contents(path):
+    with np.load(path) as file:
+        return dict(file)
+
+
+def assert_bitwise_equal(first, second):
+    assert first.mean.tobytes() == second.mean.tobytes()
+    assert first.std.tobytes() == second.std.tobytes()
+    assert len(first.layers) == len(second.layers)
+    for a, b in zip(first.layers, second.layers, strict=True):
+        assert a.weights.tobytes() == b.weights.tobytes()
+        assert a.bias.tobytes() == b.bias.tobytes()
+    assert first.provenance == second.provenance
+
+
+@pytest.fixture
+def saved(make_policy, tmp_path):
+    """A policy file, to be spoilt."""
+    path = tmp_path / "policy.npz"
+    make_policy().save(path)
+    return path
+
+
+class TestCall:
+    def test_linear_by_hand(self, provenance):
+        policy = Policy(
+            mean=np.array([1.0, 2.0]),
+            std=np.array([2.0, 0.5]),
+            layers=(Layer(np.array([[0.2, 0.1], [10.0, 0.0]]), np.array([0.05, 0.0])),),
+            provenance=provenance,
+        )
+        np.testing.assert_allclose(policy([3, 2.5]), [0.2 + 0.1 + 0.05, 1.0])
+        np.testing.assert_allclose(policy([-1, 2.0]), [-0.2 + 0.05, -1.0])
+
+    def test_deep_by_hand(self, provenance):
+        policy = Policy(
+            mean=np.zeros(1),
+            std=np.ones(1),
+            layers=(
+                Layer(np.array([[2.0], [-1.0]]), np.array([0.0, 0.5])),
+                Layer(np.array([[0.3, 0.4]]), np.array([-0.1])),
+            ),
+            provenance=provenance,
+        )
+        expected = 0.3 * np.tanh(2 * 0.7) + 0.4 * np.tanh(0.5 - 0.7) - 0.1
+        np.testing.assert_allclose(policy([0.7]), [expected])
+
+    def test_batch_equals_single(self, make_policy):
+        policy = make_policy(8)
+        seen = np.random.default_rng(1).normal(size=(20, 48))
+        batch = policy(seen)
+        assert batch.shape == (20, 5)
+        for row, action in zip(seen, batch, strict=True):
+            np.testing.assert_allclose(policy(row), action, rtol=0, atol=1e-14)
+
+    def test_constant_inputs_have_no_influence(self, make_policy):
+        policy = make_policy(constant=10)
+        seen = np.random.default_rng(2).normal(size=48)
+        changed = seen.copy()
+        changed[:10] += 5
+        np.testing.assert_array_equal(policy(seen), policy(changed))
+
+    @pytest.mark.parametrize("bad", [np.zeros(47), np.zeros((2, 49)), np.full(48, np.nan), 3.0])
+    def test_bad_observations(self, make_policy, bad):
+        with pytest.raises(InvalidInputError, match="observations"):
+            make_policy()(bad)
+
+
+class TestNetworks:
+    @pytest.mark.parametrize("hidden", [(), (16,), (12, 9)])
+    def test_compiled_equals_python(self, make_policy, simulator, hidden):
+        policy = make_policy(*hidden, constant=3)
+        starts, goals = simulator.sample(np.random.default_rng(3), 200)
+        compiled = simulator.rollout(policy, starts, goals, record=True)
+        called = simulator.rollout(lambda seen: policy(seen), starts, goals, record=True)
+        np.testing.assert_array_equal(compiled.steps, called.steps)
+        np.testing.assert_array_equal(compiled.collision, called.collision)
+        np.testing.assert_allclose(compiled.paths, called.paths, rtol=0, atol=1e-12)
+
+    def test_many_policies_at_once(self, make_policy, simulator):
+        policies = [make_policy(seed=seed) for seed in range(4)]
+        starts, goals = simulator.sample(np.random.default_rng(4), 4)
+        together = simulator.rollout(policies, starts, goals)
+        for i, policy in enumerate(policies):
+            alone = simulator.rollout(policy, starts[i : i + 1], goals[i : i + 1])
+            assert alone.returns[0] == together.returns[i]
+
+    def test_constant_inputs_have_weight_zero(self, make_policy):
+        weights = make_policy(constant=2).networks().weights[0, : 48 * 5].reshape(48, 5)
+        np.testing.assert_array_equal(weights[:2], 0)
+        assert (weights[2:] != 0).all()
+
+
+class TestInvariants:
+    def test_arrays_are_copied_and_frozen(self, provenance):
+        mean, weights = np.zeros(2), np.ones((1, 2))
+        policy = Policy(mean, np.ones(2), (Layer(weights, np.zeros(1)),), provenance)
+        mean[0], weights[0, 0] = 9, 9
+        assert policy.mean[0] == 0
+        assert policy.layers[0].weights[0, 0] == 1
+        for array in (policy.mean, policy.std, *policy.layers[0]):
+            with pytest.raises(ValueError, match="read-only"):
+                array.flat[0] = 1
+
+    def test_sizes(self, make_policy):
+        assert (make_policy(7).n_observations, make_policy(7).n_actions) == (48, 5)
+
+    def test_pickles(self, make_policy):
+        policy = make_policy(4)
+        assert_bitwise_equal(policy, pickle.loads(pickle.dumps(policy)))
+
+    @pytest.mark.parametrize(
+        ("changes", "message"),
+        [
+            ({"layers": ()}, "at least one layer"),
+            ({"std": [1.0, -1.0]}, "std must not be negative"),
+            ({"std": [1.0]}, "std must have shape"),
+            ({"mean": [0.0, np.nan]}, "mean must be finite"),
+            ({"layers": (Layer(np.ones((1, 3)), np.zeros(1)),)}, "weights of layer 0"),
+            ({"layers": (Layer(np.ones((1, 2)), np.zeros(2)),)}, "bias of layer 0"),
+            ({"layers": (Layer(np.full((1, 2), np.inf), np.zeros(1)),)}, "must be finite"),
+            (
+                {"layers": (Layer(np.ones((4, 2)), np.zeros(4)), Layer(np.ones((1, 3)), [0.0]))},
+                "weights of layer 1",
+            ),
+        ],
+    )
+    def test_parts_that_do_not_fit_are_refused(self, provenance, changes, message):
+        parts = {
+            "mean": [0.0, 0.0],
+            "std": [1.0, 1.0],
+            "layers": (Layer(np.ones((1, 2)), np.zeros(1)),),
+            "provenance": provenance,
+        }
+        with pytest.raises(InvalidInputError, match=message):
+            Policy(**{**parts, **changes})
+
+
+class TestCheckArm:
+    def test_accepts_the_arm_it_was_trained_for(self, make_policy, shipped_arms):
+        make_policy().check_arm(shipped_arms["paper"])
+
+    def test_refuses_another_arm(self, make_policy, shipped_arms):
+        with pytest.raises(
+            PolicyFileError, match="trained for arm 'paper', not for 'paper_flange'"
+        ):
+            make_policy().check_arm(shipped_arms["paper_flange"])
+
+    def test_refuses_another_version_of_the_arm(self, make_policy):
+        from kinarm.arm import Arm
+
+        with pytest.raises(PolicyFileError, match="another version of arm 'paper'"):
+            make_policy().check_arm(Arm.load("paper", n_actuated=6))
+
+
+class TestFile:
+    @pytest.mark.parametrize("hidden", [(), (6,), (6, 4)])
+    def test_round_trip_is_bitwise(self, make_policy, tmp_path, hidden):
+        policy = make_policy(*hidden)
+        policy.save(tmp_path / "policy.npz")
+        assert_bitwise_equal(policy, Policy.load(tmp_path / "policy.npz"))
+
+    def test_constant_inputs_stay_without_influence(self, make_policy, tmp_path):
+        policy = make_policy(constant=5)
+        policy.save(tmp_path / "policy.npz")
+        loaded = Policy.load(str(tmp_path / "policy.npz"))
+        seen = np.random.default_rng(5).normal(size=48)
+        np.testing.assert_array_equal(policy(seen), loaded(seen))
+        np.testing.assert_array_equal(policy.networks().weights, loaded.networks().weights)
+        seen[:5] = 100
+        np.testing.assert_array_equal(policy(seen), loaded(seen))
+
+    def test_needs_no_pickle(self, saved):
+        with np.load(saved, allow_pickle=False) as file:
+            assert all(file[key].dtype != object for key in file.files)
+
+    def test_name_is_kept_as_given(self, make_policy, tmp_path):
+        make_policy().save(tmp_path / "policy.v1")
+        assert [path.name for path in tmp_path.iterdir()] == ["policy.v1"]
+
+    def test_failed_write_leaves_the_old_file(self, make_policy, saved, monkeypatch):
+        before = saved.read_bytes()
+
+        def fail(file, **_):
+            file.write(b"half")
+            raise OSError(28, "No space left on device")
+
+        monkeypatch.setattr(np, "savez", fail)
+        with pytest.raises(OutputError, match="cannot write.*No space left"):
+            make_policy(seed=9).save(saved)
+        assert saved.read_bytes() == before
+        assert list(saved.parent.iterdir()) == [saved]
+
+    def test_unwritable_places(self, make_policy, tmp_path):
+        with pytest.raises(OutputError, match="cannot write"):
+            make_policy().save(tmp_path / "gone" / "policy.npz")
+        (tmp_path / "folder.npz").mkdir()
+        with pytest.raises(OutputError, match="cannot write"):
+            make_policy().save(tmp_path / "folder.npz")
+
+
+class TestBadFile:
+    def refused(self, path, message):
+        with pytest.raises(PolicyFileError, match=message) as caught:
+            Policy.load(path)
+        gc.collect()  # a file left open is reported here, not in a later test
+        assert path.name in str(caught.value)
+        assert "\n" not in str(caught.value)
+
+    def test_missing(self, tmp_path):
+        self.refused(tmp_path / "gone.npz", "cannot read policy .*No such file")
+
+    def test_folder(self, tmp_path):
+        self.refused(tmp_path, "cannot read policy")
+
+    @pytest.mark.parametrize("share", [0, 0.01, 0.3, 0.9, 0.999])
+    def test_truncated(self, saved, share):
+        content = saved.read_bytes()
+        saved.write_bytes(content[: int(share * len(content))])
+        self.refused(saved, "policy")
+
+    def test_flipped_bits(self, saved):
+        content = bytearray(saved.read_bytes())
+        middle = len(content) // 2
+        content[middle : middle + 8] = bytes(8 * [0x5A])
+        saved.write_bytes(content)
+        self.refused(saved, "policy")
+
+    @pytest.mark.parametrize("content", [b"", b"hello\n", b"\x00" * 100, b"PK\x03\x04junk"])
+    def test_other_content(self, saved, content):
+        saved.write_bytes(content)
+        self.refused(saved, "policy")
+
+    def test_foreign_npz(self, saved):
+        np.savez(saved, weights=np.zeros(3))
+        self.refused(saved, "not a kinarm policy")
+
+    def test_other_format(self, saved):
+        np.savez(saved, **{**contents(saved), "format": "something-else"})
+        self.refused(saved, "'something-else'")
+
+    def test_npy(self, tmp_path):
+        path = tmp_path / "array.npy"
+        np.save(path, np.zeros(3))
+        self.refused(path, "not a kinarm policy")
+
+    def test_pickle(self, saved):
+        saved.write_bytes(pickle.dumps({"format": "kinarm-policy"}))
+        self.refused(saved, "policy")
+
+    def test_pickle_inside(self, saved):
+        np.savez(saved, **{**contents(saved), "mean": np.array([{}], dtype=object)})
+        self.refused(saved, "policy")
+
+    def test_future_version(self, saved):
+        np.savez(saved, **{**contents(saved), "version": 2})
+        self.refused(saved, "format version 2; this kinarm reads up to 1")
+
+    @pytest.mark.parametrize("key", ["version", "provenance", "mean", "std", "weights_0", "bias_0"])
+    def test_missing_entry(self, saved, key):
+        kept = contents(saved)
+        del kept[key]
+        np.savez(saved, **kept)
+        self.refused(saved, "policy")
+
+    @pytest.mark.parametrize(
+        ("key", "value"),
+        [
+            ("mean", np.zeros(3)),
+            ("std", np.full(48, np.nan)),
+            ("std", np.full(48, -1.0)),
+            ("weights_0", np.zeros((5, 47))),
+            ("bias_0", np.zeros(4)),
+            ("mean", np.array(["a"] * 48)),
+            ("version", np.array("one")),
+            ("provenance", np.array("{")),
+            ("provenance", np.array("[]")),
+            ("provenance", np.array("3")),
+        ],
+    )
+    def test_bad_entry(self, saved, key, value):
+        np.savez(saved, **{**contents(saved), key: value})
+        self.refused(saved, "policy|provenance")
+
+    def test_gap_between_layers(self, make_policy, tmp_path):
+        path = tmp_path / "deep.npz"
+        make_policy(6, 4).save(path)
+        kept = contents(path)
+        del kept["weights_1"], kept["bias_1"]
+        np.savez(path, **kept)
+        self.refused(path, "policy")
+
+    def test_provenance_with_missing_and_unknown_entries(self, saved):
+        kept = contents(saved)
+        entries = json.loads(str(kept["provenance"]))
+        del entries["seed"]
+        entries["mood"] = "good"
+        np.savez(saved, **{**kept, "provenance": json.dumps(entries)})
+        with pytest.raises(PolicyFileError, match="mood, seed"):
+            Policy.load(saved)
+
+    def test_later_loads_still_work(self, make_policy, saved):
+        saved.write_bytes(b"")
+        with pytest.raises(PolicyFileError):
+            Policy.load(saved)
+        make_policy().save(saved)
+        assert isinstance(Policy.load(saved).provenance, Provenance)

@@ -1,0 +1,120 @@
+"""Imports go one way, packages say what they offer, and light imports stay light."""
+
+import ast
+import importlib
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGES = {"kinarm": "kinarm", "policies": "kinarm.policies", "evaluation": "kinarm.evaluation"}
+FORBIDDEN = {
+    "kinarm": ("kinarm.policies", "kinarm.evaluation", "policies", "evaluation"),
+    "policies": ("kinarm.evaluation", "policies", "evaluation"),
+    "evaluation": ("policies", "evaluation"),
+}
+SOURCES = [path for folder in PACKAGES for path in sorted((ROOT / folder).glob("**/*.py"))]
+
+
+def imported_modules(path):
+    """Names of everything that a source file imports, at any depth."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path} uses a relative import"
+            names.add(node.module)
+            names |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return names
+
+
+def lies_in(name, package):
+    return name == package or name.startswith(f"{package}.")
+
+
+def constant_first(name):
+    """Order of ``__all__``: constants, classes, the rest."""
+    return (0 if name.isupper() else 1 if name[0].isupper() else 2, name)
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_imports_go_one_way(path):
+    folder = path.relative_to(ROOT).parts[0]
+    forbidden = (*FORBIDDEN[folder], "kinarm.kinarm", "tests")
+    wrong = {
+        name for name in imported_modules(path) if any(lies_in(name, bad) for bad in forbidden)
+    }
+    assert not wrong
+
+
+def test_every_source_folder_was_searched():
+    assert {path.relative_to(ROOT).parts[0] for path in SOURCES} == set(PACKAGES)
+    assert "kinarm.arm" in imported_modules(ROOT / "kinarm" / "simulator.py")
+    assert "kinarm.simulator" in imported_modules(ROOT / "policies" / "ars.py")
+
+
+@pytest.mark.parametrize("package", PACKAGES.values())
+class TestExports:
+    def test_every_name_can_be_imported(self, package):
+        module = importlib.import_module(package)
+        for name in module.__all__:
+            assert getattr(module, name) is not None
+
+    def test_names_are_sorted_and_unique(self, package):
+        names = importlib.import_module(package).__all__
+        assert list(names) == sorted(set(names), key=constant_first)
+
+    def test_type_checkers_see_the_same_names(self, package):
+        module = importlib.import_module(package)
+        tree = ast.parse(Path(module.__file__).read_text(encoding="utf-8"))
+        declared = {
+            alias.asname or alias.name
+            for block in tree.body
+            if isinstance(block, ast.If) and ast.unparse(block.test) == "TYPE_CHECKING"
+            for node in block.body
+            if isinstance(node, ast.ImportFrom)
+            for alias in node.names
+        }
+        assert declared <= set(module.__all__)
+        eager = {name for name in module.__all__ if name not in declared}
+        assert eager <= set(vars(module))
+
+    def test_unknown_attribute(self, package):
+        module = importlib.import_module(package)
+        with pytest.raises(AttributeError, match="no attribute 'nothing_like_this'"):
+            module.nothing_like_this  # noqa: B018
+
+
+def loaded_by(statement):
+    """Top-level packages that a fresh interpreter holds after a statement."""
+    code = f"{statement}\nimport sys\nprint(*{{name.split('.')[0] for name in sys.modules}})"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    return set(done.stdout.split())
+
+
+HEAVY = {"numba", "torch", "matplotlib", "pinocchio", "coal", "scipy", "meshcat", "rich"}
+
+
+@pytest.mark.parametrize(
+    "statement", ["import kinarm", "import kinarm.policies", "import kinarm.evaluation"]
+)
+def test_light_imports_load_nothing_heavy(statement):
+    loaded = loaded_by(statement)
+    assert "kinarm" in loaded
+    assert not loaded & HEAVY
+
+
+def test_simulating_needs_neither_torch_nor_plots():
+    loaded = loaded_by("import kinarm; kinarm.Simulator, kinarm.ReachEnv, kinarm.ReachVectorEnv")
+    assert {"numba", "pinocchio"} <= loaded
+    assert not loaded & {"torch", "matplotlib", "meshcat"}
+
+
+def test_training_needs_neither_torch_nor_plots():
+    loaded = loaded_by("from kinarm.policies import train_ars, load_policy")
+    assert not loaded & {"torch", "matplotlib", "meshcat"}
