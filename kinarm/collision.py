@@ -151,9 +151,14 @@ class ContactModel:
         configuration : ndarray, shape (n_axes,)
             Axis positions [rad or m].
         """
-        data, geometry_data = self._workspace
-        touching = _touching(self.arm, self.geometry, configuration, data, geometry_data)
-        return self.pair_names[touching[0]] if touching else None
+        data, results = self._workspace
+        if not pin.computeCollisions(
+            self.arm.model, data, self.geometry, results, configuration, True
+        ):
+            return None
+        # Pairs are tested in order up to the first in contact; later results are of other calls.
+        found = (result.isCollision() for result in results.collisionResults)
+        return self.pair_names[next(index for index, touches in enumerate(found) if touches)]
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
         return type(self), (self.arm, self.geometry, self.body_names, self.shapes)

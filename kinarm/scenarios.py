@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from kinarm.simulator import Simulator
 
 START_ATTEMPTS = 2000
-PREFETCHED = 8
+PREFETCHED = 32
 
 
 def draw_scenarios(

@@ -388,11 +388,13 @@ class Simulator:
         Configurations are judged in the order of the motion, and not beyond the first contact.
         """
         tested = substeps(episodes.q[paused], episodes.target[paused])
+        doubt = episodes.doubt[paused]
         refused = np.zeros(paused.size, dtype=bool)
         for k in range(kernels.SUBSTEPS):
-            rows = np.flatnonzero((episodes.doubt[paused] >> k & 1).astype(bool) & ~refused)
-            refused[rows] = self.contact_model.in_contact(tested[rows, k])
-            self.judged += len(rows)
+            rows = np.flatnonzero((doubt & 1 << k != 0) & ~refused)
+            if rows.size:
+                refused[rows] = self.contact_model.in_contact(tested[rows, k])
+                self.judged += rows.size
         episodes.status[paused] = np.where(refused, COLLISION, RUNNING)
         episodes.cleared[paused] = ~refused
         ended = paused[refused]

@@ -149,8 +149,9 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
             "contact": contact,
             **{f"reward_{name}": term.copy() for name, term in result.terms._asdict().items()},
         }
-        for key in tuple(infos):
-            infos[f"_{key}"] = stepped.copy()
+        mask = stepped.copy()
+        infos.update({f"_{key}": mask for key in infos if key != "distance"})
+        infos["_distance"] = stepped.copy()
         return infos
 
     def _keep_final(
@@ -164,16 +165,12 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
             final_obs[row] = episodes.observation[row].copy()
         final_info: dict[str, Any] = {}
         for key in [key for key in infos if not key.startswith("_")]:
-            kept = np.zeros_like(infos[key])
-            if kept.dtype == object:
-                kept[:] = None
-            kept[ended] = infos[key][ended]
-            infos[key][ended] = None if kept.dtype == object else 0
-            infos[f"_{key}"][ended] = False
-            final_info[key], final_info[f"_{key}"] = kept, mask.copy()
-        infos.update(
-            final_obs=final_obs, _final_obs=mask.copy(), final_info=final_info, _final_info=mask
-        )
+            blank = None if infos[key].dtype == object else 0
+            kept = infos[key].copy()
+            kept[~mask], infos[key][mask] = blank, blank
+            final_info[key], final_info[f"_{key}"] = kept, mask
+        infos["_success"][ended] = False  # the mask of all but the distance, which is renewed
+        infos.update(final_obs=final_obs, _final_obs=mask, final_info=final_info, _final_info=mask)
 
     def _renew(self, episodes: Episodes, rows: NDArray[np.int64], infos: dict[str, Any]) -> None:
         """Begin new episodes from the streams and report their distance."""

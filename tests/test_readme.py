@@ -1,0 +1,47 @@
+"""The README: its code runs, and its results are those of its command."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def block_after(heading, kind):
+    section = README.split(f"\n## {heading}\n")[1].split("\n## ")[0]
+    return re.search(rf"```{kind}\n(.*?)```", section, re.DOTALL).group(1)
+
+
+def run(code, folder):
+    return subprocess.run(
+        [sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=True
+    ).stdout
+
+
+def test_python_example_runs(tmp_path):
+    answer = run(block_after("Ten lines of Python", "python"), tmp_path)
+    distance, share = (float(number) for number in re.findall(r"\d\.\d+", answer))
+    assert distance < 0.05
+    assert "reached: True" in answer
+    assert share > 0.85
+
+
+@pytest.mark.slow
+def test_results_are_those_of_the_command(tmp_path):
+    command = block_after("Results", "sh").split()
+    assert command[0] == "kinarm-eval"
+    code = f"from kinarm.evaluation.eval import main; main({command[1:]!r})"
+    table = run(code, tmp_path).strip()
+    assert table in README
+
+
+def test_make_targets_exist():
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    named = set(re.findall(r"`?make ([a-z]+)`?", README))
+    assert {"eval", "test", "docs"} <= named
+    for target in named:
+        assert re.search(rf"^{target}:", makefile, re.MULTILINE)
