@@ -30,6 +30,9 @@ MARGIN = 1e-6
 """Distance below which freedom is not claimed [m]; Coal's own tolerance is far below."""
 
 
+NARROW = 16
+"""Layers of fewer outputs keep their sums in registers."""
+
 POSE = 16
 """Entries of a frame's pose: quaternion w x y z, rotation matrix by rows, position."""
 
@@ -81,12 +84,14 @@ def forward_kinematics(
         poses[c, 15] = poses[k, 15] + (poses[k, 10] * tx + poses[k, 11] * ty + poses[k, 12] * tz)
         fw, fx, fy, fz = rotation[k, 0], rotation[k, 1], rotation[k, 2], rotation[k, 3]
         ax, ay, az = axis[k, 0], axis[k, 1], axis[k, 2]
-        if prismatic[k]:
-            jw, jx, jy, jz = fw, fx, fy, fz
-        else:
+        sine, cosine = 0.0, 1.0
+        if not prismatic[k] and configurations[row, k] != 0.0:
             half = 0.5 * configurations[row, k]
             sine, cosine = math.sin(half), math.cos(half)
-            ux, uy, uz = sine * ax, sine * ay, sine * az
+        ux, uy, uz = sine * ax, sine * ay, sine * az
+        if fw == 1.0:
+            jw, jx, jy, jz = cosine, ux, uy, uz
+        else:
             jw = fw * cosine - fx * ux - fy * uy - fz * uz
             jx = fw * ux + fx * cosine + fy * uz - fz * uy
             jy = fw * uy - fx * uz + fy * cosine + fz * ux
@@ -380,6 +385,9 @@ def prove_step(
         if not is_apart(after):
             doubt |= 1 << (SUBSTEPS - 1)
         unproven = 0
+        if is_apart(after - motion[pair]):
+            motion[pair] = 0.0
+            continue
         for k in range(1, SUBSTEPS):
             share = k / SUBSTEPS
             left = before - share * motion[pair]
@@ -401,6 +409,64 @@ def prove_step(
                     doubt |= bit
                     break
     return doubt
+
+
+@inlined
+def narrow_layer(
+    weights: NDArray[np.float64],
+    policy: int,
+    offset: int,
+    n_in: int,
+    n_out: int,
+    inputs: NDArray[np.float64],
+    source: int,
+    outputs: NDArray[np.float64],
+    sink: int,
+) -> None:
+    """Apply an affine layer of few outputs: sums stay in registers, five at a time."""
+    bias = offset + n_in * n_out
+    blocked = n_out - n_out % 5
+    for j in range(0, blocked, 5):
+        s0, s1 = weights[policy, bias + j], weights[policy, bias + j + 1]
+        s2, s3 = weights[policy, bias + j + 2], weights[policy, bias + j + 3]
+        s4 = weights[policy, bias + j + 4]
+        entry = offset + j
+        for i in range(n_in):
+            value = inputs[source, i]
+            s0 += value * weights[policy, entry]
+            s1 += value * weights[policy, entry + 1]
+            s2 += value * weights[policy, entry + 2]
+            s3 += value * weights[policy, entry + 3]
+            s4 += value * weights[policy, entry + 4]
+            entry += n_out
+        outputs[sink, j], outputs[sink, j + 1], outputs[sink, j + 2] = s0, s1, s2
+        outputs[sink, j + 3], outputs[sink, j + 4] = s3, s4
+    for j in range(blocked, n_out):
+        s0 = weights[policy, bias + j]
+        for i in range(n_in):
+            s0 += inputs[source, i] * weights[policy, offset + i * n_out + j]
+        outputs[sink, j] = s0
+
+
+@inlined
+def wide_layer(
+    weights: NDArray[np.float64],
+    policy: int,
+    offset: int,
+    n_in: int,
+    n_out: int,
+    inputs: NDArray[np.float64],
+    source: int,
+    outputs: NDArray[np.float64],
+    sink: int,
+) -> None:
+    """Apply an affine layer of many outputs: the loop over outputs fills vector registers."""
+    for j in range(n_out):
+        outputs[sink, j] = weights[policy, offset + n_in * n_out + j]
+    for i in range(n_in):
+        value = inputs[source, i]
+        for j in range(n_out):
+            outputs[sink, j] += value * weights[policy, offset + i * n_out + j]
 
 
 @inlined
@@ -434,17 +500,14 @@ def dense(
     """
     offset = 0
     n_layers = layers.shape[0] - 1
-    for i in range(layers[0]):
-        hidden[0, i] = observations[row, i]
     for layer in range(n_layers):
         n_in, n_out = layers[layer], layers[layer + 1]
-        source, sink = layer % 2, (layer + 1) % 2
-        for j in range(n_out):
-            hidden[sink, j] = weights[policy, offset + n_in * n_out + j]
-        for i in range(n_in):
-            value = hidden[source, i]
-            for j in range(n_out):
-                hidden[sink, j] += value * weights[policy, offset + i * n_out + j]
+        sink = (layer + 1) % 2
+        inputs, source = (observations, row) if layer == 0 else (hidden, layer % 2)
+        if n_out < NARROW:
+            narrow_layer(weights, policy, offset, n_in, n_out, inputs, source, hidden, sink)
+        else:
+            wide_layer(weights, policy, offset, n_in, n_out, inputs, source, hidden, sink)
         if layer < n_layers - 1:
             for j in range(n_out):
                 hidden[sink, j] = math.tanh(hidden[sink, j])
