@@ -7,6 +7,8 @@ from kinarm._exports import lazy_exports
 if TYPE_CHECKING:
     from kinarm.evaluation.entrants import Entrant, find_entrants
     from kinarm.evaluation.evaluations import Evaluation, PooledEvaluation, evaluate, pool
+    from kinarm.evaluation.plots import distance_histograms, save_figure
+    from kinarm.evaluation.report import evaluation_document
     from kinarm.evaluation.statistics import DistanceStatistics, Share
     from kinarm.evaluation.trials import TrialSet
 
@@ -17,16 +19,26 @@ __all__ = [
     "PooledEvaluation",
     "Share",
     "TrialSet",
+    "distance_histograms",
     "evaluate",
+    "evaluation_document",
     "find_entrants",
     "pool",
+    "save_figure",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__
+
 
 __getattr__ = lazy_exports(
     __name__,
     {
         "entrants": ("Entrant", "find_entrants"),
         "evaluations": ("Evaluation", "PooledEvaluation", "evaluate", "pool"),
+        "plots": ("distance_histograms", "save_figure"),
+        "report": ("evaluation_document",),
         "statistics": ("DistanceStatistics", "Share"),
         "trials": ("TrialSet",),
     },

@@ -3,7 +3,9 @@
 import argparse
 import json
 import platform
+import resource
 import statistics
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -92,7 +94,7 @@ def measure(policy_name: str, repetitions: int) -> dict[str, Any]:
     reference = measure_reference(simulator, policy, repetitions)
     fast = next(row for row in rollouts if _is_headline(row))
     return {
-        "machine": {"processor": platform.machine(), "threads": simulator.threads},
+        "machine": {"architecture": platform.machine(), "threads": simulator.threads},
         "versions": package_versions(),
         "commit": source_commit(),
         "policy": policy_name,
@@ -103,6 +105,7 @@ def measure(policy_name: str, repetitions: int) -> dict[str, Any]:
         "vector_environment": measure_vector_env(policy, repetitions).to_json(),
         "single_environment": measure_single_env(policy, repetitions).to_json(),
         "table_1_training": measure_training(policy.provenance.task, min(repetitions, 3)),
+        "evaluation": measure_evaluation(),
     }
 
 
@@ -132,6 +135,8 @@ def measure_rollouts(
     """Steps per second of whole episodes: batch sizes, random and trained, 1 and all threads."""
     import numpy as np
 
+    from kinarm.kernels import SUBSTEPS
+
     rows = []
     for batch in BATCHES:
         rng = np.random.default_rng(batch)
@@ -146,9 +151,9 @@ def measure_rollouts(
             ),
         }
         for actions_name, run in runs.items():
-            judged = simulator.judged
-            asked = run()
-            judged = simulator.judged - judged
+            judged_before = simulator.judged
+            steps = run()
+            judged = simulator.judged - judged_before
             for threads in sorted({1, available_threads()}):
                 simulator.threads = threads
                 rows.append(
@@ -157,7 +162,7 @@ def measure_rollouts(
                         "actions": actions_name,
                         "threads": threads,
                         "steps_per_second": timed(run, repetitions).to_json(),
-                        "judged_per_step": judged / asked,
+                        "judged_share": judged / (SUBSTEPS * steps),
                     }
                 )
     return rows
@@ -234,6 +239,16 @@ def measure_training(task: str, repetitions: int) -> dict[str, Any]:
     }
 
 
+def measure_evaluation() -> dict[str, float]:
+    """Time [s] and peak memory [MB] of ``kinarm-eval --trials 200`` as a process of its own."""
+    code = "from kinarm.evaluation.eval import main; main(['--trials', '200', '--json'])"
+    began = time.perf_counter()
+    subprocess.run([sys.executable, "-P", "-c", code], stdout=subprocess.DEVNULL, check=True)
+    seconds = time.perf_counter() - began
+    peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+    return {"seconds": seconds, "peak_memory_mb": peak / 1024}
+
+
 def _table(document: dict[str, Any]) -> Any:
     """The figures as a table."""
     from rich.table import Table
@@ -248,7 +263,7 @@ def _table(document: dict[str, Any]) -> Any:
         table.add_row(
             f"rollouts, {row['batch']} {row['actions']} episodes, {row['threads']} thread{plural}",
             *_rates(row["steps_per_second"]),
-            f"{100 * row['judged_per_step']:.2f} per 100 steps",
+            f"{100 * row['judged_share']:.3f} %",
         )
     table.add_section()
     table.add_row(f"batch environment, {VECTOR_ENVS} arms", *_rates(document["vector_environment"]))
@@ -262,6 +277,11 @@ def _table(document: dict[str, Any]) -> Any:
     table.add_row(
         f"training of Table 1 ({training['environment_steps'] / 1e6:.1f} million steps)",
         *(f"{training['seconds'][name]:.2f} s" for name in ("median", "best")),
+    )
+    table.add_row(
+        "kinarm-eval --trials 200, whole process",
+        f"{document['evaluation']['seconds']:.1f} s",
+        f"{document['evaluation']['peak_memory_mb']:.0f} MB",
     )
     return table
 

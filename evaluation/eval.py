@@ -77,8 +77,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _evaluate(options: argparse.Namespace, command: str) -> None:
     """From options to table, document and figures."""
-    if options.out is not None:
-        check_folder(options.out, create=True)
     evaluations = evaluate_all(options)
     from kinarm.evaluation.report import evaluation_document, print_table
 
@@ -96,6 +94,8 @@ def _evaluate(options: argparse.Namespace, command: str) -> None:
     print_table(document, console, markdown=options.markdown)
     if not options.markdown:
         console.print(_footnote(document), style="dim")
+        if not options.policy and all(row["trained_on"] is None for row in document["results"]):
+            console.print(f"no shipped policy was trained for arm {options.arm}", style="dim")
     if options.out is not None:
         console.print(f"written: {options.out / 'evaluation.json'} and histograms", style="dim")
 
@@ -121,6 +121,8 @@ def evaluate_all(options: argparse.Namespace) -> "list[Evaluation]":
     tasks = list(dict.fromkeys(load_task(name).name for name in options.task or ()))
     arm = Arm.load(options.arm)
     entrants = choose_entrants(options, arm)
+    if options.out is not None:
+        check_folder(options.out, create=True)
     trial_sets: dict[str, TrialSet] = {}
     evaluations = []
     for entrant, task in pair_with_tasks(entrants, tasks, options):

@@ -93,6 +93,9 @@ def print_table(document: dict[str, Any], console: "Console", *, markdown: bool 
         if console.measure(table, options=unbounded).maximum <= console.width:
             break
     console.print(table)
+    if dropped:
+        left_out = ", ".join(EXPENDABLE[:dropped])
+        console.print(f"left out for want of width: {left_out}; --markdown prints all", style="dim")
 
 
 def evaluation_table(
@@ -130,7 +133,7 @@ COLUMNS = (
     "task",
     "policy",
     "success %",
-    "over seeds",
+    "seeds: range %",
     "<= 0.1 m",
     "<= 0.2 m",
     "median m",
@@ -141,7 +144,7 @@ COLUMNS = (
 )
 
 
-EXPENDABLE = ("<= 0.1 m", "mean m", "p95 m", "steps", "over seeds", "<= 0.2 m", "contact %")
+EXPENDABLE = ("<= 0.1 m", "mean m", "p95 m", "steps", "seeds: range %", "<= 0.2 m", "contact %")
 
 
 def _rows(document: dict[str, Any], task: str) -> list[dict[str, Any]]:
@@ -165,12 +168,16 @@ def _cells(row: dict[str, Any]) -> list[str]:
         over_seeds,
         f"{100 * row['within']['0.1']['rate']:.1f}",
         f"{100 * row['within']['0.2']['rate']:.1f}",
-        "{:.3f} ({:.3f}..{:.3f})".format(distance["median"], *distance["ci95"]["median"]),
+        _metres(distance["median"], distance["ci95"]["median"]),
         f"{distance['mean']:.3f}",
         f"{distance['p95']:.3f}",
         f"{100 * row['collision']['rate']:.1f}",
         f"{row['steps']['median']:.0f}",
     ]
+
+
+def _metres(value: float, interval: list[float] | None) -> str:
+    return f"{value:.3f}" + (" ({:.3f}..{:.3f})".format(*interval) if interval else "")
 
 
 def _percent(share: dict[str, Any]) -> str:

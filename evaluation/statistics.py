@@ -60,7 +60,8 @@ class DistanceStatistics:
     mean, median, iqm, p95, max : float
         Mean, median, interquartile mean, 95th percentile and maximum.
     ci95 : dict
-        Seeded bootstrap intervals of all but the maximum.
+        Seeded bootstrap intervals of all but the maximum; None for a single trial, which tells
+        nothing about the spread.
     """
 
     mean: float
@@ -68,7 +69,7 @@ class DistanceStatistics:
     iqm: float
     p95: float
     max: float
-    ci95: dict[str, Interval]
+    ci95: dict[str, Interval | None]
 
     @classmethod
     def of(cls, distances: NDArray[np.float64]) -> "DistanceStatistics":
@@ -82,33 +83,26 @@ class DistanceStatistics:
         from scipy.stats import bootstrap
 
         samples = tuple(np.atleast_2d(distances))
-        estimates = _estimates(*samples)
-        intervals = np.stack([estimates, estimates])
+        ci95: dict[str, Interval | None] = dict.fromkeys(ESTIMATES)
         if len(samples[0]) > 1:
-            intervals = np.stack(
-                bootstrap(
-                    samples,
-                    _estimates,
-                    n_resamples=RESAMPLES,
-                    method="percentile",
-                    paired=len(samples) > 1,
-                    vectorized=True,
-                    rng=np.random.default_rng(BOOTSTRAP_SEED),
-                ).confidence_interval
-            )
-        return cls(
-            **dict(zip(ESTIMATES, estimates.tolist(), strict=True)),
-            max=float(np.max(distances)),
-            ci95={
-                name: (float(low), float(high))
-                for name, low, high in zip(ESTIMATES, *intervals, strict=True)
-            },
-        )
+            interval = bootstrap(
+                samples,
+                _estimates,
+                n_resamples=RESAMPLES,
+                method="percentile",
+                paired=len(samples) > 1,
+                vectorized=True,
+                rng=np.random.default_rng(BOOTSTRAP_SEED),
+            ).confidence_interval
+            for name, low, high in zip(ESTIMATES, *np.array(interval), strict=True):
+                ci95[name] = (float(low), float(high))
+        estimates = dict(zip(ESTIMATES, _estimates(*samples).tolist(), strict=True))
+        return cls(**estimates, max=float(np.max(distances)), ci95=ci95)
 
     def to_json(self) -> dict[str, Any]:
         """As a dictionary that JSON can hold."""
         figures = {name: getattr(self, name) for name in (*ESTIMATES, "max")}
-        return {**figures, "ci95": {name: list(ci) for name, ci in self.ci95.items()}}
+        return {**figures, "ci95": {name: ci and list(ci) for name, ci in self.ci95.items()}}
 
 
 ESTIMATES = ("mean", "median", "iqm", "p95")

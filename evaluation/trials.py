@@ -59,8 +59,7 @@ class TrialSet:
         SceneError
             If no contact-free start exists.
         """
-        whole_number("trials", trials, 1)
-        whole_number("seed", seed, 0)
+        trials, seed = whole_number("trials", trials, 1), whole_number("seed", seed, 0)
         drawn = [simulator.sample(trial_generator(seed, trial), 1) for trial in range(trials)]
         starts, goals = (np.concatenate(part) for part in zip(*drawn, strict=True))
         starts.flags.writeable = goals.flags.writeable = False

@@ -57,6 +57,11 @@ __all__ = [
     "load_task",
 ]
 
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 __getattr__ = lazy_exports(
     __name__,
     {

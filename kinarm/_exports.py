@@ -1,5 +1,6 @@
 """Package attributes that are imported when first used, so that ``--help`` stays quick."""
 
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 
@@ -19,6 +20,8 @@ def lazy_exports(package: str, exports: Mapping[str, Sequence[str]]) -> Callable
     def import_export(name: str) -> object:
         if name not in module_of:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        return getattr(import_module(f"{package}.{module_of[name]}"), name)
+        value = getattr(import_module(f"{package}.{module_of[name]}"), name)
+        setattr(sys.modules[package], name, value)
+        return value
 
     return import_export

@@ -36,7 +36,7 @@ class Arm:
     Attributes
     ----------
     name : str
-        Name of the arm: that of a shipped one, or the robot's name in the URDF.
+        Name of the arm: that of a shipped one, or of the file without its ending.
     urdf_path : Path
         The file that it was read from.
     model : pinocchio.Model
@@ -109,7 +109,7 @@ class Arm:
                 f"n_actuated must be a whole number in 1..{chain.n_axes}, got {n_actuated}"
             )
         return cls(
-            name=name or model.name,
+            name=name or path.stem,
             urdf_path=path,
             model=model,
             geometry=geometry,
@@ -245,6 +245,13 @@ def _check_xml(path: Path) -> ElementTree.Element:
         robot = ElementTree.parse(path).getroot()
     except (ElementTree.ParseError, OSError, UnicodeError) as error:
         raise ArmError(f"{path.name} is not a readable URDF: {error}") from error
+    if robot.tag != "robot":
+        raise ArmError(
+            f"{path.name} is not a readable URDF: its root is <{robot.tag}>, not <robot>"
+        )
+    capsules = robot.find("link/collision/geometry/capsule") is not None
+    if capsules and robot.get("version", "1.0") not in ("1.1", "1.2"):
+        raise ArmError(f'{path.name} has capsules, which need <robot version="1.2">')
     for joint in robot.findall("joint"):
         name, kind = joint.get("name"), joint.get("type")
         if joint.find("mimic") is not None:

@@ -3,6 +3,7 @@
 import argparse
 import math
 import os
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from typing import NoReturn
@@ -42,7 +43,7 @@ def _status(prog: str, command: Callable[[], None]) -> int:
         _discard_output()
     except OSError as error:
         _discard_output()
-        return _report(prog, f"cannot write the output: {error.strerror}", 1)
+        return _report(prog, f"{error.filename or 'standard output'}: {error.strerror}", 1)
     except KeyboardInterrupt as interruption:
         return _report(prog, str(interruption) or "interrupted", 130)
     return 0
@@ -88,4 +89,4 @@ def finite_number(text: str) -> float:
 
 def command_text(prog: str, arguments: Sequence[str] | None) -> str:
     """The command as typed, for the record."""
-    return " ".join([prog, *(sys.argv[1:] if arguments is None else arguments)])
+    return shlex.join([prog, *(sys.argv[1:] if arguments is None else arguments)])

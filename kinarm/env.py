@@ -1,6 +1,7 @@
 """The Gymnasium environment: one arm."""
 
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any, cast
 
 import gymnasium
@@ -10,11 +11,12 @@ from numpy.typing import NDArray
 
 from kinarm.arm import DEFAULT_ARM, Arm
 from kinarm.episodes import RUNNING, Episodes
-from kinarm.errors import InvalidInputError
+from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.scenarios import ScenarioStream
 from kinarm.scene import Scene
 from kinarm.simulator import Simulator
 from kinarm.task import ReachTask, RewardWeights, load_task
+from kinarm.validation import finite_array
 
 Array = NDArray[np.float64]
 
@@ -34,10 +36,11 @@ def make_simulator(
         raise InvalidInputError(f"render_mode must be None, got {render_mode!r}")
     base = load_task(task, **settings)
     if isinstance(reward, Mapping):
-        try:
-            reward = RewardWeights(**reward)
-        except TypeError as error:
-            raise InvalidInputError(f"reward has an unknown term: {error}") from error
+        terms = [item.name for item in fields(RewardWeights)]
+        for name in reward:
+            if name not in terms:
+                raise UnknownNameError("reward term", name, terms)
+        reward = RewardWeights(**reward)
     return Simulator(arm, load_task(base, reward=reward), scene, threads=threads)
 
 
@@ -147,7 +150,7 @@ class ReachEnv(gymnasium.Env[Array, Array]):
         super().reset(seed=seed)
         if self._stream is None or seed is not None:
             self._stream = ScenarioStream(self.simulator, self.np_random)
-        start, goal = chosen_scenario(self._stream, options)
+        start, goal = pick_scenario(options, *self._stream.next())
         self._episode = self.simulator.reset([start], [goal])
         return self._episode.observation[0].copy(), {"distance": float(self._episode.distance[0])}
 
@@ -156,7 +159,8 @@ class ReachEnv(gymnasium.Env[Array, Array]):
         episode = self._episode
         if episode is None or episode.status[0] != RUNNING:
             raise InvalidInputError("the episode is over or was never begun: call reset()")
-        result = self.simulator.step(episode, np.asarray(action)[None])
+        chosen = finite_array("action", action, (self.simulator.n_actions,))
+        result = self.simulator.step(episode, chosen[None])
         contact = None
         if result.collision[0]:
             contact = self.simulator.contact_pair(episode.q[0], episode.target[0])
@@ -176,13 +180,21 @@ class ReachEnv(gymnasium.Env[Array, Array]):
         )
 
 
-def chosen_scenario(
-    stream: ScenarioStream, options: Mapping[str, Any] | None
+def pick_scenario(
+    options: Mapping[str, Any] | None, start: Array, goal: Array
 ) -> tuple[Array, Array]:
-    """Take the next scenario of a stream and replace what the options of a reset set."""
+    """Replace a start and a goal by what the options of a reset set.
+
+    Raises
+    ------
+    InvalidInputError
+        If an option is unknown, or has the wrong shape or an entry that is not finite.
+    """
     given = dict(options or {})
     unknown = set(given) - {"start", "goal"}
     if unknown:
         raise InvalidInputError(f"unknown reset options {sorted(unknown)}; available: start, goal")
-    start, goal = stream.next()
-    return given.get("start", start), given.get("goal", goal)
+    return (
+        finite_array("start", given.get("start", start), start.shape),
+        finite_array("goal", given.get("goal", goal), goal.shape),
+    )

@@ -27,7 +27,14 @@ SUBSTEPS = 4
 """Configurations at which the motion of a step is tested."""
 
 MARGIN = 1e-6
-"""Distance below which freedom is not claimed [m]; Coal's own tolerance is far below."""
+"""Distance below which freedom is not claimed [m]: the tolerance of Coal's iterations."""
+
+LAYOUT = "b91b3b14f472"
+"""Hash of what is compiled in from other files; a test tells when to renew it.
+
+Numba's disk cache notices changes only in this file, so changing this line is what makes it
+compile anew.
+"""
 
 
 NARROW = 16
@@ -40,8 +47,12 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def kernel(function: Function) -> Function:
-    """Compile a function that Python calls."""
-    return cast("Function", njit(cache=True, nogil=True, error_model="numpy")(function))
+    """Compile a function that Python calls, into the disk cache where there can be one."""
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+    try:
+        return cast("Function", njit(cache=True, **options)(function))
+    except RuntimeError:
+        return cast("Function", njit(**options)(function))
 
 
 def inlined(function: Function) -> Function:
@@ -350,6 +361,7 @@ def prove_step(
     poses: NDArray[np.float64],
     between: NDArray[np.float64],
     middle: NDArray[np.float64],
+    unproven: NDArray[np.int64],
 ) -> int:
     """Prove the tested configurations of a step free where the slack ran out, and renew it.
 
@@ -363,7 +375,7 @@ def prove_step(
         As `spend_slack` took and left them; on return, ``slack`` is renewed.
     poses : ndarray, shape (n_axes + 1, POSE)
         Forward kinematics at ``target``.
-    between, middle : ndarray, shape (n_axes + 1, POSE) and (1, n_axes)
+    between, middle, unproven : ndarray, shape (n_axes + 1, POSE), (1, n_axes) and (n_pairs,)
         Work space.
 
     Returns
@@ -376,26 +388,23 @@ def prove_step(
     n_pairs, n_axes = slack.shape[1], q.shape[1]
     doubt, open_between = 0, 0
     for pair in range(n_pairs):
+        unproven[pair] = 0
         if is_apart(slack[row, pair]):
-            motion[pair] = 0.0
             continue
         before = slack[row, pair] + motion[pair]
         after = clearance(pair, pairs, capsules, link, boxes, poses)
         slack[row, pair] = after
         if not is_apart(after):
             doubt |= 1 << (SUBSTEPS - 1)
-        unproven = 0
         if is_apart(after - motion[pair]):
-            motion[pair] = 0.0
             continue
         for k in range(1, SUBSTEPS):
             share = k / SUBSTEPS
             left = before - share * motion[pair]
             right = after - (1.0 - share) * motion[pair]
             if not is_apart(max(left, right)):
-                unproven |= 1 << (k - 1)
-        motion[pair] = unproven
-        open_between |= unproven
+                unproven[pair] |= 1 << (k - 1)
+        open_between |= unproven[pair]
     for k in range(1, SUBSTEPS):
         bit = 1 << (k - 1)
         if open_between & bit:
@@ -403,7 +412,7 @@ def prove_step(
                 middle[0, axis] = q[row, axis] + k / SUBSTEPS * (target[row, axis] - q[row, axis])
             forward_kinematics(prismatic, translation, rotation, axes, middle, 0, between)
             for pair in range(n_pairs):
-                if int(motion[pair]) & bit and not is_apart(
+                if unproven[pair] & bit and not is_apart(
                     clearance(pair, pairs, capsules, link, boxes, between)
                 ):
                     doubt |= bit
@@ -616,6 +625,7 @@ def advance(
     n_axes, n_actuated, n_observations = q.shape[1], step_limit.shape[0], observation.shape[1]
     poses, between = np.empty((n_axes + 1, POSE)), np.empty((n_axes + 1, POSE))
     motion, middle = np.empty(slack.shape[1]), np.empty((1, n_axes))
+    unproven = np.empty(slack.shape[1], dtype=np.int64)
     widest = 1
     for layer in range(layers.shape[0]):
         widest = max(widest, layers[layer])
@@ -640,7 +650,7 @@ def advance(
             forward_kinematics(prismatic, translation, rotation, axes, target, e, poses)
             if not cleared[e] and spend_slack(e, travel, q, target, slack, motion):
                 doubt[e] = prove_step(
-                    e, chain, shapes, q, target, slack, motion, poses, between, middle
+                    e, chain, shapes, q, target, slack, motion, poses, between, middle, unproven
                 )
                 if doubt[e] != 0:
                     status[e] = PAUSED

@@ -12,7 +12,9 @@ BALANCED_BATCH = 256
 
 def available_threads() -> int:
     """Processors that this process may use."""
-    return len(os.sched_getaffinity(0))
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def run_rows(kernel: Callable[..., None], n: int, work: int, threads: int, *arrays: Any) -> None:

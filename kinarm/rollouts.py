@@ -50,7 +50,9 @@ class Rollouts:
 
     @classmethod
     def from_episodes(cls, starts: NDArray[np.float64], episodes: Episodes) -> "Rollouts":
-        """Collect the outcome of episodes that have ended."""
+        """Collect the outcome of episodes that have ended; their arrays become read-only."""
+        for array in (starts, *episodes):
+            array.flags.writeable = False
         return cls(
             starts=starts,
             goals=episodes.goal,

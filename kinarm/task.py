@@ -36,8 +36,8 @@ class RewardWeights:
     def __post_init__(self) -> None:
         for item in fields(self):
             value = getattr(self, item.name)
-            if not math.isfinite(value):
-                raise SceneError(f"reward weight {item.name} must be finite, got {value}")
+            if not isinstance(value, int | float | np.number) or not math.isfinite(value):
+                raise SceneError(f"reward weight {item.name} must be finite, got {value!r}")
 
 
 class RewardTerms(NamedTuple):

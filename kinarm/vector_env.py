@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from kinarm.env import (
     Array,
     action_space,
-    chosen_scenario,
     make_simulator,
     observation_space,
+    pick_scenario,
 )
 from kinarm.episodes import RUNNING, Episodes
 from kinarm.errors import InvalidInputError
@@ -54,8 +54,7 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
         **settings: Any,
     ) -> None:
-        if num_envs < 1:
-            raise InvalidInputError(f"num_envs must be at least 1, got {num_envs}")
+        num_envs = whole_number("num_envs", num_envs, 1)
         try:
             self.autoreset_mode = AutoresetMode(autoreset_mode)
         except ValueError as error:
@@ -87,6 +86,7 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         chosen = dict(options or {})
         rows = self._masked_rows(chosen.pop("reset_mask", None))
         seeds = self._seeds(seed)
+        self._check_choice(chosen)
         if not self._streams:
             first = [np.random.SeedSequence().entropy if s is None else s for s in seeds]
             self._streams = [self._stream(s) for s in first]
@@ -94,13 +94,11 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
             for row in rows:
                 if seeds[row] is not None:
                     self._streams[row] = self._stream(seeds[row])
-        scenarios = [chosen_scenario(self._streams[row], chosen) for row in rows]
+        scenarios = [pick_scenario(chosen, *self._streams[row].next()) for row in rows]
         starts, goals = (np.array(part) for part in zip(*scenarios, strict=True))
         if self._episodes is None:
             self._episodes = self.simulator.reset(starts, goals)
         else:
-            if chosen:
-                self.simulator.reset(starts, goals)  # refuses a bad choice before any change
             self._restart(self._episodes, rows, starts, goals)
         distance = np.zeros(self.num_envs)
         distance[rows] = self._episodes.distance[rows]
@@ -187,10 +185,19 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         episodes.q[rows], episodes.goal[rows] = starts, goals
         self.simulator.begin(episodes, rows)
 
+    def _check_choice(self, chosen: dict[str, Any]) -> None:
+        """Refuse a bad start or goal before anything changes."""
+        arm = self.simulator.arm
+        start, goal = pick_scenario(chosen, arm.home, np.zeros(3))
+        if "start" in chosen:
+            self.simulator.reset(start[None], goal[None])
+
     def _masked_rows(self, mask: object) -> NDArray[np.int64]:
         """Rows to reset."""
-        if mask is None or self._episodes is None:
+        if mask is None:
             return np.arange(self.num_envs)
+        if self._episodes is None:
+            raise InvalidInputError("reset_mask needs episodes: call reset() without it first")
         array = np.asarray(mask)
         if array.shape != (self.num_envs,) or array.dtype != bool or not array.any():
             raise InvalidInputError(

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 from kinarm._exports import lazy_exports
 
 if TYPE_CHECKING:
-    from kinarm.policies.ars import ARSConfig, ARSResult, train_ars
+    from kinarm.policies.ars import ARSConfig, ARSResult, ARSState, train_ars
+    from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
     from kinarm.policies.library import load_policy, policy_names
     from kinarm.policies.normalizer import Normalizer
     from kinarm.policies.policy import Layer, Policy
@@ -16,20 +17,29 @@ __all__ = [
     "ARS_RECIPES",
     "ARSConfig",
     "ARSResult",
+    "ARSState",
     "Layer",
     "Normalizer",
     "Policy",
     "Provenance",
     "ars_recipe",
+    "load_checkpoint",
     "load_policy",
     "policy_names",
+    "save_checkpoint",
     "train_ars",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__
+
 
 __getattr__ = lazy_exports(
     __name__,
     {
-        "ars": ("ARSConfig", "ARSResult", "train_ars"),
+        "ars": ("ARSConfig", "ARSResult", "ARSState", "train_ars"),
+        "checkpoint": ("load_checkpoint", "save_checkpoint"),
         "library": ("load_policy", "policy_names"),
         "normalizer": ("Normalizer",),
         "policy": ("Layer", "Policy"),

@@ -96,9 +96,9 @@ class ARSConfig:
     start_spread: float = 1.0
 
     def __post_init__(self) -> None:
-        for name in ("directions", "top_directions", "iterations", "episodes", "horizon"):
-            whole_number(name, getattr(self, name), 1)
-        whole_number("seed", self.seed, 0)
+        for name in ("directions", "top_directions", "iterations", "episodes", "horizon", "seed"):
+            number = whole_number(name, getattr(self, name), 0 if name == "seed" else 1)
+            object.__setattr__(self, name, number)
         for name in ("step_size", "noise"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.files import write_atomically
 from kinarm.policies.ars import ARSConfig, ARSState, CurvePoint
@@ -28,6 +29,7 @@ def save_checkpoint(path: str | Path, config: ARSConfig, state: ARSState) -> Non
     arrays: dict[str, Any] = {
         "format": np.array(FILE_FORMAT),
         "version": np.array(FILE_VERSION),
+        "arm_digest": np.array(Arm.load(config.arm).digest),
         "config": np.array(json.dumps(asdict(config), sort_keys=True)),
         "generator": np.array(json.dumps(state.generator, sort_keys=True)),
         "theta": state.theta,
@@ -70,13 +72,17 @@ def load_checkpoint(path: str | Path) -> tuple[ARSConfig, ARSState]:
                 ),
             )
             _check_state(state)
-            return ARSConfig(**json.loads(str(content["config"]))), state
+            config = ARSConfig(**json.loads(str(content["config"])))
+            arm_digest = str(content["arm_digest"])
     except OSError as error:
         raise PolicyFileError(f"cannot read checkpoint {str(path)!r}: {error.strerror}") from error
     except (ValueError, IndexError, KeyError, TypeError, EOFError, *CORRUPT) as error:
         if isinstance(error, InvalidInputError):
             raise
         raise PolicyFileError(f"{str(path)!r} is not a complete checkpoint") from error
+    if Arm.load(config.arm).digest != arm_digest:
+        raise PolicyFileError(f"arm {config.arm!r} has changed since {str(path)!r} was written")
+    return config, state
 
 
 def _check_state(state: ARSState) -> None:

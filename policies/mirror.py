@@ -63,7 +63,9 @@ class Mirror(NamedTuple):
         )
         mirror = cls(axes, observations, axes[: arm.n_actuated])
         if not mirror._fits(simulator):
-            raise InvalidInputError(f"arm {arm.name!r} is not its own mirror image")
+            raise InvalidInputError(
+                f"arm {arm.name!r} is not its own mirror image: train it without symmetric"
+            )
         return mirror
 
     def _fits(self, simulator: Simulator) -> bool:

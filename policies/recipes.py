@@ -46,7 +46,8 @@ def ars_recipe(name: str, **settings: Any) -> ARSConfig:
     name : str
         Name of the recipe.
     **settings
-        Fields of `ARSConfig` to replace; None leaves a field as it is.
+        Fields of `ARSConfig` to replace; None leaves a field as it is. If another field than
+        task, arm and seed changes, the recipe's name in the result gets a star.
 
     Raises
     ------
@@ -58,4 +59,9 @@ def ars_recipe(name: str, **settings: Any) -> ARSConfig:
     given = {key: value for key, value in settings.items() if value is not None}
     config = ARS_RECIPES[name]
     by_task = TASK_SETTINGS.get((name, given.get("task", config.task)), {})
-    return replace(config, **{**by_task, **given})
+    circumstances: dict[str, Any] = {
+        key: given[key] for key in ("task", "arm", "seed") if key in given
+    }
+    standard = replace(config, **{**by_task, **circumstances})
+    made = replace(standard, **given)
+    return made if made == standard else replace(made, recipe=given.get("recipe", f"{name}*"))

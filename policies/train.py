@@ -50,6 +50,11 @@ def build_parser() -> Parser:
         settings.add_argument(f"--{name}", type=whole_number(1), metavar="N")
     for name in ("step-size", "noise", "success-bonus", "collision-penalty", "start-spread"):
         settings.add_argument(f"--{name}", type=finite_number, metavar="X")
+    settings.add_argument(
+        "--symmetric",
+        action=argparse.BooleanOptionalAction,
+        help="treat mirror images alike where the task is its own mirror image",
+    )
     settings.add_argument("--sharing", choices=("none", "pair", "iteration"))
     settings.add_argument("--step-size-schedule", choices=("constant", "linear"))
     return parser
@@ -82,19 +87,22 @@ def _train(options: argparse.Namespace) -> None:
             raise KeyboardInterrupt(keeper.save_on_interrupt()) from None
     try:
         result.policy.save(out)
-    except KinarmError:
+        write_curve(curve_path(out), result.curve)
+    except (KinarmError, KeyboardInterrupt):
         keeper.save()
         raise
-    write_curve(curve_path(out), result.curve)
     checkpoint_path(out).unlink(missing_ok=True)
     sys.stdout.write(f"{_summary(result)}; written: {out}, {curve_path(out)}\n")
 
 
 def _beginning(options: argparse.Namespace) -> "tuple[ARSConfig, ARSState | None]":
     """Settings and state to begin with: from the command line, or from a checkpoint."""
+    from kinarm.policies.ars import task_mirror
     from kinarm.policies.checkpoint import load_checkpoint
     from kinarm.policies.recipes import ars_recipe
 
+    if options.arm is not None and Path(options.arm).is_file():
+        options.arm = str(Path(options.arm).resolve())
     settings = given_settings(options)
     checkpoint = checkpoint_path(options.out)
     if not options.resume:
@@ -104,7 +112,8 @@ def _beginning(options: argparse.Namespace) -> "tuple[ARSConfig, ARSState | None
                 "or delete it"
             )
         config = ars_recipe(settings.pop("recipe", "paper"), **settings)
-        config.simulator()  # refuses what cannot be simulated before any output is made
+        # Refuses what cannot be trained before any output is made.
+        task_mirror(config, config.simulator())
         return config, None
     if not checkpoint.exists():
         raise PolicyFileError(f"nothing to resume: there is no {str(checkpoint)!r}")

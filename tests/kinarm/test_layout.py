@@ -1,0 +1,18 @@
+"""What is compiled into the kernels from other files is part of their cache key."""
+
+import hashlib
+
+from kinarm import collision, episodes, kernels
+from kinarm.chain import Chain
+from kinarm.collision import ContactShapes
+from kinarm.episodes import Control, Episodes, Rules
+
+
+def test_layout_names_what_is_compiled_in():
+    parts = [
+        *(repr(layout._fields) for layout in (Chain, ContactShapes, Rules, Control, Episodes)),
+        repr([getattr(episodes, name) for name in ("RUNNING", "PAUSED", "SUCCESS", "TRUNCATED")]),
+        repr([collision.BETWEEN_CAPSULES, collision.WITH_BOX, collision.WITH_GROUND]),
+    ]
+    digest = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:12]
+    assert digest == kernels.LAYOUT, f'set LAYOUT = "{digest}" in kinarm/kernels.py'
