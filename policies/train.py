@@ -118,6 +118,8 @@ def _beginning(options: argparse.Namespace) -> "tuple[ARSConfig, ARSState | None
     if not checkpoint.exists():
         raise PolicyFileError(f"nothing to resume: there is no {str(checkpoint)!r}")
     config, state = load_checkpoint(checkpoint)
+    if settings.get("recipe") == config.recipe.removesuffix("*"):
+        del settings["recipe"]
     if replace(config, **settings) != config:
         changed = [name for name, value in settings.items() if getattr(config, name) != value]
         raise InvalidInputError(

@@ -33,7 +33,7 @@ def test_json_alone_is_printed(run, policy_folder):
 
 
 def test_table_shows_every_figure(run, monkeypatch, policy_folder):
-    row = {"batch": 512, "actions": "trained", "threads": 2, "judged_per_step": 0.0125}
+    row = {"batch": 512, "actions": "trained", "threads": 2, "judged_share": 0.0125}
     rate = {"median": 1234567.0, "best": 2345678.0}
     document = {
         "policy": "mine",
@@ -46,8 +46,20 @@ def test_table_shows_every_figure(run, monkeypatch, policy_folder):
             "seconds": {"median": 1.52, "best": 1.41},
             "environment_steps": 2_300_000,
         },
+        "evaluation": {"seconds": 4.32, "peak_memory_mb": 321.0},
     }
     monkeypatch.setattr(bench, "measure", lambda *_: document)
     answer = run("kinarm-bench")
-    for figure in ("1,234,567", "2,345,678", "400,001", "20,001", "5,001", "247 x", "1.25", "1.52"):
+    for figure in (
+        "1,234,567",
+        "2,345,678",
+        "400,001",
+        "20,001",
+        "5,001",
+        "247 x",
+        "1.250 %",
+        "1.52",
+        "4.3 s",
+        "321 MB",
+    ):
         assert figure in answer.out, figure

@@ -108,7 +108,7 @@ def test_every_setting_reaches_the_training(run, tmp_path):
     assert run("kinarm-train", "ars", "--recipe", "brs", *options, "--out", out).status == 0
     made = Policy.load(out).provenance
     assert {name: made.config[name] for name in settings} == settings
-    assert (made.recipe, made.task, made.arm, made.seed) == ("brs", "both", "paper_flange", 7)
+    assert (made.recipe, made.task, made.arm, made.seed) == ("brs*", "both", "paper_flange", 7)
     assert (made.config["normalize"], made.config["scale_by_deviation"]) == (False, False)
 
 
@@ -152,7 +152,7 @@ def test_naming_the_same_settings_again_is_fine(run, tmp_path):
     stop_after(2, ars_recipe("tuned", iterations=3, seed=5), tmp_path / "p.checkpoint.npz")
     arguments = ("--recipe", "tuned", "--seed", 5, "--iterations", 3, "--resume")
     assert run("kinarm-train", "ars", "--out", tmp_path / "p.npz", *arguments).status == 0
-    assert Policy.load(tmp_path / "p.npz").provenance.recipe == "tuned"
+    assert Policy.load(tmp_path / "p.npz").provenance.recipe == "tuned*"
 
 
 @pytest.mark.parametrize(

@@ -54,8 +54,8 @@ def test_rollouts_are_measured_in_every_combination(document):
 
 
 def test_share_of_judged_configurations_is_a_share_of_four_a_step(document):
-    assert all(0 <= row["judged_per_step"] <= 4 for row in document["rollouts"])
-    assert any(row["judged_per_step"] > 0 for row in document["rollouts"])
+    assert all(0 <= row["judged_share"] <= 1 for row in document["rollouts"])
+    assert any(row["judged_share"] > 0 for row in document["rollouts"])
 
 
 def test_training_of_table_1_is_measured(document):

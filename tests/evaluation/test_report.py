@@ -149,7 +149,7 @@ def test_table_shows_the_figures_of_the_document(document):
     assert row["mean m"] == f"{pooled['final_distance']['mean']:.3f}"
     assert row["contact %"] == f"{100 * pooled['collision']['rate']:.1f}"
     worst, best = (100 * pooled["spread"]["success"][end] for end in ("min", "max"))
-    assert row["over seeds"] == f"3: {worst:.1f}..{best:.1f}"
+    assert row["seeds: range %"] == f"3: {worst:.1f}..{best:.1f}"
 
 
 def test_table_is_sorted_by_success(document):

@@ -258,7 +258,7 @@ class TestErrors:
     @pytest.mark.parametrize("action", [np.zeros(6), np.zeros((1, 5)), 0.0, [np.nan] * 5])
     def test_bad_action(self, env, action):
         env.reset(seed=0)
-        with pytest.raises(InvalidInputError, match="actions must"):
+        with pytest.raises(InvalidInputError, match="action must"):
             env.step(action)
 
     def test_bad_action_changes_nothing(self, env):
@@ -273,8 +273,8 @@ class TestErrors:
         ("options", "message"),
         [
             ({"starts": HOME}, "unknown reset options.*'starts'.*start, goal"),
-            ({"start": np.zeros(5)}, "starts must have shape"),
-            ({"goal": [0, 0, np.nan]}, "goals must be finite"),
+            ({"start": np.zeros(5)}, "start must have shape"),
+            ({"goal": [0, 0, np.nan]}, "goal must be finite"),
             ({"start": np.full(6, 9.0)}, "outside the limits"),
         ],
     )

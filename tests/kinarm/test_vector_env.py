@@ -213,7 +213,7 @@ class TestErrors:
     @pytest.mark.parametrize(
         ("settings", "message"),
         [
-            ({"num_envs": 0}, "num_envs must be at least 1"),
+            ({"num_envs": 0}, "num_envs must be a whole number of at least 1"),
             ({"autoreset_mode": "Later"}, "autoreset_mode must be one of.*NextStep.*'Later'"),
             ({"render_mode": "human"}, "render_mode must be None"),
         ],
