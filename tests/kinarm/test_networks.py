@@ -1,9 +1,12 @@
 """Batches of networks."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from kinarm.errors import InvalidInputError
+from kinarm.kernels import dense
 from kinarm.networks import CompiledPolicy, Networks
 
 
@@ -64,3 +67,20 @@ def test_compiled_deep_network_equals_numpy(simulator):
     )
     assert first.sum() > 50
     np.testing.assert_allclose(rollouts.paths[first, 1, :5], expected[first], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("n_actions", [1, 4, 6])
+@pytest.mark.parametrize("width", [3, 15, 16, 40])
+def test_layers_of_any_width_are_evaluated(n_actions, width):
+    """Narrow and wide layers take different ways through the kernel."""
+    rng = np.random.default_rng(width)
+    widths = [9, width, width + 1, n_actions]
+    parts = [rng.normal(size=(i + 1, o)) / 3 for i, o in pairwise(widths)]
+    x = rng.normal(size=9)
+    expected = x
+    for number, part in enumerate(parts):
+        expected = (np.tanh(expected) if number else expected) @ part[:-1] + part[-1]
+    action, hidden = np.empty(n_actions), np.empty((2, width + 1))
+    weights = np.concatenate([part.reshape(-1) for part in parts])[None]
+    dense(np.array(widths), weights, 0, x[None], 0, hidden, action)
+    np.testing.assert_allclose(action, np.clip(expected, -1, 1), rtol=0, atol=1e-12)

@@ -421,3 +421,11 @@ class TestConfig:
         assert_same_policy(policy, loaded)
         assert loaded.provenance == policy.provenance
         np.testing.assert_array_equal(policy.networks().weights, loaded.networks().weights)
+
+
+def test_seeds_from_numpy_can_be_written(tmp_path):
+    config = ARSConfig(seed=np.int64(3), iterations=np.int32(1), directions=2, top_directions=1)
+    assert type(config.seed) is int
+    policy = train_ars(config).policy
+    policy.save(tmp_path / "p.npz")
+    assert Policy.load(tmp_path / "p.npz").provenance.seed == 3

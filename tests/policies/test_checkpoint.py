@@ -177,3 +177,16 @@ def test_state_that_does_not_fit_is_refused_before_training(saved, entries):
     spoil(saved, **entries)
     with pytest.raises((InvalidInputError, PolicyFileError)):
         resume(saved)
+
+
+def test_an_arm_that_changed_since_is_refused(tmp_path, write_robot, make_joint):
+    path = write_robot([make_joint(), make_joint(axis="0 1 0")])
+    config = replace(TINY, arm=str(path))
+    states = []
+    train_ars(replace(config, iterations=1), on_iteration=states.append)
+    save_checkpoint(tmp_path / "c.npz", config, states[0])
+    assert load_checkpoint(tmp_path / "c.npz")[0] == config
+    slower = path.read_text().replace('velocity="3"', 'velocity="2"')
+    path.write_text(slower)
+    with pytest.raises(PolicyFileError, match="has changed since"):
+        load_checkpoint(tmp_path / "c.npz")

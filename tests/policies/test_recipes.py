@@ -55,3 +55,16 @@ def test_unknown_setting_is_refused():
 def test_bad_setting_is_refused():
     with pytest.raises(InvalidInputError, match="directions"):
         ars_recipe("paper", directions=0)
+
+
+def test_a_changed_recipe_says_so():
+    assert ars_recipe("tuned", task="left", seed=3, arm="paper_flange").recipe == "tuned"
+    assert ars_recipe("tuned", noise=0.5).recipe == "tuned*"
+    assert ars_recipe("tuned", noise=0.5, recipe="mine").recipe == "mine"
+    assert ars_recipe("tuned", noise=ARS_RECIPES["tuned"].noise).recipe == "tuned"
+
+
+def test_tuned_adapts_to_two_benches():
+    assert ars_recipe("tuned", task="both").collision_penalty == -1
+    assert ars_recipe("tuned", task="right").collision_penalty == -2
+    assert ars_recipe("tuned", task="both", collision_penalty=-3.0).collision_penalty == -3
