@@ -1,0 +1,27 @@
+"""Compiled rollouts: kinematics, observation, policy, step and proof of freedom from contact."""
+
+from kinarm.kernels.distance import box_gap, clearance, segment_gap
+from kinarm.kernels.kinematics import POSE, forward_kinematics, observe, to_world
+from kinarm.kernels.network import dense
+from kinarm.kernels.proof import MARGIN, SUBSTEPS, is_apart, prove_step, spend_slack
+from kinarm.kernels.rollout import LAYOUT, advance, begin, screen
+
+__all__ = [
+    "LAYOUT",
+    "MARGIN",
+    "POSE",
+    "SUBSTEPS",
+    "advance",
+    "begin",
+    "box_gap",
+    "clearance",
+    "dense",
+    "forward_kinematics",
+    "is_apart",
+    "observe",
+    "prove_step",
+    "screen",
+    "segment_gap",
+    "spend_slack",
+    "to_world",
+]

@@ -1,0 +1,23 @@
+"""How kernels are compiled: without the GIL and without reordering of floating-point operations."""
+
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+from numba import njit
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def kernel(function: Function) -> Function:
+    """Compile a function that Python calls, into the disk cache where there can be one."""
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+    try:
+        return cast("Function", njit(cache=True, **options)(function))
+    except RuntimeError:
+        return cast("Function", njit(**options)(function))
+
+
+def inlined(function: Function) -> Function:
+    """Compile a helper that allocates nothing: several times faster without reference counts."""
+    options: dict[str, Any] = {"error_model": "numpy", "forceinline": True, "_nrt": False}
+    return cast("Function", njit(**options)(function))

@@ -1,0 +1,122 @@
+"""Forward kinematics and observation."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.kernels.compiling import inlined
+
+POSE = 16
+"""Entries of a frame's pose: quaternion w x y z, rotation matrix by rows, position."""
+
+
+@inlined
+def forward_kinematics(
+    prismatic: NDArray[np.bool_],
+    translation: NDArray[np.float64],
+    rotation: NDArray[np.float64],
+    axis: NDArray[np.float64],
+    configurations: NDArray[np.float64],
+    row: int,
+    poses: NDArray[np.float64],
+) -> None:
+    """Fill in the world poses of all joint frames.
+
+    Parameters
+    ----------
+    prismatic, translation, rotation, axis : ndarray
+        See `Chain`.
+    configurations : ndarray, shape (n, n_axes)
+        Axis positions [rad or m].
+    row : int
+        Which of them.
+    poses : ndarray, shape (n_axes + 1, POSE)
+        Row 0 is the world, row k the frame of the k-th joint. Quaternions are composed along the
+        chain, so they are continuous in the axis positions.
+    """
+    for i in range(POSE):
+        poses[0, i] = 1.0 if i == 0 or i == 4 or i == 8 or i == 12 else 0.0
+    for k in range(configurations.shape[1]):
+        c = k + 1
+        tx, ty, tz = translation[k, 0], translation[k, 1], translation[k, 2]
+        poses[c, 13] = poses[k, 13] + (poses[k, 4] * tx + poses[k, 5] * ty + poses[k, 6] * tz)
+        poses[c, 14] = poses[k, 14] + (poses[k, 7] * tx + poses[k, 8] * ty + poses[k, 9] * tz)
+        poses[c, 15] = poses[k, 15] + (poses[k, 10] * tx + poses[k, 11] * ty + poses[k, 12] * tz)
+        fw, fx, fy, fz = rotation[k, 0], rotation[k, 1], rotation[k, 2], rotation[k, 3]
+        ax, ay, az = axis[k, 0], axis[k, 1], axis[k, 2]
+        sine, cosine = 0.0, 1.0
+        if not prismatic[k] and configurations[row, k] != 0.0:
+            half = 0.5 * configurations[row, k]
+            sine, cosine = math.sin(half), math.cos(half)
+        ux, uy, uz = sine * ax, sine * ay, sine * az
+        if fw == 1.0:
+            jw, jx, jy, jz = cosine, ux, uy, uz
+        else:
+            jw = fw * cosine - fx * ux - fy * uy - fz * uz
+            jx = fw * ux + fx * cosine + fy * uz - fz * uy
+            jy = fw * uy - fx * uz + fy * cosine + fz * ux
+            jz = fw * uz + fx * uy - fy * ux + fz * cosine
+        pw, px, py, pz = poses[k, 0], poses[k, 1], poses[k, 2], poses[k, 3]
+        w = pw * jw - px * jx - py * jy - pz * jz
+        x = pw * jx + px * jw + py * jz - pz * jy
+        y = pw * jy - px * jz + py * jw + pz * jx
+        z = pw * jz + px * jy - py * jx + pz * jw
+        poses[c, 0], poses[c, 1], poses[c, 2], poses[c, 3] = w, x, y, z
+        poses[c, 4] = 1.0 - 2.0 * (y * y + z * z)
+        poses[c, 5] = 2.0 * (x * y - w * z)
+        poses[c, 6] = 2.0 * (x * z + w * y)
+        poses[c, 7] = 2.0 * (x * y + w * z)
+        poses[c, 8] = 1.0 - 2.0 * (x * x + z * z)
+        poses[c, 9] = 2.0 * (y * z - w * x)
+        poses[c, 10] = 2.0 * (x * z - w * y)
+        poses[c, 11] = 2.0 * (y * z + w * x)
+        poses[c, 12] = 1.0 - 2.0 * (x * x + y * y)
+        if prismatic[k]:
+            poses[c, 13] += configurations[row, k] * (
+                poses[c, 4] * ax + poses[c, 5] * ay + poses[c, 6] * az
+            )
+            poses[c, 14] += configurations[row, k] * (
+                poses[c, 7] * ax + poses[c, 8] * ay + poses[c, 9] * az
+            )
+            poses[c, 15] += configurations[row, k] * (
+                poses[c, 10] * ax + poses[c, 11] * ay + poses[c, 12] * az
+            )
+
+
+@inlined
+def to_world(
+    poses: NDArray[np.float64], frame: int, x: float, y: float, z: float
+) -> tuple[float, float, float]:
+    """Map a point of a joint frame to the world."""
+    return (
+        poses[frame, 13] + (poses[frame, 4] * x + poses[frame, 5] * y + poses[frame, 6] * z),
+        poses[frame, 14] + (poses[frame, 7] * x + poses[frame, 8] * y + poses[frame, 9] * z),
+        poses[frame, 15] + (poses[frame, 10] * x + poses[frame, 11] * y + poses[frame, 12] * z),
+    )
+
+
+@inlined
+def observe(
+    tool: NDArray[np.float64],
+    poses: NDArray[np.float64],
+    goals: NDArray[np.float64],
+    row: int,
+    observations: NDArray[np.float64],
+) -> float:
+    """Fill in a row of the observations and return the distance from the tool to the goal [m].
+
+    The order is goal (3), goal - tool (3), quaternions (4 n_axes), positions (3 n_axes).
+    """
+    n_axes = poses.shape[0] - 1
+    x, y, z = to_world(poses, n_axes, tool[0], tool[1], tool[2])
+    gx, gy, gz = goals[row, 0], goals[row, 1], goals[row, 2]
+    dx, dy, dz = gx - x, gy - y, gz - z
+    observations[row, 0], observations[row, 1], observations[row, 2] = gx, gy, gz
+    observations[row, 3], observations[row, 4], observations[row, 5] = dx, dy, dz
+    for k in range(n_axes):
+        for i in range(4):
+            observations[row, 6 + 4 * k + i] = poses[k + 1, i]
+        for i in range(3):
+            observations[row, 6 + 4 * n_axes + 3 * k + i] = poses[k + 1, 13 + i]
+    return math.sqrt(dx * dx + dy * dy + dz * dz)

@@ -1,0 +1,137 @@
+"""Proof that a step is free of contact.
+
+A step moves the arm from q to q' and is tested at the four configurations q + k/4 (q' - q). Each
+tested pair of bodies carries a *slack*: a certified lower bound of its distance at q. Slack that
+outlasts the largest possible motion of a step proves it; else the pair's distance at q' is bounded
+anew, and only if that is not enough, at the configurations between.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.chain import Chain
+from kinarm.collision import ContactShapes
+from kinarm.kernels.compiling import inlined
+from kinarm.kernels.distance import clearance
+from kinarm.kernels.kinematics import forward_kinematics
+
+SUBSTEPS = 4
+"""Configurations at which the motion of a step is tested."""
+
+MARGIN = 1e-6
+"""Distance below which freedom is not claimed [m]: the tolerance of Coal's iterations."""
+
+
+@inlined
+def is_apart(bound: float) -> bool:
+    """Whether a lower bound of a distance proves freedom from contact; NaN proves nothing."""
+    return bound > MARGIN
+
+
+@inlined
+def spend_slack(
+    row: int,
+    travel: NDArray[np.float64],
+    q: NDArray[np.float64],
+    target: NDArray[np.float64],
+    slack: NDArray[np.float64],
+    motion: NDArray[np.float64],
+) -> bool:
+    """Reduce an episode's slack by the motion of a step; return whether some pair has none left.
+
+    Parameters
+    ----------
+    row : int
+        Which episode.
+    travel : ndarray, shape (n_actuated, n_pairs)
+        See `ContactShapes`.
+    q, target : ndarray, shape (n, n_axes)
+        Ends of the step [rad or m].
+    slack : ndarray, shape (n, n_pairs)
+        Lower bounds of the distances at ``q``; on return, at ``target`` [m].
+    motion : ndarray, shape (n_pairs,)
+        Output: bounds of the relative motion of the pairs [m].
+    """
+    n_pairs = slack.shape[1]
+    for pair in range(n_pairs):
+        motion[pair] = 0.0
+    for axis in range(travel.shape[0]):
+        turn = abs(target[row, axis] - q[row, axis])
+        for pair in range(n_pairs):
+            motion[pair] += travel[axis, pair] * turn
+    least = np.inf
+    for pair in range(n_pairs):
+        slack[row, pair] -= motion[pair]
+        least = min(least, slack[row, pair])
+    return not is_apart(least)
+
+
+@inlined
+def prove_step(
+    row: int,
+    chain: Chain,
+    shapes: ContactShapes,
+    q: NDArray[np.float64],
+    target: NDArray[np.float64],
+    slack: NDArray[np.float64],
+    motion: NDArray[np.float64],
+    poses: NDArray[np.float64],
+    between: NDArray[np.float64],
+    middle: NDArray[np.float64],
+    unproven: NDArray[np.int64],
+) -> int:
+    """Prove the tested configurations of a step free where the slack ran out, and renew it.
+
+    Parameters
+    ----------
+    row : int
+        Which episode.
+    chain, shapes
+        The arm and its contact pairs.
+    q, target, slack, motion : ndarray
+        As `spend_slack` took and left them; on return, ``slack`` is renewed.
+    poses : ndarray, shape (n_axes + 1, POSE)
+        Forward kinematics at ``target``.
+    between, middle, unproven : ndarray, shape (n_axes + 1, POSE), (1, n_axes) and (n_pairs,)
+        Work space.
+
+    Returns
+    -------
+    int
+        Bit k - 1 is set if configuration k could not be proven free.
+    """
+    prismatic, translation, rotation, axes = chain[:4]
+    link, capsules, boxes, pairs = shapes[:4]
+    n_pairs, n_axes = slack.shape[1], q.shape[1]
+    doubt, open_between = 0, 0
+    for pair in range(n_pairs):
+        unproven[pair] = 0
+        if is_apart(slack[row, pair]):
+            continue
+        before = slack[row, pair] + motion[pair]
+        after = clearance(pair, pairs, capsules, link, boxes, poses)
+        slack[row, pair] = after
+        if not is_apart(after):
+            doubt |= 1 << (SUBSTEPS - 1)
+        if is_apart(after - motion[pair]):
+            continue
+        for k in range(1, SUBSTEPS):
+            share = k / SUBSTEPS
+            left = before - share * motion[pair]
+            right = after - (1.0 - share) * motion[pair]
+            if not is_apart(max(left, right)):
+                unproven[pair] |= 1 << (k - 1)
+        open_between |= unproven[pair]
+    for k in range(1, SUBSTEPS):
+        bit = 1 << (k - 1)
+        if open_between & bit:
+            for axis in range(n_axes):
+                middle[0, axis] = q[row, axis] + k / SUBSTEPS * (target[row, axis] - q[row, axis])
+            forward_kinematics(prismatic, translation, rotation, axes, middle, 0, between)
+            for pair in range(n_pairs):
+                if unproven[pair] & bit and not is_apart(
+                    clearance(pair, pairs, capsules, link, boxes, between)
+                ):
+                    doubt |= bit
+                    break
+    return doubt

@@ -1,0 +1,171 @@
+"""The kernels that Python calls: whole episodes, their beginning, and single configurations.
+
+What an episode's numbers depend on is nothing but its inputs. A step that is not proven free of
+contact pauses the episode until Coal has judged it.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.chain import Chain
+from kinarm.collision import ContactShapes
+from kinarm.episodes import PAUSED, RUNNING, SUCCESS, TRUNCATED, Control, Episodes, Rules
+from kinarm.kernels.compiling import kernel
+from kinarm.kernels.distance import clearance
+from kinarm.kernels.kinematics import POSE, forward_kinematics, observe, to_world
+from kinarm.kernels.network import dense
+from kinarm.kernels.proof import is_apart, prove_step, spend_slack
+
+LAYOUT = "fc023e574219"
+"""Hash of what is compiled in from other files; a test tells when to renew it.
+
+Numba's disk cache notices changes only in this file, so changing this line is what makes it
+compile anew.
+"""
+
+
+@kernel
+def screen(
+    first: int,
+    last: int,
+    chain: Chain,
+    shapes: ContactShapes,
+    configurations: NDArray[np.float64],
+    tools: NDArray[np.float64],
+    proven: NDArray[np.bool_],
+) -> None:
+    """Find the tool points of configurations, and which are proven free of contact.
+
+    Parameters
+    ----------
+    first, last : int
+        Range of rows to work on.
+    chain, shapes
+        The arm and its contact pairs.
+    configurations : ndarray, shape (n, n_axes)
+        Axis positions [rad or m].
+    tools : ndarray, shape (n, 3)
+        Output: tool points [m].
+    proven : ndarray of bool, shape (n,)
+        Output: whether every pair is certified to be apart.
+    """
+    prismatic, translation, rotation, axes, tool = chain[:5]
+    link, capsules, boxes, pairs = shapes[:4]
+    n_axes = configurations.shape[1]
+    poses = np.empty((n_axes + 1, POSE))
+    for i in range(first, last):
+        forward_kinematics(prismatic, translation, rotation, axes, configurations, i, poses)
+        tools[i, 0], tools[i, 1], tools[i, 2] = to_world(poses, n_axes, tool[0], tool[1], tool[2])
+        proven[i] = True
+        for pair in range(pairs.shape[0]):
+            if not is_apart(clearance(pair, pairs, capsules, link, boxes, poses)):
+                proven[i] = False
+                break
+
+
+@kernel
+def begin(
+    first: int,
+    last: int,
+    rows: NDArray[np.int64],
+    chain: Chain,
+    shapes: ContactShapes,
+    episodes: Episodes,
+) -> None:
+    """Start episodes ``rows[first]`` to ``rows[last - 1]`` at their ``q`` and ``goal``.
+
+    An episode whose start is not proven contact-free is left paused.
+    """
+    prismatic, translation, rotation, axes, tool = chain[:5]
+    link, capsules, boxes, pairs = shapes[:4]
+    q, slack, path = episodes.q, episodes.slack, episodes.path
+    poses = np.empty((q.shape[1] + 1, POSE))
+    for index in range(first, last):
+        e = rows[index]
+        forward_kinematics(prismatic, translation, rotation, axes, q, e, poses)
+        distance = observe(tool, poses, episodes.goal, e, episodes.observation)
+        episodes.distance[e] = distance
+        episodes.previous_distance[e] = distance
+        episodes.steps[e] = 0
+        episodes.total[e] = 0.0
+        episodes.cleared[e] = False
+        episodes.status[e] = RUNNING
+        for pair in range(pairs.shape[0]):
+            slack[e, pair] = clearance(pair, pairs, capsules, link, boxes, poses)
+            if not is_apart(slack[e, pair]):
+                episodes.status[e] = PAUSED
+        for axis in range(q.shape[1]):
+            if path.shape[0] > 0:
+                path[e, 0, axis] = q[e, axis]
+
+
+@kernel
+def advance(
+    first: int,
+    last: int,
+    chain: Chain,
+    shapes: ContactShapes,
+    rules: Rules,
+    control: Control,
+    episodes: Episodes,
+) -> None:
+    """Advance the running episodes among ``first`` to ``last - 1``.
+
+    Each goes on until it ends, reaches its ``stop`` or pauses before a step that is not proven
+    free of contact.
+    """
+    prismatic, translation, rotation, axes, tool, lower, upper = chain[:7]
+    layers, weights, policy, actions = control
+    status, steps, stop, q, target, doubt, cleared, slack, goal, observation, distance = episodes[
+        :11
+    ]
+    previous, total, moments, shift, path = episodes[11:]
+    step_limit, travel = rules.step_limit, shapes.travel
+    n_axes, n_actuated, n_observations = q.shape[1], step_limit.shape[0], observation.shape[1]
+    poses, between = np.empty((n_axes + 1, POSE)), np.empty((n_axes + 1, POSE))
+    motion, middle = np.empty(slack.shape[1]), np.empty((1, n_axes))
+    unproven = np.empty(slack.shape[1], dtype=np.int64)
+    widest = 1
+    for layer in range(layers.shape[0]):
+        widest = max(widest, layers[layer])
+    hidden, action = np.empty((2, widest)), np.empty(n_actuated)
+    for e in range(first, last):
+        while status[e] == RUNNING and steps[e] < stop[e]:
+            if not cleared[e]:
+                if layers.shape[0] > 0:
+                    dense(layers, weights, policy[e], observation, e, hidden, action)
+                else:
+                    column = steps[e] if actions.shape[1] > 1 else 0
+                    for axis in range(n_actuated):
+                        action[axis] = min(max(actions[e, column, axis], -1.0), 1.0)
+                if moments.shape[0] > 0:
+                    for i in range(n_observations):
+                        centred = observation[e, i] - shift[i]
+                        moments[e, 0, i] += centred
+                        moments[e, 1, i] += centred * centred
+                for axis in range(n_actuated):
+                    moved = q[e, axis] + action[axis] * step_limit[axis]
+                    target[e, axis] = min(max(moved, lower[axis]), upper[axis])
+            forward_kinematics(prismatic, translation, rotation, axes, target, e, poses)
+            if not cleared[e] and spend_slack(e, travel, q, target, slack, motion):
+                doubt[e] = prove_step(
+                    e, chain, shapes, q, target, slack, motion, poses, between, middle, unproven
+                )
+                if doubt[e] != 0:
+                    status[e] = PAUSED
+                    break
+            cleared[e] = False
+            before = distance[e]
+            after = observe(tool, poses, goal, e, observation)
+            previous[e], distance[e] = before, after
+            steps[e] += 1
+            total[e] += rules.progress * (before - after) + rules.step
+            if after <= rules.tolerance:
+                total[e] += rules.success
+                status[e] = SUCCESS
+            elif steps[e] >= rules.horizon:
+                status[e] = TRUNCATED
+            for axis in range(n_axes):
+                q[e, axis] = target[e, axis]
+                if path.shape[0] > 0:
+                    path[e, steps[e], axis] = q[e, axis]
