@@ -77,18 +77,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _evaluate(options: argparse.Namespace, command: str) -> None:
     """From options to table, document and figures."""
-    evaluations = evaluate_all(options)
+    from rich.console import Console
+
     from kinarm.evaluation.report import evaluation_document, print_table
 
-    document = evaluation_document(evaluations, command)
+    with Console(stderr=True).status("evaluating; the first run compiles"):
+        evaluations = evaluate_all(options)
+        document = evaluation_document(evaluations, command)
     if options.out is not None:
         _write(options.out, document, evaluations)
     if options.json:
         json.dump(document, sys.stdout)
         sys.stdout.write("\n")
         return
-    from rich.console import Console
-
     wide_enough = 200 if options.markdown or not sys.stdout.isatty() else None
     console = Console(width=wide_enough, highlight=False)
     print_table(document, console, markdown=options.markdown)

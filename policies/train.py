@@ -191,14 +191,12 @@ class TrainingProgress:
             TextColumn(f"ars {config.recipe} {config.task} seed {config.seed}"),
             BarColumn(),
             TextColumn("{task.completed:.0f}/{task.total:.0f}"),
-            TextColumn("return {task.fields[mean_return]:+.3f}"),
-            TextColumn("success {task.fields[success]:.0%}"),
-            TextColumn("{task.fields[speed]:.2f} M steps/s"),
+            TextColumn("{task.fields[status]}"),
             TimeRemainingColumn(),
             console=Console(stderr=True),
         )
         self._task = self._progress.add_task(
-            "", total=config.iterations, mean_return=0.0, success=0.0, speed=0.0
+            "", total=config.iterations, status="starting; the first run compiles"
         )
 
     def __enter__(self) -> "TrainingProgress":
@@ -211,12 +209,12 @@ class TrainingProgress:
     def update(self, state: "ARSState") -> None:
         """Show the latest iteration."""
         point = state.curve[-1]
+        speed = point.environment_steps / max(point.wall_time, 1e-9) / 1e6
         self._progress.update(
             self._task,
             completed=state.iteration,
-            mean_return=point.mean_return,
-            success=point.success,
-            speed=point.environment_steps / max(point.wall_time, 1e-9) / 1e6,
+            status=f"return {point.mean_return:+.3f} success {point.success:.0%} "
+            f"{speed:.2f} M steps/s",
         )
 
 
