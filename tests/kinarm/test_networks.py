@@ -80,7 +80,7 @@ def test_layers_of_any_width_are_evaluated(n_actions, width):
     expected = x
     for number, part in enumerate(parts):
         expected = (np.tanh(expected) if number else expected) @ part[:-1] + part[-1]
-    action, hidden = np.empty(n_actions), np.empty((2, width + 1))
+    action, hidden = np.empty(n_actions), np.empty((2, max(widths)))
     weights = np.concatenate([part.reshape(-1) for part in parts])[None]
     dense(np.array(widths), weights, 0, x[None], 0, hidden, action)
     np.testing.assert_allclose(action, np.clip(expected, -1, 1), rtol=0, atol=1e-12)
