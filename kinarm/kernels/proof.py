@@ -78,7 +78,7 @@ def prove_step(
     poses: NDArray[np.float64],
     between: NDArray[np.float64],
     middle: NDArray[np.float64],
-    unproven: NDArray[np.int64],
+    listed: NDArray[np.int64],
 ) -> int:
     """Prove the tested configurations of a step free where the slack ran out, and renew it.
 
@@ -92,7 +92,7 @@ def prove_step(
         As `spend_slack` took and left them; on return, ``slack`` is renewed.
     poses : ndarray, shape (n_axes + 1, POSE)
         Forward kinematics at ``target``.
-    between, middle, unproven : ndarray, shape (n_axes + 1, POSE), (1, n_axes) and (n_pairs,)
+    between, middle, listed : ndarray, shape (n_axes + 1, POSE), (1, n_axes) and (2, n_pairs + 1)
         Work space.
 
     Returns
@@ -103,34 +103,35 @@ def prove_step(
     prismatic, translation, rotation, axes = chain[:4]
     link, capsules, boxes, pairs = shapes[:4]
     n_pairs, n_axes = slack.shape[1], q.shape[1]
-    doubt, open_between = 0, 0
+    doubt, n_spent, n_open, open_between = 0, 0, 0, 0
     for pair in range(n_pairs):
-        unproven[pair] = 0
-        if is_apart(slack[row, pair]):
-            continue
+        listed[0, n_spent] = pair
+        n_spent += 0 if is_apart(slack[row, pair]) else 1
+    for index in range(n_spent):
+        pair = listed[0, index]
         before = slack[row, pair] + motion[pair]
         after = clearance(pair, pairs, capsules, link, boxes, poses)
         slack[row, pair] = after
         if not is_apart(after):
             doubt |= 1 << (SUBSTEPS - 1)
-        if is_apart(after - motion[pair]):
-            continue
+        unproven = 0
         for k in range(1, SUBSTEPS):
             share = k / SUBSTEPS
             left = before - share * motion[pair]
             right = after - (1.0 - share) * motion[pair]
-            if not is_apart(max(left, right)):
-                unproven[pair] |= 1 << (k - 1)
-        open_between |= unproven[pair]
+            unproven |= 0 if is_apart(max(left, right)) else 1 << (k - 1)
+        listed[0, n_open], listed[1, n_open] = pair, unproven
+        n_open += 0 if unproven == 0 else 1
+        open_between |= unproven
     for k in range(1, SUBSTEPS):
         bit = 1 << (k - 1)
         if open_between & bit:
             for axis in range(n_axes):
                 middle[0, axis] = q[row, axis] + k / SUBSTEPS * (target[row, axis] - q[row, axis])
             forward_kinematics(prismatic, translation, rotation, axes, middle, 0, between)
-            for pair in range(n_pairs):
-                if unproven[pair] & bit and not is_apart(
-                    clearance(pair, pairs, capsules, link, boxes, between)
+            for index in range(n_open):
+                if listed[1, index] & bit and not is_apart(
+                    clearance(listed[0, index], pairs, capsules, link, boxes, between)
                 ):
                     doubt |= bit
                     break

@@ -16,7 +16,7 @@ from kinarm.kernels.kinematics import POSE, forward_kinematics, observe, to_worl
 from kinarm.kernels.network import dense
 from kinarm.kernels.proof import is_apart, prove_step, spend_slack
 
-LAYOUT = "fc023e574219"
+LAYOUT = "015cf16c3e92"
 """Hash of what is compiled in from other files; a test tells when to renew it.
 
 Numba's disk cache notices changes only in this file, so changing this line is what makes it
@@ -124,7 +124,7 @@ def advance(
     n_axes, n_actuated, n_observations = q.shape[1], step_limit.shape[0], observation.shape[1]
     poses, between = np.empty((n_axes + 1, POSE)), np.empty((n_axes + 1, POSE))
     motion, middle = np.empty(slack.shape[1]), np.empty((1, n_axes))
-    unproven = np.empty(slack.shape[1], dtype=np.int64)
+    listed = np.empty((2, slack.shape[1] + 1), dtype=np.int64)
     widest = 1
     for layer in range(layers.shape[0]):
         widest = max(widest, layers[layer])
@@ -149,7 +149,7 @@ def advance(
             forward_kinematics(prismatic, translation, rotation, axes, target, e, poses)
             if not cleared[e] and spend_slack(e, travel, q, target, slack, motion):
                 doubt[e] = prove_step(
-                    e, chain, shapes, q, target, slack, motion, poses, between, middle, unproven
+                    e, chain, shapes, q, target, slack, motion, poses, between, middle, listed
                 )
                 if doubt[e] != 0:
                     status[e] = PAUSED
