@@ -22,9 +22,6 @@ from kinarm.validation import finite_array, whole_number
 TIME_STEP = 0.02
 """Duration of a step [s]."""
 
-BEGIN_WORK = 2
-"""Time to begin an episode, in steps."""
-
 PolicyFunction = Callable[[NDArray[np.float64]], ArrayLike]
 """Maps observations, shape (n, n_observations), to actions, shape (n, n_actuated)."""
 
@@ -325,7 +322,7 @@ class Simulator:
         """
         shapes = self.contact_model.shapes
         arrays = (rows, self.arm.chain, shapes, episodes)
-        run_rows(kernels.begin, len(rows), BEGIN_WORK * len(rows), self.threads, *arrays)
+        run_rows(kernels.begin, len(rows), len(rows), self.threads, *arrays)
         paused = rows[episodes.status[rows] == PAUSED]
         touching = self.contact_model.in_contact(episodes.q[paused])
         if touching.any():
