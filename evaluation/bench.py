@@ -144,7 +144,7 @@ def measure_rollouts(
         actions = rng.uniform(-1, 1, (batch, simulator.task.horizon, simulator.n_actions))
         runs: dict[str, Callable[[], int]] = {
             "random": lambda a=actions, s=starts, g=goals: int(  # type: ignore[misc]
-                simulator.replay(a, s, g).steps.sum()
+                simulator.rollout_actions(a, s, g).steps.sum()
             ),
             "trained": lambda s=starts, g=goals: int(  # type: ignore[misc]
                 simulator.rollout(policy, s, g).steps.sum()

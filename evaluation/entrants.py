@@ -94,7 +94,7 @@ def _run_random(trials: TrialSet) -> Rollouts:
         trial_generator(trials.seed, trial, stream=1).uniform(-1, 1, shape)
         for trial in range(len(trials))
     ]
-    return simulator.replay(np.array(actions), trials.starts, trials.goals)
+    return simulator.rollout_actions(np.array(actions), trials.starts, trials.goals)
 
 
 BASELINES = {

@@ -264,7 +264,7 @@ class Simulator:
             self._advance(control, episodes, len(q) * self.task.horizon)
         return Rollouts.from_episodes(q, episodes)
 
-    def replay(
+    def rollout_actions(
         self, actions: ArrayLike, starts: ArrayLike, goals: ArrayLike, *, record: bool = False
     ) -> Rollouts:
         """Run whole episodes on given actions.

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 from kinarm._exports import lazy_exports
 
 if TYPE_CHECKING:
-    from kinarm.policies.ars import ARSConfig, ARSResult, ARSState, train_ars
+    from kinarm.policies.ars import ARSResult, ARSState, train_ars
+    from kinarm.policies.ars_config import ARSConfig
     from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
     from kinarm.policies.library import load_policy, policy_names
     from kinarm.policies.normalizer import Normalizer
@@ -38,7 +39,8 @@ def __dir__() -> list[str]:
 __getattr__ = lazy_exports(
     __name__,
     {
-        "ars": ("ARSConfig", "ARSResult", "ARSState", "train_ars"),
+        "ars": ("ARSResult", "ARSState", "train_ars"),
+        "ars_config": ("ARSConfig",),
         "checkpoint": ("load_checkpoint", "save_checkpoint"),
         "library": ("load_policy", "policy_names"),
         "normalizer": ("Normalizer",),

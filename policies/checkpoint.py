@@ -10,7 +10,8 @@ import numpy as np
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.files import write_atomically
-from kinarm.policies.ars import ARSConfig, ARSState, CurvePoint
+from kinarm.policies.ars import ARSState, CurvePoint
+from kinarm.policies.ars_config import ARSConfig
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.policy import CORRUPT
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 from kinarm.errors import UnknownNameError
-from kinarm.policies.ars import ARSConfig
+from kinarm.policies.ars_config import ARSConfig
 
 TUNED = ARSConfig(
     recipe="tuned",

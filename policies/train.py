@@ -15,7 +15,8 @@ from kinarm.errors import InvalidInputError, KinarmError, PolicyFileError
 from kinarm.files import check_folder, write_atomically
 
 if TYPE_CHECKING:
-    from kinarm.policies.ars import ARSConfig, ARSResult, ARSState, CurvePoint
+    from kinarm.policies.ars import ARSResult, ARSState, CurvePoint
+    from kinarm.policies.ars_config import ARSConfig
 
 PROG = "kinarm-train"
 CHECKPOINT_SECONDS = 5.0

@@ -412,7 +412,7 @@ class TestStepProof:
         rng = np.random.default_rng(15)
         starts, goals = any_simulator.sample(rng, 600)
         actions = np.repeat(rng.uniform(-1, 1, (600, 8, any_simulator.n_actions)), 8, axis=1)
-        rollouts = any_simulator.replay(actions, starts, goals, record=True)
+        rollouts = any_simulator.rollout_actions(actions, starts, goals, record=True)
         judge = any_simulator.contact_model.in_contact
         moves = rollouts.steps - rollouts.collision
         for path, count in zip(rollouts.paths, moves, strict=True):

@@ -99,7 +99,7 @@ def compare_actions(simulator, seed, count, held=6):
     starts, goals = simulator.sample(rng, count)
     blocks = rng.uniform(-1.5, 1.5, (count, -(-horizon // held), simulator.n_actions))
     actions = np.repeat(blocks, held, axis=1)[:, :horizon]
-    rollouts = simulator.replay(actions, starts, goals, record=True)
+    rollouts = simulator.rollout_actions(actions, starts, goals, record=True)
     reference = ReferenceSimulator(simulator)
     for i in range(count):
         episode = reference.rollout(scripted(actions[i]), starts[i], goals[i])

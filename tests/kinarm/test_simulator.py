@@ -113,7 +113,7 @@ class TestAgreement:
     def test_step_loop_equals_replay(self, simulator, scenarios):
         starts, goals = (part[:200] for part in scenarios)
         actions = np.random.default_rng(8).uniform(-1.5, 1.5, (200, 64, 5))
-        replayed = simulator.replay(actions, starts, goals, record=True)
+        replayed = simulator.rollout_actions(actions, starts, goals, record=True)
         episodes = simulator.reset(starts, goals, record=True)
         total, terminated = np.zeros(200), np.zeros(200, dtype=bool)
         for step in range(64):
@@ -261,7 +261,7 @@ class TestStep:
     def test_held_axis_stays_where_it_starts(self, simulator):
         start = HOME.copy()
         start[0, 5] = 1.25
-        rollouts = simulator.replay(np.ones((1, 64, 5)), start, FAR_GOAL, record=True)
+        rollouts = simulator.rollout_actions(np.ones((1, 64, 5)), start, FAR_GOAL, record=True)
         np.testing.assert_array_equal(rollouts.paths[0, : rollouts.steps[0] + 1, 5], 1.25)
 
     def test_horizon_truncates(self, simulator):
@@ -437,7 +437,7 @@ class TestRefusals:
         with pytest.raises(InvalidInputError, match=message):
             simulator.reset(starts, goals)
         with pytest.raises(InvalidInputError, match=message):
-            simulator.replay(np.zeros((len(starts), 64, 5)), starts, goals)
+            simulator.rollout_actions(np.zeros((len(starts), 64, 5)), starts, goals)
 
     @pytest.mark.parametrize("bad", [np.nan, np.inf])
     def test_actions_that_are_not_finite(self, simulator, bad):
@@ -446,7 +446,7 @@ class TestRefusals:
         with pytest.raises(InvalidInputError, match="actions must be finite"):
             simulator.step(simulator.reset(HOME, FAR_GOAL), actions)
         with pytest.raises(InvalidInputError, match="actions must be finite"):
-            simulator.replay(np.tile(actions, (1, 64, 1)), HOME, FAR_GOAL)
+            simulator.rollout_actions(np.tile(actions, (1, 64, 1)), HOME, FAR_GOAL)
         with pytest.raises(InvalidInputError, match="actions must be finite"):
             simulator.rollout(lambda x: actions, HOME, FAR_GOAL)
 
@@ -457,7 +457,7 @@ class TestRefusals:
 
     def test_action_table_of_the_wrong_length(self, simulator):
         with pytest.raises(InvalidInputError, match=r"actions must have shape \(1, 64, 5\)"):
-            simulator.replay(np.zeros((1, 63, 5)), HOME, FAR_GOAL)
+            simulator.rollout_actions(np.zeros((1, 63, 5)), HOME, FAR_GOAL)
 
     @pytest.mark.parametrize("index", [[0, 3], [-1, 0], [0], [[0, 1]], [0.5, 1.0], ["a", "b"]])
     def test_bad_policy_index(self, simulator, index):
@@ -516,9 +516,9 @@ class TestRefusals:
 
 def test_coal_is_asked_only_where_freedom_is_not_proven(simulator):
     idle = Simulator(simulator.arm, "right", threads=1)
-    idle.replay(np.zeros((1, 64, 5)), HOME, FAR_GOAL)
+    idle.rollout_actions(np.zeros((1, 64, 5)), HOME, FAR_GOAL)
     assert idle.judged == 0
-    idle.replay(np.tile([0.0, 1, 0, 0, 0], (1, 64, 1)), HOME, FAR_GOAL)
+    idle.rollout_actions(np.tile([0.0, 1, 0, 0, 0], (1, 64, 1)), HOME, FAR_GOAL)
     assert 0 < idle.judged < 4 * 64
 
 

@@ -23,7 +23,7 @@ from kinarm.policies import policy_names
 from kinarm.simulator import Simulator
 simulator = Simulator(task="both", threads=1)
 starts, goals = simulator.sample(np.random.default_rng(0), 3)
-rollouts = simulator.replay(np.ones((3, 64, 5)), starts, goals)
+rollouts = simulator.rollout_actions(np.ones((3, 64, 5)), starts, goals)
 json.dump({
     "files": [m.__file__ for m in (kinarm, kinarm.data, kinarm.evaluation, kinarm.policies)],
     "path": list(kinarm.__path__),
@@ -160,7 +160,7 @@ def test_it_simulates_as_the_clone_does(used):
 
     simulator = Simulator(task="both")
     starts, goals = simulator.sample(np.random.default_rng(0), 3)
-    rollouts = simulator.replay(np.ones((3, 64, 5)), starts, goals)
+    rollouts = simulator.rollout_actions(np.ones((3, 64, 5)), starts, goals)
     assert used["steps"] == rollouts.steps.tolist()
     assert used["distance"] == rollouts.distance.tolist()
 
