@@ -53,6 +53,7 @@ always_use_bars_union = True
 nitpick_ignore_regex = [
     (r"py:.*", r"(numpy|pinocchio|gymnasium|pathlib|collections|typing)\..*"),
     (r"py:data", r"Ellipsis"),
+    (r"py:class", r"Figure"),  # matplotlib, which is imported when first used
 ]
 
 sphinx_gallery_conf = {
