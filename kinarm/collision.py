@@ -24,6 +24,7 @@ BETWEEN_CAPSULES, WITH_BOX, WITH_GROUND = range(3)
 """Kinds of pairs in `ContactShapes.pairs`."""
 
 MOUNT_SAMPLES = 721
+"""Positions of the first axis at which the mounting is tested."""
 
 
 class ContactShapes(NamedTuple):
@@ -236,8 +237,8 @@ def _touching(
 def _uninformative_pairs(arm: Arm, geometry: pin.GeometryModel, n_shapes: int) -> set[int]:
     """Pairs within the arm that touch at home, and pairs of the mounting.
 
-    The mounting is the first link against the world, where turning the first axis changes
-    nothing: it touches everywhere or nowhere.
+    The mounting is the first link against the world, where it touches everywhere or nowhere
+    along the range of the first axis, which is sampled at 721 positions.
     """
     data, geometry_data = arm.model.createData(), forget_history(geometry.createData())
     pairs, objects = list(geometry.collisionPairs), geometry.geometryObjects
