@@ -292,11 +292,9 @@ class Simulator:
         configuration, target : ndarray, shape (n_axes,)
             Ends of the step [rad or m].
         """
-        for tested in substeps(configuration[None], target[None])[0]:
-            pair = self.contact_model.contact_pair(tested)
-            if pair is not None:
-                return pair
-        return None
+        tested = substeps(configuration[None], target[None])[0]
+        touching = np.flatnonzero(self.contact_model.in_contact(tested))
+        return self.contact_model.contact_pair(tested[touching[0]]) if touching.size else None
 
     def contact_pairs(self, rollouts: Rollouts) -> tuple[tuple[str, str] | None, ...]:
         """Name the bodies that touched, per episode; None where nothing did."""

@@ -118,6 +118,7 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
             over = np.flatnonzero(~before).tolist()
             raise InvalidInputError(f"episodes {over} are over: reset them with reset_mask")
         result = self.simulator.step(episodes, actions)
+        terminated = result.terminated
         infos = self._step_infos(episodes, result, before)
         ended = np.flatnonzero(before & (episodes.status != RUNNING))
         if self.autoreset_mode is AutoresetMode.NEXT_STEP and not before.all():
@@ -128,7 +129,7 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         return (
             episodes.observation.copy(),
             result.reward,
-            result.terminated,
+            terminated,
             result.truncated,
             infos,
         )
@@ -136,16 +137,16 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
     def _step_infos(
         self, episodes: Episodes, result: StepResult, stepped: NDArray[np.bool_]
     ) -> dict[str, Any]:
-        """Infos of the arms that moved, with their masks."""
+        """Infos of the arms that moved, with their masks; takes over the arrays of the result."""
         contact = np.full(self.num_envs, None, dtype=object)
         for row in np.flatnonzero(result.collision):
             contact[row] = self.simulator.contact_pair(episodes.q[row], episodes.target[row])
         infos: dict[str, Any] = {
             "distance": episodes.distance.copy(),
-            "success": result.success.copy(),
-            "collision": result.collision.copy(),
+            "success": result.success,
+            "collision": result.collision,
             "contact": contact,
-            **{f"reward_{name}": term.copy() for name, term in result.terms._asdict().items()},
+            **{f"reward_{name}": term for name, term in result.terms._asdict().items()},
         }
         mask = stepped.copy()
         infos.update({f"_{key}": mask for key in infos if key != "distance"})
