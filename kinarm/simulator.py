@@ -378,7 +378,10 @@ class Simulator:
             if paused.size == 0:
                 return
             self._judge(episodes, paused)
-            work = int((episodes.stop - episodes.steps)[paused].sum())
+            resumed = paused[episodes.cleared[paused]]
+            if resumed.size == 0:
+                return
+            work = int((episodes.stop - episodes.steps)[resumed].sum())
 
     def _judge(self, episodes: Episodes, paused: NDArray[np.int64]) -> None:
         """Let Coal decide the steps in doubt: refuse those that touch, clear the others.
