@@ -133,38 +133,45 @@ def measure_rollouts(
     simulator: "Simulator", policy: "Policy", repetitions: int
 ) -> list[dict[str, Any]]:
     """Steps per second of whole episodes: batch sizes, random and trained, 1 and all threads."""
+    return [
+        row for batch in BATCHES for row in measure_batch(simulator, policy, batch, repetitions)
+    ]
+
+
+def measure_batch(
+    simulator: "Simulator", policy: "Policy", batch: int, repetitions: int
+) -> list[dict[str, Any]]:
+    """Steps per second of one batch size."""
     import numpy as np
 
     from kinarm.kernels import SUBSTEPS
 
+    rng = np.random.default_rng(batch)
+    starts, goals = simulator.sample(rng, batch)
+    actions = rng.uniform(-1, 1, (batch, simulator.task.horizon, simulator.n_actions))
+
+    def run_random() -> int:
+        return int(simulator.rollout_actions(actions, starts, goals).steps.sum())
+
+    def run_trained() -> int:
+        return int(simulator.rollout(policy, starts, goals).steps.sum())
+
     rows = []
-    for batch in BATCHES:
-        rng = np.random.default_rng(batch)
-        starts, goals = simulator.sample(rng, batch)
-        actions = rng.uniform(-1, 1, (batch, simulator.task.horizon, simulator.n_actions))
-        runs: dict[str, Callable[[], int]] = {
-            "random": lambda a=actions, s=starts, g=goals: int(  # type: ignore[misc]
-                simulator.rollout_actions(a, s, g).steps.sum()
-            ),
-            "trained": lambda s=starts, g=goals: int(  # type: ignore[misc]
-                simulator.rollout(policy, s, g).steps.sum()
-            ),
-        }
-        for actions_name, run in runs.items():
-            judged_before = simulator.judged
-            steps = run()
-            judged = simulator.judged - judged_before
-            for threads in sorted({1, available_threads()}):
-                simulator.threads = threads
-                rows.append(
-                    {
-                        "batch": batch,
-                        "actions": actions_name,
-                        "threads": threads,
-                        "steps_per_second": timed(run, repetitions).to_json(),
-                        "judged_share": judged / (SUBSTEPS * steps),
-                    }
-                )
+    for name, run in (("random", run_random), ("trained", run_trained)):
+        judged_before = simulator.judged
+        steps = run()
+        judged_share = (simulator.judged - judged_before) / (SUBSTEPS * steps)
+        for threads in sorted({1, available_threads()}):
+            simulator.threads = threads
+            rows.append(
+                {
+                    "batch": batch,
+                    "actions": name,
+                    "threads": threads,
+                    "steps_per_second": timed(run, repetitions).to_json(),
+                    "judged_share": judged_share,
+                }
+            )
     return rows
 
 

@@ -90,8 +90,7 @@ def _evaluate(options: argparse.Namespace, command: str) -> None:
         json.dump(document, sys.stdout)
         sys.stdout.write("\n")
         return
-    wide_enough = 200 if options.markdown or not sys.stdout.isatty() else None
-    console = Console(width=wide_enough, highlight=False)
+    console = Console(width=None if sys.stdout.isatty() else 200, highlight=False)
     print_table(document, console, markdown=options.markdown)
     if not options.markdown:
         console.print(_footnote(document), style="dim")

@@ -119,7 +119,7 @@ class PooledEvaluation:
     def to_json(self) -> dict[str, Any]:
         """Summary as a dictionary that JSON can hold."""
         rates = np.array(self.success_rates)
-        medians = np.array([member.distance.median for member in self.members])
+        medians = np.array([np.median(member.rollouts.distance) for member in self.members])
         return {
             **_identity(self.name, self.members[0].entrant, self.task),
             "members": [member.entrant.name for member in self.members],

@@ -6,6 +6,7 @@ which the compiled simulator proves that most configurations need no judge.
 """
 
 import warnings
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -227,11 +228,11 @@ def _touching(
     q: NDArray[np.float64],
     data: pin.Data,
     geometry_data: pin.GeometryData,
-) -> list[int]:
-    """Indices of the pairs in contact at a configuration, in order."""
+    pairs: Iterable[int],
+) -> set[int]:
+    """Indices, among those of some pairs, that are in contact at a configuration."""
     pin.updateGeometryPlacements(arm.model, data, geometry, geometry_data, q)
-    pairs = range(len(geometry.collisionPairs))
-    return [index for index in pairs if pin.computeCollision(geometry, geometry_data, index)]
+    return {index for index in pairs if pin.computeCollision(geometry, geometry_data, index)}
 
 
 def _uninformative_pairs(arm: Arm, geometry: pin.GeometryModel, n_shapes: int) -> set[int]:
@@ -242,7 +243,8 @@ def _uninformative_pairs(arm: Arm, geometry: pin.GeometryModel, n_shapes: int) -
     """
     data, geometry_data = arm.model.createData(), forget_history(geometry.createData())
     pairs, objects = list(geometry.collisionPairs), geometry.geometryObjects
-    resting = _touching(arm, geometry, arm.home, data, geometry_data)
+    within = [index for index, pair in enumerate(pairs) if pair.second < n_shapes]
+    resting = _touching(arm, geometry, arm.home, data, geometry_data, within)
     mounting = {
         index
         for index, pair in enumerate(pairs)
@@ -252,10 +254,10 @@ def _uninformative_pairs(arm: Arm, geometry: pin.GeometryModel, n_shapes: int) -
     q = arm.home.copy()
     for position in np.linspace(arm.lower[0], arm.upper[0], MOUNT_SAMPLES if mounting else 0):
         q[0] = position
-        now = set(_touching(arm, geometry, q, data, geometry_data))
+        now = _touching(arm, geometry, q, data, geometry_data, mounting)
         always &= now
         never -= now
-    return always | never | {index for index in resting if pairs[index].second < n_shapes}
+    return always | never | resting
 
 
 def _contact_shapes(

@@ -34,14 +34,13 @@ def make_simulator(
     """Build the simulator of an environment from the environment's arguments."""
     if render_mode is not None:
         raise InvalidInputError(f"render_mode must be None, got {render_mode!r}")
-    base = load_task(task, **settings)
     if isinstance(reward, Mapping):
         terms = [item.name for item in fields(RewardWeights)]
         for name in reward:
             if name not in terms:
                 raise UnknownNameError("reward term", name, terms)
         reward = RewardWeights(**reward)
-    return Simulator(arm, load_task(base, reward=reward), scene, threads=threads)
+    return Simulator(arm, load_task(task, reward=reward, **settings), scene, threads=threads)
 
 
 def observation_space(simulator: Simulator) -> Space[Array]:

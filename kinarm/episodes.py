@@ -9,6 +9,11 @@ RUNNING, PAUSED, SUCCESS, COLLISION, TRUNCATED = range(5)
 """States of an episode."""
 
 
+def observation_size(n_axes: int) -> int:
+    """Length of an observation: goal, goal - tool, and quaternion and position of every axis."""
+    return 6 + 7 * n_axes
+
+
 class Rules(NamedTuple):
     """Task and motion limits as the kernels need them."""
 
@@ -125,7 +130,7 @@ class Episodes(NamedTuple):
             Collect sums of the observations about this point.
         """
         n, n_axes = starts.shape
-        n_observations = 6 + 7 * n_axes
+        n_observations = observation_size(n_axes)
         collected = 0 if shift is None else n
         recorded = (n, horizon + 1) if record else (0, 0)
         return cls(

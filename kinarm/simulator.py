@@ -9,7 +9,17 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm import kernels
 from kinarm.arm import Arm
 from kinarm.collision import ContactModel
-from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Control, Episodes, Rules
+from kinarm.episodes import (
+    COLLISION,
+    PAUSED,
+    RUNNING,
+    SUCCESS,
+    TRUNCATED,
+    Control,
+    Episodes,
+    Rules,
+    observation_size,
+)
 from kinarm.errors import InvalidInputError, StartInContactError
 from kinarm.networks import CompiledPolicy, Networks, network_control, table_control
 from kinarm.parallel import available_threads, run_rows
@@ -118,7 +128,7 @@ class Simulator:
     @property
     def n_observations(self) -> int:
         """Length of an observation."""
-        return 6 + 7 * self.arm.n_axes
+        return observation_size(self.arm.n_axes)
 
     @property
     def n_actions(self) -> int:
