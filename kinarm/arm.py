@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm.chain import Chain
 from kinarm.errors import ArmError, UnknownNameError
+from kinarm.motion_bounds import link_lengths
 from kinarm.validation import finite_array
 
 DEFAULT_ARM = "paper"
@@ -147,11 +148,7 @@ class Arm:
     @property
     def reach(self) -> float:
         """Upper bound of the distance from the world's origin to the tool point [m]."""
-        return float(
-            np.linalg.norm(self.chain.translation, axis=1).sum()
-            + np.linalg.norm(self.chain.tool)
-            + np.abs(np.where(self.chain.prismatic, np.fmax(-self.lower, self.upper), 0)).sum()
-        )
+        return float(link_lengths(self.chain).sum() + np.linalg.norm(self.chain.tool))
 
     @cached_property
     def digest(self) -> str:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from kinarm.arm import Arm
 from kinarm.chain import Chain
 from kinarm.errors import ArmError
+from kinarm.motion_bounds import point_speed
 from kinarm.scene import Scene
 
 BETWEEN_CAPSULES, WITH_BOX, WITH_GROUND = range(3)
@@ -45,6 +46,8 @@ class ContactShapes(NamedTuple):
     travel : ndarray, shape (n_actuated, n_pairs)
         Bound on how far an axis moves the two bodies of a pair relative to each other
         [m/rad, or m/m].
+    exact : ndarray of bool, shape (n_shapes,)
+        Whether the capsule is the shape, rather than encloses it.
     """
 
     link: NDArray[np.int64]
@@ -52,6 +55,7 @@ class ContactShapes(NamedTuple):
     boxes: NDArray[np.float64]
     pairs: NDArray[np.int64]
     travel: NDArray[np.float64]
+    exact: NDArray[np.bool_]
 
 
 class Capsule(NamedTuple):
@@ -277,17 +281,23 @@ def _contact_shapes(
         for axis in range(base, min(int(link[mover]), arm.n_actuated)):
             if kind == WITH_GROUND and _keeps_height(arm.chain, axis):
                 continue
-            travel[axis, column] = _travel_bound(arm.chain, axis, int(link[mover]), capsules[mover])
+            ends = np.array([capsules[mover].start, capsules[mover].end])
+            travel[axis, column] = point_speed(arm.chain, axis, int(link[mover]), ends)
     arrays = ContactShapes(
         link=link,
         capsules=np.array([np.hstack(capsule) for capsule in capsules]).reshape(-1, 7),
         boxes=np.array([(bench.lower, bench.upper) for bench in scene.benches]).reshape(-1, 2, 3),
         pairs=np.array(rows, dtype=np.int64).reshape(-1, 3),
         travel=travel,
+        exact=np.array([_is_capsule(shape) for shape in objects], dtype=bool),
     )
     for array in arrays:
         array.flags.writeable = False
     return arrays
+
+
+def _is_capsule(shape: pin.GeometryObject) -> bool:
+    return isinstance(shape.geometry, coal.Capsule | coal.Sphere)
 
 
 def _keeps_height(chain: Chain, axis: int) -> bool:
@@ -297,24 +307,6 @@ def _keeps_height(chain: Chain, axis: int) -> bool:
     w, x, y, z = chain.rotation[0]
     world_axis = pin.Quaternion(w, x, y, z).matrix() @ chain.axis[0]
     return bool(np.hypot(world_axis[0], world_axis[1]) < 1e-12)
-
-
-def _travel_bound(chain: Chain, axis: int, link: int, capsule: Capsule) -> float:
-    """Bound on the speed of any point of a capsule's segment per unit speed of an axis.
-
-    A revolute axis moves a point by its distance from the axis. For the link that the axis
-    carries itself that is a constant; for a later link it is at most the distance from the
-    joint's origin, hence at most the length of the chain between them.
-    """
-    if chain.prismatic[axis]:
-        return 1.0
-    ends = np.array([capsule.start, capsule.end])
-    if link == axis + 1:
-        return float(np.linalg.norm(np.cross(chain.axis[axis], ends), axis=1).max())
-    between = slice(axis + 1, link)
-    length = np.linalg.norm(chain.translation[between], axis=1).sum()
-    slide = np.where(chain.prismatic, np.fmax(np.abs(chain.lower), np.abs(chain.upper)), 0.0)
-    return float(length + slide[between].sum() + np.linalg.norm(ends, axis=1).max())
 
 
 def enclosing_capsule(shape: pin.GeometryObject) -> Capsule:

@@ -7,7 +7,7 @@ from functools import cache
 from typing import Any
 
 PARALLEL_STEPS = 1024
-BALANCED_BATCH = 256
+BALANCED_STEPS = 16384
 
 
 def available_threads() -> int:
@@ -39,7 +39,7 @@ def run_rows(kernel: Callable[..., None], n: int, work: int, threads: int, *arra
     if threads == 1 or n == 0 or work < PARALLEL_STEPS:
         kernel(0, n, *arrays)
         return
-    ranges_each = 1 if n < BALANCED_BATCH else 4
+    ranges_each = 1 if work < BALANCED_STEPS else 4
     size = -(-n // (ranges_each * threads))
     pool = _thread_pool(os.getpid(), threads)
     ranges = [

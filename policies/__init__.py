@@ -8,8 +8,11 @@ if TYPE_CHECKING:
     from kinarm.policies.ars import ARSResult, ARSState, train_ars
     from kinarm.policies.ars_config import ARSConfig
     from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
+    from kinarm.policies.inverse_kinematics import inverse_kinematics
     from kinarm.policies.library import load_policy, policy_names
     from kinarm.policies.normalizer import Normalizer
+    from kinarm.policies.oracle import Oracle
+    from kinarm.policies.oracle_solution import OracleSolution, OracleSolutions
     from kinarm.policies.policy import Layer, Policy
     from kinarm.policies.provenance import Provenance
     from kinarm.policies.recipes import ARS_RECIPES, ars_recipe
@@ -21,9 +24,13 @@ __all__ = [
     "ARSState",
     "Layer",
     "Normalizer",
+    "Oracle",
+    "OracleSolution",
+    "OracleSolutions",
     "Policy",
     "Provenance",
     "ars_recipe",
+    "inverse_kinematics",
     "load_checkpoint",
     "load_policy",
     "policy_names",
@@ -42,8 +49,11 @@ __getattr__ = lazy_exports(
         "ars": ("ARSResult", "ARSState", "train_ars"),
         "ars_config": ("ARSConfig",),
         "checkpoint": ("load_checkpoint", "save_checkpoint"),
+        "inverse_kinematics": ("inverse_kinematics",),
         "library": ("load_policy", "policy_names"),
         "normalizer": ("Normalizer",),
+        "oracle": ("Oracle",),
+        "oracle_solution": ("OracleSolution", "OracleSolutions"),
         "policy": ("Layer", "Policy"),
         "provenance": ("Provenance",),
         "recipes": ("ARS_RECIPES", "ars_recipe"),

@@ -11,17 +11,13 @@ from kinarm.kernels.kinematics import to_world
 
 
 @inlined
-def segment_gap(
+def between_segments(
     a: tuple[float, float, float],
     b: tuple[float, float, float],
     c: tuple[float, float, float],
     d: tuple[float, float, float],
-) -> float:
-    """Lower bound of the distance between the segments ab and cd, certified by a plane.
-
-    The direction between (nearly) closest points only proposes the plane; the bound is the gap
-    between the two segments along it, and so holds however the direction was found.
-    """
+) -> tuple[float, float, float]:
+    """Vector from a point of the segment cd to one of ab, (nearly) the closest ones."""
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     vx, vy, vz = d[0] - c[0], d[1] - c[1], d[2] - c[2]
     rx, ry, rz = a[0] - c[0], a[1] - c[1], a[2] - c[2]
@@ -39,33 +35,46 @@ def segment_gap(
         t = min(max((uv * s + vr) / vv, 0.0), 1.0)
     if uu > 0.0:
         s = min(max((uv * t - ur) / uu, 0.0), 1.0)
-    nx, ny, nz = rx + s * ux - t * vx, ry + s * uy - t * vy, rz + s * uz - t * vz
+    return rx + s * ux - t * vx, ry + s * uy - t * vy, rz + s * uz - t * vz
+
+
+@inlined
+def segment_gap(
+    a: tuple[float, float, float],
+    b: tuple[float, float, float],
+    c: tuple[float, float, float],
+    d: tuple[float, float, float],
+) -> float:
+    """Lower bound of the distance between the segments ab and cd, certified by a plane.
+
+    The vector between (nearly) closest points only proposes the plane; the bound is the gap
+    between the two segments along it, and so holds however the vector was found.
+    """
+    nx, ny, nz = between_segments(a, b, c, d)
     norm = math.sqrt(nx * nx + ny * ny + nz * nz)
     if norm < 1e-12:
         return 0.0
-    along_u = nx * ux + ny * uy + nz * uz
-    along_v = nx * vx + ny * vy + nz * vz
-    along_r = nx * rx + ny * ry + nz * rz
+    along_u = nx * (b[0] - a[0]) + ny * (b[1] - a[1]) + nz * (b[2] - a[2])
+    along_v = nx * (d[0] - c[0]) + ny * (d[1] - c[1]) + nz * (d[2] - c[2])
+    along_r = nx * (a[0] - c[0]) + ny * (a[1] - c[1]) + nz * (a[2] - c[2])
     return (along_r + min(along_u, 0.0) - max(along_v, 0.0)) / norm
 
 
 @inlined
-def box_gap(
+def closest_to_box(
     a: tuple[float, float, float],
     b: tuple[float, float, float],
     lower: tuple[float, float, float],
     upper: tuple[float, float, float],
 ) -> float:
-    """Lower bound of the distance between the segment ab and a box, certified by a plane.
+    """Where on the segment ab, from 0 to 1, it is (nearly) closest to a box.
 
-    A safeguarded Newton iteration on the squared distance, which is convex along the segment,
-    proposes the plane.
+    By a safeguarded Newton iteration on the squared distance, which is convex along the segment.
     """
     lx, ly, lz = lower
     hx, hy, hz = upper
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     low, high, t = 0.0, 1.0, 0.5
-    nx, ny, nz = 0.0, 0.0, 0.0
     for _ in range(16):
         x, y, z = a[0] + t * ux, a[1] + t * uy, a[2] + t * uz
         nx = x - min(max(x, lx), hx)
@@ -93,12 +102,35 @@ def box_gap(
         elif step >= high:
             step = 1.0 if high == 1.0 else 0.5 * (low + high)
         t = step
+    return t
+
+
+@inlined
+def box_gap(
+    a: tuple[float, float, float],
+    b: tuple[float, float, float],
+    lower: tuple[float, float, float],
+    upper: tuple[float, float, float],
+) -> float:
+    """Lower bound of the distance between the segment ab and a box, certified by a plane.
+
+    The vector between (nearly) closest points proposes the plane.
+    """
+    t = closest_to_box(a, b, lower, upper)
+    x, y, z = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
+    nx = x - min(max(x, lower[0]), upper[0])
+    ny = y - min(max(y, lower[1]), upper[1])
+    nz = z - min(max(z, lower[2]), upper[2])
     norm = math.sqrt(nx * nx + ny * ny + nz * nz)
     if norm < 1e-12:
         return 0.0
     first = nx * a[0] + ny * a[1] + nz * a[2]
     second = nx * b[0] + ny * b[1] + nz * b[2]
-    support = max(nx * lx, nx * hx) + max(ny * ly, ny * hy) + max(nz * lz, nz * hz)
+    support = (
+        max(nx * lower[0], nx * upper[0])
+        + max(ny * lower[1], ny * upper[1])
+        + max(nz * lower[2], nz * upper[2])
+    )
     return (min(first, second) - support) / norm
 
 

@@ -1,4 +1,4 @@
-"""Forward kinematics and observation."""
+"""Forward kinematics, Jacobian and observation."""
 
 import math
 
@@ -94,6 +94,42 @@ def to_world(
         poses[frame, 14] + (poses[frame, 7] * x + poses[frame, 8] * y + poses[frame, 9] * z),
         poses[frame, 15] + (poses[frame, 10] * x + poses[frame, 11] * y + poses[frame, 12] * z),
     )
+
+
+@inlined
+def point_jacobian(
+    prismatic: NDArray[np.bool_],
+    axis: NDArray[np.float64],
+    poses: NDArray[np.float64],
+    point: tuple[float, float, float],
+    jacobian: NDArray[np.float64],
+) -> None:
+    """Fill in how fast a point beyond the axes moves per unit speed of each.
+
+    Parameters
+    ----------
+    prismatic, axis : ndarray
+        See `Chain`.
+    poses : ndarray, shape (n_axes + 1, POSE)
+        Forward kinematics.
+    point : tuple of float
+        The point in the world frame [m].
+    jacobian : ndarray, shape (3, n)
+        Output, for the first n axes, in the world frame [m/rad, or m/m].
+    """
+    for k in range(jacobian.shape[1]):
+        c = k + 1
+        ax, ay, az = axis[k, 0], axis[k, 1], axis[k, 2]
+        wx = poses[c, 4] * ax + poses[c, 5] * ay + poses[c, 6] * az
+        wy = poses[c, 7] * ax + poses[c, 8] * ay + poses[c, 9] * az
+        wz = poses[c, 10] * ax + poses[c, 11] * ay + poses[c, 12] * az
+        if prismatic[k]:
+            jacobian[0, k], jacobian[1, k], jacobian[2, k] = wx, wy, wz
+        else:
+            rx, ry, rz = point[0] - poses[c, 13], point[1] - poses[c, 14], point[2] - poses[c, 15]
+            jacobian[0, k] = wy * rz - wz * ry
+            jacobian[1, k] = wz * rx - wx * rz
+            jacobian[2, k] = wx * ry - wy * rx
 
 
 @inlined

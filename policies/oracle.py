@@ -1,0 +1,262 @@
+"""The oracle: bounds of what any policy could reach, and in how many steps.
+
+For each trial the oracle *proves* bounds and *finds* a motion; the best policy lies between them.
+
+Proven, by branch and bound over all configurations within reach (`kinarm.kernels.approach`):
+
+- the number of steps below which no policy can bring the tool within the tolerance of the goal;
+- where none can within the horizon, a distance that no policy can beat, to a millimetre.
+
+Contact is ignored in that, which makes both hold all the more for motions that avoid it. Where the
+motion found is slower than the bound, the bound is raised: a motion does not end where the arm
+touches something, as far as its shapes are capsules. Boxes of configurations and distances are
+enlarged by 1e-9 to cover rounding. When the budget of a proof runs out, what is proven so far
+stands and is marked as not tight.
+
+Found, by search, and replayed in the simulator, whose outcome is what counts: a motion that
+reaches the goal without contact. It need not be the fastest one, and that none was found proves
+nothing.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kinarm import kernels
+from kinarm.arm import DEFAULT_ARM, Arm
+from kinarm.motion_bounds import MotionBounds
+from kinarm.parallel import run_rows
+from kinarm.policies.inverse_kinematics import inverse_kinematics, step_box
+from kinarm.policies.motion_search import MotionSearch
+from kinarm.policies.oracle_solution import OracleSolution, OracleSolutions
+from kinarm.rollouts import Rollouts
+from kinarm.scene import Scene
+from kinarm.simulator import Simulator
+from kinarm.task import ReachTask
+from kinarm.validation import finite_array
+
+BUDGET = 200_000
+"""Boxes that a proof may examine."""
+
+CONTACT_BUDGET = 20_000
+"""Boxes that a proof that counts contact may examine for each number of steps."""
+
+RESOLUTION = 1e-3
+"""By how much a proven distance may fall short of the smallest possible one [m]."""
+
+EXTRA_STEPS = 24
+"""How far above its lower bound the number of steps is raised before a detour is planned."""
+
+LOT = 128
+"""Trials that are solved together."""
+
+Progress = Callable[[int, int], object]
+"""Called with the number of trials solved so far and in all."""
+
+
+class Oracle:
+    """Bounds what any policy could do in given trials.
+
+    The result for a trial depends on nothing else: not on other trials, their order or the
+    number of threads.
+
+    Parameters
+    ----------
+    arm : Arm or str
+        The arm, or what `Arm.load` takes.
+    scene : Scene, optional
+        The paper's scene by default.
+    task : ReachTask or str
+        The task; its tolerance and horizon count.
+    simulator : Simulator, optional
+        Brings arm, scene and task with it.
+
+    Attributes
+    ----------
+    simulator : Simulator
+        Where motions are replayed.
+    """
+
+    def __init__(
+        self,
+        arm: Arm | str = DEFAULT_ARM,
+        scene: Scene | None = None,
+        task: ReachTask | str = "both",
+        *,
+        simulator: Simulator | None = None,
+    ) -> None:
+        self.simulator = simulator or Simulator(arm, task, scene)
+        chain, n = self.simulator.arm.chain, self.simulator.n_actions
+        self._arm = (chain, MotionBounds.of(chain, n), self.simulator.contact_model.shapes)
+
+    def solve(self, start: ArrayLike, goal: ArrayLike) -> OracleSolution:
+        """Solve one trial.
+
+        Parameters
+        ----------
+        start : array_like, shape (n_axes,)
+            Contact-free start configuration [rad or m].
+        goal : array_like, shape (3,)
+            Goal position [m].
+
+        Raises
+        ------
+        InvalidInputError
+            If a shape is wrong, an entry is not finite or the start is beyond the limits.
+        StartInContactError
+            If the start touches something.
+        """
+        q = finite_array("start", start, (self.simulator.arm.n_axes,))
+        return self.solve_batch(q[None], finite_array("goal", goal, (3,))[None])[0]
+
+    def solve_batch(
+        self, starts: ArrayLike, goals: ArrayLike, *, on_progress: Progress | None = None
+    ) -> OracleSolutions:
+        """Solve many trials.
+
+        Parameters
+        ----------
+        starts : array_like, shape (n, n_axes)
+            Contact-free start configurations [rad or m].
+        goals : array_like, shape (n, 3)
+            Goal positions [m].
+        on_progress : callable, optional
+            Called with the number of trials solved so far and in all.
+
+        Raises
+        ------
+        InvalidInputError
+            If a shape is wrong, an entry is not finite or a start is beyond the limits.
+        StartInContactError
+            If a start touches something.
+        """
+        q, g = self.simulator.check_scenarios(starts, goals)
+        self.simulator.reset(q, g)
+        parts = []
+        for first in range(0, max(len(q), 1), LOT):
+            lot = slice(first, first + LOT)
+            parts.append(self._solve_lot(q[lot], g[lot]))
+            if on_progress is not None:
+                on_progress(min(first + LOT, len(q)), len(q))
+        return OracleSolutions.concatenated(parts)
+
+    def inverse_kinematics(self, start: ArrayLike, goal: ArrayLike) -> NDArray[np.float64]:
+        """Find distinct contact-free configurations at a goal; see `inverse_kinematics`."""
+        return inverse_kinematics(self.simulator, start, goal)
+
+    def _solve_lot(
+        self, starts: NDArray[np.float64], goals: NDArray[np.float64]
+    ) -> OracleSolutions:
+        """From trials to bounds, motions and their replay."""
+        task, n = self.simulator.task, len(starts)
+        lot = _Lot(starts, goals, witnesses=starts.copy())
+        # The horizon comes first: most of what is out of reach is settled at once.
+        horizon = np.full(n, task.horizon)
+        floors, tight = self._steps_floor(lot, np.arange(n), horizon, horizon, BUDGET)
+        within = np.flatnonzero(floors <= horizon)
+        ones = np.ones(within.size, dtype=np.int64)
+        floors[within], tight[within] = self._steps_floor(
+            lot, within, ones, horizon[within], BUDGET
+        )
+        search = MotionSearch(self.simulator, starts, goals)
+        for extra in range(EXTRA_STEPS + 1):
+            search.try_steps(within, floors[within] + extra, lot.witnesses)
+        search.try_detours(within)
+        slow = within[search.steps[within] > floors[within]]
+        floors[slow], tight[slow] = self._steps_floor(
+            lot, slow, floors[slow], search.steps[slow] - 1, CONTACT_BUDGET, contact=True
+        )
+        missed = np.flatnonzero(~search.reached)
+        distance_floors = np.zeros(n)
+        distance_floors[missed] = self._distance_floor(lot, missed)
+        distance_floors[floors > horizon] = np.fmax(
+            distance_floors[floors > horizon], task.tolerance
+        )
+        search.try_approach(missed, np.fmax(distance_floors[missed], task.tolerance), lot.witnesses)
+        replay = self.simulator.rollout_actions(search.actions, starts, goals, record=True)
+        return OracleSolutions(
+            reachable=replay.success,
+            tight=tight,
+            steps=replay.steps,
+            steps_lower_bound=floors,
+            final_distance=replay.distance,
+            distance_lower_bound=distance_floors,
+            actions=search.actions,
+            paths=replay.paths,
+            reasons=self._reasons(replay, floors, distance_floors, search.has_solution),
+        )
+
+    def _steps_floor(
+        self,
+        lot: "_Lot",
+        rows: NDArray[np.int64],
+        fewest: NDArray[np.int64],
+        most: NDArray[np.int64],
+        budget: int,
+        *,
+        contact: bool = False,
+    ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Prove how many steps some trials take at least; see `kinarm.kernels.steps_floor`."""
+        simulator, n = self.simulator, len(rows)
+        floors, tight = np.empty(n, dtype=np.int64), np.empty(n, dtype=bool)
+        witnesses = lot.witnesses[rows]
+        inputs = (*self._arm, lot.starts[rows], lot.goals[rows], simulator.step_limit)
+        limits = (simulator.task.tolerance, contact, budget, fewest, most)
+        arrays = (*inputs, *limits, floors, tight, witnesses)
+        run_rows(kernels.steps_floor, n, budget * n, simulator.threads, *arrays)
+        lot.witnesses[rows] = witnesses
+        return floors, tight
+
+    def _distance_floor(self, lot: "_Lot", rows: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Prove how close the tool can come within the horizon, and note where it does."""
+        simulator, n = self.simulator, len(rows)
+        distances, configurations = np.empty((n, 2)), np.empty((n, simulator.arm.n_axes))
+        starts, goals = lot.starts[rows], lot.goals[rows]
+        box = step_box(simulator, starts, np.full(n, simulator.task.horizon))
+        inputs = (*self._arm, *box, starts, goals, RESOLUTION, False, BUDGET)
+        arrays = (*inputs, distances, configurations)
+        run_rows(kernels.closest_approach, n, BUDGET * n, simulator.threads, *arrays)
+        lot.witnesses[rows] = configurations
+        return distances[:, 0]
+
+    def _reasons(
+        self,
+        replay: Rollouts,
+        floors: NDArray[np.int64],
+        distance_floors: NDArray[np.float64],
+        has_solution: NDArray[np.bool_],
+    ) -> NDArray[np.str_]:
+        """Say, per trial, why no motion reaches the goal."""
+        horizon = self.simulator.task.horizon
+        reasons = []
+        for row, reached in enumerate(replay.success):
+            if reached:
+                reasons.append("")
+            elif floors[row] > horizon:
+                reasons.append(
+                    f"out of reach: proven to stay {distance_floors[row]:.3f} m away or more "
+                    f"within {horizon} steps"
+                )
+            elif has_solution[row]:
+                reasons.append(f"no contact-free motion of {horizon} steps or less found")
+            else:
+                reasons.append("no contact-free configuration at the goal found")
+        return np.array(reasons, dtype=np.str_)
+
+
+class _Lot(NamedTuple):
+    """Trials that are solved together; arrays of n rows.
+
+    Attributes
+    ----------
+    starts, goals : ndarray
+        The trials.
+    witnesses : ndarray, shape (n, n_axes)
+        Configurations that attain what was proven last [rad or m].
+    """
+
+    starts: NDArray[np.float64]
+    goals: NDArray[np.float64]
+    witnesses: NDArray[np.float64]
