@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from kinarm.policies.ars import ARSResult, ARSState, train_ars
     from kinarm.policies.ars_config import ARSConfig
     from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
-    from kinarm.policies.inverse_kinematics import inverse_kinematics
+    from kinarm.policies.inverse import inverse_kinematics
     from kinarm.policies.library import load_policy, policy_names
     from kinarm.policies.normalizer import Normalizer
     from kinarm.policies.oracle import Oracle
@@ -49,7 +49,7 @@ __getattr__ = lazy_exports(
         "ars": ("ARSResult", "ARSState", "train_ars"),
         "ars_config": ("ARSConfig",),
         "checkpoint": ("load_checkpoint", "save_checkpoint"),
-        "inverse_kinematics": ("inverse_kinematics",),
+        "inverse": ("inverse_kinematics",),
         "library": ("load_policy", "policy_names"),
         "normalizer": ("Normalizer",),
         "oracle": ("Oracle",),

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.policies.detour import find_detour
-from kinarm.policies.inverse_kinematics import (
+from kinarm.policies.inverse import (
     Solutions,
     evenly_spread,
     inverse_kinematics,

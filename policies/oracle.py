@@ -28,7 +28,7 @@ from kinarm import kernels
 from kinarm.arm import DEFAULT_ARM, Arm
 from kinarm.motion_bounds import MotionBounds
 from kinarm.parallel import run_rows
-from kinarm.policies.inverse_kinematics import inverse_kinematics, step_box
+from kinarm.policies.inverse import inverse_kinematics, step_box
 from kinarm.policies.motion_search import MotionSearch
 from kinarm.policies.oracle_solution import OracleSolution, OracleSolutions
 from kinarm.rollouts import Rollouts
