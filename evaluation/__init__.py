@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from kinarm._exports import lazy_exports
 
 if TYPE_CHECKING:
+    from kinarm.evaluation.bounds import oracle_bounds
     from kinarm.evaluation.entrants import Entrant, find_entrants
     from kinarm.evaluation.evaluations import Evaluation, PooledEvaluation, evaluate, pool
     from kinarm.evaluation.plots import distance_histograms, save_figure
@@ -23,6 +24,7 @@ __all__ = [
     "evaluate",
     "evaluation_document",
     "find_entrants",
+    "oracle_bounds",
     "pool",
     "save_figure",
 ]
@@ -35,6 +37,7 @@ def __dir__() -> list[str]:
 __getattr__ = lazy_exports(
     __name__,
     {
+        "bounds": ("oracle_bounds",),
         "entrants": ("Entrant", "find_entrants"),
         "evaluations": ("Evaluation", "PooledEvaluation", "evaluate", "pool"),
         "plots": ("distance_histograms", "save_figure"),

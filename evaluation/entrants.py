@@ -8,6 +8,7 @@ import numpy as np
 
 from kinarm.arm import Arm
 from kinarm.errors import UnknownNameError
+from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.trials import TrialSet, trial_generator
 from kinarm.networks import Networks
 from kinarm.policies.library import group_of, policy_files, policy_names
@@ -49,6 +50,17 @@ class Entrant:
     trained_on: str | None = None
     policy: Policy | None = None
     source: Path | None = None
+
+    def check_arm(self, arm: Arm) -> None:
+        """See that the policy, if there is one, was trained for an arm.
+
+        Raises
+        ------
+        PolicyFileError
+            If it was trained for another one.
+        """
+        if self.policy is not None:
+            self.policy.check_arm(arm)
 
     @classmethod
     def from_policy(cls, name: str, policy: Policy, source: Path | None = None) -> "Entrant":
@@ -97,11 +109,21 @@ def _run_random(trials: TrialSet) -> Rollouts:
     return simulator.rollout_actions(np.array(actions), trials.starts, trials.goals)
 
 
+def _run_oracle(trials: TrialSet) -> Rollouts:
+    actions = oracle_bounds(trials).actions
+    return trials.simulator.rollout_actions(actions, trials.starts, trials.goals)
+
+
 BASELINES = {
     "random": Entrant("random", _run_random, "baseline", "random", "random"),
     "zero": Entrant("zero", _run_zero, "baseline", "zero", "zero"),
 }
 """Uniformly random actions, and no motion at all."""
+
+ORACLE = Entrant("oracle", _run_oracle, "oracle", "oracle", "oracle")
+"""The motions that the oracle found, replayed."""
+
+UNTRAINED = {**BASELINES, ORACLE.name: ORACLE}
 
 
 def find_entrants(name_or_file: str | Path) -> tuple[Entrant, ...]:
@@ -110,7 +132,8 @@ def find_entrants(name_or_file: str | Path) -> tuple[Entrant, ...]:
     Parameters
     ----------
     name_or_file : str or Path
-        A baseline, a shipped policy, a group of them (all training seeds), or a policy file.
+        A baseline, ``"oracle"``, a shipped policy, a group of them (all training seeds), or a
+        policy file.
 
     Raises
     ------
@@ -119,12 +142,12 @@ def find_entrants(name_or_file: str | Path) -> tuple[Entrant, ...]:
     PolicyFileError
         If a file cannot be used.
     """
-    if name_or_file in BASELINES:
-        return (BASELINES[str(name_or_file)],)
+    if name_or_file in UNTRAINED:
+        return (UNTRAINED[str(name_or_file)],)
     try:
         paths = policy_files(name_or_file)
     except UnknownNameError as error:
-        available = (*BASELINES, *error.available)
+        available = (*UNTRAINED, *error.available)
         raise UnknownNameError(error.kind, error.given, available) from None
     return tuple(
         Entrant.from_policy(path.stem, Policy.load(path), path.resolve()) for path in paths

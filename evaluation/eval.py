@@ -3,7 +3,8 @@
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,8 +41,8 @@ def build_parser() -> Parser:
         "--policy",
         action="append",
         metavar="NAME_OR_FILE",
-        help="shipped policy, recipe (all its seeds), baseline (random, zero) or .npz file; "
-        "repeatable; default: all shipped ones and the baselines",
+        help="shipped policy, recipe (all its seeds), random, zero, oracle, or .npz file; "
+        "repeatable; default: all shipped ones, random and zero",
     )
     parser.add_argument(
         "--trials", type=whole_number(1), default=200, metavar="N", help="trials a task (200)"
@@ -57,6 +58,12 @@ def build_parser() -> Parser:
     )
     parser.add_argument(
         "--matrix", action="store_true", help="every policy on every task, not only on its own"
+    )
+    parser.add_argument(
+        "--no-oracle",
+        dest="oracle",
+        action="store_false",
+        help="leave out the bounds of what any policy could reach",
     )
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="write evaluation.json and histograms there"
@@ -81,8 +88,8 @@ def _evaluate(options: argparse.Namespace, command: str) -> None:
 
     from kinarm.evaluation.report import evaluation_document, print_table
 
-    with Console(stderr=True).status("evaluating; the first run compiles"):
-        evaluations = evaluate_all(options)
+    with Console(stderr=True).status("evaluating; the first run compiles") as status:
+        evaluations = evaluate_all(options, status.update)
         document = evaluation_document(evaluations, command)
     if options.out is not None:
         _write(options.out, document, evaluations)
@@ -103,16 +110,38 @@ def _evaluate(options: argparse.Namespace, command: str) -> None:
 def _footnote(document: dict[str, Any]) -> str:
     """What the figures in the table stand on."""
     protocol = document["protocol"]
-    hashes = (f"{task} {entry['trial_set_hash']}" for task, entry in protocol["tasks"].items())
-    return (
+    tasks = protocol["tasks"].items()
+    hashes = (f"{task} {entry['trial_set_hash']}" for task, entry in tasks)
+    lines = [
         f"{protocol['trials']} trials a task, seed {protocol['seed']}, arm {protocol['arm']}; "
-        f"95 % intervals in brackets\ntrial sets: {', '.join(hashes)}"
-    )
+        "95 % intervals in brackets",
+        f"trial sets: {', '.join(hashes)}",
+    ]
+    bounds = [(task, entry["oracle"]) for task, entry in tasks if entry["oracle"]]
+    if bounds:
+        shares = (f"{task} {100 * bound['tight_share']:.1f} %" for task, bound in bounds)
+        lines.insert(
+            1,
+            "step ratio: steps over the number proven necessary, of trials that succeeded; "
+            f"proofs complete: {', '.join(shares)}",
+        )
+    return "\n".join(lines)
 
 
-def evaluate_all(options: argparse.Namespace) -> "list[Evaluation]":
-    """Let every chosen policy face the trials of its tasks."""
+def evaluate_all(
+    options: argparse.Namespace, report: Callable[[str], object]
+) -> "list[Evaluation]":
+    """Let every chosen policy face the trials of its tasks.
+
+    Parameters
+    ----------
+    options : Namespace
+        The options of the command.
+    report : callable
+        Called with what is being done.
+    """
     from kinarm.arm import Arm
+    from kinarm.evaluation.bounds import oracle_bounds
     from kinarm.evaluation.evaluations import run_trials
     from kinarm.evaluation.trials import TrialSet
     from kinarm.simulator import Simulator
@@ -120,19 +149,30 @@ def evaluate_all(options: argparse.Namespace) -> "list[Evaluation]":
 
     tasks = list(dict.fromkeys(load_task(name).name for name in options.task or ()))
     arm = Arm.load(options.arm)
-    entrants = choose_entrants(options, arm)
+    pairs = pair_with_tasks(choose_entrants(options, arm), tasks, options)
+    if not pairs:
+        raise InvalidInputError("no chosen policy was trained on a task that exists: name a --task")
+    for entrant, _ in () if options.allow_other_arm else pairs:
+        entrant.check_arm(arm)
     if options.out is not None:
         check_folder(options.out, create=True)
-    trial_sets: dict[str, TrialSet] = {}
     evaluations = []
-    for entrant, task in pair_with_tasks(entrants, tasks, options):
-        if task not in trial_sets:
-            simulator = Simulator(arm, task)
-            trial_sets[task] = TrialSet.draw(simulator, options.trials, options.seed)
-        evaluations.append(run_trials(entrant, trial_sets[task], options.allow_other_arm))
-    if not evaluations:
-        raise InvalidInputError("no chosen policy was trained on a task that exists: name a --task")
+    for task in dict.fromkeys(task for _, task in pairs):
+        trials = TrialSet.draw(Simulator(arm, task), options.trials, options.seed)
+        if options.oracle:
+            oracle_bounds(trials, partial(_report_bounds, report, task))
+        report(f"evaluating on {task}")
+        evaluations += [
+            run_trials(entrant, trials, options.allow_other_arm, oracle=options.oracle)
+            for entrant, faced in pairs
+            if faced == task
+        ]
     return evaluations
+
+
+def _report_bounds(report: Callable[[str], object], task: str, done: int, total: int) -> None:
+    """Say how far the oracle is."""
+    report(f"what could any policy reach on {task}? {done} of {total} trials solved")
 
 
 def choose_entrants(options: argparse.Namespace, arm: Any) -> "list[Entrant]":
@@ -159,8 +199,9 @@ def pair_with_tasks(
 
     By default a trained policy faces the task that it was trained on and a baseline all tasks in
     play. ``--task`` restricts the default selection; together with ``--policy`` or ``--matrix``
-    it says what they face.
+    it says what they face. The oracle joins on every task that is faced.
     """
+    from kinarm.evaluation.entrants import ORACLE
     from kinarm.task import TASKS
 
     trained = list(dict.fromkeys(e.trained_on for e in entrants if e.trained_on))
@@ -168,12 +209,15 @@ def pair_with_tasks(
     if options.matrix:
         played = tasks or list(TASKS)
     named = bool(options.policy and tasks)
-    return [
+    pairs = [
         (entrant, task)
         for task in played
         for entrant in entrants
         if options.matrix or named or entrant.trained_on in (None, task)
     ]
+    if options.oracle and ORACLE not in entrants:
+        pairs += [(ORACLE, task) for task in dict.fromkeys(task for _, task in pairs)]
+    return pairs
 
 
 def _write(folder: Path, document: dict[str, Any], evaluations: "list[Evaluation]") -> None:
@@ -182,7 +226,8 @@ def _write(folder: Path, document: dict[str, Any], evaluations: "list[Evaluation
 
     text = json.dumps(document, indent=1).encode()
     write_atomically(folder / "evaluation.json", lambda file: file.write(text))
-    save_figure(distance_histograms(evaluations), folder, "final_distance")
+    shown = [e for e in evaluations if e.entrant.algorithm != "oracle"] or evaluations
+    save_figure(distance_histograms(shown), folder, "final_distance")
 
 
 if __name__ == "__main__":

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from kinarm.arm import DEFAULT_ARM, Arm
 from kinarm.errors import InvalidInputError
+from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.entrants import Entrant, find_entrants
 from kinarm.evaluation.statistics import DistanceStatistics, Share
 from kinarm.evaluation.trials import TrialSet
+from kinarm.policies.oracle_solution import OracleSolutions
 from kinarm.policies.policy import Policy
 from kinarm.rollouts import Rollouts
 from kinarm.simulator import PolicyFunction, Simulator
@@ -35,11 +37,14 @@ class Evaluation:
         What it faced.
     rollouts : Rollouts
         What it did.
+    bounds : OracleSolutions or None
+        What any policy could do, if that was asked for.
     """
 
     entrant: Entrant
     trials: TrialSet
     rollouts: Rollouts
+    bounds: OracleSolutions | None = None
 
     @property
     def task(self) -> str:
@@ -65,6 +70,20 @@ class Evaluation:
     def contacts(self) -> tuple[tuple[str, str] | None, ...]:
         """Bodies that touched, per trial."""
         return self.trials.simulator.contact_pairs(self.rollouts)
+
+    @property
+    def step_ratio(self) -> NDArray[np.float64]:
+        """Steps taken over those proven to be necessary, of the trials that succeeded.
+
+        Raises
+        ------
+        InvalidInputError
+            If the evaluation was made without bounds.
+        """
+        if self.bounds is None:
+            raise InvalidInputError(f"{self.entrant.name!r} was evaluated without the oracle")
+        ratio: NDArray[np.float64] = self.rollouts.steps / self.bounds.steps_lower_bound
+        return ratio[self.rollouts.success]
 
     @property
     def outcomes(self) -> tuple[str, ...]:
@@ -162,6 +181,24 @@ def _figures(evaluations: Sequence[Evaluation]) -> dict[str, Any]:
         "within": {str(limit): Share.of(distance <= limit).to_json() for limit in WITHIN},
         "collision": Share.of(collision).to_json(),
         "steps": {"mean": float(steps.mean()), "median": float(np.median(steps))},
+        "oracle": _beside_oracle(evaluations, float(success.mean())),
+    }
+
+
+def _beside_oracle(evaluations: Sequence[Evaluation], success: float) -> dict[str, Any] | None:
+    """Figures in relation to the bounds of the trials; None if those are not known."""
+    bounds = evaluations[0].bounds
+    if bounds is None:
+        return None
+    possible = float(bounds.reachable.mean())
+    ratios = np.concatenate([evaluation.step_ratio for evaluation in evaluations])
+    return {
+        "relative_success": success / possible if possible else None,
+        "step_ratio": {
+            "trials": ratios.size,
+            "median": float(np.median(ratios)) if ratios.size else None,
+            "p95": float(np.percentile(ratios, 95)) if ratios.size else None,
+        },
     }
 
 
@@ -177,14 +214,15 @@ def evaluate(
     *,
     arm: str | Arm = DEFAULT_ARM,
     allow_other_arm: bool = False,
+    oracle: bool = False,
 ) -> Evaluation:
     """Put one policy to the trials (paper, section 3.3: 200 random goals, 64 steps each).
 
     Parameters
     ----------
     policy : str, Path, Policy, Entrant or function
-        A shipped policy or baseline by name (a group's first seed), a file, a policy, or a
-        function from observations (n, n_observations) to actions (n, n_actions).
+        A shipped policy, a baseline or the oracle by name (a group's first seed), a file, a
+        policy, or a function from observations (n, n_observations) to actions (n, n_actions).
     task : str or ReachTask, optional
         The task; by default the one that the policy was trained on.
     trials : int
@@ -195,6 +233,8 @@ def evaluate(
         The arm.
     allow_other_arm : bool
         Whether a policy may face an arm that it was not trained for.
+    oracle : bool
+        Whether to bound what any policy could do in the trials; see `Evaluation.bounds`.
 
     Raises
     ------
@@ -207,8 +247,8 @@ def evaluate(
     task = task or entrant.trained_on
     if task is None:
         raise InvalidInputError(f"{entrant.name!r} was not trained on a task: name one")
-    simulator = Simulator(arm, task)
-    return run_trials(entrant, TrialSet.draw(simulator, trials, seed), allow_other_arm)
+    trial_set = TrialSet.draw(Simulator(arm, task), trials, seed)
+    return run_trials(entrant, trial_set, allow_other_arm, oracle=oracle)
 
 
 def _as_entrant(policy: str | Path | Policy | Entrant | PolicyFunction) -> Entrant:
@@ -222,17 +262,29 @@ def _as_entrant(policy: str | Path | Policy | Entrant | PolicyFunction) -> Entra
     return Entrant.from_function(getattr(policy, "__name__", "function"), policy)
 
 
-def run_trials(entrant: Entrant, trials: TrialSet, allow_other_arm: bool = False) -> Evaluation:
+def run_trials(
+    entrant: Entrant, trials: TrialSet, allow_other_arm: bool = False, *, oracle: bool = False
+) -> Evaluation:
     """Let an entrant face a set of trials.
+
+    Parameters
+    ----------
+    entrant : Entrant
+        The policy.
+    trials : TrialSet
+        What it faces.
+    allow_other_arm, oracle
+        As for `evaluate`.
 
     Raises
     ------
     PolicyFileError
         If it was trained for another arm and that is not allowed.
     """
-    if entrant.policy is not None and not allow_other_arm:
-        entrant.policy.check_arm(trials.simulator.arm)
-    return Evaluation(entrant, trials, entrant.run(trials))
+    if not allow_other_arm:
+        entrant.check_arm(trials.simulator.arm)
+    bounds = oracle_bounds(trials) if oracle else None
+    return Evaluation(entrant, trials, entrant.run(trials), bounds)
 
 
 def pool(evaluations: Sequence[Evaluation]) -> tuple[PooledEvaluation, ...]:

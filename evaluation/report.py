@@ -4,6 +4,7 @@ import io
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
+from kinarm.evaluation.bounds import bounds_document
 from kinarm.evaluation.evaluations import Evaluation, pool
 from kinarm.evaluation.statistics import BOOTSTRAP_SEED, RESAMPLES
 from kinarm.policies.provenance import package_versions, source_commit
@@ -28,11 +29,11 @@ def evaluation_document(evaluations: Sequence[Evaluation], command: str) -> dict
     Returns
     -------
     dict
-        ``protocol`` (trials per task with their hash, arm, versions, commit, command),
+        ``protocol`` (trials per task with their hash and bounds, arm, versions, commit, command),
         ``results`` (one per policy and task, with the outcome of every trial) and ``pooled``
         (one per recipe and task with several training seeds).
     """
-    trial_sets = {evaluation.task: evaluation.trials for evaluation in evaluations}
+    trial_sets = {e.task: (e.trials, e.bounds) for e in evaluations}
     any_set = evaluations[0].trials
     arm = any_set.simulator.arm
     return {
@@ -57,8 +58,9 @@ def evaluation_document(evaluations: Sequence[Evaluation], command: str) -> dict
                     "horizon": trials.simulator.task.horizon,
                     "starts": trials.starts.tolist(),
                     "goals": trials.goals.tolist(),
+                    "oracle": None if bounds is None else bounds_document(bounds),
                 }
-                for task, trials in trial_sets.items()
+                for task, (trials, bounds) in trial_sets.items()
             },
             "versions": package_versions(),
             "commit": source_commit(),
@@ -133,6 +135,7 @@ COLUMNS = (
     "task",
     "policy",
     "success %",
+    "of oracle %",
     "seeds: range %",
     "<= 0.1 m",
     "<= 0.2 m",
@@ -141,10 +144,20 @@ COLUMNS = (
     "p95 m",
     "contact %",
     "steps",
+    "step ratio",
 )
 
 
-EXPENDABLE = ("<= 0.1 m", "mean m", "p95 m", "steps", "seeds: range %", "<= 0.2 m", "contact %")
+EXPENDABLE = (
+    "<= 0.1 m",
+    "mean m",
+    "p95 m",
+    "steps",
+    "seeds: range %",
+    "<= 0.2 m",
+    "contact %",
+    "of oracle %",
+)
 
 
 def _rows(document: dict[str, Any], task: str) -> list[dict[str, Any]]:
@@ -165,6 +178,7 @@ def _cells(row: dict[str, Any]) -> list[str]:
         row["task"],
         row["policy"],
         _percent(row["success"]),
+        _relative(row["oracle"]),
         over_seeds,
         f"{100 * row['within']['0.1']['rate']:.1f}",
         f"{100 * row['within']['0.2']['rate']:.1f}",
@@ -173,7 +187,21 @@ def _cells(row: dict[str, Any]) -> list[str]:
         f"{distance['p95']:.3f}",
         f"{100 * row['collision']['rate']:.1f}",
         f"{row['steps']['median']:.0f}",
+        _ratio(row["oracle"]),
     ]
+
+
+def _relative(beside: dict[str, Any] | None) -> str:
+    """Success in per cent of the oracle's."""
+    share = beside["relative_success"] if beside else None
+    return "" if share is None else f"{100 * share:.1f}"
+
+
+def _ratio(beside: dict[str, Any] | None) -> str:
+    """Median and 95th percentile of the step ratio."""
+    if not beside or beside["step_ratio"]["median"] is None:
+        return ""
+    return "{median:.2f} (p95 {p95:.2f})".format(**beside["step_ratio"])
 
 
 def _metres(value: float, interval: list[float] | None) -> str:
