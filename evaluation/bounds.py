@@ -103,10 +103,12 @@ def bounds_document(solutions: OracleSolutions) -> dict[str, Any]:
     -------
     dict
         ``success``, ``unsolved`` (trials that no motion was found for, and why), ``steps`` and
-        ``steps_lower_bound`` (mean, median and 95th percentile), ``tight_share``, and
-        ``trials`` with the bounds of every trial.
+        ``steps_lower_bound`` of all trials and their ``gap`` where one was found (mean, median,
+        95th percentile and maximum), ``tight_share``, and ``trials`` with the bounds of every
+        trial.
     """
     missed = np.flatnonzero(~solutions.reachable)
+    gap = (solutions.steps - solutions.steps_lower_bound)[solutions.reachable]
     return {
         "success": Share.of(solutions.reachable).to_json(),
         "unsolved": [
@@ -114,6 +116,7 @@ def bounds_document(solutions: OracleSolutions) -> dict[str, Any]:
         ],
         "steps": _summary(solutions.steps),
         "steps_lower_bound": _summary(solutions.steps_lower_bound),
+        "gap": _summary(gap) if gap.size else None,
         "tight_share": float(solutions.tight.mean()),
         "trials": {
             "reachable": solutions.reachable.tolist(),
@@ -131,4 +134,5 @@ def _summary(steps: np.ndarray[Any, np.dtype[np.int64]]) -> dict[str, float]:
         "mean": float(steps.mean()),
         "median": float(np.median(steps)),
         "p95": float(np.percentile(steps, 95)),
+        "max": float(steps.max()),
     }

@@ -37,11 +37,8 @@ from kinarm.simulator import Simulator
 from kinarm.task import ReachTask
 from kinarm.validation import finite_array
 
-BUDGET = 200_000
-"""Boxes that a proof may examine."""
-
-CONTACT_BUDGET = 20_000
-"""Boxes that a proof that counts contact may examine for each number of steps."""
+BUDGET = 100_000
+"""Boxes that a proof may examine, for each number of steps."""
 
 RESOLUTION = 1e-3
 """By how much a proven distance may fall short of the smallest possible one [m]."""
@@ -154,19 +151,17 @@ class Oracle:
         lot = _Lot(starts, goals, witnesses=starts.copy())
         # The horizon comes first: most of what is out of reach is settled at once.
         horizon = np.full(n, task.horizon)
-        floors, tight = self._steps_floor(lot, np.arange(n), horizon, horizon, BUDGET)
+        floors, tight = self._steps_floor(lot, np.arange(n), horizon, horizon)
         within = np.flatnonzero(floors <= horizon)
         ones = np.ones(within.size, dtype=np.int64)
-        floors[within], tight[within] = self._steps_floor(
-            lot, within, ones, horizon[within], BUDGET
-        )
+        floors[within], tight[within] = self._steps_floor(lot, within, ones, horizon[within])
         search = MotionSearch(self.simulator, starts, goals)
         for extra in range(EXTRA_STEPS + 1):
             search.try_steps(within, floors[within] + extra, lot.witnesses)
         search.try_detours(within)
         slow = within[search.steps[within] > floors[within]]
         floors[slow], tight[slow] = self._steps_floor(
-            lot, slow, floors[slow], search.steps[slow] - 1, CONTACT_BUDGET, contact=True
+            lot, slow, floors[slow], search.steps[slow] - 1, contact=True
         )
         missed = np.flatnonzero(~search.reached)
         distance_floors = np.zeros(n)
@@ -194,7 +189,6 @@ class Oracle:
         rows: NDArray[np.int64],
         fewest: NDArray[np.int64],
         most: NDArray[np.int64],
-        budget: int,
         *,
         contact: bool = False,
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
@@ -203,9 +197,9 @@ class Oracle:
         floors, tight = np.empty(n, dtype=np.int64), np.empty(n, dtype=bool)
         witnesses = lot.witnesses[rows]
         inputs = (*self._arm, lot.starts[rows], lot.goals[rows], simulator.step_limit)
-        limits = (simulator.task.tolerance, contact, budget, fewest, most)
+        limits = (simulator.task.tolerance, contact, BUDGET, fewest, most)
         arrays = (*inputs, *limits, floors, tight, witnesses)
-        run_rows(kernels.steps_floor, n, budget * n, simulator.threads, *arrays)
+        run_rows(kernels.steps_floor, n, BUDGET * n, simulator.threads, *arrays)
         lot.witnesses[rows] = witnesses
         return floors, tight
 

@@ -122,6 +122,62 @@ def linear_bound(
     return bound
 
 
+@inlined
+def model_error(
+    curvature: NDArray[np.float64], half: NDArray[np.float64], spread: NDArray[np.float64]
+) -> float:
+    """Bound of what the linear model misses in a box [m], and what each axis has part in it."""
+    error = 0.0
+    for i in range(half.shape[0]):
+        spread[i] = 0.0
+        for j in range(half.shape[0]):
+            spread[i] += curvature[i, j] * half[j]
+        spread[i] *= half[i]
+        error += 0.5 * spread[i]
+    return error
+
+
+@inlined
+def halve(
+    boxes: NDArray[np.float64],
+    last: int,
+    bound: float,
+    step: NDArray[np.float64],
+    spread: NDArray[np.float64],
+) -> None:
+    """Halve a box along the axis that the model misses most by; the half to come first is last."""
+    n = step.shape[0]
+    widest = 0
+    for i in range(n):
+        if spread[i] > spread[widest]:
+            widest = i
+    middle = 0.5 * (boxes[last, widest] + boxes[last, n + widest])
+    boxes[last, 2 * n] = bound
+    for i in range(2 * n + 1):
+        boxes[last + 1, i] = boxes[last, i]
+    # The half in which the proposed point lies comes first.
+    above, below = (last, last + 1) if step[widest] <= 0.0 else (last + 1, last)
+    boxes[above, widest] = middle
+    boxes[below, n + widest] = middle
+
+
+@inlined
+def improves(
+    distance: float,
+    closest: float,
+    contact: bool,
+    chain: Chain,
+    shapes: ContactShapes,
+    poses: NDArray[np.float64],
+    half: NDArray[np.float64],
+    jacobian: NDArray[np.float64],
+) -> bool:
+    """Whether a configuration is closer than any before, and not ruled out by contact."""
+    if distance >= closest:
+        return False
+    return not contact or not overlaps(chain, shapes, poses, half, 0.0, jacobian)
+
+
 @kernel
 def search(
     chain: Chain,
@@ -178,54 +234,31 @@ def search(
     n, n_axes = lower.shape[0], best.shape[1]
     poses, jacobian, offset = np.empty((n_axes + 1, POSE)), np.empty((3, n)), np.empty(3)
     half, step, spread, q = np.empty(n), np.empty(n), np.empty(n), best.copy()
-    curvature = bounds.curvature
     boxes[0, :n], boxes[0, n : 2 * n], boxes[0, 2 * n] = lower, upper, 0.0
     waiting, examined = 1, 0
     closest, proven, cutoff = np.inf, np.inf, enough + ROUNDING
-    outcome = EXCLUDED
-    while waiting > 0:
+    while waiting > 0 and closest > enough:
         if examined >= budget or waiting + 1 >= BOXES:
-            outcome = EXHAUSTED
-            break
+            for i in range(waiting):
+                proven = min(proven, boxes[i, 2 * n])
+            return EXHAUSTED, closest, max(min(proven, closest) - ROUNDING, 0.0), examined
         waiting -= 1
         examined += 1
-        if boxes[waiting, 2 * n] > cutoff:
-            proven = min(proven, boxes[waiting, 2 * n])
-            continue
         for i in range(n):
             q[0, i] = 0.5 * (boxes[waiting, i] + boxes[waiting, n + i])
             half[i] = 0.5 * (boxes[waiting, n + i] - boxes[waiting, i])
         distance = tool_offset(chain, q, goals, row, poses, offset)
-        better = distance < closest
-        if better and contact:
-            better = not overlaps(chain, shapes, poses, half, 0.0, jacobian)
-        if better:
+        if improves(distance, closest, contact, chain, shapes, poses, half, jacobian):
             closest = distance
             cutoff = max(enough, closest - resolution) + ROUNDING
             best[0, :n] = q[0, :n]
-            if closest <= enough:
-                outcome = FOUND
-                break
         bound = max(boxes[waiting, 2 * n], joint_bound(bounds, poses, goals, row, half))
-        if bound > cutoff:
-            proven = min(proven, bound)
-            continue
-        remainder = 0.0
-        for i in range(n):
-            spread[i] = 0.0
-            for j in range(n):
-                spread[i] += curvature[i, j] * half[j]
-            spread[i] *= half[i]
-            remainder += 0.5 * spread[i]
-        point_jacobian(
-            chain.prismatic,
-            chain.axis,
-            poses,
-            (offset[0] + goals[row, 0], offset[1] + goals[row, 1], offset[2] + goals[row, 2]),
-            jacobian,
-        )
-        linear = linear_bound(jacobian, offset, half, cutoff + remainder, step)
-        bound = max(bound, linear - remainder)
+        if bound <= cutoff:
+            error = model_error(bounds.curvature, half, spread)
+            x, y, z = goals[row, 0], goals[row, 1], goals[row, 2]
+            tool = (x + offset[0], y + offset[1], z + offset[2])
+            point_jacobian(chain.prismatic, chain.axis, poses, tool, jacobian)
+            bound = max(bound, linear_bound(jacobian, offset, half, cutoff + error, step) - error)
         if bound > cutoff:
             proven = min(proven, bound)
             continue
@@ -234,32 +267,13 @@ def search(
         for i in range(n):
             q[0, i] += step[i]
         distance = tool_offset(chain, q, goals, row, poses, offset)
-        better = distance < closest
-        if better and contact:
-            better = not overlaps(chain, shapes, poses, half, 0.0, jacobian)
-        if better:
+        if improves(distance, closest, contact, chain, shapes, poses, half, jacobian):
             closest = distance
             cutoff = max(enough, closest - resolution) + ROUNDING
             best[0, :n] = q[0, :n]
-            if closest <= enough:
-                outcome = FOUND
-                break
-        widest = 0
-        for i in range(n):
-            if spread[i] > spread[widest]:
-                widest = i
-        middle = 0.5 * (boxes[waiting, widest] + boxes[waiting, n + widest])
-        boxes[waiting, 2 * n] = bound
-        for i in range(2 * n + 1):
-            boxes[waiting + 1, i] = boxes[waiting, i]
-        # The half in which the proposed point lies comes first.
-        first, second = (waiting, waiting + 1) if step[widest] <= 0.0 else (waiting + 1, waiting)
-        boxes[first, widest] = middle
-        boxes[second, n + widest] = middle
+        halve(boxes, waiting, bound, step, spread)
         waiting += 2
-    if outcome == EXHAUSTED:
-        for i in range(waiting):
-            proven = min(proven, boxes[i, 2 * n])
+    outcome = FOUND if closest <= enough else EXCLUDED
     return outcome, closest, max(min(proven, closest) - ROUNDING, 0.0), examined
 
 
