@@ -1,4 +1,7 @@
-"""Inverse kinematics: configurations that bring the tool to a goal without contact."""
+"""Inverse kinematics: configurations that bring the tool to a goal without contact.
+
+Kinematics and Jacobian are those of the Pinocchio model, flattened for the compiled kernels.
+"""
 
 from typing import NamedTuple
 

@@ -62,7 +62,7 @@ class Oracle:
     Parameters
     ----------
     arm : Arm or str
-        The arm, or what `Arm.load` takes.
+        The arm, or what `kinarm.Arm.load` takes.
     scene : Scene, optional
         The paper's scene by default.
     task : ReachTask or str

@@ -37,41 +37,41 @@ policy = evaluate("ars-tuned-both", trials=400, seed=3, oracle=True)
 oracle = evaluate("oracle", task="both", trials=400, seed=3, oracle=True)
 solved = policy.rollouts.success
 
-figure, panels = plt.subplots(1, 2, figsize=(9.2, 4.4), layout="constrained")
-jitter = np.random.default_rng(0).uniform(-0.3, 0.3, (2, len(trials)))
+figure, axes = plt.subplots(figsize=(5.2, 5.0), layout="constrained")
+jitter = np.random.default_rng(0).uniform(-0.35, 0.35, len(trials))  # the same across and up
 for which, steps, colour, name in (
     (solved, policy.rollouts.steps, "#d55e00", "trained policy"),
     (oracle.rollouts.success, oracle.rollouts.steps, "#0072b2", "oracle"),
 ):
-    across, up = bounds.steps_lower_bound + jitter[0], steps + jitter[1]
-    panels[0].plot(across[which], up[which], ".", color=colour, markersize=4, label=name)
-panels[0].plot([0, 64], [0, 64], color="#444444", linewidth=1)
-panels[0].text(50, 47, "impossible below", rotation=45, ha="center", va="top", color="#444444")
-panels[0].set(
-    xlabel="steps proven necessary",
-    ylabel="steps taken",
-    xlim=(0, 65),
-    ylim=(0, 65),
-    aspect="equal",
-)
-panels[0].legend(frameon=False, loc="lower right")
+    across, up = bounds.steps_lower_bound + jitter, steps + jitter
+    axes.plot(across[which], up[which], ".", color=colour, markersize=4, label=name)
+axes.plot([0, 65], [0, 65], color="#444444", linewidth=1)
+axes.text(50, 47, "impossible below", rotation=45, ha="center", va="top", color="#444444")
+axes.set(xlabel="steps proven necessary", ylabel="steps taken", xlim=(0, 65), ylim=(0, 65))
+axes.set_aspect("equal")
+axes.legend(frameon=False, loc="lower right")
+axes.spines[["top", "right"]].set_visible(False)
 
 # %%
 # The step ratio
 # --------------
-# Steps taken over steps proven necessary, of the trials that were solved.
+# Steps taken over steps proven necessary, of the trials that were solved: the share of all trials
+# that were solved with a ratio of at most so much.
 
+figure, axes = plt.subplots(figsize=(6.4, 3.6), layout="constrained")
 for ratio, colour, name in (
-    (policy.step_ratio, "#d55e00", "trained policy"),
     (oracle.step_ratio, "#0072b2", "oracle"),
+    (policy.step_ratio, "#d55e00", "trained policy"),
 ):
-    share = np.arange(1, len(ratio) + 1) / len(trials)
-    panels[1].step(np.sort(ratio), share, where="post", color=colour, label=name)
+    ordered = np.append(np.sort(ratio), 32.0)
+    share = np.minimum(np.arange(1, len(ratio) + 2), len(ratio)) / len(trials)
+    axes.step(ordered, share, where="post", color=colour, label=name)
     print(f"{name}: median {np.median(ratio):.2f}, 95th percentile {np.percentile(ratio, 95):.2f}")
-panels[1].set(xlabel="step ratio", ylabel="share of trials solved", xscale="log", ylim=(0, 1.02))
-panels[1].set_xticks([1, 2, 4, 8, 16], ["1", "2", "4", "8", "16"])
-panels[1].legend(frameon=False, loc="lower right")
-for axes in panels:
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(alpha=0.3)
-plt.show()
+axes.set(
+    xlabel="step ratio", ylabel="share of trials", xscale="log", xlim=(0.95, 32), ylim=(0, 1.02)
+)
+axes.set_xticks([1, 2, 4, 8, 16, 32], ["1", "2", "4", "8", "16", "32"])
+axes.minorticks_off()
+axes.legend(frameon=False, loc="center right")
+axes.spines[["top", "right"]].set_visible(False)
+axes.grid(alpha=0.3)
