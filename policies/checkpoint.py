@@ -10,8 +10,9 @@ import numpy as np
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.files import write_atomically
-from kinarm.policies.ars import ARSState, CurvePoint
+from kinarm.policies.ars import ARSState
 from kinarm.policies.ars_config import ARSConfig
+from kinarm.policies.curve import CurvePoint
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.policy import CORRUPT
 
@@ -61,16 +62,7 @@ def load_checkpoint(path: str | Path) -> tuple[ARSConfig, ARSState]:
                 theta=content["theta"],
                 normalizer=Normalizer(int(content["count"]), content["mean"], content["squares"]),
                 generator=json.loads(str(content["generator"])),
-                curve=tuple(
-                    CurvePoint(
-                        mean_return=float(row[0]),
-                        std_return=float(row[1]),
-                        success=float(row[2]),
-                        environment_steps=int(row[3]),
-                        wall_time=float(row[4]),
-                    )
-                    for row in content["curve"]
-                ),
+                curve=tuple(CurvePoint.from_row(row) for row in content["curve"]),
             )
             _check_state(state)
             config = ARSConfig(**json.loads(str(content["config"])))
