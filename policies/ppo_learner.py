@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from stable_baselines3 import PPO
-from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
+from stable_baselines3.common.logger import KVWriter, Logger, TensorBoardOutputFormat
 from torch.nn.utils import parameters_to_vector, vector_to_parameters
 
 from kinarm.errors import InvalidInputError
@@ -105,7 +105,9 @@ class PPOLearner:
             },
             device="cpu",
         )
-        outputs = [] if tensorboard is None else [TensorBoardOutputFormat(str(tensorboard))]
+        outputs: list[KVWriter] = []
+        if tensorboard is not None:
+            outputs.append(TensorBoardOutputFormat(str(tensorboard)))
         self.model.set_logger(Logger(folder=None, output_formats=outputs))
 
     @classmethod
@@ -188,9 +190,9 @@ class PPOLearner:
         weights = list(model.policy.parameters())
         vector_to_parameters(torch.tensor(state.parameters), weights)
         moments = (state.first_moment, state.second_moment)
-        sizes_of = [weight.numel() for weight in weights]
-        parts = zip(*(torch.tensor(moment).split(sizes_of) for moment in moments), strict=True)
-        for weight, (first, second) in zip(weights, parts, strict=True):
+        lengths = [weight.numel() for weight in weights]
+        parts = (torch.split(torch.tensor(moment), lengths) for moment in moments)
+        for weight, first, second in zip(weights, *parts, strict=True):
             model.policy.optimizer.state[weight] = {
                 "step": torch.tensor(float(state.iteration * updates)),
                 "exp_avg": first.view_as(weight),
@@ -218,10 +220,11 @@ class PPOLearner:
         """Freeze the actor of a state into a policy, which takes its mean action."""
         self.load(state)
         actor = self.model.policy
-        linear = [part for part in actor.mlp_extractor.policy_net if hasattr(part, "weight")]
+        parts = [*actor.mlp_extractor.policy_net.modules(), actor.action_net]
         layers = tuple(
             Layer(part.weight.detach().numpy(), part.bias.detach().numpy())
-            for part in (*linear, actor.action_net)
+            for part in parts
+            if isinstance(part, torch.nn.Linear)
         )
         mean, std = state.normalizer.mean, state.normalizer.std
         if self.env.mirror is not None:
