@@ -13,7 +13,7 @@ from kinarm.validation import whole_number
 
 WHOLE_NUMBERS = ("arms", "rollout_steps", "minibatch", "epochs", "iterations", "horizon")
 POSITIVE_NUMBERS = ("learning_rate", "clip_range", "max_grad_norm", "tolerance")
-SHARES = ("gamma", "gae_lambda")
+SHARES = ("gamma", "gae_lambda", "start_spread", "initial_start_spread", "widening")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,6 +79,10 @@ class PPOConfig:
         Reward weight of a step.
     start_spread : float
         Scales the range of the start configurations.
+    initial_start_spread : float
+        The same at the beginning of the training.
+    widening : float
+        Share of the training in which the spread grows linearly from the one to the other.
     """
 
     task: str = "right"
@@ -107,6 +111,8 @@ class PPOConfig:
     success_bonus: float = 0.0
     step_reward: float = 0.0
     start_spread: float = 1.0
+    initial_start_spread: float = 1.0
+    widening: float = 0.0
 
     def __post_init__(self) -> None:
         for name in (*WHOLE_NUMBERS, "seed"):
@@ -170,8 +176,15 @@ class PPOConfig:
         )
         return Simulator(Arm.load(self.arm), task, threads=1)
 
-    def learning_rate_at(self, progress_remaining: float) -> float:
-        """Learning rate when this share of the training lies ahead."""
+    def learning_rate_at(self, done: float) -> float:
+        """Learning rate after this share of the training."""
         if self.learning_rate_schedule == "constant":
             return self.learning_rate
-        return self.learning_rate * progress_remaining
+        return self.learning_rate * (1 - done)
+
+    def start_spread_at(self, done: float) -> float:
+        """Spread of the start configurations after this share of the training."""
+        if done >= self.widening:
+            return self.start_spread
+        grown = done / self.widening
+        return (1 - grown) * self.initial_start_spread + grown * self.start_spread

@@ -1,6 +1,7 @@
 """The simulator as a vectorised environment of Stable-Baselines3."""
 
 import time
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -161,6 +162,10 @@ class BatchEnv(VecEnv):
             return self._actions
         left = self.mirror.seen_on_the_left(observations)
         return np.where(left[:, None], self._actions * self.mirror.actions, self._actions)
+
+    def spread_starts(self, spread: float) -> None:
+        """From now on, scale the range of the start configurations by this factor in [0, 1]."""
+        self.simulator.task = replace(self.simulator.task, start_spread=spread)
 
     def states(self) -> EpisodeStates:
         """Copy what the running episodes depend on."""

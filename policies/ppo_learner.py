@@ -121,6 +121,7 @@ class PPOLearner:
             observations = mirror.to_the_right(observations)
         learner = cls(config, Normalizer.of(observations))
         learner.env.rng = rng
+        learner.env.spread_starts(config.start_spread_at(0.0))
         learner.env.reset()
         parameters = learner.parameters()
         return PPOState(
@@ -149,7 +150,9 @@ class PPOLearner:
         config, model, env = self.config, self.model, self.env
         env.rng = seed_iteration(config.seed, state.iteration + 1)
         self.load(state)
-        self._learning_rate = config.learning_rate_at(1 - state.iteration / config.iterations)
+        done = state.iteration / config.iterations
+        self._learning_rate = config.learning_rate_at(done)
+        env.spread_starts(config.start_spread_at(done))
         model.learn(config.steps_per_iteration, reset_num_timesteps=False)
         returns, successes, simulator_time = env.take_record()
         point = CurvePoint(

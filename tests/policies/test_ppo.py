@@ -7,11 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-torch = pytest.importorskip("torch")
+pytest.importorskip("torch")
 pytest.importorskip("stable_baselines3")
 
-from kinarm.errors import InvalidInputError, MissingExtraError  # noqa: E402
-from kinarm.policies import (  # noqa: E402
+import torch
+
+from kinarm.errors import InvalidInputError, MissingExtraError
+from kinarm.policies import (
     PPOConfig,
     load_ppo_checkpoint,
     ppo,
@@ -19,8 +21,8 @@ from kinarm.policies import (  # noqa: E402
     save_ppo_checkpoint,
     train_ppo,
 )
-from kinarm.policies.ppo_learner import PPOLearner, alone_in_torch, seed_iteration  # noqa: E402
-from kinarm.simulator import Simulator  # noqa: E402
+from kinarm.policies.ppo_learner import PPOLearner, alone_in_torch, seed_iteration
+from kinarm.simulator import Simulator
 
 TINY = PPOConfig(
     task="both",
@@ -162,7 +164,7 @@ class TestResuming:
             learner = PPOLearner(config, states[0].normalizer)
             learner.iterate(states[0], 0.0)
             learner.env.rng = seed_iteration(config.seed, 2 + 1)
-            learner._learning_rate = config.learning_rate_at(1 - 2 / config.iterations)
+            learner._learning_rate = config.learning_rate_at(2 / config.iterations)
             learner.model.learn(config.steps_per_iteration, reset_num_timesteps=False)
             assert learner.parameters().tobytes() == states[2].parameters.tobytes()
             assert learner.model.num_timesteps == states[2].environment_steps
@@ -254,6 +256,22 @@ def test_compiled_rollouts_follow_the_model(trained):
     stepped = simulator.rollout(lambda seen: predicted(learner, seen), starts, goals)
     np.testing.assert_array_equal(compiled.steps, stepped.steps)
     np.testing.assert_allclose(compiled.configurations, stepped.configurations, atol=1e-3)
+
+
+def test_starts_spread_out_as_configured():
+    """From home at the beginning, over the whole range from half of the training on."""
+    config = replace(
+        TINY, iterations=9, initial_start_spread=0.0, widening=0.5, horizon=2, tolerance=0.01
+    )
+    assert [config.start_spread_at(done) for done in (0, 0.25, 0.5, 1)] == [0, 0.5, 1, 1]
+    states = [PPOLearner.initial_state(config)]
+    train_ppo(config, on_iteration=states.append)
+    home = config.simulator().arm.home
+    limit = 2 * config.simulator().step_limit
+    moved = [np.abs(state.episodes.q - home)[:, :5] for state in states]
+    assert (moved[0] == 0).all()
+    assert (moved[1] <= limit + 1e-9).all()
+    assert (moved[-1] > limit).any()
 
 
 class TestGlobalState:

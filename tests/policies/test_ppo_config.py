@@ -38,6 +38,9 @@ def test_numbers_follow_from_others():
         ({"tolerance": 0}, "tolerance"),
         ({"gamma": 1.5}, r"gamma must lie in \[0, 1\], got 1.5"),
         ({"gae_lambda": float("nan")}, "gae_lambda"),
+        ({"start_spread": 1.5}, r"start_spread must lie in \[0, 1\], got 1.5"),
+        ({"initial_start_spread": -0.1}, "initial_start_spread"),
+        ({"widening": 2}, "widening"),
         ({"entropy_weight": -1}, "entropy_weight must not be negative, got -1"),
         ({"value_weight": float("nan")}, "value_weight"),
         ({"initial_log_std": float("inf")}, "initial_log_std must be finite"),
@@ -59,7 +62,7 @@ def test_is_frozen_and_comparable():
 def test_learning_rate():
     assert PPOConfig(learning_rate=0.01).learning_rate_at(0.25) == 0.01
     falling = PPOConfig(learning_rate=0.01, learning_rate_schedule="linear")
-    assert [falling.learning_rate_at(left) for left in (1, 0.25)] == [0.01, 0.0025]
+    assert [falling.learning_rate_at(done) for done in (0, 0.75)] == [0.01, 0.0025]
 
 
 def test_simulator_has_the_settings():
