@@ -44,10 +44,12 @@ PPO_RECIPES = {
         learning_rate=1e-3,
         learning_rate_schedule="linear",
         entropy_weight=0.002,
+        initial_log_std=-0.7,
         tolerance=0.03,
         symmetric=True,
         success_bonus=5.0,
-        step_reward=-0.02,
+        initial_start_spread=0.2,
+        widening=0.4,
     ),
 }
 """PPO settings by name; both take 1.2 million environment steps, as the paper did.
