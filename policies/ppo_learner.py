@@ -189,7 +189,8 @@ class PPOLearner:
                 f"the state to resume has {sizes[0]} parameters and {sizes[1]} arms, "
                 f"not {expected[0]} and {expected[1]}"
             )
-        updates = config.epochs * config.steps_per_iteration // config.minibatch
+        epochs = state.iteration * config.epochs
+        updates = epochs * config.steps_per_iteration // config.minibatch
         weights = list(model.policy.parameters())
         vector_to_parameters(torch.tensor(state.parameters), weights)
         moments = (state.first_moment, state.second_moment)
@@ -197,11 +198,11 @@ class PPOLearner:
         parts = (torch.split(torch.tensor(moment), lengths) for moment in moments)
         for weight, first, second in zip(weights, *parts, strict=True):
             model.policy.optimizer.state[weight] = {
-                "step": torch.tensor(float(state.iteration * updates)),
+                "step": torch.tensor(float(updates)),
                 "exp_avg": first.view_as(weight),
                 "exp_avg_sq": second.view_as(weight),
             }
-        model.num_timesteps = state.environment_steps
+        model.num_timesteps, model._n_updates = state.environment_steps, epochs
         model._last_obs = self.env.restore(state.episodes)
         model._last_episode_starts = state.episodes.steps == 0
 
