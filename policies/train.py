@@ -142,6 +142,8 @@ def _train(options: argparse.Namespace) -> None:
     check_folder(out.parent)
     learner = _ars() if options.learner == "ars" else _ppo(options.tensorboard)
     config, state = _beginning(options, learner)
+    if learner.name == "ppo" and options.tensorboard is not None:
+        check_folder(options.tensorboard, create=True)
     keeper = CheckpointKeeper(learner, config, checkpoint_path(out))
     with TrainingProgress(learner.name, config) as progress:
 
@@ -186,8 +188,6 @@ def _ppo(tensorboard: Path | None) -> Learner:
     from kinarm.policies.recipes import ppo_recipe
 
     require_ppo(tensorboard=tensorboard is not None)
-    if tensorboard is not None:
-        check_folder(tensorboard, create=True)
     from kinarm.policies.ppo_learner import task_mirror
 
     return Learner(

@@ -128,7 +128,8 @@ def test_train_refuses(run, tmp_path, arguments, words):
 )
 def test_train_ppo_refuses(run, tmp_path, arguments, words):
     pytest.importorskip("stable_baselines3")
-    answer = run("kinarm-train", "ppo", "--out", tmp_path / "p.npz", *arguments)
+    paths = ("--out", tmp_path / "p.npz", "--tensorboard", tmp_path / "logs")
+    answer = run("kinarm-train", "ppo", *paths, *arguments)
     check_refused(answer, *words)
     assert list(tmp_path.iterdir()) == []
 
