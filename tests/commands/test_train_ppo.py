@@ -140,7 +140,7 @@ def test_learners_do_not_resume_each_other(run, tmp_path):
 
 def test_ctrl_c_and_resume_give_the_uninterrupted_policy(run, tmp_path):
     out, checkpoint = tmp_path / "p.npz", tmp_path / "p.checkpoint.npz"
-    options = [str(word) for word in ("--iterations", 400, *TINY_OPTIONS)]
+    options = [str(word) for word in ("--iterations", 150, *TINY_OPTIONS)]
     process = subprocess.Popen(
         [sys.executable, "-c", TRAIN_WITH_FREQUENT_CHECKPOINTS, "ppo", "--out", out, *options],
         cwd=ROOT,
@@ -159,7 +159,7 @@ def test_ctrl_c_and_resume_give_the_uninterrupted_policy(run, tmp_path):
     assert errors.splitlines()[-1].startswith("kinarm-train: interrupted after")
     assert not out.exists()
     assert run("kinarm-train", "ppo", "--out", out, "--resume").status == 0
-    check_equal(Policy.load(out), train_ppo(ppo_recipe("paper", iterations=400, **TINY)).policy)
+    check_equal(Policy.load(out), train_ppo(ppo_recipe("paper", iterations=150, **TINY)).policy)
 
 
 def test_tensorboard(run, tmp_path):
