@@ -57,7 +57,7 @@ def train_ppo(
     Raises
     ------
     MissingExtraError
-        If Stable-Baselines3 or what `tensorboard` needs is not installed.
+        If Stable-Baselines3 is not installed, or TensorBoard if it is asked for.
     InvalidInputError
         If the state is not one of such a training.
     """
