@@ -92,7 +92,7 @@ class PPOConfig:
     arms: int = 16
     rollout_steps: int = 125
     iterations: int = 600
-    minibatch: int = 250
+    minibatch: int = 500
     epochs: int = 10
     hidden: tuple[int, ...] = (64, 64)
     learning_rate: float = 3e-4
