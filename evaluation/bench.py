@@ -11,6 +11,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from kinarm.command_line import Parser, run_command, whole_number
@@ -49,6 +50,9 @@ def build_parser() -> Parser:
         metavar="NAME_OR_FILE",
         help="trained policy to run (ars-tuned-right)",
     )
+    parser.add_argument(
+        "--ppo", action="store_true", help="time a training with PPO as well (a minute or two)"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON on standard output")
     return parser
 
@@ -60,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _bench(options: argparse.Namespace) -> None:
     """From options to figures."""
-    document = measure(options.policy, options.repetitions)
+    document = measure(options.policy, options.repetitions, ppo=options.ppo)
     if options.json:
         json.dump(document, sys.stdout)
         sys.stdout.write("\n")
@@ -71,7 +75,7 @@ def _bench(options: argparse.Namespace) -> None:
     console.print(_table(document))
 
 
-def measure(policy_name: str, repetitions: int) -> dict[str, Any]:
+def measure(policy_name: str, repetitions: int, *, ppo: bool = False) -> dict[str, Any]:
     """Measure everything.
 
     Parameters
@@ -80,6 +84,8 @@ def measure(policy_name: str, repetitions: int) -> dict[str, Any]:
         Trained policy to run.
     repetitions : int
         How often each figure is measured.
+    ppo : bool
+        Time a training with PPO as well, once.
 
     Returns
     -------
@@ -110,6 +116,7 @@ def measure(policy_name: str, repetitions: int) -> dict[str, Any]:
         "table_1_training": measure_training(policy.provenance.task, min(repetitions, 3)),
         "oracle": measure_oracle(policy.provenance.task, min(repetitions, 3)),
         "evaluation": measure_evaluation(),
+        **({"ppo_training": measure_ppo(policy.provenance.task)} if ppo else {}),
     }
 
 
@@ -266,6 +273,32 @@ def measure_oracle(task: str, repetitions: int) -> dict[str, Any]:
     return {"trials": ORACLE_TRIALS, "trials_per_second": timed(run, repetitions).to_json()}
 
 
+def measure_ppo(task: str) -> dict[str, Any]:
+    """Time, steps and the simulator's share of a training with PPO's tuned recipe.
+
+    Returns
+    -------
+    dict
+        Figures that JSON can hold, or under ``skipped`` why there are none.
+    """
+    from kinarm.errors import MissingExtraError
+    from kinarm.policies.ppo import train_ppo
+    from kinarm.policies.recipes import ppo_recipe
+
+    config = ppo_recipe("tuned", task=task)
+    try:
+        train_ppo(replace(config, iterations=1))  # imports torch and compiles
+    except MissingExtraError as error:
+        return {"skipped": str(error)}
+    result = train_ppo(config)
+    seconds = result.curve[-1].wall_time
+    return {
+        "seconds": seconds,
+        "environment_steps": result.curve[-1].environment_steps,
+        "simulator_share": result.simulator_time / seconds,
+    }
+
+
 def measure_evaluation() -> dict[str, float]:
     """Time [s] and peak memory [MB] of ``kinarm-eval --trials 200`` as a process of its own.
 
@@ -322,6 +355,9 @@ def _table(document: dict[str, Any]) -> Any:
         f"training of Table 1 ({training['environment_steps'] / 1e6:.1f} million steps)",
         *(f"{training['seconds'][name]:.2f} s" for name in ("median", "best")),
     )
+    if "ppo_training" in document:
+        for row in _ppo_rows(document["ppo_training"]):
+            table.add_row(*row)
     table.add_row(
         f"oracle, {document['oracle']['trials']} trials of a task",
         *(
@@ -340,6 +376,17 @@ def _table(document: dict[str, Any]) -> Any:
         "kinarm-eval --trials 200, bounds known", f"{evaluation['seconds']:.1f} s", memory
     )
     return table
+
+
+def _ppo_rows(training: dict[str, Any]) -> list[tuple[str, ...]]:
+    """Rows of the training with PPO, which is timed once."""
+    if "skipped" in training:
+        return [("training with PPO", "skipped"), (training["skipped"],)]
+    steps = training["environment_steps"] / 1e6
+    return [
+        (f"training with PPO ({steps:.1f} million steps)", f"{training['seconds']:.1f} s"),
+        ("share of it in the simulator", f"{training['simulator_share']:.1%}"),
+    ]
 
 
 def _rates(timing: dict[str, float]) -> list[str]:

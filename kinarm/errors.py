@@ -9,7 +9,8 @@
     │   └── UnknownNameError    a name that does not exist; lists the ones that do
     ├── StartInContactError a start configuration that touches something
     ├── PolicyFileError     a policy file or checkpoint that cannot be read or used here
-    └── OutputError         a file or folder that cannot be written
+    ├── OutputError         a file or folder that cannot be written
+    └── MissingExtraError   an optional package that is not installed; says how to install it
 
 Command lines turn any of them into one line on standard error and exit status 2.
 """
@@ -82,3 +83,23 @@ class PolicyFileError(KinarmError):
 
 class OutputError(KinarmError):
     """A file or folder cannot be written."""
+
+
+class MissingExtraError(KinarmError):
+    """An optional package that is not installed.
+
+    Parameters
+    ----------
+    package : str
+        The package that is missing.
+    extra : str
+        The extra of kinarm that brings it.
+    """
+
+    def __init__(self, package: str, extra: str) -> None:
+        self.package = package
+        self.extra = extra
+        super().__init__(f"{package} is not installed: pip install 'kinarm[{extra}]'")
+
+    def __reduce__(self) -> tuple[type, tuple[str, str]]:
+        return type(self), (self.package, self.extra)

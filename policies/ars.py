@@ -12,33 +12,12 @@ from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError
 from kinarm.networks import Networks
 from kinarm.policies.ars_config import ARSConfig
+from kinarm.policies.curve import CurvePoint
 from kinarm.policies.mirror import Mirror, is_symmetric
 from kinarm.policies.normalizer import Normalizer, input_scale
 from kinarm.policies.policy import Layer, Policy
 from kinarm.policies.provenance import Provenance, package_versions, source_commit
 from kinarm.simulator import Simulator
-
-
-class CurvePoint(NamedTuple):
-    """What one iteration of the training looked like.
-
-    Attributes
-    ----------
-    mean_return, std_return : float
-        Mean and standard deviation of the returns of the iteration's episodes.
-    success : float
-        Share of its episodes that reached the goal.
-    environment_steps : int
-        Steps taken since the training began.
-    wall_time : float
-        Time spent since the training began [s].
-    """
-
-    mean_return: float
-    std_return: float
-    success: float
-    environment_steps: int
-    wall_time: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -17,6 +17,8 @@ from kinarm.simulator import Simulator
 
 TESTED_CONFIGURATIONS = 16
 ACCURACY = 1e-9
+GOAL_Y = 1
+"""Index of the goal's y coordinate in an observation."""
 
 
 class Mirror(NamedTuple):
@@ -43,6 +45,16 @@ class Mirror(NamedTuple):
         Shape (n_actions, n_observations).
         """
         return np.outer(self.actions, self.observations) > 0
+
+    def seen_on_the_left(self, observations: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which observations, shape (n, n_observations), have a goal to the left of the arm."""
+        left: NDArray[np.bool_] = observations[:, GOAL_Y] > 0
+        return left
+
+    def to_the_right(self, observations: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Reflect those observations, shape (n, n_observations), whose goal lies to the left."""
+        left = self.seen_on_the_left(observations)
+        return np.where(left[:, None], observations * self.observations, observations)
 
     @classmethod
     def of(cls, simulator: Simulator) -> "Mirror":

@@ -44,6 +44,12 @@ class Normalizer:
         """Statistics before the first observation: mean 0 and standard deviation 1."""
         return cls(0, np.zeros(n_observations), np.zeros(n_observations))
 
+    @classmethod
+    def of(cls, observations: NDArray[np.float64]) -> "Normalizer":
+        """Statistics of given observations, shape (n, n_observations)."""
+        mean = observations.mean(axis=0)
+        return cls(len(observations), mean, ((observations - mean) ** 2).sum(axis=0))
+
     @property
     def std(self) -> NDArray[np.float64]:
         """Population standard deviation, shape (n_observations,); 1 before any observation."""

@@ -10,7 +10,10 @@ from typing import Any
 
 from kinarm.errors import InvalidInputError
 
-RECORDED_PACKAGES = ("kinarm", "numpy", "numba", "pin", "coal", "gymnasium", "scipy")
+RECORDED_PACKAGES = (
+    *("kinarm", "numpy", "numba", "pin", "coal", "gymnasium", "scipy"),
+    *("torch", "stable-baselines3"),
+)
 
 
 @dataclass(frozen=True, kw_only=True)

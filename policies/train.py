@@ -1,64 +1,130 @@
 """``kinarm-train``: train a policy."""
 
 import argparse
-import csv
-import io
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from kinarm.command_line import Parser, finite_number, run_command, whole_number
 from kinarm.errors import InvalidInputError, KinarmError, PolicyFileError
-from kinarm.files import check_folder, write_atomically
+from kinarm.files import check_folder
 
 if TYPE_CHECKING:
-    from kinarm.policies.ars import ARSResult, ARSState, CurvePoint
-    from kinarm.policies.ars_config import ARSConfig
+    from kinarm.policies.curve import CurvePoint
 
 PROG = "kinarm-train"
 CHECKPOINT_SECONDS = 5.0
 
-EPILOG = """
+ARS_EPILOG = """
 examples:
   kinarm-train ars --task right --out right.npz                      the paper's Table 1
   kinarm-train ars --task both --recipe tuned --seed 3 --out b.npz   our best linear policy
   kinarm-train ars --out b.npz --resume                              go on where it stopped
 """
 
+PPO_EPILOG = """
+needs the extra ppo: pip install 'kinarm[ppo]'
+
+examples:
+  kinarm-train ppo --task right --out right.npz                      the paper's reward
+  kinarm-train ppo --task both --recipe tuned --seed 3 --out b.npz   our best policy
+  kinarm-train ppo --out b.npz --resume                              go on where it stopped
+"""
+
+
+class Learner(NamedTuple):
+    """What the command needs of a learner.
+
+    Attributes
+    ----------
+    name : str
+        Its name on the command line.
+    recipe : callable
+        Looks settings up by name, with replacements.
+    check : callable
+        Refuses settings that cannot be trained.
+    train : callable
+        Trains, given settings, the state to go on from, and what to call with every state.
+    save, load : callable
+        Write and read checkpoints.
+    """
+
+    name: str
+    recipe: Callable[..., Any]
+    check: Callable[[Any], object]
+    train: Callable[..., Any]
+    save: Callable[[Path, Any, Any], None]
+    load: Callable[[Path], tuple[Any, Any]]
+
 
 def build_parser() -> Parser:
     """The options of the command."""
     parser = Parser(prog=PROG, description="Train a policy.")
     learners = parser.add_subparsers(dest="learner", required=True, metavar="LEARNER")
+    _add_ars(learners)
+    _add_ppo(learners)
+    return parser
+
+
+def _add_ars(learners: "argparse._SubParsersAction[Parser]") -> None:
+    """Options of ``kinarm-train ars``."""
     ars = learners.add_parser(
         "ars",
         help="Augmented Random Search",
         description="Train a linear policy with Augmented Random Search.",
-        epilog=EPILOG,
+        epilog=ARS_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    ars.add_argument("--task", metavar="NAME", help="left, right (default) or both")
-    ars.add_argument("--recipe", metavar="NAME", help="named settings (paper)")
-    ars.add_argument("--seed", type=whole_number(0), metavar="N", help="seed of all randomness (0)")
-    ars.add_argument("--arm", metavar="NAME_OR_URDF", help="arm to train (paper)")
-    ars.add_argument("--out", type=Path, required=True, metavar="FILE.npz", help="the policy")
-    ars.add_argument("--resume", action="store_true", help="go on from the checkpoint beside --out")
-    settings = ars.add_argument_group("settings that replace those of the recipe")
+    settings = _add_common(ars)
     for name in ("iterations", "directions", "top-directions", "episodes"):
         settings.add_argument(f"--{name}", type=whole_number(1), metavar="N")
     for name in ("step-size", "noise", "success-bonus", "collision-penalty", "start-spread"):
         settings.add_argument(f"--{name}", type=finite_number, metavar="X")
+    settings.add_argument("--sharing", choices=("none", "pair", "iteration"))
+    settings.add_argument("--step-size-schedule", choices=("constant", "linear"))
+
+
+def _add_ppo(learners: "argparse._SubParsersAction[Parser]") -> None:
+    """Options of ``kinarm-train ppo``."""
+    ppo = learners.add_parser(
+        "ppo",
+        help="Proximal Policy Optimization",
+        description="Train a neural policy with Proximal Policy Optimization.",
+        epilog=PPO_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    ppo.add_argument("--tensorboard", type=Path, metavar="FOLDER", help="write logs there")
+    settings = _add_common(ppo)
+    for name in ("iterations", "arms", "rollout-steps", "minibatch", "epochs"):
+        settings.add_argument(f"--{name}", type=whole_number(1), metavar="N")
+    settings.add_argument("--hidden", type=whole_number(1), nargs="+", metavar="WIDTH")
+    for name in ("learning-rate", "gamma", "entropy-weight", "tolerance"):
+        settings.add_argument(f"--{name}", type=finite_number, metavar="X")
+    for name in ("success-bonus", "collision-penalty", "step-reward", "start-spread"):
+        settings.add_argument(f"--{name}", type=finite_number, metavar="X")
+    settings.add_argument("--learning-rate-schedule", choices=("constant", "linear"))
+
+
+def _add_common(parser: Parser) -> "argparse._ArgumentGroup":
+    """Options of every learner; returns the group for those that replace settings."""
+    add = parser.add_argument
+    add("--task", metavar="NAME", help="left, right (default) or both")
+    add("--recipe", metavar="NAME", help="named settings (paper)")
+    add("--seed", type=whole_number(0), metavar="N", help="seed of all randomness (0)")
+    add("--arm", metavar="NAME_OR_URDF", help="arm to train (paper)")
+    add("--out", type=Path, required=True, metavar="FILE.npz", help="the policy")
+    add("--resume", action="store_true", help="go on from the checkpoint beside --out")
+    settings = parser.add_argument_group("settings that replace those of the recipe")
     settings.add_argument(
         "--symmetric",
         action=argparse.BooleanOptionalAction,
         help="treat mirror images alike where the task is its own mirror image",
     )
-    settings.add_argument("--sharing", choices=("none", "pair", "iteration"))
-    settings.add_argument("--step-size-schedule", choices=("constant", "linear"))
-    return parser
+    return settings
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -68,22 +134,25 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _train(options: argparse.Namespace) -> None:
     """From options to a policy file and its learning curve."""
-    from kinarm.policies.ars import train_ars
+    from kinarm.policies.curve import write_curve
 
     out: Path = options.out
     if out.suffix != ".npz" or out.is_dir():
         raise InvalidInputError(f"--out must be a file that ends in .npz, got {str(out)!r}")
     check_folder(out.parent)
-    config, state = _beginning(options)
-    keeper = CheckpointKeeper(config, checkpoint_path(out))
-    with TrainingProgress(config) as progress:
+    learner = _ars() if options.learner == "ars" else _ppo(options.tensorboard)
+    config, state = _beginning(options, learner)
+    if learner.name == "ppo" and options.tensorboard is not None:
+        check_folder(options.tensorboard, create=True)
+    keeper = CheckpointKeeper(learner, config, checkpoint_path(out))
+    with TrainingProgress(learner.name, config) as progress:
 
-        def on_iteration(state: "ARSState") -> None:
+        def on_iteration(state: Any) -> None:
             progress.update(state)
             keeper.update(state)
 
         try:
-            result = train_ars(config, state=state, on_iteration=on_iteration)
+            result = learner.train(config, state=state, on_iteration=on_iteration)
         except KeyboardInterrupt:
             raise KeyboardInterrupt(keeper.save_on_interrupt()) from None
     try:
@@ -93,15 +162,46 @@ def _train(options: argparse.Namespace) -> None:
         keeper.save()
         raise
     checkpoint_path(out).unlink(missing_ok=True)
-    sys.stdout.write(f"{_summary(result)}; written: {out}, {curve_path(out)}\n")
+    sys.stdout.write(f"{_summary(result.curve)}; written: {out}, {curve_path(out)}\n")
 
 
-def _beginning(options: argparse.Namespace) -> "tuple[ARSConfig, ARSState | None]":
-    """Settings and state to begin with: from the command line, or from a checkpoint."""
-    from kinarm.policies.ars import task_mirror
-    from kinarm.policies.checkpoint import load_checkpoint
+def _ars() -> Learner:
+    """Augmented Random Search."""
+    from kinarm.policies.ars import task_mirror, train_ars
+    from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
     from kinarm.policies.recipes import ars_recipe
 
+    return Learner(
+        name="ars",
+        recipe=ars_recipe,
+        check=lambda config: task_mirror(config, config.simulator()),
+        train=train_ars,
+        save=save_checkpoint,
+        load=load_checkpoint,
+    )
+
+
+def _ppo(tensorboard: Path | None) -> Learner:
+    """Proximal Policy Optimization, if what it needs is installed."""
+    from kinarm.policies.checkpoint import load_ppo_checkpoint, save_ppo_checkpoint
+    from kinarm.policies.ppo import require_ppo, train_ppo
+    from kinarm.policies.recipes import ppo_recipe
+
+    require_ppo(tensorboard=tensorboard is not None)
+    from kinarm.policies.ppo_learner import task_mirror
+
+    return Learner(
+        name="ppo",
+        recipe=ppo_recipe,
+        check=lambda config: task_mirror(config, config.simulator()),
+        train=partial(train_ppo, tensorboard=tensorboard),
+        save=save_ppo_checkpoint,
+        load=load_ppo_checkpoint,
+    )
+
+
+def _beginning(options: argparse.Namespace, learner: Learner) -> tuple[Any, Any]:
+    """Settings and state to begin with: from the command line, or from a checkpoint."""
     if options.arm is not None and Path(options.arm).is_file():
         options.arm = str(Path(options.arm).resolve())
     settings = given_settings(options)
@@ -112,13 +212,12 @@ def _beginning(options: argparse.Namespace) -> "tuple[ARSConfig, ARSState | None
                 f"{str(checkpoint)!r} holds an unfinished training: go on with --resume, "
                 "or delete it"
             )
-        config = ars_recipe(settings.pop("recipe", "paper"), **settings)
-        # Refuses what cannot be trained before any output is made.
-        task_mirror(config, config.simulator())
+        config = learner.recipe(settings.pop("recipe", "paper"), **settings)
+        learner.check(config)  # Before any output is made.
         return config, None
     if not checkpoint.exists():
         raise PolicyFileError(f"nothing to resume: there is no {str(checkpoint)!r}")
-    config, state = load_checkpoint(checkpoint)
+    config, state = learner.load(checkpoint)
     if settings.get("recipe") == config.recipe.removesuffix("*"):
         del settings["recipe"]
     if replace(config, **settings) != config:
@@ -132,12 +231,11 @@ def _beginning(options: argparse.Namespace) -> "tuple[ARSConfig, ARSState | None
 
 def given_settings(options: argparse.Namespace) -> dict[str, Any]:
     """Settings of the learner that the command line sets."""
-    ours = ("learner", "out", "resume")
-    return {
-        name: value
-        for name, value in vars(options).items()
-        if name not in ours and value is not None
-    }
+    ours = ("learner", "out", "resume", "tensorboard")
+    given = {name: value for name, value in vars(options).items() if value is not None}
+    if "hidden" in given:
+        given["hidden"] = tuple(given["hidden"])
+    return {name: value for name, value in given.items() if name not in ours}
 
 
 def checkpoint_path(out: Path) -> Path:
@@ -153,12 +251,12 @@ def curve_path(out: Path) -> Path:
 class CheckpointKeeper:
     """Saves the latest state every few seconds and on demand."""
 
-    def __init__(self, config: "ARSConfig", path: Path) -> None:
-        self._config, self._path = config, path
+    def __init__(self, learner: Learner, config: Any, path: Path) -> None:
+        self._learner, self._config, self._path = learner, config, path
         self._saved_at = time.monotonic()
-        self._state: ARSState | None = None
+        self._state: Any = None
 
-    def update(self, state: "ARSState") -> None:
+    def update(self, state: Any) -> None:
         """Take note of a state, and save it if the last checkpoint is old."""
         self._state = state
         if time.monotonic() - self._saved_at > CHECKPOINT_SECONDS:
@@ -174,22 +272,20 @@ class CheckpointKeeper:
 
     def save(self) -> None:
         """Save the latest state."""
-        from kinarm.policies.checkpoint import save_checkpoint
-
         if self._state is not None:
-            save_checkpoint(self._path, self._config, self._state)
+            self._learner.save(self._path, self._config, self._state)
             self._saved_at = time.monotonic()
 
 
 class TrainingProgress:
     """A progress bar on standard error: return, success, steps per second, remaining time."""
 
-    def __init__(self, config: "ARSConfig") -> None:
+    def __init__(self, learner: str, config: Any) -> None:
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
         self._progress = Progress(
-            TextColumn(f"ars {config.recipe} {config.task} seed {config.seed}"),
+            TextColumn(f"{learner} {config.recipe} {config.task} seed {config.seed}"),
             BarColumn(),
             TextColumn("{task.completed:.0f}/{task.total:.0f}"),
             TextColumn("{task.fields[status]}"),
@@ -207,9 +303,9 @@ class TrainingProgress:
     def __exit__(self, *_: object) -> None:
         self._progress.stop()
 
-    def update(self, state: "ARSState") -> None:
+    def update(self, state: Any) -> None:
         """Show the latest iteration."""
-        point = state.curve[-1]
+        point: CurvePoint = state.curve[-1]
         speed = point.environment_steps / max(point.wall_time, 1e-9) / 1e6
         self._progress.update(
             self._task,
@@ -219,19 +315,10 @@ class TrainingProgress:
         )
 
 
-def write_curve(path: Path, curve: "Sequence[CurvePoint]") -> None:
-    """Write a learning curve as CSV, one line per iteration."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("iteration", *curve[0]._fields))
-    writer.writerows((number, *point) for number, point in enumerate(curve, start=1))
-    write_atomically(path, lambda file: file.write(text.getvalue().encode()))
-
-
-def _summary(result: "ARSResult") -> str:
-    last = result.curve[-1]
+def _summary(curve: "Sequence[CurvePoint]") -> str:
+    last = curve[-1]
     return (
-        f"{len(result.curve)} iterations, {last.environment_steps / 1e6:.2f} million steps in "
+        f"{len(curve)} iterations, {last.environment_steps / 1e6:.2f} million steps in "
         f"{last.wall_time:.1f} s; last iteration: mean return {last.mean_return:+.3f}, "
         f"success {last.success:.0%}"
     )

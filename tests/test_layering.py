@@ -115,6 +115,14 @@ def test_simulating_needs_neither_torch_nor_plots():
     assert not loaded & {"torch", "matplotlib", "meshcat"}
 
 
+def test_names_of_ppo_need_no_torch():
+    """They do not say that it is missing before there is something to train."""
+    loaded = loaded_by(
+        "from kinarm.policies import PPOConfig, PPOState, load_ppo_checkpoint, train_ppo"
+    )
+    assert not loaded & {"torch", "stable_baselines3", "tensorboard"}
+
+
 def test_training_needs_neither_torch_nor_plots():
     loaded = loaded_by("from kinarm.policies import train_ars, load_policy")
     assert not loaded & {"torch", "matplotlib", "meshcat"}

@@ -107,7 +107,34 @@ def test_train_refuses(run, tmp_path, arguments, words):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("arguments", [[], ["nobody"], ["ars"]])
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--task", "upwards"], ["'upwards'", "left, right, both"]),
+        (["--recipe", "nothing"], ["'nothing'", "paper, tuned"]),
+        (["--arm", "missing.urdf"], ["missing.urdf"]),
+        (["--iterations", "0"], ["--iterations"]),
+        (["--minibatch", "300"], ["minibatch", "2000 steps"]),
+        (["--hidden", "0"], ["--hidden"]),
+        (["--hidden", "8", "--symmetric"], ["hidden", "at least 2"]),
+        (["--learning-rate", "0"], ["learning_rate", "greater than 0"]),
+        (["--learning-rate", "nan"], ["--learning-rate", "finite"]),
+        (["--gamma", "2"], ["gamma", "[0, 1]"]),
+        (["--tolerance", "-1"], ["tolerance"]),
+        (["--start-spread", "1.5"], ["start_spread", "1.5"]),
+        (["--directions", "3"], ["--directions"]),
+        (["--resume"], ["nothing to resume"]),
+    ],
+)
+def test_train_ppo_refuses(run, tmp_path, arguments, words):
+    pytest.importorskip("stable_baselines3")
+    paths = ("--out", tmp_path / "p.npz", "--tensorboard", tmp_path / "logs")
+    answer = run("kinarm-train", "ppo", *paths, *arguments)
+    check_refused(answer, *words)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("arguments", [[], ["nobody"], ["ars"], ["ppo"]])
 def test_train_needs_a_learner_and_a_file(run, arguments):
     check_refused(run("kinarm-train", *arguments))
 

@@ -47,9 +47,16 @@ def test_table_shows_every_figure(run, monkeypatch, policy_folder):
             "environment_steps": 2_300_000,
         },
         "evaluation": {"seconds": 4.32, "peak_memory_mb": 321.0},
+        "ppo_training": {
+            "seconds": 98.76,
+            "environment_steps": 1_200_000,
+            "simulator_share": 0.0721,
+        },
     }
-    monkeypatch.setattr(bench, "measure", lambda *_: document)
-    answer = run("kinarm-bench")
+    asked = []
+    monkeypatch.setattr(bench, "measure", lambda *_, ppo: asked.append(ppo) or document)
+    answer = run("kinarm-bench", "--ppo")
+    assert asked == [True]
     for figure in (
         "1,234,567",
         "2,345,678",
@@ -61,5 +68,12 @@ def test_table_shows_every_figure(run, monkeypatch, policy_folder):
         "1.52",
         "4.3 s",
         "321 MB",
+        "98.8 s",
+        "7.2%",
     ):
         assert figure in answer.out, figure
+
+
+def test_training_that_was_skipped_says_why(run, monkeypatch):
+    reason = "torch is not installed: pip install 'kinarm[ppo]'"
+    assert bench._ppo_rows({"skipped": reason}) == [("training with PPO", "skipped"), (reason,)]

@@ -38,8 +38,9 @@ def test_help_loads_nothing_heavy(program):
     assert done.returncode == 0, done.stderr
 
 
-def test_learners_have_help_of_their_own(run):
-    answer = run("kinarm-train", "ars", "--help")
+@pytest.mark.parametrize("learner", ["ars", "ppo"])
+def test_learners_have_help_of_their_own(run, learner):
+    answer = run("kinarm-train", learner, "--help")
     assert (answer.status, answer.err) == (0, "")
     assert "--recipe" in answer.out
 
@@ -51,7 +52,7 @@ def test_learners_have_help_of_their_own(run):
             "kinarm-eval",
             "--task --policy --trials --seed --arm --out --json --matrix --allow-other-arm",
         ),
-        ("kinarm-bench", "--repetitions --policy --json"),
+        ("kinarm-bench", "--repetitions --policy --ppo --json"),
     ],
 )
 def test_help_names_every_option(run, program, options):
@@ -59,10 +60,17 @@ def test_help_names_every_option(run, program, options):
     assert [option for option in options.split() if option not in text] == []
 
 
-def test_training_help_names_every_option(run):
-    text = run("kinarm-train", "ars", "--help").out
-    options = "--task --recipe --seed --arm --out --resume --iterations --sharing --step-size"
-    assert [option for option in options.split() if option not in text] == []
+@pytest.mark.parametrize(
+    ("learner", "options"),
+    [
+        ("ars", "--iterations --sharing --step-size"),
+        ("ppo", "--iterations --arms --hidden --learning-rate --tolerance --tensorboard"),
+    ],
+)
+def test_training_help_names_every_option(run, learner, options):
+    text = run("kinarm-train", learner, "--help").out
+    common = "--task --recipe --seed --arm --out --resume --symmetric"
+    assert [option for option in f"{common} {options}".split() if option not in text] == []
 
 
 @pytest.mark.parametrize("program", PROGRAMS)

@@ -113,3 +113,29 @@ def test_environments_are_measured_with_all_their_arms(monkeypatch, train_novice
     bench.measure_vector_env(train_novice("right"), 1)
     assert made[0].num_envs == 64
     assert counted[0] % 64 == 0
+
+
+class TestPPO:
+    @pytest.fixture
+    def training(self, monkeypatch):
+        pytest.importorskip("stable_baselines3")
+        whole = recipes.ppo_recipe
+        tiny = {"iterations": 3, "arms": 4, "minibatch": 64, "hidden": (8, 8)}
+        monkeypatch.setattr(recipes, "ppo_recipe", lambda name, **kw: whole(name, **tiny, **kw))
+        return bench.measure_ppo("left")
+
+    def test_share_of_the_simulator(self, training):
+        assert training["environment_steps"] == 3 * 4 * 16
+        assert training["seconds"] > 0
+        assert 0 < training["simulator_share"] < 1
+        assert json.loads(json.dumps(training)) == training
+
+    def test_skipped_without_its_packages(self, monkeypatch):
+        from kinarm.policies import ppo
+
+        monkeypatch.setattr(ppo, "find_spec", lambda name: None)
+        assert "pip install 'kinarm[ppo]'" in bench.measure_ppo("left")["skipped"]
+
+
+def test_training_with_ppo_is_measured_on_demand(document):
+    assert "ppo_training" not in document

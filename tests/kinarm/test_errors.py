@@ -9,6 +9,7 @@ from kinarm.errors import (
     ArmError,
     InvalidInputError,
     KinarmError,
+    MissingExtraError,
     OutputError,
     PolicyFileError,
     SceneError,
@@ -24,6 +25,7 @@ EXAMPLES = [
     StartInContactError(3, ("hand", "ground")),
     PolicyFileError("no file"),
     OutputError("no space"),
+    MissingExtraError("torch", "ppo"),
 ]
 
 

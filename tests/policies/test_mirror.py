@@ -81,3 +81,14 @@ def test_symmetric_policy_has_half_the_parameters(mirror):
 def test_single_bench_is_trained_without_symmetry(mirror):
     weights = train_ars(replace(TINY, task="right")).policy.layers[0].weights
     assert (weights[~mirror.weights] != 0).any()
+
+
+def test_observations_reflected_to_the_right(mirror, simulator):
+    seen = simulator.observe(*simulator.sample(np.random.default_rng(3), 50))
+    left = mirror.seen_on_the_left(seen)
+    np.testing.assert_array_equal(left, seen[:, 1] > 0)
+    assert 10 < left.sum() < 40
+    reflected = mirror.to_the_right(seen)
+    np.testing.assert_array_equal(reflected[~left], seen[~left])
+    np.testing.assert_array_equal(reflected[left], seen[left] * mirror.observations)
+    assert not mirror.seen_on_the_left(reflected).any()

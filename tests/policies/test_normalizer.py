@@ -73,3 +73,11 @@ def test_constant_inputs_get_weight_zero(value):
 
 def test_scale_is_the_inverse_deviation():
     np.testing.assert_array_equal(input_scale(np.array([2.0, 0.5, 0.0, 1e-7])), [0.5, 2, 0, 0])
+
+
+def test_statistics_of_given_observations():
+    data = np.random.default_rng(3).normal(2, 3, size=(200, 4))
+    seen = Normalizer.of(data)
+    assert seen.count == 200
+    np.testing.assert_allclose(seen.mean, data.mean(axis=0), rtol=1e-12)
+    np.testing.assert_allclose(seen.std, data.std(axis=0), rtol=1e-12)

@@ -1,9 +1,18 @@
 """Named settings."""
 
+import inspect
+
 import pytest
 
 from kinarm.errors import InvalidInputError, UnknownNameError
-from kinarm.policies import ARS_RECIPES, ARSConfig, ars_recipe
+from kinarm.policies import (
+    ARS_RECIPES,
+    PPO_RECIPES,
+    ARSConfig,
+    PPOConfig,
+    ars_recipe,
+    ppo_recipe,
+)
 
 
 def test_paper_is_table_1():
@@ -68,3 +77,54 @@ def test_tuned_adapts_to_two_benches():
     assert ars_recipe("tuned", task="both").collision_penalty == -1
     assert ars_recipe("tuned", task="right").collision_penalty == -2
     assert ars_recipe("tuned", task="both", collision_penalty=-3.0).collision_penalty == -3
+
+
+class TestPPO:
+    @pytest.mark.parametrize("name", ["paper", "tuned"])
+    def test_all_take_the_papers_steps(self, name):
+        config = ppo_recipe(name, task="both", seed=2)
+        assert config.environment_steps == 1_200_000
+        assert (config.recipe, config.task, config.seed) == (name, "both", 2)
+        assert config.horizon == 64
+
+    def test_paper_has_the_papers_reward(self):
+        config = ppo_recipe("paper")
+        assert (config.collision_penalty, config.success_bonus, config.step_reward) == (-1, 0, 0)
+        assert (config.tolerance, config.start_spread) == (0.05, 1)
+        assert config.start_spread_at(0) == 1
+        assert not config.symmetric
+
+    def test_paper_has_the_defaults_of_stable_baselines3(self):
+        """All but those of arms and batches."""
+        sb3 = pytest.importorskip("stable_baselines3")
+        defaults = {
+            name: parameter.default
+            for name, parameter in inspect.signature(sb3.PPO.__init__).parameters.items()
+        }
+        config = ppo_recipe("paper")
+        for ours, theirs in {
+            "learning_rate": "learning_rate",
+            "epochs": "n_epochs",
+            "gamma": "gamma",
+            "gae_lambda": "gae_lambda",
+            "clip_range": "clip_range",
+            "entropy_weight": "ent_coef",
+            "value_weight": "vf_coef",
+            "max_grad_norm": "max_grad_norm",
+        }.items():
+            assert getattr(config, ours) == defaults[theirs], ours
+        assert config.hidden == (64, 64)
+        assert (config.initial_log_std, config.learning_rate_schedule) == (0, "constant")
+
+    def test_names(self):
+        assert set(PPO_RECIPES) == {"paper", "tuned"}
+        assert all(config.recipe == name for name, config in PPO_RECIPES.items())
+        assert PPO_RECIPES["paper"] == PPOConfig(recipe="paper")
+
+    def test_unknown_recipe_lists_the_recipes(self):
+        with pytest.raises(UnknownNameError, match="unknown recipe 'v1'; available: paper, tuned"):
+            ppo_recipe("v1")
+
+    def test_a_changed_recipe_says_so(self):
+        assert ppo_recipe("tuned", gamma=0.5).recipe == "tuned*"
+        assert ppo_recipe("tuned", gamma=None, iterations=600).recipe == "tuned"

@@ -1,0 +1,253 @@
+"""The PPO model of Stable-Baselines3, driven one iteration at a time."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from stable_baselines3 import PPO
+from stable_baselines3.common.logger import KVWriter, Logger, TensorBoardOutputFormat
+from torch.nn.utils import parameters_to_vector, vector_to_parameters
+
+from kinarm.errors import InvalidInputError
+from kinarm.policies.curve import CurvePoint
+from kinarm.policies.mirror import Mirror, is_symmetric
+from kinarm.policies.normalizer import Normalizer
+from kinarm.policies.policy import Layer, Policy
+from kinarm.policies.ppo_config import PPOConfig
+from kinarm.policies.ppo_env import BatchEnv
+from kinarm.policies.ppo_state import PPOState
+from kinarm.policies.provenance import Provenance, package_versions, source_commit
+from kinarm.policies.symmetric_layers import symmetric_layers
+from kinarm.simulator import Simulator
+
+NORMALIZED_OVER = 10_000
+"""Random starts whose observations are the statistics of the normaliser."""
+
+
+@contextmanager
+def alone_in_torch() -> Iterator[None]:
+    """Keep torch to one thread, and put back the global random states that PPO draws from."""
+    threads, numpy_state = torch.get_num_threads(), np.random.get_state()  # noqa: NPY002
+    with torch.random.fork_rng(devices=[]):
+        torch.set_num_threads(1)
+        try:
+            yield
+        finally:
+            torch.set_num_threads(threads)
+            np.random.set_state(numpy_state)  # noqa: NPY002
+
+
+def seed_iteration(seed: int, iteration: int) -> np.random.Generator:
+    """Give an iteration random numbers of its own, wherever the training began.
+
+    Stable-Baselines3 samples actions from torch's global generator and shuffles minibatches with
+    NumPy's; scenarios come from the generator that is returned.
+    """
+    children = np.random.SeedSequence(seed, spawn_key=(iteration,)).spawn(3)
+    torch.manual_seed(int(children[0].generate_state(1)[0]))
+    np.random.seed(int(children[1].generate_state(1)[0]))  # noqa: NPY002
+    return np.random.default_rng(children[2])
+
+
+def task_mirror(config: PPOConfig, simulator: Simulator) -> Mirror | None:
+    """Reflection that the policy has to commute with, if any."""
+    symmetric = config.symmetric and is_symmetric(simulator.scene, simulator.task.benches)
+    return Mirror.of(simulator) if symmetric else None
+
+
+class PPOLearner:
+    """Environment and model of a training; all that changes is in the `PPOState`.
+
+    Parameters
+    ----------
+    config : PPOConfig
+        The settings.
+    normalizer : Normalizer
+        Statistics by which observations are normalised.
+    tensorboard : str or Path, optional
+        Folder for logs.
+    """
+
+    def __init__(
+        self, config: PPOConfig, normalizer: Normalizer, tensorboard: str | Path | None = None
+    ) -> None:
+        self.config = config
+        simulator = config.simulator()
+        self.env = BatchEnv(
+            simulator,
+            config.arms,
+            normalizer=normalizer,
+            rng=np.random.default_rng(),
+            mirror=task_mirror(config, simulator),
+        )
+        self._learning_rate = config.learning_rate
+        self.model = PPO(
+            "MlpPolicy",
+            self.env,
+            n_steps=config.rollout_steps,
+            batch_size=config.minibatch,
+            n_epochs=config.epochs,
+            learning_rate=lambda _: self._learning_rate,
+            gamma=config.gamma,
+            gae_lambda=config.gae_lambda,
+            clip_range=config.clip_range,
+            ent_coef=config.entropy_weight,
+            vf_coef=config.value_weight,
+            max_grad_norm=config.max_grad_norm,
+            policy_kwargs={
+                "net_arch": list(config.hidden),
+                "log_std_init": config.initial_log_std,
+            },
+            device="cpu",
+        )
+        outputs: list[KVWriter] = []
+        if tensorboard is not None:
+            outputs.append(TensorBoardOutputFormat(str(tensorboard)))
+        self.model.set_logger(Logger(folder=None, output_formats=outputs))
+
+    @classmethod
+    def initial_state(cls, config: PPOConfig) -> PPOState:
+        """State before the first iteration; the normaliser has seen random starts."""
+        rng = seed_iteration(config.seed, 0)
+        simulator = config.simulator()
+        observations = simulator.observe(*simulator.sample(rng, NORMALIZED_OVER))
+        mirror = task_mirror(config, simulator)
+        if mirror is not None:
+            observations = mirror.to_the_right(observations)
+        learner = cls(config, Normalizer.of(observations))
+        learner.env.rng = rng
+        learner.env.spread_starts(config.start_spread_at(0.0))
+        learner.env.reset()
+        parameters = learner.parameters()
+        return PPOState(
+            parameters=parameters,
+            first_moment=np.zeros_like(parameters),
+            second_moment=np.zeros_like(parameters),
+            normalizer=Normalizer.of(observations),
+            episodes=learner.env.states(),
+        )
+
+    def iterate(self, state: PPOState, began: float) -> PPOState:
+        """One rollout and one update.
+
+        Parameters
+        ----------
+        state : PPOState
+            State before the iteration.
+        began : float
+            Reading of ``time.perf_counter`` when the training began [s].
+
+        Returns
+        -------
+        PPOState
+            State after it.
+        """
+        config, model, env = self.config, self.model, self.env
+        env.rng = seed_iteration(config.seed, state.iteration + 1)
+        self.load(state)
+        done = state.iteration / config.iterations
+        self._learning_rate = config.learning_rate_at(done)
+        env.spread_starts(config.start_spread_at(done))
+        model.learn(config.steps_per_iteration, reset_num_timesteps=False)
+        returns, successes, simulator_time = env.take_record()
+        point = CurvePoint(
+            mean_return=float(np.mean(returns)) if returns else float("nan"),
+            std_return=float(np.std(returns)) if returns else float("nan"),
+            success=float(np.mean(successes)) if successes else float("nan"),
+            environment_steps=model.num_timesteps,
+            wall_time=time.perf_counter() - began,
+        )
+        first_moment, second_moment = self._moments()
+        return PPOState(
+            parameters=self.parameters(),
+            first_moment=first_moment,
+            second_moment=second_moment,
+            normalizer=state.normalizer,
+            episodes=env.states(),
+            curve=(*state.curve, point),
+            simulator_time=state.simulator_time + simulator_time,
+        )
+
+    def load(self, state: PPOState) -> None:
+        """Put a state into the model and the environment.
+
+        Raises
+        ------
+        InvalidInputError
+            If it has another number of parameters or of arms.
+        """
+        config, model = self.config, self.model
+        sizes = (len(state.parameters), len(state.episodes.goal))
+        expected = (len(self.parameters()), config.arms)
+        if sizes != expected:
+            raise InvalidInputError(
+                f"the state to resume has {sizes[0]} parameters and {sizes[1]} arms, "
+                f"not {expected[0]} and {expected[1]}"
+            )
+        epochs = state.iteration * config.epochs
+        updates = epochs * config.steps_per_iteration // config.minibatch
+        weights = list(model.policy.parameters())
+        vector_to_parameters(torch.tensor(state.parameters), weights)
+        moments = (state.first_moment, state.second_moment)
+        lengths = [weight.numel() for weight in weights]
+        parts = (torch.split(torch.tensor(moment), lengths) for moment in moments)
+        for weight, first, second in zip(weights, *parts, strict=True):
+            model.policy.optimizer.state[weight] = {
+                "step": torch.tensor(float(updates)),
+                "exp_avg": first.view_as(weight),
+                "exp_avg_sq": second.view_as(weight),
+            }
+        model.num_timesteps, model._n_updates = state.environment_steps, epochs
+        model._last_obs = self.env.restore(state.episodes)
+        model._last_episode_starts = state.episodes.steps == 0
+
+    def parameters(self) -> NDArray[np.float32]:
+        """Parameters of actor and critic, shape (n_parameters,)."""
+        return self._flat([weight.detach() for weight in self.model.policy.parameters()])
+
+    def _moments(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Adam's means of the gradients and of their squares, shape (n_parameters,) each."""
+        adam = [self.model.policy.optimizer.state[w] for w in self.model.policy.parameters()]
+        return self._flat([s["exp_avg"] for s in adam]), self._flat([s["exp_avg_sq"] for s in adam])
+
+    @staticmethod
+    def _flat(tensors: list[torch.Tensor]) -> NDArray[np.float32]:
+        vector: NDArray[np.float32] = parameters_to_vector(tensors).numpy().copy()
+        return vector
+
+    def policy(self, state: PPOState) -> Policy:
+        """Freeze the actor of a state into a policy, which takes its mean action."""
+        self.load(state)
+        actor = self.model.policy
+        parts = [*actor.mlp_extractor.policy_net.modules(), actor.action_net]
+        layers = tuple(
+            Layer(part.weight.detach().numpy(), part.bias.detach().numpy())
+            for part in parts
+            if isinstance(part, torch.nn.Linear)
+        )
+        mean, std = state.normalizer.mean, state.normalizer.std
+        if self.env.mirror is not None:
+            layers = symmetric_layers(layers, mean, std, self.env.mirror)
+        config, arm = self.config, self.env.simulator.arm
+        return Policy(
+            mean=mean,
+            std=std,
+            layers=layers,
+            provenance=Provenance(
+                algorithm="ppo",
+                recipe=config.recipe,
+                task=config.task,
+                arm=arm.name,
+                arm_digest=arm.digest,
+                seed=config.seed,
+                environment_steps=state.environment_steps,
+                config=asdict(config),
+                versions=package_versions(),
+                commit=source_commit(),
+            ),
+        )

@@ -1,0 +1,150 @@
+"""Checkpoint files of PPO, which need none of its packages; resuming is tested in test_ppo."""
+
+import gc
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinarm.errors import InvalidInputError, PolicyFileError
+from kinarm.policies import (
+    ARSConfig,
+    CurvePoint,
+    Normalizer,
+    PPOConfig,
+    PPOState,
+    load_checkpoint,
+    load_ppo_checkpoint,
+    save_checkpoint,
+    save_ppo_checkpoint,
+)
+from kinarm.policies.ars import initial_state
+from kinarm.policies.ppo_state import EpisodeStates
+
+CONFIG = PPOConfig(task="left", hidden=(9, 8), arms=3, rollout_steps=4, minibatch=6)
+
+
+@pytest.fixture(scope="module")
+def state():
+    rng = np.random.default_rng(0)
+    return PPOState(
+        parameters=rng.normal(size=50).astype(np.float32),
+        first_moment=rng.normal(size=50).astype(np.float32),
+        second_moment=rng.random(50).astype(np.float32),
+        normalizer=Normalizer(1000, rng.normal(size=48), rng.random(48)),
+        episodes=EpisodeStates(
+            q=rng.normal(size=(3, 6)),
+            goal=rng.normal(size=(3, 3)),
+            steps=np.array([0, 5, 63]),
+            total=rng.normal(size=3),
+        ),
+        curve=(
+            CurvePoint(float("nan"), float("nan"), float("nan"), 12, 0.5),
+            CurvePoint(0.25, 0.5, 0.125, 24, 0.75),
+        ),
+        simulator_time=0.0625,
+    )
+
+
+@pytest.fixture
+def saved(state, tmp_path):
+    path = tmp_path / "run.ckpt"
+    save_ppo_checkpoint(path, CONFIG, state)
+    return path
+
+
+def refused(path, words=None):
+    with pytest.raises(PolicyFileError, match=words) as caught:
+        load_ppo_checkpoint(path)
+    gc.collect()  # a file left open is reported here, not in a later test
+    assert path.name in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def spoil(path, **entries):
+    """Replace entries, or leave out those that are None."""
+    with np.load(path) as file:
+        content = {**file, **entries}
+    with path.open("wb") as file:
+        np.savez(file, **{key: value for key, value in content.items() if value is not None})
+
+
+def test_round_trip(saved, state):
+    config, loaded = load_ppo_checkpoint(saved)
+    assert config == CONFIG
+    for name in ("parameters", "first_moment", "second_moment"):
+        first, second = getattr(loaded, name), getattr(state, name)
+        assert (first.dtype, first.tobytes()) == (second.dtype, second.tobytes())
+    for first, second in zip(loaded.episodes, state.episodes, strict=True):
+        assert (first.dtype, first.tobytes()) == (second.dtype, second.tobytes())
+    assert loaded.normalizer.count == 1000
+    assert loaded.normalizer.mean.tobytes() == state.normalizer.mean.tobytes()
+    assert loaded.normalizer.squares.tobytes() == state.normalizer.squares.tobytes()
+    np.testing.assert_array_equal(loaded.curve, state.curve)
+    assert (loaded.iteration, loaded.environment_steps, loaded.wall_time) == (2, 24, 0.75)
+    assert loaded.simulator_time == 0.0625
+
+
+def test_before_the_first_iteration(saved, state):
+    save_ppo_checkpoint(saved, CONFIG, replace(state, curve=(), simulator_time=0.0))
+    loaded = load_ppo_checkpoint(saved)[1]
+    assert (loaded.iteration, loaded.environment_steps, loaded.wall_time) == (0, 0, 0.0)
+
+
+@pytest.mark.parametrize("share", [0, 0.05, 0.5, 0.99])
+def test_truncated(saved, share):
+    content = saved.read_bytes()
+    saved.write_bytes(content[: int(share * len(content))])
+    refused(saved)
+
+
+def test_learners_do_not_read_each_other(saved, tmp_path):
+    with pytest.raises(PolicyFileError, match=r"kinarm-ars-checkpoint"):
+        load_checkpoint(saved)
+    config = ARSConfig()
+    save_checkpoint(saved, config, initial_state(config, config.simulator(threads=1)))
+    refused(saved, "kinarm-ppo-checkpoint")
+
+
+def test_missing_file(tmp_path):
+    refused(tmp_path / "gone.ckpt")
+
+
+@pytest.mark.parametrize("key", ["config", "parameters", "first_moment", "episodes_q", "curve"])
+def test_missing_entry(saved, key):
+    spoil(saved, **{key: None})
+    refused(saved)
+
+
+@pytest.mark.parametrize(
+    "entries",
+    [
+        {"parameters": np.zeros(49, dtype=np.float32)},
+        {"parameters": np.zeros(50)},
+        {"second_moment": np.full(50, np.nan, dtype=np.float32)},
+        {"parameters": np.array([{}], dtype=object)},
+        {"episodes_goal": np.zeros((4, 3))},
+        {"mean": np.zeros((48, 1))},
+        {"squares": np.zeros(3)},
+        {"curve": np.zeros((2, 3))},
+        {"config": np.array("{")},
+    ],
+    ids=lambda entries: next(iter(entries)),
+)
+def test_bad_entry(saved, entries):
+    spoil(saved, **entries)
+    refused(saved)
+
+
+def test_later_version(saved):
+    spoil(saved, version=np.array(99))
+    refused(saved, "later version")
+
+
+def test_impossible_setting_is_named(saved):
+    with np.load(saved) as file:
+        config = json.loads(str(file["config"]))
+    spoil(saved, config=np.array(json.dumps({**config, "minibatch": 7})))
+    with pytest.raises(InvalidInputError, match="minibatch"):
+        load_ppo_checkpoint(saved)
