@@ -9,7 +9,7 @@ from sphinx.util.docutils import SphinxDirective
 
 from kinarm import Arm, Simulator, arm_names
 from kinarm.collision import enclosing_capsule
-from kinarm.policies import ARS_RECIPES
+from kinarm.policies import ARS_RECIPES, PPO_RECIPES
 
 
 def markdown(header: list[str], rows: list[list[str]]) -> str:
@@ -74,22 +74,23 @@ def arms_table() -> str:
     return markdown([*header, "speeds [deg/s]"], rows)
 
 
-def recipe_table() -> str:
-    """Settings of the ARS recipes that differ between them, and those that do not."""
+def recipe_table(recipes: dict[str, object]) -> str:
+    """Settings of a learner's recipes."""
     skipped = ("task", "arm", "seed", "recipe")
     rows = [
-        [f"`{item.name}`", *(f"{getattr(c, item.name)}" for c in ARS_RECIPES.values())]
-        for item in fields(next(iter(ARS_RECIPES.values())))
+        [f"`{item.name}`", *(f"{getattr(c, item.name)}" for c in recipes.values())]
+        for item in fields(next(iter(recipes.values())))
         if item.name not in skipped
     ]
-    return markdown(["setting", *(f"`{name}`" for name in ARS_RECIPES)], rows)
+    return markdown(["setting", *(f"`{name}`" for name in recipes)], rows)
 
 
 TABLES = {
     "arm": lambda: arm_table("paper"),
     "capsules": lambda: capsule_table("paper"),
     "arms": arms_table,
-    "recipes": recipe_table,
+    "ars-recipes": lambda: recipe_table(ARS_RECIPES),
+    "ppo-recipes": lambda: recipe_table(PPO_RECIPES),
 }
 
 
