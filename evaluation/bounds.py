@@ -2,7 +2,7 @@
 
 import hashlib
 import os
-import zipfile
+import tempfile
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from kinarm.files import check_folder, write_atomically
 from kinarm.policies import oracle
 from kinarm.policies.oracle import Oracle, Progress
 from kinarm.policies.oracle_solution import OracleSolutions
+from kinarm.policies.policy import CORRUPT
 from kinarm.policies.provenance import package_versions
 
 CACHE_VARIABLE = "KINARM_CACHE"
@@ -45,7 +46,7 @@ def oracle_bounds(trials: TrialSet, on_progress: Progress | None = None) -> Orac
     """
     if trials not in _known:
         path = cache_folder() / f"oracle-{trials.digest}-{oracle_version()}.npz"
-        solutions = _load(path, len(trials))
+        solutions = _load(path, trials)
         if solutions is None:
             solver = Oracle(simulator=trials.simulator)
             solutions = solver.solve_batch(trials.starts, trials.goals, on_progress=on_progress)
@@ -56,18 +57,20 @@ def oracle_bounds(trials: TrialSet, on_progress: Progress | None = None) -> Orac
 
 def cache_folder() -> Path:
     """Folder for what can be computed anew: ``$KINARM_CACHE``, or kinarm in the user's cache."""
-    chosen = os.environ.get(CACHE_VARIABLE)
+    chosen, users = os.environ.get(CACHE_VARIABLE), os.environ.get("XDG_CACHE_HOME")
     if chosen:
         return Path(chosen)
-    users = os.environ.get("XDG_CACHE_HOME")
-    return (Path(users) if users else Path.home() / ".cache") / "kinarm"
+    try:
+        return (Path(users) if users else Path.home() / ".cache") / "kinarm"
+    except RuntimeError:  # a user without a home
+        return Path(tempfile.gettempdir()) / "kinarm"
 
 
 @cache
 def oracle_version() -> str:
     """Hash of the sources and package versions that solutions depend on."""
-    sources = sorted(Path(kinarm.__file__).parent.rglob("*.py"))
-    policies = Path(oracle.__file__).parent
+    simulator, policies = Path(kinarm.__file__).parent, Path(oracle.__file__).parent
+    sources = sorted(simulator.glob("*.py")) + sorted(simulator.glob("kernels/*.py"))
     sources += [policies / f"{name}.py" for name in ORACLE_MODULES]
     content = hashlib.sha256(repr(package_versions()).encode())
     for source in sources:
@@ -75,25 +78,33 @@ def oracle_version() -> str:
     return content.hexdigest()[:12]
 
 
-def _load(path: Path, n_trials: int) -> OracleSolutions | None:
+def _load(path: Path, trials: TrialSet) -> OracleSolutions | None:
     """Read solutions; None if there are none or they cannot be used."""
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
             solutions = OracleSolutions(**dict(file))
-    except (OSError, ValueError, TypeError, EOFError, zipfile.BadZipFile):
+    except (OSError, *CORRUPT):
         return None
-    lengths = {len(array) for array in solutions.arrays().values()}
-    return solutions if lengths == {n_trials} else None
+    task, n = trials.simulator.task, len(trials)
+    expected = {
+        "actions": (n, task.horizon, trials.simulator.n_actions),
+        "paths": (n, task.horizon + 1, trials.simulator.arm.n_axes),
+    }
+    fits = (array.shape == expected.get(name, (n,)) for name, array in solutions.arrays().items())
+    return solutions if all(fits) else None
 
 
 def _save(path: Path, solutions: OracleSolutions) -> None:
-    """Write solutions, if possible."""
+    """Write solutions, if possible, in place of those of another version."""
     arrays: dict[str, Any] = solutions.arrays()
     try:
         check_folder(path.parent, create=True)
         write_atomically(path, partial(np.savez_compressed, **arrays))
     except OutputError:
         return
+    trial_set = path.name.rpartition("-")[0]
+    for other in set(path.parent.glob(f"{trial_set}-*.npz")) - {path}:
+        other.unlink(missing_ok=True)
 
 
 def bounds_document(solutions: OracleSolutions) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 import argparse
 import json
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -150,6 +150,7 @@ def evaluate_all(
     tasks = list(dict.fromkeys(load_task(name).name for name in options.task or ()))
     arm = Arm.load(options.arm)
     pairs = pair_with_tasks(choose_entrants(options, arm), tasks, options)
+    _check_names(entrant for entrant, _ in pairs)
     if not pairs:
         raise InvalidInputError("no chosen policy was trained on a task that exists: name a --task")
     for entrant, _ in () if options.allow_other_arm else pairs:
@@ -181,15 +182,21 @@ def choose_entrants(options: argparse.Namespace, arm: Any) -> "list[Entrant]":
 
     if not options.policy:
         return list(shipped_entrants(arm))
-    entrants: dict[str, Entrant] = {}
-    for entrant in (entrant for name in options.policy for entrant in find_entrants(name)):
-        known = entrants.setdefault(entrant.name, entrant)
-        if known.source != entrant.source:
+    named = (entrant for name in options.policy for entrant in find_entrants(name))
+    return list({(entrant.name, entrant.source): entrant for entrant in named}.values())
+
+
+def _check_names(entrants: "Iterable[Entrant]") -> None:
+    """Refuse two entrants of one name, which tables could not tell apart."""
+    known: dict[str, Entrant] = {}
+    for entrant in entrants:
+        first = known.setdefault(entrant.name, entrant)
+        if first.source != entrant.source:
+            sources = (e.source or "the one that needs no file" for e in (first, entrant))
             raise InvalidInputError(
-                f"two policies are called {entrant.name!r}: {known.source or 'the baseline'} and "
-                f"{entrant.source or 'the baseline'}; rename a file"
+                f"two policies are called {entrant.name!r}: {' and '.join(map(str, sources))}; "
+                "rename a file"
             )
-    return list(entrants.values())
 
 
 def pair_with_tasks(

@@ -187,10 +187,10 @@ def _figures(evaluations: Sequence[Evaluation]) -> dict[str, Any]:
 
 def _beside_oracle(evaluations: Sequence[Evaluation], success: float) -> dict[str, Any] | None:
     """Figures in relation to the bounds of the trials; None if those are not known."""
-    bounds = evaluations[0].bounds
-    if bounds is None:
+    known = [evaluation.bounds for evaluation in evaluations if evaluation.bounds is not None]
+    if len(known) < len(evaluations):
         return None
-    possible = float(bounds.reachable.mean())
+    possible = float(known[0].reachable.mean())
     ratios = np.concatenate([evaluation.step_ratio for evaluation in evaluations])
     return {
         "relative_success": success / possible if possible else None,

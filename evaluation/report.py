@@ -33,7 +33,8 @@ def evaluation_document(evaluations: Sequence[Evaluation], command: str) -> dict
         ``results`` (one per policy and task, with the outcome of every trial) and ``pooled``
         (one per recipe and task with several training seeds).
     """
-    trial_sets = {e.task: (e.trials, e.bounds) for e in evaluations}
+    trial_sets = {e.task: e.trials for e in evaluations}
+    bounds = {e.task: bounds_document(e.bounds) for e in evaluations if e.bounds is not None}
     any_set = evaluations[0].trials
     arm = any_set.simulator.arm
     return {
@@ -58,9 +59,9 @@ def evaluation_document(evaluations: Sequence[Evaluation], command: str) -> dict
                     "horizon": trials.simulator.task.horizon,
                     "starts": trials.starts.tolist(),
                     "goals": trials.goals.tolist(),
-                    "oracle": None if bounds is None else bounds_document(bounds),
+                    "oracle": bounds.get(task),
                 }
-                for task, (trials, bounds) in trial_sets.items()
+                for task, trials in trial_sets.items()
             },
             "versions": package_versions(),
             "commit": source_commit(),
@@ -157,6 +158,7 @@ EXPENDABLE = (
     "<= 0.2 m",
     "contact %",
     "of oracle %",
+    "step ratio",
 )
 
 

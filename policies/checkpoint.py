@@ -129,7 +129,7 @@ def _load(
             arm_digest = str(content["arm_digest"])
     except OSError as error:
         raise PolicyFileError(f"cannot read checkpoint {str(path)!r}: {error.strerror}") from error
-    except (ValueError, IndexError, KeyError, TypeError, EOFError, *CORRUPT) as error:
+    except (IndexError, *CORRUPT) as error:
         if isinstance(error, InvalidInputError):
             raise
         raise PolicyFileError(f"{str(path)!r} is not a complete checkpoint") from error

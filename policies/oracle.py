@@ -147,29 +147,20 @@ class Oracle:
         self, starts: NDArray[np.float64], goals: NDArray[np.float64]
     ) -> OracleSolutions:
         """From trials to bounds, motions and their replay."""
-        task, n = self.simulator.task, len(starts)
+        horizon, n = self.simulator.task.horizon, len(starts)
         lot = _Lot(starts, goals, witnesses=starts.copy())
         # The horizon comes first: most of what is out of reach is settled at once.
-        horizon = np.full(n, task.horizon)
-        floors, tight = self._steps_floor(lot, np.arange(n), horizon, horizon)
+        last = np.full(n, horizon)
+        floors, tight = self._steps_floor(lot, np.arange(n), last, last)
         within = np.flatnonzero(floors <= horizon)
         ones = np.ones(within.size, dtype=np.int64)
-        floors[within], tight[within] = self._steps_floor(lot, within, ones, horizon[within])
+        floors[within], tight[within] = self._steps_floor(lot, within, ones, last[within])
         search = MotionSearch(self.simulator, starts, goals)
         for extra in range(EXTRA_STEPS + 1):
             search.try_steps(within, floors[within] + extra, lot.witnesses)
         search.try_detours(within)
-        slow = within[search.steps[within] > floors[within]]
-        floors[slow], tight[slow] = self._steps_floor(
-            lot, slow, floors[slow], search.steps[slow] - 1, contact=True
-        )
-        missed = np.flatnonzero(~search.reached)
-        distance_floors = np.zeros(n)
-        distance_floors[missed] = self._distance_floor(lot, missed)
-        distance_floors[floors > horizon] = np.fmax(
-            distance_floors[floors > horizon], task.tolerance
-        )
-        search.try_approach(missed, np.fmax(distance_floors[missed], task.tolerance), lot.witnesses)
+        self._count_contact(lot, search, floors, tight)
+        distance_floors = self._approach(lot, search, floors)
         replay = self.simulator.rollout_actions(search.actions, starts, goals, record=True)
         return OracleSolutions(
             reachable=replay.success,
@@ -182,6 +173,37 @@ class Oracle:
             paths=replay.paths,
             reasons=self._reasons(replay, floors, distance_floors, search.has_solution),
         )
+
+    def _count_contact(
+        self,
+        lot: "_Lot",
+        search: MotionSearch,
+        floors: NDArray[np.int64],
+        tight: NDArray[np.bool_],
+    ) -> None:
+        """Raise the floors of motions that are slower, and of goals that none reaches."""
+        horizon = self.simulator.task.horizon
+        slow = np.flatnonzero(search.reached & (search.steps > floors))
+        floors[slow], tight[slow] = self._steps_floor(
+            lot, slow, floors[slow], search.steps[slow] - 1, contact=True
+        )
+        blocked = np.flatnonzero(~search.reached & (floors <= horizon))
+        last = np.full(blocked.size, horizon)
+        beyond, _ = self._steps_floor(lot, blocked, last, last, contact=True)
+        tight[blocked] = beyond > horizon
+        floors[blocked] = np.where(tight[blocked], beyond, floors[blocked])
+
+    def _approach(
+        self, lot: "_Lot", search: MotionSearch, floors: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        """Prove, and seek, how close motions come to the goals that none reaches."""
+        task, missed = self.simulator.task, np.flatnonzero(~search.reached)
+        distances = np.zeros(len(floors))
+        distances[missed] = self._distance_floor(lot, missed)
+        out_of_reach = floors > task.horizon
+        distances[out_of_reach] = np.fmax(distances[out_of_reach], task.tolerance)
+        search.try_approach(missed, np.fmax(distances[missed], task.tolerance), lot.witnesses)
+        return distances
 
     def _steps_floor(
         self,

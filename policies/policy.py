@@ -1,6 +1,7 @@
 """One class for every trained policy: a normaliser, dense layers and a clip."""
 
 import json
+import tokenize
 import zipfile
 import zlib
 from dataclasses import dataclass
@@ -21,8 +22,17 @@ from kinarm.validation import finite_array
 
 FILE_FORMAT = "kinarm-policy"
 FILE_VERSION = 1
-CORRUPT = (zipfile.BadZipFile, zlib.error)
-"""What numpy raises for a damaged ``.npz``, beside the errors of Python itself."""
+CORRUPT = (
+    ValueError,
+    KeyError,
+    TypeError,
+    EOFError,
+    RuntimeError,
+    tokenize.TokenError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""What reading a damaged ``.npz`` raises."""
 
 
 class Layer(NamedTuple):
@@ -177,7 +187,7 @@ class Policy:
                 return cls._read(name, file)
         except OSError as error:
             raise PolicyFileError(f"cannot read policy {name!r}: {error.strerror}") from error
-        except (ValueError, KeyError, TypeError, EOFError, *CORRUPT) as error:
+        except CORRUPT as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise PolicyFileError(f"{name!r} is not a complete kinarm policy: {reason}") from error
 

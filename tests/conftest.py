@@ -1,6 +1,6 @@
 """Shared fixtures: the shipped arms, robots written on the spot, and simulators of both."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -85,6 +85,15 @@ def write_obj(path: Path, corners: np.ndarray) -> None:
     vertices = "".join("v {} {} {}\n".format(*corner) for corner in corners)
     faces = "".join("f {} {} {}\n".format(*(i + 1 for i in face)) for face in CUBE_FACES)
     path.write_text(vertices + faces)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Keep what is cached out of the user's folder, in other processes, too."""
+    folder = tmp_path_factory.mktemp("cache")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("KINARM_CACHE", str(folder))
+        yield folder
 
 
 @pytest.fixture(scope="session")

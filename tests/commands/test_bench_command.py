@@ -12,7 +12,10 @@ from kinarm.policies import recipes
 def small(monkeypatch):
     """Sizes for a test."""
     whole = recipes.ars_recipe
+    evaluation = {"seconds_without_bounds": 9.87, "seconds": 4.32, "peak_memory_mb": 321.0}
     monkeypatch.setattr(bench, "BATCHES", (512,))
+    monkeypatch.setattr(bench, "ORACLE_TRIALS", 4)
+    monkeypatch.setattr(bench, "measure_evaluation", lambda: evaluation)
     monkeypatch.setattr(recipes, "ars_recipe", lambda name, **kw: whole(name, iterations=2, **kw))
 
 
@@ -28,6 +31,8 @@ def test_json_alone_is_printed(run, policy_folder):
         "reference",
         "speed_up_over_reference",
         "table_1_training",
+        "oracle",
+        "evaluation",
     } <= set(document)
     assert document["policy"] == str(path)
 
@@ -46,7 +51,8 @@ def test_table_shows_every_figure(run, monkeypatch, policy_folder):
             "seconds": {"median": 1.52, "best": 1.41},
             "environment_steps": 2_300_000,
         },
-        "evaluation": {"seconds": 4.32, "peak_memory_mb": 321.0},
+        "oracle": {"trials": 200, "trials_per_second": {"median": 31.0, "best": 37.0}},
+        "evaluation": bench.measure_evaluation(),
         "ppo_training": {
             "seconds": 98.76,
             "environment_steps": 1_200_000,
@@ -66,6 +72,9 @@ def test_table_shows_every_figure(run, monkeypatch, policy_folder):
         "247 x",
         "1.250 %",
         "1.52",
+        "6.5 s",
+        "5.4 s",
+        "9.9 s",
         "4.3 s",
         "321 MB",
         "98.8 s",

@@ -5,7 +5,10 @@ import json
 import numpy as np
 import pytest
 
+from kinarm.evaluation.bounds import bounds_document
+from kinarm.evaluation.eval import build_parser, evaluate_all
 from kinarm.evaluation.evaluations import evaluate
+from kinarm.policies.oracle import Oracle
 
 FILES = {"evaluation.json", "final_distance.png", "final_distance.svg"}
 
@@ -22,16 +25,39 @@ def evaluated(run):
     return call
 
 
+@pytest.fixture
+def solved(monkeypatch) -> list[int]:
+    """How many trials the oracle is asked to solve, call by call."""
+    whole, calls = Oracle.solve_batch, []
+
+    def solve_batch(self, starts, goals, **settings):
+        calls.append(len(starts))
+        return whole(self, starts, goals, **settings)
+
+    monkeypatch.setattr(Oracle, "solve_batch", solve_batch)
+    return calls
+
+
+@pytest.fixture
+def empty_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("KINARM_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
 def faced(document) -> list[tuple[str, str]]:
     return [(row["policy"], row["task"]) for row in document["results"]]
 
 
 def test_json_alone_is_printed_and_equals_the_library(evaluated, policy_folder):
     document = evaluated("--policy", policy_folder / "mine-seed0.npz", "--trials", 9, "--seed", 4)
-    (row,) = document["results"]
-    expected = evaluate(policy_folder / "mine-seed0.npz", trials=9, seed=4)
-    assert row == json.loads(json.dumps(expected.to_json()))
+    expected, oracle = (
+        evaluate(entrant, "right", trials=9, seed=4, oracle=True)
+        for entrant in (policy_folder / "mine-seed0.npz", "oracle")
+    )
+    rows = json.loads(json.dumps([expected.to_json(), oracle.to_json()]))
+    assert document["results"] == rows
     entry = document["protocol"]["tasks"]["right"]
+    assert entry["oracle"] == json.loads(json.dumps(bounds_document(expected.bounds)))
     assert entry["trial_set_hash"] == expected.trials.digest
     np.testing.assert_array_equal(entry["starts"], expected.trials.starts)
 
@@ -48,6 +74,9 @@ def test_defaults(evaluated, run, policy_folder):
     document = evaluated("--policy", "zero", "--task", "left")
     protocol = document["protocol"]
     assert (protocol["trials"], protocol["seed"], protocol["arm"]) == (200, 0, "paper")
+    assert faced(document) == [("zero", "left"), ("oracle", "left")]
+    assert len(protocol["tasks"]["left"]["oracle"]["trials"]["steps"]) == 200
+    assert all(row["oracle"] for row in document["results"])
 
 
 def test_command_is_recorded(evaluated):
@@ -65,6 +94,8 @@ def test_policies_of_several_kinds_at_once(evaluated, policy_folder):
     assert sorted(faced(document)) == [
         ("lefty", "left"),
         ("mine-seed0", "right"),
+        ("oracle", "left"),
+        ("oracle", "right"),
         ("random", "left"),
         ("random", "right"),
     ]
@@ -73,7 +104,7 @@ def test_policies_of_several_kinds_at_once(evaluated, policy_folder):
 def test_named_task_is_what_named_policies_face(evaluated, policy_folder):
     document = evaluated(
         *("--policy", policy_folder / "lefty.npz", "--task", "both", "--task", "right"),
-        *("--trials", 3),
+        *("--trials", 3, "--no-oracle"),
     )
     assert faced(document) == [("lefty", "both"), ("lefty", "right")]
 
@@ -84,18 +115,19 @@ def test_matrix_is_every_policy_on_every_task(evaluated, policy_folder):
     )
     tasks = ("left", "right", "both")
     assert sorted(faced(document)) == sorted(
-        (name, task) for name in ("lefty", "zero") for task in tasks
+        (name, task) for name in ("lefty", "zero", "oracle") for task in tasks
     )
 
 
 def test_a_policy_named_twice_is_evaluated_once(evaluated, policy_folder):
     path = policy_folder / "mine-seed0.npz"
-    assert len(evaluated("--policy", path, "--policy", path, "--trials", 2)["results"]) == 1
+    document = evaluated("--policy", path, "--policy", path, "--trials", 2, "--no-oracle")
+    assert faced(document) == [("mine-seed0", "right")]
 
 
 def test_a_task_named_twice_is_played_once(evaluated):
     document = evaluated("--policy", "zero", "--task", "left", "--task", "left", "--trials", 2)
-    assert faced(document) == [("zero", "left")]
+    assert faced(document) == [("zero", "left"), ("oracle", "left")]
 
 
 def test_training_seeds_of_files_are_pooled(evaluated, policy_folder):
@@ -125,27 +157,28 @@ def test_a_file_called_like_a_baseline_does_not_replace_it(run, policy, tmp_path
         *("--trials", 2),
     )
     kinds = {row["algorithm"] for row in json.loads(answer.out or '{"results": []}')["results"]}
-    assert answer.status == 2 or kinds == {"ars", "baseline"}
+    assert answer.status == 2 or kinds == {"ars", "baseline", "oracle"}
 
 
 def test_an_arm_of_ones_choice(evaluated, policy_folder):
     arguments = ("--policy", policy_folder / "flange.npz", "--trials", 3)
     document = evaluated(*arguments, "--arm", "paper_flange")
     assert document["protocol"]["arm"] == "paper_flange"
-    assert faced(document) == [("flange", "right")]
+    assert faced(document) == [("flange", "right"), ("oracle", "right")]
 
 
 def test_another_arm_when_asked_for(evaluated, policy_folder):
     document = evaluated(
         *("--policy", policy_folder / "flange.npz", "--trials", 3, "--allow-other-arm")
     )
-    assert (document["protocol"]["arm"], len(document["results"])) == ("paper", 1)
+    assert document["protocol"]["arm"] == "paper"
+    assert faced(document) == [("flange", "right"), ("oracle", "right")]
 
 
 def test_table_for_people(run, policy_folder):
     answer = run("kinarm-eval", "--policy", policy_folder / "lefty.npz", "--trials", 3)
     assert (answer.status, answer.err) == (0, "")
-    for words in ("lefty", "left", "3 trials", "seed 0", "arm paper"):
+    for words in ("lefty", "oracle", "left", "3 trials", "seed 0", "arm paper"):
         assert words in answer.out
     assert evaluate("zero", "left", trials=3).trials.digest in answer.out
 
@@ -161,7 +194,7 @@ def test_markdown_is_a_table_alone(run, policy_folder):
         *("--policy", "zero", "--trials", 3),
     )
     lines = answer.out.splitlines()
-    assert len(lines) == 4
+    assert len(lines) == 5
     assert all(line.startswith("|") and line.endswith("|") for line in lines)
     assert len({line.count("|") for line in lines}) == 1
 
@@ -197,4 +230,165 @@ def test_files_are_the_same_from_every_process(run, run_outside, policy_folder, 
 
 def test_without_policies_all_fitting_ones_and_the_baselines_take_part(evaluated):
     names = {name for name, _ in faced(evaluated("--trials", 1, "--arm", "paper_flange"))}
-    assert names == {"random", "zero"}
+    assert names == {"random", "zero", "oracle"}
+
+
+def test_the_oracle_alone(evaluated):
+    document = evaluated("--policy", "oracle", "--task", "right", "--trials", 5)
+    (row,) = document["results"]
+    assert (row["policy"], row["algorithm"], row["task"]) == ("oracle", "oracle", "right")
+    assert (row["trained_on"], row["training_seed"]) == (None, None)
+    assert (row["success"]["rate"], row["collision"]["rate"]) == (1, 0)
+    assert row["oracle"]["relative_success"] == 1
+    assert row["oracle"]["step_ratio"]["trials"] == 5
+    bounds = document["protocol"]["tasks"]["right"]["oracle"]
+    assert row["outcomes"]["steps"] == bounds["trials"]["steps"]
+    assert row["outcomes"]["final_distance"] == bounds["trials"]["final_distance"]
+
+
+def test_the_oracle_lists_what_it_cannot_solve(evaluated):
+    arguments = ("--policy", "oracle", "--task", "right", "--arm", "paper_flange", "--seed", 2)
+    document = evaluated(*arguments, "--trials", 12)
+    (row,) = document["results"]
+    bounds = document["protocol"]["tasks"]["right"]["oracle"]
+    solved = row["outcomes"]["outcome"].count("success")
+    assert 0 < row["success"]["rate"] == bounds["success"]["rate"] == solved / 12 < 1
+    assert row["oracle"]["relative_success"] == 1
+    assert row["oracle"]["step_ratio"]["trials"] == solved
+    unsolved = [i for i, reachable in enumerate(bounds["trials"]["reachable"]) if not reachable]
+    assert [entry["trial"] for entry in bounds["unsolved"]] == unsolved
+    assert len(unsolved) == 12 - solved
+    assert any("proven" in entry["reason"] for entry in bounds["unsolved"])
+    assert all(row["outcomes"]["final_distance"][trial] > 0.05 for trial in unsolved)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "tasks"),
+    [
+        (["zero"], ["left", "right", "both"]),
+        (["zero", "oracle"], ["left", "right", "both"]),
+        (["oracle"], ["left", "right", "both"]),
+        (["oracle", "oracle", "--task", "left", "--task", "left"], ["left"]),
+        (["zero", "oracle", "--task", "both", "--task", "left"], ["both", "left"]),
+        (["oracle", "zero", "--matrix"], ["left", "right", "both"]),
+    ],
+)
+def test_the_oracle_faces_every_task_in_play_once(evaluated, arguments, tasks):
+    words = (
+        word for name in arguments if name in ("zero", "oracle") for word in ("--policy", name)
+    )
+    others = [word for word in arguments if word not in ("zero", "oracle")]
+    document = evaluated(*words, *others, "--trials", 2)
+    assert [task for name, task in faced(document) if name == "oracle"] == tasks
+    assert list(document["protocol"]["tasks"]) == tasks
+
+
+def test_the_oracle_joins_those_who_are_entered_by_default(evaluated):
+    document = evaluated("--task", "left", "--trials", 2)
+    assert faced(document).count(("oracle", "left")) == 1
+    assert {task for _, task in faced(document)} == {"left"}
+    assert all(row["oracle"] for row in (*document["results"], *document["pooled"]))
+
+
+def test_without_the_oracle_nothing_is_solved(evaluated, solved, empty_cache):
+    document = evaluated("--policy", "zero", "--trials", 2, "--no-oracle")
+    assert faced(document) == [("zero", task) for task in ("left", "right", "both")]
+    assert all(entry["oracle"] is None for entry in document["protocol"]["tasks"].values())
+    assert all(row["oracle"] is None for row in document["results"])
+    assert solved == []
+    assert not empty_cache.exists()
+
+
+def test_the_oracle_may_be_named_and_its_bounds_left_out(evaluated):
+    document = evaluated("--policy", "oracle", "--task", "left", "--trials", 2, "--no-oracle")
+    (row,) = document["results"]
+    assert (row["success"]["rate"], row["oracle"]) == (1, None)
+    assert document["protocol"]["tasks"]["left"]["oracle"] is None
+
+
+def test_trials_are_solved_once_and_then_looked_up(evaluated, solved, empty_cache):
+    arguments = ("--policy", "zero", "--policy", "random", "--task", "right", "--trials", 3)
+    first, second = evaluated(*arguments), evaluated(*arguments)
+    assert solved == [3]
+    assert len(list(empty_cache.iterdir())) == 1
+    assert first == second
+
+
+def test_an_empty_cache_is_filled_without_a_word(run_outside, empty_cache):
+    arguments = ("--policy", "zero", "--task", "right", "--trials", 2)
+    answer = run_outside("kinarm-eval", *arguments)
+    assert (answer.status, answer.err) == (0, "")
+    assert len(list(empty_cache.iterdir())) == 1
+
+
+def test_a_cache_that_cannot_be_used_is_done_without(evaluated, tmp_path, monkeypatch):
+    arguments = ("--policy", "zero", "--task", "right", "--trials", 2)
+    expected = evaluated(*arguments)
+    (tmp_path / "file").write_text("mine")
+    monkeypatch.setenv("KINARM_CACHE", str(tmp_path / "file"))
+    assert evaluated(*arguments) == expected
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--policy", "zero", "--policy", "flange.npz"], ["'paper_flange'", "'paper'"]),
+        (["--policy", "flange.npz", "--task", "right"], ["'paper_flange'", "'paper'"]),
+        (["--policy", "flange.npz", "--matrix"], ["'paper_flange'", "'paper'"]),
+        (["--policy", "lefty.npz", "--arm", "paper_flange"], ["'paper_flange'", "'paper'"]),
+        (["--policy", "zero", "--task", "left", "--out", "lefty.npz"], ["lefty.npz"]),
+        (["--policy", "zero", "--policy", "nobody"], ["'nobody'", "random, zero, oracle"]),
+    ],
+)
+def test_what_is_refused_is_refused_before_trials_are_solved(
+    run, policy_folder, solved, empty_cache, arguments, words
+):
+    paths = [policy_folder / word if word.endswith(".npz") else word for word in arguments]
+    answer = run("kinarm-eval", "--trials", 2, *paths)
+    assert (answer.status, answer.out, len(answer.err.splitlines())) == (2, "", 1)
+    for word in words:
+        assert word in answer.err
+    assert solved == []
+    assert not empty_cache.exists()
+
+
+def test_a_file_called_oracle_is_not_mixed_up_with_the_oracle(run, policy, tmp_path):
+    """Either the clash is refused or one can tell the rows apart."""
+    policy.save(tmp_path / "oracle.npz")
+    answer = run("kinarm-eval", "--json", "--policy", tmp_path / "oracle.npz", "--trials", 2)
+    if answer.status == 0:
+        rows = json.loads(answer.out)["results"]
+        assert len({row["policy"] for row in rows}) == len(rows)
+    else:
+        assert "two policies are called 'oracle'" in answer.err
+
+
+def test_table_tells_how_far_the_proofs_got(run):
+    arguments = ("--policy", "zero", "--task", "right", "--trials", 5)
+    share = evaluate("zero", "right", trials=5, oracle=True).bounds.tight.mean()
+    beside, alone = (run("kinarm-eval", *arguments, *more).out for more in ([], ["--no-oracle"]))
+    assert f"proofs complete: right {100 * share:.1f} %" in beside
+    assert "proofs complete" not in alone
+
+
+def test_histograms_leave_out_the_oracle_unless_it_is_alone(run, policy_folder, tmp_path):
+    for folder, more in (("beside", []), ("alone", ["--no-oracle"])):
+        arguments = ("--policy", policy_folder / "lefty.npz", "--trials", 4, *more)
+        assert run("kinarm-eval", *arguments, "--out", tmp_path / folder).status == 0
+    name = "final_distance.svg"
+    assert (tmp_path / "beside" / name).read_bytes() == (tmp_path / "alone" / name).read_bytes()
+    arguments = ("--policy", "oracle", "--task", "left", "--trials", 4, "--out", tmp_path / "only")
+    assert run("kinarm-eval", *arguments).status == 0
+    assert "oracle" in (tmp_path / "only" / name).read_text()
+
+
+def test_what_is_being_done_is_told(empty_cache):
+    told = []
+    options = build_parser().parse_args(["--policy", "zero", "--task", "right", "--trials", "3"])
+    evaluate_all(options, told.append)
+    evaluate_all(options, told.append)
+    solving, *evaluating = told
+    assert "right" in solving
+    assert "3 of 3 trials solved" in solving
+    assert evaluating == ["evaluating on right"] * 2

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.entrants import BASELINES, Entrant
 from kinarm.evaluation.evaluations import Evaluation, run_trials
 from kinarm.evaluation.trials import TrialSet
@@ -54,6 +55,18 @@ def evaluations(
         run_trials(BASELINES["zero"], trials),
         run_trials(Entrant.from_policy("made-left-seed0", train_novice("left")), left),
     ]
+
+
+@pytest.fixture(scope="session")
+def bounded(skilled_evaluation: Evaluation) -> Evaluation:
+    """The skilled policy beside the oracle."""
+    return replace(skilled_evaluation, bounds=oracle_bounds(skilled_evaluation.trials))
+
+
+@pytest.fixture(scope="session")
+def bounded_evaluations(evaluations: list[Evaluation]) -> list[Evaluation]:
+    """All of them beside the oracle."""
+    return [replace(each, bounds=oracle_bounds(each.trials)) for each in evaluations]
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,9 @@
 """The benchmark measures what it says, on sizes small enough for a test."""
 
 import json
+import subprocess
 import time
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -22,10 +24,17 @@ def document(train_novice, tmp_path_factory):
 
 
 def shrink(patch: pytest.MonkeyPatch) -> None:
-    """Fewer batch sizes and a short training."""
-    whole = recipes.ars_recipe
+    """Fewer batch sizes and trials, and a short training."""
+    recipe, run = recipes.ars_recipe, subprocess.run
+
+    def run_less(command, **settings):
+        *words, last = command
+        return run([*words, last.replace("'200'", "'1', '--policy', 'zero'")], **settings)
+
     patch.setattr(bench, "BATCHES", (6, 512))
-    patch.setattr(recipes, "ars_recipe", lambda name, **kw: whole(name, iterations=3, **kw))
+    patch.setattr(bench, "ORACLE_TRIALS", 4)
+    patch.setattr(recipes, "ars_recipe", lambda name, **kw: recipe(name, iterations=3, **kw))
+    patch.setattr(subprocess, "run", run_less)
 
 
 def rates(document) -> list[dict[str, float]]:
@@ -62,6 +71,35 @@ def test_training_of_table_1_is_measured(document):
     training = document["table_1_training"]
     assert 0 < training["seconds"]["best"] <= training["seconds"]["median"]
     assert 3 * 48 <= training["environment_steps"] <= 3 * 48 * 64
+
+
+def test_the_oracle_is_measured(document):
+    rate = document["oracle"]["trials_per_second"]
+    assert document["oracle"]["trials"] == 4
+    assert 0 < rate["median"] <= rate["best"]
+
+
+def test_the_evaluation_is_measured(document):
+    assert set(document["evaluation"]) == {"seconds_without_bounds", "seconds", "peak_memory_mb"}
+    assert all(figure > 0 for figure in document["evaluation"].values())
+
+
+def test_the_evaluation_is_measured_before_and_after_its_bounds_are_known(monkeypatch, own_cache):
+    clock, seen = iter([0.0, 9.0, 10.0, 13.0]), []
+
+    def run(*_, env, **__):
+        folder = Path(env["KINARM_CACHE"])
+        seen.append((folder, len(list(folder.iterdir()))))
+        (folder / "bounds").touch()
+
+    monkeypatch.setattr(subprocess, "run", run)
+    monkeypatch.setattr(time, "perf_counter", lambda: next(clock))
+    figures = bench.measure_evaluation()
+    assert (figures["seconds_without_bounds"], figures["seconds"]) == (9, 3)
+    ((folder, before), (again, after)) = seen
+    assert (folder == again, before, after) == (True, 0, 1)
+    assert folder != own_cache
+    assert not folder.exists()
 
 
 def test_speed_up_is_the_ratio_of_two_figures(document):

@@ -5,8 +5,17 @@ import pytest
 
 from kinarm.arm import Arm
 from kinarm.errors import PolicyFileError, UnknownNameError
-from kinarm.evaluation.entrants import BASELINES, Entrant, find_entrants, shipped_entrants
+from kinarm.evaluation.bounds import oracle_bounds
+from kinarm.evaluation.entrants import (
+    BASELINES,
+    ORACLE,
+    Entrant,
+    find_entrants,
+    shipped_entrants,
+)
+from kinarm.evaluation.trials import TrialSet
 from kinarm.policies import policy_names
+from kinarm.simulator import Simulator
 
 
 @pytest.mark.parametrize("name", ["random", "zero"])
@@ -31,16 +40,17 @@ def test_a_relative_file_needs_no_folder(skilled, tmp_path, monkeypatch):
     assert find_entrants("mine.npz")[0].name == "mine"
 
 
-def test_a_file_called_like_a_baseline_is_that_file(skilled, tmp_path):
-    skilled.save(tmp_path / "random.npz")
-    (entrant,) = find_entrants(tmp_path / "random.npz")
+@pytest.mark.parametrize("name", ["random.npz", "oracle.npz"])
+def test_a_file_called_like_a_baseline_is_that_file(skilled, tmp_path, name):
+    skilled.save(tmp_path / name)
+    (entrant,) = find_entrants(tmp_path / name)
     assert entrant.policy is not None
 
 
 def test_an_unknown_name_lists_what_exists():
     with pytest.raises(UnknownNameError, match="unknown policy 'nobody'") as caught:
         find_entrants("nobody")
-    assert {"random", "zero"} <= set(caught.value.available)
+    assert {"random", "zero", "oracle"} <= set(caught.value.available)
 
 
 def test_a_missing_file_is_told_apart_from_an_unknown_name(tmp_path):
@@ -65,3 +75,39 @@ def test_baselines_close_the_list_of_all_entrants():
 def test_policies_for_another_arm_are_not_entered():
     entrants = shipped_entrants(Arm.load("paper_flange"))
     assert [entrant.name for entrant in entrants] == ["random", "zero"]
+
+
+def test_the_oracle_by_name():
+    (entrant,) = find_entrants("oracle")
+    assert entrant is ORACLE
+    assert (entrant.algorithm, entrant.trained_on, entrant.policy) == ("oracle", None, None)
+
+
+def test_the_oracle_replays_what_it_found():
+    trials = TrialSet.draw(Simulator("paper_flange", "right"), 12, seed=2)
+    rollouts, bounds = ORACLE.run(trials), oracle_bounds(trials)
+    assert 0 < bounds.reachable.sum() < 12
+    np.testing.assert_array_equal(rollouts.success, bounds.reachable)
+    np.testing.assert_array_equal(rollouts.steps, bounds.steps)
+    np.testing.assert_array_equal(rollouts.distance, bounds.final_distance)
+    assert not rollouts.collision.any()
+
+
+def test_the_oracle_does_not_change_other_entrants(skilled, trials):
+    entrant = Entrant.from_policy("mine", skilled)
+    before = entrant.run(trials)
+    ORACLE.run(trials)
+    np.testing.assert_array_equal(entrant.run(trials).distance, before.distance)
+
+
+def test_a_policy_for_another_arm_is_told(skilled):
+    entrant = Entrant.from_policy("mine", skilled)
+    entrant.check_arm(Arm.load())
+    with pytest.raises(PolicyFileError, match=r"trained for arm 'paper', not for 'paper_flange'"):
+        entrant.check_arm(Arm.load("paper_flange"))
+
+
+@pytest.mark.parametrize("entrant", [*BASELINES.values(), ORACLE], ids=lambda e: e.name)
+def test_what_is_not_trained_fits_every_arm(shipped_arms, entrant):
+    for arm in shipped_arms.values():
+        entrant.check_arm(arm)

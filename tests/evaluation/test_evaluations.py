@@ -2,15 +2,17 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError, SceneError, UnknownNameError
-from kinarm.evaluation.entrants import BASELINES, Entrant
+from kinarm.evaluation.entrants import BASELINES, ORACLE, Entrant, find_entrants
 from kinarm.evaluation.evaluations import evaluate, pool, run_trials
 from kinarm.evaluation.trials import TrialSet
+from kinarm.policies.oracle import Oracle
 from kinarm.reference import ReferenceSimulator
 from kinarm.scene import Bench, Scene
 from kinarm.simulator import Simulator
@@ -290,3 +292,152 @@ def test_pooled_interval_is_no_narrower_than_its_trials_allow(evaluations):
 
 def test_pooled_training_seeds_are_told(evaluations):
     assert pool(evaluations)[0].to_json()["training_seeds"] == [0, 1, 2]
+
+
+def test_step_ratio_is_that_of_the_trials_that_succeeded(bounded):
+    rollouts, starts, goals = bounded.rollouts, bounded.trials.starts, bounded.trials.goals
+    solutions = Oracle(task="right").solve_batch(starts, goals)
+    expected = [
+        rollouts.steps[trial] / solution.steps_lower_bound
+        for trial, solution in enumerate(solutions)
+        if rollouts.success[trial]
+    ]
+    assert 0 < len(expected) < 60
+    assert bounded.step_ratio.tolist() == expected
+    assert bounded.to_json()["oracle"]["step_ratio"] == {
+        "trials": len(expected),
+        "median": np.median(expected),
+        "p95": np.percentile(expected, 95),
+    }
+
+
+@pytest.mark.parametrize("reached", [range(60), range(0, 60, 3), [7]])
+def test_relative_success_is_the_ratio_of_two_rates(bounded, reached):
+    reachable = np.isin(np.arange(60), list(reached))
+    made = replace(bounded, bounds=replace(bounded.bounds, reachable=reachable))
+    successes, possible = bounded.outcomes.count("success"), len(reached)
+    relative = made.to_json()["oracle"]["relative_success"]
+    assert relative == pytest.approx((successes / 60) / (possible / 60))
+
+
+def test_a_policy_that_never_succeeds_has_no_step_ratio():
+    evaluation = evaluate("zero", "right", trials=4, oracle=True)
+    assert evaluation.step_ratio.shape == (0,)
+    assert evaluation.to_json()["oracle"] == {
+        "relative_success": 0,
+        "step_ratio": {"trials": 0, "median": None, "p95": None},
+    }
+
+
+@pytest.mark.parametrize("name", ["oracle", "zero"])
+def test_where_the_oracle_reaches_nothing_there_is_nothing_to_compare_with(name):
+    evaluation = evaluate(name, load_task("right", horizon=1), trials=4, oracle=True)
+    assert not evaluation.bounds.reachable.any()
+    assert evaluation.to_json()["oracle"] == {
+        "relative_success": None,
+        "step_ratio": {"trials": 0, "median": None, "p95": None},
+    }
+
+
+def test_without_the_oracle_there_are_no_bounds(skilled_evaluation):
+    assert skilled_evaluation.bounds is None
+    assert skilled_evaluation.to_json()["oracle"] is None
+    with pytest.raises(InvalidInputError, match="'skilled' was evaluated without the oracle"):
+        _ = skilled_evaluation.step_ratio
+
+
+def test_evaluations_are_made_without_the_oracle_unless_asked_for(skilled, monkeypatch):
+    monkeypatch.setattr(Oracle, "solve_batch", None)
+    assert evaluate(skilled, trials=3, seed=99).bounds is None
+
+
+def test_the_oracle_changes_nothing_but_the_bounds(skilled_evaluation, bounded):
+    alone, beside = skilled_evaluation.to_json(), bounded.to_json()
+    assert alone.pop("oracle") is None
+    assert set(beside.pop("oracle")) == {"relative_success", "step_ratio"}
+    assert alone == beside
+
+
+def test_the_oracle_evaluated_by_name():
+    evaluation = evaluate("oracle", task="right", trials=5, seed=5, oracle=True)
+    expected = Oracle(task="right").solve_batch(evaluation.trials.starts, evaluation.trials.goals)
+    np.testing.assert_array_equal(evaluation.bounds.paths, expected.paths)
+    np.testing.assert_array_equal(evaluation.rollouts.steps, expected.steps)
+    np.testing.assert_array_equal(evaluation.rollouts.distance, expected.final_distance)
+    assert set(evaluation.outcomes) == {"success"}
+    np.testing.assert_array_equal(
+        evaluation.step_ratio, expected.steps / expected.steps_lower_bound
+    )
+
+
+def test_the_oracle_evaluated_without_bounds():
+    evaluation = evaluate("oracle", task="right", trials=5, seed=5)
+    assert evaluation.success.rate == 1
+    assert evaluation.bounds is None
+
+
+def test_the_oracle_has_no_task_of_its_own():
+    with pytest.raises(InvalidInputError, match="'oracle' was not trained on a task"):
+        evaluate("oracle", trials=1)
+
+
+def test_the_oracle_is_all_that_is_possible_where_not_everything_is():
+    evaluation = evaluate("oracle", "right", trials=12, seed=2, arm="paper_flange", oracle=True)
+    solved = int(evaluation.bounds.reachable.sum())
+    assert 0 < evaluation.success.rate == solved / 12 < 1
+    beside = evaluation.to_json()["oracle"]
+    assert (beside["relative_success"], beside["step_ratio"]["trials"]) == (1, solved)
+
+
+@pytest.mark.parametrize(
+    ("arm", "name", "task"),
+    [
+        ("paper", "ars-tuned-both-seed0", "both"),
+        ("paper", "random", "left"),
+        ("paper", "oracle", "both"),
+        ("paper_flange", "oracle", "right"),
+        ("lrmate200ic_5l", "oracle", "right"),
+    ],
+)
+def test_nobody_is_better_than_proven_possible(arm, name, task):
+    evaluation = evaluate(name, task, trials=25, seed=2, arm=arm, oracle=True)
+    assert (evaluation.step_ratio >= 1).all()
+    rollouts, bounds = evaluation.rollouts, evaluation.bounds
+    assert (rollouts.distance >= bounds.distance_lower_bound).all()
+    assert not rollouts.success[bounds.steps_lower_bound > 64].any()
+
+
+def test_trials_are_solved_once_for_all_who_face_them(skilled, monkeypatch):
+    solve, calls = Oracle.solve_batch, []
+    monkeypatch.setattr(
+        Oracle, "solve_batch", lambda *args, **kw: calls.append(1) or solve(*args, **kw)
+    )
+    trials = TrialSet.draw(Simulator(task="right"), 3, seed=77)
+    for entrant in (Entrant.from_policy("mine", skilled), ORACLE, BASELINES["zero"]):
+        run_trials(entrant, trials, oracle=True)
+    assert len(calls) == 1
+
+
+def test_a_policy_for_another_arm_is_refused_before_the_oracle_is_asked(skilled, monkeypatch):
+    monkeypatch.setattr(Oracle, "solve_batch", None)
+    with pytest.raises(PolicyFileError, match="trained for arm"):
+        evaluate(skilled, arm="lrmate200ic_5l", trials=2, oracle=True)
+
+
+def test_pooled_step_ratio_is_over_all_seeds(trials):
+    members = [run_trials(e, trials, oracle=True) for e in find_entrants("ars-tuned-right")]
+    beside = pool(members)[0].to_json()["oracle"]
+    ratios = [
+        member.rollouts.steps[trial] / member.bounds.steps_lower_bound[trial]
+        for member in members
+        for trial in np.flatnonzero(member.rollouts.success)
+    ]
+    assert 60 < len(ratios) < 240
+    assert beside["step_ratio"]["trials"] == len(ratios)
+    assert beside["step_ratio"]["median"] == pytest.approx(np.median(ratios))
+    assert beside["step_ratio"]["p95"] == pytest.approx(np.percentile(ratios, 95))
+    assert beside["relative_success"] == pytest.approx(len(ratios) / 240)
+
+
+def test_pooled_figures_without_bounds_have_none(evaluations):
+    assert pool(evaluations)[0].to_json()["oracle"] is None

@@ -8,7 +8,8 @@ import pytest
 from rich.console import Console
 
 from kinarm.arm import Arm
-from kinarm.evaluation.entrants import Entrant
+from kinarm.evaluation.bounds import bounds_document
+from kinarm.evaluation.entrants import ORACLE, Entrant
 from kinarm.evaluation.evaluations import evaluate, run_trials
 from kinarm.evaluation.report import evaluation_document, print_table
 from kinarm.reference import ReferenceSimulator
@@ -28,9 +29,18 @@ RESULT_FIELDS = {
 }
 
 
+@pytest.fixture(scope="module", params=["evaluations", "bounded_evaluations"])
+def document(request):
+    """With and without bounds."""
+    return evaluation_document(request.getfixturevalue(request.param), "kinarm-eval --matrix")
+
+
 @pytest.fixture(scope="module")
-def document(evaluations):
-    return evaluation_document(evaluations, "kinarm-eval --matrix")
+def bounded_document(bounded_evaluations):
+    """With a row for the oracle, too."""
+    trial_sets = {each.task: each.trials for each in bounded_evaluations}
+    oracle = [run_trials(ORACLE, trials, oracle=True) for trials in trial_sets.values()]
+    return evaluation_document([*bounded_evaluations, *oracle], "kinarm-eval")
 
 
 def printed(document, width: int = 250, **settings) -> str:
@@ -51,7 +61,8 @@ def shown(document) -> list[dict[str, str]]:
 
 
 def cells(line: str, border: str) -> list[str]:
-    return [cell.strip() for cell in line.strip(f" {border}").split(border)]
+    inside = line.strip().removeprefix(border).removesuffix(border)
+    return [cell.strip() for cell in inside.split(border)]
 
 
 def test_document_is_plain_json_without_nan(document):
@@ -128,7 +139,7 @@ def test_training_seeds_are_recorded(document):
 def test_table_has_a_column_per_figure(document):
     headings = list(shown(document)[0])
     figures = ("success", "seeds", "0.1", "0.2", "median", "mean", "p95", "contact", "steps")
-    for name in ("task", "policy", *figures):
+    for name in ("task", "policy", *figures, "of oracle", "step ratio"):
         assert any(name in heading for heading in headings), name
 
 
@@ -150,6 +161,57 @@ def test_table_shows_the_figures_of_the_document(document):
     assert row["contact %"] == f"{100 * pooled['collision']['rate']:.1f}"
     worst, best = (100 * pooled["spread"]["success"][end] for end in ("min", "max"))
     assert row["seeds: range %"] == f"3: {worst:.1f}..{best:.1f}"
+
+
+def test_results_stand_beside_the_oracle(bounded_document, bounded_evaluations):
+    assert json.loads(json.dumps(bounded_document, allow_nan=False)) == bounded_document
+    for row, evaluation in zip(bounded_document["results"], bounded_evaluations, strict=False):
+        ratios = evaluation.step_ratio
+        assert row["oracle"]["relative_success"] == row["success"]["rate"]
+        assert row["oracle"]["step_ratio"] == {
+            "trials": len(ratios),
+            "median": np.median(ratios) if len(ratios) else None,
+            "p95": np.percentile(ratios, 95) if len(ratios) else None,
+        }
+
+
+def test_protocol_tells_the_bounds_of_its_tasks(bounded_document, bounded_evaluations):
+    tasks = bounded_document["protocol"]["tasks"]
+    for evaluation in bounded_evaluations:
+        expected = json.loads(json.dumps(bounds_document(evaluation.bounds)))
+        assert tasks[evaluation.task]["oracle"] == expected
+        column = tasks[evaluation.task]["oracle"]["trials"]["steps_lower_bound"]
+        assert len(column) == len(tasks[evaluation.task]["starts"])
+
+
+def test_without_bounds_there_are_none(evaluations):
+    document = evaluation_document(evaluations, "")
+    assert all(entry["oracle"] is None for entry in document["protocol"]["tasks"].values())
+    assert all(row["oracle"] is None for row in (*document["results"], *document["pooled"]))
+    assert {row["of oracle %"] + row["step ratio"] for row in shown(document)} == {""}
+
+
+def test_table_shows_the_bounds(bounded_document):
+    rows = {(row["task"], row["policy"]): row for row in shown(bounded_document)}
+    pooled = bounded_document["pooled"][0]["oracle"]
+    row = rows["right", "made-right"]
+    assert row["of oracle %"] == f"{100 * pooled['relative_success']:.1f}"
+    median, p95 = (pooled["step_ratio"][name] for name in ("median", "p95"))
+    assert row["step ratio"] == f"{median:.2f} (p95 {p95:.2f})"
+    assert (rows["right", "zero"]["of oracle %"], rows["right", "zero"]["step ratio"]) == (
+        "0.0",
+        "",
+    )
+
+
+def test_table_has_one_row_a_task_for_the_oracle(bounded_document):
+    rows = [row for row in shown(bounded_document) if row["policy"] == "oracle"]
+    assert [(row["task"], row["of oracle %"]) for row in rows] == [
+        ("right", "100.0"),
+        ("left", "100.0"),
+    ]
+    assert all(row["step ratio"].startswith("1.") for row in rows)
+    assert all(row["success %"].startswith("100.0 ") for row in rows)
 
 
 def test_table_is_sorted_by_success(document):
