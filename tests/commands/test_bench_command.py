@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from kinarm.evaluation import bench
+from kinarm.evaluation import bench, measurements
 from kinarm.policies import recipes
 
 
@@ -13,9 +13,9 @@ def small(monkeypatch):
     """Sizes for a test."""
     whole = recipes.ars_recipe
     evaluation = {"seconds_without_bounds": 9.87, "seconds": 4.32, "peak_memory_mb": 321.0}
-    monkeypatch.setattr(bench, "BATCHES", (512,))
-    monkeypatch.setattr(bench, "ORACLE_TRIALS", 4)
-    monkeypatch.setattr(bench, "measure_evaluation", lambda: evaluation)
+    monkeypatch.setattr(measurements, "BATCHES", (512,))
+    monkeypatch.setattr(measurements, "ORACLE_TRIALS", 4)
+    monkeypatch.setattr(measurements, "measure_evaluation", lambda: evaluation)
     monkeypatch.setattr(recipes, "ars_recipe", lambda name, **kw: whole(name, iterations=2, **kw))
 
 
@@ -52,7 +52,7 @@ def test_table_shows_every_figure(run, monkeypatch, policy_folder):
             "environment_steps": 2_300_000,
         },
         "oracle": {"trials": 200, "trials_per_second": {"median": 31.0, "best": 37.0}},
-        "evaluation": bench.measure_evaluation(),
+        "evaluation": measurements.measure_evaluation(),
         "ppo_training": {
             "seconds": 98.76,
             "environment_steps": 1_200_000,

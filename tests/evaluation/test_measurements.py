@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from kinarm.evaluation import bench
+from kinarm.evaluation import measurements
 from kinarm.policies import recipes
 from kinarm.simulator import Simulator
 
@@ -20,7 +20,7 @@ def document(train_novice, tmp_path_factory):
     train_novice("left").save(path)
     with pytest.MonkeyPatch.context() as patch:
         shrink(patch)
-        return bench.measure(str(path), 1)
+        return measurements.measure(str(path), 1)
 
 
 def shrink(patch: pytest.MonkeyPatch) -> None:
@@ -31,8 +31,8 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
         *words, last = command
         return run([*words, last.replace("'200'", "'1', '--policy', 'zero'")], **settings)
 
-    patch.setattr(bench, "BATCHES", (6, 512))
-    patch.setattr(bench, "ORACLE_TRIALS", 4)
+    patch.setattr(measurements, "BATCHES", (6, 512))
+    patch.setattr(measurements, "ORACLE_TRIALS", 4)
     patch.setattr(recipes, "ars_recipe", lambda name, **kw: recipe(name, iterations=3, **kw))
     patch.setattr(subprocess, "run", run_less)
 
@@ -56,7 +56,7 @@ def test_rates_are_positive(document):
 
 
 def test_rollouts_are_measured_in_every_combination(document):
-    threads = {1, bench.available_threads()}
+    threads = {1, measurements.available_threads()}
     seen = {(row["batch"], row["actions"], row["threads"]) for row in document["rollouts"]}
     assert seen == {(b, a, t) for b in (6, 512) for a in ("random", "trained") for t in threads}
     assert len(document["rollouts"]) == len(seen)
@@ -94,7 +94,7 @@ def test_the_evaluation_is_measured_before_and_after_its_bounds_are_known(monkey
 
     monkeypatch.setattr(subprocess, "run", run)
     monkeypatch.setattr(time, "perf_counter", lambda: next(clock))
-    figures = bench.measure_evaluation()
+    figures = measurements.measure_evaluation()
     assert (figures["seconds_without_bounds"], figures["seconds"]) == (9, 3)
     ((folder, before), (again, after)) = seen
     assert (folder == again, before, after) == (True, 0, 1)
@@ -113,7 +113,7 @@ def test_speed_up_is_the_ratio_of_two_figures(document):
 
 
 def test_machine_and_versions_are_told(document):
-    assert document["machine"]["threads"] == bench.available_threads()
+    assert document["machine"]["threads"] == measurements.available_threads()
     assert {"python", "numpy", "numba"} <= set(document["versions"])
     assert document["repetitions"] == 1
 
@@ -122,7 +122,7 @@ def test_timing_divides_steps_by_time_and_leaves_out_the_first_run(monkeypatch):
     clock = iter([0.0, 2.0, 10.0, 11.0, 20.0, 24.0])
     runs = []
     monkeypatch.setattr(time, "perf_counter", lambda: next(clock))
-    timing = bench.timed(lambda: runs.append(1) or 8, 3)
+    timing = measurements.timed(lambda: runs.append(1) or 8, 3)
     assert timing == (4.0, 8.0)
     assert len(runs) == 4
 
@@ -130,10 +130,12 @@ def test_timing_divides_steps_by_time_and_leaves_out_the_first_run(monkeypatch):
 def test_measured_steps_are_steps_taken(monkeypatch, train_novice):
     """The rate of trained rollouts counts the steps of the episodes, not their horizon."""
     counted = []
-    monkeypatch.setattr(bench, "BATCHES", (32,))
-    monkeypatch.setattr(bench, "timed", lambda run, _: counted.append(run()) or bench.Timing(1, 1))
+    monkeypatch.setattr(measurements, "BATCHES", (32,))
+    monkeypatch.setattr(
+        measurements, "timed", lambda run, _: counted.append(run()) or measurements.Timing(1, 1)
+    )
     simulator, policy = Simulator(task="right", threads=1), train_novice("right")
-    bench.measure_rollouts(simulator, policy, 1)
+    measurements.measure_rollouts(simulator, policy, 1)
     starts, goals = simulator.sample(np.random.default_rng(32), 32)
     steps = int(simulator.rollout(policy, starts, goals).steps.sum())
     assert steps < 32 * 64
@@ -142,13 +144,15 @@ def test_measured_steps_are_steps_taken(monkeypatch, train_novice):
 
 def test_environments_are_measured_with_all_their_arms(monkeypatch, train_novice):
     counted = []
-    monkeypatch.setattr(bench, "timed", lambda run, _: counted.append(run()) or bench.Timing(1, 1))
+    monkeypatch.setattr(
+        measurements, "timed", lambda run, _: counted.append(run()) or measurements.Timing(1, 1)
+    )
     made = []
     whole = gymnasium.make_vec
     monkeypatch.setattr(
         gymnasium, "make_vec", lambda *a, **kw: made.append(whole(*a, **kw)) or made[-1]
     )
-    bench.measure_vector_env(train_novice("right"), 1)
+    measurements.measure_vector_env(train_novice("right"), 1)
     assert made[0].num_envs == 64
     assert counted[0] % 64 == 0
 
@@ -160,7 +164,7 @@ class TestPPO:
         whole = recipes.ppo_recipe
         tiny = {"iterations": 3, "arms": 4, "minibatch": 64, "hidden": (8, 8)}
         monkeypatch.setattr(recipes, "ppo_recipe", lambda name, **kw: whole(name, **tiny, **kw))
-        return bench.measure_ppo("left")
+        return measurements.measure_ppo("left")
 
     def test_share_of_the_simulator(self, training):
         assert training["environment_steps"] == 3 * 4 * 16
@@ -172,7 +176,7 @@ class TestPPO:
         from kinarm.policies import ppo
 
         monkeypatch.setattr(ppo, "find_spec", lambda name: None)
-        assert "pip install 'kinarm[ppo]'" in bench.measure_ppo("left")["skipped"]
+        assert "pip install 'kinarm[ppo]'" in measurements.measure_ppo("left")["skipped"]
 
 
 def test_training_with_ppo_is_measured_on_demand(document):
