@@ -12,7 +12,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm.arm import Arm
-from kinarm.collision import forget_history
+from kinarm.collision import make_verdicts_reliable
 from kinarm.simulator import Simulator
 
 
@@ -59,7 +59,7 @@ class ReferenceSimulator:
         self.step_limit = simulator.step_limit
         self.contact_model = simulator.contact_model
         self._data = self.arm.model.createData()
-        self._geometry_data = forget_history(self.contact_model.geometry.createData())
+        self._geometry_data = make_verdicts_reliable(self.contact_model.geometry.createData())
 
     def rollout(
         self,

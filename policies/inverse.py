@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm import kernels
+from kinarm.errors import InvalidInputError
 from kinarm.parallel import run_rows
 from kinarm.policies.motion import steps_between
 from kinarm.simulator import Simulator
@@ -68,13 +69,16 @@ def inverse_kinematics(
     Raises
     ------
     InvalidInputError
-        If a shape is wrong, an entry is not finite or the start is beyond the limits.
+        If a shape is wrong, an entry is not finite, the start is beyond the limits or a number
+        is not positive.
     """
     q = finite_array("start", start, (simulator.arm.n_axes,))
     g = finite_array("goal", goal, (3,))
     starts, goals = simulator.check_scenarios(q[None], g[None])
     horizon, tolerance = np.array([simulator.task.horizon]), np.array([simulator.task.tolerance])
     samples = whole_number("samples", samples, 1)
+    if not separation > 0:
+        raise InvalidInputError(f"separation must be greater than 0, got {separation}")
     found, _ = solve_within(simulator, starts, goals, horizon, tolerance, starts, samples)
     remaining = found[np.argsort(steps_between(simulator, starts, found), kind="stable")]
     distinct = []

@@ -95,7 +95,7 @@ def along_path(
     """
     lengths = steps_between(simulator, path[:-1], path[1:])
     if through_corners:
-        lengths = np.ceil(lengths)
+        lengths = np.ceil(lengths - 1e-9)
     arrival = np.concatenate([[0.0], np.cumsum(lengths)])
     n_steps = int(np.ceil(arrival[-1] - 1e-9))
     if n_steps > simulator.task.horizon:

@@ -5,7 +5,8 @@ For each trial the oracle *proves* bounds and *finds* a motion; the best policy 
 Proven, by branch and bound over all configurations within reach (`kinarm.kernels.approach`):
 
 - the number of steps below which no policy can bring the tool within the tolerance of the goal;
-- where none can within the horizon, a distance that no policy can beat, to a millimetre.
+- where none can within the horizon, a distance that no policy can beat, to a millimetre if the
+  budget suffices.
 
 Contact is ignored in that, which makes both hold all the more for motions that avoid it. Where the
 motion found is slower than the bound, the bound is raised: a motion does not end where the arm
@@ -68,7 +69,7 @@ class Oracle:
     task : ReachTask or str
         The task; its tolerance and horizon count.
     simulator : Simulator, optional
-        Brings arm, scene and task with it.
+        Used instead of arm, scene and task.
 
     Attributes
     ----------

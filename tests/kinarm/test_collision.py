@@ -16,7 +16,7 @@ from kinarm.collision import (
     WITH_GROUND,
     ContactModel,
     enclosing_capsule,
-    forget_history,
+    make_verdicts_reliable,
 )
 from kinarm.errors import ArmError
 from kinarm.scene import Bench, Scene
@@ -41,7 +41,7 @@ def proven_free(simulator, configurations):
 def in_contact(simulator, configurations):
     """Ask Coal one configuration at a time, without a broad phase."""
     model, geometry = simulator.arm.model, simulator.contact_model.geometry
-    data, geometry_data = model.createData(), forget_history(geometry.createData())
+    data, geometry_data = model.createData(), make_verdicts_reliable(geometry.createData())
     return np.array(
         [
             pin.computeCollisions(model, data, geometry, geometry_data, q, True)
@@ -429,3 +429,22 @@ def test_bench_in_the_way_is_an_obstacle(simulator):
     wall = Bench(name="wall", x=(0.3, 0.6), y=(-0.2, 0.2), height=1.0)
     model = ContactModel.build(simulator.arm, Scene(benches=(wall,)))
     assert "wall bench" in model.contact_pair(np.zeros(6))
+
+
+@pytest.mark.parametrize(
+    "configuration",
+    [
+        "2.089669367612132 1.4484182951518316 1.2221036959293732 "
+        "0.3209242395453302 -0.3047626538669959 -3.1965649212790037",
+        "-2.226523374792933 0.910218036619165 0.15901152469457733 "
+        "-0.639787945605816 0.46831362615289185 -3.4513153356917727",
+    ],
+)
+def test_deep_contacts_that_coal_overlooks_by_default_are_found(simulators, configuration):
+    q = np.fromstring(configuration, sep=" ")
+    model = simulators["paper"].contact_model
+    data, distances = model.arm.model.createData(), model.geometry.createData()
+    pin.computeDistances(model.arm.model, data, model.geometry, distances, q)
+    assert min(result.min_distance for result in distances.distanceResults) < -0.02
+    assert model.in_contact(q[None])[0]
+    assert "bench" in model.contact_pair(q)[1]
