@@ -114,17 +114,16 @@ def _footnote(document: dict[str, Any]) -> str:
     hashes = (f"{task} {entry['trial_set_hash']}" for task, entry in tasks)
     lines = [
         f"{protocol['trials']} trials a task, seed {protocol['seed']}, arm {protocol['arm']}; "
-        "95 % intervals in brackets",
-        f"trial sets: {', '.join(hashes)}",
+        "95 % intervals in brackets"
     ]
     bounds = [(task, entry["oracle"]) for task, entry in tasks if entry["oracle"]]
     if bounds:
         shares = (f"{task} {100 * bound['tight_share']:.1f} %" for task, bound in bounds)
-        lines.insert(
-            1,
+        lines.append(
             "step ratio: steps over the number proven necessary, of trials that succeeded; "
-            f"proofs complete: {', '.join(shares)}",
+            f"proofs complete: {', '.join(shares)}"
         )
+    lines.append(f"trial sets: {', '.join(hashes)}")
     return "\n".join(lines)
 
 
@@ -153,8 +152,9 @@ def evaluate_all(
     _check_names(entrant for entrant, _ in pairs)
     if not pairs:
         raise InvalidInputError("no chosen policy was trained on a task that exists: name a --task")
-    for entrant, _ in () if options.allow_other_arm else pairs:
-        entrant.check_arm(arm)
+    if not options.allow_other_arm:
+        for entrant, _ in pairs:
+            entrant.check_arm(arm)
     if options.out is not None:
         check_folder(options.out, create=True)
     evaluations = []

@@ -78,8 +78,8 @@ def point_speed(chain: Chain, axis: int, link: int, points: NDArray[np.float64])
         return 1.0
     if link == axis + 1:
         return float(np.linalg.norm(np.cross(chain.axis[axis], points), axis=1).max())
-    following = chain.translation[axis + 1]
-    slide = link_lengths(chain)[axis + 1] - np.linalg.norm(following)
+    following, lengths = chain.translation[axis + 1], link_lengths(chain)
+    slide = lengths[axis + 1] - np.linalg.norm(following)
     offset = np.linalg.norm(np.cross(chain.axis[axis], following)) + slide
-    between = link_lengths(chain)[axis + 2 : link].sum()
+    between = lengths[axis + 2 : link].sum()
     return float(offset + between + np.linalg.norm(points, axis=1).max())

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,10 +13,10 @@ from kinarm.errors import InvalidInputError
 from kinarm.networks import Networks
 from kinarm.policies.ars_config import ARSConfig
 from kinarm.policies.curve import CurvePoint
-from kinarm.policies.mirror import Mirror, is_symmetric
+from kinarm.policies.mirror import Mirror, task_mirror
 from kinarm.policies.normalizer import Normalizer, input_scale
 from kinarm.policies.policy import Layer, Policy
-from kinarm.policies.provenance import Provenance, package_versions, source_commit
+from kinarm.policies.provenance import Provenance
 from kinarm.simulator import Simulator
 
 
@@ -97,7 +97,7 @@ def train_ars(
     shape = (simulator.n_actions, simulator.n_observations)
     if state.theta.shape != shape:
         raise InvalidInputError(f"the state to resume has shape {state.theta.shape}, not {shape}")
-    mirror = task_mirror(config, simulator)
+    mirror = task_mirror(config.symmetric, simulator)
     began = time.perf_counter() - state.wall_time
     while state.iteration < config.iterations:
         state = ars_iteration(config, simulator, state, began, mirror)
@@ -190,12 +190,6 @@ def draw_scenarios(
     return np.tile(starts, (copies, 1)), np.tile(goals, (copies, 1))
 
 
-def task_mirror(config: ARSConfig, simulator: Simulator) -> Mirror | None:
-    """Reflection that the policy has to commute with, if any."""
-    symmetric = config.symmetric and is_symmetric(simulator.scene, simulator.task.benches)
-    return Mirror.of(simulator) if symmetric else None
-
-
 def policy_normalizer(
     config: ARSConfig, seen: Normalizer, mirror: Mirror | None
 ) -> Normalizer | None:
@@ -276,16 +270,5 @@ def state_policy(
         mean=normalizer.mean,
         std=normalizer.std,
         layers=(Layer(state.theta, np.zeros(n_actions)),),
-        provenance=Provenance(
-            algorithm="ars",
-            recipe=config.recipe,
-            task=config.task,
-            arm=arm.name,
-            arm_digest=arm.digest,
-            seed=config.seed,
-            environment_steps=state.environment_steps,
-            config=asdict(config),
-            versions=package_versions(),
-            commit=source_commit(),
-        ),
+        provenance=Provenance.of("ars", config, arm, state.environment_steps),
     )

@@ -94,6 +94,19 @@ class Mirror(NamedTuple):
         return np.allclose(mirrored, seen * self.observations, rtol=0, atol=ACCURACY)
 
 
+def task_mirror(symmetric: bool, simulator: Simulator) -> Mirror | None:
+    """Reflection that a policy has to commute with, if it is to and the task is its own image.
+
+    Raises
+    ------
+    InvalidInputError
+        If the reflection does not map the arm's motions to themselves.
+    """
+    if not (symmetric and is_symmetric(simulator.scene, simulator.task.benches)):
+        return None
+    return Mirror.of(simulator)
+
+
 def is_symmetric(scene: Scene, benches: tuple[str, ...]) -> bool:
     """Whether the reflection maps a scene, and the benches that carry cubes, to themselves."""
     chosen = [scene.bench(name) for name in benches]

@@ -130,8 +130,8 @@ class Oracle:
         StartInContactError
             If a start touches something.
         """
-        q, g = self.simulator.check_scenarios(starts, goals)
-        self.simulator.reset(q, g)
+        episodes = self.simulator.reset(starts, goals)
+        q, g = episodes.q, episodes.goal
         parts = []
         for first in range(0, max(len(q), 1), LOT):
             lot = slice(first, first + LOT)

@@ -3,7 +3,6 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -15,15 +14,14 @@ from torch.nn.utils import parameters_to_vector, vector_to_parameters
 
 from kinarm.errors import InvalidInputError
 from kinarm.policies.curve import CurvePoint
-from kinarm.policies.mirror import Mirror, is_symmetric
+from kinarm.policies.mirror import task_mirror
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.policy import Layer, Policy
 from kinarm.policies.ppo_config import PPOConfig
 from kinarm.policies.ppo_env import BatchEnv
 from kinarm.policies.ppo_state import PPOState
-from kinarm.policies.provenance import Provenance, package_versions, source_commit
+from kinarm.policies.provenance import Provenance
 from kinarm.policies.symmetric_layers import symmetric_layers
-from kinarm.simulator import Simulator
 
 NORMALIZED_OVER = 10_000
 """Random starts whose observations are the statistics of the normaliser."""
@@ -54,12 +52,6 @@ def seed_iteration(seed: int, iteration: int) -> np.random.Generator:
     return np.random.default_rng(children[2])
 
 
-def task_mirror(config: PPOConfig, simulator: Simulator) -> Mirror | None:
-    """Reflection that the policy has to commute with, if any."""
-    symmetric = config.symmetric and is_symmetric(simulator.scene, simulator.task.benches)
-    return Mirror.of(simulator) if symmetric else None
-
-
 class PPOLearner:
     """Environment and model of a training; all that changes is in the `PPOState`.
 
@@ -83,7 +75,7 @@ class PPOLearner:
             config.arms,
             normalizer=normalizer,
             rng=np.random.default_rng(),
-            mirror=task_mirror(config, simulator),
+            mirror=task_mirror(config.symmetric, simulator),
         )
         self._learning_rate = config.learning_rate
         self.model = PPO(
@@ -116,7 +108,7 @@ class PPOLearner:
         rng = seed_iteration(config.seed, 0)
         simulator = config.simulator()
         observations = simulator.observe(*simulator.sample(rng, NORMALIZED_OVER))
-        mirror = task_mirror(config, simulator)
+        mirror = task_mirror(config.symmetric, simulator)
         if mirror is not None:
             observations = mirror.to_the_right(observations)
         learner = cls(config, Normalizer.of(observations))
@@ -238,16 +230,5 @@ class PPOLearner:
             mean=mean,
             std=std,
             layers=layers,
-            provenance=Provenance(
-                algorithm="ppo",
-                recipe=config.recipe,
-                task=config.task,
-                arm=arm.name,
-                arm_digest=arm.digest,
-                seed=config.seed,
-                environment_steps=state.environment_steps,
-                config=asdict(config),
-                versions=package_versions(),
-                commit=source_commit(),
-            ),
+            provenance=Provenance.of("ppo", config, arm, state.environment_steps),
         )

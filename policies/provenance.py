@@ -6,9 +6,14 @@ from dataclasses import asdict, dataclass, field, fields
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from kinarm.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from kinarm.arm import Arm
+    from kinarm.policies.ars_config import ARSConfig
+    from kinarm.policies.ppo_config import PPOConfig
 
 RECORDED_PACKAGES = (
     *("kinarm", "numpy", "numba", "pin", "coal", "gymnasium", "scipy"),
@@ -52,6 +57,24 @@ class Provenance:
     config: dict[str, Any] = field(default_factory=dict)
     versions: dict[str, str] = field(default_factory=dict)
     commit: str = ""
+
+    @classmethod
+    def of(
+        cls, algorithm: str, config: "ARSConfig | PPOConfig", arm: "Arm", environment_steps: int
+    ) -> "Provenance":
+        """Record a training that took place here and now, with these settings."""
+        return cls(
+            algorithm=algorithm,
+            recipe=config.recipe,
+            task=config.task,
+            arm=arm.name,
+            arm_digest=arm.digest,
+            seed=config.seed,
+            environment_steps=environment_steps,
+            config=asdict(config),
+            versions=package_versions(),
+            commit=source_commit(),
+        )
 
     def to_json(self) -> dict[str, Any]:
         """As a dictionary that JSON can hold."""

@@ -45,8 +45,6 @@ class Learner(NamedTuple):
         Its name on the command line.
     recipe : callable
         Looks settings up by name, with replacements.
-    check : callable
-        Refuses settings that cannot be trained.
     train : callable
         Trains, given settings, the state to go on from, and what to call with every state.
     save, load : callable
@@ -55,7 +53,6 @@ class Learner(NamedTuple):
 
     name: str
     recipe: Callable[..., Any]
-    check: Callable[[Any], object]
     train: Callable[..., Any]
     save: Callable[[Path, Any, Any], None]
     load: Callable[[Path], tuple[Any, Any]]
@@ -167,14 +164,13 @@ def _train(options: argparse.Namespace) -> None:
 
 def _ars() -> Learner:
     """Augmented Random Search."""
-    from kinarm.policies.ars import task_mirror, train_ars
+    from kinarm.policies.ars import train_ars
     from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
     from kinarm.policies.recipes import ars_recipe
 
     return Learner(
         name="ars",
         recipe=ars_recipe,
-        check=lambda config: task_mirror(config, config.simulator()),
         train=train_ars,
         save=save_checkpoint,
         load=load_checkpoint,
@@ -188,12 +184,9 @@ def _ppo(tensorboard: Path | None) -> Learner:
     from kinarm.policies.recipes import ppo_recipe
 
     require_ppo(tensorboard=tensorboard is not None)
-    from kinarm.policies.ppo_learner import task_mirror
-
     return Learner(
         name="ppo",
         recipe=ppo_recipe,
-        check=lambda config: task_mirror(config, config.simulator()),
         train=partial(train_ppo, tensorboard=tensorboard),
         save=save_ppo_checkpoint,
         load=load_ppo_checkpoint,
@@ -202,6 +195,8 @@ def _ppo(tensorboard: Path | None) -> Learner:
 
 def _beginning(options: argparse.Namespace, learner: Learner) -> tuple[Any, Any]:
     """Settings and state to begin with: from the command line, or from a checkpoint."""
+    from kinarm.policies.mirror import task_mirror
+
     if options.arm is not None and Path(options.arm).is_file():
         options.arm = str(Path(options.arm).resolve())
     settings = given_settings(options)
@@ -213,7 +208,8 @@ def _beginning(options: argparse.Namespace, learner: Learner) -> tuple[Any, Any]
                 "or delete it"
             )
         config = learner.recipe(settings.pop("recipe", "paper"), **settings)
-        learner.check(config)  # Before any output is made.
+        # Refuses what cannot be trained before any output is made.
+        task_mirror(config.symmetric, config.simulator())
         return config, None
     if not checkpoint.exists():
         raise PolicyFileError(f"nothing to resume: there is no {str(checkpoint)!r}")

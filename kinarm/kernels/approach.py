@@ -193,7 +193,7 @@ def search(
     budget: int,
     best: NDArray[np.float64],
     boxes: NDArray[np.float64],
-) -> tuple[int, float, float, int]:
+) -> tuple[int, float, float]:
     """Search a box for a configuration that brings the tool close to the goal.
 
     Parameters
@@ -228,8 +228,6 @@ def search(
         That of the closest configuration found [m].
     proven : float
         Lower bound of the distance over the box [m].
-    examined : int
-        Number of boxes examined.
     """
     n, n_axes = lower.shape[0], best.shape[1]
     poses, jacobian, offset = np.empty((n_axes + 1, POSE)), np.empty((3, n)), np.empty(3)
@@ -241,7 +239,7 @@ def search(
         if examined >= budget or waiting + 1 >= BOXES:
             for i in range(waiting):
                 proven = min(proven, boxes[i, 2 * n])
-            return EXHAUSTED, closest, max(min(proven, closest) - ROUNDING, 0.0), examined
+            return EXHAUSTED, closest, max(min(proven, closest) - ROUNDING, 0.0)
         waiting -= 1
         examined += 1
         for i in range(n):
@@ -274,7 +272,7 @@ def search(
         halve(boxes, waiting, bound, step, spread)
         waiting += 2
     outcome = FOUND if closest <= enough else EXCLUDED
-    return outcome, closest, max(min(proven, closest) - ROUNDING, 0.0), examined
+    return outcome, closest, max(min(proven, closest) - ROUNDING, 0.0)
 
 
 @kernel
@@ -337,7 +335,7 @@ def steps_floor(
                 reach = floors[row] * step_limit[i] + ROUNDING
                 lower[i] = max(chain.lower[i], starts[row, i] - reach)
                 upper[i] = min(chain.upper[i], starts[row, i] + reach)
-            outcome, _, _, _ = search(
+            outcome, _, _ = search(
                 chain,
                 bounds,
                 shapes,
@@ -405,7 +403,7 @@ def closest_approach(
     best, boxes = np.empty((1, starts.shape[1])), np.empty((BOXES, 2 * lower.shape[1] + 1))
     for row in range(first, last):
         best[0] = starts[row]
-        _, found, proven, _ = search(
+        _, found, proven = search(
             chain,
             bounds,
             shapes,

@@ -6,6 +6,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from configurations import contact_boundary, random_configurations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -23,11 +24,6 @@ from kinarm.scene import Bench, Scene
 from kinarm.simulator import substeps
 
 CAPSULE_ARMS = ("lrmate200ic_5l", "paper", "paper_flange")
-
-
-def random_configurations(simulator, seed, count):
-    arm = simulator.arm
-    return np.random.default_rng(seed).uniform(arm.lower, arm.upper, (count, arm.n_axes))
 
 
 def proven_free(simulator, configurations):
@@ -48,20 +44,6 @@ def in_contact(simulator, configurations):
             for q in configurations
         ]
     )
-
-
-def contact_boundary(simulator, seed, count):
-    """Pairs of configurations, free and touching, that are closer than 1e-9 to each other."""
-    judge = simulator.contact_model.in_contact
-    candidates = random_configurations(simulator, seed, 8 * count)
-    touching = judge(candidates)
-    n = min(count, touching.sum(), (~touching).sum())
-    free, hit = candidates[~touching][:n], candidates[touching][:n]
-    for _ in range(34):
-        middle = (free + hit) / 2
-        touches = judge(middle)[:, None]
-        free, hit = np.where(touches, free, middle), np.where(touches, middle, hit)
-    return free, hit
 
 
 def jittered(configurations, seed):

@@ -3,6 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+from configurations import contact_boundary, random_configurations
 from numba import njit
 
 from kinarm import kernels
@@ -35,15 +36,10 @@ def claims(simulator, centres, halves=None, share=1.0):
     return claimed
 
 
-def drawn(simulator, seed, count):
-    arm = simulator.arm
-    return np.random.default_rng(seed).uniform(arm.lower, arm.upper, (count, arm.n_axes))
-
-
 def boxes(simulator, seed, count, smallest=-3.0, largest=-0.3):
     """Centres and half-widths of boxes within the limits; the other axes keep their place."""
     rng, arm, n = np.random.default_rng(seed), simulator.arm, simulator.n_actions
-    middle = drawn(simulator, rng, count)
+    middle = random_configurations(simulator, rng, count)
     width = 10.0 ** rng.uniform(smallest, largest, (count, 1)) * rng.random((count, n))
     lower = np.fmax(middle[:, :n] - width, arm.lower[:n])
     upper = np.fmin(middle[:, :n] + width, arm.upper[:n])
@@ -59,20 +55,6 @@ def within(centre, half, rng, count):
     inside = np.tile(centre, (count, 1))
     inside[:, :n] += shares * half
     return inside
-
-
-def contact_boundary(simulator, seed, count):
-    """Pairs of configurations, free and touching, that are closer than 1e-9 to each other."""
-    judge = simulator.contact_model.in_contact
-    candidates = drawn(simulator, seed, 8 * count)
-    touching = judge(candidates)
-    n = min(count, touching.sum(), (~touching).sum())
-    free, hit = candidates[~touching][:n], candidates[touching][:n]
-    for _ in range(34):
-        middle = (free + hit) / 2
-        touches = judge(middle)[:, None]
-        free, hit = np.where(touches, free, middle), np.where(touches, middle, hit)
-    return free, hit
 
 
 def depths(simulator, configurations):
@@ -114,7 +96,7 @@ def touching_alone(simulator, configurations):
 
 class TestSingleConfigurations:
     def test_never_claims_contact_where_nothing_touches(self, any_simulator):
-        configurations = drawn(any_simulator, 1, 40_000)
+        configurations = random_configurations(any_simulator, 1, 40_000)
         claimed = claims(any_simulator, configurations)
         assert certainly_free(any_simulator, configurations[claimed]).size == 0
 
@@ -131,7 +113,7 @@ class TestSingleConfigurations:
     @pytest.mark.parametrize("name", CAPSULE_ARMS)
     def test_claims_nearly_all_contact_between_capsules(self, simulators, name):
         simulator = simulators[name]
-        configurations = drawn(simulator, 4, 20_000)
+        configurations = random_configurations(simulator, 4, 20_000)
         touching = simulator.contact_model.in_contact(configurations)
         assert touching.sum() > 2000
         assert claims(simulator, configurations)[touching].mean() > 0.99
@@ -139,7 +121,7 @@ class TestSingleConfigurations:
     @pytest.mark.parametrize("name", CAPSULE_ARMS)
     def test_claims_contact_of_every_kind(self, simulators, name):
         simulator = simulators[name]
-        configurations = drawn(simulator, 5, 6000)
+        configurations = random_configurations(simulator, 5, 6000)
         alone, kinds = touching_alone(simulator, configurations)
         claimed = claims(simulator, configurations[alone])
         for kind in range(3):
@@ -147,7 +129,7 @@ class TestSingleConfigurations:
             assert claimed[kinds == kind].mean() > 0.95
 
     def test_agrees_with_the_proof_of_freedom(self, any_simulator):
-        configurations = drawn(any_simulator, 6, 20_000)
+        configurations = random_configurations(any_simulator, 6, 20_000)
         n = len(configurations)
         tools, free = np.empty((n, 3)), np.empty(n, dtype=bool)
         shapes = any_simulator.contact_model.shapes
@@ -158,7 +140,7 @@ class TestSingleConfigurations:
 class TestShapes:
     def test_shapes_that_are_only_enclosed_prove_nothing(self, simulators):
         simulator = simulators["mesh"]
-        configurations = drawn(simulator, 7, 20_000)
+        configurations = random_configurations(simulator, 7, 20_000)
         assert simulator.contact_model.in_contact(configurations).mean() > 0.05
         assert not simulator.contact_model.shapes.exact.any()
         assert not claims(simulator, configurations).any()
@@ -166,7 +148,7 @@ class TestShapes:
     def test_capsules_beside_other_shapes_do(self, simulators):
         simulator = simulators["sliding"]
         assert simulator.contact_model.shapes.exact.sum() == 2
-        assert claims(simulator, drawn(simulator, 8, 20_000)).sum() > 20
+        assert claims(simulator, random_configurations(simulator, 8, 20_000)).sum() > 20
 
     def test_by_hand(self, make_joint, make_collision, write_robot):
         # A ball of 0.1 m that turns at a distance of 0.5 m from a vertical axis, at z = 0.4.
@@ -218,7 +200,7 @@ class TestBoxes:
     @pytest.mark.parametrize("name", CAPSULE_ARMS)
     def test_small_boxes_of_deep_overlap_are_claimed(self, simulators, name):
         simulator = simulators[name]
-        configurations = drawn(simulator, 13, 4000)
+        configurations = random_configurations(simulator, 13, 4000)
         deep = configurations[depths(simulator, configurations) > 0.03]
         assert len(deep) > 200
         halves = np.full((len(deep), simulator.n_actions), 0.003)

@@ -1,0 +1,22 @@
+"""Configurations at which contact is tested."""
+
+import numpy as np
+
+
+def random_configurations(simulator, seed, count):
+    arm = simulator.arm
+    return np.random.default_rng(seed).uniform(arm.lower, arm.upper, (count, arm.n_axes))
+
+
+def contact_boundary(simulator, seed, count):
+    """Pairs of configurations, free and touching, that are closer than 1e-9 to each other."""
+    judge = simulator.contact_model.in_contact
+    candidates = random_configurations(simulator, seed, 8 * count)
+    touching = judge(candidates)
+    n = min(count, touching.sum(), (~touching).sum())
+    free, hit = candidates[~touching][:n], candidates[touching][:n]
+    for _ in range(34):
+        middle = (free + hit) / 2
+        touches = judge(middle)[:, None]
+        free, hit = np.where(touches, free, middle), np.where(touches, middle, hit)
+    return free, hit
