@@ -96,8 +96,8 @@ class ReachEnv(gymnasium.Env[Array, Array]):
     Quaternions are composed along the chain, so they have no sign flips over the joint range.
 
     **Reward**: sum of the terms ``reward_progress`` (metres by which the tool came closer),
-    ``reward_collision`` (-1 when a move touches something), ``reward_success`` (0) and
-    ``reward_step`` (0), with the default weights in brackets.
+    ``reward_closer`` (0, for every step closer), ``reward_collision`` (-1 when a move touches
+    something), ``reward_success`` (0) and ``reward_step`` (0), with the default weights in brackets.
 
     **Start**: each actuated axis uniform within its limits, rejected until the arm touches
     nothing and the tool is farther from the goal than the tolerance. Goals are uniform over the
@@ -107,7 +107,7 @@ class ReachEnv(gymnasium.Env[Array, Array]):
     ground, a bench or the arm itself (the move is refused); truncated after 64 steps.
 
     **Info**: ``distance`` [m]; and after a step ``success``, ``collision``, ``contact`` (names of
-    the two bodies that would have touched, or None) and the four reward terms.
+    the two bodies that would have touched, or None) and the five reward terms.
 
     **Versions**: v0, the first.
     """

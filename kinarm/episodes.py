@@ -21,6 +21,7 @@ class Rules(NamedTuple):
     tolerance: float
     horizon: int
     progress: float
+    closer: float
     collision: float
     success: float
     step: float

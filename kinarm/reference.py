@@ -96,6 +96,7 @@ class ReferenceSimulator:
                 success = distance <= self.task.tolerance
             rewards.append(
                 reward.progress * (before - distance)
+                + reward.closer * np.sign(before - distance)
                 + reward.step
                 + reward.collision * (contact is not None)
                 + reward.success * success

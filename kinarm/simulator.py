@@ -120,6 +120,7 @@ class Simulator:
             tolerance=self.task.tolerance,
             horizon=self.task.horizon,
             progress=float(reward.progress),
+            closer=float(reward.closer),
             collision=float(reward.collision),
             success=float(reward.success),
             step=float(reward.step),

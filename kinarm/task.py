@@ -14,12 +14,15 @@ from kinarm.validation import whole_number
 
 @dataclass(frozen=True, kw_only=True)
 class RewardWeights:
-    """Weights of the four reward terms.
+    """Weights of the five reward terms.
 
     Parameters
     ----------
     progress : float
         Per metre by which the tool came closer to the goal in a step [1/m].
+    closer : float
+        Added in every step that brings the tool closer, subtracted in every step that takes it
+        farther, however far.
     collision : float
         Added once when a move touches something and the episode ends; usually negative.
     success : float
@@ -29,6 +32,7 @@ class RewardWeights:
     """
 
     progress: float = 1.0
+    closer: float = 0.0
     collision: float = -1.0
     success: float = 0.0
     step: float = 0.0
@@ -45,11 +49,12 @@ class RewardTerms(NamedTuple):
 
     Attributes
     ----------
-    progress, collision, success, step : ndarray, shape (n,)
+    progress, closer, collision, success, step : ndarray, shape (n,)
         See `RewardWeights`.
     """
 
     progress: NDArray[np.float64]
+    closer: NDArray[np.float64]
     collision: NDArray[np.float64]
     success: NDArray[np.float64]
     step: NDArray[np.float64]
@@ -57,7 +62,7 @@ class RewardTerms(NamedTuple):
     @property
     def total(self) -> NDArray[np.float64]:
         """The reward."""
-        total: NDArray[np.float64] = self.progress + self.collision + self.success + self.step
+        total: NDArray[np.float64] = sum(self[1:], start=self.progress)
         return total
 
 
@@ -86,6 +91,7 @@ def reward_terms(
     """
     return RewardTerms(
         progress=weights.progress * (distance_before - distance_after),
+        closer=weights.closer * np.sign(distance_before - distance_after),
         collision=np.where(collided, weights.collision, 0.0),
         success=np.where(reached, weights.success, 0.0),
         step=np.full(np.shape(distance_after), weights.step),

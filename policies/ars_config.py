@@ -54,6 +54,10 @@ class ARSConfig:
         of a perturbation, or all perturbations of an iteration.
     episodes : int
         Episodes whose mean return judges a perturbed policy.
+    progress_reward : float
+        Reward weight of a metre by which the tool came closer [1/m].
+    closer_reward : float
+        Reward weight of a step that brings the tool closer, against one that takes it farther.
     collision_penalty : float
         Reward weight of a collision.
     success_bonus : float
@@ -80,6 +84,8 @@ class ARSConfig:
     scale_by_deviation: bool = True
     sharing: Sharing = "none"
     episodes: int = 1
+    progress_reward: float = 1.0
+    closer_reward: float = 0.0
     collision_penalty: float = -1.0
     success_bonus: float = 0.0
     step_reward: float = 0.0
@@ -110,7 +116,11 @@ class ARSConfig:
     def simulator(self, threads: int | None = None) -> Simulator:
         """Build the simulator to train in."""
         reward = RewardWeights(
-            collision=self.collision_penalty, success=self.success_bonus, step=self.step_reward
+            progress=self.progress_reward,
+            closer=self.closer_reward,
+            collision=self.collision_penalty,
+            success=self.success_bonus,
+            step=self.step_reward,
         )
         task = load_task(
             self.task, horizon=self.horizon, start_spread=self.start_spread, reward=reward

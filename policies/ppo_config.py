@@ -71,6 +71,10 @@ class PPOConfig:
         Whether the policy is to treat mirror images alike, where the task is its own mirror
         image (``both``); it then learns from goals on the right and from mirror images of those
         on the left; see `kinarm.policies.symmetric_layers`. Needs two hidden layers.
+    progress_reward : float
+        Reward weight of a metre by which the tool came closer [1/m].
+    closer_reward : float
+        Reward weight of a step that brings the tool closer, against one that takes it farther.
     collision_penalty : float
         Reward weight of a collision.
     success_bonus : float
@@ -107,6 +111,8 @@ class PPOConfig:
     horizon: int = 64
     tolerance: float = 0.05
     symmetric: bool = False
+    progress_reward: float = 1.0
+    closer_reward: float = 0.0
     collision_penalty: float = -1.0
     success_bonus: float = 0.0
     step_reward: float = 0.0
@@ -165,7 +171,11 @@ class PPOConfig:
     def simulator(self) -> Simulator:
         """Build the simulator to train in; its batches are too small for several threads."""
         reward = RewardWeights(
-            collision=self.collision_penalty, success=self.success_bonus, step=self.step_reward
+            progress=self.progress_reward,
+            closer=self.closer_reward,
+            collision=self.collision_penalty,
+            success=self.success_bonus,
+            step=self.step_reward,
         )
         task = load_task(
             self.task,

@@ -27,7 +27,7 @@ from kinarm.kernels.kinematics import POSE, forward_kinematics, point_jacobian, 
 from kinarm.kernels.overlap import overlaps
 from kinarm.motion_bounds import MotionBounds
 
-LAYOUT = "efb25cafe9ff"
+LAYOUT = "0236ea918130"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 FOUND, EXCLUDED, EXHAUSTED = range(3)

@@ -110,7 +110,7 @@ class TestEpisode:
             "success",
             "collision",
             "contact",
-            *(f"reward_{term}" for term in ("progress", "collision", "success", "step")),
+            *(f"reward_{term}" for term in ("progress", "closer", "collision", "success", "step")),
         }
         assert reward == sum(value for key, value in info.items() if key.startswith("reward_"))
         angle = math.radians(7)

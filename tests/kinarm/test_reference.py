@@ -11,7 +11,7 @@ from kinarm.reference import ReferenceSimulator
 from kinarm.simulator import Simulator
 from kinarm.task import ReachTask, RewardWeights
 
-REWARD = RewardWeights(progress=1.5, collision=-0.7, success=0.4, step=-0.01)
+REWARD = RewardWeights(progress=1.5, closer=0.03, collision=-0.7, success=0.4, step=-0.01)
 
 
 def task(**settings):

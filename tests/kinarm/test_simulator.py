@@ -52,7 +52,7 @@ def scenarios(simulator):
 @pytest.fixture(scope="module")
 def rewarded(simulator):
     """A simulator in which each reward term is non-zero."""
-    return with_reward(simulator, progress=2.0, collision=-3.0, success=5.0, step=-0.25)
+    return with_reward(simulator, progress=2.0, closer=0.125, collision=-3.0, success=5.0, step=-0.25)
 
 
 class TestDeterminism:
@@ -179,7 +179,8 @@ class TestAgreement:
             result = rewarded.step(episodes, rng.uniform(-1, 1, (100, 5)))
             terms = result.terms
             np.testing.assert_allclose(
-                result.reward, terms.progress + terms.collision + terms.success + terms.step
+                result.reward,
+                terms.progress + terms.closer + terms.collision + terms.success + terms.step,
             )
             total += np.where(running, result.reward, 0)
         np.testing.assert_allclose(total, episodes.total, atol=1e-12)
@@ -203,7 +204,8 @@ class TestStep:
         assert result.terms.step[0] == -0.25
         assert result.terms.success[0] == 0
         assert result.terms.collision[0] == 0
-        assert result.reward[0] == pytest.approx(2 * (1.0 - after) - 0.25)
+        assert result.terms.closer[0] == 0.125
+        assert result.reward[0] == pytest.approx(2 * (1.0 - after) + 0.125 - 0.25)
 
     def test_success_by_hand(self, rewarded):
         angle = math.radians(7)
@@ -214,7 +216,7 @@ class TestStep:
         assert result.success[0]
         assert result.terminated[0]
         assert not result.truncated[0]
-        assert result.reward[0] == pytest.approx(2 * (before - 0.01) + 5 - 0.25)
+        assert result.reward[0] == pytest.approx(2 * (before - 0.01) + 0.125 + 5 - 0.25)
 
     def test_refused_move_leaves_the_arm_in_place(self, rewarded):
         episodes = rewarded.reset(HOME, FAR_GOAL)

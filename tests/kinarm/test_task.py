@@ -19,7 +19,7 @@ def test_three_tasks_with_the_papers_settings():
     for name, task in TASKS.items():
         assert task.name == name
         assert (task.tolerance, task.horizon, task.start_spread) == (0.05, 64, 1.0)
-        assert task.reward == RewardWeights(progress=1, collision=-1, success=0, step=0)
+        assert task.reward == RewardWeights(progress=1, closer=0, collision=-1, success=0, step=0)
     assert TASKS["left"].benches == ("left",)
     assert TASKS["right"].benches == ("right",)
     assert set(TASKS["both"].benches) == {"left", "right"}
@@ -58,7 +58,7 @@ def test_frozen(value):
 
 class TestReward:
     def test_terms_by_hand(self):
-        weights = RewardWeights(progress=2, collision=-3, success=5, step=-0.5)
+        weights = RewardWeights(progress=2, closer=0.1, collision=-3, success=5, step=-0.5)
         terms = reward_terms(
             weights,
             np.array([1.0, 1.0, 0.5]),
@@ -67,15 +67,22 @@ class TestReward:
             np.array([False, False, True]),
         )
         np.testing.assert_allclose(terms.progress, [0.5, 0, 0.92])
+        np.testing.assert_array_equal(terms.closer, [0.1, 0, 0.1])
         np.testing.assert_array_equal(terms.collision, [0, -3, 0])
         np.testing.assert_array_equal(terms.success, [0, 0, 5])
         np.testing.assert_array_equal(terms.step, [-0.5, -0.5, -0.5])
-        np.testing.assert_allclose(terms.total, [0, -3.5, 5.42])
+        np.testing.assert_allclose(terms.total, [0.1, -3.5, 5.52])
 
     def test_closer_is_positive_and_farther_negative(self):
         no = np.array([False, False])
         terms = reward_terms(RewardWeights(), np.array([1.0, 1.0]), np.array([0.9, 1.1]), no, no)
         np.testing.assert_allclose(terms.total, [0.1, -0.1])
+
+    def test_steps_closer_count_the_same_however_far(self):
+        no, before = np.full(4, False), np.ones(4)
+        signs = RewardWeights(progress=0, closer=0.5)
+        terms = reward_terms(signs, before, np.array([0.9, 0.999, 1.0, 1.2]), no, no)
+        np.testing.assert_array_equal(terms.total, [0.5, 0.5, 0, -0.5])
 
 
 class TestGoals:

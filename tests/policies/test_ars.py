@@ -404,7 +404,15 @@ class TestConfig:
             train_ars(replace(TINY, arm="nope"))
 
     @pytest.mark.parametrize(
-        "name", ["collision_penalty", "success_bonus", "step_reward", "start_spread"]
+        "name",
+        [
+            "progress_reward",
+            "closer_reward",
+            "collision_penalty",
+            "success_bonus",
+            "step_reward",
+            "start_spread",
+        ],
     )
     def test_settings_that_are_not_finite(self, name):
         with pytest.raises(KinarmError, match="nan"):
