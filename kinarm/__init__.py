@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         SceneError,
         StartInContactError,
         UnknownNameError,
+        WorkerError,
     )
     from kinarm.networks import CompiledPolicy, Networks
     from kinarm.reference import ReferenceSimulator
@@ -54,6 +55,7 @@ __all__ = [
     "StartInContactError",
     "StepResult",
     "UnknownNameError",
+    "WorkerError",
     "__version__",
     "arm_names",
     "load_task",
@@ -79,6 +81,7 @@ __getattr__ = lazy_exports(
             "SceneError",
             "StartInContactError",
             "UnknownNameError",
+            "WorkerError",
         ),
         "networks": ("CompiledPolicy", "Networks"),
         "reference": ("ReferenceSimulator",),

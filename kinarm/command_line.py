@@ -38,7 +38,7 @@ def _status(prog: str, command: Callable[[], None]) -> int:
             return leaving.code if isinstance(leaving.code, int) else 0
         sys.stdout.flush()
     except KinarmError as error:
-        return _report(prog, str(error), 2)
+        return _report(prog, str(error), error.exit_status)
     except BrokenPipeError:
         _discard_output()
     except OSError as error:

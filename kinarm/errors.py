@@ -10,16 +10,26 @@
     ├── StartInContactError a start configuration that touches something
     ├── PolicyFileError     a policy file or checkpoint that cannot be read or used here
     ├── OutputError         a file or folder that cannot be written
-    └── MissingExtraError   an optional package that is not installed; says how to install it
+    ├── MissingExtraError   an optional package that is not installed; says how to install it
+    └── WorkerError         a worker process that ended unexpectedly
 
-Command lines turn any of them into one line on standard error and exit status 2.
+Command lines turn any of them into one line on standard error and exit status 2, or 1 for a
+WorkerError, which is a failure of the machine.
 """
 
 from collections.abc import Iterable
 
 
 class KinarmError(Exception):
-    """Base of all errors that kinarm raises on purpose."""
+    """Base of all errors that kinarm raises on purpose.
+
+    Attributes
+    ----------
+    exit_status : int
+        What a command line exits with.
+    """
+
+    exit_status = 2
 
 
 class ArmError(KinarmError):
@@ -83,6 +93,12 @@ class PolicyFileError(KinarmError):
 
 class OutputError(KinarmError):
     """A file or folder cannot be written."""
+
+
+class WorkerError(KinarmError):
+    """A worker process ended unexpectedly."""
+
+    exit_status = 1
 
 
 class MissingExtraError(KinarmError):

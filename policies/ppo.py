@@ -75,6 +75,22 @@ def train_ppo(
         return PPOResult(learner.policy(state), state.curve, state.simulator_time)
 
 
+def ppo_policy(config: PPOConfig, state: PPOState) -> Policy:
+    """Freeze a state of a training into a policy, which takes the actor's mean action.
+
+    Parameters
+    ----------
+    config : PPOConfig
+        The settings.
+    state : PPOState
+        The state.
+    """
+    require_ppo()
+    from kinarm.policies.ppo_learner import PPOLearner
+
+    return PPOLearner(config, state.normalizer).policy(state)
+
+
 def require_ppo(*, tensorboard: bool = False) -> None:
     """Refuse to go on without the packages that PPO needs.
 

@@ -52,7 +52,9 @@ def scenarios(simulator):
 @pytest.fixture(scope="module")
 def rewarded(simulator):
     """A simulator in which each reward term is non-zero."""
-    return with_reward(simulator, progress=2.0, closer=0.125, collision=-3.0, success=5.0, step=-0.25)
+    return with_reward(
+        simulator, progress=2.0, closer=0.125, collision=-3.0, success=5.0, step=-0.25
+    )
 
 
 class TestDeterminism:

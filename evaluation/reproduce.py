@@ -1,0 +1,131 @@
+"""``kinarm-reproduce``: train what the paper trained, and see which of its claims hold."""
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from kinarm.command_line import Parser, command_text, run_command, whole_number
+from kinarm.errors import InvalidInputError
+from kinarm.files import check_folder, write_atomically
+from kinarm.parallel import available_threads
+
+if TYPE_CHECKING:
+    from kinarm.evaluation.reproduction.outcome import OutcomeStore
+    from kinarm.evaluation.reproduction.results import Results
+    from kinarm.evaluation.reproduction.study import Study
+
+PROG = "kinarm-reproduce"
+
+EPILOG = """
+needs the extra ppo: pip install 'kinarm[ppo]' (or --no-ppo)
+
+An interrupted reproduction goes on where it stopped, by the same command.
+
+examples:
+  kinarm-reproduce                  the whole paper, into the folder reproduction
+  kinarm-reproduce --quick          see in a minute that everything works; results mean nothing
+  kinarm-reproduce --no-ppo         Augmented Random Search alone, some ten minutes
+"""
+
+
+def build_parser() -> Parser:
+    """The options of the command."""
+    parser = Parser(
+        prog=PROG,
+        description="Train everything that the paper trained, and judge its claims.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="output folder (reproduction, or reproduction-quick with --quick)",
+    )
+    parser.add_argument(
+        "--jobs",
+        type=whole_number(1),
+        default=available_threads(),
+        metavar="N",
+        help="trainings at a time (one a processor)",
+    )
+    parser.add_argument("--quick", action="store_true", help="a smoke version of everything")
+    parser.add_argument("--no-ppo", dest="ppo", action="store_false", help="leave PPO out")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line."""
+    run_command(
+        PROG,
+        lambda: _reproduce(build_parser().parse_args(arguments), command_text(PROG, arguments)),
+    )
+
+
+def _reproduce(options: argparse.Namespace, command: str) -> None:
+    """Train what is missing, then write what it came to."""
+    from kinarm.evaluation.reproduction.document import write_all
+    from kinarm.evaluation.reproduction.outcome import OutcomeStore
+    from kinarm.evaluation.reproduction.results import Results
+    from kinarm.evaluation.reproduction.study import full_study, quick_study
+    from kinarm.policies.ppo import require_ppo
+
+    if options.ppo:
+        require_ppo()
+    study = (quick_study if options.quick else full_study)(ppo=options.ppo)
+    folder = options.out or Path("reproduction-quick" if options.quick else "reproduction")
+    check_folder(folder, create=True)
+    _claim_folder(folder, study)
+    store = OutcomeStore(folder, study.protocol)
+    results = Results.load(study, store)
+    try:
+        if results.missing:
+            results = _train(results, store, options.jobs)
+        table = write_all(results, store, command)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(
+            "interrupted; what is finished is kept, and the same command goes on"
+        ) from None
+    sys.stdout.write(f"{table}\nwritten: {folder / 'REPRODUCTION.md'}\n")
+
+
+def _claim_folder(folder: Path, study: "Study") -> None:
+    """Mark the folder as that of a study; refuse one that holds another."""
+    marker = folder / "study.json"
+    if marker.exists():
+        try:
+            held = json.loads(marker.read_bytes())["study"]
+        except (ValueError, KeyError, TypeError, OSError):
+            held = "unknown"
+        if held != study.name:
+            raise InvalidInputError(
+                f"{str(folder)!r} holds a {held} reproduction, not a {study.name} one: "
+                "name another folder with --out"
+            )
+    text = json.dumps({"study": study.name}).encode()
+    write_atomically(marker, lambda file: file.write(text))
+
+
+def _train(results: "Results", store: "OutcomeStore", jobs: int) -> "Results":
+    """Carry out what is missing, and read all outcomes anew."""
+    from rich.console import Console
+
+    from kinarm.evaluation.reproduction.progress import StudyProgress
+    from kinarm.evaluation.reproduction.results import Results
+    from kinarm.evaluation.reproduction.workers import carry_out_all
+
+    study, missing = results.study, results.missing
+    console = Console(stderr=True, highlight=False)
+    if results.outcomes:
+        console.print(f"{len(results.outcomes)} of {len(study.trainings)} trainings are finished")
+    jobs = min(jobs, len(missing))
+    with StudyProgress(study, missing, console) as progress:
+        carry_out_all(missing, study.protocol, store.folder, jobs, progress)
+    return Results.load(study, store)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,314 @@
+"""The paper's claims, and whether they hold here."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.evaluation.reproduction.intervals import Estimate, Term, contrast, student, superiority
+from kinarm.evaluation.reproduction.outcome import Outcome
+from kinarm.evaluation.reproduction.results import Results, distances_after, steps_to_level
+from kinarm.evaluation.reproduction.study import (
+    LITERAL,
+    SWEEP_PERTURBATIONS,
+    SWEEP_RATES,
+    WITHIN,
+    Purpose,
+    Reading,
+)
+
+Verdict = Literal["holds", "does not hold", "undecided"]
+
+LEVELS = ((0.2, 0.25), (0.2, 0.5), (0.2, 0.75), (0.1, 0.25), (0.1, 0.5), (0.05, 0.25), (0.05, 0.5))
+"""Distances [m] and shares of trials by which the speed of learning is measured."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A statistic that a claim puts on one side of a threshold.
+
+    Attributes
+    ----------
+    measure : str
+        What the statistic is.
+    estimate : Estimate
+        The statistic and its interval.
+    claimed : {"above", "below"}
+        On which side of the threshold the claim puts it.
+    threshold : float
+        The threshold.
+    """
+
+    measure: str
+    estimate: Estimate
+    claimed: Literal["above", "below"]
+    threshold: float
+
+    @property
+    def verdict(self) -> Verdict:
+        """Where the interval lies: on the claimed side, on the other one, or on both."""
+        if self.estimate.ci95 is None:
+            return "undecided"
+        low, high = self.estimate.ci95
+        if low > self.threshold:
+            return "holds" if self.claimed == "above" else "does not hold"
+        if high < self.threshold:
+            return "holds" if self.claimed == "below" else "does not hold"
+        return "undecided"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """Something that the paper found.
+
+    Attributes
+    ----------
+    name : str
+        Short and unique.
+    statement : str
+        The finding.
+    parts : tuple of Part
+        What it means in numbers; all have to be so.
+    """
+
+    name: str
+    statement: str
+    parts: tuple[Part, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        """It holds if all parts do, and does not if one does not."""
+        verdicts = {part.verdict for part in self.parts}
+        if "does not hold" in verdicts:
+            return "does not hold"
+        return "holds" if verdicts == {"holds"} else "undecided"
+
+    def to_json(self) -> dict[str, Any]:
+        """As a dictionary that JSON can hold."""
+        return {
+            "name": self.name,
+            "statement": self.statement,
+            "verdict": self.verdict,
+            "parts": [
+                {
+                    "measure": part.measure,
+                    "statistic": part.estimate.value,
+                    "ci95": part.estimate.ci95 and list(part.estimate.ci95),
+                    "claimed": part.claimed,
+                    "threshold": part.threshold,
+                    "verdict": part.verdict,
+                }
+                for part in self.parts
+            ],
+        }
+
+
+def assess(results: Results, reading: Reading = LITERAL) -> tuple[Claim, ...]:
+    """All claims that can be judged under a reading.
+
+    Parameters
+    ----------
+    results : Results
+        All outcomes.
+    reading : Reading
+        Trainings of this reading are compared; the sweep follows the literal one.
+    """
+    claims = [
+        mostly_within(results, reading, "left"),
+        mostly_within(results, reading, "right"),
+        both_is_worse(results, reading),
+        one_bench_is_poor(results, reading),
+    ]
+    if results.select("ppo", reading=reading):
+        claims += [
+            ppo_ends_nearer(results, reading),
+            ppo_is_better_on_both(results, reading),
+            ars_needs_fewer_steps(results, reading),
+        ]
+    if reading == LITERAL:
+        claims += [
+            low_rate_is_worse(results),
+            many_perturbations_are_worse(results),
+            many_perturbations_are_worse_for_their_steps(results),
+        ]
+    return tuple(claims)
+
+
+def mostly_within(results: Results, reading: Reading, task: str) -> Claim:
+    """Section 4: on tasks 1 and 2, most trials end within 0.2."""
+    within = (results.distances("ars", task, reading) <= WITHIN).astype(float)
+    share = contrast([Term(1.0, within, task)])
+    return Claim(
+        f"ars-{task}",
+        f"ARS mostly ends within {WITHIN} m on {task}",
+        (Part(f"share of trials within {WITHIN} m", share, "above", 0.5),),
+    )
+
+
+def both_is_worse(results: Results, reading: Reading) -> Claim:
+    """Section 4: task 3 is learnt less well than tasks 1 and 2."""
+    terms = [
+        Term(weight, results.distances("ars", task, reading), task)
+        for task, weight in (("both", 1.0), ("left", -0.5), ("right", -0.5))
+    ]
+    return Claim(
+        "ars-both",
+        "ARS does worse on both benches than on one",
+        (_difference("mean final distance on both, less that on left and right [m]", terms),),
+    )
+
+
+def one_bench_is_poor(results: Results, reading: Reading) -> Claim:
+    """Section 4: on task 3, a policy does well on one bench and poorly on the other."""
+    within = results.distances("ars", "both", reading) <= WITHIN
+    better, worse = bench_shares(within, results.left_bench("both", reading))
+    label = f"share of trials within {WITHIN} m on a policy's {{}} bench"
+    return Claim(
+        "ars-one-bench",
+        "On both, ARS does well on one bench and poorly on the other",
+        (
+            Part(label.format("better"), better, "above", 0.5),
+            Part(label.format("worse"), worse, "below", 0.5),
+        ),
+    )
+
+
+def bench_shares(within: NDArray[np.bool_], left: NDArray[np.bool_]) -> tuple[Estimate, Estimate]:
+    """Share of hits on the better and on the worse bench of every seed's policy.
+
+    Which bench is the better one is told by one half of the trials and measured on the other, and
+    the other way round: picking the larger of two noisy shares would flatter it.
+
+    Parameters
+    ----------
+    within : ndarray of bool, shape (n_seeds, n_trials)
+        Whether a trial hit.
+    left : ndarray of bool, shape (n_trials,)
+        Whether its goal lies on the left bench.
+    """
+    half = np.arange(within.shape[1]) % 2 == 0
+    shares = np.array(
+        [
+            [[seed[part & bench].mean() for bench in (left, ~left)] for part in (half, ~half)]
+            for seed in within
+        ]
+    )
+    order = np.argsort(-shares, axis=2, kind="stable")[:, ::-1]
+    better, worse = np.moveaxis(np.take_along_axis(shares, order, axis=2).mean(axis=1), 1, 0)
+    per_bench = min(left.sum(), (~left).sum())
+    return _share_of_seeds(better, per_bench), _share_of_seeds(worse, per_bench)
+
+
+def _share_of_seeds(shares: NDArray[np.float64], trials: int) -> Estimate:
+    """Mean of the seeds' shares; trials count as if all seeds had met the same ones."""
+    n, value = len(shares), float(shares.mean())
+    seeds = float(shares.var(ddof=1)) / n if n > 1 else 0.0
+    return student(value, [(seeds, n - 1), (value * (1 - value) / trials, trials - 1)])
+
+
+def ppo_ends_nearer(results: Results, reading: Reading) -> Claim:
+    """Section 4: densities of PPO's final distances are shifted to the left of ARS's."""
+    terms = [
+        Term(weight, results.distances(learner, task, reading), task)
+        for task in ("left", "right")
+        for learner, weight in (("ars", 0.5), ("ppo", -0.5))
+    ]
+    return Claim(
+        "ppo-nearer",
+        "PPO ends nearer than ARS on left and right",
+        (_difference("mean final distance of ARS, less that of PPO [m]", terms),),
+    )
+
+
+def ppo_is_better_on_both(results: Results, reading: Reading) -> Claim:
+    """Section 4: PPO delivers more on task 3."""
+    terms = [
+        Term(weight, results.distances(learner, "both", reading), "both")
+        for learner, weight in (("ars", 1.0), ("ppo", -1.0))
+    ]
+    return Claim(
+        "ppo-both",
+        "PPO does better than ARS on both",
+        (_difference("mean final distance of ARS, less that of PPO [m]", terms),),
+    )
+
+
+def ars_needs_fewer_steps(results: Results, reading: Reading) -> Claim:
+    """Section 4: ARS is much more sample-efficient."""
+    pairs = []
+    for task in ("left", "right", "both"):
+        ars, ppo = (steps_to_levels(results, who, task, reading) for who in ("ars", "ppo"))
+        reached = np.isfinite(ars).any(axis=1) | np.isfinite(ppo).any(axis=1)
+        if reached.any():
+            pairs.append((ars[reached], ppo[reached]))
+    estimate = superiority(pairs) if pairs else Estimate(float("nan"), None)
+    measure = "probability that ARS reaches a level of success in fewer environment steps than PPO"
+    return Claim(
+        "ars-samples",
+        "ARS needs fewer environment steps than PPO",
+        (Part(measure, estimate, "above", 0.5),),
+    )
+
+
+def steps_to_levels(
+    results: Results, purpose: Purpose, task: str, reading: Reading
+) -> NDArray[np.float64]:
+    """Environment steps to `LEVELS`, shape (n_levels, n_seeds); infinity for never."""
+    outcomes = results.select(purpose, task, reading).values()
+    return np.array([[steps_to_level(outcome, *level) for outcome in outcomes] for level in LEVELS])
+
+
+def low_rate_is_worse(results: Results) -> Claim:
+    """Section 3.3: too low a learning rate may not be desirable."""
+    lowest = min(SWEEP_RATES)
+    terms = _sweep_terms(results, lambda rate, _: rate == lowest, lambda run: run.distance)
+    measure = f"mean final distance with rate {lowest}, less that with higher rates [m]"
+    statement = "Too low a learning rate is undesirable"
+    return Claim("sweep-rate", statement, (_difference(measure, terms),))
+
+
+def many_perturbations_are_worse(results: Results) -> Claim:
+    """Section 3.3: too many perturbations may not be desirable."""
+    most = max(SWEEP_PERTURBATIONS)
+    terms = _sweep_terms(results, lambda _, n: n == most, lambda run: run.distance)
+    measure = f"mean final distance with {most} perturbations, less that with fewer [m]"
+    statement = "Too many perturbations are undesirable, after as many iterations"
+    return Claim("sweep-perturbations", statement, (_difference(measure, terms),))
+
+
+def many_perturbations_are_worse_for_their_steps(results: Results) -> Claim:
+    """The same, where all have taken as many environment steps."""
+    most = max(SWEEP_PERTURBATIONS)
+    budget = min(run.environment_steps[-1] for run in results.select("sweep").values())
+    terms = _sweep_terms(results, lambda _, n: n == most, lambda run: distances_after(run, budget))
+    measure = (
+        f"mean final distance with {most} perturbations, less that with fewer, "
+        f"after {budget / 1e3:.0f} thousand environment steps [m]"
+    )
+    statement = "Too many perturbations are undesirable, after as many environment steps"
+    return Claim("sweep-perturbations-steps", statement, (_difference(measure, terms),))
+
+
+def _sweep_terms(
+    results: Results,
+    chosen: Callable[[float, int], bool],
+    distances: Callable[[Outcome], NDArray[Any]],
+) -> list[Term]:
+    """Mean of the settings that are chosen, less that of all others."""
+    settings = results.sweep()
+    n = sum(chosen(*setting) for setting in settings)
+    return [
+        Term(
+            1.0 / n if chosen(*setting) else -1.0 / (len(settings) - n),
+            np.array([distances(run) for run in runs]),
+            "left",
+        )
+        for setting, runs in settings.items()
+    ]
+
+
+def _difference(measure: str, terms: Sequence[Term]) -> Part:
+    """A difference that the claim puts above zero."""
+    return Part(measure, contrast(terms), "above", 0.0)

@@ -1,0 +1,220 @@
+"""What a reproduction consists of: the paper's trainings, under every reading of its text."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass, replace
+from itertools import product
+from typing import Any, Literal, get_args
+
+from kinarm.policies.ars_config import ARSConfig, Sharing
+from kinarm.policies.ppo_config import PPOConfig
+from kinarm.policies.recipes import ars_recipe, ppo_recipe
+from kinarm.task import TASKS
+
+Reward = Literal["progress", "sign"]
+Purpose = Literal["sweep", "ars", "ppo"]
+
+SWEEP_RATES = (0.05, 0.01, 0.005)
+SWEEP_PERTURBATIONS = (16, 24, 32)
+SWEEP_ITERATIONS = 300
+"""Nine settings that the paper tried on task 1 before it chose those of Table 1 (section 3.3)."""
+
+WITHIN = 0.2
+"""Distance by which the paper judges its policies (section 4) [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """One way to read what the paper leaves open; the defaults are the literal one.
+
+    Parameters
+    ----------
+    start_spread : float
+        Share of the joint ranges about the home pose from which starts are drawn, in training
+        and in trials.
+    reward : {"progress", "sign"}
+        Whether a step is rewarded by the metres that it brings the tool closer, or by 1 or -1
+        for closer or farther, divided by the horizon.
+    sharing : {"none", "pair", "iteration"}
+        Which rollouts of an ARS iteration face the same start and goal.
+    """
+
+    start_spread: float = 1.0
+    reward: Reward = "progress"
+    sharing: Sharing = "none"
+
+    @property
+    def name(self) -> str:
+        """Such as ``"spread1-progress-none"``."""
+        return f"spread{self.start_spread:g}-{self.reward}-{self.sharing}"
+
+    def settings(self) -> dict[str, float]:
+        """Settings of either learner that follow from the reading."""
+        signs = self.reward == "sign"
+        return {
+            "start_spread": self.start_spread,
+            "progress_reward": 0.0 if signs else 1.0,
+            "closer_reward": 1.0 / ARSConfig.horizon if signs else 0.0,
+        }
+
+    @property
+    def for_ppo(self) -> "Reading":
+        """The reading without what does not concern PPO."""
+        return replace(self, sharing="none")
+
+
+LITERAL = Reading()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Protocol:
+    """How trained policies are judged.
+
+    Parameters
+    ----------
+    trials, seed : int
+        Size and seed of the set of trials that the final policies face.
+    snapshots : int
+        How often the policy is judged in the course of a training.
+    snapshot_trials, snapshot_seed : int
+        Size and seed of the set of trials that it then faces.
+    """
+
+    trials: int = 200
+    seed: int = 0
+    snapshots: int = 50
+    snapshot_trials: int = 100
+    snapshot_seed: int = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Training:
+    """One training of a study.
+
+    Parameters
+    ----------
+    purpose : {"sweep", "ars", "ppo"}
+        What it is for.
+    config : ARSConfig or PPOConfig
+        The settings.
+    reading : Reading
+        The reading that they follow.
+    """
+
+    purpose: Purpose
+    config: ARSConfig | PPOConfig
+    reading: Reading = LITERAL
+
+    @property
+    def name(self) -> str:
+        """Unique within a study, and fit for a file name."""
+        config = self.config
+        parts: list[str] = [self.purpose]
+        if self.purpose == "sweep" and isinstance(config, ARSConfig):
+            parts += [f"rate{config.step_size:g}", f"perturb{config.directions}"]
+        parts += [config.task, f"seed{config.seed}"]
+        return "-".join(parts if self.reading == LITERAL else [*parts, self.reading.name])
+
+    @property
+    def cost(self) -> float:
+        """Rough duration relative to other trainings, for scheduling and progress."""
+        if isinstance(self.config, PPOConfig):
+            return 30.0 * self.config.environment_steps
+        return float(2 * self.config.iterations * self.config.directions * self.config.horizon)
+
+    def to_json(self) -> dict[str, Any]:
+        """Everything that the outcome depends on, save the code."""
+        return {
+            "purpose": self.purpose,
+            "config": asdict(self.config),
+            "reading": asdict(self.reading),
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """A set of trainings and the protocol by which they are judged.
+
+    Parameters
+    ----------
+    name : str
+        ``"full"`` or ``"quick"``.
+    trainings : tuple of Training
+        What is trained.
+    protocol : Protocol
+        How it is judged.
+    """
+
+    name: str
+    trainings: tuple[Training, ...]
+    protocol: Protocol
+
+    def readings(self, purpose: Purpose = "ars") -> tuple[Reading, ...]:
+        """Readings under which there are trainings for a purpose."""
+        return tuple(dict.fromkeys(t.reading for t in self.trainings if t.purpose == purpose))
+
+
+def full_study(*, ppo: bool = True) -> Study:
+    """The whole paper: 36 trainings for the sweep, and 4 seeds a task under every reading.
+
+    Parameters
+    ----------
+    ppo : bool
+        Whether PPO takes part.
+    """
+    readings = [
+        Reading(start_spread=spread, reward=reward, sharing=sharing)
+        for spread, reward, sharing in product((1.0, 0.1), get_args(Reward), get_args(Sharing))
+    ]
+    trainings = (*_sweep(range(4)), *_ars(readings, range(4)))
+    if ppo:
+        trainings = (*trainings, *_ppo(readings, range(4)))
+    return Study(name="full", trainings=trainings, protocol=Protocol())
+
+
+def quick_study(*, ppo: bool = True) -> Study:
+    """A smoke version of `full_study`: everything is there, but nothing is trained to the end.
+
+    Parameters
+    ----------
+    ppo : bool
+        Whether PPO takes part.
+    """
+    readings = (LITERAL, Reading(start_spread=0.1, reward="sign", sharing="iteration"))
+    trainings = (
+        *_sweep(range(2), iterations=6),
+        *_ars(readings, range(2), iterations=10),
+        *(_ppo((LITERAL,), range(2), iterations=2, epochs=2) if ppo else ()),
+    )
+    protocol = Protocol(trials=20, snapshots=3, snapshot_trials=10)
+    return Study(name="quick", trainings=trainings, protocol=protocol)
+
+
+def _sweep(seeds: Iterable[int], iterations: int = SWEEP_ITERATIONS) -> Iterator[Training]:
+    """The sweep on the paper's task 1, with half of the perturbations on top as in Table 1."""
+    for rate, perturbations, seed in product(SWEEP_RATES, SWEEP_PERTURBATIONS, seeds):
+        config = ars_recipe(
+            "paper",
+            task="left",
+            seed=seed,
+            step_size=rate,
+            directions=perturbations,
+            top_directions=perturbations // 2,
+            iterations=iterations,
+        )
+        yield Training(purpose="sweep", config=config)
+
+
+def _ars(readings: Iterable[Reading], seeds: Iterable[int], **settings: Any) -> Iterator[Training]:
+    """Table 1."""
+    for reading, task, seed in product(readings, TASKS, seeds):
+        given = {**reading.settings(), **settings}
+        config = ars_recipe("paper", task=task, seed=seed, sharing=reading.sharing, **given)
+        yield Training(purpose="ars", config=config, reading=reading)
+
+
+def _ppo(readings: Iterable[Reading], seeds: Iterable[int], **settings: Any) -> Iterator[Training]:
+    """The comparison with PPO (section 4)."""
+    distinct = dict.fromkeys(reading.for_ppo for reading in readings)
+    for reading, task, seed in product(distinct, TASKS, seeds):
+        config = ppo_recipe("paper", task=task, seed=seed, **reading.settings(), **settings)
+        yield Training(purpose="ppo", config=config, reading=reading)
