@@ -3,7 +3,7 @@
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from kinarm.files import check_folder, write_atomically
 from kinarm.parallel import available_threads
 
 if TYPE_CHECKING:
+    from kinarm.evaluation.reproduction.claims import Claim
     from kinarm.evaluation.reproduction.outcome import OutcomeStore
     from kinarm.evaluation.reproduction.results import Results
     from kinarm.evaluation.reproduction.study import Study
@@ -84,12 +85,28 @@ def _reproduce(options: argparse.Namespace, command: str) -> None:
     try:
         if results.missing:
             results = _train(results, store, options.jobs)
-        table = write_all(results, store, command)
+        claims = write_all(results, store, command)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(
             "interrupted; what is finished is kept, and the same command goes on"
         ) from None
-    sys.stdout.write(f"{table}\nwritten: {folder / 'REPRODUCTION.md'}\n")
+    _print(claims)
+    sys.stdout.write(f"written: {folder / 'REPRODUCTION.md'}, with tables and figures beside it\n")
+
+
+def _print(claims: "Iterable[Claim]") -> None:
+    """Print the verdicts."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("claim", "measured (95 %)", "claimed", "verdict", header_style="bold")
+    for claim in claims:
+        measured, claimed = zip(
+            *((str(part.estimate), f"{part.claimed} {part.threshold:g}") for part in claim.parts),
+            strict=True,
+        )
+        table.add_row(claim.statement, "\n".join(measured), "\n".join(claimed), claim.verdict)
+    Console(width=None if sys.stdout.isatty() else 120, highlight=False).print(table)
 
 
 def _claim_folder(folder: Path, study: "Study") -> None:

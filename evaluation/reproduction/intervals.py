@@ -23,6 +23,12 @@ class Estimate(NamedTuple):
     value: float
     ci95: tuple[float, float] | None
 
+    def __str__(self) -> str:
+        if np.isnan(self.value):
+            return "not measurable"
+        interval = "no interval" if self.ci95 is None else "{:.3f}..{:.3f}".format(*self.ci95)
+        return f"{self.value:.3f} ({interval})"
+
 
 class Term(NamedTuple):
     """One part of a contrast of means.
@@ -89,6 +95,30 @@ def student(value: float, components: Iterable[tuple[float, int]]) -> Estimate:
     effective = total**2 / float((variances**2 / freedom).sum())
     reach = float(t.ppf((1 + LEVEL) / 2, effective)) * total**0.5
     return Estimate(value, (value - reach, value + reach))
+
+
+def share(shares: NDArray[np.float64], trials: int) -> Estimate:
+    """Mean of the seeds' shares of trials.
+
+    The trials' part of the variance is that of a binomial share, with two hits and two misses
+    added (Agresti and Coull), so that it does not vanish where nothing or everything was hit.
+
+    Parameters
+    ----------
+    shares : ndarray, shape (n_seeds,)
+        Share of every seed.
+    trials : int
+        Trials of a seed; they count as if all seeds had met the same ones.
+    """
+    value = float(shares.mean())
+    moderate = (value * trials + 2) / (trials + 4)
+    binomial = moderate * (1 - moderate) / (trials + 4)
+    components = [(_mean_variance(shares), len(shares) - 1), (binomial, trials - 1)]
+    estimate = student(value, components)
+    if estimate.ci95 is None:
+        return estimate
+    low, high = estimate.ci95
+    return Estimate(value, (max(low, 0.0), min(high, 1.0)))
 
 
 def superiority(pairs: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> Estimate:

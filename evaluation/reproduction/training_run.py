@@ -26,7 +26,7 @@ from kinarm.task import load_task
 @cache
 def trial_set(task: str, start_spread: float, trials: int, seed: int) -> TrialSet:
     """Trials of a task with the starts of a reading, drawn once in a process."""
-    simulator = Simulator("paper", load_task(task, start_spread=start_spread), threads=1)
+    simulator = Simulator("paper", load_task(task, start_spread=start_spread))
     return TrialSet.draw(simulator, trials, seed)
 
 
