@@ -116,7 +116,7 @@ def _claim_folder(folder: Path, study: "Study") -> None:
         try:
             held = json.loads(marker.read_bytes())["study"]
         except (ValueError, KeyError, TypeError, OSError):
-            held = "unknown"
+            held = "foreign"
         if held != study.name:
             raise InvalidInputError(
                 f"{str(folder)!r} holds a {held} reproduction, not a {study.name} one: "

@@ -197,8 +197,8 @@ def reproduction_page(
         "## Other readings of the paper",
         "",
         "The paper leaves open how starts are drawn (here: from which share of the joint ranges "
-        "about the home pose), how the reward is scaled (metres of progress, or their sign) and which "
-        "rollouts of an ARS iteration share a start and goal.",
+        "about the home pose), how the reward is scaled (metres of progress, or their sign) and "
+        "which rollouts of an ARS iteration share a start and goal.",
         "",
         readings_table(results, claims),
         best_readings(claims),

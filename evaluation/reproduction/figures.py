@@ -17,7 +17,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-LEARNERS: dict[Purpose, tuple[str, str]] = {"ars": ("ARS", COLOURS[0]), "ppo": ("PPO", COLOURS[1])}
+LEARNERS: dict[Purpose, dict[str, Any]] = {
+    "ars": {"label": "ARS", "color": COLOURS[0], "linestyle": "solid"},
+    "ppo": {"label": "PPO", "color": COLOURS[1], "linestyle": "dashed"},
+}
+"""How lines of a learner look; its seeds are drawn thin and faint in the same colour."""
+
 SHOWN_DISTANCE = 1.2
 """Where the axes of final distances end [m]."""
 
@@ -72,14 +77,12 @@ def figure_3(results: Results) -> "Figure":
     for number, (task, axes) in enumerate(zip(TASKS, panels[:, 0], strict=True), start=1):
         distance = np.linspace(0.0, SHOWN_DISTANCE, 481)
         highest = 0.0
-        for learner, (label, colour) in LEARNERS.items():
+        for learner, style in LEARNERS.items():
             seeds = [density(o.distance, distance) for o in results.select(learner, task).values()]
             if not seeds:
                 continue
-            axes.plot(distance, np.transpose(seeds), color=colour, lw=0.6, alpha=0.5)
-            pooled = np.mean(seeds, axis=0)
-            dashes = "solid" if learner == "ars" else "dashed"
-            axes.plot(distance, pooled, color=colour, lw=2.2, linestyle=dashes, label=label)
+            axes.plot(distance, np.transpose(seeds), color=style["color"], lw=0.6, alpha=0.5)
+            axes.plot(distance, np.mean(seeds, axis=0), lw=2.2, **style)
             highest = max(highest, float(np.max(seeds)))
         trials = results.trials(task)
         actions = oracle_bounds(trials).actions
@@ -129,17 +132,16 @@ def learning_curves(results: Results, against: str) -> "Figure":
     figure, panels = _panels((10.5, 6.4), 2, len(TASKS), sharex=True, sharey="row")
     across = _steps if against == "steps" else _seconds
     for task, (above, below) in zip(TASKS, panels.T, strict=True):
-        for learner, (label, colour) in LEARNERS.items():
+        for learner, style in LEARNERS.items():
             outcomes = tuple(results.select(learner, task).values())
-            _curves(above, outcomes, across, _share_within, label, colour)
-            _curves(below, outcomes, across, _median, label, colour)
-        above.set(title=f"task {task}", ylim=(0, 1))
+            _curves(above, outcomes, across, _share_within, style)
+            _curves(below, outcomes, across, _median, style)
+        above.set_title(f"task {task}")
         below.set(xlabel="million environment steps" if against == "steps" else "training time [s]")
-        below.set_ylim(0, None)
         if against == "time":
             below.set_xscale("log")
-    panels[0, 0].set_ylabel(f"share of trials within {WITHIN} m")
-    panels[1, 0].set_ylabel("median final distance [m]")
+    panels[0, 0].set(ylabel=f"share of trials within {WITHIN} m", ylim=(0, 1))
+    panels[1, 0].set(ylabel="median final distance [m]", ylim=(0, None))
     panels[0, 0].legend(frameon=False)
     return figure
 
@@ -149,15 +151,14 @@ def _curves(
     outcomes: Sequence[Outcome],
     across: Callable[[Outcome], NDArray[np.float64]],
     up: Callable[[Outcome], NDArray[np.float64]],
-    label: str,
-    colour: str,
+    style: dict[str, Any],
 ) -> None:
     """Curves of the seeds faintly, and the mean of what they do at the same iteration boldly."""
     for outcome in outcomes:
-        axes.plot(across(outcome), up(outcome), color=colour, lw=0.6, alpha=0.5)
+        axes.plot(across(outcome), up(outcome), color=style["color"], lw=0.6, alpha=0.5)
     if outcomes:
         mean = (np.mean([part(o) for o in outcomes], axis=0) for part in (across, up))
-        axes.plot(*mean, color=colour, lw=2, label=label)
+        axes.plot(*mean, lw=2, **style)
 
 
 def _steps(outcome: Outcome) -> NDArray[np.float64]:

@@ -114,7 +114,10 @@ class OutcomeStore:
         """Read a finished training; None if it is not finished, incomplete or of other settings."""
         try:
             wall_time = np.array(json.loads(self._timing_path(training).read_text()), dtype=float)
-            with np.load(self._run_path(training), allow_pickle=False) as file:
+            with (
+                self._run_path(training).open("rb") as opened,
+                np.load(opened, allow_pickle=False) as file,
+            ):
                 arrays: dict[str, Any] = dict(file)
             known = str(arrays.pop("identity")) == self._identity(training)
             intact = str(arrays.pop("policy_digest")) == _digest(self.policy_path(training))

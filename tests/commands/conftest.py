@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import pytest
 
-from kinarm.evaluation import bench, eval  # noqa: A004
+from kinarm.evaluation import bench, eval, reproduce  # noqa: A004
 from kinarm.policies import Policy, ars_recipe, train, train_ars
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -17,8 +17,14 @@ MODULES = {
     "kinarm-eval": "kinarm.evaluation.eval",
     "kinarm-train": "kinarm.policies.train",
     "kinarm-bench": "kinarm.evaluation.bench",
+    "kinarm-reproduce": "kinarm.evaluation.reproduce",
 }
-MAINS = {"kinarm-eval": eval.main, "kinarm-train": train.main, "kinarm-bench": bench.main}
+MAINS = {
+    "kinarm-eval": eval.main,
+    "kinarm-train": train.main,
+    "kinarm-bench": bench.main,
+    "kinarm-reproduce": reproduce.main,
+}
 
 
 class Answer(NamedTuple):

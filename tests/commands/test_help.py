@@ -13,6 +13,7 @@ PROGRAMS = {
     "kinarm-eval": "kinarm.evaluation.eval",
     "kinarm-train": "kinarm.policies.train",
     "kinarm-bench": "kinarm.evaluation.bench",
+    "kinarm-reproduce": "kinarm.evaluation.reproduce",
 }
 HEAVY = ("torch", "numba", "matplotlib", "pinocchio", "coal", "scipy", "stable_baselines3")
 

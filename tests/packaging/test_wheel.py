@@ -131,6 +131,7 @@ def test_metadata_name_the_commands_the_licence_and_no_torch(wheel):
         "kinarm-eval = kinarm.evaluation.eval:main",
         "kinarm-train = kinarm.policies.train:main",
         "kinarm-bench = kinarm.evaluation.bench:main",
+        "kinarm-reproduce = kinarm.evaluation.reproduce:main",
     ):
         assert line in commands
     assert "License-Expression: BSD-2-Clause" in metadata

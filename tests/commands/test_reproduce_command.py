@@ -1,0 +1,215 @@
+"""``kinarm-reproduce``: a quick study from end to end, killed and resumed, and bad input."""
+
+import json
+import multiprocessing
+import os
+import signal
+import subprocess
+import time
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kinarm.errors import WorkerError
+from kinarm.evaluation.reproduction import workers
+from kinarm.evaluation.reproduction.study import quick_study
+from kinarm.evaluation.reproduction.workers import carry_out_all
+
+QUICK = ("--quick", "--no-ppo", "--jobs", 2)
+needs_ppo = pytest.mark.skipif(find_spec("stable_baselines3") is None, reason="needs the extra ppo")
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """All files that do not depend on the clock."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and "timing" not in str(path.relative_to(folder))
+    }
+
+
+@pytest.fixture(scope="module")
+def reference(run_outside, tmp_path_factory):
+    """An uninterrupted quick reproduction without PPO, and what it printed."""
+    place = tmp_path_factory.mktemp("reference")
+    answer = run_outside("kinarm-reproduce", *QUICK, cwd=place)
+    assert answer.status == 0, answer.err
+    return place / "reproduction-quick", answer
+
+
+class TestQuick:
+    def test_prints_verdicts_and_says_where_the_rest_is(self, reference):
+        _, answer = reference
+        assert "ARS mostly ends within 0.2 m on left" in answer.out
+        assert "does not hold" in answer.out
+        assert "reproduction-quick/REPRODUCTION.md" in answer.out
+        assert "Traceback" not in answer.err
+
+    def test_writes_everything(self, reference):
+        folder, _ = reference
+        study = quick_study(ppo=False)
+        assert len(list((folder / "runs").iterdir())) == len(study.trainings)
+        assert len(list((folder / "policies").iterdir())) == len(study.trainings)
+        for figure in ("figure2", "figure3", "learning_curves", "timing_learning_curves"):
+            assert (folder / f"{figure}.png").read_bytes().startswith(b"\x89PNG")
+            assert b"</svg>" in (folder / f"{figure}.svg").read_bytes()
+        lines = (folder / "runs.csv").read_text().splitlines()
+        assert len(lines) == 1 + len(study.trainings)
+
+    def test_document_and_page_agree(self, reference):
+        folder, _ = reference
+        document = json.loads((folder / "claims.json").read_text())
+        page = (folder / "REPRODUCTION.md").read_text()
+        assert document["study"] == "quick"
+        assert "smoke version" in page
+        assert len(document["readings"]) == 2
+        for claim in document["readings"][0]["claims"]:
+            (row,) = (line for line in page.splitlines() if f"| {claim['statement']} |" in line)
+            assert f"**{claim['verdict']}**" in row
+            assert f"{claim['parts'][0]['statistic']:.3f}" in row
+
+    def test_again_trains_nothing_and_writes_the_same(self, reference, run_outside):
+        folder, _ = reference
+        runs = {path: path.stat().st_mtime_ns for path in (folder / "runs").iterdir()}
+        before = contents(folder)
+        answer = run_outside("kinarm-reproduce", *QUICK, cwd=folder.parent)
+        assert answer.status == 0
+        assert contents(folder) == before
+        assert {path: path.stat().st_mtime_ns for path in (folder / "runs").iterdir()} == runs
+
+    def test_a_damaged_run_is_made_anew(self, reference, run_outside):
+        folder, _ = reference
+        before = contents(folder)
+        damaged = folder / "runs" / "ars-both-seed1.npz"
+        damaged.write_bytes(damaged.read_bytes()[:1000])
+        answer = run_outside("kinarm-reproduce", *QUICK, cwd=folder.parent)
+        assert "29 of 30 trainings are finished" in answer.err
+        assert contents(folder) == before
+
+
+@pytest.mark.slow
+def test_killed_at_random_points_and_resumed(reference, command, tmp_path):
+    folder = tmp_path / "reproduction-quick"
+    rng = np.random.default_rng(0)
+    spelled = command("kinarm-reproduce", *QUICK)
+    kills = 0
+    for enough in (1, 9, 20):
+        process = subprocess.Popen(
+            spelled, cwd=tmp_path, stderr=subprocess.DEVNULL, start_new_session=True
+        )
+        while process.poll() is None and len(list(folder.glob("runs/*.npz"))) < enough:
+            time.sleep(0.01)
+        time.sleep(rng.uniform(0, 0.3))
+        kills += process.poll() is None
+        process.kill()
+        process.wait()
+        see_that_all_end(process.pid)
+    assert kills >= 2
+    done = subprocess.run(spelled, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert "of 30 trainings are finished" in done.stderr
+    assert contents(folder) == contents(reference[0])
+
+
+def see_that_all_end(session: int) -> None:
+    """Workers have to end when the process that started them is killed."""
+    deadline = time.monotonic() + 30
+    while time.monotonic() < deadline:
+        if subprocess.run(["pgrep", "-s", str(session)], stdout=subprocess.DEVNULL).returncode:
+            return
+        time.sleep(0.05)
+    os.killpg(session, signal.SIGKILL)
+    raise AssertionError("workers outlived the process that started them")
+
+
+@pytest.mark.slow
+def test_interrupt_keeps_what_is_finished(command, tmp_path):
+    process = subprocess.Popen(
+        command("kinarm-reproduce", *QUICK),
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    while not list(tmp_path.glob("reproduction-quick/runs/*.npz")):
+        time.sleep(0.02)
+    os.killpg(process.pid, signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert err.splitlines()[-1] == (
+        "kinarm-reproduce: interrupted; what is finished is kept, and the same command goes on"
+    )
+    assert "Traceback" not in err
+    see_that_all_end(process.pid)
+
+
+@needs_ppo
+@pytest.mark.slow
+def test_quick_with_ppo(run_outside, tmp_path):
+    answer = run_outside("kinarm-reproduce", "--quick", cwd=tmp_path)
+    assert answer.status == 0, answer.err
+    assert "ARS needs fewer environment steps than PPO" in answer.out
+    page = (tmp_path / "reproduction-quick" / "REPRODUCTION.md").read_text()
+    assert "| 3: both | PPO, 2 seeds |" in page
+    assert "| 3: both | oracle | 100.0 |" in page
+
+
+class TestWorkers:
+    def test_a_worker_that_is_killed(self, tmp_path):
+        class KillsWorkers:
+            def began(self, training):
+                pass
+
+            finished = began
+
+            def refresh(self):
+                for worker in multiprocessing.active_children():
+                    worker.kill()
+
+        study = quick_study(ppo=False)
+        with pytest.raises(WorkerError, match="a worker ended unexpectedly"):
+            carry_out_all(study.trainings, study.protocol, tmp_path, 1, KillsWorkers())
+
+    def test_its_exit_status_is_that_of_a_failed_run(self, run, monkeypatch, tmp_path):
+        def fail(*_):
+            raise WorkerError("a worker ended unexpectedly")
+
+        monkeypatch.setattr(workers, "carry_out_all", fail)
+        answer = run("kinarm-reproduce", *QUICK, "--out", tmp_path)
+        assert answer.status == 1
+        assert answer.err.splitlines()[-1] == "kinarm-reproduce: a worker ended unexpectedly"
+
+
+class TestBadInput:
+    def check(self, answer, words):
+        assert answer.status == 2
+        assert words in answer.err
+        assert len(answer.err.splitlines()) == 1
+        assert answer.out == ""
+
+    def test_jobs(self, run):
+        self.check(run("kinarm-reproduce", "--jobs", 0), "must be a whole number of at least 1")
+
+    def test_folder_of_another_study(self, run, tmp_path):
+        (tmp_path / "study.json").write_text('{"study": "full"}')
+        answer = run("kinarm-reproduce", *QUICK, "--out", tmp_path)
+        self.check(answer, "holds a full reproduction, not a quick one")
+        assert [path.name for path in tmp_path.iterdir()] == ["study.json"]
+
+    def test_folder_with_an_unreadable_marker(self, run, tmp_path):
+        (tmp_path / "study.json").write_text("{")
+        answer = run("kinarm-reproduce", *QUICK, "--out", tmp_path)
+        self.check(answer, "holds a foreign reproduction")
+
+    def test_output_that_cannot_be_written(self, run, tmp_path):
+        (tmp_path / "file").touch()
+        answer = run("kinarm-reproduce", *QUICK, "--out", tmp_path / "file")
+        self.check(answer, "cannot write")
+
+    def test_without_the_extra(self, run, tmp_path, monkeypatch):
+        monkeypatch.setattr("kinarm.policies.ppo.find_spec", lambda _: None)
+        answer = run("kinarm-reproduce", "--quick", "--out", tmp_path)
+        self.check(answer, "pip install 'kinarm[ppo]'")
+        assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,25 @@
+"""Results of trainings that never took place."""
+
+from collections.abc import Callable
+
+import pytest
+
+from kinarm.evaluation.reproduction.outcome import Outcome
+from kinarm.evaluation.reproduction.results import Results
+from kinarm.evaluation.reproduction.study import Study, Training, full_study
+
+
+@pytest.fixture(scope="session")
+def study() -> Study:
+    """The full study, of which nothing is trained."""
+    return full_study()
+
+
+@pytest.fixture(scope="session")
+def results_of(study: Study) -> Callable[..., Results]:
+    """Make results from a function from trainings to outcomes."""
+
+    def make(outcome_of: Callable[[Training], Outcome]) -> Results:
+        return Results(study, {training: outcome_of(training) for training in study.trainings})
+
+    return make

@@ -1,0 +1,193 @@
+"""Verdicts on results that are made up so that the answers are known."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from outcomes import made_up
+
+from kinarm.evaluation.reproduction.claims import Claim, Part, assess, bench_shares
+from kinarm.evaluation.reproduction.intervals import Estimate
+from kinarm.evaluation.reproduction.study import LITERAL, Protocol, Reading
+from kinarm.evaluation.reproduction.training_run import final_trials
+
+TRIALS = 200
+
+
+def noise(training, scale=0.01):
+    """Differences between the seeds of a training, and between its trials."""
+    rng = np.random.default_rng([len(training.name), training.config.seed])
+    return scale * (rng.normal() + rng.normal(size=TRIALS))
+
+
+def learnt_at(snapshot):
+    """Distances at four snapshots of a policy that reaches everything from one of them on."""
+    return np.where(np.arange(4)[:, None] >= snapshot, 0.01, 1.0) * np.ones((4, 10))
+
+
+def as_the_paper_says(training):
+    """A world in which everything is as in the paper."""
+    config = training.config
+    if training.purpose == "sweep":
+        worse = 0.2 * (config.step_size == 0.005) + 0.2 * (config.directions == 32)
+        distance = 0.3 + worse + noise(training)
+        return made_up(distance, np.tile(distance[:10], (4, 1)))
+    base = 0.1 if training.purpose == "ars" else 0.05
+    distance = base + np.abs(noise(training))
+    if training.purpose == "ars" and config.task == "both":
+        trials = final_trials("both", training.reading, Protocol())
+        poor = (trials.goals[:, 1] > 0) == bool(config.seed % 2)
+        distance = distance + 0.5 * poor
+    return made_up(distance, learnt_at(0 if training.purpose == "ars" else 2))
+
+
+def the_other_way_round(training):
+    """A world in which nothing is."""
+    config = training.config
+    if training.purpose == "sweep":
+        better = 0.1 * (config.step_size == 0.005) + 0.1 * (config.directions == 32)
+        distance = 0.5 - better + noise(training)
+        return made_up(distance, np.tile(distance[:10], (4, 1)))
+    base = 0.5 if training.purpose == "ars" else 0.7
+    distance = base - 0.1 * (config.task == "both") + noise(training)
+    return made_up(distance, learnt_at(2 if training.purpose == "ars" else 0))
+
+
+def by_chance(training):
+    """A world in which seeds differ and nothing else does."""
+    rng = np.random.default_rng([*training.name.encode()])
+    distance = np.full(TRIALS, rng.uniform(0.1, 0.3))
+    return made_up(distance, np.full((4, 10), rng.uniform(0.1, 0.3)))
+
+
+def verdicts(claims):
+    return {claim.name: claim.verdict for claim in claims}
+
+
+ALL = {
+    *("ars-left", "ars-right", "ars-both", "ars-one-bench"),
+    *("ppo-nearer", "ppo-both", "ars-samples"),
+    *("sweep-rate", "sweep-perturbations", "sweep-perturbations-steps"),
+}
+
+
+class TestWorlds:
+    def test_as_the_paper_says(self, results_of):
+        found = verdicts(assess(results_of(as_the_paper_says)))
+        assert found == dict.fromkeys(ALL, "holds")
+
+    def test_the_other_way_round(self, results_of):
+        found = verdicts(assess(results_of(the_other_way_round)))
+        assert found == dict.fromkeys(ALL, "does not hold")
+
+    def test_by_chance(self, results_of):
+        found = verdicts(assess(results_of(by_chance)))
+        assert set(found) == ALL
+        assert found["ppo-nearer"] == found["ppo-both"] == found["ars-samples"] == "undecided"
+        assert found["sweep-rate"] == found["sweep-perturbations"] == "undecided"
+
+    def test_other_readings_are_judged_by_their_own_trainings(self, results_of):
+        near = Reading(start_spread=0.1, sharing="pair")
+
+        def outcome_of(training):
+            world = as_the_paper_says if training.reading.start_spread == 1 else the_other_way_round
+            return world(training)
+
+        results = results_of(outcome_of)
+        assert set(verdicts(assess(results)).values()) == {"holds"}
+        found = verdicts(assess(results, near))
+        assert set(found) == {name for name in ALL if not name.startswith("sweep")}
+        assert set(found.values()) == {"does not hold"}
+
+
+class TestStatistics:
+    def test_values_by_hand(self, results_of):
+        claims = {claim.name: claim for claim in assess(results_of(the_other_way_round))}
+        values = {name: claim.parts[0].estimate.value for name, claim in claims.items()}
+        assert values["ars-left"] == 0
+        assert values["ars-both"] == pytest.approx(-0.1, abs=0.02)
+        assert values["ppo-nearer"] == pytest.approx(-0.2, abs=0.02)
+        assert values["sweep-rate"] == pytest.approx(-0.1, abs=0.02)
+        assert values["sweep-perturbations"] == pytest.approx(-0.1, abs=0.02)
+        assert values["ars-samples"] == 0
+
+    def test_where_no_level_is_reached_speed_cannot_be_compared(self, results_of):
+        results = results_of(lambda training: made_up(np.ones(TRIALS)))
+        claim = {claim.name: claim for claim in assess(results)}["ars-samples"]
+        assert claim.verdict == "undecided"
+        assert math.isnan(claim.parts[0].estimate.value)
+        json.dumps(claim.to_json(), allow_nan=False)
+
+    def test_equal_steps_are_those_of_the_shortest_training(self, results_of):
+        def outcome_of(training):
+            if training.purpose != "sweep":
+                return made_up(np.ones(TRIALS))
+            many = training.config.directions == 32
+            snapshots = np.array([[0.4], [0.3], [0.2], [0.1]]) * np.ones((4, 10))
+            return made_up(np.full(TRIALS, 0.1), snapshots, 2000 if many else 1000)
+
+        claims = {claim.name: claim for claim in assess(results_of(outcome_of))}
+        part = claims["sweep-perturbations-steps"].parts[0]
+        assert "after 4 thousand environment steps" in part.measure
+        assert part.estimate.value == pytest.approx(0.2)
+        assert claims["sweep-perturbations"].parts[0].estimate.value == pytest.approx(0)
+
+
+class TestBenchShares:
+    def test_by_hand(self):
+        left = np.tile([True, True, False, False], 25)
+        all_left_and_even_right = np.tile([True, True, True, False], 25)
+        all_right = ~left
+        better, worse = bench_shares(np.stack([all_left_and_even_right, all_right]), left)
+        assert better.value == pytest.approx(np.mean([1.0, 1.0]))
+        assert worse.value == pytest.approx(np.mean([0.5, 0.0]))
+
+    def test_the_better_bench_is_told_by_other_trials(self):
+        left = np.tile([True, True, False, False], 25)
+        even_left_and_odd_right = np.tile([True, False, False, True], 25)
+        better, worse = bench_shares(even_left_and_odd_right[None], left)
+        assert (better.value, worse.value) == (0.0, 1.0)
+
+    def test_no_bench_is_better_where_both_are_alike(self):
+        rng = np.random.default_rng(0)
+        gaps = []
+        for _ in range(300):
+            left, within = rng.random(200) < 0.5, rng.random((4, 200)) < 0.5
+            better, worse = bench_shares(within, left)
+            gaps.append(better.value - worse.value)
+        assert abs(np.mean(gaps)) < 3 * np.std(gaps) / math.sqrt(300)
+
+
+class TestVerdict:
+    @pytest.mark.parametrize(
+        ("ci95", "above", "below"),
+        [
+            ((0.6, 0.9), "holds", "does not hold"),
+            ((0.1, 0.4), "does not hold", "holds"),
+            ((0.4, 0.6), "undecided", "undecided"),
+            ((0.5, 0.6), "undecided", "undecided"),
+            (None, "undecided", "undecided"),
+        ],
+    )
+    def test_of_a_part(self, ci95, above, below):
+        estimate = Estimate(0.5, ci95)
+        assert Part("", estimate, "above", 0.5).verdict == above
+        assert Part("", estimate, "below", 0.5).verdict == below
+
+    def test_of_a_claim_with_several_parts(self):
+        yes, no, perhaps = (
+            Part("", Estimate(0, interval), "above", 0.0)
+            for interval in ((1.0, 2.0), (-2.0, -1.0), (-1.0, 1.0))
+        )
+        assert Claim("", "", (yes, yes)).verdict == "holds"
+        assert Claim("", "", (yes, perhaps)).verdict == "undecided"
+        assert Claim("", "", (perhaps, no)).verdict == "does not hold"
+
+    def test_as_json(self, results_of):
+        for claim in assess(results_of(as_the_paper_says), LITERAL):
+            entries = json.loads(json.dumps(claim.to_json(), allow_nan=False))
+            assert entries["verdict"] == "holds"
+            assert len(entries["parts"]) == len(claim.parts)
+            low, high = entries["parts"][0]["ci95"]
+            assert low <= entries["parts"][0]["statistic"] <= high
