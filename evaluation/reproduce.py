@@ -68,6 +68,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _reproduce(options: argparse.Namespace, command: str) -> None:
     """Train what is missing, then write what it came to."""
+    from rich.console import Console
+
     from kinarm.evaluation.reproduction.document import write_all
     from kinarm.evaluation.reproduction.outcome import OutcomeStore
     from kinarm.evaluation.reproduction.results import Results
@@ -85,7 +87,8 @@ def _reproduce(options: argparse.Namespace, command: str) -> None:
     try:
         if results.missing:
             results = _train(results, store, options.jobs)
-        claims = write_all(results, store, command)
+        with Console(stderr=True).status("bounding what could be reached, drawing figures"):
+            claims = write_all(results, store, command)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(
             "interrupted; what is finished is kept, and the same command goes on"

@@ -11,7 +11,8 @@ from rich.table import Table
 
 from kinarm.evaluation.reproduction.study import Study, Training
 
-PURPOSES = {"sweep": "ARS, sweep", "ars": "ARS, Table 1", "ppo": "PPO"}
+PURPOSES = {"sweep": "ARS, sweep", "ars": "ARS, settings of Table 1", "ppo": "PPO"}
+RUNNING_WIDTH = 50
 LINE_SECONDS = 30.0
 """How often a line is printed where there is no terminal."""
 
@@ -83,7 +84,8 @@ class StudyProgress:
 
     def _table(self) -> Group:
         """The table, with a bar of what is done by its cost."""
-        table = Table("trainings", "finished", "running", header_style="bold", min_width=60)
+        table = Table("trainings", "finished", header_style="bold")
+        table.add_column("running", min_width=RUNNING_WIDTH)
         for purpose, total in self._all.items():
             now = time.monotonic()
             running = [
@@ -93,5 +95,7 @@ class StudyProgress:
             ]
             finished = f"{self._done[purpose]} of {total}"
             table.add_row(PURPOSES[purpose], finished, "\n".join(running))
-        bar = ProgressBar(total=self._cost or 1.0, completed=self._cost - self._cost_left, width=60)
-        return Group(table, bar, self._remaining() if self._cost_left else "all are finished")
+        below = Table.grid(padding=(0, 1))
+        bar = ProgressBar(total=self._cost, completed=self._cost - self._cost_left, width=60)
+        below.add_row(bar, self._remaining() if self._cost_left else "all are finished")
+        return Group(table, below)
