@@ -5,7 +5,7 @@ const SPEEDS = [0.1, 0.25, 0.5, 1, 2];
 const HOLD = 1.4; // seconds between the end of a trial and the next one
 const THEMES = {
   light: { back: 0xeef1f4, floor: 0xd9dee4, grid: 0xb4bdc7, bench: 0x8f9aa8, top: 0xb3bdc8, ghost: 0x4d5a68, sky: 0.3, sun: 0.62 },
-  dark: { back: 0x14181d, floor: 0x1e242b, grid: 0x3c4753, bench: 0x3d4752, top: 0x586573, ghost: 0xb4c1ce, sky: 0.22, sun: 0.6 },
+  dark: { back: 0x1a1f25, floor: 0x191e24, grid: 0x3c4753, bench: 0x3d4752, top: 0x586573, ghost: 0xb4c1ce, sky: 0.22, sun: 0.6 },
 };
 const RIVAL = 0x56b4e9;
 const BEHIND = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 8 }; // gives way to what coincides
@@ -191,8 +191,8 @@ class Stage {
   look(side) {
     const { viewer } = this;
     const aspect = window.innerWidth / window.innerHeight;
-    const away = 1.12 * Math.max(1, 1.28 / aspect);
-    const target = new this.THREE.Vector3(0.05, 0.27, -0.1 * side);
+    const away = 1.2 * Math.max(1, 1.28 / aspect);
+    const target = new this.THREE.Vector3(0.05, 0.2, -0.1 * side);
     const eye = new this.THREE.Vector3(-2.35, 1.5, -1.85 * side).multiplyScalar(away);
     viewer.controls.target.copy(target);
     viewer.camera.position.copy(target).add(eye);
