@@ -3,6 +3,7 @@
 import itertools
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -12,7 +13,7 @@ from kinarm.evaluation.entrants import ORACLE, Entrant
 from kinarm.evaluation.recording import record
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle import Oracle
-from kinarm.replay.drawing import draw_arm, draw_goal, draw_surroundings, draw_trace
+from kinarm.replay.drawing import aim_camera, draw_arm, draw_goal, draw_surroundings, draw_trace
 from kinarm.replay.live import LiveServer
 from kinarm.simulator import Simulator
 from kinarm.trajectory import Recording, record_rollouts
@@ -26,14 +27,15 @@ REST = 1.2
 
 def fresh_recordings(entrant: Entrant, simulator: Simulator, seed: int) -> Iterator[Recording]:
     """Record one trial after the other, without end; each has a seed of its own."""
-    for number in itertools.count(seed):
-        trials = TrialSet.draw(simulator, 1, number)
+    for number in itertools.count():
+        trials = TrialSet.draw(simulator, 1, seed + number)
         if entrant is ORACLE:  # solved here, so that no bounds are kept of every trial
             actions = Oracle(simulator=simulator).solve_batch(trials.starts, trials.goals).actions
             rollouts = simulator.rollout_actions(actions, trials.starts, trials.goals, record=True)
-            yield from record_rollouts(simulator, rollouts, entrant.name)
+            (recording,) = record_rollouts(simulator, rollouts, entrant.name)
         else:
-            yield from record(entrant, trials, allow_other_arm=True)
+            (recording,) = record(entrant, trials, allow_other_arm=True)
+        yield replace(recording, trial=number)
 
 
 def follow(
@@ -60,6 +62,7 @@ def follow(
     """
     window, arm = server.window, simulator.arm
     draw_surroundings(window, simulator.scene)
+    aim_camera(window)
     draw_goal(window["goal"], simulator.scene, simulator.task.tolerance)
     frames = draw_arm(window["arm"], arm)
     for recording in fresh_recordings(entrant, simulator, seed):

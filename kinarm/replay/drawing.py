@@ -40,6 +40,9 @@ TRACE_SIDES = 6
 SUN_PLACE = [-2.0, -1.0, 3.4]
 CLUTTER = ("/Axes", "/Grid", "/Lights/PointLightPositiveX", "/Lights/PointLightNegativeX")
 """What Meshcat shows by default and a replay does not."""
+DIMMED = {"/Lights/AmbientLight/<object>": 0.42, "/Lights/FillLight/<object>": 0.2}
+CAMERA = {"fov": 32, "position": [-2.4, 1.6, 1.9]}
+"""In the frame of three.js, whose y axis points up."""
 
 
 class _Skin(Geometry):  # type: ignore[misc]
@@ -113,7 +116,7 @@ class _Sun(Object):  # type: ignore[misc]
             "uuid": self.uuid,
             "type": "DirectionalLight",
             "color": 0xFFF6E8,
-            "intensity": 0.75,
+            "intensity": 0.5,
         }
         return {"object": {**light, "shadow": {**shadow, "camera": camera}}}
 
@@ -139,7 +142,9 @@ def put(window: Visualizer, finish: Finish, *meshes: Mesh) -> None:
 def draw_surroundings(window: Visualizer, scene: Scene) -> None:
     """Lights, floor with a grid, and benches."""
     for path in CLUTTER:
-        window[path].delete()
+        window[path].set_property("visible", False)
+    for path, intensity in DIMMED.items():
+        window[path].set_property("intensity", intensity)
     for end in ("top_color", "bottom_color"):
         window["/Background"].set_property(end, BACKGROUND)
     window["sun"].set_object(_Sun())
@@ -165,6 +170,12 @@ def _grid() -> NDArray[np.float64]:
         half = np.sqrt(max(GRID_RADIUS**2 - across**2, 0))
         lines += [(across, -half), (across, half), (-half, across), (half, across)]
     return np.column_stack([np.array(lines), np.full(len(lines), 0.0005)])
+
+
+def aim_camera(window: Visualizer) -> None:
+    """Look at the arm from behind its right side."""
+    for name, value in CAMERA.items():
+        window["/Cameras/default/rotated/<object>"].set_property(name, value)
 
 
 def draw_goal(window: Visualizer, scene: Scene, tolerance: float) -> None:
