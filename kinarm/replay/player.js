@@ -344,8 +344,8 @@ function verdict(run, trial) {
   if (run.outcome === "horizon") {
     return `${distance} from the goal after ${count(steps, "step")}`;
   }
-  const ratio = trial.floor ? `, ${(steps / trial.floor).toFixed(1)} times what is necessary` : "";
-  return `${count(steps, "step")}${ratio}`;
+  const ratio = steps === trial.floor ? ", as few as possible" : `, ${(steps / trial.floor).toFixed(1)} times what is necessary`;
+  return `${count(steps, "step")}${trial.floor ? ratio : ""}`;
 }
 
 function fillCard(trial) {
