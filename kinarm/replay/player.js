@@ -139,10 +139,10 @@ class Player {
   select(index) {
     this.index = (index + this.data.trials.length) % this.data.trials.length;
     this.frames = Math.max(...this.trial.runs.map((run) => run.states.length - 1));
+    fillCard(this.trial);
     this.stage.select(this.index);
     element("trial").value = this.index;
     element("frame").max = this.frames;
-    fillCard(this.trial);
     drawPlot(this.trial, this.frames, this.data.colours);
     this.show(0);
     const run = this.trial.runs[0];

@@ -155,6 +155,12 @@ class Stage {
     this.touched = false;
     viewer.controls.addEventListener("start", () => { this.touched = true; });
     viewer.controls.addEventListener("change", () => this.clear());
+    if (window.self !== window.top) { // within another page, the wheel scrolls that one until the scene is touched
+      const stage = viewer.dom_element;
+      viewer.controls.enableZoom = false;
+      stage.addEventListener("pointerdown", () => { viewer.controls.enableZoom = true; });
+      stage.addEventListener("pointerleave", () => { viewer.controls.enableZoom = false; });
+    }
     viewer.controls.minDistance = 0.3;
     viewer.controls.maxDistance = 7;
     viewer.controls.maxPolarAngle = 1.54;
@@ -168,15 +174,23 @@ class Stage {
     fog.far = fog.near + 3.6;
   }
 
-  /** Look from behind, on the side (1 left, -1 right) where the goal is. */
+  /** Look from behind, on the side (1 left, -1 right) where the goal is, past card and dock. */
   look(side) {
-    const { viewer } = this;
-    const aspect = window.innerWidth / window.innerHeight;
-    const away = 1.2 * Math.max(1, 1.28 / aspect);
-    const target = new this.THREE.Vector3(0.05, 0.2, -0.1 * side);
-    const eye = new this.THREE.Vector3(-2.35, 1.5, -1.85 * side).multiplyScalar(away);
-    viewer.controls.target.copy(target);
-    viewer.camera.position.copy(target).add(eye);
+    const { viewer, THREE } = this;
+    const [width, height] = [window.innerWidth, window.innerHeight];
+    const [card, dock] = ["card", "dock"].map((id) => document.getElementById(id));
+    const tall = width <= 640;
+    const free = {
+      width: width - (tall ? 0 : 0.4 * card.offsetWidth),
+      height: height - dock.offsetHeight - (tall ? card.offsetHeight : 0) - 24,
+    };
+    const away = 0.96 * Math.max(height / free.height, (1.32 * height) / free.width);
+    const right = tall || width > 1100 ? 0 : 0.2 * card.offsetWidth;
+    const up = (dock.offsetHeight - (tall ? card.offsetHeight : 0)) / 2;
+    viewer.camera.setViewOffset(width, height, -right, up, width, height);
+    viewer.controls.target.set(0.05, 0.3, -0.1 * side);
+    const eye = new THREE.Vector3(-2.35, 1.5, -1.85 * side).multiplyScalar(away);
+    viewer.camera.position.copy(viewer.controls.target).add(eye);
     this.side = side;
     this.touched = false;
     viewer.set_dirty();
