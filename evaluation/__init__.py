@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from kinarm.evaluation.entrants import Entrant, find_entrants
     from kinarm.evaluation.evaluations import Evaluation, PooledEvaluation, evaluate, pool
     from kinarm.evaluation.plots import distance_histograms, save_figure
+    from kinarm.evaluation.recording import record
     from kinarm.evaluation.report import evaluation_document
     from kinarm.evaluation.statistics import DistanceStatistics, Share
     from kinarm.evaluation.trials import TrialSet
@@ -26,6 +27,7 @@ __all__ = [
     "find_entrants",
     "oracle_bounds",
     "pool",
+    "record",
     "save_figure",
 ]
 
@@ -41,6 +43,7 @@ __getattr__ = lazy_exports(
         "entrants": ("Entrant", "find_entrants"),
         "evaluations": ("Evaluation", "PooledEvaluation", "evaluate", "pool"),
         "plots": ("distance_histograms", "save_figure"),
+        "recording": ("record",),
         "report": ("evaluation_document",),
         "statistics": ("DistanceStatistics", "Share"),
         "trials": ("TrialSet",),

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         MissingExtraError,
         OutputError,
         PolicyFileError,
+        RecordingFileError,
         SceneError,
         StartInContactError,
         UnknownNameError,
@@ -23,10 +24,12 @@ if TYPE_CHECKING:
     )
     from kinarm.networks import CompiledPolicy, Networks
     from kinarm.reference import ReferenceSimulator
+    from kinarm.replay import Replay
     from kinarm.rollouts import Rollouts
     from kinarm.scene import Bench, Scene
     from kinarm.simulator import Simulator, StepResult
     from kinarm.task import TASKS, ReachTask, RewardWeights, load_task
+    from kinarm.trajectory import Recording, load_recordings, save_recordings
     from kinarm.vector_env import ReachVectorEnv
 
 __version__ = "0.1.0"
@@ -46,7 +49,10 @@ __all__ = [
     "ReachEnv",
     "ReachTask",
     "ReachVectorEnv",
+    "Recording",
+    "RecordingFileError",
     "ReferenceSimulator",
+    "Replay",
     "RewardWeights",
     "Rollouts",
     "Scene",
@@ -58,7 +64,9 @@ __all__ = [
     "WorkerError",
     "__version__",
     "arm_names",
+    "load_recordings",
     "load_task",
+    "save_recordings",
 ]
 
 
@@ -78,6 +86,7 @@ __getattr__ = lazy_exports(
             "MissingExtraError",
             "OutputError",
             "PolicyFileError",
+            "RecordingFileError",
             "SceneError",
             "StartInContactError",
             "UnknownNameError",
@@ -85,10 +94,12 @@ __getattr__ = lazy_exports(
         ),
         "networks": ("CompiledPolicy", "Networks"),
         "reference": ("ReferenceSimulator",),
+        "replay": ("Replay",),
         "rollouts": ("Rollouts",),
         "scene": ("Bench", "Scene"),
         "simulator": ("Simulator", "StepResult"),
         "task": ("TASKS", "ReachTask", "RewardWeights", "load_task"),
+        "trajectory": ("Recording", "load_recordings", "save_recordings"),
         "vector_env": ("ReachVectorEnv",),
     },
 )
