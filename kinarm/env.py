@@ -97,7 +97,8 @@ class ReachEnv(gymnasium.Env[Array, Array]):
 
     **Reward**: sum of the terms ``reward_progress`` (metres by which the tool came closer),
     ``reward_closer`` (0, for every step closer), ``reward_collision`` (-1 when a move touches
-    something), ``reward_success`` (0) and ``reward_step`` (0), with the default weights in brackets.
+    something), ``reward_success`` (0) and ``reward_step`` (0), with the default weights in
+    brackets.
 
     **Start**: each actuated axis uniform within its limits, rejected until the arm touches
     nothing and the tool is farther from the goal than the tolerance. Goals are uniform over the

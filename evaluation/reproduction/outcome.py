@@ -14,9 +14,9 @@ import kinarm
 from kinarm.errors import PolicyFileError
 from kinarm.evaluation import trials
 from kinarm.evaluation.reproduction.study import Protocol, Training
-from kinarm.files import write_atomically
+from kinarm.files import CORRUPT, write_atomically
 from kinarm.policies import oracle
-from kinarm.policies.policy import CORRUPT, Policy
+from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import package_versions
 
 FORMAT = "kinarm-outcome-1"
