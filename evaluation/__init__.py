@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from kinarm.evaluation.bounds import oracle_bounds
     from kinarm.evaluation.entrants import Entrant, find_entrants
     from kinarm.evaluation.evaluations import Evaluation, PooledEvaluation, evaluate, pool
+    from kinarm.evaluation.html_report.page import report_page, write_report
     from kinarm.evaluation.plots import distance_histograms, save_figure
     from kinarm.evaluation.report import evaluation_document
     from kinarm.evaluation.statistics import DistanceStatistics, Share
@@ -26,7 +27,9 @@ __all__ = [
     "find_entrants",
     "oracle_bounds",
     "pool",
+    "report_page",
     "save_figure",
+    "write_report",
 ]
 
 
@@ -40,6 +43,7 @@ __getattr__ = lazy_exports(
         "bounds": ("oracle_bounds",),
         "entrants": ("Entrant", "find_entrants"),
         "evaluations": ("Evaluation", "PooledEvaluation", "evaluate", "pool"),
+        "html_report.page": ("report_page", "write_report"),
         "plots": ("distance_histograms", "save_figure"),
         "report": ("evaluation_document",),
         "statistics": ("DistanceStatistics", "Share"),
