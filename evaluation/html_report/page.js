@@ -3,10 +3,15 @@
 const root = document.documentElement;
 const prefersDark = window.matchMedia("(prefers-color-scheme: dark)");
 
+function shownTheme() {
+  return root.dataset.theme || (prefersDark.matches ? "dark" : "light");
+}
+
 document.getElementById("theme").addEventListener("click", () => {
-  const shown = root.dataset.theme || (prefersDark.matches ? "dark" : "light");
-  root.dataset.theme = shown === "dark" ? "light" : "dark";
+  root.dataset.theme = shownTheme() === "dark" ? "light" : "dark";
+  shareTheme();
 });
+prefersDark.addEventListener("change", () => shareTheme());
 
 // Pointing at a policy in a legend or table dims the others in the charts of its section.
 function highlight(section, name) {
@@ -19,4 +24,60 @@ for (const item of document.querySelectorAll("section .legend li[data-series], s
   const section = item.closest("section");
   item.addEventListener("pointerenter", () => highlight(section, item.dataset.series));
   item.addEventListener("pointerleave", () => highlight(section, null));
+}
+
+// The replay of the worst trials: a row chooses the trial, and follows when the player goes on.
+const frame = document.querySelector("#worst iframe");
+const rows = [...document.querySelectorAll("tr[data-replay]")];
+let player = null;
+let wanted = null;
+
+function mark(index) {
+  for (const row of rows) {
+    row.toggleAttribute("aria-current", Number(row.dataset.replay) === index);
+  }
+}
+
+function watch(index) {
+  wanted = index;
+  mark(index);
+  frame.loading = "eager";
+  if (player) {
+    player.select(index);
+    player.play();
+  }
+}
+
+function shareTheme() {
+  if (player && player.state.theme !== shownTheme()) {
+    frame.contentDocument.getElementById("theme").click();
+  }
+}
+
+function join() {
+  const inside = frame.contentDocument;
+  if (!inside.body || !("ready" in inside.body.dataset)) {
+    return;
+  }
+  player = frame.contentWindow.kinarm;
+  shareTheme();
+  new MutationObserver(() => mark(player.state.index)).observe(inside.getElementById("spoken"), { childList: true });
+  if (wanted === null) {
+    mark(player.state.index);
+  } else {
+    watch(wanted);
+  }
+}
+
+frame.addEventListener("load", () => {
+  const waiting = new MutationObserver(() => {
+    waiting.disconnect();
+    join();
+  });
+  waiting.observe(frame.contentDocument.body, { attributeFilter: ["data-ready"] });
+  join();
+});
+
+for (const row of rows) {
+  row.addEventListener("click", () => watch(Number(row.dataset.replay)));
 }

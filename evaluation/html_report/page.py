@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from importlib import resources
+from itertools import accumulate
 from pathlib import Path
 from string import Template
 from typing import Any
@@ -13,6 +14,7 @@ from kinarm.evaluation.html_report.maps import bench_map, map_legend
 from kinarm.evaluation.html_report.markup import Child, Markup, join, tag
 from kinarm.evaluation.html_report.method import method_section
 from kinarm.evaluation.html_report.profiles import legend, profile_chart
+from kinarm.evaluation.html_report.replays import replay_frame
 from kinarm.evaluation.html_report.summary import card, oracle_rate, summary_table
 from kinarm.evaluation.html_report.worst import worst_table, worst_trials
 from kinarm.files import check_folder, write_atomically
@@ -168,4 +170,10 @@ def _task_words(task: TaskResults) -> str:
 
 def _worst_section(tasks: Sequence[TaskResults]) -> Markup:
     """Tables of the worst trials, beside their replay."""
-    return join(worst_table(task, worst_trials(task), None) for task in tasks)
+    chosen = [worst_trials(task) for task in tasks]
+    firsts = accumulate((len(each) for each in chosen), initial=0)
+    tables = [worst_table(*each) for each in zip(tasks, chosen, firsts, strict=False)]
+    return join(
+        tag("div", tables, class_="panel"),
+        tag("div", replay_frame([worst for each in chosen for worst in each]), class_="stage"),
+    )

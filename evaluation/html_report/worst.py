@@ -7,7 +7,6 @@ from kinarm.evaluation.evaluations import Evaluation
 from kinarm.evaluation.html_report.groups import Group, TaskResults
 from kinarm.evaluation.html_report.maps import OUTCOMES
 from kinarm.evaluation.html_report.markup import DASH, Markup, tag
-from kinarm.evaluation.html_report.profiles import swatch
 
 BEST_GROUPS = 4
 """Groups of a task whose worst trials are shown."""
@@ -60,7 +59,7 @@ def _worst_of(group: Group, count: int) -> list[WorstTrial]:
     return [WorstTrial(group, group.members[seed], trial) for *_, seed, trial in ranked[:count]]
 
 
-def worst_table(task: TaskResults, chosen: Sequence[WorstTrial], first: int | None) -> Markup:
+def worst_table(task: TaskResults, chosen: Sequence[WorstTrial], first: int) -> Markup:
     """The chosen trials of a task.
 
     Parameters
@@ -69,22 +68,18 @@ def worst_table(task: TaskResults, chosen: Sequence[WorstTrial], first: int | No
         The task.
     chosen : sequence of WorstTrial
         What `worst_trials` returned.
-    first : int or None
-        Place of the first of them in the replay; None if there is no replay.
+    first : int
+        Place of the first of them in the replay.
     """
-    headings = ["policy", "trial", "distance m", "outcome", "steps", "oracle's steps"]
-    if not task.entry["oracle"]:
-        headings.pop()
-    if first is not None:
-        headings.append("replay")
-    heads = [tag("th", heading, scope="col", role="columnheader") for heading in headings]
-    rows = [
-        _row(task, worst, headings, None if first is None else first + place)
-        for place, worst in enumerate(chosen)
+    headings = [*HEADINGS, "oracle's steps"] if task.entry["oracle"] else HEADINGS
+    heads = [
+        tag("th", text, scope="col", role="columnheader")
+        for text in (tag("span", "replay", class_="hidden"), "policy", *headings)
     ]
+    rows = [_row(task, worst, headings, first + place) for place, worst in enumerate(chosen)]
     return tag(
         "table",
-        tag("caption", f"Worst trials on {task.name}"),
+        tag("caption", f"Task {task.name}"),
         tag("thead", tag("tr", heads, role="row"), role="rowgroup"),
         tag("tbody", rows, role="rowgroup"),
         class_="worst",
@@ -92,33 +87,35 @@ def worst_table(task: TaskResults, chosen: Sequence[WorstTrial], first: int | No
     )
 
 
-def _row(
-    task: TaskResults, worst: WorstTrial, headings: Sequence[str], place: int | None
-) -> Markup:
-    name = worst.evaluation.entrant.name
-    rollouts, trial = worst.evaluation.rollouts, worst.trial
-    cells = (
-        f"{trial}",
-        f"{rollouts.distance[trial]:.3f}",
-        describe_outcome(worst),
-        f"{rollouts.steps[trial]}",
-        _oracle_steps(task, trial),
-        _button(name, trial, place),
-    )
-    figures = zip(headings[1:], (cell for cell in cells if cell is not None), strict=True)
+HEADINGS = ("trial", "distance m", "outcome", "steps")
+"""Columns beside the policy, the oracle's steps and the button."""
+
+STYLES = {"outcome": "words"}
+
+
+def _row(task: TaskResults, worst: WorstTrial, headings: Sequence[str], place: int) -> Markup:
+    name, trial = worst.evaluation.entrant.name, worst.trial
+    rollouts = worst.evaluation.rollouts
+    figures = {
+        "trial": f"{trial}",
+        "distance m": f"{rollouts.distance[trial]:.3f}",
+        "outcome": describe_outcome(worst),
+        "steps": f"{rollouts.steps[trial]}",
+        "oracle's steps": _oracle_steps(task, trial),
+    }
+    button = tag("button", "▶", type="button", aria_label=f"Watch trial {trial} of {name}")
     return tag(
         "tr",
-        tag("th", swatch(worst.group), tag("span", name), scope="row", role="rowheader"),
+        tag("td", button, role="cell", class_="watch"),
+        tag("th", tag("span", name), scope="row", role="rowheader"),
         [
-            tag("td", cell, role="cell", data_label=heading, class_=CLASSES.get(heading))
-            for heading, cell in figures
+            tag("td", figures[heading], role="cell", data_label=heading, class_=STYLES.get(heading))
+            for heading in headings
         ],
         role="row",
-        data_replay=None if place is None else str(place),
+        class_=worst.group.style,
+        data_replay=str(place),
     )
-
-
-CLASSES = {"outcome": "words", "replay": "watch"}
 
 
 def describe_outcome(worst: WorstTrial) -> str:
@@ -128,19 +125,12 @@ def describe_outcome(worst: WorstTrial) -> str:
     return f"{OUTCOMES[outcome]}: {pair[0]} {DASH} {pair[1]}" if pair else OUTCOMES[outcome]
 
 
-def _oracle_steps(task: TaskResults, trial: int) -> str | None:
+def _oracle_steps(task: TaskResults, trial: int) -> str:
     """Steps of the oracle's motion, and how many are proven to be necessary if they are fewer."""
     if not task.entry["oracle"]:
-        return None
+        return ""
     bounds = task.entry["oracle"]["trials"]
     if not bounds["reachable"][trial]:
         return "not reached"
     steps, proven = bounds["steps"][trial], bounds["steps_lower_bound"][trial]
     return f"{steps}" if steps == proven else f"{steps}, proven ≥ {proven}"
-
-
-def _button(name: str, trial: int, place: int | None) -> Markup | None:
-    if place is None:
-        return None
-    label = f"Watch trial {trial} of {name}"
-    return tag("button", "▶ Watch", type="button", aria_label=label, data_replay=str(place))

@@ -50,8 +50,8 @@ def test_learners_have_help_of_their_own(run, learner):
     [
         (
             "kinarm-eval",
-            "--task --policy --trials --seed --arm --out --report --json --matrix --allow-other-arm "
-            "--no-oracle --markdown",
+            "--task --policy --trials --seed --arm --out --report --json --matrix "
+            "--allow-other-arm --no-oracle --markdown",
         ),
         ("kinarm-bench", "--repetitions --policy --ppo --json"),
     ],

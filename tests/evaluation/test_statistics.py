@@ -1,6 +1,7 @@
 """Figures of merit against formulas written out here, and against a bootstrap written here."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -136,7 +137,7 @@ def test_profile_is_the_share_within_each_limit(shape):
     profile = performance_profile(distances, limits)
     assert profile == tuple(Share.of(distances <= limit) for limit in limits)
     assert (profile[0].rate, profile[-1].rate) == (0, 1)
-    for lower, upper in zip(profile, profile[1:], strict=False):
+    for lower, upper in pairwise(profile):
         assert lower.rate <= upper.rate
         assert lower.ci95 <= upper.ci95
 
