@@ -14,11 +14,10 @@ import kinarm
 from kinarm.errors import OutputError
 from kinarm.evaluation.statistics import Share
 from kinarm.evaluation.trials import TrialSet
-from kinarm.files import check_folder, write_atomically
+from kinarm.files import CORRUPT, check_folder, write_atomically
 from kinarm.policies import oracle
 from kinarm.policies.oracle import Oracle, Progress
 from kinarm.policies.oracle_solution import OracleSolutions
-from kinarm.policies.policy import CORRUPT
 from kinarm.policies.provenance import package_versions
 
 CACHE_VARIABLE = "KINARM_CACHE"

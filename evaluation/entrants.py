@@ -1,8 +1,8 @@
 """Who takes part in an evaluation: trained policies and baselines."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -15,6 +15,13 @@ from kinarm.policies.library import group_of, policy_files, policy_names
 from kinarm.policies.policy import Policy
 from kinarm.rollouts import Rollouts
 from kinarm.simulator import PolicyFunction
+
+
+class Run(Protocol):
+    """Runs all trials of a set, and keeps the configurations visited if that is asked for."""
+
+    def __call__(self, trials: TrialSet, *, record: bool = False) -> Rollouts:
+        """Return what happened."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +49,7 @@ class Entrant:
     """
 
     name: str
-    run: Callable[[TrialSet], Rollouts]
+    run: Run
     algorithm: str
     recipe: str
     group: str
@@ -68,7 +75,7 @@ class Entrant:
         made = policy.provenance
         return cls(
             name=name,
-            run=lambda trials: trials.simulator.rollout(policy, trials.starts, trials.goals),
+            run=_running(policy),
             algorithm=made.algorithm,
             recipe=made.recipe,
             group=group_of(name),
@@ -83,35 +90,45 @@ class Entrant:
         """Enter a function from observations (n, n_observations) to actions (n, n_actions)."""
         return cls(
             name=name,
-            run=lambda trials: trials.simulator.rollout(function, trials.starts, trials.goals),
+            run=_running(function),
             algorithm="function",
             recipe="",
             group=name,
         )
 
 
-def _run_zero(trials: TrialSet) -> Rollouts:
+def _running(policy: Policy | PolicyFunction) -> Run:
+    """Run something that chooses actions."""
+
+    def run(trials: TrialSet, *, record: bool = False) -> Rollouts:
+        return trials.simulator.rollout(policy, trials.starts, trials.goals, record=record)
+
+    return run
+
+
+def _run_zero(trials: TrialSet, *, record: bool = False) -> Rollouts:
     simulator = trials.simulator
     still = Networks.linear(
         np.zeros((1, simulator.n_actions, simulator.n_observations)),
         np.zeros((1, simulator.n_actions)),
     )
-    return simulator.rollout(still, trials.starts, trials.goals)
+    return simulator.rollout(still, trials.starts, trials.goals, record=record)
 
 
-def _run_random(trials: TrialSet) -> Rollouts:
+def _run_random(trials: TrialSet, *, record: bool = False) -> Rollouts:
     simulator = trials.simulator
     shape = (simulator.task.horizon, simulator.n_actions)
     actions = [
         trial_generator(trials.seed, trial, stream=1).uniform(-1, 1, shape)
         for trial in range(len(trials))
     ]
-    return simulator.rollout_actions(np.array(actions), trials.starts, trials.goals)
+    table = np.array(actions)
+    return simulator.rollout_actions(table, trials.starts, trials.goals, record=record)
 
 
-def _run_oracle(trials: TrialSet) -> Rollouts:
+def _run_oracle(trials: TrialSet, *, record: bool = False) -> Rollouts:
     actions = oracle_bounds(trials).actions
-    return trials.simulator.rollout_actions(actions, trials.starts, trials.goals)
+    return trials.simulator.rollout_actions(actions, trials.starts, trials.goals, record=record)
 
 
 BASELINES = {

@@ -16,16 +16,19 @@ if TYPE_CHECKING:
         MissingExtraError,
         OutputError,
         PolicyFileError,
+        RecordingFileError,
         SceneError,
         StartInContactError,
         UnknownNameError,
     )
     from kinarm.networks import CompiledPolicy, Networks
     from kinarm.reference import ReferenceSimulator
+    from kinarm.replay import Replay
     from kinarm.rollouts import Rollouts
     from kinarm.scene import Bench, Scene
     from kinarm.simulator import Simulator, StepResult
     from kinarm.task import TASKS, ReachTask, RewardWeights, load_task
+    from kinarm.trajectory import Recording, load_recordings, save_recordings
     from kinarm.vector_env import ReachVectorEnv
 
 __version__ = "0.1.0"
@@ -45,7 +48,10 @@ __all__ = [
     "ReachEnv",
     "ReachTask",
     "ReachVectorEnv",
+    "Recording",
+    "RecordingFileError",
     "ReferenceSimulator",
+    "Replay",
     "RewardWeights",
     "Rollouts",
     "Scene",
@@ -56,7 +62,9 @@ __all__ = [
     "UnknownNameError",
     "__version__",
     "arm_names",
+    "load_recordings",
     "load_task",
+    "save_recordings",
 ]
 
 
@@ -76,16 +84,19 @@ __getattr__ = lazy_exports(
             "MissingExtraError",
             "OutputError",
             "PolicyFileError",
+            "RecordingFileError",
             "SceneError",
             "StartInContactError",
             "UnknownNameError",
         ),
         "networks": ("CompiledPolicy", "Networks"),
         "reference": ("ReferenceSimulator",),
+        "replay": ("Replay",),
         "rollouts": ("Rollouts",),
         "scene": ("Bench", "Scene"),
         "simulator": ("Simulator", "StepResult"),
         "task": ("TASKS", "ReachTask", "RewardWeights", "load_task"),
+        "trajectory": ("Recording", "load_recordings", "save_recordings"),
         "vector_env": ("ReachVectorEnv",),
     },
 )

@@ -66,6 +66,24 @@ class Capsule(NamedTuple):
     radius: float
 
 
+class Contact(NamedTuple):
+    """Two bodies that touch.
+
+    Attributes
+    ----------
+    configuration : ndarray, shape (n_axes,)
+        Axis positions at which they do [rad or m].
+    pair : tuple of str
+        Their names.
+    point : ndarray, shape (3,)
+        Where, in the world [m].
+    """
+
+    configuration: NDArray[np.float64]
+    pair: tuple[str, str]
+    point: NDArray[np.float64]
+
+
 @dataclass(frozen=True, eq=False)
 class ContactModel:
     """An arm in a scene, with the pairs of bodies that are tested for contact.
@@ -107,7 +125,7 @@ class ContactModel:
         return cls(
             arm=arm,
             geometry=geometry,
-            body_names=(*_body_names(arm), *obstacles),
+            body_names=(*body_names(arm), *obstacles),
             shapes=_contact_shapes(arm, scene, kept, n_shapes),
         )
 
@@ -157,14 +175,30 @@ class ContactModel:
         configuration : ndarray, shape (n_axes,)
             Axis positions [rad or m].
         """
+        contact = self.contact(configuration)
+        return contact.pair if contact else None
+
+    def contact(self, configuration: NDArray[np.float64]) -> Contact | None:
+        """Describe the first tested pair that is in contact, or return None.
+
+        Parameters
+        ----------
+        configuration : ndarray, shape (n_axes,)
+            Axis positions [rad or m].
+        """
         data, results = self._workspace
         if not pin.computeCollisions(
             self.arm.model, data, self.geometry, results, configuration, True
         ):
             return None
         # Pairs are tested in order up to the first in contact; later results are of other calls.
-        found = (result.isCollision() for result in results.collisionResults)
-        return self.pair_names[next(index for index, touches in enumerate(found) if touches)]
+        index, found = next(
+            (index, result)
+            for index, result in enumerate(results.collisionResults)
+            if result.isCollision()
+        )
+        point = np.array(found.getContact(0).pos)
+        return Contact(configuration, self.pair_names[index], point)
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
         return type(self), (self.arm, self.geometry, self.body_names, self.shapes)
@@ -201,7 +235,7 @@ def _add_scene(geometry: pin.GeometryModel, scene: Scene) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _body_names(arm: Arm) -> tuple[str, ...]:
+def body_names(arm: Arm) -> tuple[str, ...]:
     """Name each collision shape after its link, numbered only where a link has several."""
     names = [shape.name for shape in arm.geometry.geometryObjects]
     links = [name.rsplit("_", 1)[0] for name in names]

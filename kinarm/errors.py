@@ -9,6 +9,7 @@
     │   └── UnknownNameError    a name that does not exist; lists the ones that do
     ├── StartInContactError a start configuration that touches something
     ├── PolicyFileError     a policy file or checkpoint that cannot be read or used here
+    ├── RecordingFileError  a file of recordings that cannot be read or used here
     ├── OutputError         a file or folder that cannot be written
     └── MissingExtraError   an optional package that is not installed; says how to install it
 
@@ -79,6 +80,10 @@ class StartInContactError(KinarmError):
 
 class PolicyFileError(KinarmError):
     """A policy file is missing, truncated, foreign, too new, or made for something else."""
+
+
+class RecordingFileError(KinarmError):
+    """A file of recordings is missing, truncated, foreign or too new."""
 
 
 class OutputError(KinarmError):

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm import kernels
 from kinarm.arm import Arm
-from kinarm.collision import ContactModel
+from kinarm.collision import Contact, ContactModel
 from kinarm.episodes import (
     COLLISION,
     PAUSED,
@@ -292,6 +292,20 @@ class Simulator:
         self._advance(table_control(table), episodes, len(q) * self.task.horizon)
         return Rollouts.from_episodes(q, episodes)
 
+    def contact(
+        self, configuration: NDArray[np.float64], target: NDArray[np.float64]
+    ) -> Contact | None:
+        """Describe the first contact on the way of a step, or return None.
+
+        Parameters
+        ----------
+        configuration, target : ndarray, shape (n_axes,)
+            Ends of the step [rad or m].
+        """
+        tested = substeps(configuration[None], target[None])[0]
+        touching = np.flatnonzero(self.contact_model.in_contact(tested))
+        return self.contact_model.contact(tested[touching[0]]) if touching.size else None
+
     def contact_pair(
         self, configuration: NDArray[np.float64], target: NDArray[np.float64]
     ) -> tuple[str, str] | None:
@@ -302,9 +316,8 @@ class Simulator:
         configuration, target : ndarray, shape (n_axes,)
             Ends of the step [rad or m].
         """
-        tested = substeps(configuration[None], target[None])[0]
-        touching = np.flatnonzero(self.contact_model.in_contact(tested))
-        return self.contact_model.contact_pair(tested[touching[0]]) if touching.size else None
+        contact = self.contact(configuration, target)
+        return contact.pair if contact else None
 
     def contact_pairs(self, rollouts: Rollouts) -> tuple[tuple[str, str] | None, ...]:
         """Name the bodies that touched, per episode; None where nothing did."""
@@ -442,6 +455,29 @@ class Simulator:
         -------
         ndarray, shape (n, n_observations)
         """
+        return self._at(configurations, goals).observation
+
+    def distances(
+        self, configurations: NDArray[np.float64], goals: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Distances from the tool to goals, as in episodes.
+
+        Parameters
+        ----------
+        configurations : ndarray, shape (n, n_axes)
+            Axis positions [rad or m].
+        goals : ndarray, shape (n, 3)
+            Goal positions [m].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Distances [m].
+        """
+        return self._at(configurations, goals).distance
+
+    def _at(self, configurations: NDArray[np.float64], goals: NDArray[np.float64]) -> Episodes:
+        """Episodes that begin at configurations, whether or not those touch something."""
         episodes = Episodes.allocate(
             finite_array("configurations", configurations, (None, self.arm.n_axes)),
             finite_array("goals", goals, (len(configurations), 3)),
@@ -450,7 +486,7 @@ class Simulator:
         )
         arrays = (np.arange(len(configurations)), self.arm.chain, self.contact_model.shapes)
         kernels.begin(0, len(configurations), *arrays, episodes)
-        return episodes.observation
+        return episodes
 
     def screen(
         self, configurations: NDArray[np.float64]

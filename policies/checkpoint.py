@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError
-from kinarm.files import write_atomically
+from kinarm.files import CORRUPT, write_atomically
 from kinarm.policies.ars import ARSState
 from kinarm.policies.ars_config import ARSConfig
 from kinarm.policies.curve import CurvePoint
 from kinarm.policies.normalizer import Normalizer
-from kinarm.policies.policy import CORRUPT
 from kinarm.policies.ppo_config import PPOConfig
 from kinarm.policies.ppo_state import EpisodeStates, PPOState
 

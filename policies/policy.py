@@ -1,9 +1,6 @@
 """One class for every trained policy: a normaliser, dense layers and a clip."""
 
 import json
-import tokenize
-import zipfile
-import zlib
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError
-from kinarm.files import write_atomically
+from kinarm.files import CORRUPT, write_atomically
 from kinarm.networks import Networks
 from kinarm.policies.normalizer import input_scale
 from kinarm.policies.provenance import Provenance
@@ -22,17 +19,6 @@ from kinarm.validation import finite_array
 
 FILE_FORMAT = "kinarm-policy"
 FILE_VERSION = 1
-CORRUPT = (
-    ValueError,
-    KeyError,
-    TypeError,
-    EOFError,
-    RuntimeError,
-    tokenize.TokenError,
-    zipfile.BadZipFile,
-    zlib.error,
-)
-"""What reading a damaged ``.npz`` raises."""
 
 
 class Layer(NamedTuple):
