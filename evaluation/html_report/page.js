@@ -38,10 +38,18 @@ function mark(index) {
   }
 }
 
+function load() {
+  if (!frame.srcdoc) {
+    frame.srcdoc = frame.dataset.page;
+    frame.removeAttribute("data-page");
+  }
+}
+
 function watch(index) {
   wanted = index;
   mark(index);
-  frame.loading = "eager";
+  load();
+  frame.scrollIntoView({ block: "nearest" });
   if (player) {
     player.select(index);
     player.play();
@@ -70,6 +78,9 @@ function join() {
 }
 
 frame.addEventListener("load", () => {
+  if (!frame.srcdoc) {
+    return;
+  }
   const waiting = new MutationObserver(() => {
     waiting.disconnect();
     join();
@@ -77,6 +88,15 @@ frame.addEventListener("load", () => {
   waiting.observe(frame.contentDocument.body, { attributeFilter: ["data-ready"] });
   join();
 });
+
+// Nothing is loaded before it is near, and nothing plays on out of sight.
+new IntersectionObserver(([entry]) => {
+  if (entry.isIntersecting) {
+    load();
+  } else if (player) {
+    player.pause();
+  }
+}, { rootMargin: "300px" }).observe(frame);
 
 for (const row of rows) {
   row.addEventListener("click", () => watch(Number(row.dataset.replay)));

@@ -21,8 +21,8 @@ def replay_frame(chosen: Sequence[WorstTrial]) -> Markup:
     return tag(
         "iframe",
         title="Replay of the worst trials",
-        srcdoc=replay(record_trials(chosen), arm=arm).html,
-        loading="lazy",
+        # The script of the page makes it the content when a reader comes near.
+        data_page=replay(record_trials(chosen), arm=arm).html,
     )
 
 

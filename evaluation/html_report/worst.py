@@ -71,10 +71,11 @@ def worst_table(task: TaskResults, chosen: Sequence[WorstTrial], first: int) -> 
     first : int
         Place of the first of them in the replay.
     """
-    headings = [*HEADINGS, "oracle's steps"] if task.entry["oracle"] else HEADINGS
+    headings = [*HEADINGS, "oracle"] if task.entry["oracle"] else HEADINGS
+    hidden = tag("span", "replay", class_="hidden")
     heads = [
-        tag("th", text, scope="col", role="columnheader")
-        for text in (tag("span", "replay", class_="hidden"), "policy", *headings)
+        tag("th", text, scope="col", role="columnheader", title=MEANINGS.get(text))
+        for text in (hidden, "policy", *headings)
     ]
     rows = [_row(task, worst, headings, first + place) for place, worst in enumerate(chosen)]
     return tag(
@@ -90,6 +91,8 @@ def worst_table(task: TaskResults, chosen: Sequence[WorstTrial], first: int) -> 
 HEADINGS = ("trial", "distance m", "outcome", "steps")
 """Columns beside the policy, the oracle's steps and the button."""
 
+MEANINGS = {"oracle": "steps of the oracle's motion in the same trial"}
+
 STYLES = {"outcome": "words"}
 
 
@@ -101,7 +104,7 @@ def _row(task: TaskResults, worst: WorstTrial, headings: Sequence[str], place: i
         "distance m": f"{rollouts.distance[trial]:.3f}",
         "outcome": describe_outcome(worst),
         "steps": f"{rollouts.steps[trial]}",
-        "oracle's steps": _oracle_steps(task, trial),
+        "oracle": _oracle_steps(task, trial),
     }
     button = tag("button", "▶", type="button", aria_label=f"Watch trial {trial} of {name}")
     return tag(
