@@ -3,9 +3,9 @@
 from collections import defaultdict
 from collections.abc import Sequence
 
-import meshcat
 import numpy as np
 import umsgpack
+from meshcat import Visualizer
 from meshcat.geometry import Geometry, LineBasicMaterial, LineSegments, Material, Object
 from meshcat.geometry import Mesh as DrawnMesh
 from numpy.typing import NDArray
@@ -40,8 +40,9 @@ TRACE_SIDES = 6
 SUN_PLACE = [-2.0, -1.0, 3.4]
 CLUTTER = ("/Axes", "/Grid", "/Lights/PointLightPositiveX", "/Lights/PointLightNegativeX")
 """What Meshcat shows by default and a replay does not."""
-
-Window = meshcat.Visualizer
+DIMMED = {"/Lights/AmbientLight/<object>": 0.42, "/Lights/FillLight/<object>": 0.2}
+CAMERA = {"fov": 32, "position": [-2.4, 1.6, 1.9]}
+"""In the frame of three.js, whose y axis points up."""
 
 
 class _Skin(Geometry):  # type: ignore[misc]
@@ -115,7 +116,7 @@ class _Sun(Object):  # type: ignore[misc]
             "uuid": self.uuid,
             "type": "DirectionalLight",
             "color": 0xFFF6E8,
-            "intensity": 0.75,
+            "intensity": 0.5,
         }
         return {"object": {**light, "shadow": {**shadow, "camera": camera}}}
 
@@ -133,15 +134,17 @@ def _packed(array: NDArray[np.generic], size: int) -> dict[str, object]:
     return {"itemSize": size, "type": name, "array": data, "normalized": name == "Int8Array"}
 
 
-def put(window: Window, finish: Finish, *meshes: Mesh) -> None:
+def put(window: Visualizer, finish: Finish, *meshes: Mesh) -> None:
     """Show meshes with one finish."""
     window.set_object(DrawnMesh(_Skin(meshes), _Surface(finish)))
 
 
-def draw_surroundings(window: Window, scene: Scene) -> None:
+def draw_surroundings(window: Visualizer, scene: Scene) -> None:
     """Lights, floor with a grid, and benches."""
     for path in CLUTTER:
-        window[path].delete()
+        window[path].set_property("visible", False)
+    for path, intensity in DIMMED.items():
+        window[path].set_property("intensity", intensity)
     for end in ("top_color", "bottom_color"):
         window["/Background"].set_property(end, BACKGROUND)
     window["sun"].set_object(_Sun())
@@ -169,14 +172,20 @@ def _grid() -> NDArray[np.float64]:
     return np.column_stack([np.array(lines), np.full(len(lines), 0.0005)])
 
 
-def draw_goal(window: Window, scene: Scene, tolerance: float) -> None:
+def aim_camera(window: Visualizer) -> None:
+    """Look at the arm from behind its right side."""
+    for name, value in CAMERA.items():
+        window["/Cameras/default/rotated/<object>"].set_property(name, value)
+
+
+def draw_goal(window: Visualizer, scene: Scene, tolerance: float) -> None:
     """The cube, and a halo within which the goal counts as reached, about the origin."""
     edge = scene.cube_edge or 0.01
     put(window["cube"], CUBE, box((edge, edge, edge), 0.08 * edge))
     put(window["halo"], HALO, capsule(0.0, tolerance))
 
 
-def draw_arm(window: Window, arm: Arm) -> list[Window]:
+def draw_arm(window: Visualizer, arm: Arm) -> list[Visualizer]:
     """Draw an arm as nested groups, one for each joint.
 
     Returns
@@ -195,7 +204,7 @@ def draw_arm(window: Window, arm: Arm) -> list[Window]:
     return frames
 
 
-def draw_trace(window: Window, arm: Arm, recording: Recording) -> None:
+def draw_trace(window: Visualizer, arm: Arm, recording: Recording) -> None:
     """The way of the tool, in the colour of the outcome."""
     points = [arm.tool_position(state) for state in recording.states]
     finish = Finish(OUTCOME_COLOURS[recording.outcome], roughness=0.5)

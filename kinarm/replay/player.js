@@ -4,8 +4,8 @@ const element = (id) => document.getElementById(id);
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2];
 const HOLD = 1.4; // seconds between the end of a trial and the next one
 const THEMES = {
-  light: { back: 0xeef1f4, floor: 0xd9dee4, grid: 0xb4bdc7, bench: 0x8f9aa8, top: 0xb3bdc8, ghost: 0x4d5a68, sky: 0.3, sun: 0.62 },
-  dark: { back: 0x14181d, floor: 0x1e242b, grid: 0x3c4753, bench: 0x3d4752, top: 0x586573, ghost: 0xb4c1ce, sky: 0.22, sun: 0.6 },
+  light: { back: 0xeef1f4, floor: 0xcfd5dc, grid: 0xb4bdc7, bench: 0x8f9aa8, top: 0xb3bdc8, ghost: 0x4d5a68, sky: 0.3, sun: 0.62 },
+  dark: { back: 0x1a1f25, floor: 0x12161b, grid: 0x3c4753, bench: 0x3d4752, top: 0x586573, ghost: 0xb4c1ce, sky: 0.22, sun: 0.6 },
 };
 const RIVAL = 0x56b4e9;
 const BEHIND = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 8 }; // gives way to what coincides
@@ -103,6 +103,8 @@ class Stage {
     const { THREE } = this;
     viewer.renderer.outputEncoding = THREE.sRGBEncoding;
     viewer.renderer.domElement.tabIndex = -1;
+    viewer.renderer.setClearAlpha(0); // the page's own background shows through
+    viewer.scene.background = null;
     viewer.scene.traverse((node) => node.isMesh && node.material.color.convertSRGBToLinear());
     this.light();
     this.arm = new ArmModel(THREE, this.find("arm"), data);
@@ -111,6 +113,8 @@ class Stage {
     this.refused = this.arm.ghost(data, data.colours.collision, 0.34);
     this.rival = data.trials.some((trial) => trial.runs.length > 1) ? this.arm.ghost(data, RIVAL, 0.55) : null;
     this.flash = this.find("flash");
+    this.mesh("flash").renderOrder = 9;
+    this.mesh("flash").material.depthTest = false;
     for (const name of ["goal", "flash"]) {
       this.find(name).traverse((node) => { node.castShadow = node.castShadow && node.material && !node.material.transparent; });
     }
@@ -159,8 +163,8 @@ class Stage {
     const { viewer } = this;
     const look = THEMES[name];
     const colour = (value) => new this.THREE.Color(value).convertSRGBToLinear();
-    viewer.scene.background = new this.THREE.Color(look.back);
-    viewer.scene.fog = new this.THREE.Fog(colour(look.back), 3.6, 8.5);
+    viewer.scene.fog = new this.THREE.Fog(colour(look.back), 1, 2);
+    this.clear();
     const paint = (value, node) => node.traverse((mesh) => mesh.material && mesh.material.color.copy(colour(value)));
     paint(look.floor, this.find("floor"));
     paint(look.grid, this.find("grid"));
@@ -181,18 +185,26 @@ class Stage {
     this.side = 0;
     this.touched = false;
     viewer.controls.addEventListener("start", () => { this.touched = true; });
+    viewer.controls.addEventListener("change", () => this.clear());
     viewer.controls.minDistance = 0.3;
     viewer.controls.maxDistance = 7;
     viewer.controls.maxPolarAngle = 1.54;
     window.addEventListener("resize", () => this.touched || this.look(this.side));
   }
 
+  /** Let the floor fade out behind the scene, wherever that is seen from. */
+  clear() {
+    const { fog } = this.viewer.scene;
+    fog.near = this.viewer.camera.position.length() + 0.2;
+    fog.far = fog.near + 3.6;
+  }
+
   /** Look from behind, on the side (1 left, -1 right) where the goal is. */
   look(side) {
     const { viewer } = this;
     const aspect = window.innerWidth / window.innerHeight;
-    const away = 1.12 * Math.max(1, 1.28 / aspect);
-    const target = new this.THREE.Vector3(0.05, 0.27, -0.1 * side);
+    const away = 1.2 * Math.max(1, 1.28 / aspect);
+    const target = new this.THREE.Vector3(0.05, 0.2, -0.1 * side);
     const eye = new this.THREE.Vector3(-2.35, 1.5, -1.85 * side).multiplyScalar(away);
     viewer.controls.target.copy(target);
     viewer.camera.position.copy(target).add(eye);
