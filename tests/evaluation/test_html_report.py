@@ -19,8 +19,10 @@ from kinarm.evaluation.html_report.groups import COLOURS, DASHES, group_results
 from kinarm.evaluation.html_report.maps import fates, level
 from kinarm.evaluation.html_report.markup import Markup, join, number, tag
 from kinarm.evaluation.html_report.page import report_page, write_report
+from kinarm.evaluation.html_report.replays import record_trials
 from kinarm.evaluation.html_report.worst import worst_trials
 from kinarm.evaluation.report import evaluation_document, table_rows
+from kinarm.replay import replay
 
 PIXEL = 0.051
 """Coordinates are written to a tenth."""
@@ -290,6 +292,28 @@ class TestWorst:
             assert cells["oracle"].startswith(str(evaluation.bounds.steps[trial]))
             pair = evaluation.contacts[trial]
             assert all(body in cells["outcome"] for body in pair or ())
+
+    def test_replay_holds_the_trials_of_the_rows_in_their_order(self, page, tasks):
+        chosen = [worst for task in tasks.values() for worst in worst_trials(task)]
+        rows = content(page).findall(".//section[@id='worst']//tbody/tr")
+        assert [row.get("data-replay") for row in rows] == [str(n) for n in range(len(chosen))]
+        for recording, worst in zip(record_trials(chosen), chosen, strict=True):
+            _, evaluation, trial = worst
+            assert (recording.policy, recording.task, recording.trial) == (
+                evaluation.entrant.name,
+                evaluation.task,
+                trial,
+            )
+            assert recording.final_distance == evaluation.rollouts.distance[trial]
+            assert recording.outcome == evaluation.outcomes[trial]
+
+    def test_replay_is_part_of_the_page(self, page, tasks):
+        chosen = [worst for task in tasks.values() for worst in worst_trials(task)]
+        simulator = chosen[0].evaluation.trials.simulator
+        (frame,) = content(page).findall(".//iframe")
+        expected = replay(record_trials(chosen), arm=simulator.arm).html
+        assert " ".join(frame.get("data-page").split()) == " ".join(expected.split())
+        assert frame.get("title")
 
 
 class TestPage:
