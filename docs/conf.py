@@ -11,7 +11,7 @@ from sphinx import addnodes
 from sphinx.application import Sphinx
 
 mpl.use("Agg")  # examples run without a display
-sys.path.insert(0, str(Path(__file__).parent))  # tables.py, and drawing.py for the examples
+sys.path.insert(0, str(Path(__file__).parent))  # extensions, and drawing.py for the examples
 
 import kinarm
 
@@ -29,6 +29,7 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx_autodoc_typehints",
     "sphinx_gallery.gen_gallery",
+    "players",
     "tables",
 ]
 # examples: read by sphinx-gallery, which writes its pages to gallery.
@@ -62,7 +63,7 @@ sphinx_gallery_conf = {
     "abort_on_example_error": True,
     "image_scrapers": ("matplotlib",),
     "matplotlib_animations": False,
-    "capture_repr": (),
+    "capture_repr": ("_repr_html_",),
     "remove_config_comments": True,
     "show_memory": False,
     "show_signature": False,

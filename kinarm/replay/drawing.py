@@ -205,7 +205,9 @@ def draw_arm(window: Visualizer, arm: Arm) -> list[Visualizer]:
 
 
 def draw_trace(window: Visualizer, arm: Arm, recording: Recording) -> None:
-    """The way of the tool, in the colour of the outcome."""
+    """The way of the tool, in the colour of the outcome; nothing if there is no way."""
+    if recording.steps == 0:
+        return
     points = [arm.tool_position(state) for state in recording.states]
     finish = Finish(OUTCOME_COLOURS[recording.outcome], roughness=0.5)
     put(window, finish, tube(points, TRACE_RADIUS, TRACE_SIDES))

@@ -78,6 +78,8 @@ def _smooth(corners: NDArray[np.int64], weighted: Array, flat: Array) -> Array:
     )
     theirs = order[starts[group] + within]
     joins = (flat[mine // 3] * flat[theirs // 3]).sum(axis=1) >= CREASE
+    empty = np.linalg.norm(weighted, axis=1) == 0
+    joins |= empty[mine // 3]  # a face without area takes any side
     total = np.zeros((len(corners), 3))
     np.add.at(total, mine[joins], weighted[theirs[joins] // 3])
     unit: Array = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-30)

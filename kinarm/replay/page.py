@@ -30,7 +30,7 @@ from kinarm.replay.drawing import (
 from kinarm.replay.meshes import capsule
 from kinarm.trajectory import Recording
 
-FLASH_RADIUS = 0.02
+FLASH_RADIUS = 0.025
 
 
 def build_page(recordings: Sequence[Recording], ghosts: Sequence[Recording], arm: Arm) -> str:

@@ -4,8 +4,8 @@ const element = (id) => document.getElementById(id);
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2];
 const HOLD = 1.4; // seconds between the end of a trial and the next one
 const THEMES = {
-  light: { back: 0xeef1f4, floor: 0xcfd5dc, grid: 0xb4bdc7, bench: 0x8f9aa8, top: 0xb3bdc8, ghost: 0x4d5a68, sky: 0.3, sun: 0.62 },
-  dark: { back: 0x1a1f25, floor: 0x12161b, grid: 0x3c4753, bench: 0x3d4752, top: 0x586573, ghost: 0xb4c1ce, sky: 0.22, sun: 0.6 },
+  light: { back: 0xeef1f4, floor: 0xd3d9df, grid: 0xb4bdc7, bench: 0x8f9aa8, top: 0xb3bdc8, ghost: 0x4d5a68, sky: 0.3, sun: 0.62 },
+  dark: { back: 0x1a1f25, floor: 0x171c22, grid: 0x3c4753, bench: 0x3d4752, top: 0x586573, ghost: 0xb4c1ce, sky: 0.22, sun: 0.6 },
 };
 const RIVAL = 0x56b4e9;
 const BEHIND = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 8 }; // gives way to what coincides
@@ -163,7 +163,7 @@ class Stage {
     const { viewer } = this;
     const look = THEMES[name];
     const colour = (value) => new this.THREE.Color(value).convertSRGBToLinear();
-    viewer.scene.fog = new this.THREE.Fog(colour(look.back), 1, 2);
+    viewer.scene.fog = new this.THREE.Fog(look.back, 1, 2); // mixed in after the conversion to sRGB
     this.clear();
     const paint = (value, node) => node.traverse((mesh) => mesh.material && mesh.material.color.copy(colour(value)));
     paint(look.floor, this.find("floor"));
@@ -344,8 +344,8 @@ function verdict(run, trial) {
   if (run.outcome === "horizon") {
     return `${distance} from the goal after ${count(steps, "step")}`;
   }
-  const ratio = trial.floor ? `, ${(steps / trial.floor).toFixed(1)} times what is necessary` : "";
-  return `${count(steps, "step")}${ratio}`;
+  const ratio = steps === trial.floor ? ", as few as possible" : `, ${(steps / trial.floor).toFixed(1)} times what is necessary`;
+  return `${count(steps, "step")}${trial.floor ? ratio : ""}`;
 }
 
 function fillCard(trial) {

@@ -9,16 +9,22 @@ from typing import NamedTuple
 
 import pytest
 
-from kinarm.evaluation import bench, eval  # noqa: A004
+from kinarm.evaluation import bench, eval, replay  # noqa: A004
 from kinarm.policies import Policy, ars_recipe, train, train_ars
 
 ROOT = Path(__file__).resolve().parents[2]
 MODULES = {
     "kinarm-eval": "kinarm.evaluation.eval",
+    "kinarm-replay": "kinarm.evaluation.replay",
     "kinarm-train": "kinarm.policies.train",
     "kinarm-bench": "kinarm.evaluation.bench",
 }
-MAINS = {"kinarm-eval": eval.main, "kinarm-train": train.main, "kinarm-bench": bench.main}
+MAINS = {
+    "kinarm-eval": eval.main,
+    "kinarm-replay": replay.main,
+    "kinarm-train": train.main,
+    "kinarm-bench": bench.main,
+}
 
 
 class Answer(NamedTuple):

@@ -11,6 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = {
     "kinarm-eval": "kinarm.evaluation.eval",
+    "kinarm-replay": "kinarm.evaluation.replay",
     "kinarm-train": "kinarm.policies.train",
     "kinarm-bench": "kinarm.evaluation.bench",
 }
@@ -52,6 +53,11 @@ def test_learners_have_help_of_their_own(run, learner):
             "kinarm-eval",
             "--task --policy --trials --seed --arm --out --report --json --matrix "
             "--allow-other-arm --no-oracle --markdown",
+        ),
+        (
+            "kinarm-replay",
+            "--policy --compare --task --trial --worst --collisions --trials --seed --arm "
+            "--allow-other-arm --no-oracle --out --record --live --port --no-browser",
         ),
         ("kinarm-bench", "--repetitions --policy --ppo --json"),
     ],

@@ -12,6 +12,7 @@ from kinarm.errors import (
     MissingExtraError,
     OutputError,
     PolicyFileError,
+    RecordingFileError,
     SceneError,
     StartInContactError,
     UnknownNameError,
@@ -24,6 +25,7 @@ EXAMPLES = [
     UnknownNameError("task", "up", ("left", "right")),
     StartInContactError(3, ("hand", "ground")),
     PolicyFileError("no file"),
+    RecordingFileError("no recording"),
     OutputError("no space"),
     MissingExtraError("torch", "ppo"),
 ]

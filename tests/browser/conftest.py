@@ -1,0 +1,116 @@
+"""A real browser without network, or a skip that says what is missing."""
+
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kinarm.replay import replay
+from kinarm.simulator import Simulator
+from kinarm.trajectory import Recording, record_rollouts
+
+REQUIRED = "KINARM_REQUIRE_BROWSER"
+FLAGS = (
+    *("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
+    *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
+    *("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
+)
+
+
+def do_without(reason: str) -> None:
+    """Skip, unless the environment demands a browser."""
+    if os.environ.get(REQUIRED) == "1":
+        pytest.fail(f"{REQUIRED}=1, but {reason}")
+    pytest.skip(reason)
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[object]:
+    """One browser for all tests."""
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        do_without("playwright is not installed: pip install 'kinarm[test]'")
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    if chromium is None:
+        do_without("chromium is not installed: apt-get install chromium")
+    with sync_playwright() as playwright:
+        launched = playwright.chromium.launch(executable_path=chromium, args=list(FLAGS))
+        yield launched
+        launched.close()
+
+
+class Watched:
+    """A page, with everything that it asked for and complained about."""
+
+    def __init__(self, browser: object, path: Path, size: tuple[int, int], calm: bool) -> None:
+        self.context = browser.new_context(
+            viewport={"width": size[0], "height": size[1]},
+            offline=True,
+            color_scheme="light",
+            reduced_motion="reduce" if calm else "no-preference",
+        )
+        self.page = self.context.new_page()
+        self.requests: list[str] = []
+        self.complaints: list[str] = []
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.on("console", self._listen)
+        self.page.goto(path.as_uri())
+        self.page.wait_for_selector("body[data-ready]", timeout=120_000)
+
+    def _listen(self, message: object) -> None:
+        if message.type == "error" or "THREE" in message.text:
+            self.complaints.append(message.text)
+
+    def tell(self, script: str) -> object:
+        """Evaluate a script in the page."""
+        return self.page.evaluate(script)
+
+    @property
+    def state(self) -> dict[str, object]:
+        return self.tell("window.kinarm.state")
+
+
+@pytest.fixture(scope="session")
+def open_page(browser: object) -> Iterator[Callable[..., Watched]]:
+    """Open pages that are closed at the end."""
+    opened = []
+
+    def watch(path: Path, size: tuple[int, int] = (800, 600), *, calm: bool = True) -> Watched:
+        opened.append(Watched(browser, path, size, calm))
+        return opened[-1]
+
+    yield watch
+    for each in opened:
+        each.context.close()
+
+
+@pytest.fixture(scope="session")
+def recorded() -> list[Recording]:
+    """Three random motions in ``both``, one of which collides."""
+    simulator = Simulator(task="both", threads=1)
+    count = 24
+    starts, goals = simulator.sample(np.random.default_rng(0), count)
+    shape = (count, simulator.task.horizon, simulator.n_actions)
+    actions = np.random.default_rng(1).uniform(-1, 1, shape)
+    rollouts = simulator.rollout_actions(actions, starts, goals, record=True)
+    late = np.flatnonzero(rollouts.collision & (rollouts.steps > 5))[:1]
+    chosen = [*np.flatnonzero(~rollouts.collision)[:2], *late]
+    return record_rollouts(simulator, rollouts, "wave", chosen, steps_lower_bound=lambda _: 9)
+
+
+@pytest.fixture(scope="session")
+def page_file(recorded: list[Recording], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("page") / "replay.html"
+    replay(recorded, path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def watched(open_page: Callable[..., Watched], page_file: Path) -> Watched:
+    """The page, opened once for a file of tests."""
+    return open_page(page_file)

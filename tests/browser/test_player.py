@@ -1,0 +1,222 @@
+"""The replay in a real browser, offline."""
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from kinarm.arm import Arm
+from kinarm.replay import replay
+
+
+def placement(arm, configuration, name):
+    """Pose of a joint or of the tool through Pinocchio, shape (4, 4)."""
+    data = arm.model.createData()
+    pin.framesForwardKinematics(arm.model, data, np.array(configuration))
+    if name == "tool":
+        return data.oMf[arm.model.getFrameId("tool0", pin.FrameType.BODY)].homogeneous
+    return data.oMi[int(name.removeprefix("axis_"))].homogeneous
+
+
+def pose(watched, name, run=0):
+    """Pose of a joint or of the tool in the page, shape (4, 4)."""
+    return np.array(watched.tell(f"kinarm.pose({name!r}, {run})")).reshape(4, 4).T
+
+
+def show(watched, index, frame):
+    watched.tell(f"kinarm.select({index}); kinarm.seek({frame})")
+
+
+def text(watched, selector):
+    return watched.page.locator(selector).inner_text()
+
+
+def test_nothing_is_fetched_and_nothing_fails(watched, page_file):
+    for index in range(3):
+        show(watched, index, 5)
+    watched.page.wait_for_timeout(100)
+    assert watched.requests == [page_file.as_uri()]
+    assert watched.complaints == []
+
+
+@pytest.mark.parametrize("index", [0, 1, 2])
+def test_poses_are_those_of_pinocchio(watched, recorded, index):
+    arm, recording = Arm.load("paper"), recorded[index]
+    for frame in (0, 1, recording.steps // 2, recording.steps):
+        show(watched, index, frame)
+        for name in ("tool", "axis_1", "axis_3", "axis_6"):
+            expected = placement(arm, recording.states[frame], name)
+            np.testing.assert_allclose(pose(watched, name), expected, rtol=0, atol=1e-6)
+
+
+def test_the_arm_is_there(watched):
+    show(watched, 0, 10)
+    census = watched.tell("kinarm.census()")
+    boxes = np.array(census["meshes"])
+    assert len(boxes) >= 12
+    assert np.isfinite(boxes).all()
+    extent = boxes[:, 3:].max(axis=0) - boxes[:, :3].min(axis=0)
+    assert (extent > 0.2).all()
+    assert (extent < 2).all()
+    assert census["triangles"] > 20_000
+
+
+def test_pixels_are_drawn(watched):
+    """The arm is in the picture: many colours, and different ones at another step."""
+    show(watched, 0, 0)
+    first = watched.page.locator("#stage").screenshot()
+    show(watched, 0, 40)
+    assert first != watched.page.locator("#stage").screenshot()
+    assert len(first) > 20_000
+
+
+def test_the_card_says_what_happens(watched, recorded):
+    collided = recorded[2]
+    show(watched, 2, 3)
+    assert text(watched, "#eyebrow") == f"Task both · trial {collided.trial}"
+    assert text(watched, "#runs .name") == "wave"
+    assert text(watched, "#runs .badge") == "Contact"
+    assert " touches ".join(collided.contact) in text(watched, "#runs .note")
+    assert text(watched, "#step") == f"3 / {collided.steps}"
+    assert text(watched, "#distance") == f"{collided.distances[3]:.3f} m"
+    assert text(watched, "#floor") == "9 steps"
+    show(watched, 0, 0)
+    assert text(watched, "#runs .badge") == "Out of time"
+
+
+def test_buttons(watched, recorded):
+    click = watched.page.click
+    show(watched, 0, 7)
+    click("#forward")
+    assert watched.state["frame"] == 8
+    click("#back")
+    click("#back")
+    assert watched.state["frame"] == 6
+    click("#first")
+    assert watched.state["frame"] == 0
+    click("#play")
+    assert watched.state["playing"]
+    watched.page.wait_for_function("() => window.kinarm.state.frame > 1", timeout=60_000)
+    click("#play")
+    assert not watched.state["playing"]
+    click("#next")
+    assert watched.state["trial"] == recorded[1].trial
+    click("#previous")
+    click("#previous")
+    assert watched.state["trial"] == recorded[2].trial
+    watched.page.select_option("#speed", "2")
+    assert watched.state["speed"] == 2
+    watched.page.select_option("#trial", "1")
+    assert watched.state["trial"] == recorded[1].trial
+    click("#theme")
+    assert watched.state["theme"] == "dark"
+    click("#theme")
+    click("#help")
+    assert watched.page.locator("#keys").is_visible()
+    click("#help")
+    assert not watched.page.locator("#keys").is_visible()
+
+
+def test_the_scrubber(watched):
+    show(watched, 0, 0)
+    watched.page.fill("#frame", "13")
+    assert watched.state["frame"] == 13
+    watched.page.focus("#frame")
+    watched.page.keyboard.press("ArrowRight")
+    assert watched.state["frame"] == 14
+    bounds = watched.page.locator("#plot").bounding_box()
+    watched.page.mouse.click(bounds["x"] + bounds["width"] / 2, bounds["y"] + 10)
+    assert watched.state["frame"] == round(watched.state["frames"] / 2)
+
+
+def test_keys(watched, recorded):
+    press = watched.page.keyboard.press
+    show(watched, 0, 7)
+    watched.tell("document.activeElement.blur()")
+    press("ArrowRight")
+    assert watched.state["frame"] == 8
+    press("ArrowLeft")
+    press("ArrowLeft")
+    assert watched.state["frame"] == 6
+    press("End")
+    assert watched.state["frame"] == recorded[0].steps
+    press("Home")
+    assert watched.state["frame"] == 0
+    press(" ")
+    assert watched.state["playing"]
+    press(" ")
+    assert not watched.state["playing"]
+    press("n")
+    assert watched.state["trial"] == recorded[1].trial
+    press("p")
+    assert watched.state["trial"] == recorded[0].trial
+    watched.tell("document.querySelector('#speed').value")
+    before = watched.state["speed"]
+    press(",")
+    assert watched.state["speed"] < before
+    press(".")
+    assert watched.state["speed"] == before
+    press("t")
+    assert watched.state["theme"] == "dark"
+    press("t")
+    press("?")
+    assert watched.page.locator("#keys").is_visible()
+    press("?")
+
+
+def test_everything_can_be_reached_and_has_a_name(watched):
+    nameless = watched.tell(
+        "[...document.querySelectorAll('#dock button, #dock input, #dock select')]"
+        ".filter((node) => !node.getAttribute('aria-label')).map((node) => node.id)"
+    )
+    assert nameless == []
+    watched.page.focus("#first")
+    watched.page.keyboard.press("Tab")
+    assert watched.tell("document.activeElement.id") == "back"
+    assert watched.tell("getComputedStyle(document.activeElement).outlineStyle") == "solid"
+
+
+def test_meshcats_own_controls_are_hidden(watched):
+    assert watched.tell("[...document.querySelectorAll('.dg')].every((n) => !n.offsetParent)")
+
+
+@pytest.mark.parametrize("size", [(390, 844), (844, 390), (320, 568)])
+def test_a_phone_shows_everything(watched, size):
+    watched.page.set_viewport_size({"width": size[0], "height": size[1]})
+    show(watched, 2, 3)
+    watched.page.wait_for_timeout(50)
+    assert watched.tell("document.documentElement.scrollWidth") == size[0]
+    assert watched.tell("document.documentElement.scrollHeight") == size[1]
+    boxes = {name: watched.page.locator(name).bounding_box() for name in ("#card", "#dock")}
+    for box in boxes.values():
+        assert box["x"] >= 0
+        assert box["y"] >= 0
+        assert box["x"] + box["width"] <= size[0]
+        assert box["y"] + box["height"] <= size[1]
+    for name in ("#play", "#frame", "#speed", "#trial", "#next"):
+        box = watched.page.locator(name).bounding_box()
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= size[0]
+    watched.page.set_viewport_size({"width": 800, "height": 600})
+
+
+def test_it_plays_by_itself_and_a_ghost_comes_along(open_page, recorded, tmp_path):
+    first = recorded[0]
+    other = replace(
+        first,
+        policy="other",
+        states=np.concatenate([first.states[:1], first.states[:-1]]),
+    )
+    replay([first], tmp_path / "made.html", ghosts=[other])
+    watched = open_page(tmp_path / "made.html", calm=False)
+    assert watched.state["playing"]
+    show(watched, 0, 20)
+    arm = Arm.load("paper")
+    for run, recording in enumerate((first, other)):
+        expected = placement(arm, recording.states[20], "tool")
+        np.testing.assert_allclose(pose(watched, "tool", run), expected, rtol=0, atol=1e-6)
+    names = watched.page.locator("#runs .name").all_inner_texts()
+    assert names == ["wave", "other"]
+    assert not watched.page.locator("#trial-choice").is_visible()
+    assert watched.complaints == []

@@ -1,0 +1,299 @@
+"""``kinarm-replay``: pages from policies, evaluations and recordings, and a live one."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import time
+import urllib.request
+from dataclasses import replace as changed_to
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kinarm.trajectory import load_recordings, save_recordings
+
+QUICK = ("--no-oracle",)
+
+
+@pytest.fixture
+def replay(run, tmp_path):
+    """Run the command; its page goes to ``made.html``."""
+
+    def call(*arguments):
+        return run("kinarm-replay", *arguments, "--out", tmp_path / "made.html")
+
+    return call
+
+
+@pytest.fixture(scope="session")
+def evaluation(run_outside, policy_folder, tmp_path_factory) -> Path:
+    """An evaluation of a policy and of a baseline."""
+    folder = tmp_path_factory.mktemp("evaluation")
+    options = ("--policy", policy_folder / "mine-seed0.npz", "--policy", "random")
+    settings = ("--task", "right", "--trials", 12, "--seed", 4, "--no-oracle")
+    assert run_outside("kinarm-eval", *options, *settings, "--out", folder).status == 0
+    return folder / "evaluation.json"
+
+
+@pytest.fixture(scope="session")
+def recordings(run_outside, policy_folder, tmp_path_factory) -> Path:
+    """Recordings of four trials."""
+    folder = tmp_path_factory.mktemp("recordings")
+    options = ("--policy", policy_folder / "mine-seed0.npz", "--trials", 4, *QUICK)
+    files = ("--out", folder / "page.html", "--record", folder / "made.npz")
+    assert run_outside("kinarm-replay", *options, *files).status == 0
+    return folder / "made.npz"
+
+
+def outcomes(evaluation, policy):
+    rows = json.loads(evaluation.read_text())["results"]
+    return next(row["outcomes"] for row in rows if row["policy"] == policy)
+
+
+def refused(answer, *words):
+    """One line that names what is wrong, and status 2."""
+    assert (answer.status, answer.out) == (2, ""), answer
+    assert len(answer.err.splitlines()) == 1, answer.err
+    for word in words:
+        assert word in answer.err, answer.err
+
+
+def played(answer):
+    """Trials, in the order in which they are played."""
+    assert answer.status == 0, answer.err
+    return [int(line.split()[1].rstrip(",")) for line in answer.out.splitlines()[:-1]]
+
+
+def test_trials_of_a_policy(replay, policy_folder, tmp_path):
+    answer = replay("--policy", policy_folder / "mine-seed0.npz", "--trials", 2)
+    assert played(answer) == [0, 1]
+    assert "proven necessary" in answer.out
+    assert "made.html" in answer.out
+    assert (tmp_path / "made.html").read_text().startswith("<!DOCTYPE html>")
+
+
+def test_recordings_end_as_the_evaluation_says(run, tmp_path, evaluation, policy_folder):
+    options = ("--policy", policy_folder / "mine-seed0.npz", "--task", "right")
+    settings = ("--trials", 12, "--seed", 4, *QUICK)
+    files = ("--out", tmp_path / "made.html", "--record", tmp_path / "made.npz")
+    assert run("kinarm-replay", *options, *settings, *files).status == 0
+    said = outcomes(evaluation, "mine-seed0")
+    recorded = load_recordings(tmp_path / "made.npz")
+    assert [each.final_distance for each in recorded] == said["final_distance"]
+    assert [each.steps for each in recorded] == said["steps"]
+    assert [each.outcome for each in recorded] == said["outcome"]
+    contacts = [tuple(pair) if pair else None for pair in said["contact"]]
+    assert [each.contact for each in recorded] == contacts
+
+
+def test_what_was_recorded_plays_the_same(run, tmp_path, recordings):
+    assert run("kinarm-replay", recordings, "--out", tmp_path / "again.html").status == 0
+    again = (tmp_path / "again.html").read_bytes()
+    assert again == (recordings.parent / "page.html").read_bytes()
+
+
+def test_the_worst_of_an_evaluation(replay, evaluation):
+    distances = np.array(outcomes(evaluation, "random")["final_distance"])
+    answer = replay(evaluation, "--policy", "random", "--worst", 3, *QUICK)
+    assert played(answer) == np.argsort(-distances, kind="stable")[:3].tolist()
+
+
+def test_the_collisions_of_an_evaluation(replay, evaluation):
+    ends = outcomes(evaluation, "random")["outcome"]
+    expected = [number for number, end in enumerate(ends) if end == "collision"]
+    assert expected
+    answer = replay(evaluation, "--policy", "random", "--collisions", *QUICK)
+    assert played(answer) == expected
+    assert answer.out.count(" touches ") == len(expected)
+
+
+def test_one_trial_of_an_evaluation(replay, evaluation, policy_folder):
+    policy = policy_folder / "mine-seed0.npz"
+    assert played(replay(evaluation, "--policy", policy, "--trial", 7, "--trial", 2)) == [7, 2]
+
+
+def test_two_policies_on_the_same_trials(replay, tmp_path):
+    answer = replay("--compare", "random", "zero", "--task", "left", "--trials", 2, *QUICK)
+    assert played(answer) == [0, 0, 1, 1]
+    assert "random and zero" in (tmp_path / "made.html").read_text()
+
+
+def test_the_oracle_and_a_policy(replay):
+    answer = replay("--compare", "oracle", "ars-tuned-right", "--trial", 3)
+    assert played(answer) == [3, 3]
+    assert "oracle: reached the goal" in answer.out
+
+
+def test_another_arm(replay):
+    options = ("--policy", "oracle", "--task", "right", "--arm", "lrmate200ic_5l")
+    assert played(replay(*options, "--trials", 1)) == [0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ((), ["name a --policy"]),
+        (("--policy", "zero"), ["'zero'", "name a --task"]),
+        (("--policy", "nobody"), ["'nobody'", "ars-tuned-right"]),
+        (("--policy", "zero", "--task", "up"), ["'up'", "left, right, both"]),
+        (("--policy", "ars-tuned-right", "--arm", "paper_flange"), ["trained for arm 'paper'"]),
+        (("--policy", "zero", "--compare", "zero", "random"), ["--compare"]),
+        (("--policy", "zero", "--task", "left", "--trial", "200"), ["no trial 200", "0 to 199"]),
+        (("--policy", "zero", "--task", "left", "--trial", "x"), ["--trial", "'x'"]),
+        (("--policy", "zero", "--task", "left", "--trials", "3", "--worst", "4"), ["--worst 4"]),
+        (("--policy", "zero", "--task", "left", "--collisions"), ["none of the 200 trials"]),
+        (("--policy", "zero", "--task", "left", "--port", "7001"), ["--live"]),
+        (("--policy", "zero", "--task", "left", "--live"), ["--out", "--live"]),
+        (("missing.npz",), ["missing.npz", "No such file"]),
+        (("missing.json",), ["missing.json", "No such file"]),
+        (("missing.npz", "--seed", "3"), ["--seed"]),
+    ],
+)
+def test_bad_input(replay, tmp_path, arguments, words):
+    refused(replay(*arguments), *words)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_page_cannot_be_written(run, tmp_path):
+    options = ("--policy", "zero", "--task", "left", "--trials", 1, *QUICK)
+    missing = tmp_path / "none" / "made.html"
+    refused(run("kinarm-replay", *options, "--out", missing), "none")
+    refused(run("kinarm-replay", *options, "--out", tmp_path), str(tmp_path))
+    bad = ("--out", tmp_path / "made.html", "--record", tmp_path / "none" / "made.npz")
+    refused(run("kinarm-replay", *options, *bad), "none")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_recordings_of_another_arm(replay, recordings):
+    refused(replay(recordings, "--arm", "paper_flange"), "'paper'", "'paper_flange'")
+
+
+def test_recordings_do_not_hold_it(replay, recordings):
+    refused(replay(recordings, "--policy", "nobody"), "'nobody'", "mine-seed0")
+    refused(replay(recordings, "--task", "left"), "holds no recording")
+    refused(replay(recordings, "--trial", 9), "no trial 9", "0 to 3")
+
+
+def test_recordings_are_compared_in_the_same_trials_only(replay, recordings, tmp_path):
+    first, second, *_ = load_recordings(recordings)
+    mixed = tmp_path / "mixed.npz"
+    save_recordings(mixed, [first, changed_to(second, policy="other")])
+    refused(replay(mixed, "--compare", "mine-seed0", "other"), "cannot be compared")
+    save_recordings(mixed, [first, changed_to(first, policy="other")])
+    assert played(replay(mixed, "--compare", "mine-seed0", "other")) == [0, 0]
+
+
+@pytest.mark.parametrize("content", ["", "{}", "[1]", '{"protocol": {}}', "\x00"])
+def test_damaged_evaluations(replay, tmp_path, content):
+    path = tmp_path / "evaluation.json"
+    path.write_text(content)
+    refused(replay(path), "evaluation.json", "not an evaluation")
+
+
+def test_an_evaluation_that_no_longer_holds(replay, evaluation, tmp_path):
+    document = json.loads(evaluation.read_text())
+    path = tmp_path / "evaluation.json"
+
+    def changed(change):
+        copy = json.loads(evaluation.read_text())
+        change(copy)
+        path.write_text(json.dumps(copy))
+        return replay(path, "--policy", "random", *QUICK)
+
+    assert document["protocol"]["format_version"] == 1
+    refused(changed(lambda d: d["protocol"].update(format_version=2)), "format version 2")
+    refused(changed(lambda d: d["protocol"].update(arm_digest="0")), "of arm 'paper' (0)")
+    refused(changed(lambda d: d["protocol"]["tasks"]["right"]["goals"].reverse()), "hash")
+    row = document["results"].index(next(r for r in document["results"] if r["policy"] == "random"))
+    refused(changed(lambda d: d["results"][row]["outcomes"]["steps"].reverse()), "ends otherwise")
+
+
+def test_an_evaluation_of_several_policies(replay, evaluation):
+    refused(replay(evaluation, "--policy", "nobody"), "'nobody'", "random")
+    refused(replay(evaluation, "--policy", "random", "--task", "left"), "'random'")
+
+
+# The live page
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@pytest.fixture
+def live(command):
+    """Start the live page; whatever happens, it does not outlast the test."""
+    started = []
+
+    def start(port):
+        options = ("--policy", "zero", "--task", "left", "--live", "--no-browser", "--port", port)
+        process = subprocess.Popen(
+            command("kinarm-replay", *options),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        started.append(process)
+        return process, process.stdout.readline()
+
+    yield start
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+def children(pid: int) -> list[str]:
+    tasks = Path(f"/proc/{pid}/task").glob("*/children")
+    return [child for task in tasks for child in task.read_text().split()]
+
+
+def listens(port: int, host: str = "127.0.0.1") -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex((host, port)) == 0
+
+
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_nothing_is_left_behind(live, sent):
+    port = free_port()
+    process, line = live(port)
+    assert f"http://127.0.0.1:{port}/static/" in line
+    assert children(process.pid) == []
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/static/") as page:
+        assert b"MeshCat" in page.read()
+    process.send_signal(sent)
+    status = process.wait(10)
+    assert status == (130 if sent == signal.SIGINT else -sent)
+    assert not listens(port)
+    if sent == signal.SIGINT:
+        assert process.stderr.read() == "kinarm-replay: interrupted\n"
+
+
+def test_only_this_machine_is_served(live):
+    """127.0.0.2 is this machine too, and would answer if every interface were bound."""
+    port = free_port()
+    live(port)
+    assert listens(port)
+    assert not listens(port, "127.0.0.2")
+
+
+def test_a_port_in_use(live):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        process, line = live(port)
+        assert line == f"port {port} is in use: taking {port + 1}\n"
+        assert f":{port + 1}/static/" in process.stdout.readline()
+
+
+def test_trials_are_reported_as_they_end(live):
+    process, _ = live(free_port())
+    os.set_blocking(process.stdout.fileno(), True)
+    began = time.monotonic()
+    assert "left 0, zero: out of time after 64 steps" in process.stdout.readline()
+    assert time.monotonic() - began < 30
