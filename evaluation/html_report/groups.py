@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm.errors import InvalidInputError
 from kinarm.evaluation.evaluations import Evaluation
 from kinarm.evaluation.plots import series_label
 from kinarm.evaluation.report import table_rows
@@ -75,6 +76,11 @@ class TaskResults:
     groups: tuple[Group, ...]
 
     @property
+    def trials(self) -> int:
+        """Number of trials."""
+        return len(self.entry["goals"])
+
+    @property
     def tolerance(self) -> float:
         """Distance within which a goal is reached [m]."""
         return float(self.entry["tolerance"])
@@ -104,8 +110,18 @@ def group_results(
         What `evaluation_document` made of the evaluations.
     evaluations : sequence of Evaluation
         The evaluations.
+
+    Raises
+    ------
+    InvalidInputError
+        If the document was made of others, or two of them cannot be told apart.
     """
     known = {(each.entrant.name, each.task): each for each in evaluations}
+    if list(known) != [(row["policy"], row["task"]) for row in document["results"]]:
+        raise InvalidInputError(
+            "a report needs the document of the very evaluations that it shows, and a name of its "
+            "own for each policy on a task"
+        )
     styles = _styles(evaluations)
     return tuple(
         TaskResults(

@@ -20,6 +20,9 @@ MARGIN = 0.07
 BASE_RADIUS = 0.1
 """Of the circle that stands for the arm [m]."""
 
+MARKERS = 1000
+"""Trials of which a map shows markers, the first ones; the figures beside them count all."""
+
 SLICES = 10
 """Of a bench, along x, whose failures are counted."""
 
@@ -142,9 +145,9 @@ def bench_map(task: TaskResults, group: Group) -> Markup:
 
 def _markers(task: TaskResults, group: Group, results: Sequence[Fate], view: View) -> list[Markup]:
     """Goals as markers, the worst on top."""
-    goals = group.members[0].trials.goals
+    goals = group.members[0].trials.goals[:MARKERS]
     across, down = view.place(goals[:, 0], goals[:, 1])
-    order = np.argsort([fate.distance for fate in results], kind="stable")
+    order = np.argsort([fate.distance for fate in results[:MARKERS]], kind="stable")
     return [
         tag(
             "path",

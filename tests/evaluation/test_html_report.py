@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from kinarm.errors import OutputError
+from kinarm.errors import InvalidInputError, OutputError
 from kinarm.evaluation.entrants import BASELINES, ORACLE, Entrant
 from kinarm.evaluation.evaluations import evaluate, run_trials
 from kinarm.evaluation.html_report import histograms, maps, profiles, summary
@@ -225,6 +225,12 @@ class TestMap:
             seen.add(fate.outcome)
         assert len(seen) > 1
 
+    def test_many_trials_leave_a_map_light(self, right, monkeypatch):
+        monkeypatch.setattr(maps, "MARKERS", 7)
+        drawn = maps.bench_map(right, right.contenders[0])
+        assert drawn.count("<title>trial ") == 7
+        assert "<title>trial 6," in drawn
+
     def test_fate_is_the_worst_over_the_seeds(self, right):
         group = right.contenders[0]
         for trial, fate in enumerate(fates(group)):
@@ -396,6 +402,15 @@ class TestPage:
         ]
         (task,) = group_results(evaluation_document(many, ""), many)
         assert len({group.style for group in task.groups}) == len(many)
+
+    def test_another_document_is_refused(self, document, evaluations):
+        with pytest.raises(InvalidInputError, match="document of the very evaluations"):
+            report_page(document, evaluations)
+
+    def test_policies_of_one_name_are_refused(self, skilled_evaluation):
+        twice = [skilled_evaluation, skilled_evaluation]
+        with pytest.raises(InvalidInputError, match="a name of its own"):
+            report_page(evaluation_document(twice, ""), twice)
 
     def test_a_single_policy_is_the_title(self, skilled_evaluation):
         page = report_page(evaluation_document([skilled_evaluation], ""), [skilled_evaluation])
