@@ -9,8 +9,13 @@ from kinarm.evaluation.html_report.markup import Markup, tag
 from kinarm.evaluation.plots import BIN_WIDTH
 
 WIDTH, LEFT, RIGHT, TOP = 460, 46, 448, 4
-BAR, GAP = 34, 14
-"""Height of the tallest bar, and of the space above it."""
+GAP = 14
+"""Space above the tallest bar of a row."""
+
+
+def row_height(rows: int) -> int:
+    """Height of a row without its gap: rows share what a profile takes, while there is enough."""
+    return max(34, 270 // rows - GAP)
 
 
 def histogram_chart(task: TaskResults) -> Markup:
@@ -26,7 +31,8 @@ def histogram_chart(task: TaskResults) -> Markup:
     furthest = max(float(group.distances.max()) for group in task.groups)
     edges = np.arange(0.0, furthest + 2 * BIN_WIDTH, BIN_WIDTH)
     across = Axis(0, float(edges[-1]), LEFT, RIGHT)
-    bottom = TOP + len(task.groups) * (BAR + GAP)
+    height = row_height(len(task.groups)) + GAP
+    bottom = TOP + len(task.groups) * height
     spacing = 0.2 if edges[-1] < 2 else 0.5 * np.ceil(edges[-1] / 5)
     ticks = np.arange(0, edges[-1], spacing).round(9).tolist()
     return tag(
@@ -34,7 +40,7 @@ def histogram_chart(task: TaskResults) -> Markup:
         bottom_axis(across, ticks, TOP, bottom, "final distance to the goal [m]"),
         tolerance_line(across, task.tolerance, TOP, bottom),
         [
-            _row(group, edges, across, TOP + place * (BAR + GAP))
+            _row(group, edges, across, (TOP + place * height, TOP + (place + 1) * height))
             for place, group in enumerate(task.groups)
         ],
         viewBox=f"0 0 {WIDTH} {bottom + 44}",
@@ -59,9 +65,11 @@ def bin_shares(group: Group, edges: NDArray[np.float64]) -> NDArray[np.float64]:
     return shares
 
 
-def _row(group: Group, edges: NDArray[np.float64], across: Axis, top: float) -> Markup:
-    """Bars, base line and name of one group."""
-    bottom = top + BAR + GAP
+def _row(
+    group: Group, edges: NDArray[np.float64], across: Axis, ends: tuple[float, float]
+) -> Markup:
+    """Bars, base line and name of one group, between two heights."""
+    top, bottom = ends
     up = Axis(0, 1, bottom, top + GAP, "sqrt")
     shares = bin_shares(group, edges)
     bars = [
@@ -79,7 +87,7 @@ def _row(group: Group, edges: NDArray[np.float64], across: Axis, top: float) -> 
         tag("path", d=f"M{LEFT},{bottom}H{RIGHT}", class_="base"),
         tag("text", f"{100 * shares[0]:.1f} %", x=LEFT - 6, y=bottom - 2, class_="tick end"),
         tag("g", bars, class_="bars"),
-        tag("text", group.name, x=RIGHT, y=bottom - 20, class_="name end"),
+        tag("text", group.name, x=RIGHT, y=top + GAP + 12, class_="name end"),
         class_=f"series {group.style}",
         data_series=group.name,
     )

@@ -29,6 +29,9 @@ SLICES = 10
 BAR_OFFSET, BAR_LENGTH = 0.02, 0.25
 """Where the bars of failures begin beside the bench, and the length of 100 % [m]."""
 
+AXIS_LENGTH = 0.2
+"""Of the world axes [m]."""
+
 LEVELS = 6
 """Colours of distances: within the tolerance, and twice the distance from one to the next."""
 
@@ -54,10 +57,10 @@ class View(NamedTuple):
 
     @classmethod
     def of(cls, benches: Sequence[Bench]) -> "View":
-        """Show some benches and the arm's base."""
-        reach = BASE_RADIUS
+        """Show some benches, the arm's base and the axes with their names."""
+        low, high = -BASE_RADIUS, AXIS_LENGTH + MARGIN
         bounds = [
-            (min(-reach, *(side[0] for side in sides)), max(reach, *(side[1] for side in sides)))
+            (min(low, *(side[0] for side in sides)), max(high, *(side[1] for side in sides)))
             for sides in ([bench.x for bench in benches], [bench.y for bench in benches])
         ]
         x, y = ((low - MARGIN, high + MARGIN) for low, high in bounds)
@@ -232,9 +235,9 @@ def _failures(bench: Bench, group: Group, view: View) -> Markup:
 
 
 def _base(view: View) -> Markup:
-    """The arm's base, and the world axes, 0.2 m long."""
+    """The arm's base, and the world axes."""
     x, y = (float(place) for place in view.place(0.0, 0.0))
-    length, name = 0.2 * SCALE, "axis-name middle"
+    length, name = AXIS_LENGTH * SCALE, "axis-name middle"
     return join(
         tag(
             "circle",
@@ -262,19 +265,19 @@ def map_legend(task: TaskResults) -> Markup:
         for step, text in enumerate(ranges)
     ]
     shapes = [
-        tag("li", _sample(outcome, "plain"), tag("span", text)) for outcome, text in SHAPES.items()
+        tag("li", _sample(outcome, "plain"), tag("span", text))
+        for outcome, text in OUTCOMES.items()
     ]
-    return join(
-        tag("ul", tag("li", tag("b", "Mean final distance [m]")), colours, class_="legend"),
-        tag("ul", tag("li", tag("b", "Outcome")), shapes, class_="legend"),
+    pooled = any(len(group.members) > 1 for group in task.contenders)
+    headings = (
+        ("Mean final distance of the seeds [m]", "Worst outcome of the seeds")
+        if pooled
+        else ("Final distance [m]", "Outcome")
     )
-
-
-SHAPES = {
-    "success": "reached, by every seed",
-    "horizon": "out of steps, with one seed or more",
-    "collision": "contact, with one seed or more",
-}
+    return join(
+        tag("ul", tag("li", tag("b", heading)), samples, class_="legend")
+        for heading, samples in zip(headings, (colours, shapes), strict=True)
+    )
 
 
 def _sample(outcome: str, style: str) -> Markup:

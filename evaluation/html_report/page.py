@@ -10,7 +10,7 @@ from typing import Any
 from kinarm.evaluation.evaluations import Evaluation
 from kinarm.evaluation.html_report.groups import TaskResults, group_results
 from kinarm.evaluation.html_report.histograms import histogram_chart
-from kinarm.evaluation.html_report.maps import MARKERS, bench_map, map_legend
+from kinarm.evaluation.html_report.maps import AXIS_LENGTH, MARKERS, bench_map, map_legend
 from kinarm.evaluation.html_report.markup import Child, Markup, join, tag
 from kinarm.evaluation.html_report.method import method_section
 from kinarm.evaluation.html_report.profiles import legend, profile_chart
@@ -135,8 +135,8 @@ def _task_section(task: TaskResults) -> Markup:
         ),
         _figure(
             "Where do they fail?",
-            "The benches from above, to scale, x forward and y to the left (arrows: 0.2 m). Each "
-            "marker is the goal of a trial; point at it for its figures. Bars beside a bench: "
+            "The benches from above, to scale, x forward, y to the left (arrows: "
+            f"{AXIS_LENGTH:g} m). Each marker is the goal of a trial; point at it for its figures. Bars beside a bench: "
             "share of trials that failed in that tenth of it; the line is 100 %."
             + (
                 f" Markers are those of the first {MARKERS} trials."
