@@ -1,6 +1,7 @@
 """Take ``docs/_static/replay.png``: a replay in a browser.
 
-Run ``python docs/make_screenshot.py`` from the root of a clone. It needs Chromium and the extra ``test``.
+Run ``python docs/make_screenshot.py`` from the root of a clone, with Chromium and the extra
+``test`` installed.
 """
 
 import shutil

@@ -47,7 +47,7 @@ def record(
         entrant.run(trials, record=True),
         entrant.name,
         numbers,
-        steps_lower_bound=(lambda n: int(bounds.steps_lower_bound[n])) if bounds else None,
+        steps_lower_bound=None if bounds is None else lambda n: int(bounds.steps_lower_bound[n]),
         provenance={
             "trial_seed": trials.seed,
             "policy": made,

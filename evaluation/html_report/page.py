@@ -136,8 +136,9 @@ def _task_section(task: TaskResults) -> Markup:
         _figure(
             "Where do they fail?",
             "The benches from above, to scale, x forward, y to the left (arrows: "
-            f"{AXIS_LENGTH:g} m). Each marker is the goal of a trial; point at it for its figures. Bars beside a bench: "
-            "share of trials that failed in that tenth of it; the line is 100 %."
+            f"{AXIS_LENGTH:g} m). Each marker is the goal of a trial; point at it for its "
+            "figures. Bars beside a bench: share of trials that failed in that tenth of it; "
+            "the line is 100 %."
             + (
                 f" Markers are those of the first {MARKERS} trials."
                 if task.trials > MARKERS

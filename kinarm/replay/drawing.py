@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from kinarm.arm import Arm
 from kinarm.replay.arm_shapes import arm_parts
-from kinarm.replay.meshes import Mesh, box, capsule, pin, tube
+from kinarm.replay.meshes import Mesh, box, capsule, cylinder, tube
 from kinarm.replay.parts import Finish
 from kinarm.scene import Scene
 from kinarm.trajectory import Recording
@@ -150,7 +150,7 @@ def draw_surroundings(window: Visualizer, scene: Scene) -> None:
     window["sun"].set_object(_Sun())
     window["sun"]["<object>"].set_property("position", SUN_PLACE)
     if scene.ground:
-        put(window["floor"], FLOOR, pin(0.002, FLOOR_RADIUS, 0.0).moved((0, 0, -0.002)))
+        put(window["floor"], FLOOR, cylinder(0.002, FLOOR_RADIUS, 0.0).moved((0, 0, -0.002)))
         grid = LineSegments(_Lines(_grid()), LineBasicMaterial(color=GRID_COLOUR))
         window["grid"].set_object(grid)
     for bench in scene.benches:

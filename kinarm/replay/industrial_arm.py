@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from kinarm.arm import Arm
-from kinarm.replay.meshes import Mesh, box, capsule, housing, lathe, loft, pin
+from kinarm.replay.meshes import Mesh, box, capsule, cylinder, housing, lathe, loft
 from kinarm.replay.parts import ACCENT, GRAPHITE, PAINT, STEEL, Part
 
 AXES = np.array([(0, 0, 1), (0, 1, 0), (0, -1, 0), (-1, 0, 0), (0, -1, 0), (-1, 0, 0)])
@@ -56,10 +56,10 @@ def _base() -> Iterator[Part]:
     yield Part(0, PAINT, housing([*foot, *neck]))
     yield Part(0, GRAPHITE, box((0.05, 0.13, 0.07), 0.008).moved((-0.125, 0, 0.062)))
     for y in (-0.035, 0.0, 0.035):
-        yield Part(0, STEEL, pin(0.02, 0.012, 0.002, "x").moved((-0.156, y, 0.064)))
+        yield Part(0, STEEL, cylinder(0.02, 0.012, 0.002, "x").moved((-0.156, y, 0.064)))
     for x in (-0.125, 0.101):
         for y in (-0.105, 0.105):
-            yield Part(0, STEEL, pin(0.01, 0.0085, 0.002).moved((x, y, 0.026)))
+            yield Part(0, STEEL, cylinder(0.01, 0.0085, 0.002).moved((x, y, 0.026)))
 
 
 def _shoulder() -> Iterator[Part]:
@@ -100,7 +100,7 @@ def _shoulder() -> Iterator[Part]:
         STEEL,
         lathe([(-0.124, 0.03), (-0.121, 0.034), (-0.115, 0.034)], "y").moved((0.075, 0, 0)),
     )
-    yield Part(1, GRAPHITE, pin(0.09, 0.05, 0.007).moved((-0.045, 0, -0.045)))
+    yield Part(1, GRAPHITE, cylinder(0.09, 0.05, 0.007).moved((-0.045, 0, -0.045)))
 
 
 def _upper_arm(length: float) -> Iterator[Part]:
@@ -119,11 +119,11 @@ def _upper_arm(length: float) -> Iterator[Part]:
             ]
         )
         yield Part(2, PAINT, cheek.moved((0, 0.072 * side, 0)))
-        yield Part(2, STEEL, pin(0.006, 0.04, 0.002, "y").moved((0, 0.093 * side, length)))
+        yield Part(2, STEEL, cylinder(0.006, 0.04, 0.002, "y").moved((0, 0.093 * side, length)))
         for angle in np.arange(6) * np.pi / 3 + 0.26:
             place = (0.05 * np.cos(angle), 0.093 * side, 0.05 * np.sin(angle))
             if side < 0:
-                yield Part(2, STEEL, pin(0.006, 0.006, 0.001, "y").moved(place))
+                yield Part(2, STEEL, cylinder(0.006, 0.006, 0.001, "y").moved(place))
     spine = housing(
         [
             (0.105, -0.006, 0.034, 0.066, 4.0),
@@ -150,7 +150,7 @@ def _upper_arm(length: float) -> Iterator[Part]:
 
 
 def _elbow() -> Iterator[Part]:
-    yield Part(3, GRAPHITE, pin(0.112, 0.054, 0.004, "y"))
+    yield Part(3, GRAPHITE, cylinder(0.112, 0.054, 0.004, "y"))
     yield Part(
         3,
         PAINT,
@@ -186,8 +186,8 @@ def _forearm(length: float) -> Iterator[Part]:
     yield Part(4, PAINT, lathe([*tube, (-0.075, 0.044), (-0.068, 0.04)], "x"))
     for side in (-1, 1):
         yield Part(4, PAINT, _cheek().moved((0, 0.043 * side, 0)))
-        yield Part(4, GRAPHITE, pin(0.008, 0.026, 0.002, "y").moved((0, 0.0545 * side, 0)))
-        yield Part(4, STEEL, pin(0.003, 0.012, 0.001, "y").moved((0, 0.0595 * side, 0)))
+        yield Part(4, GRAPHITE, cylinder(0.008, 0.026, 0.002, "y").moved((0, 0.0545 * side, 0)))
+        yield Part(4, STEEL, cylinder(0.003, 0.012, 0.001, "y").moved((0, 0.0595 * side, 0)))
 
 
 def _cheek() -> Mesh:
@@ -204,7 +204,7 @@ def _cheek() -> Mesh:
 
 
 def _wrist() -> Iterator[Part]:
-    yield Part(5, STEEL, pin(0.062, 0.033, 0.003, "y"))
+    yield Part(5, STEEL, cylinder(0.062, 0.033, 0.003, "y"))
     yield Part(
         5, GRAPHITE, lathe([(0.0, 0.028), (0.03, 0.03), (0.058, 0.031), (0.062, 0.028)], "x")
     )
@@ -216,7 +216,7 @@ def _hand(tool: float) -> Iterator[Part]:
     )
     for angle in np.arange(4) * np.pi / 2 + np.pi / 4:
         place = (0.0005, 0.0235 * np.cos(angle), 0.0235 * np.sin(angle))
-        yield Part(6, GRAPHITE, pin(0.004, 0.0032, 0.0005, "x").moved(place))
+        yield Part(6, GRAPHITE, cylinder(0.004, 0.0032, 0.0005, "x").moved(place))
     if tool == 0:
         return
     yield Part(

@@ -3,7 +3,6 @@
 import asyncio
 import errno
 import threading
-from functools import partial
 from types import TracebackType
 from typing import Any
 
@@ -17,6 +16,7 @@ from meshcat.servers.zmqserver import (
     WebSocketHandler,
     ZMQWebSocketBridge,
 )
+from tornado.httpserver import HTTPServer
 
 from kinarm.errors import OutputError
 
@@ -36,22 +36,35 @@ class _Socket(WebSocketHandler):  # type: ignore[misc]
         self.bridge.websocket_pool.discard(self)
 
 
+class _Application(tornado.web.Application):
+    """Meshcat's pages, for this machine only."""
+
+    def listen(self, port: int, **settings: Any) -> HTTPServer:  # type: ignore[override]
+        self.server = super().listen(port, address=HOST, **settings)
+        return self.server
+
+
 class _Bridge(ZMQWebSocketBridge):  # type: ignore[misc]
     """Meshcat's server without its ZeroMQ port, listening to this machine only."""
 
-    def make_app(self) -> tornado.web.Application:
+    def make_app(self) -> _Application:
         files = {"path": VIEWER_ROOT, "default_filename": VIEWER_HTML}
-        app = tornado.web.Application(
+        return _Application(
             [(r"/static/(.*)", StaticFileHandlerNoCache, files), (r"/", _Socket, {"bridge": self})]
         )
-        app.listen = partial(app.listen, address=HOST)  # type: ignore[method-assign]
-        return app
 
     def setup_zmq(self, url: str) -> tuple["_Bridge", None, str]:
         return self, None, url
 
     def send(self, _: bytes) -> None:
         """Take the answers that would go to ZeroMQ."""
+
+    async def close(self) -> None:
+        """Let the browsers go, and stop listening."""
+        self.app.server.stop()
+        for socket in set(self.websocket_pool):
+            socket.ws_connection.stream.close()
+        await self.app.server.close_all_connections()
 
 
 class LiveServer:
@@ -129,6 +142,7 @@ class LiveServer:
         self._bridge = self._listen()
         self._started.set()
         await self._over.wait()
+        await self._bridge.close()
 
     def _listen(self) -> _Bridge:
         """Open the port, or the next free one."""

@@ -129,7 +129,7 @@ def lathe(profile: Sequence[tuple[float, float]], axis: str = "z") -> Mesh:
     return loft(np.stack(order[axis], axis=2))
 
 
-def pin(length: float, radius: float, chamfer: float, axis: str = "z") -> Mesh:
+def cylinder(length: float, radius: float, chamfer: float, axis: str = "z") -> Mesh:
     """A cylinder about the origin with chamfered rims [m]."""
     half = length / 2
     profile = [(-half, radius - chamfer), (-half + chamfer, radius)]
@@ -239,7 +239,7 @@ def from_coal(shape: coal.CollisionGeometry) -> Mesh:
     if isinstance(shape, coal.Capsule):
         return capsule(2 * shape.halfLength, shape.radius)
     if isinstance(shape, coal.Cylinder):
-        return pin(2 * shape.halfLength, shape.radius, 0.0)
+        return cylinder(2 * shape.halfLength, shape.radius, 0.0)
     if isinstance(shape, coal.ConvexBase):
         return _hull(np.array(shape.points()))
     if isinstance(shape, coal.BVHModelBase):

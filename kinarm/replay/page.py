@@ -56,6 +56,7 @@ def build_page(recordings: Sequence[Recording], ghosts: Sequence[Recording], arm
         "viewer": _packed_viewer(),
         "scene": _packed(_frames(_commands(trials, arm))),
         "trials": _packed(document.encode()),
+        "stage": _asset("stage.js"),
         "player": _asset("player.js"),
     }.items():
         template = template.replace(f"<!--kinarm:{marker}-->", text, 1)

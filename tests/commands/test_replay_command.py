@@ -186,6 +186,18 @@ def test_recordings_are_compared_in_the_same_trials_only(replay, recordings, tmp
     assert played(replay(mixed, "--compare", "mine-seed0", "other")) == [0, 0]
 
 
+@pytest.mark.parametrize("share", [0, 0.5, 0.99])
+def test_truncated_recordings(replay, recordings, tmp_path, share):
+    content = recordings.read_bytes()
+    path = tmp_path / "cut.npz"
+    path.write_bytes(content[: int(share * len(content))])
+    refused(replay(path), "cut.npz", "not a complete recording")
+
+
+def test_policies_are_no_recordings(replay, policy_folder):
+    refused(replay(policy_folder / "lefty.npz"), "'kinarm-policy'", "'kinarm-recordings'")
+
+
 @pytest.mark.parametrize("content", ["", "{}", "[1]", '{"protocol": {}}', "\x00"])
 def test_damaged_evaluations(replay, tmp_path, content):
     path = tmp_path / "evaluation.json"

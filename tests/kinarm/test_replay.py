@@ -16,7 +16,7 @@ import kinarm
 from kinarm.errors import InvalidInputError, OutputError
 from kinarm.replay import replay
 from kinarm.replay.arm_shapes import arm_parts
-from kinarm.replay.meshes import Mesh, box, capsule, housing, lathe, pin, tube
+from kinarm.replay.meshes import Mesh, box, capsule, cylinder, housing, lathe, tube
 from kinarm.trajectory import record_rollouts
 
 
@@ -163,7 +163,7 @@ def volume(mesh: Mesh) -> float:
         (box((1, 2, 3)), 6.0),
         (capsule(1.0, 0.2), np.pi * 0.04 + np.pi * 0.032 / 3),
         (capsule(0.0, 1.0), 4 * np.pi / 3),
-        *((pin(2.0, 0.5, 0.0, axis), np.pi / 2) for axis in "xyz"),
+        *((cylinder(2.0, 0.5, 0.0, axis), np.pi / 2) for axis in "xyz"),
         (lathe([(0, 1), (3, 0)]), np.pi),
         (housing([(0, 0, 1, 2, 2), (1, 0, 1, 2, 2)]), 2 * np.pi),
         (tube([(0, 0, 0), (1, 0, 0), (2, 0, 0)], 0.1, 64), 2 * np.pi * 0.01),
