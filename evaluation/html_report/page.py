@@ -107,55 +107,60 @@ def _subtitle(document: dict[str, Any]) -> str:
 
 def _task_section(task: TaskResults) -> Markup:
     """Everything about one task, but its worst trials."""
-    maps = [
-        tag("figure", tag("figcaption", group.name), bench_map(task, group))
-        for group in task.contenders
-    ]
     return tag(
         "section",
         tag("h2", f"Task {task.name}"),
         tag("p", _task_words(task), class_="lead"),
         tag("div", summary_table(task), class_="panel"),
-        tag(
-            "div",
-            _figure(
-                "How close do they come?",
-                "Share of trials that end within a distance d, with its 95 % band; dotted: the "
-                "tolerance.",
-                profile_chart(task),
-                legend(task.groups),
-            ),
-            _figure(
-                "How far off are the failures?",
-                "Histograms of the final distance; bar heights are square roots of shares, so "
-                "that rare failures show. Left: share in the first bin.",
-                histogram_chart(task),
-            ),
-            class_="pair",
-        ),
-        _figure(
-            "Where do they fail?",
-            "The benches from above, to scale, x forward, y to the left (arrows: "
-            f"{AXIS_LENGTH:g} m). Each marker is the goal of a trial; point at it for its "
-            "figures. Bars beside a bench: share of trials that failed in that tenth of it; "
-            "the line is 100 %."
-            + (
-                f" Markers are those of the first {MARKERS} trials."
-                if task.trials > MARKERS
-                else ""
-            ),
-            map_legend(task),
-            tag(
-                "div",
-                maps,
-                class_="maps wide" if len(task.benches) > 1 else "maps",
-                tabindex="0",
-                role="region",
-                aria_label=f"Maps of {task.name}",
-            ),
-        ),
+        _charts(task),
+        _maps(task),
         id=task.name,
     )
+
+
+def _charts(task: TaskResults) -> Markup:
+    """Profiles and histograms beside each other."""
+    return tag(
+        "div",
+        _figure(
+            "How close do they come?",
+            "Share of trials that end within a distance d, with its 95 % band; dotted: the "
+            "tolerance.",
+            profile_chart(task),
+            legend(task.groups),
+        ),
+        _figure(
+            "How far off are the failures?",
+            "Histograms of the final distance; bar heights are square roots of shares, so that "
+            "rare failures show. Left: share in the first bin.",
+            histogram_chart(task),
+        ),
+        class_="pair",
+    )
+
+
+def _maps(task: TaskResults) -> Markup:
+    """A map for each policy, or for the baselines if there is none."""
+    words = (
+        f"The benches from above, to scale, x forward, y to the left (arrows: {AXIS_LENGTH:g} m). "
+        "Each marker is the goal of a trial; point at it for its figures. Bars beside a bench: "
+        "share of trials that failed in that tenth of it; the line is 100 %."
+    )
+    if task.trials > MARKERS:
+        words += f" Markers are those of the first {MARKERS} trials."
+    maps = [
+        tag("figure", tag("figcaption", group.name), bench_map(task, group))
+        for group in task.contenders
+    ]
+    grid = tag(
+        "div",
+        maps,
+        class_="maps wide" if len(task.benches) > 1 else "maps",
+        tabindex="0",
+        role="region",
+        aria_label=f"Maps of {task.name}",
+    )
+    return _figure("Where do they fail?", words, map_legend(task), grid)
 
 
 def _figure(title: str, words: str, *content: Child) -> Markup:

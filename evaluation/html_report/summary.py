@@ -116,16 +116,14 @@ def card(task: TaskResults) -> Markup:
     """The best of a task in large figures, as a link to the rest."""
     best = task.contenders[0]
     cells = table_cells(best.row)
-    share, interval = cells["success %"].split(" ", 1)
+    share, interval = cells["success %"].replace("..", DASH).split(" ", 1)
     beside = f"; the oracle {100 * rate:.1f} %" if (rate := oracle_rate(task)) is not None else ""
     return tag(
         "a",
         tag("span", task.name, class_="task"),
         tag("span", share, tag("small", " %"), class_="big"),
         interval_bar(best.row["success"], rate, best.style),
-        tag(
-            "span", f"reached by {best.name} {interval}{beside}".replace("..", DASH), class_="note"
-        ),
+        tag("span", f"reached by {best.name} {interval}{beside}", class_="note"),
         href=f"#{task.name}",
         class_="card",
     )
