@@ -183,13 +183,13 @@ def _positions(
     """Positions of the chosen trials, in the order in which they are to be played."""
     everything = range(len(recordings))
     if options.trial is not None:
-        place = {recording.trial: position for position, recording in enumerate(recordings)}
+        numbers = [recording.trial for recording in recordings]
         for number in options.trial:
-            if number not in place:
+            if number not in numbers:
                 raise InvalidInputError(
-                    f"there is no trial {number}: they go from {min(place)} to {max(place)}"
+                    f"there is no trial {number}: they go from {min(numbers)} to {max(numbers)}"
                 )
-        return [place[number] for number in options.trial]
+        return [k for number in options.trial for k in everything if numbers[k] == number]
     if options.collisions:
         collided = [k for k in everything if recordings[k].outcome == "collision"]
         if not collided:

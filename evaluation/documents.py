@@ -16,6 +16,8 @@ from kinarm.task import load_task
 from kinarm.trajectory import Recording
 
 FORMAT_VERSION = 1
+ENDS = ("outcome", "steps", "final_distance")
+"""What has to be the same again."""
 
 
 @dataclass(frozen=True)
@@ -49,15 +51,28 @@ class EvaluationDocument:
             content = json.loads(Path(path).read_text(encoding="utf-8"))
             version = content["protocol"]["format_version"]
             document = cls(str(path), content["protocol"], content["results"])
+            if version == FORMAT_VERSION:
+                document._look_through()
         except OSError as error:
             raise InvalidInputError(f"cannot read {str(path)!r}: {error.strerror}") from error
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, LookupError, TypeError, AttributeError) as error:
             raise InvalidInputError(f"{str(path)!r} is not an evaluation of kinarm-eval") from error
         if version != FORMAT_VERSION:
             raise InvalidInputError(
                 f"{str(path)!r} has format version {version}; this kinarm reads {FORMAT_VERSION}"
             )
         return document
+
+    def _look_through(self) -> None:
+        """Touch everything that will be needed; whatever is missing raises."""
+        for row in self.results:
+            said = row["outcomes"]
+            _ = (row["policy"], row["trained_on"], self.protocol["tasks"][row["task"]])
+            _ = list(zip(*(said[part] for part in ENDS), strict=True))
+        for entry in self.protocol["tasks"].values():
+            _ = [entry[part] for part in ("tolerance", "horizon", "trial_set_hash", "oracle")]
+            np.hstack([np.array(entry[part], dtype=float) for part in ("starts", "goals")])
+        _ = [self.protocol[part] for part in ("arm", "arm_digest", "seed")]
 
     def result(self, policy: str | None, task: str | None) -> dict[str, Any]:
         """Find the result of a policy, or of a group's first seed, on a task.
@@ -119,10 +134,10 @@ class EvaluationDocument:
         InvalidInputError
             If one does not: policy or simulator have changed since.
         """
-        said = row["outcomes"]
-        ends = zip(said["outcome"], said["steps"], said["final_distance"], strict=True)
-        for recording, end in zip(recordings, ends, strict=True):
-            if (recording.outcome, recording.steps, recording.final_distance) != end:
+        ends = list(zip(*(row["outcomes"][part] for part in ENDS), strict=True))
+        for recording in recordings:
+            end = (recording.outcome, recording.steps, recording.final_distance)
+            if len(ends) != len(recordings) or end != ends[recording.trial]:
                 raise InvalidInputError(
                     f"trial {recording.trial} of {recording.policy!r} ends otherwise than in "
                     f"{self.name!r}: the policy or kinarm has changed, evaluate again"

@@ -208,7 +208,7 @@ def load_recordings(path: str | Path) -> list[Recording]:
             return _read(name, file)
     except OSError as error:
         raise RecordingFileError(f"cannot read recording {name!r}: {error.strerror}") from error
-    except CORRUPT as error:
+    except (AttributeError, *CORRUPT) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise RecordingFileError(f"{name!r} is not a complete recording: {reason}") from error
 

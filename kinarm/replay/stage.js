@@ -180,12 +180,13 @@ class Stage {
     const [width, height] = [window.innerWidth, window.innerHeight];
     const [card, dock] = ["card", "dock"].map((id) => document.getElementById(id));
     const tall = width <= 640;
+    const narrow = width <= 1000 ? 1 : 0;
     const free = {
-      width: width - (tall ? 0 : 0.4 * card.offsetWidth),
+      width: width - (tall ? 0 : 0.64 * card.offsetWidth * narrow),
       height: height - dock.offsetHeight - (tall ? card.offsetHeight : 0) - 24,
     };
     const away = 0.96 * Math.max(height / free.height, (1.32 * height) / free.width);
-    const right = tall || width > 1100 ? 0 : 0.2 * card.offsetWidth;
+    const right = tall ? 0 : 0.32 * card.offsetWidth * narrow;
     const up = (dock.offsetHeight - (tall ? card.offsetHeight : 0)) / 2;
     viewer.camera.setViewOffset(width, height, -right, up, width, height);
     viewer.controls.target.set(0.05, 0.3, -0.1 * side);

@@ -223,6 +223,29 @@ def test_an_evaluation_that_no_longer_holds(replay, evaluation, tmp_path):
     refused(changed(lambda d: d["results"][row]["outcomes"]["steps"].reverse()), "ends otherwise")
 
 
+@pytest.mark.parametrize(
+    "path",
+    [
+        ("results", 0, "task"),
+        ("results", 0, "policy"),
+        ("results", 0, "outcomes", "steps"),
+        ("protocol", "seed"),
+        ("protocol", "tasks", "right", "starts"),
+        ("protocol", "tasks", "right", "oracle"),
+        ("protocol", "tasks", "right"),
+    ],
+)
+def test_an_evaluation_with_something_missing(replay, evaluation, tmp_path, path):
+    document = json.loads(evaluation.read_text())
+    *where, last = path
+    part = document
+    for step in where:
+        part = part[step]
+    del part[last]
+    (tmp_path / "evaluation.json").write_text(json.dumps(document))
+    refused(replay(tmp_path / "evaluation.json"), "evaluation.json", "not an evaluation")
+
+
 def test_an_evaluation_of_several_policies(replay, evaluation):
     refused(replay(evaluation, "--policy", "nobody"), "'nobody'", "random")
     refused(replay(evaluation, "--policy", "random", "--task", "left"), "'random'")

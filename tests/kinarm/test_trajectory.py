@@ -221,6 +221,9 @@ def test_missing_entries(recordings, tmp_path):
     np.savez(path, **{**content, "recordings": np.array(json.dumps(entries))})
     with pytest.raises(RecordingFileError, match="task"):
         load_recordings(path)
+    np.savez(path, **{**content, "recordings": np.array("[1]")})
+    with pytest.raises(RecordingFileError, match="not a complete recording"):
+        load_recordings(path)
     del content["states_0"]
     np.savez(path, **content)
     with pytest.raises(RecordingFileError, match="states"):
