@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
 # An editable install links the modules that exist: a new one, or new metadata, calls for another.
-MODULES := $(shell ls kinarm/*.py kinarm/*/*.py kinarm/replay/*.* policies/*.py evaluation/*.py evaluation/*/*.py data/*/* | cksum | cut -d' ' -f1)
+MODULES := $(shell ls kinarm/*.py kinarm/*/*.* policies/*.py evaluation/*.py evaluation/*/*.* data/*/* | cksum | cut -d' ' -f1)
 INSTALLED = $(VENV)/.installed-$(1)-$(MODULES)
 
 .PHONY: eval test lint docs clean

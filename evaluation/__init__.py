@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from kinarm.evaluation.bounds import oracle_bounds
     from kinarm.evaluation.entrants import Entrant, find_entrants
     from kinarm.evaluation.evaluations import Evaluation, PooledEvaluation, evaluate, pool
+    from kinarm.evaluation.html_report.page import report_page, write_report
     from kinarm.evaluation.plots import distance_histograms, save_figure
     from kinarm.evaluation.recording import record
     from kinarm.evaluation.report import evaluation_document
@@ -28,7 +29,9 @@ __all__ = [
     "oracle_bounds",
     "pool",
     "record",
+    "report_page",
     "save_figure",
+    "write_report",
 ]
 
 
@@ -42,6 +45,7 @@ __getattr__ = lazy_exports(
         "bounds": ("oracle_bounds",),
         "entrants": ("Entrant", "find_entrants"),
         "evaluations": ("Evaluation", "PooledEvaluation", "evaluate", "pool"),
+        "html_report.page": ("report_page", "write_report"),
         "plots": ("distance_histograms", "save_figure"),
         "recording": ("record",),
         "report": ("evaluation_document",),

@@ -23,6 +23,7 @@ examples:
   kinarm-eval --trials 200                              all shipped policies and baselines
   kinarm-eval --policy ars-tuned-right --task right     one recipe, all its training seeds
   kinarm-eval --policy my_policy.npz --out results      your own, with figures and every trial
+  kinarm-eval --trials 200 --report results             a page to look at: results/index.html
 """
 
 
@@ -69,6 +70,9 @@ def build_parser() -> Parser:
         "--out", type=Path, metavar="DIR", help="write evaluation.json and histograms there"
     )
     parser.add_argument(
+        "--report", type=Path, metavar="DIR", help="write the report there: index.html, one page"
+    )
+    parser.add_argument(
         "--json", action="store_true", help="print the JSON document alone on standard output"
     )
     parser.add_argument("--markdown", action="store_true", help="print the table as Markdown")
@@ -91,6 +95,8 @@ def _evaluate(options: argparse.Namespace, command: str) -> None:
     with Console(stderr=True).status("evaluating; the first run compiles") as status:
         evaluations = evaluate_all(options, status.update)
         document = evaluation_document(evaluations, command)
+        if options.report is not None:
+            _report(options.report, document, evaluations, status.update)
     if options.out is not None:
         _write(options.out, document, evaluations)
     if options.json:
@@ -105,6 +111,8 @@ def _evaluate(options: argparse.Namespace, command: str) -> None:
             console.print(f"no shipped policy was trained for arm {options.arm}", style="dim")
     if options.out is not None:
         console.print(f"written: {options.out / 'evaluation.json'} and histograms", style="dim")
+    if options.report is not None:
+        console.print(f"written: {options.report / 'index.html'}", style="dim")
 
 
 def _footnote(document: dict[str, Any]) -> str:
@@ -155,8 +163,9 @@ def evaluate_all(
     if not options.allow_other_arm:
         for entrant, _ in pairs:
             entrant.check_arm(arm)
-    if options.out is not None:
-        check_folder(options.out, create=True)
+    for folder in (options.out, options.report):
+        if folder is not None:
+            check_folder(folder, create=True)
     evaluations = []
     for task in dict.fromkeys(task for _, task in pairs):
         trials = TrialSet.draw(Simulator(arm, task), options.trials, options.seed)
@@ -235,6 +244,19 @@ def _write(folder: Path, document: dict[str, Any], evaluations: "list[Evaluation
     write_atomically(folder / "evaluation.json", lambda file: file.write(text))
     shown = [e for e in evaluations if e.entrant.algorithm != "oracle"] or evaluations
     save_figure(distance_histograms(shown), folder, "final_distance")
+
+
+def _report(
+    folder: Path,
+    document: dict[str, Any],
+    evaluations: "list[Evaluation]",
+    report: Callable[[str], object],
+) -> None:
+    """Write the page."""
+    from kinarm.evaluation.html_report.page import write_report
+
+    report("writing the report")
+    write_report(folder, document, evaluations)
 
 
 if __name__ == "__main__":

@@ -36,14 +36,14 @@ def distance_histograms(evaluations: Sequence[Evaluation]) -> "Figure":
     from matplotlib.figure import Figure
 
     tasks = list(dict.fromkeys(evaluation.task for evaluation in evaluations))
-    labels = list(dict.fromkeys(_label(evaluation) for evaluation in evaluations))
+    labels = list(dict.fromkeys(series_label(evaluation) for evaluation in evaluations))
     furthest = max(float(evaluation.rollouts.distance.max()) for evaluation in evaluations)
     edges = np.arange(0.0, furthest + BIN_WIDTH, BIN_WIDTH)
     figure = Figure(figsize=(4.2 * len(tasks), 3.6), layout="constrained")
     for axes, task in zip(figure.subplots(1, len(tasks), squeeze=False)[0], tasks, strict=True):
         on_task = [evaluation for evaluation in evaluations if evaluation.task == task]
         for number, label in enumerate(labels):
-            distances = [e.rollouts.distance for e in on_task if _label(e) == label]
+            distances = [e.rollouts.distance for e in on_task if series_label(e) == label]
             if distances:
                 _stairs(axes, distances, edges, label, number)
         tolerance = on_task[0].trials.simulator.task.tolerance
@@ -71,8 +71,14 @@ def _stairs(
     axes.stairs(shares.mean(axis=0), edges, color=colour, linestyle=dash, linewidth=2, label=label)
 
 
-def _label(evaluation: Evaluation) -> str:
-    """Name of what the training seeds of one recipe share, and the task if it is another one."""
+def series_label(evaluation: Evaluation) -> str:
+    """Name of what the training seeds of one recipe share, and the task if it is another one.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        Of one training seed.
+    """
     entrant = evaluation.entrant
     if entrant.policy is None:
         return entrant.name

@@ -126,8 +126,8 @@ def evaluation_table(
     for task in document["protocol"]["tasks"]:
         if not markdown:
             table.add_section()
-        for row in sorted(_rows(document, task), key=lambda row: -row["success"]["rate"]):
-            cells = dict(zip(COLUMNS, _cells(row), strict=True))
+        for row in table_rows(document, task):
+            cells = table_cells(row)
             table.add_row(*(cells[heading] for heading in kept))
     return table
 
@@ -162,21 +162,37 @@ EXPENDABLE = (
 )
 
 
-def _rows(document: dict[str, Any], task: str) -> list[dict[str, Any]]:
-    """Pooled results of a task, and the results that are not part of them."""
+def table_rows(document: dict[str, Any], task: str) -> list[dict[str, Any]]:
+    """Pooled results of a task and the results that are not part of them, best first.
+
+    Parameters
+    ----------
+    document : dict
+        What `evaluation_document` returned.
+    task : str
+        Name of one of its tasks.
+    """
     pooled = [row for row in document["pooled"] if row["task"] == task]
     members = {name for row in pooled for name in row["members"]}
     single = [row for row in document["results"] if row["task"] == task]
-    return pooled + [row for row in single if row["policy"] not in members]
+    rows = pooled + [row for row in single if row["policy"] not in members]
+    return sorted(rows, key=lambda row: -row["success"]["rate"])
 
 
-def _cells(row: dict[str, Any]) -> list[str]:
+def table_cells(row: dict[str, Any]) -> dict[str, str]:
+    """The figures of a row as text, by heading.
+
+    Parameters
+    ----------
+    row : dict
+        One of `table_rows`.
+    """
     distance, spread = row["final_distance"], row.get("spread")
     over_seeds = ""
     if spread:
         low, high = (100 * spread["success"][end] for end in ("min", "max"))
         over_seeds = f"{len(row['members'])}: {low:.1f}..{high:.1f}"
-    return [
+    figures = (
         row["task"],
         row["policy"],
         _percent(row["success"]),
@@ -190,7 +206,8 @@ def _cells(row: dict[str, Any]) -> list[str]:
         f"{100 * row['collision']['rate']:.1f}",
         f"{row['steps']['median']:.0f}",
         _ratio(row["oracle"]),
-    ]
+    )
+    return dict(zip(COLUMNS, figures, strict=True))
 
 
 def _relative(beside: dict[str, Any] | None) -> str:

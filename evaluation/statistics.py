@@ -1,6 +1,8 @@
 """Figures of merit with 95 % intervals."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -37,18 +39,38 @@ class Share:
             Whether a trial hit. Several seeds face the same trials, so they are no independent
             evidence about them: their interval is that of n_trials trials, widened to whole hits.
         """
-        from scipy.stats import binomtest
-
         rate, trials = float(hits.mean()), hits.shape[-1]
         expected = hits.sum() / (hits.size // trials)
         few, many = int(np.floor(expected)), int(np.ceil(expected))
-        low = binomtest(few, trials).proportion_ci(method="wilson").low
-        high = binomtest(many, trials).proportion_ci(method="wilson").high
-        return cls(rate, (float(low), float(high)))
+        return cls(rate, (_wilson(few, trials)[0], _wilson(many, trials)[1]))
 
     def to_json(self) -> dict[str, Any]:
         """As a dictionary that JSON can hold."""
         return {"rate": self.rate, "ci95": list(self.ci95)}
+
+
+@cache
+def _wilson(hits: int, trials: int) -> Interval:
+    """95 % interval of a share; profiles ask for the same ones over and over."""
+    from scipy.stats import binomtest
+
+    interval = binomtest(hits, trials).proportion_ci(method="wilson")
+    return float(interval.low), float(interval.high)
+
+
+def performance_profile(
+    distances: NDArray[np.float64], limits: Iterable[float]
+) -> tuple[Share, ...]:
+    """Shares of trials whose final distance is at most each of some limits.
+
+    Parameters
+    ----------
+    distances : ndarray, shape (n_trials,) or (n_seeds, n_trials)
+        Final distances [m]; several seeds face the same trials, see `Share.of`.
+    limits : iterable of float
+        The limits [m].
+    """
+    return tuple(Share.of(distances <= limit) for limit in limits)
 
 
 @dataclass(frozen=True)

@@ -283,18 +283,27 @@ def test_a_folder_is_no_policy(run, tmp_path):
     check_refused(run("kinarm-eval", "--policy", tmp_path), str(tmp_path))
 
 
-def test_an_output_folder_that_cannot_be_made_is_refused(run, tmp_path):
+@pytest.mark.parametrize("option", ["--out", "--report"])
+def test_an_output_folder_that_cannot_be_made_is_refused(run, tmp_path, option):
     (tmp_path / "file").write_text("mine")
     for out in (tmp_path / "file", tmp_path / "file" / "deep"):
-        answer = run("kinarm-eval", "--policy", "zero", "--trials", 1, "--out", out)
+        answer = run("kinarm-eval", "--policy", "zero", "--trials", 1, option, out)
         check_refused(answer, "file")
     assert (tmp_path / "file").read_text() == "mine"
 
 
-@pytest.mark.parametrize("name", ["evaluation.json", "final_distance.png", "final_distance.svg"])
-def test_results_that_cannot_be_written_are_refused(run, tmp_path, name):
+@pytest.mark.parametrize(
+    ("option", "name"),
+    [
+        ("--out", "evaluation.json"),
+        ("--out", "final_distance.png"),
+        ("--out", "final_distance.svg"),
+        ("--report", "index.html"),
+    ],
+)
+def test_results_that_cannot_be_written_are_refused(run, tmp_path, option, name):
     (tmp_path / name).mkdir()
-    arguments = ("--policy", "zero", "--task", "left", "--trials", 1, "--out", tmp_path)
+    arguments = ("--policy", "zero", "--task", "left", "--trials", 1, option, tmp_path)
     check_refused(run("kinarm-eval", *arguments), str(tmp_path))
 
 

@@ -215,6 +215,36 @@ def test_earlier_results_are_replaced(run, tmp_path):
     assert (tmp_path / "notes.txt").read_text() == "mine"
 
 
+def test_report_is_one_page(run, policy_folder, tmp_path):
+    arguments = ("--policy", policy_folder / "mine-seed0.npz", "--trials", 4)
+    answer = run("kinarm-eval", *arguments, "--report", tmp_path / "new" / "report")
+    assert (answer.status, answer.err) == (0, "")
+    (page,) = (tmp_path / "new" / "report").iterdir()
+    assert page.name == "index.html"
+    assert str(page) in "".join(answer.out.split("\n"))
+    text = page.read_text(encoding="utf-8")
+    assert "mine-seed0" in text
+    assert evaluate("zero", "right", trials=4).trials.digest in text
+    assert "kinarm-eval --policy" in text
+
+
+def test_report_and_results_share_a_folder(run, tmp_path):
+    arguments = ("--policy", "zero", "--task", "left", "--trials", 2, "--json")
+    answer = run("kinarm-eval", *arguments, "--out", tmp_path, "--report", tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {*FILES, "index.html"}
+    assert json.loads(answer.out) == json.loads((tmp_path / "evaluation.json").read_text())
+
+
+def test_report_is_the_same_from_every_process(run, run_outside, policy_folder, tmp_path):
+    arguments = ("--policy", policy_folder / "mine-seed0.npz", "--trials", 9)
+    arguments = (*arguments, "--report", tmp_path / "report")
+    pages = []
+    for call in (run, run_outside):
+        assert call("kinarm-eval", *arguments).status == 0
+        pages.append((tmp_path / "report" / "index.html").read_bytes())
+    assert pages[0] == pages[1]
+
+
 def test_files_are_the_same_from_every_process(run, run_outside, policy_folder, tmp_path):
     one, other = tmp_path / "one", tmp_path / "other"
     arguments = ("--policy", policy_folder / "mine-seed0.npz", "--policy", "zero", "--trials", 9)
@@ -338,6 +368,7 @@ def test_a_cache_that_cannot_be_used_is_done_without(evaluated, tmp_path, monkey
         (["--policy", "flange.npz", "--matrix"], ["'paper_flange'", "'paper'"]),
         (["--policy", "lefty.npz", "--arm", "paper_flange"], ["'paper_flange'", "'paper'"]),
         (["--policy", "zero", "--task", "left", "--out", "lefty.npz"], ["lefty.npz"]),
+        (["--policy", "zero", "--task", "left", "--report", "lefty.npz"], ["lefty.npz"]),
         (["--policy", "zero", "--policy", "nobody"], ["'nobody'", "random, zero, oracle"]),
     ],
 )

@@ -52,8 +52,8 @@ def test_learners_have_help_of_their_own(run, learner):
     [
         (
             "kinarm-eval",
-            "--task --policy --trials --seed --arm --out --json --matrix --allow-other-arm "
-            "--no-oracle --markdown",
+            "--task --policy --trials --seed --arm --out --report --json --matrix "
+            "--allow-other-arm --no-oracle --markdown",
         ),
         (
             "kinarm-replay",

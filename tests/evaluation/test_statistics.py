@@ -1,13 +1,14 @@
 """Figures of merit against formulas written out here, and against a bootstrap written here."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kinarm.evaluation.statistics import DistanceStatistics, Share
+from kinarm.evaluation.statistics import DistanceStatistics, Share, performance_profile
 
 Z = 1.959963984540054
 """97.5 % quantile of the normal distribution."""
@@ -127,6 +128,18 @@ def test_pooled_share_is_no_surer_than_one_trial_set():
 def test_pooled_share_of_equal_seeds_is_that_of_one():
     hits = np.arange(40) % 3 == 0
     assert Share.of(np.stack([hits] * 4)) == Share.of(hits)
+
+
+@pytest.mark.parametrize("shape", [(40,), (3, 40)])
+def test_profile_is_the_share_within_each_limit(shape):
+    distances = np.random.default_rng(2).exponential(0.3, shape)
+    limits = [0.0, 0.1, 0.3, float(distances.max())]
+    profile = performance_profile(distances, limits)
+    assert profile == tuple(Share.of(distances <= limit) for limit in limits)
+    assert (profile[0].rate, profile[-1].rate) == (0, 1)
+    for lower, upper in pairwise(profile):
+        assert lower.rate <= upper.rate
+        assert lower.ci95 <= upper.ci95
 
 
 def test_share_as_json():

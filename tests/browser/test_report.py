@@ -1,0 +1,190 @@
+"""The report in a real browser: offline, quiet, dark and light, on a phone, with its replay."""
+
+import time
+from pathlib import Path
+
+import pytest
+
+from kinarm.evaluation.bounds import oracle_bounds
+from kinarm.evaluation.entrants import ORACLE, find_entrants
+from kinarm.evaluation.evaluations import run_trials
+from kinarm.evaluation.html_report.groups import group_results
+from kinarm.evaluation.html_report.page import write_report
+from kinarm.evaluation.html_report.worst import worst_trials
+from kinarm.evaluation.report import evaluation_document
+from kinarm.evaluation.trials import TrialSet
+from kinarm.simulator import Simulator
+
+pytestmark = pytest.mark.slow
+
+DESKTOP = {"viewport": {"width": 1280, "height": 900}}
+PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
+
+CONTRAST = Path(__file__).with_name("contrast.js")
+
+PLAYER = "document.querySelector('#worst iframe').contentWindow.kinarm"
+
+
+@pytest.fixture(scope="module")
+def evaluations():
+    """Two recipes on one task, one on another, beside the oracle."""
+    made = []
+    for task, names in (("right", ("ars-tuned-right", "ppo-tuned-right")), ("both", ("zero",))):
+        trials = TrialSet.draw(Simulator(task=task), 20, seed=3)
+        oracle_bounds(trials)
+        entrants = [each for name in names for each in find_entrants(name)]
+        made += [run_trials(each, trials, oracle=True) for each in (*entrants, ORACLE)]
+    return made
+
+
+@pytest.fixture(scope="module")
+def document(evaluations):
+    return evaluation_document(evaluations, "kinarm-eval --report report")
+
+
+@pytest.fixture(scope="module")
+def chosen(document, evaluations):
+    """The worst trials in the order of the rows."""
+    return [worst for task in group_results(document, evaluations) for worst in worst_trials(task)]
+
+
+@pytest.fixture(scope="module")
+def address(document, evaluations, tmp_path_factory) -> str:
+    return write_report(tmp_path_factory.mktemp("report"), document, evaluations).as_uri()
+
+
+@pytest.fixture
+def visit(browser, address):
+    """Open the report without a network; nothing may be fetched and nothing may go wrong."""
+    contexts, requests, problems = [], [], []
+
+    def call(**settings):
+        context = browser.new_context(offline=True, **settings)
+        contexts.append(context)
+        page = context.new_page()
+        page.on("request", lambda request: requests.append(request.url))
+        page.on("pageerror", lambda error: problems.append(str(error)))
+        page.on(
+            "console",
+            lambda message: problems.append(message.text) if message.type == "error" else None,
+        )
+        page.goto(address)
+        return page
+
+    yield call
+    for context in contexts:
+        context.close()
+    assert problems == []
+    assert [url for url in requests if url != address and not url.startswith("data:")] == []
+
+
+def wait_until(page, condition: str, seconds: float = 60):
+    """Ask again and again; the page forbids the evaluation of strings that waiting would need."""
+    end = time.monotonic() + seconds
+    while not page.evaluate(condition):
+        assert time.monotonic() < end, condition
+        page.wait_for_timeout(50)
+
+
+def start_replay(page):
+    page.locator("#worst iframe").scroll_into_view_if_needed()
+    wait_until(page, f"Boolean({PLAYER})")
+
+
+def colour_of(page, selector: str) -> str:
+    return page.evaluate(f"getComputedStyle(document.querySelector('{selector}')).backgroundColor")
+
+
+def test_page_fits_every_width(visit):
+    for width in (320, 390, 768, 1280):
+        page = visit(viewport={"width": width, "height": 800})
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_appearance_follows_the_system_and_the_button(visit):
+    light = visit(**DESKTOP, color_scheme="light")
+    dark = visit(**DESKTOP, color_scheme="dark")
+    colours = [colour_of(page, "body") for page in (light, dark)]
+    assert colours[0] != colours[1]
+    for page, other in ((light, colours[1]), (dark, colours[0])):
+        page.locator("#theme").click()
+        assert colour_of(page, "body") == other
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_can_be_read(visit, scheme):
+    """A contrast of 4.5 to 1 at least (WCAG 2, AA), wherever there is text."""
+    page = visit(**DESKTOP, color_scheme=scheme)
+    contrast, where = page.evaluate(CONTRAST.read_text())
+    assert contrast >= 4.5, where
+
+
+def test_everything_is_there(visit, evaluations):
+    page = visit(**DESKTOP)
+    assert page.locator("section").count() == 4
+    assert page.locator("svg.chart").count() == 4
+    for drawing in page.locator("svg.chart, svg.map:not(.sample)").all():
+        box = drawing.bounding_box()
+        assert min(box["width"], box["height"]) > 100
+
+
+def test_replay_waits_until_it_is_near(visit):
+    page = visit(**DESKTOP)
+    page.wait_for_timeout(500)
+    assert not page.evaluate("document.querySelector('#worst iframe').srcdoc")
+
+
+@pytest.mark.parametrize("settings", [DESKTOP, PHONE], ids=["desktop", "phone"])
+def test_a_row_chooses_the_trial(visit, chosen, settings):
+    page = visit(**settings)
+    start_replay(page)
+    for place in (len(chosen) - 1, 2):
+        page.locator(f"tr[data-replay='{place}'] th").click()
+        state = page.evaluate(f"{PLAYER}.state")
+        assert (state["policy"], state["task"], state["trial"]) == (
+            chosen[place].evaluation.entrant.name,
+            chosen[place].evaluation.task,
+            chosen[place].trial,
+        )
+        assert page.locator("tr[aria-current]").get_attribute("data-replay") == str(place)
+        box = page.locator("#worst iframe").bounding_box()
+        assert 0 <= box["y"] < settings["viewport"]["height"] / 2
+
+
+def test_a_row_chosen_before_the_replay_is_there(visit, chosen):
+    page = visit(**DESKTOP)
+    page.locator("tr[data-replay='3'] button").dispatch_event("click")
+    wait_until(page, f"Boolean({PLAYER})")
+    wait_until(page, f"{PLAYER}.state.index === 3")
+
+
+def test_page_and_player_go_together(visit):
+    """Rows can be chosen by key; rows and colours follow, whichever of the two changes them."""
+    page = visit(**DESKTOP, color_scheme="light")
+    page.locator("#theme").click()
+    start_replay(page)
+    wait_until(page, f"{PLAYER}.state.theme === 'dark'")
+    page.locator("#theme").click()
+    wait_until(page, f"{PLAYER}.state.theme === 'light'")
+    page.locator("tr[data-replay='1'] button").focus()
+    page.keyboard.press("Enter")
+    assert page.evaluate(f"{PLAYER}.state.index") == 1
+    page.frame_locator("#worst iframe").locator("#trial").select_option("2")
+    wait_until(page, "document.querySelector('tr[aria-current]').dataset.replay === '2'")
+
+
+def test_player_rests_out_of_sight(visit):
+    page = visit(**DESKTOP)
+    start_replay(page)
+    page.evaluate(f"{PLAYER}.play()")
+    page.evaluate("window.scrollTo(0, 0)")
+    wait_until(page, f"!{PLAYER}.state.playing")
+
+
+def test_pointing_at_a_policy_dims_the_others(visit):
+    page = visit(**DESKTOP)
+    page.locator("#right .legend li[data-series='ars-tuned-right']").hover()
+    dimmed = page.locator("#right .chart .dimmed").count()
+    shown = page.locator("#right .chart .series:not(.dimmed)").all()
+    assert dimmed > 0
+    assert {each.get_attribute("data-series") for each in shown} == {"ars-tuned-right"}
