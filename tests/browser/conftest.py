@@ -13,6 +13,9 @@ from kinarm.simulator import Simulator
 from kinarm.trajectory import Recording, record_rollouts
 
 REQUIRED = "KINARM_REQUIRE_BROWSER"
+PATIENCE = 120_000
+"""How long a page may take for anything [ms]: without a graphics card, drawing is slow."""
+
 FLAGS = (
     *("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
     *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
@@ -53,6 +56,7 @@ class Watched:
             color_scheme="light",
             reduced_motion="reduce" if calm else "no-preference",
         )
+        self.context.set_default_timeout(PATIENCE)
         self.page = self.context.new_page()
         self.requests: list[str] = []
         self.complaints: list[str] = []
@@ -60,7 +64,7 @@ class Watched:
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.page.on("console", self._listen)
         self.page.goto(path.as_uri())
-        self.page.wait_for_selector("body[data-ready]", timeout=120_000)
+        self.page.wait_for_selector("body[data-ready]")
 
     def _listen(self, message: object) -> None:
         if message.type == "error" or "THREE" in message.text:
@@ -75,9 +79,9 @@ class Watched:
         return self.tell("window.kinarm.state")
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def open_page(browser: object) -> Iterator[Callable[..., Watched]]:
-    """Open pages that are closed at the end."""
+    """Open pages that are closed after a file of tests: drawing them costs time."""
     opened = []
 
     def watch(path: Path, size: tuple[int, int] = (800, 600), *, calm: bool = True) -> Watched:

@@ -97,7 +97,7 @@ def test_buttons(watched, recorded):
     assert watched.state["frame"] == 0
     click("#play")
     assert watched.state["playing"]
-    watched.page.wait_for_function("() => window.kinarm.state.frame > 1", timeout=60_000)
+    watched.page.wait_for_function("() => window.kinarm.state.frame > 1")
     click("#play")
     assert not watched.state["playing"]
     click("#next")
