@@ -1,6 +1,6 @@
 """The paper's claims, and whether they hold here."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -259,17 +259,20 @@ def steps_to_levels(
 
 def low_rate_is_worse(results: Results) -> Claim:
     """Section 3.3: too low a learning rate may not be desirable."""
-    lowest = min(SWEEP_RATES)
-    terms = _sweep_terms(results, lambda rate, _: rate == lowest, lambda run: run.distance)
-    measure = f"mean final distance with rate {lowest}, less that with higher rates [m]"
-    statement = "Too low a learning rate is undesirable"
-    return Claim("sweep-rate", statement, (_difference(measure, terms),))
+    lowest, *higher = sorted(SWEEP_RATES)
+    parts = []
+    for other in higher:
+        pair = {s: runs for s, runs in results.sweep().items() if s[0] in (lowest, other)}
+        terms = _sweep_terms(pair, lambda rate, _: rate == lowest, lambda run: run.distance)
+        measure = f"mean final distance with rate {lowest}, less that with rate {other} [m]"
+        parts.append(_difference(measure, terms))
+    return Claim("sweep-rate", "Too low a learning rate is undesirable", tuple(parts))
 
 
 def many_perturbations_are_worse(results: Results) -> Claim:
     """Section 3.3: too many perturbations may not be desirable."""
     most = max(SWEEP_PERTURBATIONS)
-    terms = _sweep_terms(results, lambda _, n: n == most, lambda run: run.distance)
+    terms = _sweep_terms(results.sweep(), lambda _, n: n == most, lambda run: run.distance)
     measure = f"mean final distance with {most} perturbations, less that with fewer [m]"
     statement = "Too many perturbations are undesirable, after as many iterations"
     return Claim("sweep-perturbations", statement, (_difference(measure, terms),))
@@ -279,7 +282,9 @@ def many_perturbations_are_worse_for_their_steps(results: Results) -> Claim:
     """The same, where all have taken as many environment steps."""
     most = max(SWEEP_PERTURBATIONS)
     budget = min(run.environment_steps[-1] for run in results.select("sweep").values())
-    terms = _sweep_terms(results, lambda _, n: n == most, lambda run: distances_after(run, budget))
+    terms = _sweep_terms(
+        results.sweep(), lambda _, n: n == most, lambda run: distances_after(run, budget)
+    )
     measure = (
         f"mean final distance with {most} perturbations, less that with fewer, "
         f"after {budget / 1e3:.0f} thousand environment steps [m]"
@@ -289,12 +294,11 @@ def many_perturbations_are_worse_for_their_steps(results: Results) -> Claim:
 
 
 def _sweep_terms(
-    results: Results,
+    settings: Mapping[tuple[float, int], Sequence[Outcome]],
     chosen: Callable[[float, int], bool],
     distances: Callable[[Outcome], NDArray[Any]],
 ) -> list[Term]:
     """Mean of the settings that are chosen, less that of all others."""
-    settings = results.sweep()
     n = sum(chosen(*setting) for setting in settings)
     return [
         Term(

@@ -26,6 +26,9 @@ LEARNERS: dict[Purpose, dict[str, Any]] = {
 SHOWN_DISTANCE = 1.2
 """Where the axes of final distances end [m]."""
 
+NARROWEST = 0.005
+"""Least bandwidth of a density [m]."""
+
 
 def figure_2(results: Results) -> "Figure":
     """Training rewards and final distances of ARS, a row per task (paper, Figure 2)."""
@@ -37,7 +40,6 @@ def figure_2(results: Results) -> "Figure":
         row[0].set_ylabel(f"task {number}: {task}\nmean return of an iteration")
         row[1].set_ylabel(f"share of trials per {BIN_WIDTH} m")
     panels[0, 0].legend(frameon=False, loc="lower right")
-    panels[0, 1].legend(frameon=False)
     panels[-1, 0].set_xlabel("iteration")
     panels[-1, 1].set(xlabel="final distance to the goal [m]", xlim=(0, SHOWN_DISTANCE))
     return figure
@@ -71,7 +73,8 @@ def _histograms(axes: "Axes", outcomes: Sequence[Outcome]) -> None:
 def figure_3(results: Results) -> "Figure":
     """Densities of the final distances of ARS and PPO, a row per task (paper, Figure 3).
 
-    The oracle's is drawn behind them: what could be reached.
+    The oracle's is drawn behind them: what could be reached. Heights are square roots, so that
+    broad and narrow densities can be told apart beside each other.
     """
     figure, panels = _panels((7.5, 8.4), len(TASKS), 1, sharex=True)
     for number, (task, axes) in enumerate(zip(TASKS, panels[:, 0], strict=True), start=1):
@@ -91,7 +94,8 @@ def figure_3(results: Results) -> "Figure":
             distance, density(reached, distance), color="#bbbbbb", lw=0, label="oracle (cut off)"
         )
         axes.axvline(trials.simulator.task.tolerance, color="#444444", linestyle=":", lw=1)
-        axes.set(ylabel=f"task {number}: {task}\ndensity [1/m]", ylim=(0, 1.05 * highest))
+        axes.set_yscale("function", functions=(np.sqrt, np.square))
+        axes.set(ylabel=f"task {number}: {task}\ndensity [1/m]", ylim=(0, 1.1 * highest))
     panels[0, 0].legend(frameon=False)
     panels[-1, 0].set(xlabel="final distance to the goal [m]", xlim=(0, SHOWN_DISTANCE))
     return figure
@@ -99,6 +103,9 @@ def figure_3(results: Results) -> "Figure":
 
 def density(samples: NDArray[np.float64], positions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Kernel density of distances, reflected at zero so that none is lost below it.
+
+    The kernel is normal, with Silverman's robust bandwidth: a few trials that end far away must
+    not blur where the many end.
 
     Parameters
     ----------
@@ -112,10 +119,13 @@ def density(samples: NDArray[np.float64], positions: NDArray[np.float64]) -> NDA
     ndarray, shape (m,)
         Densities [1/m]; their integral over positive distances is 1.
     """
-    from scipy.stats import gaussian_kde
+    from scipy.stats import iqr, norm
 
-    kernel = gaussian_kde(samples)
-    values: NDArray[np.float64] = kernel(positions) + kernel(-positions)
+    spread = min(float(samples.std()), float(iqr(samples)) / 1.349)
+    bandwidth = max(0.9 * spread * len(samples) ** -0.2, NARROWEST)
+    reflected = np.concatenate([samples, -samples])
+    kernels = norm.pdf(positions[:, None], loc=reflected, scale=bandwidth)
+    values: NDArray[np.float64] = kernels.sum(axis=1) / len(samples)
     return values
 
 
