@@ -1,5 +1,6 @@
 """The README: its code runs, and its results are those of its command."""
 
+import json
 import re
 import subprocess
 import sys
@@ -37,6 +38,27 @@ def test_results_are_those_of_the_command(tmp_path):
     code = f"from kinarm.evaluation.eval import main; main({command[1:]!r})"
     table = run(code, tmp_path).strip()
     assert table in README
+
+
+def test_verdicts_are_the_recorded_ones():
+    document = json.loads((ROOT / "data/results/claims.json").read_text(encoding="utf-8"))
+    readings = {reading["name"]: reading["claims"] for reading in document["readings"]}
+    shared = {claim["name"]: claim for claim in readings["spread1-progress-iteration"]}
+    for claim in readings["spread1-progress-none"]:
+        cells = [verdict_cell(claim)]
+        cells.append(verdict_cell(shared[claim["name"]]) if claim["name"] in shared else "")
+        assert f"| {claim['statement']} | {' | '.join(cells)} |" in README
+    assert f"{document['trainings']} trainings" in README
+    assert f"{document['environment_steps'] / 1e6:.0f} million" in README
+
+
+def verdict_cell(claim):
+    """Verdict, and statistics with their intervals."""
+    measured = (
+        "{:.2f} ({:.2f}..{:.2f})".format(part["statistic"], *part["ci95"])
+        for part in claim["parts"]
+    )
+    return f"**{claim['verdict']}**: {'; '.join(measured)}"
 
 
 def test_make_targets_exist():

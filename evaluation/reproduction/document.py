@@ -176,8 +176,9 @@ def reproduction_page(
         "",
         "![Densities of the final distances of ARS and PPO](figure3.png)",
         "",
-        "*The paper's Figure 3: densities of the final distances, thin for each seed; grey, what "
-        "the oracle reaches.*",
+        "*The paper's Figure 3: densities of the final distances, thin for each seed, on a "
+        "square-root scale, where single trials show as small bumps; grey, what the oracle "
+        "reaches.*",
         "",
         "## Learning rate and number of perturbations",
         "",
