@@ -9,13 +9,13 @@ import numpy as np
 
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.evaluation.report import FORMAT_VERSION
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.library import group_of
 from kinarm.simulator import Simulator
 from kinarm.task import load_task
 from kinarm.trajectory import Recording
 
-FORMAT_VERSION = 1
 ENDS = ("outcome", "steps", "final_distance")
 """What has to be the same again."""
 
