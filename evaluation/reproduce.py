@@ -28,7 +28,7 @@ An interrupted reproduction goes on where it stopped, by the same command.
 examples:
   kinarm-reproduce                  the whole paper, into the folder reproduction
   kinarm-reproduce --quick          see in a minute that everything works; results mean nothing
-  kinarm-reproduce --no-ppo         Augmented Random Search alone, some ten minutes
+  kinarm-reproduce --no-ppo         Augmented Random Search alone, a few minutes
 """
 
 

@@ -131,7 +131,7 @@ def test_interrupt_keeps_what_is_finished(command, tmp_path):
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     while not list(tmp_path.glob("reproduction-quick/runs/*.npz")):
         time.sleep(0.02)
