@@ -33,8 +33,10 @@ def test_provenance_is_complete_and_that_of_the_released_recipe(name):
     made = policy.provenance
     assert (made.algorithm, made.recipe, made.task) == (algorithm, recipe, task)
     assert made.seed == int(seed.removeprefix("seed"))
-    released = asdict(SETTINGS[algorithm](recipe, task=task, seed=made.seed))
-    assert made.config == json.loads(json.dumps(released))
+    released = SETTINGS[algorithm](recipe, task=task, seed=made.seed)
+    # Settings that have come since it was trained had no other value then.
+    config = {**asdict(type(released)()), **made.config}
+    assert json.dumps(config, sort_keys=True) == json.dumps(asdict(released), sort_keys=True)
     assert (made.arm, made.arm_digest) == ("paper", Arm.load("paper").digest)
     assert {"python", "kinarm", "numpy", "numba", "pin", "coal"} <= set(made.versions)
     assert made.commit

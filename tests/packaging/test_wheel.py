@@ -104,10 +104,17 @@ def test_every_module_and_data_file_is_in_the_wheel(wheel):
     expected = {
         "/".join([folders[name.split("/")[0]], *name.split("/")[1:]])
         for name in sources()
-        if name.split("/")[0] in folders and not name.endswith(".md")
+        if name.split("/")[0] in folders
+        and not name.endswith(".md")
+        and not name.startswith("data/results/")
     }
     assert expected
     assert expected <= set(names(wheel))
+
+
+def test_recorded_results_are_not_in_the_wheel(wheel):
+    assert any(name.startswith("data/results/") for name in sources())
+    assert not any("data/results" in name for name in names(wheel))
 
 
 def test_types_are_declared(wheel):
