@@ -16,6 +16,7 @@ from kinarm.errors import (
     SceneError,
     StartInContactError,
     UnknownNameError,
+    WorkerError,
 )
 
 EXAMPLES = [
@@ -28,6 +29,7 @@ EXAMPLES = [
     RecordingFileError("no recording"),
     OutputError("no space"),
     MissingExtraError("torch", "ppo"),
+    WorkerError("a worker ended"),
 ]
 
 
