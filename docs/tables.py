@@ -9,13 +9,8 @@ from sphinx.util.docutils import SphinxDirective
 
 from kinarm import Arm, Simulator, arm_names
 from kinarm.collision import enclosing_capsule
+from kinarm.evaluation.reproduction.tables import markdown
 from kinarm.policies import ARS_RECIPES, PPO_RECIPES
-
-
-def markdown(header: list[str], rows: list[list[str]]) -> str:
-    """Format a Markdown table."""
-    lines = [header, ["---"] * len(header), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
 
 
 def numbers(values: np.ndarray) -> str:

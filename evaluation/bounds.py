@@ -10,7 +10,6 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-import kinarm
 from kinarm.errors import OutputError
 from kinarm.evaluation.statistics import Share
 from kinarm.evaluation.trials import TrialSet
@@ -18,7 +17,7 @@ from kinarm.files import CORRUPT, check_folder, write_atomically
 from kinarm.policies import oracle
 from kinarm.policies.oracle import Oracle, Progress
 from kinarm.policies.oracle_solution import OracleSolutions
-from kinarm.policies.provenance import package_versions
+from kinarm.policies.provenance import hash_sources, package_versions
 
 CACHE_VARIABLE = "KINARM_CACHE"
 """Environment variable that names another cache folder."""
@@ -68,13 +67,9 @@ def cache_folder() -> Path:
 @cache
 def oracle_version() -> str:
     """Hash of the sources and package versions that solutions depend on."""
-    simulator, policies = Path(kinarm.__file__).parent, Path(oracle.__file__).parent
-    sources = sorted(simulator.glob("*.py")) + sorted(simulator.glob("kernels/*.py"))
-    sources += [policies / f"{name}.py" for name in ORACLE_MODULES]
-    content = hashlib.sha256(repr(package_versions()).encode())
-    for source in sources:
-        content.update(source.read_bytes())
-    return content.hexdigest()[:12]
+    policies = Path(oracle.__file__).parent
+    sources = hash_sources(*(policies / f"{name}.py" for name in ORACLE_MODULES))
+    return hashlib.sha256(f"{package_versions()} {sources}".encode()).hexdigest()[:12]
 
 
 def _load(path: Path, trials: TrialSet) -> OracleSolutions | None:

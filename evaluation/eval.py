@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from kinarm.command_line import Parser, command_text, run_command, whole_number
 from kinarm.errors import InvalidInputError
-from kinarm.files import check_folder, write_atomically
+from kinarm.files import check_folder, write_text
 
 if TYPE_CHECKING:
     from kinarm.evaluation.entrants import Entrant
@@ -240,8 +240,7 @@ def _write(folder: Path, document: dict[str, Any], evaluations: "list[Evaluation
     """Write the document and the figures."""
     from kinarm.evaluation.plots import distance_histograms, save_figure
 
-    text = json.dumps(document, indent=1).encode()
-    write_atomically(folder / "evaluation.json", lambda file: file.write(text))
+    write_text(folder / "evaluation.json", json.dumps(document, indent=1))
     shown = [e for e in evaluations if e.entrant.algorithm != "oracle"] or evaluations
     save_figure(distance_histograms(shown), folder, "final_distance")
 

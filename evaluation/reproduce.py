@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from kinarm.command_line import Parser, command_text, run_command, whole_number
 from kinarm.errors import InvalidInputError
-from kinarm.files import check_folder, write_atomically
+from kinarm.files import check_folder, write_text
 from kinarm.parallel import available_threads
 
 if TYPE_CHECKING:
@@ -125,8 +125,7 @@ def _claim_folder(folder: Path, study: "Study") -> None:
                 f"{str(folder)!r} holds a {held} reproduction, not a {study.name} one: "
                 "name another folder with --out"
             )
-    text = json.dumps({"study": study.name}).encode()
-    write_atomically(marker, lambda file: file.write(text))
+    write_text(marker, json.dumps({"study": study.name}))
 
 
 def _train(results: "Results", store: "OutcomeStore", jobs: int) -> "Results":

@@ -7,7 +7,7 @@ import zipfile
 import zlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from kinarm.errors import OutputError
 
@@ -43,6 +43,62 @@ def write_atomically(path: str | Path, write: Callable[[IO[bytes]], object]) -> 
         _write_and_move(Path(path), write)
     except OSError as error:
         raise OutputError(f"cannot write {str(path)!r}: {error.strerror}") from error
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write a text file in UTF-8, as `write_atomically` does.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    write_atomically(path, lambda file: file.write(text.encode()))
+
+
+def open_archive(
+    name: str, file: IO[bytes], *, kind: str, file_format: str, version: int, error: type[Exception]
+) -> Any:
+    """Open an ``.npz`` file without pickle, and see that it is of our making.
+
+    Parameters
+    ----------
+    name : str
+        Name of the file, for messages.
+    file : binary file
+        The file.
+    kind : str
+        What it should hold, such as ``"policy"``.
+    file_format : str
+        What its entry ``format`` has to say.
+    version : int
+        The latest version that can be read.
+    error : type
+        What to raise.
+
+    Returns
+    -------
+    numpy.lib.npyio.NpzFile
+        Its content.
+    """
+    import numpy as np
+
+    content = np.load(file, allow_pickle=False)
+    if not isinstance(content, np.lib.npyio.NpzFile) or "format" not in content:
+        raise error(f"{name!r} is not a kinarm {kind}")
+    if str(content["format"]) != file_format:
+        raise error(f"{name!r} holds {str(content['format'])!r}, not {file_format!r}")
+    if int(content["version"]) > version:
+        raise error(
+            f"{name!r} has format version {int(content['version'])}; "
+            f"this kinarm reads up to {version}"
+        )
+    return content
+
+
+def first_line(error: BaseException) -> str:
+    """What an error says, in one line; its name if it says nothing."""
+    return str(error).splitlines()[0] if str(error) else type(error).__name__
 
 
 def _write_and_move(target: Path, write: Callable[[IO[bytes]], object]) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, RecordingFileError
-from kinarm.files import CORRUPT, write_atomically
+from kinarm.files import CORRUPT, first_line, open_archive, write_atomically
 from kinarm.rollouts import Rollouts
 from kinarm.scene import Bench, Scene
 from kinarm.simulator import Simulator
@@ -209,21 +209,20 @@ def load_recordings(path: str | Path) -> list[Recording]:
     except OSError as error:
         raise RecordingFileError(f"cannot read recording {name!r}: {error.strerror}") from error
     except (AttributeError, *CORRUPT) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise RecordingFileError(f"{name!r} is not a complete recording: {reason}") from error
+        raise RecordingFileError(
+            f"{name!r} is not a complete recording: {first_line(error)}"
+        ) from error
 
 
 def _read(name: str, file: IO[bytes]) -> list[Recording]:
-    content = np.load(file, allow_pickle=False)
-    if not isinstance(content, np.lib.npyio.NpzFile) or "format" not in content:
-        raise RecordingFileError(f"{name!r} is not a kinarm recording")
-    if str(content["format"]) != FILE_FORMAT:
-        raise RecordingFileError(f"{name!r} holds {str(content['format'])!r}, not {FILE_FORMAT!r}")
-    version = int(content["version"])
-    if version > FILE_VERSION:
-        raise RecordingFileError(
-            f"{name!r} has format version {version}; this kinarm reads up to {FILE_VERSION}"
-        )
+    content = open_archive(
+        name,
+        file,
+        kind="recording",
+        file_format=FILE_FORMAT,
+        version=FILE_VERSION,
+        error=RecordingFileError,
+    )
     return [
         _recording(entries, {part: content.get(f"{part}_{number}") for part in ARRAYS})
         for number, entries in enumerate(json.loads(str(content["recordings"])))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from kinarm.files import write_atomically
+from kinarm.files import write_text
 
 
 class CurvePoint(NamedTuple):
@@ -50,4 +50,4 @@ def write_curve(path: Path, curve: Sequence[CurvePoint]) -> None:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(("iteration", *CurvePoint._fields))
     writer.writerows((number, *point) for number, point in enumerate(curve, start=1))
-    write_atomically(path, lambda file: file.write(text.getvalue().encode()))
+    write_text(path, text.getvalue())

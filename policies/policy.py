@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError
-from kinarm.files import CORRUPT, write_atomically
+from kinarm.files import CORRUPT, first_line, open_archive, write_atomically
 from kinarm.networks import Networks
 from kinarm.policies.normalizer import input_scale
 from kinarm.policies.provenance import Provenance
@@ -174,21 +174,20 @@ class Policy:
         except OSError as error:
             raise PolicyFileError(f"cannot read policy {name!r}: {error.strerror}") from error
         except CORRUPT as error:
-            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-            raise PolicyFileError(f"{name!r} is not a complete kinarm policy: {reason}") from error
+            raise PolicyFileError(
+                f"{name!r} is not a complete kinarm policy: {first_line(error)}"
+            ) from error
 
     @classmethod
     def _read(cls, name: str, file: IO[bytes]) -> "Policy":
-        content = np.load(file, allow_pickle=False)
-        if not isinstance(content, np.lib.npyio.NpzFile) or "format" not in content:
-            raise PolicyFileError(f"{name!r} is not a kinarm policy")
-        if str(content["format"]) != FILE_FORMAT:
-            raise PolicyFileError(f"{name!r} holds {str(content['format'])!r}, not {FILE_FORMAT!r}")
-        version = int(content["version"])
-        if version > FILE_VERSION:
-            raise PolicyFileError(
-                f"{name!r} has format version {version}; this kinarm reads up to {FILE_VERSION}"
-            )
+        content = open_archive(
+            name,
+            file,
+            kind="policy",
+            file_format=FILE_FORMAT,
+            version=FILE_VERSION,
+            error=PolicyFileError,
+        )
         n_layers = sum(key.startswith("weights_") for key in content.files)
         return cls(
             mean=content["mean"],

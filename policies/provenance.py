@@ -1,5 +1,6 @@
 """Where a policy comes from."""
 
+import hashlib
 import platform
 import subprocess
 from dataclasses import asdict, dataclass, field, fields
@@ -8,6 +9,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import kinarm
 from kinarm.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -98,13 +100,29 @@ class Provenance:
 
 def package_versions() -> dict[str, str]:
     """Versions of Python and of the packages that results depend on."""
+    return dict(_package_versions())
+
+
+@cache
+def _package_versions() -> tuple[tuple[str, str], ...]:
+    """Look them up once in a process: they are asked for with every policy that is made."""
     versions = {"python": platform.python_version()}
     for package in RECORDED_PACKAGES:
         try:
             versions[package] = metadata.version(package)
         except metadata.PackageNotFoundError:
             continue
-    return versions
+    return tuple(versions.items())
+
+
+def hash_sources(*others: Path) -> str:
+    """Hash of the simulator's sources, and of others in the given order."""
+    simulator = Path(kinarm.__file__).parent
+    sources = (*sorted(simulator.glob("*.py")), *sorted(simulator.glob("kernels/*.py")), *others)
+    content = hashlib.sha256()
+    for source in sources:
+        content.update(source.read_bytes())
+    return content.hexdigest()
 
 
 @cache

@@ -17,7 +17,7 @@ from kinarm.evaluation.html_report.profiles import legend, profile_chart
 from kinarm.evaluation.html_report.replays import replay_frame
 from kinarm.evaluation.html_report.summary import card, oracle_rate, summary_table
 from kinarm.evaluation.html_report.worst import worst_table, worst_trials
-from kinarm.files import check_folder, write_atomically
+from kinarm.files import check_folder, write_text
 
 
 def write_report(
@@ -43,8 +43,8 @@ def write_report(
         If it cannot be written.
     """
     check_folder(folder, create=True)
-    path, text = Path(folder) / "index.html", report_page(document, evaluations).encode()
-    write_atomically(path, lambda file: file.write(text))
+    path = Path(folder) / "index.html"
+    write_text(path, report_page(document, evaluations))
     return path
 
 

@@ -6,7 +6,6 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,7 @@ from kinarm.evaluation.reproduction.tables import (
     speed_table,
     sweep_table,
 )
-from kinarm.files import write_atomically
+from kinarm.files import write_text
 from kinarm.policies.provenance import package_versions
 
 FIGURES: dict[str, Callable[[Results], Any]] = {
@@ -68,17 +67,13 @@ def write_all(results: Results, store: OutcomeStore, command: str) -> tuple[Clai
     claims = {reading: assess(results, reading) for reading in readings}
     document = claims_document(results, claims, store, command)
     folder = store.folder
-    _write_text(folder / "claims.json", json.dumps(document, indent=1) + "\n")
-    _write_text(folder / "runs.csv", runs_csv(results))
-    _write_text(folder / "timing.json", json.dumps(timing(results), indent=1) + "\n")
+    write_text(folder / "claims.json", json.dumps(document, indent=1) + "\n")
+    write_text(folder / "runs.csv", runs_csv(results))
+    write_text(folder / "timing.json", json.dumps(timing(results), indent=1) + "\n")
     for name, draw in FIGURES.items():
         save_figure(draw(results), folder, name)
-    _write_text(folder / "REPRODUCTION.md", reproduction_page(results, claims, document))
+    write_text(folder / "REPRODUCTION.md", reproduction_page(results, claims, document))
     return claims[LITERAL]
-
-
-def _write_text(path: Path, text: str) -> None:
-    write_atomically(path, lambda file: file.write(text.encode()))
 
 
 def claims_document(

@@ -10,16 +10,16 @@ from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.plots import BIN_WIDTH, COLOURS
 from kinarm.evaluation.reproduction.outcome import Outcome
 from kinarm.evaluation.reproduction.results import Results
-from kinarm.evaluation.reproduction.study import WITHIN, Purpose
+from kinarm.evaluation.reproduction.study import LEARNERS, WITHIN, Purpose
 from kinarm.task import TASKS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-LEARNERS: dict[Purpose, dict[str, Any]] = {
-    "ars": {"label": "ARS", "color": COLOURS[0], "linestyle": "solid"},
-    "ppo": {"label": "PPO", "color": COLOURS[1], "linestyle": "dashed"},
+STYLES: dict[Purpose, dict[str, Any]] = {
+    "ars": {"label": LEARNERS["ars"], "color": COLOURS[0], "linestyle": "solid"},
+    "ppo": {"label": LEARNERS["ppo"], "color": COLOURS[1], "linestyle": "dashed"},
 }
 """How lines of a learner look; its seeds are drawn thin and faint in the same colour."""
 
@@ -80,7 +80,7 @@ def figure_3(results: Results) -> "Figure":
     for number, (task, axes) in enumerate(zip(TASKS, panels[:, 0], strict=True), start=1):
         distance = np.linspace(0.0, SHOWN_DISTANCE, 481)
         highest = 0.0
-        for learner, style in LEARNERS.items():
+        for learner, style in STYLES.items():
             seeds = [density(o.distance, distance) for o in results.select(learner, task).values()]
             if not seeds:
                 continue
@@ -88,8 +88,7 @@ def figure_3(results: Results) -> "Figure":
             axes.plot(distance, np.mean(seeds, axis=0), lw=2.2, **style)
             highest = max(highest, float(np.max(seeds)))
         trials = results.trials(task)
-        actions = oracle_bounds(trials).actions
-        reached = trials.simulator.rollout_actions(actions, trials.starts, trials.goals).distance
+        reached = oracle_bounds(trials).final_distance
         axes.fill_between(
             distance, density(reached, distance), color="#bbbbbb", lw=0, label="oracle (cut off)"
         )
@@ -142,7 +141,7 @@ def learning_curves(results: Results, against: str) -> "Figure":
     figure, panels = _panels((10.5, 6.4), 2, len(TASKS), sharex=True, sharey="row")
     across = _steps if against == "steps" else _seconds
     for task, (above, below) in zip(TASKS, panels.T, strict=True):
-        for learner, style in LEARNERS.items():
+        for learner, style in STYLES.items():
             outcomes = tuple(results.select(learner, task).values())
             _curves(above, outcomes, across, _share_within, style)
             _curves(below, outcomes, across, _median, style)

@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import kinarm
 from kinarm.errors import PolicyFileError
 from kinarm.evaluation import trials
 from kinarm.evaluation.reproduction.study import Protocol, Training
-from kinarm.files import CORRUPT, write_atomically
+from kinarm.files import CORRUPT, write_atomically, write_text
 from kinarm.policies import oracle
 from kinarm.policies.policy import Policy
-from kinarm.policies.provenance import package_versions
+from kinarm.policies.provenance import hash_sources, package_versions
 
 FORMAT = "kinarm-outcome-1"
 PPO_PACKAGES = ("torch", "stable-baselines3")
@@ -104,8 +103,8 @@ class OutcomeStore:
             path(training).parent.mkdir(parents=True, exist_ok=True)
         policy.save(self.policy_path(training))
         arrays = {**vars(outcome)}
-        wall_time = json.dumps(arrays.pop("wall_time").round(4).tolist()).encode()
-        write_atomically(self._timing_path(training), lambda file: file.write(wall_time))
+        wall_time = arrays.pop("wall_time").round(4).tolist()
+        write_text(self._timing_path(training), json.dumps(wall_time))
         arrays["identity"] = np.array(self._identity(training))
         arrays["policy_digest"] = np.array(_digest(self.policy_path(training)))
         write_atomically(self._run_path(training), partial(np.savez_compressed, **arrays))
@@ -159,9 +158,5 @@ def _digest(path: Path) -> str:
 @cache
 def sources_digest() -> str:
     """Hash of the sources of simulator, learners and trials."""
-    simulator, policies = Path(kinarm.__file__).parent, Path(oracle.__file__).parent
-    sources = [*simulator.glob("*.py"), *simulator.glob("kernels/*.py"), *policies.glob("*.py")]
-    content = hashlib.sha256()
-    for source in (*sorted(sources), Path(trials.__file__)):
-        content.update(source.read_bytes())
-    return content.hexdigest()[:16]
+    policies = Path(oracle.__file__).parent.glob("*.py")
+    return hash_sources(*sorted(policies), Path(trials.__file__))[:16]

@@ -77,10 +77,6 @@ class Results:
         left: NDArray[np.bool_] = self.trials(task, reading).goals[:, 1] > 0
         return left
 
-    def seconds(self) -> float:
-        """Time that all trainings took together, each on one processor or as many as it had [s]."""
-        return float(sum(outcome.wall_time[-1] for outcome in self.outcomes.values()))
-
 
 def steps_to_level(outcome: Outcome, distance: float, share: float) -> float:
     """Environment steps after which a policy first ended within a distance often enough.

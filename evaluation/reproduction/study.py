@@ -1,6 +1,6 @@
 """What a reproduction consists of: the paper's trainings, under every reading of its text."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from itertools import product
 from typing import Any, Literal, get_args
@@ -12,6 +12,9 @@ from kinarm.task import TASKS
 
 Reward = Literal["progress", "sign"]
 Purpose = Literal["sweep", "ars", "ppo"]
+
+LEARNERS: Mapping[Purpose, str] = {"ars": "ARS", "ppo": "PPO"}
+"""Names of the learners that are compared, by the purpose of their trainings."""
 
 SWEEP_RATES = (0.05, 0.01, 0.005)
 SWEEP_PERTURBATIONS = (16, 24, 32)

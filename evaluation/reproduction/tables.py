@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.reproduction.claims import LEVELS, Claim, steps_to_levels
 from kinarm.evaluation.reproduction.results import Results
-from kinarm.evaluation.reproduction.study import LITERAL, WITHIN, Purpose, Reading
+from kinarm.evaluation.reproduction.study import LEARNERS, LITERAL, WITHIN, Reading
 from kinarm.task import TASKS
 
-LEARNERS: Mapping[Purpose, str] = {"ars": "ARS", "ppo": "PPO"}
 MARKS = {"holds": "holds", "does not hold": "no", "undecided": "?"}
 
 

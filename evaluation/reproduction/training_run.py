@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.arm import Arm
+from kinarm.arm import DEFAULT_ARM, Arm
 from kinarm.evaluation.reproduction.outcome import Outcome, OutcomeStore
 from kinarm.evaluation.reproduction.study import Protocol, Reading, Training
 from kinarm.evaluation.trials import TrialSet
@@ -26,7 +26,7 @@ from kinarm.task import load_task
 @cache
 def trial_set(task: str, start_spread: float, trials: int, seed: int) -> TrialSet:
     """Trials of a task with the starts of a reading, drawn once in a process."""
-    simulator = Simulator("paper", load_task(task, start_spread=start_spread))
+    simulator = Simulator(DEFAULT_ARM, load_task(task, start_spread=start_spread))
     return TrialSet.draw(simulator, trials, seed)
 
 

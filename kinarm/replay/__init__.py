@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from kinarm.arm import Arm
-from kinarm.files import write_atomically
+from kinarm.files import write_text
 from kinarm.replay.page import build_page, check_recordings
 from kinarm.trajectory import Recording
 
@@ -36,7 +36,7 @@ class Replay:
         OutputError
             If the file cannot be written; an existing file is then left as it was.
         """
-        write_atomically(path, lambda file: file.write(self.html.encode()))
+        write_text(path, self.html)
 
     def __repr__(self) -> str:
         return f"Replay({len(self.html) / 1e6:.1f} MB of HTML)"

@@ -45,7 +45,7 @@ CAMERA = {"fov": 32, "position": [-2.4, 1.6, 1.9]}
 """In the frame of three.js, whose y axis points up."""
 
 
-class _Skin(Geometry):  # type: ignore[misc]
+class _Skin(Geometry):
     """A mesh with normals, in as few bytes as three.js reads."""
 
     def __init__(self, meshes: Sequence[Mesh]) -> None:
@@ -68,7 +68,7 @@ class _Skin(Geometry):  # type: ignore[misc]
         }
 
 
-class _Lines(Geometry):  # type: ignore[misc]
+class _Lines(Geometry):
     """Pairs of points, shape (2n, 3)."""
 
     def __init__(self, points: NDArray[np.float64]) -> None:
@@ -82,7 +82,7 @@ class _Lines(Geometry):  # type: ignore[misc]
         return {"uuid": self.uuid, "type": "BufferGeometry", "data": attributes}
 
 
-class _Surface(Material):  # type: ignore[misc]
+class _Surface(Material):
     """A finish as a material."""
 
     def __init__(self, finish: Finish) -> None:
@@ -101,7 +101,7 @@ class _Surface(Material):  # type: ignore[misc]
         return described | shine | {"type": "MeshStandardMaterial"}
 
 
-class _Sun(Object):  # type: ignore[misc]
+class _Sun(Object):
     """A light from afar that casts shadows."""
 
     def __init__(self) -> None:

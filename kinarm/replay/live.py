@@ -25,7 +25,7 @@ PORT = 7000
 PORTS_TRIED = 100
 
 
-class _Socket(WebSocketHandler):  # type: ignore[misc]
+class _Socket(WebSocketHandler):
     """A browser that watches, without the messages that Meshcat prints about it."""
 
     def open(self, *_: str, **__: str) -> None:
@@ -44,7 +44,7 @@ class _Application(tornado.web.Application):
         return self.server
 
 
-class _Bridge(ZMQWebSocketBridge):  # type: ignore[misc]
+class _Bridge(ZMQWebSocketBridge):
     """Meshcat's server without its ZeroMQ port, listening to this machine only."""
 
     def make_app(self) -> _Application:

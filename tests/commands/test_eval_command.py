@@ -4,11 +4,11 @@ import json
 
 import numpy as np
 import pytest
+from oracle_calls import count_calls
 
 from kinarm.evaluation.bounds import bounds_document
 from kinarm.evaluation.eval import build_parser, evaluate_all
 from kinarm.evaluation.evaluations import evaluate
-from kinarm.policies.oracle import Oracle
 
 FILES = {"evaluation.json", "final_distance.png", "final_distance.svg"}
 
@@ -28,14 +28,7 @@ def evaluated(run):
 @pytest.fixture
 def solved(monkeypatch) -> list[int]:
     """How many trials the oracle is asked to solve, call by call."""
-    whole, calls = Oracle.solve_batch, []
-
-    def solve_batch(self, starts, goals, **settings):
-        calls.append(len(starts))
-        return whole(self, starts, goals, **settings)
-
-    monkeypatch.setattr(Oracle, "solve_batch", solve_batch)
-    return calls
+    return count_calls(monkeypatch)
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from oracle_calls import count_calls
 
 import kinarm
 from kinarm.arm import Arm
@@ -100,18 +101,6 @@ def run_outside(code: str, folder: Path, **variables: str) -> str:
     )
     assert (done.returncode, done.stderr) == (0, "")
     return done.stdout.strip()
-
-
-def count_calls(monkeypatch) -> list[int]:
-    """Let the oracle note how many trials it is asked to solve."""
-    whole, calls = Oracle.solve_batch, []
-
-    def solve_batch(self, starts, goals, **settings):
-        calls.append(len(starts))
-        return whole(self, starts, goals, **settings)
-
-    monkeypatch.setattr(Oracle, "solve_batch", solve_batch)
-    return calls
 
 
 def forbid_solving(monkeypatch) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from configurations import contact_boundary, random_configurations
+from configurations import contact_boundary, depths, random_configurations
 from numba import njit
 
 from kinarm import kernels
@@ -55,17 +55,6 @@ def within(centre, half, rng, count):
     inside = np.tile(centre, (count, 1))
     inside[:, :n] += shares * half
     return inside
-
-
-def depths(simulator, configurations):
-    """How deep the deepest pair overlaps, according to Coal; less than 0 if nothing touches [m]."""
-    model, geometry = simulator.arm.model, simulator.contact_model.geometry
-    data, geometry_data = model.createData(), geometry.createData()
-    found = []
-    for q in configurations:
-        pin.computeDistances(model, data, geometry, geometry_data, q)
-        found.append(-min(result.min_distance for result in geometry_data.distanceResults))
-    return np.array(found)
 
 
 def certainly_free(simulator, configurations):

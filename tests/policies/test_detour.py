@@ -3,8 +3,8 @@
 import itertools
 
 import numpy as np
-import pinocchio as pin
 import pytest
+from configurations import depths
 
 from kinarm.arm import Arm
 from kinarm.policies.detour import Tree, find_detour
@@ -49,17 +49,6 @@ def between(simulator, path, per_step=16):
         count = 1 + int(per_step * steps_between(simulator, first, second))
         parts.append(first + np.linspace(0, 1, count + 1)[1:, None] * (second - first))
     return np.concatenate(parts)
-
-
-def depths(simulator, configurations):
-    """How deep the deepest pair overlaps, as Coal measures it [m]."""
-    model, geometry = simulator.arm.model, simulator.contact_model.geometry
-    data, geometry_data = model.createData(), geometry.createData()
-    found = []
-    for q in configurations:
-        pin.computeDistances(model, data, geometry, geometry_data, q)
-        found.append(-min(result.min_distance for result in geometry_data.distanceResults))
-    return np.array(found)
 
 
 def length(simulator, path):

@@ -1,6 +1,7 @@
-"""Configurations at which contact is tested."""
+"""Configurations at which contact is tested, and how deep it is there."""
 
 import numpy as np
+import pinocchio as pin
 
 
 def random_configurations(simulator, seed, count):
@@ -20,3 +21,14 @@ def contact_boundary(simulator, seed, count):
         touches = judge(middle)[:, None]
         free, hit = np.where(touches, free, middle), np.where(touches, middle, hit)
     return free, hit
+
+
+def depths(simulator, configurations):
+    """How deep the deepest pair overlaps, according to Coal; less than 0 if nothing touches [m]."""
+    model, geometry = simulator.arm.model, simulator.contact_model.geometry
+    data, geometry_data = model.createData(), geometry.createData()
+    found = []
+    for q in configurations:
+        pin.computeDistances(model, data, geometry, geometry_data, q)
+        found.append(-min(result.min_distance for result in geometry_data.distanceResults))
+    return np.array(found)
