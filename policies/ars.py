@@ -14,7 +14,7 @@ from kinarm.networks import Networks
 from kinarm.policies.ars_config import ARSConfig
 from kinarm.policies.curve import CurvePoint
 from kinarm.policies.mirror import Mirror, task_mirror
-from kinarm.policies.normalizer import Normalizer, input_scale
+from kinarm.policies.normalizer import Normalizer, fold_normalizer
 from kinarm.policies.policy import Layer, Policy
 from kinarm.policies.provenance import Provenance
 from kinarm.simulator import Simulator
@@ -209,10 +209,10 @@ def linear_networks(theta: NDArray[np.float64], normalizer: Normalizer | None) -
     normalizer : Normalizer or None
         Statistics of the observations; None leaves them as they are.
     """
+    bias = np.zeros(theta.shape[:2])
     if normalizer is None:
-        return Networks.linear(theta, np.zeros(theta.shape[:2]))
-    weights = theta * input_scale(normalizer.std)
-    return Networks.linear(weights, -weights @ normalizer.mean)
+        return Networks.linear(theta, bias)
+    return Networks.linear(*fold_normalizer(theta, bias, normalizer.mean, normalizer.std))
 
 
 def top_directions(returns: NDArray[np.float64], b: int) -> NDArray[np.int64]:
@@ -255,7 +255,9 @@ def ars_step(
     sigma = float(returns.std()) if config.scale_by_deviation else 1.0
     if sigma < 1e-12:
         return np.zeros(delta.shape[1:])
-    step: NDArray[np.float64] = np.tensordot(returns[0, top] - returns[1, top], delta[top], axes=1)
+    difference = returns[0, top] - returns[1, top]
+    # Summed in order, not by BLAS: the same bits on every processor.
+    step: NDArray[np.float64] = (difference[:, None, None] * delta[top]).sum(axis=0)
     return step_size / (b * sigma) * step
 
 

@@ -21,6 +21,34 @@ def input_scale(std: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(constant, 0.0, 1.0 / np.where(constant, 1.0, std))
 
 
+def fold_normalizer(
+    weights: NDArray[np.float64],
+    bias: NDArray[np.float64],
+    mean: NDArray[np.float64],
+    std: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Make affine layers that take observations as they are of ones that take normalised ones.
+
+    The sums are taken in a fixed order, not by BLAS, whose order depends on the processor.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (..., n_out, n_observations)
+        Weights of the layers.
+    bias : ndarray, shape (..., n_out)
+        Their biases.
+    mean, std : ndarray, shape (n_observations,)
+        Statistics by which their inputs are normalised.
+
+    Returns
+    -------
+    weights, bias : ndarray
+        Of the same shapes.
+    """
+    scaled = weights * input_scale(std)
+    return scaled, bias - (scaled * mean).sum(axis=-1)
+
+
 @dataclass(frozen=True, eq=False)
 class Normalizer:
     """Statistics of all observations seen so far: the paper's mu and diag(Sigma).

@@ -13,7 +13,7 @@ from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.files import CORRUPT, first_line, open_archive, write_atomically
 from kinarm.networks import Networks
-from kinarm.policies.normalizer import input_scale
+from kinarm.policies.normalizer import fold_normalizer, input_scale
 from kinarm.policies.provenance import Provenance
 from kinarm.validation import finite_array
 
@@ -112,9 +112,8 @@ class Policy:
 
     @cached_property
     def _networks(self) -> Networks:
-        scale = input_scale(self.std)
-        first = self.layers[0].weights * scale
-        layers = (Layer(first, self.layers[0].bias - first @ self.mean), *self.layers[1:])
+        first = Layer(*fold_normalizer(*self.layers[0], self.mean, self.std))
+        layers = (first, *self.layers[1:])
         flat = [part for weights, bias in layers for part in (weights.T.reshape(-1), bias)]
         widths = [self.n_observations, *(len(layer.bias) for layer in layers)]
         return Networks(np.array(widths, dtype=np.int64), np.concatenate(flat)[None])

@@ -1,0 +1,153 @@
+"""Digests of what must not change: trials, rollouts, training iterations and oracle solutions.
+
+``python tests/golden/digests.py`` prints them, ``--record`` keeps them in ``digests.json``.
+Numbers are rounded to 8 decimals, far above what processors and C libraries differ by.
+"""
+
+import hashlib
+import json
+import sys
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from kinarm.evaluation.trials import TrialSet
+from kinarm.policies.ars import ARSState, train_ars
+from kinarm.policies.library import load_policy
+from kinarm.policies.oracle import Oracle
+from kinarm.policies.recipes import ars_recipe, ppo_recipe
+from kinarm.rollouts import Rollouts
+from kinarm.simulator import Simulator
+
+RECORDED = Path(__file__).with_name("digests.json")
+ARMS = ("lrmate200ic_5l", "paper", "paper_flange")
+TASKS = ("left", "right", "both")
+EPISODES = 96
+
+
+def digest(arrays: Iterable[object], decimals: int = 8) -> str:
+    """Hash of numbers, rounded."""
+    content = hashlib.sha256()
+    for array in arrays:
+        numbers = np.asarray(array)
+        content.update(str(numbers.shape).encode())
+        rounded = np.round(numbers.astype(np.float64), decimals) + 0.0
+        content.update(rounded.tobytes())
+    return content.hexdigest()[:16]
+
+
+def of_rollouts(rollouts: Rollouts) -> str:
+    """Hash of everything that happened."""
+    return digest(
+        [
+            *(rollouts.success, rollouts.collision, rollouts.steps, rollouts.distance),
+            *(rollouts.returns, rollouts.configurations, rollouts.targets),
+            *(np.nan_to_num(rollouts.paths, nan=-9.0), rollouts.moments),
+        ]
+    )
+
+
+def trial_digests() -> dict[str, str]:
+    """Starts and goals of the trials of every arm and task."""
+    found = {}
+    for arm in ARMS:
+        for task in TASKS:
+            trials = TrialSet.draw(Simulator(arm, task), 200, 0)
+            found[f"trials {arm} {task}"] = digest([trials.starts, trials.goals], 12)
+    return found
+
+
+def rollout_digests() -> dict[str, str]:
+    """Rollouts of random actions and of shipped policies on every arm and task."""
+    found = {}
+    for arm in ARMS:
+        for task in TASKS:
+            simulator = Simulator(arm, task)
+            rng = np.random.default_rng(5)
+            starts, goals = simulator.sample(rng, EPISODES)
+            actions = rng.uniform(-1, 1, (EPISODES, 64, simulator.n_actions))
+            found[f"rollouts {arm} {task} random"] = of_rollouts(
+                simulator.rollout_actions(actions, starts, goals, record=True)
+            )
+            learners = ("ars-paper", "ars-tuned", "ppo-tuned")
+            for learner in (*learners, "ppo-paper") if arm == "paper" else learners:
+                policy = load_policy(f"{learner}-{task}-seed1")
+                shift = np.linspace(-0.5, 0.5, simulator.n_observations)
+                found[f"rollouts {arm} {task} {learner}"] = of_rollouts(
+                    simulator.rollout(policy, starts, goals, record=True, shift=shift)
+                )
+    return found
+
+
+def ars_digests() -> dict[str, str]:
+    """Ten iterations of Augmented Random Search."""
+    found = {}
+    for recipe in ("paper", "tuned", "brs"):
+        for task in TASKS:
+            states: list[ARSState] = []
+            config = replace(ars_recipe(recipe, task=task, seed=2), iterations=10)
+            result = train_ars(config, on_iteration=states.append)
+            state = states[-1]
+            curve = [point[:4] for point in state.curve]
+            found[f"ars {recipe} {task}"] = digest(
+                [
+                    *(state.theta, state.normalizer.mean, state.normalizer.squares, curve),
+                    *result.policy.networks().weights,
+                ]
+            )
+    return found
+
+
+def ppo_digests() -> dict[str, str]:
+    """Three iterations of PPO, which follow torch's kernels: the same on one machine only."""
+    from kinarm.policies.ppo import train_ppo
+    from kinarm.policies.ppo_state import PPOState
+
+    found = {}
+    for recipe, task in (("paper", "right"), ("tuned", "left"), ("tuned", "both")):
+        states: list[PPOState] = []
+        train_ppo(
+            replace(ppo_recipe(recipe, task=task, seed=2), iterations=3),
+            on_iteration=states.append,
+        )
+        state = states[-1]
+        found[f"ppo {recipe} {task}"] = digest(
+            [
+                *(state.parameters, state.first_moment, state.second_moment),
+                *(state.normalizer.mean, state.normalizer.squares, *state.episodes),
+                np.nan_to_num([point[:4] for point in state.curve]),
+            ]
+        )
+    return found
+
+
+def oracle_digests() -> dict[str, str]:
+    """What the oracle knows about 200 trials."""
+    found = {}
+    for arm, task in (("paper", "both"), ("paper_flange", "right"), ("lrmate200ic_5l", "left")):
+        simulator = Simulator(arm, task)
+        trials = TrialSet.draw(simulator, 200, 3)
+        solutions = Oracle(simulator=simulator).solve_batch(trials.starts, trials.goals)
+        found[f"oracle {arm} {task}"] = digest(
+            [
+                *(solutions.reachable, solutions.tight, solutions.steps),
+                *(solutions.steps_lower_bound, solutions.final_distance),
+                *(solutions.distance_lower_bound, solutions.actions),
+                np.nan_to_num(solutions.paths, nan=-9.0),
+            ]
+        )
+    return found
+
+
+def all_digests() -> dict[str, str]:
+    """Everything that is the same on every machine."""
+    return {**trial_digests(), **rollout_digests(), **ars_digests(), **oracle_digests()}
+
+
+if __name__ == "__main__":
+    digests = {**all_digests(), **ppo_digests()}
+    if "--record" in sys.argv:
+        RECORDED.write_text(json.dumps(digests, indent=1) + "\n")
+    sys.stdout.write(json.dumps(digests, indent=1) + "\n")
