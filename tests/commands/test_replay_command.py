@@ -215,8 +215,8 @@ def test_an_evaluation_that_no_longer_holds(replay, evaluation, tmp_path):
         path.write_text(json.dumps(copy))
         return replay(path, "--policy", "random", *QUICK)
 
-    assert document["protocol"]["format_version"] == 1
-    refused(changed(lambda d: d["protocol"].update(format_version=2)), "format version 2")
+    assert document["protocol"]["format_version"] == 2
+    refused(changed(lambda d: d["protocol"].update(format_version=9)), "format version 9")
     refused(changed(lambda d: d["protocol"].update(arm_digest="0")), "of arm 'paper' (0)")
     refused(changed(lambda d: d["protocol"]["tasks"]["right"]["goals"].reverse()), "hash")
     row = document["results"].index(next(r for r in document["results"] if r["policy"] == "random"))
