@@ -14,8 +14,7 @@ from kinarm.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from kinarm.arm import Arm
-    from kinarm.policies.ars_config import ARSConfig
-    from kinarm.policies.ppo_config import PPOConfig
+    from kinarm.policies.learners import Config
 
 RECORDED_PACKAGES = (
     *("kinarm", "numpy", "numba", "pin", "coal", "gymnasium", "scipy"),
@@ -62,7 +61,7 @@ class Provenance:
 
     @classmethod
     def of(
-        cls, algorithm: str, config: "ARSConfig | PPOConfig", arm: "Arm", environment_steps: int
+        cls, algorithm: str, config: "Config", arm: "Arm", environment_steps: int
     ) -> "Provenance":
         """Record a training that took place here and now, with these settings."""
         return cls(
@@ -73,7 +72,7 @@ class Provenance:
             arm_digest=arm.digest,
             seed=config.seed,
             environment_steps=environment_steps,
-            config=asdict(config),
+            config=asdict(config),  # type: ignore[call-overload]
             versions=package_versions(),
             commit=source_commit(),
         )

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import pytest
 
 from kinarm.evaluation import bench, eval, replay, reproduce  # noqa: A004
-from kinarm.policies import Policy, ars_recipe, train, train_ars
+from kinarm.policies import Policy, recipe, train, train_policy
 
 ROOT = Path(__file__).resolve().parents[2]
 MODULES = {
@@ -81,7 +81,7 @@ def run_outside(command: Callable[..., list[str]]) -> Callable[..., Answer]:
 @pytest.fixture(scope="session")
 def policy() -> Policy:
     """A policy for ``right``, hardly trained."""
-    return train_ars(ars_recipe("paper", task="right", iterations=5)).policy
+    return train_policy(recipe("ars", "paper", task="right", iterations=5)).policy
 
 
 @pytest.fixture(scope="session")
@@ -95,6 +95,6 @@ def policy_folder(policy: Policy, tmp_path_factory: pytest.TempPathFactory) -> P
         "flange": {"task": "right", "arm": "paper_flange"},
     }
     for name, settings in others.items():
-        config = ars_recipe("paper", iterations=2, **settings)
-        train_ars(config).policy.save(folder / f"{name}.npz")
+        config = recipe("ars", "paper", iterations=2, **settings)
+        train_policy(config).policy.save(folder / f"{name}.npz")
     return folder

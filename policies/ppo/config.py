@@ -2,14 +2,15 @@
 
 import math
 from dataclasses import dataclass
-from typing import get_args
+from typing import TYPE_CHECKING, get_args
 
-from kinarm.arm import DEFAULT_ARM, Arm
 from kinarm.errors import InvalidInputError
-from kinarm.policies.ars_config import Schedule
-from kinarm.simulator import Simulator
+from kinarm.policies.learners import Schedule, scheduled
 from kinarm.task import RewardWeights, load_task
 from kinarm.validation import whole_number
+
+if TYPE_CHECKING:
+    from kinarm.simulator import Simulator
 
 WHOLE_NUMBERS = ("arms", "rollout_steps", "minibatch", "epochs", "iterations", "horizon")
 POSITIVE_NUMBERS = ("learning_rate", "clip_range", "max_grad_norm", "tolerance")
@@ -90,7 +91,7 @@ class PPOConfig:
     """
 
     task: str = "right"
-    arm: str = DEFAULT_ARM
+    arm: str = "paper"
     seed: int = 0
     recipe: str = "custom"
     arms: int = 16
@@ -168,8 +169,10 @@ class PPOConfig:
         """Environment steps of the whole training."""
         return self.iterations * self.steps_per_iteration
 
-    def simulator(self) -> Simulator:
+    def simulator(self) -> "Simulator":
         """Build the simulator to train in; its batches are too small for several threads."""
+        from kinarm.simulator import Simulator
+
         reward = RewardWeights(
             progress=self.progress_reward,
             closer=self.closer_reward,
@@ -184,13 +187,11 @@ class PPOConfig:
             start_spread=self.start_spread,
             reward=reward,
         )
-        return Simulator(Arm.load(self.arm), task, threads=1)
+        return Simulator(self.arm, task, threads=1)
 
     def learning_rate_at(self, done: float) -> float:
         """Learning rate after this share of the training."""
-        if self.learning_rate_schedule == "constant":
-            return self.learning_rate
-        return self.learning_rate * (1 - done)
+        return scheduled(self.learning_rate, self.learning_rate_schedule, done)
 
     def start_spread_at(self, done: float) -> float:
         """Spread of the start configurations after this share of the training."""

@@ -2,16 +2,17 @@
 
 import math
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
-from kinarm.arm import DEFAULT_ARM, Arm
 from kinarm.errors import InvalidInputError
-from kinarm.simulator import Simulator
+from kinarm.policies.learners import Schedule, scheduled
 from kinarm.task import RewardWeights, load_task
 from kinarm.validation import whole_number
 
+if TYPE_CHECKING:
+    from kinarm.simulator import Simulator
+
 Sharing = Literal["none", "pair", "iteration"]
-Schedule = Literal["constant", "linear"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +70,7 @@ class ARSConfig:
     """
 
     task: str = "right"
-    arm: str = DEFAULT_ARM
+    arm: str = "paper"
     seed: int = 0
     recipe: str = "custom"
     step_size: float = 0.02
@@ -113,8 +114,10 @@ class ARSConfig:
                     f"{name} must be one of {', '.join(choices)}, got {getattr(self, name)!r}"
                 )
 
-    def simulator(self, threads: int | None = None) -> Simulator:
+    def simulator(self, threads: int | None = None) -> "Simulator":
         """Build the simulator to train in."""
+        from kinarm.simulator import Simulator
+
         reward = RewardWeights(
             progress=self.progress_reward,
             closer=self.closer_reward,
@@ -125,10 +128,8 @@ class ARSConfig:
         task = load_task(
             self.task, horizon=self.horizon, start_spread=self.start_spread, reward=reward
         )
-        return Simulator(Arm.load(self.arm), task, threads=threads)
+        return Simulator(self.arm, task, threads=threads)
 
     def step_size_at(self, iteration: int) -> float:
         """Learning rate of an iteration."""
-        if self.step_size_schedule == "constant":
-            return self.step_size
-        return self.step_size * (1 - iteration / self.iterations)
+        return scheduled(self.step_size, self.step_size_schedule, iteration / self.iterations)
