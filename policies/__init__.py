@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from kinarm.policies.ars.config import ARSConfig
     from kinarm.policies.ars.state import ARSState
     from kinarm.policies.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+    from kinarm.policies.config import TrainingConfig
     from kinarm.policies.curve import CurvePoint
     from kinarm.policies.inverse import inverse_kinematics
     from kinarm.policies.learners import (
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
         TrainingState,
         find_learner,
         learner_names,
-        recipe,
         register_learner,
         state_policy,
         train_policy,
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from kinarm.policies.ppo.config import PPOConfig
     from kinarm.policies.ppo.state import PPOState
     from kinarm.policies.provenance import Provenance
+    from kinarm.policies.recipes import recipe
 
 __all__ = [
     "ARSConfig",
@@ -45,6 +46,7 @@ __all__ = [
     "PPOState",
     "Policy",
     "Provenance",
+    "TrainingConfig",
     "TrainingResult",
     "TrainingState",
     "find_learner",
@@ -71,6 +73,7 @@ __getattr__ = lazy_exports(
         "ars.config": ("ARSConfig",),
         "ars.state": ("ARSState",),
         "checkpoint": ("Checkpoint", "load_checkpoint", "save_checkpoint"),
+        "config": ("TrainingConfig",),
         "curve": ("CurvePoint",),
         "inverse": ("inverse_kinematics",),
         "learners": (
@@ -79,7 +82,6 @@ __getattr__ = lazy_exports(
             "TrainingState",
             "find_learner",
             "learner_names",
-            "recipe",
             "register_learner",
             "state_policy",
             "train_policy",
@@ -92,5 +94,6 @@ __getattr__ = lazy_exports(
         "ppo.config": ("PPOConfig",),
         "ppo.state": ("PPOState",),
         "provenance": ("Provenance",),
+        "recipes": ("recipe",),
     },
 )

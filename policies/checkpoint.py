@@ -1,21 +1,21 @@
 """Checkpoints of a training, from which it resumes exactly."""
 
 import json
-from collections.abc import Iterable, Mapping
-from dataclasses import asdict, fields, is_dataclass
+from collections.abc import Iterable
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.arm import Arm
+from kinarm._archive import Arrays, load_archive, reading, save_archive
+from kinarm._fields import from_plain, to_plain
 from kinarm.errors import PolicyFileError
-from kinarm.files import CORRUPT, first_line, open_archive, write_atomically
-from kinarm.policies.learners import Config, TrainingState, find_learner, learner_of
+from kinarm.policies.config import TrainingConfig
+from kinarm.policies.learners import TrainingState, find_learner, learner_of
 
-FILE_FORMAT = "kinarm-checkpoint"
-FILE_VERSION = 1
+FORMAT_VERSION = 1
 
 
 class Checkpoint(NamedTuple):
@@ -33,7 +33,7 @@ class Checkpoint(NamedTuple):
     state: Any
 
 
-def save_checkpoint(path: str | Path, config: Config, state: TrainingState) -> None:
+def save_checkpoint(path: str | Path, config: TrainingConfig, state: TrainingState) -> None:
     """Write the state of a training, replacing an earlier checkpoint only when complete.
 
     Parameters
@@ -50,15 +50,12 @@ def save_checkpoint(path: str | Path, config: Config, state: TrainingState) -> N
     OutputError
         If the file cannot be written.
     """
-    arrays: dict[str, Any] = {
-        "format": np.array(FILE_FORMAT),
-        "version": np.array(FILE_VERSION),
-        "learner": np.array(learner_of(config).name),
-        "config": np.array(json.dumps(asdict(config), sort_keys=True)),  # type: ignore[call-overload]
-        "arm_digest": np.array(Arm.load(config.arm).digest),
-        **arrays_of("state", state),
+    header = {
+        "learner": learner_of(config).name,
+        "config": to_plain(config),
+        "arm_digest": config.problem.arm_digest,
     }
-    write_atomically(path, lambda file: np.savez(file, **arrays))
+    save_archive(path, "checkpoint", FORMAT_VERSION, arrays_of("state", state), header)
 
 
 def load_checkpoint(path: str | Path) -> Checkpoint:
@@ -69,29 +66,17 @@ def load_checkpoint(path: str | Path) -> Checkpoint:
     PolicyFileError
         If the file is missing, truncated or not a checkpoint, or if the arm has changed since.
     """
-    name = str(path)
-    try:
-        with Path(path).open("rb") as file:
-            content = open_archive(
-                name,
-                file,
-                kind="checkpoint",
-                file_format=FILE_FORMAT,
-                version=FILE_VERSION,
-                error=PolicyFileError,
-            )
-            learner = find_learner(str(content["learner"]))
-            config = learner.config(**json.loads(str(content["config"])))
-            state = rebuilt(learner.state, "state", content)
-            arm_digest = str(content["arm_digest"])
-    except OSError as error:
-        raise PolicyFileError(f"cannot read checkpoint {name!r}: {error.strerror}") from error
-    except (IndexError, *CORRUPT) as error:
+    header, arrays = load_archive(path, "checkpoint", FORMAT_VERSION, PolicyFileError)
+    name = repr(str(path))
+    with reading(name, "checkpoint", PolicyFileError):
+        learner = find_learner(header["learner"])
+        config = from_plain(learner.config, header["config"], "settings")
+        state = rebuilt(learner.state, "state", arrays)
+        arm_digest = header["arm_digest"]
+    if config.problem.arm_digest != arm_digest:
         raise PolicyFileError(
-            f"{name!r} is not a complete checkpoint: {first_line(error)}"
-        ) from error
-    if Arm.load(config.arm).digest != arm_digest:
-        raise PolicyFileError(f"arm {config.arm!r} has changed since {name!r} was written")
+            f"arm {config.problem.arm.name!r} has changed since {name} was written"
+        )
     return Checkpoint(config, state)
 
 
@@ -113,7 +98,7 @@ def arrays_of(name: str, value: Any) -> dict[str, NDArray[Any]]:
     return {name: np.array(value)}
 
 
-def rebuilt(kind: Any, name: str, arrays: Mapping[str, NDArray[Any]]) -> Any:
+def rebuilt(kind: Any, name: str, arrays: Arrays) -> Any:
     """Rebuild a value of a kind, a type or its annotation, from what `arrays_of` returned."""
     if is_dataclass(kind) or hasattr(kind, "_fields"):
         hints = get_type_hints(kind)

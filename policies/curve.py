@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from kinarm.files import write_text
+from kinarm._files import write_text
 
 
 class CurvePoint(NamedTuple):

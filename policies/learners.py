@@ -5,43 +5,17 @@ class. The module of ARS, for example, is ``kinarm.policies.ars``.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 
 from kinarm.errors import InvalidInputError, MissingExtraError, UnknownNameError
+from kinarm.policies.config import TrainingConfig
 from kinarm.policies.curve import CurvePoint
 
 if TYPE_CHECKING:
     from kinarm.policies.policy import Policy
-
-Schedule = Literal["constant", "linear"]
-"""Whether a setting stays or falls linearly to zero in the course of a training."""
-
-
-class Config(Protocol):
-    """Settings of a training: a frozen dataclass, whose other fields are the learner's own."""
-
-    @property
-    def task(self) -> str:
-        """Task to train for."""
-
-    @property
-    def arm(self) -> str:
-        """Arm to train."""
-
-    @property
-    def seed(self) -> int:
-        """Seed of all randomness."""
-
-    @property
-    def recipe(self) -> str:
-        """Name of the settings, for the record."""
-
-    @property
-    def iterations(self) -> int:
-        """After how many iterations the training is complete."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,7 +49,7 @@ class TrainingState:
         return self.curve[-1].wall_time if self.curve else 0.0
 
 
-ConfigT = TypeVar("ConfigT", bound=Config)
+ConfigT = TypeVar("ConfigT", bound=TrainingConfig)
 StateT = TypeVar("StateT", bound=TrainingState)
 
 
@@ -108,7 +82,7 @@ class Learner(Generic[ConfigT, StateT]):
     policy : callable
         Freezes a state into a policy, given settings and state.
     adapt : callable, optional
-        Adapts a recipe to the task that it is for.
+        Adapts a recipe to the problem that it is for.
     options : tuple of str
         Names of the options that `begin` takes.
     packages : tuple of str
@@ -193,7 +167,7 @@ def find_learner(name: str) -> Learner[Any, Any]:
     return learner
 
 
-def learner_of(config: Config) -> Learner[Any, Any]:
+def learner_of(config: TrainingConfig) -> Learner[Any, Any]:
     """Look up the learner that settings are for.
 
     Raises
@@ -209,7 +183,7 @@ def learner_of(config: Config) -> Learner[Any, Any]:
 
 
 def train_policy(
-    config: Config,
+    config: TrainingConfig,
     *,
     state: TrainingState | None = None,
     on_iteration: Callable[[Any], object] | None = None,
@@ -251,45 +225,9 @@ def train_policy(
     return TrainingResult(learner.policy(config, state), state.curve, state)
 
 
-def state_policy(config: Config, state: TrainingState) -> "Policy":
+def state_policy(config: TrainingConfig, state: TrainingState) -> "Policy":
     """Freeze a state of a training into a policy, with all that belongs to it."""
     return learner_of(config).policy(config, state)
-
-
-def recipe(learner: str, name: str = "paper", **changes: Any) -> Any:
-    """Look settings up, adapt them to the task and replace some of them.
-
-    Parameters
-    ----------
-    learner : str
-        Name of the learner.
-    name : str
-        Name of the recipe.
-    **changes
-        Fields of the learner's settings to replace; None leaves a field as it is. If another
-        field than task, arm and seed changes, the recipe's name in the result gets a star.
-
-    Returns
-    -------
-    ARSConfig, PPOConfig or settings of another learner
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such learner, recipe or field.
-    """
-    found = find_learner(learner)
-    if name not in found.recipes:
-        raise UnknownNameError("recipe", name, found.recipes)
-    available = [item.name for item in fields(found.config)]
-    for change in changes:
-        if change not in available:
-            raise UnknownNameError(f"setting of {learner}", change, available)
-    given = {key: value for key, value in changes.items() if value is not None}
-    circumstances = {key: given[key] for key in ("task", "arm", "seed") if key in given}
-    standard = found.adapt(replace(found.recipes[name], **circumstances))
-    made = replace(standard, **given)
-    return made if made == standard else replace(made, recipe=given.get("recipe", f"{name}*"))
 
 
 def require_packages(packages: tuple[str, ...], extra: str) -> None:
@@ -303,8 +241,3 @@ def require_packages(packages: tuple[str, ...], extra: str) -> None:
     for package in packages:
         if find_spec(package) is None:
             raise MissingExtraError(package, extra)
-
-
-def scheduled(value: float, schedule: Schedule, done: float) -> float:
-    """Value of a setting after this share of the training."""
-    return value if schedule == "constant" else value * (1 - done)

@@ -5,15 +5,16 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.networks import Networks
+from kinarm.networks import Mirror, Networks
 from kinarm.policies.ars.config import ARSConfig
 from kinarm.policies.ars.state import ARSState
 from kinarm.policies.curve import CurvePoint
-from kinarm.policies.mirror import Mirror, task_mirror
+from kinarm.policies.mirror import commuting_weights, task_mirror
 from kinarm.policies.normalizer import Normalizer, fold_normalizer
 from kinarm.policies.policy import Layer, Policy
 from kinarm.policies.provenance import Provenance
 from kinarm.simulator import Simulator
+from kinarm.world import World
 
 
 class ARSTraining:
@@ -29,7 +30,7 @@ class ARSTraining:
 
     def __init__(self, config: ARSConfig, threads: int | None = None) -> None:
         self.config, self.simulator = config, config.simulator(threads)
-        self.mirror = task_mirror(config.symmetric, self.simulator)
+        self.mirror = task_mirror(config.symmetric, self.simulator.world)
 
     def initial_state(self) -> ARSState:
         """State before the first iteration."""
@@ -78,7 +79,7 @@ def ars_iteration(
     N, theta, normalizer = config.directions, state.theta, state.normalizer
     delta = rng.standard_normal((N, *theta.shape))
     if mirror is not None:
-        delta *= mirror.weights
+        delta *= commuting_weights(mirror)
     candidates = np.concatenate([theta + config.noise * delta, theta - config.noise * delta])
     starts, goals = shared_scenarios(config, simulator, rng)
     rollouts = simulator.rollout(
@@ -193,8 +194,7 @@ def ars_step(
 
 def linear_policy(config: ARSConfig, state: ARSState) -> Policy:
     """Freeze a state of the training into a policy."""
-    simulator = config.simulator(threads=1)
-    mirror = task_mirror(config.symmetric, simulator)
+    mirror = task_mirror(config.symmetric, World(config.problem, threads=1))
     n_actions, n_observations = state.theta.shape
     normalizer = policy_normalizer(config, state.normalizer, mirror)
     normalizer = normalizer or Normalizer.empty(n_observations)
@@ -202,5 +202,5 @@ def linear_policy(config: ARSConfig, state: ARSState) -> Policy:
         mean=normalizer.mean,
         std=normalizer.std,
         layers=(Layer(state.theta, np.zeros(n_actions)),),
-        provenance=Provenance.of("ars", config, simulator.arm, state.environment_steps),
+        provenance=Provenance.of("ars", config, state.environment_steps),
     )

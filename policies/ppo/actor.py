@@ -10,7 +10,7 @@ from kinarm.policies.policy import Layer, Policy
 from kinarm.policies.ppo.config import PPOConfig
 from kinarm.policies.ppo.state import PPOState
 from kinarm.policies.provenance import Provenance
-from kinarm.policies.symmetric_layers import symmetric_layers
+from kinarm.world import World
 
 
 def actor_policy(config: PPOConfig, state: PPOState) -> Policy:
@@ -28,17 +28,13 @@ def actor_policy(config: PPOConfig, state: PPOState) -> Policy:
     InvalidInputError
         If the state has another number of parameters than such a training.
     """
-    simulator = config.simulator()
-    mirror = task_mirror(config.symmetric, simulator)
-    layers = actor_layers(config, state, simulator.n_observations, simulator.n_actions)
-    mean, std = state.normalizer.mean, state.normalizer.std
-    if mirror is not None:
-        layers = symmetric_layers(layers, mean, std, mirror)
+    world = World(config.problem, threads=1)
     return Policy(
-        mean=mean,
-        std=std,
-        layers=layers,
-        provenance=Provenance.of("ppo", config, simulator.arm, state.environment_steps),
+        mean=state.normalizer.mean,
+        std=state.normalizer.std,
+        layers=actor_layers(config, state, world.n_observations, world.n_actions),
+        provenance=Provenance.of("ppo", config, state.environment_steps),
+        mirror=task_mirror(config.symmetric, world),
     )
 
 
@@ -50,8 +46,8 @@ def actor_layers(
     Their order is that of Stable-Baselines3: standard deviations of the actions, hidden layers of
     actor and critic, last layers of actor and critic; of every layer the weights come first.
     """
-    hidden = list(pairwise((n_observations, *config.hidden)))
-    actor_end, critic_end = (config.hidden[-1], n_actions), (config.hidden[-1], 1)
+    hidden = list(pairwise((n_observations, *config.net_arch)))
+    actor_end, critic_end = (config.net_arch[-1], n_actions), (config.net_arch[-1], 1)
     widths = [*hidden, *hidden, actor_end, critic_end]
     sizes = [n_actions, *(size for n_in, n_out in widths for size in (n_in * n_out, n_out))]
     if len(state.parameters) != sum(sizes):

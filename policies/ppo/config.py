@@ -2,49 +2,35 @@
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, get_args
 
+from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
-from kinarm.policies.learners import Schedule, scheduled
-from kinarm.task import RewardWeights, load_task
-from kinarm.validation import whole_number
-
-if TYPE_CHECKING:
-    from kinarm.simulator import Simulator
-
-WHOLE_NUMBERS = ("arms", "rollout_steps", "minibatch", "epochs", "iterations", "horizon")
-POSITIVE_NUMBERS = ("learning_rate", "clip_range", "max_grad_norm", "tolerance")
-SHARES = ("gamma", "gae_lambda", "start_spread", "initial_start_spread", "widening")
+from kinarm.policies.config import Schedule, TrainingConfig, scheduled
+from kinarm.problem import ReachProblem
 
 
 @dataclass(frozen=True, kw_only=True)
-class PPOConfig:
+class PPOConfig(TrainingConfig):
     """Settings of a training of 1.2 million environment steps, as in the paper.
 
-    The paper gives no other settings; the defaults are those of Stable-Baselines3, save that 16
-    arms fill its rollouts of 2000 steps and that minibatches are larger, for speed.
+    The paper gives no other settings; names and defaults are those of Stable-Baselines3, save that
+    16 environments fill its rollouts of 2000 steps and that minibatches are larger, for speed.
 
     Parameters
     ----------
-    task : str
-        ``"left"``, ``"right"`` or ``"both"``.
-    arm : str
-        A shipped arm or the path of a URDF.
-    seed : int
-        Seed of all randomness.
-    recipe : str
-        Name of these settings, for the record.
-    arms : int
-        Arms that are simulated at once.
-    rollout_steps : int
-        Steps of each arm between two updates.
+    problem, reward, seed, recipe
+        See `TrainingConfig`.
     iterations : int
         Rollouts, each followed by an update.
-    minibatch : int
+    n_envs : int
+        Arms that are simulated at once.
+    n_steps : int
+        Steps of each arm between two updates.
+    batch_size : int
         Environment steps per gradient step.
-    epochs : int
+    n_epochs : int
         How often an update uses each environment step.
-    hidden : tuple of int
+    net_arch : tuple of int
         Widths of the hidden layers of the actor and of the critic.
     learning_rate : float
         Step size of Adam.
@@ -56,138 +42,84 @@ class PPOConfig:
         Decay of generalised advantage estimation.
     clip_range : float
         How far the probability ratio may leave 1.
-    entropy_weight : float
+    ent_coef : float
         Weight of the entropy in the loss.
-    value_weight : float
+    vf_coef : float
         Weight of the critic's loss.
     max_grad_norm : float
         Gradients are shortened to this norm.
-    initial_log_std : float
+    log_std_init : float
         Logarithm of the standard deviation of the actions at the beginning.
-    horizon : int
-        Steps of an episode.
-    tolerance : float
-        Distance at which an episode of the training counts as a success [m].
+    training_tolerance : float, optional
+        Distance at which an episode of the training counts as a success; the task's if it is not
+        given [m].
     symmetric : bool
         Whether the policy is to treat mirror images alike, where the task is its own mirror
         image (``both``); it then learns from goals on the right and from mirror images of those
-        on the left; see `kinarm.policies.symmetric_layers`. Needs two hidden layers.
-    progress_reward : float
-        Reward weight of a metre by which the tool came closer [1/m].
-    closer_reward : float
-        Reward weight of a step that brings the tool closer, against one that takes it farther.
-    collision_penalty : float
-        Reward weight of a collision.
-    success_bonus : float
-        Reward weight of success.
-    step_reward : float
-        Reward weight of a step.
-    start_spread : float
-        Scales the range of the start configurations.
+        on the left.
     initial_start_spread : float
-        The same at the beginning of the training.
+        Spread of the start configurations at the beginning of the training.
     widening : float
-        Share of the training in which the spread grows linearly from the one to the other.
+        Share of the training in which the spread grows linearly to that of the task.
     """
 
-    task: str = "right"
-    arm: str = "paper"
-    seed: int = 0
-    recipe: str = "custom"
-    arms: int = 16
-    rollout_steps: int = 125
     iterations: int = 600
-    minibatch: int = 500
-    epochs: int = 10
-    hidden: tuple[int, ...] = (64, 64)
+    n_envs: int = 16
+    n_steps: int = 125
+    batch_size: int = 500
+    n_epochs: int = 10
+    net_arch: tuple[int, ...] = (64, 64)
     learning_rate: float = 3e-4
     learning_rate_schedule: Schedule = "constant"
     gamma: float = 0.99
     gae_lambda: float = 0.95
     clip_range: float = 0.2
-    entropy_weight: float = 0.0
-    value_weight: float = 0.5
+    ent_coef: float = 0.0
+    vf_coef: float = 0.5
     max_grad_norm: float = 0.5
-    initial_log_std: float = 0.0
-    horizon: int = 64
-    tolerance: float = 0.05
+    log_std_init: float = 0.0
+    training_tolerance: float | None = None
     symmetric: bool = False
-    progress_reward: float = 1.0
-    closer_reward: float = 0.0
-    collision_penalty: float = -1.0
-    success_bonus: float = 0.0
-    step_reward: float = 0.0
-    start_spread: float = 1.0
     initial_start_spread: float = 1.0
     widening: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in (*WHOLE_NUMBERS, "seed"):
-            number = whole_number(name, getattr(self, name), 0 if name == "seed" else 1)
-            object.__setattr__(self, name, number)
-        hidden = tuple(whole_number("hidden", width, 1) for width in self.hidden)
-        object.__setattr__(self, "hidden", hidden)
-        if len(hidden) < 1 + self.symmetric:
-            raise InvalidInputError(
-                f"hidden must name at least {1 + self.symmetric} layers, got {len(hidden)}"
-            )
-        self._check_numbers()
-        if self.learning_rate_schedule not in get_args(Schedule):
-            raise InvalidInputError(
-                f"learning_rate_schedule must be one of {', '.join(get_args(Schedule))}, "
-                f"got {self.learning_rate_schedule!r}"
-            )
-        if self.minibatch == 1 or self.steps_per_iteration % self.minibatch:
-            raise InvalidInputError(
-                f"minibatch must be above 1 and divide the {self.steps_per_iteration} steps of a "
-                f"rollout, got {self.minibatch}"
-            )
-
-    def _check_numbers(self) -> None:
-        """Refuse real numbers out of their range."""
-        for name in POSITIVE_NUMBERS:
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise InvalidInputError(f"{name} must be greater than 0, got {value}")
-        for name in SHARES:
-            if not 0 <= getattr(self, name) <= 1:
-                raise InvalidInputError(f"{name} must lie in [0, 1], got {getattr(self, name)}")
-        for name in ("entropy_weight", "value_weight"):
+        super().__post_init__()
+        self._check_whole_numbers(("n_envs", "n_steps", "batch_size", "n_epochs"))
+        if not self.net_arch:
+            raise InvalidInputError("net_arch must name at least one layer")
+        widths = tuple(whole_number("net_arch", width, 1) for width in self.net_arch)
+        object.__setattr__(self, "net_arch", widths)
+        self._check_above_zero(("learning_rate", "clip_range", "max_grad_norm"))
+        if self.training_tolerance is not None:
+            self._check_above_zero(("training_tolerance",))
+        self._check_shares(("gamma", "gae_lambda", "initial_start_spread", "widening"))
+        for name in ("ent_coef", "vf_coef"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0):
                 raise InvalidInputError(f"{name} must not be negative, got {value}")
-        if not math.isfinite(self.initial_log_std):
-            raise InvalidInputError(f"initial_log_std must be finite, got {self.initial_log_std}")
+        if not math.isfinite(self.log_std_init):
+            raise InvalidInputError(f"log_std_init must be finite, got {self.log_std_init}")
+        if self.batch_size == 1 or self.steps_per_iteration % self.batch_size:
+            raise InvalidInputError(
+                f"batch_size must be above 1 and divide the {self.steps_per_iteration} steps of a "
+                f"rollout, got {self.batch_size}"
+            )
 
     @property
     def steps_per_iteration(self) -> int:
         """Environment steps of a rollout."""
-        return self.arms * self.rollout_steps
+        return self.n_envs * self.n_steps
 
     @property
     def environment_steps(self) -> int:
         """Environment steps of the whole training."""
         return self.iterations * self.steps_per_iteration
 
-    def simulator(self) -> "Simulator":
-        """Build the simulator to train in; its batches are too small for several threads."""
-        from kinarm.simulator import Simulator
-
-        reward = RewardWeights(
-            progress=self.progress_reward,
-            closer=self.closer_reward,
-            collision=self.collision_penalty,
-            success=self.success_bonus,
-            step=self.step_reward,
-        )
-        task = load_task(
-            self.task,
-            horizon=self.horizon,
-            tolerance=self.tolerance,
-            start_spread=self.start_spread,
-            reward=reward,
-        )
-        return Simulator(self.arm, task, threads=1)
+    @property
+    def training_problem(self) -> ReachProblem:
+        """What is trained on: the problem with the reward and tolerance of these settings."""
+        return self.problem.replace(reward=self.reward, tolerance=self.training_tolerance)
 
     def learning_rate_at(self, done: float) -> float:
         """Learning rate after this share of the training."""
@@ -195,7 +127,8 @@ class PPOConfig:
 
     def start_spread_at(self, done: float) -> float:
         """Spread of the start configurations after this share of the training."""
+        final = self.problem.task.start_spread
         if done >= self.widening:
-            return self.start_spread
+            return final
         grown = done / self.widening
-        return (1 - grown) * self.initial_start_spread + grown * self.start_spread
+        return (1 - grown) * self.initial_start_spread + grown * final

@@ -66,28 +66,27 @@ class PPOTraining:
     @alone_in_torch()
     def __init__(self, config: PPOConfig, tensorboard: str | Path | None = None) -> None:
         rng = seed_iteration(config.seed, 0)
-        simulator = config.simulator()
+        simulator = config.simulator(threads=1)
+        mirror = task_mirror(config.symmetric, simulator.world)
         self.config = config
-        self.env = SB3VecEnv(
-            simulator, config.arms, rng=rng, mirror=task_mirror(config.symmetric, simulator)
-        )
+        self.env = SB3VecEnv(simulator, config.n_envs, rng=rng, mirror=mirror)
         self._learning_rate = config.learning_rate
         self.model = PPO(
             "MlpPolicy",
             self.env,
-            n_steps=config.rollout_steps,
-            batch_size=config.minibatch,
-            n_epochs=config.epochs,
+            n_steps=config.n_steps,
+            batch_size=config.batch_size,
+            n_epochs=config.n_epochs,
             learning_rate=lambda _: self._learning_rate,
             gamma=config.gamma,
             gae_lambda=config.gae_lambda,
             clip_range=config.clip_range,
-            ent_coef=config.entropy_weight,
-            vf_coef=config.value_weight,
+            ent_coef=config.ent_coef,
+            vf_coef=config.vf_coef,
             max_grad_norm=config.max_grad_norm,
             policy_kwargs={
-                "net_arch": list(config.hidden),
-                "log_std_init": config.initial_log_std,
+                "net_arch": list(config.net_arch),
+                "log_std_init": config.log_std_init,
             },
             device="cpu",
         )
@@ -101,11 +100,11 @@ class PPOTraining:
     def initial_state(self) -> PPOState:
         """State before the first iteration; the normaliser has seen random starts."""
         env, rng = self.env, seed_iteration(self.config.seed, 0)
-        observations = env.simulator.observe(*env.simulator.sample(rng, NORMALIZED_OVER))
+        observations = env.simulator.world.observe(*env.simulator.sample(rng, NORMALIZED_OVER))
         if env.mirror is not None:
-            observations = env.mirror.to_the_right(observations)
+            observations = env.mirror.from_the_right(observations)
         env.rng = rng
-        env.spread_starts(self.config.start_spread_at(0.0))
+        env.start_spread = self.config.start_spread_at(0.0)
         env.reset()
         return PPOState(
             parameters=self._first_parameters,
@@ -124,7 +123,7 @@ class PPOTraining:
         self.load(state)
         done = state.iteration / config.iterations
         self._learning_rate = config.learning_rate_at(done)
-        env.spread_starts(config.start_spread_at(done))
+        env.start_spread = config.start_spread_at(done)
         model.learn(config.steps_per_iteration, reset_num_timesteps=False)
         returns, successes, simulator_time = env.take_ended()
         point = CurvePoint(
@@ -155,14 +154,14 @@ class PPOTraining:
         """
         config, model = self.config, self.model
         sizes = (len(state.parameters), len(state.episodes.goal))
-        expected = (len(self.parameters()), config.arms)
+        expected = (len(self.parameters()), config.n_envs)
         if sizes != expected:
             raise InvalidInputError(
                 f"the state to resume has {sizes[0]} parameters and {sizes[1]} arms, "
                 f"not {expected[0]} and {expected[1]}"
             )
-        epochs = state.iteration * config.epochs
-        updates = epochs * config.steps_per_iteration // config.minibatch
+        epochs = state.iteration * config.n_epochs
+        updates = epochs * config.steps_per_iteration // config.batch_size
         weights = list(model.policy.parameters())
         vector_to_parameters(torch.tensor(state.parameters), weights)
         moments = (state.first_moment, state.second_moment)

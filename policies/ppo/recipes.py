@@ -1,23 +1,24 @@
 """Settings of Proximal Policy Optimization by name."""
 
 from kinarm.policies.ppo.config import PPOConfig
+from kinarm.task import RewardWeights
 
 RECIPES = {
     "paper": PPOConfig(recipe="paper"),
     "tuned": PPOConfig(
         recipe="tuned",
-        arms=125,
-        rollout_steps=16,
-        minibatch=1000,
-        hidden=(64, 64, 64),
+        n_envs=125,
+        n_steps=16,
+        batch_size=1000,
+        net_arch=(64, 64, 64),
         learning_rate=1e-3,
         learning_rate_schedule="linear",
         gae_lambda=0.9,
-        entropy_weight=0.002,
-        initial_log_std=-0.7,
-        tolerance=0.03,
+        ent_coef=0.002,
+        log_std_init=-0.7,
+        training_tolerance=0.03,
         symmetric=True,
-        success_bonus=5.0,
+        reward=RewardWeights(success=5.0),
         initial_start_spread=0.2,
         widening=0.4,
     ),

@@ -1,7 +1,6 @@
 """The simulator as a vectorised environment of Stable-Baselines3."""
 
 import time
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +10,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from kinarm.episodes import RUNNING, SUCCESS, TRUNCATED, Episodes
 from kinarm.errors import InvalidInputError
-from kinarm.policies.mirror import Mirror
+from kinarm.networks import Mirror
 from kinarm.policies.normalizer import Normalizer, input_scale
 from kinarm.policies.ppo.state import EpisodeStates
 from kinarm.simulator import Simulator
@@ -53,6 +52,11 @@ class SB3VecEnv(VecEnv):
     mirror : Mirror, optional
         Reflection that sends goals on the left to the right.
 
+    Attributes
+    ----------
+    start_spread : float
+        Scales the range of the start configurations of episodes to come.
+
     Notes
     -----
     The info of an episode that ended holds what Stable-Baselines3 looks for:
@@ -69,6 +73,7 @@ class SB3VecEnv(VecEnv):
         mirror: Mirror | None = None,
     ) -> None:
         self.simulator, self.rng, self.mirror = simulator, rng, mirror
+        self.start_spread = simulator.task.start_spread
         self.render_mode = None
         self.normalize_by(Normalizer.empty(simulator.n_observations))
         seen = Box(-np.inf, np.inf, (simulator.n_observations,), dtype=np.float32)
@@ -82,8 +87,12 @@ class SB3VecEnv(VecEnv):
 
     def reset(self) -> NDArray[np.float32]:
         """Begin all episodes anew; returns observations, shape (num_envs, n_observations)."""
-        self._episodes = self.simulator.reset(*self.simulator.sample(self.rng, self.num_envs))
+        self._episodes = self.simulator.reset(*self._scenarios(self.num_envs))
         return self._normalized(self._episodes.observation)
+
+    def _scenarios(self, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Starts and goals of new episodes."""
+        return self.simulator.sample(self.rng, count, start_spread=self.start_spread)
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Take note of the actions, shape (num_envs, n_actions), for `step_wait`."""
@@ -113,7 +122,7 @@ class SB3VecEnv(VecEnv):
                 ended.tolist(), self._infos_of_ended(episodes, ended), strict=True
             ):
                 infos[row] = info
-            episodes.q[ended], episodes.goal[ended] = self.simulator.sample(self.rng, ended.size)
+            episodes.q[ended], episodes.goal[ended] = self._scenarios(ended.size)
             self.simulator.begin(episodes, ended)
         observations = self._normalized(episodes.observation)
         self._time += time.perf_counter() - began
@@ -151,7 +160,7 @@ class SB3VecEnv(VecEnv):
     def _normalized(self, observations: NDArray[np.float64]) -> NDArray[np.float32]:
         """Observations as the learner sees them."""
         if self.mirror is not None:
-            observations = self.mirror.to_the_right(observations)
+            observations = self.mirror.from_the_right(observations)
         seen: NDArray[np.float32] = ((observations - self._mean) * self._scale).astype(np.float32)
         return seen
 
@@ -159,16 +168,12 @@ class SB3VecEnv(VecEnv):
         """The learner's actions, given what it saw, as the simulator needs them."""
         if self.mirror is None:
             return self._actions
-        left = self.mirror.seen_on_the_left(observations)
+        left = self.mirror.on_the_left(observations)
         return np.where(left[:, None], self._actions * self.mirror.actions, self._actions)
 
     def normalize_by(self, normalizer: Normalizer) -> None:
         """From now on, normalise observations by these statistics, of what the learner sees."""
         self._mean, self._scale = normalizer.mean, input_scale(normalizer.std)
-
-    def spread_starts(self, spread: float) -> None:
-        """From now on, scale the range of the start configurations by this factor in [0, 1]."""
-        self.simulator.task = replace(self.simulator.task, start_spread=spread)
 
     def states(self) -> EpisodeStates:
         """Copy what the running episodes depend on."""

@@ -15,9 +15,11 @@ import numpy as np
 
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.ars.state import ARSState
-from kinarm.policies.learners import recipe, train_policy
+from kinarm.policies.learners import train_policy
 from kinarm.policies.library import load_policy
 from kinarm.policies.oracle import Oracle
+from kinarm.policies.recipes import recipe
+from kinarm.problem import PROBLEMS
 from kinarm.rollouts import Rollouts
 from kinarm.simulator import Simulator
 
@@ -54,7 +56,7 @@ def trial_digests() -> dict[str, str]:
     found = {}
     for arm in ARMS:
         for task in TASKS:
-            trials = TrialSet.draw(Simulator(arm, task), 200, 0)
+            trials = TrialSet.draw(PROBLEMS[task].replace(arm=arm), 200, 0)
             found[f"trials {arm} {task}"] = digest([trials.starts, trials.goals], 12)
     return found
 
@@ -64,7 +66,7 @@ def rollout_digests() -> dict[str, str]:
     found = {}
     for arm in ARMS:
         for task in TASKS:
-            simulator = Simulator(arm, task)
+            simulator = Simulator(PROBLEMS[task].replace(arm=arm))
             rng = np.random.default_rng(5)
             starts, goals = simulator.sample(rng, EPISODES)
             actions = rng.uniform(-1, 1, (EPISODES, 64, simulator.n_actions))
@@ -87,7 +89,7 @@ def ars_digests() -> dict[str, str]:
     for name in ("paper", "tuned", "brs"):
         for task in TASKS:
             states: list[ARSState] = []
-            config = replace(recipe("ars", name, task=task, seed=2), iterations=10)
+            config = replace(recipe("ars", name, problem=task, seed=2), iterations=10)
             result = train_policy(config, on_iteration=states.append)
             state = states[-1]
             curve = [point[:4] for point in state.curve]
@@ -108,7 +110,7 @@ def ppo_digests() -> dict[str, str]:
     for name, task in (("paper", "right"), ("tuned", "left"), ("tuned", "both")):
         states: list[PPOState] = []
         train_policy(
-            replace(recipe("ppo", name, task=task, seed=2), iterations=3),
+            replace(recipe("ppo", name, problem=task, seed=2), iterations=3),
             on_iteration=states.append,
         )
         state = states[-1]
@@ -126,9 +128,9 @@ def oracle_digests() -> dict[str, str]:
     """What the oracle knows about 200 trials."""
     found = {}
     for arm, task in (("paper", "both"), ("paper_flange", "right"), ("lrmate200ic_5l", "left")):
-        simulator = Simulator(arm, task)
-        trials = TrialSet.draw(simulator, 200, 3)
-        solutions = Oracle(simulator=simulator).solve_batch(trials.starts, trials.goals)
+        problem = PROBLEMS[task].replace(arm=arm)
+        trials = TrialSet.draw(problem, 200, 3)
+        solutions = Oracle(problem).solve_batch(trials.starts, trials.goals)
         found[f"oracle {arm} {task}"] = digest(
             [
                 *(solutions.reachable, solutions.tight, solutions.steps),

@@ -1,0 +1,97 @@
+"""Recipes: settings by name, or from a file."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from kinarm._fields import from_plain, init_fields, to_plain
+from kinarm._files import first_line
+from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.policies.learners import Learner, find_learner
+from kinarm.problem import ReachProblem
+
+
+def recipe(learner: str, name_or_file: str | Path = "paper", **changes: Any) -> Any:
+    """Look settings up, adapt them to the problem and replace some of them.
+
+    Parameters
+    ----------
+    learner : str
+        Name of the learner.
+    name_or_file : str or Path
+        Name of a recipe, or a TOML file with some of the learner's settings; the others are those
+        of the recipe that its entry ``base`` names, or of ``"paper"``.
+    **changes
+        Fields of the learner's settings to replace; None leaves a field as it is. A mapping for
+        ``reward`` replaces the weights that it names. If another field than problem and seed
+        changes, the recipe's name in the result gets a star.
+
+    Returns
+    -------
+    ARSConfig, PPOConfig or settings of another learner
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such learner, recipe or setting.
+    InvalidInputError
+        If the file cannot be used; in one line that names file, key and what is expected.
+    """
+    found = find_learner(learner)
+    available = init_fields(found.config)
+    for change in changes:
+        if change not in available:
+            raise UnknownNameError(f"setting of {learner}", change, available)
+    given = {key: value for key, value in changes.items() if value is not None}
+    circumstances = {key: given.pop(key) for key in ("problem", "seed") if key in given}
+    if str(name_or_file).endswith(".toml"):
+        standard = _read_recipe(found, Path(name_or_file), circumstances)
+    else:
+        standard = _named_recipe(found, str(name_or_file), circumstances)
+    made = standard.changed(given)
+    return made if made == standard else replace(made, **{"recipe": f"{made.recipe}*", **given})
+
+
+def _named_recipe(learner: Learner[Any, Any], name: str, circumstances: Mapping[str, Any]) -> Any:
+    """A recipe of a learner for a problem and a seed."""
+    if name not in learner.recipes:
+        raise UnknownNameError("recipe", name, (*learner.recipes, "path/to/recipe.toml"))
+    return learner.adapt(replace(learner.recipes[name], **circumstances))
+
+
+def _read_recipe(learner: Learner[Any, Any], path: Path, circumstances: Mapping[str, Any]) -> Any:
+    """Settings of a file for a problem and a seed, which may be in the file."""
+    name = str(path)
+    try:
+        entries = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InvalidInputError(f"cannot read recipe {name!r}: {error.strerror}") from error
+    except ValueError as error:
+        raise InvalidInputError(f"{name}: not a recipe file: {first_line(error)}") from error
+    base = entries.pop("base", "paper")
+    if base not in learner.recipes:
+        choices = ", ".join(learner.recipes)
+        raise InvalidInputError(f"{name}: base must be one of {choices}, got {base!r}")
+    known = {**circumstances}
+    problem = entries.pop("problem", None)
+    if problem is not None and "problem" not in known:
+        known["problem"] = _problem_of_file(problem, path)
+    standard = _named_recipe(learner, base, known)
+    given = {"recipe": path.stem, **{key: v for key, v in entries.items() if key not in known}}
+    if isinstance(given.get("reward"), Mapping):
+        weights = standard.reward or standard.problem.task.reward
+        given["reward"] = {**to_plain(weights), **given["reward"]}
+    made = from_plain(learner.config, {**to_plain(standard), **given}, name)
+    return replace(made, problem=standard.problem)
+
+
+def _problem_of_file(problem: object, path: Path) -> ReachProblem:
+    """The problem that a recipe file names; a file's path is relative to it."""
+    if not isinstance(problem, str):
+        raise InvalidInputError(
+            f"{path}: problem must be the name or file of a problem, got {problem!r}"
+        )
+    beside = path.parent / problem
+    return ReachProblem.load(beside if beside.is_file() else problem)
