@@ -7,7 +7,8 @@ from kinarm._exports import lazy_exports
 from kinarm.envs.registration import register_environments
 
 if TYPE_CHECKING:
-    from kinarm.arm import Arm, ArmSpecification
+    from kinarm.arm import Arm
+    from kinarm.arm_specification import ArmSpecification, arm_names
     from kinarm.envs import ReachEnv, ReachVectorEnv
     from kinarm.errors import (
         ArmError,
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from kinarm.simulator import Simulator
     from kinarm.task import REWARD_TERMS, ReachTask, RewardWeights
     from kinarm.trajectory import Recording, load_recordings, save_recordings
-    from kinarm.urdf import arm_names
     from kinarm.world import World
 
 __version__ = "0.1.0"
@@ -85,7 +85,8 @@ def __dir__() -> list[str]:
 __getattr__ = lazy_exports(
     __name__,
     {
-        "arm": ("Arm", "ArmSpecification"),
+        "arm": ("Arm",),
+        "arm_specification": ("ArmSpecification", "arm_names"),
         "envs": ("ReachEnv", "ReachVectorEnv"),
         "errors": (
             "ArmError",
@@ -109,7 +110,6 @@ __getattr__ = lazy_exports(
         "simulator": ("Simulator",),
         "task": ("REWARD_TERMS", "ReachTask", "RewardWeights"),
         "trajectory": ("Recording", "load_recordings", "save_recordings"),
-        "urdf": ("arm_names",),
         "world": ("World",),
     },
 )
