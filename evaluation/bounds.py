@@ -16,7 +16,7 @@ from kinarm.evaluation.trials import TrialSet
 from kinarm.files import CORRUPT, check_folder, write_atomically
 from kinarm.policies import oracle
 from kinarm.policies.oracle import Oracle, Progress
-from kinarm.policies.oracle_solution import OracleSolutions
+from kinarm.policies.oracle.solution import OracleSolutions
 from kinarm.policies.provenance import hash_sources, package_versions
 
 CACHE_VARIABLE = "KINARM_CACHE"

@@ -14,11 +14,14 @@ if TYPE_CHECKING:
         save_ppo_checkpoint,
     )
     from kinarm.policies.curve import CurvePoint
-    from kinarm.policies.inverse import inverse_kinematics
     from kinarm.policies.library import load_policy, policy_names
     from kinarm.policies.normalizer import Normalizer
-    from kinarm.policies.oracle import Oracle
-    from kinarm.policies.oracle_solution import OracleSolution, OracleSolutions
+    from kinarm.policies.oracle import (
+        Oracle,
+        OracleSolution,
+        OracleSolutions,
+        inverse_kinematics,
+    )
     from kinarm.policies.policy import Layer, Policy
     from kinarm.policies.ppo import PPOResult, train_ppo
     from kinarm.policies.ppo_config import PPOConfig
@@ -73,11 +76,9 @@ __getattr__ = lazy_exports(
             "save_ppo_checkpoint",
         ),
         "curve": ("CurvePoint",),
-        "inverse": ("inverse_kinematics",),
         "library": ("load_policy", "policy_names"),
         "normalizer": ("Normalizer",),
-        "oracle": ("Oracle",),
-        "oracle_solution": ("OracleSolution", "OracleSolutions"),
+        "oracle": ("Oracle", "OracleSolution", "OracleSolutions", "inverse_kinematics"),
         "policy": ("Layer", "Policy"),
         "ppo": ("PPOResult", "train_ppo"),
         "ppo_config": ("PPOConfig",),

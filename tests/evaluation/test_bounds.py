@@ -21,7 +21,7 @@ from kinarm.evaluation.bounds import bounds_document, cache_folder, oracle_bound
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies import oracle
 from kinarm.policies.oracle import Oracle
-from kinarm.policies.oracle_solution import OracleSolutions
+from kinarm.policies.oracle.solution import OracleSolutions
 from kinarm.scene import Bench, Scene
 from kinarm.simulator import Simulator
 from kinarm.task import RewardWeights, load_task

@@ -5,10 +5,10 @@ import pinocchio as pin
 import pytest
 from scipy.optimize import minimize
 
-from kinarm import kernels
 from kinarm.arm import Arm
 from kinarm.motion_bounds import MotionBounds
-from kinarm.policies.inverse import project, solve_within, step_box
+from kinarm.policies.oracle.inverse import project, solve_within, step_box
+from kinarm.policies.oracle.kernels.approach import ArmInScene, bound_distance, bound_steps
 from kinarm.scene import Bench, Scene
 from kinarm.simulator import Simulator
 from kinarm.task import ReachTask
@@ -29,7 +29,7 @@ def known(simulator):
     """What the kernels know of an arm in a scene."""
     chain = simulator.arm.chain
     bounds = MotionBounds.of(chain, simulator.n_actions)
-    return chain, bounds, simulator.contact_model.shapes
+    return ArmInScene(chain, bounds, simulator.contact_model.shapes)
 
 
 def prove_steps(simulator, starts, goals, *, contact=False, budget=BUDGET, fewest=1, most=None):
@@ -38,8 +38,8 @@ def prove_steps(simulator, starts, goals, *, contact=False, budget=BUDGET, fewes
     floors, tight, witnesses = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=bool), starts.copy()
     last = simulator.task.horizon if most is None else most
     limits = (np.full(n, 1) * fewest, np.full(n, 1) * last)
-    inputs = (*known(simulator), starts, goals, simulator.step_limit, simulator.task.tolerance)
-    kernels.steps_floor(0, n, *inputs, contact, budget, *limits, floors, tight, witnesses)
+    inputs = (known(simulator), starts, goals, simulator.step_limit, simulator.task.tolerance)
+    bound_steps(0, n, *inputs, contact, budget, *limits, floors, tight, witnesses)
     return floors, tight, witnesses
 
 
@@ -51,8 +51,8 @@ def prove_distance(
     arm = simulator.arm
     lower, upper = box or (np.tile(limit[moved], (n, 1)) for limit in (arm.lower, arm.upper))
     distances, configurations = np.empty((n, 2)), np.empty(starts.shape)
-    inputs = (*known(simulator), lower, upper, starts, goals, resolution, contact, budget)
-    kernels.closest_approach(0, n, *inputs, distances, configurations)
+    inputs = (known(simulator), lower, upper, starts, goals, resolution, contact, budget)
+    bound_distance(0, n, *inputs, distances, configurations)
     return distances[:, 0], distances[:, 1], configurations
 
 
@@ -268,8 +268,8 @@ class TestPlanarSteps:
         starts, goals = rng.uniform(-3, 3, (8, 2)), planar_goals(rng, 8, 0.2, 0.8)
         floors, tight = np.full(8, -1), np.zeros(8, dtype=bool)
         limits = (np.full(8, 1), np.full(8, 64))
-        inputs = (*known(planar), starts, goals, planar.step_limit, TOLERANCE, False, BUDGET)
-        kernels.steps_floor(3, 5, *inputs, *limits, floors, tight, starts.copy())
+        inputs = (known(planar), starts, goals, planar.step_limit, TOLERANCE, False, BUDGET)
+        bound_steps(3, 5, *inputs, *limits, floors, tight, starts.copy())
         np.testing.assert_array_equal(floors[[0, 1, 2, 5, 6, 7]], -1)
         np.testing.assert_array_equal(floors[3:5], prove_steps(planar, starts, goals)[0][3:5])
 

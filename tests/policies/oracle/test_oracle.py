@@ -8,7 +8,7 @@ import pytest
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, StartInContactError, UnknownNameError
 from kinarm.policies import Oracle, OracleSolution, OracleSolutions
-from kinarm.policies.motion import steps_between
+from kinarm.policies.oracle.motion import steps_between
 from kinarm.reference import ReferenceSimulator
 from kinarm.scene import LEFT_BENCH, Bench, Scene
 from kinarm.simulator import Simulator
@@ -185,7 +185,7 @@ class TestDeterminism:
     def test_lots_do_not_matter(self, oracle, monkeypatch):
         starts, goals = drawn(oracle.simulator, 6, 20)
         whole = oracle.solve_batch(starts, goals)
-        monkeypatch.setattr("kinarm.policies.oracle.LOT", 7)
+        monkeypatch.setattr("kinarm.policies.oracle.oracle.LOT", 7)
         assert_identical(whole, oracle.solve_batch(starts, goals))
 
     def test_single_trials_equal_a_batch(self, oracle):
@@ -461,7 +461,7 @@ class TestRefusals:
 
 class TestProgress:
     def test_counts_up_to_all(self, oracle, monkeypatch):
-        monkeypatch.setattr("kinarm.policies.oracle.LOT", 4)
+        monkeypatch.setattr("kinarm.policies.oracle.oracle.LOT", 4)
         calls = []
         starts, goals = drawn(oracle.simulator, 16, 10)
         oracle.solve_batch(starts, goals, on_progress=lambda *done: calls.append(done))

@@ -7,8 +7,8 @@ import pytest
 from configurations import depths
 
 from kinarm.arm import Arm
-from kinarm.policies.detour import Tree, find_detour
-from kinarm.policies.motion import along_path, steps_between, straight
+from kinarm.policies.oracle.detour import Tree, find_detour
+from kinarm.policies.oracle.motion import along_path, steps_between, straight
 from kinarm.scene import LEFT_BENCH, RIGHT_BENCH, Bench, Scene
 from kinarm.simulator import Simulator
 from kinarm.task import ReachTask
@@ -147,10 +147,10 @@ class TestEnds:
         np.testing.assert_array_equal(path[-1], ends[1])
 
 
-def test_tree_branches_back_to_the_root():
+def test_nodes_lead_back_to_their_root():
     tree = Tree(np.array([[0.0, 0.0], [1.0, 0.0]]))
     first = tree.add(np.array([0.0, 1.0]), 0)
     second = tree.add(np.array([0.0, 2.0]), first)
     assert (first, second) == (2, 3)
-    np.testing.assert_array_equal(tree.branch(second), [[0, 2], [0, 1], [0, 0]])
-    np.testing.assert_array_equal(tree.branch(1), [[1, 0]])
+    np.testing.assert_array_equal(tree.path_to_root(second), [[0, 2], [0, 1], [0, 0]])
+    np.testing.assert_array_equal(tree.path_to_root(1), [[1, 0]])

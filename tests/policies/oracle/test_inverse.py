@@ -9,8 +9,8 @@ from scipy.stats import qmc
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError
 from kinarm.policies import inverse_kinematics
-from kinarm.policies.inverse import evenly_spread, project, solve_within, step_box
-from kinarm.policies.motion import steps_between
+from kinarm.policies.oracle.inverse import evenly_spread, project, solve_within, step_box
+from kinarm.policies.oracle.motion import steps_between
 from kinarm.simulator import Simulator
 from kinarm.task import ReachTask
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinarm.arm import Arm
-from kinarm.policies.motion import along_path, steps_between, straight, two_segments
+from kinarm.policies.oracle.motion import along_path, steps_between, straight, two_segments
 from kinarm.scene import Bench, Scene
 from kinarm.simulator import Simulator
 from kinarm.task import ReachTask

@@ -6,9 +6,10 @@ import pytest
 from configurations import contact_boundary, depths, random_configurations
 from numba import njit
 
-from kinarm import kernels
 from kinarm.arm import Arm
-from kinarm.kernels.overlap import overlaps
+from kinarm.kernels.kinematics import POSE, forward_kinematics
+from kinarm.kernels.rollout import screen
+from kinarm.policies.oracle.kernels.overlap import overlaps
 from kinarm.scene import Bench, Scene
 from kinarm.simulator import Simulator
 
@@ -18,7 +19,7 @@ CAPSULE_ARMS = ("lrmate200ic_5l", "paper", "paper_flange")
 @njit
 def claims_of(chain, shapes, centres, halves, share, poses, jacobian, claimed):
     for i in range(len(centres)):
-        kernels.forward_kinematics(
+        forward_kinematics(
             chain.prismatic, chain.translation, chain.rotation, chain.axis, centres, i, poses
         )
         claimed[i] = overlaps(chain, shapes, poses, halves[i], share, jacobian)
@@ -29,7 +30,7 @@ def claims(simulator, centres, halves=None, share=1.0):
     n = simulator.n_actions
     if halves is None:
         halves, share = np.ones((len(centres), n)), 0.0
-    poses, jacobian = np.empty((simulator.arm.n_axes + 1, kernels.POSE)), np.empty((3, n))
+    poses, jacobian = np.empty((simulator.arm.n_axes + 1, POSE)), np.empty((3, n))
     claimed = np.empty(len(centres), dtype=bool)
     shapes = simulator.contact_model.shapes
     claims_of(simulator.arm.chain, shapes, centres, halves, share, poses, jacobian, claimed)
@@ -122,7 +123,7 @@ class TestSingleConfigurations:
         n = len(configurations)
         tools, free = np.empty((n, 3)), np.empty(n, dtype=bool)
         shapes = any_simulator.contact_model.shapes
-        kernels.screen(0, n, any_simulator.arm.chain, shapes, configurations, tools, free)
+        screen(0, n, any_simulator.arm.chain, shapes, configurations, tools, free)
         assert not (free & claims(any_simulator, configurations)).any()
 
 
