@@ -1,13 +1,14 @@
 """Bounds of trials: those of the oracle, found once, kept on disk, whatever happens there."""
 
-import ast
 import gc
 import io
 import json
 import os
 import subprocess
 import sys
+import time
 import weakref
+from copy import copy
 from pathlib import Path
 
 import numpy as np
@@ -19,20 +20,16 @@ from kinarm.arm import Arm
 from kinarm.evaluation import bounds
 from kinarm.evaluation.bounds import bounds_document, cache_folder, oracle_bounds
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies import oracle
-from kinarm.policies.oracle import Oracle
-from kinarm.policies.oracle.solution import OracleSolutions
+from kinarm.policies.oracle import Oracle, OracleSolutions
+from kinarm.policies.provenance import package_versions
 from kinarm.scene import Bench, Scene
 from kinarm.simulator import Simulator
 from kinarm.task import RewardWeights, load_task
 
 FAR = Bench(name="far", x=(5, 6), y=(5, 6), height=1)
 
-ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(kinarm.__file__).parent.parent
 """What the package is imported from."""
-
-PRINT_VERSION = "from kinarm.evaluation.bounds import oracle_version; print(oracle_version())"
 
 PROCESSES = 3
 
@@ -201,14 +198,13 @@ def test_other_trials_are_solved_and_kept_apart(folder, monkeypatch, other):
     assert len(list(folder.iterdir())) == 2
 
 
-def test_another_version_of_the_oracle_solves_again_and_replaces_the_file(folder, monkeypatch):
+def test_another_version_of_the_oracle_solves_again(folder, monkeypatch):
     oracle_bounds(draw())
     calls = count_calls(monkeypatch)
     monkeypatch.setattr(bounds, "oracle_version", lambda: "later")
     oracle_bounds(draw())
     assert calls == [3]
-    (path,) = folder.iterdir()
-    assert path.stem.endswith("-later")
+    assert len(list(folder.glob("*-later.npz"))) == 1
 
 
 def archive(arrays: dict[str, np.ndarray]) -> bytes:
@@ -265,11 +261,13 @@ def test_whichever_byte_of_a_file_is_wrong_the_bounds_are_right(folder, solution
     (path,) = folder.iterdir()
     whole = path.read_bytes()
     monkeypatch.setattr(Oracle, "solve_batch", lambda *_, **__: solutions)
+    monkeypatch.setattr(bounds, "_save", lambda *_: None)
+    drawn = draw()
     for place in range(0, len(whole), 13):
         content = bytearray(whole)
         content[place] ^= 0xFF
         path.write_bytes(content)
-        assert same(oracle_bounds(TrialSet(**vars(draw()))), solutions), place
+        assert same(oracle_bounds(copy(drawn)), solutions), place
 
 
 @pytest.mark.parametrize("inside", ["", "deep"])
@@ -306,62 +304,97 @@ def test_the_folder_is_the_chosen_or_the_users(monkeypatch, variables, expected)
     assert cache_folder() == Path(expected)
 
 
-def modules_of(package: str, path: Path) -> set[str]:
-    """Modules of a package that a source file imports."""
-    nodes = ast.walk(ast.parse(path.read_text()))
-    names = {node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module}
-    return {name.removeprefix(package) for name in names if name.startswith(package)}
-
-
-def test_the_version_covers_everything_that_the_oracle_consists_of():
-    found, waiting = set(), {"oracle"}
-    while waiting:
-        found.add(name := waiting.pop())
-        source = Path(oracle.__file__).with_name(f"{name}.py")
-        waiting |= modules_of("kinarm.policies.", source) - found
-    assert found == set(bounds.ORACLE_MODULES)
-
-
-def test_the_version_is_the_same_in_every_process(tmp_path):
-    version = run_outside(PRINT_VERSION, tmp_path, PYTHONPATH=str(HERE))
-    assert version == bounds.oracle_version()
-
-
-def test_the_version_is_the_same_in_the_clone_and_elsewhere(tmp_path):
-    assert run_outside(PRINT_VERSION, ROOT) == run_outside(PRINT_VERSION, tmp_path)
-
-
-KERNELS = Path(kinarm.__file__).parent / "kernels"
-
-
-@pytest.mark.parametrize(
-    "source",
-    [
-        *(Path(oracle.__file__).with_name(f"{name}.py") for name in bounds.ORACLE_MODULES),
-        *(KERNELS / "approach.py", KERNELS.parent / "simulator.py", KERNELS.parent / "scene.py"),
-    ],
-    ids=lambda path: path.stem,
-)
-def test_the_version_changes_with_the_sources(monkeypatch, source):
+@pytest.mark.parametrize("constant", ["ORACLE_SEMANTICS"])
+def test_the_version_changes_with_what_the_oracle_means(monkeypatch, constant):
     before = bounds.oracle_version.__wrapped__()
     assert before == bounds.oracle_version()
-    read = Path.read_bytes
-
-    def read_bytes(path):
-        return read(path) + b"# changed" * path.samefile(source)
-
-    monkeypatch.setattr(Path, "read_bytes", read_bytes)
+    monkeypatch.setattr(bounds, constant, "another")
     assert bounds.oracle_version.__wrapped__() != before
 
 
-def test_the_version_changes_with_the_packages(monkeypatch):
-    before = bounds.oracle_version.__wrapped__()
-    monkeypatch.setattr(bounds, "package_versions", lambda: {"numpy": "99"})
+@pytest.mark.parametrize("package", bounds.COMPUTING_PACKAGES)
+def test_the_version_changes_with_the_packages_that_compute(monkeypatch, package):
+    before, installed = bounds.oracle_version.__wrapped__(), package_versions()
+    monkeypatch.setattr(bounds, "package_versions", lambda: {**installed, package: "99"})
     assert bounds.oracle_version.__wrapped__() != before
+    monkeypatch.setattr(bounds, "package_versions", lambda: {**installed, "torch": "99"})
+    assert bounds.oracle_version.__wrapped__() == before
+
+
+def fill(folder: Path, *names: str, size: int = 1000) -> None:
+    """Write files of which each was used an hour before the next, the last one an hour ago."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for age, name in enumerate(reversed(names), start=1):
+        (folder / name).write_bytes(bytes(size))
+        used = time.time() - 3600 * age
+        os.utime(folder / name, (used, used))
+
+
+def names_in(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+class TestRoom:
+    """What the cache keeps when it gets full."""
+
+    def test_the_least_recently_used_files_go_beyond_a_number(self, folder, monkeypatch):
+        monkeypatch.setattr(bounds, "KEPT_FILES", 3)
+        fill(folder, *(f"oracle-{name}-1.npz" for name in "abcd"))
+        oracle_bounds(draw())
+        assert {f"oracle-{name}-1.npz" for name in "cd"} < names_in(folder)
+        assert len(names_in(folder)) == 3
+
+    def test_the_least_recently_used_files_go_beyond_a_size(self, folder, monkeypatch):
+        fill(folder, *(f"oracle-{name}-1.npz" for name in "abcd"), size=100_000)
+        monkeypatch.setattr(bounds, "KEPT_BYTES", 250_000)
+        oracle_bounds(draw())
+        assert {f"oracle-{name}-1.npz" for name in "cd"} < names_in(folder)
+        assert len(names_in(folder)) == 3
+
+    def test_looking_up_is_use(self, folder, monkeypatch):
+        monkeypatch.setattr(bounds, "KEPT_FILES", 2)
+        oracle_bounds(draw())
+        (first,) = names_in(folder)
+        os.utime(folder / first, (0, 0))
+        fill(folder, "oracle-old-1.npz")
+        oracle_bounds(draw())
+        oracle_bounds(draw(seed=6))
+        assert first in names_in(folder)
+        assert "oracle-old-1.npz" not in names_in(folder)
+
+    def test_bounds_larger_than_the_cache_are_kept_alone(self, folder, monkeypatch):
+        monkeypatch.setattr(bounds, "KEPT_BYTES", 1)
+        fill(folder, "oracle-old-1.npz")
+        oracle_bounds(draw())
+        (kept,) = names_in(folder)
+        assert kept != "oracle-old-1.npz"
+
+    def test_only_what_belongs_to_the_cache_goes(self, folder, monkeypatch):
+        monkeypatch.setattr(bounds, "KEPT_FILES", 1)
+        abandoned = ".oracle-a-1.npz.x2f9k"
+        fill(folder, abandoned, "notes.txt", "oracle.npz", "policy.npz", "oracle-mine.txt")
+        oracle_bounds(draw())
+        assert {"notes.txt", "oracle.npz", "policy.npz", "oracle-mine.txt"} < names_in(folder)
+        assert abandoned not in names_in(folder)
+
+    def test_files_that_vanish_or_cannot_be_deleted_do_no_harm(self, folder, monkeypatch):
+        fill(folder, *(f"oracle-{name}-1.npz" for name in "abc"))
+        (folder / "oracle-folder-1.npz" / "inside").mkdir(parents=True)
+        (folder / "oracle-link-1.npz").symlink_to(folder / "nothing")
+        monkeypatch.setattr(bounds, "KEPT_FILES", 0)
+        unlink = Path.unlink
+
+        def race(path, **settings):
+            unlink(path)
+            unlink(path)
+
+        monkeypatch.setattr(Path, "unlink", race)
+        oracle_bounds(draw())
+        assert not {f"oracle-{name}-1.npz" for name in "abc"} & names_in(folder)
 
 
 def test_progress_is_told_while_trials_are_solved(folder, monkeypatch):
-    monkeypatch.setattr(oracle, "LOT", 2)
+    monkeypatch.setattr("kinarm.policies.oracle.oracle.LOT", 2)
     told = []
     trials = draw(trials=5)
     oracle_bounds(trials, lambda *counts: told.append(counts))
