@@ -4,19 +4,21 @@ import hashlib
 import os
 import tempfile
 from contextlib import suppress
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from kinarm.errors import OutputError
+from kinarm._archive import load_archive, save_archive
+from kinarm._files import check_folder
+from kinarm.errors import InvalidInputError, OutputError
 from kinarm.evaluation.statistics import Share
 from kinarm.evaluation.trials import TrialSet
-from kinarm.files import CORRUPT, check_folder, write_atomically
 from kinarm.policies.oracle import ORACLE_SEMANTICS, Oracle, OracleSolutions, Progress
 from kinarm.policies.provenance import package_versions
+from kinarm.semantics import SEMANTICS
 
 CACHE_VARIABLE = "KINARM_CACHE"
 """Environment variable that names another cache folder."""
@@ -26,6 +28,9 @@ KEPT_FILES, KEPT_BYTES = 200, 256 * 2**20
 
 COMPUTING_PACKAGES = ("numpy", "numba", "pin", "coal")
 """Packages that the numbers of a solution come from."""
+
+ARCHIVE = ("bounds", 1)
+"""Kind and version of the files."""
 
 _known: WeakKeyDictionary[TrialSet, OracleSolutions] = WeakKeyDictionary()
 
@@ -49,8 +54,8 @@ def oracle_bounds(trials: TrialSet, on_progress: Progress | None = None) -> Orac
         path = cache_folder() / f"oracle-{trials.digest}-{oracle_version()}.npz"
         solutions = _load(path, trials)
         if solutions is None:
-            solver = Oracle(simulator=trials.simulator)
-            solutions = solver.solve_batch(trials.starts, trials.goals, on_progress=on_progress)
+            oracle = Oracle(trials.simulator.problem)
+            solutions = oracle.solve_batch(trials.starts, trials.goals, on_progress=on_progress)
             _save(path, solutions)
         _known[trials] = solutions
     return _known[trials]
@@ -69,23 +74,22 @@ def cache_folder() -> Path:
 
 @cache
 def oracle_version() -> str:
-    """Hash of the versions of oracle and packages that solutions depend on."""
+    """Hash of the versions of oracle, simulator and packages that solutions depend on."""
     packages = package_versions()
-    versions = [ORACLE_SEMANTICS, *(packages[name] for name in COMPUTING_PACKAGES)]
+    versions = (ORACLE_SEMANTICS, SEMANTICS, *(packages[name] for name in COMPUTING_PACKAGES))
     return hashlib.sha256(" ".join(versions).encode()).hexdigest()[:12]
 
 
 def _load(path: Path, trials: TrialSet) -> OracleSolutions | None:
     """Read solutions; None if there are none or they cannot be used."""
     try:
-        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
-            solutions = OracleSolutions(**dict(file))
-    except (OSError, *CORRUPT):
+        solutions = OracleSolutions(**load_archive(path, *ARCHIVE, InvalidInputError).arrays)
+    except (InvalidInputError, TypeError):
         return None
-    task, n = trials.simulator.task, len(trials)
+    simulator, n = trials.simulator, len(trials)
     expected = {
-        "actions": (n, task.horizon, trials.simulator.n_actions),
-        "paths": (n, task.horizon + 1, trials.simulator.arm.n_axes),
+        "actions": (n, simulator.task.horizon, simulator.n_actions),
+        "paths": (n, simulator.task.horizon + 1, simulator.arm.n_axes),
     }
     fits = (array.shape == expected.get(name, (n,)) for name, array in solutions.arrays().items())
     if not all(fits):
@@ -97,10 +101,9 @@ def _load(path: Path, trials: TrialSet) -> OracleSolutions | None:
 
 def _save(path: Path, solutions: OracleSolutions) -> None:
     """Write solutions, if possible, and make room for them."""
-    arrays: dict[str, Any] = solutions.arrays()
     with suppress(OutputError):
-        check_folder(path.parent, create=True)
-        write_atomically(path, partial(np.savez_compressed, **arrays))
+        check_folder(path.parent)
+        save_archive(path, *ARCHIVE, solutions.arrays(), {}, compress=True)
         _delete_least_recently_used(path.parent)
 
 

@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.kernels.proof import SUBSTEPS
 from kinarm.policies.oracle.motion import steps_between
 from kinarm.simulator import Simulator
 
@@ -118,7 +117,8 @@ def _tested_configurations(
     simulator: Simulator, first: NDArray[np.float64], second: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Configurations as far apart as those at which a step is tested, without the first."""
-    count = max(1, int(np.ceil(SUBSTEPS * steps_between(simulator, first, second))))
+    tested_each = simulator.problem.stepping.tested_configurations
+    count = max(1, int(np.ceil(tested_each * steps_between(simulator, first, second))))
     shares = np.arange(1, count + 1)[:, None] / count
     tested: NDArray[np.float64] = first + shares * (second - first)
     tested[-1] = second
@@ -127,7 +127,7 @@ def _tested_configurations(
 
 def _count_free(simulator: Simulator, configurations: NDArray[np.float64]) -> int:
     """How many configurations in a row touch nothing."""
-    _, touching = simulator.screen(configurations)
+    _, touching = simulator.world.screen(configurations)
     return int(touching.argmax()) if touching.any() else len(configurations)
 
 

@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kinarm._parallel import run_rows
+from kinarm._validation import finite_array, whole_number
 from kinarm.errors import InvalidInputError
-from kinarm.parallel import run_rows
 from kinarm.policies.oracle.kernels.projection import damped_least_squares
 from kinarm.policies.oracle.motion import steps_between
 from kinarm.simulator import Simulator
-from kinarm.validation import finite_array, whole_number
 
 RESERVE = 1e-6
 """Share of the tolerance that is left against rounding."""
@@ -129,7 +129,7 @@ def solve_within(
         simulator, beginnings.reshape(-1, n_axes), owner, box, goals, radius
     )
     near = np.flatnonzero(distances <= allowed)
-    _, touching = simulator.screen(configurations[near])
+    _, touching = simulator.world.screen(configurations[near])
     free = near[~touching]
     return Solutions(configurations[free], owner[free])
 

@@ -25,18 +25,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm.arm import DEFAULT_ARM, Arm
+from kinarm._parallel import run_rows
+from kinarm._validation import finite_array
 from kinarm.motion_bounds import MotionBounds
-from kinarm.parallel import run_rows
 from kinarm.policies.oracle.inverse import inverse_kinematics, step_box
 from kinarm.policies.oracle.kernels.approach import ArmInScene, bound_distance, bound_steps
 from kinarm.policies.oracle.motion_search import MotionSearch
 from kinarm.policies.oracle.solution import OracleSolution, OracleSolutions
+from kinarm.problem import ProblemLike
 from kinarm.rollouts import Rollouts
-from kinarm.scene import Scene
 from kinarm.simulator import Simulator
-from kinarm.task import ReachTask
-from kinarm.validation import finite_array
 
 ORACLE_SEMANTICS = "1"
 """Version of what the oracle proves and finds: raised with every change of its results."""
@@ -65,14 +63,10 @@ class Oracle:
 
     Parameters
     ----------
-    arm : Arm or str
-        The arm, or what `kinarm.Arm.load` takes.
-    scene : Scene, optional
-        The paper's scene by default.
-    task : ReachTask or str
-        The task; its tolerance and horizon count.
-    simulator : Simulator, optional
-        Used instead of arm, scene and task.
+    problem : ReachProblem, str or Path
+        The problem, its name or its file; its rewards do not matter.
+    threads : int, optional
+        Threads to use; as many as the processors that this process may use by default.
 
     Attributes
     ----------
@@ -80,18 +74,14 @@ class Oracle:
         Where motions are replayed.
     """
 
-    def __init__(
-        self,
-        arm: Arm | str = DEFAULT_ARM,
-        scene: Scene | None = None,
-        task: ReachTask | str = "both",
-        *,
-        simulator: Simulator | None = None,
-    ) -> None:
-        self.simulator = simulator or Simulator(arm, task, scene)
+    def __init__(self, problem: ProblemLike, *, threads: int | None = None) -> None:
+        self.simulator = Simulator(problem, threads=threads)
         chain, n = self.simulator.arm.chain, self.simulator.n_actions
-        shapes = self.simulator.contact_model.shapes
+        shapes = self.simulator.world.contact_model.shapes
         self._arm = ArmInScene(chain, MotionBounds.of(chain, n), shapes)
+
+    def __repr__(self) -> str:
+        return f"Oracle({self.simulator.problem!r})"
 
     def solve(self, start: ArrayLike, goal: ArrayLike) -> OracleSolution:
         """Solve one trial.

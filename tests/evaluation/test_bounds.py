@@ -22,11 +22,11 @@ from kinarm.evaluation.bounds import bounds_document, cache_folder, oracle_bound
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle import Oracle, OracleSolutions
 from kinarm.policies.provenance import package_versions
-from kinarm.scene import Bench, Scene
-from kinarm.simulator import Simulator
-from kinarm.task import RewardWeights, load_task
+from kinarm.problem import PROBLEMS
+from kinarm.scene import PAPER_BENCHES, Obstacle, Scene
+from kinarm.task import RewardWeights
 
-FAR = Bench(name="far", x=(5, 6), y=(5, 6), height=1)
+FAR = Obstacle(name="far", lower=(5.0, 5.0, 0.0), upper=(6.0, 6.0, 1.0))
 
 HERE = Path(kinarm.__file__).parent.parent
 """What the package is imported from."""
@@ -39,11 +39,9 @@ from multiprocessing import get_context
 from kinarm.evaluation import TrialSet, oracle_bounds
 from kinarm.evaluation.bounds import bounds_document
 from kinarm.policies.oracle import Oracle
-from kinarm.simulator import Simulator
 
-simulator = Simulator(task="right", threads=1)
-trials = TrialSet.draw(simulator, 3, seed=5)
-Oracle(simulator=simulator).solve(trials.starts[0], trials.goals[0])
+trials = TrialSet.draw("right", 3, seed=5)
+Oracle("right", threads=1).solve(trials.starts[0], trials.goals[0])
 
 def solve(_):
     all_ready.wait()
@@ -67,7 +65,7 @@ def folder(tmp_path, monkeypatch) -> Path:
 def solutions() -> OracleSolutions:
     """What the oracle says of the trials that ``draw`` draws."""
     trials = draw()
-    return Oracle(simulator=trials.simulator).solve_batch(trials.starts, trials.goals)
+    return Oracle("right").solve_batch(trials.starts, trials.goals)
 
 
 @pytest.fixture(scope="module")
@@ -76,8 +74,8 @@ def hard() -> TrialSet:
     return draw("right", 12, 2, arm="paper_flange")
 
 
-def draw(task="right", trials=3, seed=5, arm="paper", scene=None, **settings) -> TrialSet:
-    return TrialSet.draw(Simulator(arm, load_task(task, **settings), scene), trials, seed)
+def draw(problem="right", trials=3, seed=5, **overrides) -> TrialSet:
+    return TrialSet.draw(PROBLEMS[problem].replace(**overrides), trials, seed)
 
 
 def same(one: OracleSolutions, other: OracleSolutions) -> bool:
@@ -116,16 +114,16 @@ def test_bounds_are_those_of_the_oracle(folder, solutions):
     trials = draw()
     found = oracle_bounds(trials)
     assert same(found, solutions)
-    single = Oracle(task="right").solve(trials.starts[1], trials.goals[1])
+    single = Oracle("right").solve(trials.starts[1], trials.goals[1])
     assert (found[1].steps, found[1].steps_lower_bound) == (single.steps, single.steps_lower_bound)
     np.testing.assert_array_equal(found[1].path, single.path)
 
 
-def test_bounds_are_those_of_the_arm_scene_and_task_of_the_trials(folder):
-    bench = Bench(name="right", x=(0.3, 0.5), y=(-0.8, -0.6), height=0.2)
-    trials = draw(tolerance=0.1, horizon=20, arm="lrmate200ic_5l", scene=Scene(benches=(bench,)))
-    task = load_task("right", tolerance=0.1, horizon=20)
-    solver = Oracle("lrmate200ic_5l", Scene(benches=(bench,)), task)
+def test_bounds_are_those_of_the_problem_of_the_trials(folder):
+    post = Obstacle(name="post", lower=(0.3, -0.8, 0.0), upper=(0.5, -0.6, 0.2))
+    settings = {"tolerance": 0.1, "horizon": 20, "arm": "lrmate200ic_5l"}
+    trials = draw(scene=Scene(obstacles=(post,)), **settings)
+    solver = Oracle(PROBLEMS["right"].replace(scene=Scene(obstacles=(post,)), **settings))
     assert same(oracle_bounds(trials), solver.solve_batch(trials.starts, trials.goals))
 
 
@@ -180,12 +178,12 @@ def test_the_reward_does_not_matter(folder, monkeypatch):
     [
         {"seed": 6},
         {"trials": 4},
-        {"task": "left"},
+        {"problem": "left"},
         {"arm": "paper_flange"},
         {"tolerance": 0.04},
         {"horizon": 65},
         {"start_spread": 0.5},
-        {"scene": Scene(benches=(*Scene().benches, FAR))},
+        {"scene": Scene(obstacles=(*PAPER_BENCHES, FAR))},
     ],
     ids=lambda other: next(iter(other)),
 )
@@ -304,8 +302,8 @@ def test_the_folder_is_the_chosen_or_the_users(monkeypatch, variables, expected)
     assert cache_folder() == Path(expected)
 
 
-@pytest.mark.parametrize("constant", ["ORACLE_SEMANTICS"])
-def test_the_version_changes_with_what_the_oracle_means(monkeypatch, constant):
+@pytest.mark.parametrize("constant", ["ORACLE_SEMANTICS", "SEMANTICS"])
+def test_the_version_changes_with_what_oracle_and_simulator_mean(monkeypatch, constant):
     before = bounds.oracle_version.__wrapped__()
     assert before == bounds.oracle_version()
     monkeypatch.setattr(bounds, constant, "another")

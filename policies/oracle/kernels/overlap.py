@@ -1,6 +1,6 @@
 """Proof that the arm touches something throughout a box of configurations.
 
-Two points prove it, one of each body's axis, or of bench or ground, that stay closer than the
+Two points prove it, one of each body's axis, or of obstacle or ground, that stay closer than the
 radii however the arm moves in the box. Bodies that are only enclosed by a capsule prove nothing.
 """
 
@@ -131,7 +131,7 @@ def overlaps(
             if capsules_overlap(a, b, c, d, radii, pair, travel, half, share):
                 return True
             continue
-        # A point deep in the bench stays in it longest. The ground is a box without end, of which
+        # A point deep in an obstacle stays in it longest. The ground is a box without end, of which
         # the lower end of the segment is the deepest point.
         lower, upper = (-np.inf, -np.inf, -np.inf), (np.inf, np.inf, 0.0)
         point = a if a[2] < b[2] else b
@@ -144,7 +144,7 @@ def overlaps(
         if distance_from_box(x, y, z) >= radius:
             continue
         # The point's motion along each world axis to first order, by its Jacobian: an arm that
-        # slides along a bench top does not leave it, however far it goes.
+        # slides along an obstacle does not leave it, however far it goes.
         point_jacobian(prismatic, axes, poses, point, jacobian)
         remainder = 0.0
         for axis in range(min(n, link[i])):

@@ -9,10 +9,9 @@ from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, StartInContactError, UnknownNameError
 from kinarm.policies import Oracle, OracleSolution, OracleSolutions
 from kinarm.policies.oracle.motion import steps_between
+from kinarm.problem import PROBLEMS
 from kinarm.reference import ReferenceSimulator
-from kinarm.scene import LEFT_BENCH, Bench, Scene
-from kinarm.simulator import Simulator
-from kinarm.task import ReachTask, load_task
+from kinarm.scene import PAPER_BENCHES, Obstacle, Scene
 
 TRIALS = {"lrmate200ic_5l": 100, "paper": 150, "paper_flange": 220}
 
@@ -40,16 +39,16 @@ def replayed(simulator, start, goal, solution):
 
 
 @pytest.fixture(scope="module", params=sorted(TRIALS))
-def solved(request, shipped_arms):
+def solved(request):
     """An arm's oracle, random trials of both benches, and what it knows about them."""
-    oracle = Oracle(simulator=Simulator(shipped_arms[request.param], "both", threads=2))
+    oracle = Oracle(PROBLEMS["both"].replace(arm=request.param), threads=2)
     starts, goals = drawn(oracle.simulator, 1, TRIALS[request.param])
     return oracle, starts, goals, oracle.solve_batch(starts, goals)
 
 
 @pytest.fixture(scope="module")
-def oracle(shipped_arms):
-    return Oracle(simulator=Simulator(shipped_arms["paper"], "both", threads=1))
+def oracle():
+    return Oracle("both", threads=1)
 
 
 class TestBounds:
@@ -109,8 +108,8 @@ class TestBounds:
             assert share == 1
 
     @pytest.mark.slow
-    def test_a_thousand_trials_of_the_default_arm(self, shipped_arms):
-        oracle = Oracle(shipped_arms["paper"])
+    def test_a_thousand_trials_of_the_default_arm(self):
+        oracle = Oracle("both")
         known = oracle.solve_batch(*drawn(oracle.simulator, 4, 1000))
         rest = {row: known[row].reason for row in np.flatnonzero(~known.reachable)}
         assert len(rest) <= 1, rest
@@ -162,7 +161,7 @@ class TestDeterminism:
         slow = np.argsort(known.steps - known.steps_lower_bound, kind="stable")[-6:]
         rows = np.unique(np.concatenate([missed, slow, np.arange(16)]))
         np.random.default_rng(5).shuffle(rows)
-        alone = Oracle(simulator=Simulator(oracle.simulator.arm, "both", threads=1))
+        alone = Oracle(oracle.simulator.problem, threads=1)
         parts = [
             alone.solve_batch(starts[part], goals[part]) for part in np.split(rows, [1, 4, 15])
         ]
@@ -204,9 +203,8 @@ class TestDeterminism:
         np.testing.assert_array_equal(known.paths[:, 0], before[0])
 
 
-def with_task(oracle, **settings):
-    task = load_task("both", **settings)
-    return Oracle(simulator=Simulator(oracle.simulator.arm, task, threads=1))
+def with_task(**settings):
+    return Oracle(PROBLEMS["both"].replace(**settings), threads=1)
 
 
 class TestSingleTrials:
@@ -258,7 +256,7 @@ class TestSingleTrials:
         known = oracle.solve_batch(starts, goals)
         row = int(known.steps_lower_bound.argmax())
         horizon = int(known.steps_lower_bound[row]) - 1
-        solution = with_task(oracle, horizon=horizon).solve(starts[row], goals[row])
+        solution = with_task(horizon=horizon).solve(starts[row], goals[row])
         assert not solution.reachable
         assert solution.steps == horizon
         assert solution.steps_lower_bound == horizon + 1
@@ -266,14 +264,13 @@ class TestSingleTrials:
         assert solution.reason.endswith(f"within {horizon} steps")
         assert TOLERANCE <= solution.distance_lower_bound <= solution.final_distance
         assert solution.final_distance < 2 * TOLERANCE
-        enough = with_task(oracle, horizon=int(known.steps[row]))
+        enough = with_task(horizon=int(known.steps[row]))
         assert enough.solve(starts[row], goals[row]).steps == known.steps[row]
 
     def test_wider_tolerance_lowers_the_floor(self, oracle):
         starts, goals = drawn(oracle.simulator, 12, 12)
         strict, wide = (
-            with_task(oracle, tolerance=tolerance).solve_batch(starts, goals)
-            for tolerance in (0.02, 0.1)
+            with_task(tolerance=tolerance).solve_batch(starts, goals) for tolerance in (0.02, 0.1)
         )
         assert (wide.steps_lower_bound <= strict.steps_lower_bound).all()
         assert (wide.steps_lower_bound < strict.steps_lower_bound).any()
@@ -298,15 +295,15 @@ def posts(make_joint, make_collision, write_robot):
     )
     joints = [make_joint(xyz="0 0 0.4", limit=limit), make_joint(xyz="0.3 0 0", limit=limit)]
     arm = Arm.load(write_robot(joints, {2: bar}, tool="0.4 0 0"))
-    benches = []
-    for name, angle in (("left", 0.9), ("right", -0.9)):
+    obstacles = []
+    for name, angle in (("left post", 0.9), ("right post", -0.9)):
         x, y = 0.5 * np.cos(angle), 0.5 * np.sin(angle)
-        sides = {"x": (x - 0.03, x + 0.03), "y": (y - 0.03, y + 0.03)}
-        benches.append(Bench(name=name, height=1, **sides))
-    task = ReachTask(name="posts", benches=("left",), tolerance=0.02)
+        lower, upper = (x - 0.03, y - 0.03, 0.0), (x + 0.03, y + 0.03, 1.0)
+        obstacles.append(Obstacle(name=name, lower=lower, upper=upper))
+    problem = PROBLEMS["left"].replace(arm=arm, tolerance=0.02)
     among, without = (
-        Oracle(simulator=Simulator(arm, task, scene, threads=1))
-        for scene in (Scene(benches=tuple(benches)), Scene(benches=(LEFT_BENCH,)))
+        Oracle(problem.replace(scene=Scene(obstacles=placed)), threads=1)
+        for placed in (tuple(obstacles), PAPER_BENCHES[1:])
     )
     return among, without, np.array([-1.2, 0.0]), arm.tool_position([1.2, 0.0])
 
@@ -323,7 +320,7 @@ class TestOtherWorlds:
         episode = replayed(among.simulator, start, goal, detour)
         assert episode.success
         assert len(episode.rewards) == detour.steps
-        assert "right bench" in replayed(among.simulator, start, goal, free).contact
+        assert "right post" in replayed(among.simulator, start, goal, free).contact
 
     def test_detours_do_not_depend_on_other_trials(self, posts):
         among, _, start, goal = posts
@@ -348,7 +345,7 @@ class TestOtherWorlds:
         ]
         arm = Arm.load(write_robot(joints, {2: bar, 3: bar}, tool="0.4 0 -0.02"))
         assert arm.n_actuated == 3
-        oracle = Oracle(simulator=Simulator(arm, "both", threads=1))
+        oracle = Oracle(PROBLEMS["both"].replace(arm=arm), threads=1)
         starts, goals = drawn(oracle.simulator, 13, 60)
         known = oracle.solve_batch(starts, goals)
         assert known.reachable.mean() > 0.7
@@ -365,7 +362,7 @@ class TestOtherWorlds:
 
     def test_arms_of_other_shapes(self, simulators):
         for name in ("sliding", "mesh"):
-            oracle = Oracle(simulator=simulators[name])
+            oracle = Oracle(simulators[name].problem, threads=1)
             starts, goals = drawn(oracle.simulator, 14, 12)
             known = oracle.solve_batch(starts, goals)
             for start, goal, solution in zip(starts, goals, known, strict=True):
@@ -374,17 +371,16 @@ class TestOtherWorlds:
                 assert episode.success == solution.reachable
                 assert solution.final_distance >= solution.distance_lower_bound
 
-    def test_names_are_looked_up(self):
-        oracle = Oracle("paper_flange", task="left")
-        assert oracle.simulator.arm.name == "paper_flange"
-        assert oracle.simulator.task.name == "left"
-        assert Oracle().simulator.arm.name == "paper"
-        with pytest.raises(UnknownNameError, match="'paperr'"):
-            Oracle("paperr")
+    def test_problems_are_looked_up(self, tmp_path):
+        PROBLEMS["left"].replace(horizon=7).save(tmp_path / "short.toml")
+        assert Oracle("left").simulator.problem == PROBLEMS["left"]
+        assert Oracle(tmp_path / "short.toml").simulator.task.horizon == 7
+        assert repr(Oracle("left")) == f"Oracle({PROBLEMS['left']!r})"
+        with pytest.raises(UnknownNameError, match="'leftt'"):
+            Oracle("leftt")
 
-    def test_task_of_ones_own(self):
-        task = ReachTask(name="own", benches=("left",), tolerance=0.2, horizon=30)
-        oracle = Oracle("paper", task=task)
+    def test_problem_of_ones_own(self):
+        oracle = Oracle(PROBLEMS["left"].replace(tolerance=0.2, horizon=30))
         known = oracle.solve_batch(*drawn(oracle.simulator, 15, 3))
         assert known.actions.shape == (3, 30, 5)
         assert known.paths.shape == (3, 31, 6)
@@ -427,7 +423,7 @@ class TestRefusals:
             oracle.solve_batch(starts, goals)
 
     def test_start_in_contact_names_the_pair(self, oracle):
-        expected = oracle.simulator.contact_model.contact_pair(FOLDED)
+        expected = oracle.simulator.world.contact_model.contact_pair(FOLDED)
         with pytest.raises(StartInContactError) as caught:
             oracle.solve(FOLDED, GOAL)
         assert (caught.value.index, caught.value.pair) == (0, expected)
@@ -525,4 +521,4 @@ def test_inverse_kinematics_is_at_hand(oracle):
     assert len(found) > 5
     tools = np.array([oracle.simulator.arm.tool_position(q) for q in found])
     assert (np.linalg.norm(tools - goal, axis=1) <= TOLERANCE).all()
-    assert not oracle.simulator.contact_model.in_contact(found).any()
+    assert not oracle.simulator.world.contact_model.in_contact(found).any()

@@ -11,9 +11,9 @@ from kinarm.arm import Arm
 from kinarm.motion_bounds import MotionBounds
 from kinarm.policies.oracle.inverse import project, solve_within, step_box
 from kinarm.policies.oracle.kernels.approach import ArmInScene, bound_distance, bound_steps
-from kinarm.scene import Bench, Scene
+from kinarm.problem import PROBLEMS
+from kinarm.scene import Obstacle, Scene
 from kinarm.simulator import Simulator
-from kinarm.task import ReachTask
 
 CAPSULE_ARMS = ("lrmate200ic_5l", "paper", "paper_flange")
 
@@ -31,7 +31,7 @@ def known(simulator):
     """What the kernels know of an arm in a scene."""
     chain = simulator.arm.chain
     bounds = MotionBounds.of(chain, simulator.n_actions)
-    return ArmInScene(chain, bounds, simulator.contact_model.shapes)
+    return ArmInScene(chain, bounds, simulator.world.contact_model.shapes)
 
 
 def prove_steps(simulator, starts, goals, *, contact=False, budget=BUDGET, fewest=1, most=None):
@@ -72,8 +72,8 @@ def turning_joint(make_joint, xyz):
 
 
 def planar_simulator(arm, scene=None, **settings):
-    task = ReachTask(name="planar", benches=("left",), tolerance=TOLERANCE, **settings)
-    return Simulator(arm, task, scene, threads=1)
+    problem = PROBLEMS["left"].replace(arm=arm, scene=scene, tolerance=TOLERANCE, **settings)
+    return Simulator(problem, threads=1)
 
 
 @pytest.fixture(scope="module")
@@ -101,9 +101,9 @@ def walled(make_joint, make_collision, write_robot):
         )
         for k, length in enumerate((INNER, OUTER))
     }
-    wall = Bench(name="left", x=(-1, 1), y=(0.3, 0.5), height=1)
+    wall = Obstacle(name="wall", lower=(-1, 0.3, 0), upper=(1, 0.5, 1))
     arm = Arm.load(write_robot(joints, shapes, tool=f"{OUTER} 0 0"))
-    return planar_simulator(arm, Scene(benches=(wall,)))
+    return planar_simulator(arm, Scene(obstacles=(wall,)))
 
 
 def planar_goals(rng, count, nearest=0.0, farthest=INNER + OUTER, height=0.0):
@@ -287,9 +287,9 @@ def measured_free(simulator, configurations):
 
     Its verdict alone misses about one contact of a capsule and a box in 100 000, at any depth.
     """
-    model, geometry = simulator.arm.model, simulator.contact_model.geometry
+    model, geometry = simulator.arm.model, simulator.world.contact_model.geometry
     data, geometry_data = model.createData(), geometry.createData()
-    free = ~simulator.contact_model.in_contact(configurations)
+    free = ~simulator.world.contact_model.in_contact(configurations)
     for index in np.flatnonzero(free):
         pin.computeDistances(model, data, geometry, geometry_data, configurations[index])
         free[index] = all(result.min_distance > 0 for result in geometry_data.distanceResults)
@@ -341,7 +341,7 @@ class TestPlanarContact:
         # The grid is coarse: 0.0165 rad, a quarter of a step.
         assert (steps - floors <= 1)[tight].mean() > 0.8
         reached = tight & (floors <= 64)
-        assert not walled.contact_model.in_contact(witnesses[reached]).any()
+        assert not walled.world.contact_model.in_contact(witnesses[reached]).any()
 
     def test_approach_stops_at_the_wall(self, walled, free_grid):
         goals = np.stack(
@@ -358,7 +358,7 @@ class TestPlanarContact:
         assert complete.sum() > 5
         # Whichever way, the outer link stays its radius away from the wall at y = 0.3.
         assert (proven > 0.1 + 0.03 - 0.011)[complete].all()
-        assert not walled.contact_model.in_contact(at).any()
+        assert not walled.world.contact_model.in_contact(at).any()
 
 
 @pytest.fixture(scope="module")
@@ -424,7 +424,7 @@ class TestSearchesDoNotBeatTheFloor:
         rng, closest = np.random.default_rng(15), []
         for i in range(len(starts)):
             drawn = within(lower[i], upper[i], starts[i], rng, 6_000)
-            tools, _ = simulator.screen(drawn)
+            tools, _ = simulator.world.screen(drawn)
             closest.append(np.linalg.norm(tools - goals[i], axis=1).min())
         assert (np.array(closest) > simulator.task.tolerance).all()
         assert min(closest) < 0.08
@@ -502,7 +502,7 @@ class TestSearchesDoNotBeatTheDistance:
 
             assert distance(at[i, :n]) == pytest.approx(found[i], abs=1e-12)
             drawn = within(lower, upper, starts[i], rng, 5000)
-            tools, _ = simulator.screen(drawn)
+            tools, _ = simulator.world.screen(drawn)
             away = np.linalg.norm(tools - goals[i], axis=1)
             limits = list(zip(lower, upper, strict=True))
             descended = [
