@@ -15,7 +15,7 @@ from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.entrants import Entrant, find_entrants
 from kinarm.evaluation.statistics import DistanceStatistics, Share
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.oracle_solution import OracleSolutions
+from kinarm.policies.oracle.solution import OracleSolutions
 from kinarm.policies.policy import Policy
 from kinarm.rollouts import Rollouts
 from kinarm.simulator import PolicyFunction, Simulator

@@ -8,15 +8,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm import kernels
+from kinarm._parallel import run_rows
+from kinarm._validation import finite_array, whole_number
 from kinarm.errors import InvalidInputError
-from kinarm.parallel import run_rows
-from kinarm.policies.motion import steps_between
+from kinarm.policies.oracle.kernels.projection import damped_least_squares
+from kinarm.policies.oracle.motion import steps_between
 from kinarm.simulator import Simulator
-from kinarm.validation import finite_array, whole_number
 
-MARGIN = 1e-6
-"""Share of the tolerance that is kept against rounding."""
+RESERVE = 1e-6
+"""Share of the tolerance that is left against rounding."""
 
 
 class Solutions(NamedTuple):
@@ -116,30 +116,39 @@ def solve_within(
     samples : int
         Configurations to begin with, per goal: the start, the guess, and evenly spread ones.
     """
-    m, n_axes, moved = len(starts), simulator.arm.n_axes, slice(simulator.n_actions)
-    lower, upper = step_box(simulator, starts, steps)
+    m, n_axes = len(starts), simulator.arm.n_axes
+    box = step_box(simulator, starts, steps)
     spread = evenly_spread(samples, simulator.n_actions + 1)
-    begun = np.repeat(starts[:, None], samples, axis=1)
-    begun[:, :, moved] = lower[:, None] + spread[:, :-1] * (upper - lower)[:, None]
-    begun[:, 1 % samples] = guesses
-    begun[:, 0] = starts
-    begun[:, :, moved] = np.clip(begun[:, :, moved], lower[:, None], upper[:, None])
+    beginnings = _beginnings(starts, guesses, box, spread[:, :-1])
     # Half of the solutions may rest on the rim of the ball, the others lie throughout it.
     shares = np.where(np.arange(samples) % 2 == 0, 1.0, np.cbrt(spread[:, -1]))
     owner = np.repeat(np.arange(m), samples)
-    allowed = (tolerances * (1.0 - MARGIN))[owner]
+    allowed = (tolerances * (1.0 - RESERVE))[owner]
+    radius = allowed * np.tile(shares, m)
     configurations, distances = project(
-        simulator,
-        begun.reshape(-1, n_axes),
-        owner,
-        (lower, upper),
-        goals,
-        allowed * np.tile(shares, m),
+        simulator, beginnings.reshape(-1, n_axes), owner, box, goals, radius
     )
     near = np.flatnonzero(distances <= allowed)
-    _, touching = simulator.screen(configurations[near])
+    _, touching = simulator.world.screen(configurations[near])
     free = near[~touching]
     return Solutions(configurations[free], owner[free])
+
+
+def _beginnings(
+    starts: NDArray[np.float64],
+    guesses: NDArray[np.float64],
+    box: tuple[NDArray[np.float64], NDArray[np.float64]],
+    spread: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Start, guess and evenly spread configurations of boxes, shape (m, samples, n_axes)."""
+    lower, upper = box[0][:, None], box[1][:, None]
+    samples, moved = len(spread), slice(lower.shape[-1])
+    beginnings = np.repeat(starts[:, None], samples, axis=1)
+    beginnings[:, :, moved] = lower + spread * (upper - lower)
+    beginnings[:, 1 % samples] = guesses
+    beginnings[:, 0] = starts
+    beginnings[:, :, moved] = np.clip(beginnings[:, :, moved], lower, upper)
+    return beginnings
 
 
 def project(
@@ -176,7 +185,7 @@ def project(
     """
     ended, distances = configurations.copy(), np.empty(len(configurations))
     arrays = (simulator.arm.chain, owner, *box, goals, radius, ended, distances)
-    run_rows(kernels.project, len(ended), 4 * len(ended), simulator.threads, *arrays)
+    run_rows(damped_least_squares, len(ended), 4 * len(ended), simulator.threads, *arrays)
     return ended, distances
 
 

@@ -1,17 +1,19 @@
 """Branch and bound: closed forms and grids of a planar arm, and searches that try to beat it."""
 
+from functools import cache
+
 import numpy as np
 import pinocchio as pin
 import pytest
 from scipy.optimize import minimize
 
-from kinarm import kernels
 from kinarm.arm import Arm
 from kinarm.motion_bounds import MotionBounds
-from kinarm.policies.inverse import project, solve_within, step_box
-from kinarm.scene import Bench, Scene
+from kinarm.policies.oracle.inverse import project, solve_within, step_box
+from kinarm.policies.oracle.kernels.approach import ArmInScene, bound_distance, bound_steps
+from kinarm.problem import PROBLEMS
+from kinarm.scene import Obstacle, Scene
 from kinarm.simulator import Simulator
-from kinarm.task import ReachTask
 
 CAPSULE_ARMS = ("lrmate200ic_5l", "paper", "paper_flange")
 
@@ -29,7 +31,7 @@ def known(simulator):
     """What the kernels know of an arm in a scene."""
     chain = simulator.arm.chain
     bounds = MotionBounds.of(chain, simulator.n_actions)
-    return chain, bounds, simulator.contact_model.shapes
+    return ArmInScene(chain, bounds, simulator.world.contact_model.shapes)
 
 
 def prove_steps(simulator, starts, goals, *, contact=False, budget=BUDGET, fewest=1, most=None):
@@ -38,8 +40,8 @@ def prove_steps(simulator, starts, goals, *, contact=False, budget=BUDGET, fewes
     floors, tight, witnesses = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=bool), starts.copy()
     last = simulator.task.horizon if most is None else most
     limits = (np.full(n, 1) * fewest, np.full(n, 1) * last)
-    inputs = (*known(simulator), starts, goals, simulator.step_limit, simulator.task.tolerance)
-    kernels.steps_floor(0, n, *inputs, contact, budget, *limits, floors, tight, witnesses)
+    inputs = (known(simulator), starts, goals, simulator.step_limit, simulator.task.tolerance)
+    bound_steps(0, n, *inputs, contact, budget, *limits, floors, tight, witnesses)
     return floors, tight, witnesses
 
 
@@ -51,8 +53,8 @@ def prove_distance(
     arm = simulator.arm
     lower, upper = box or (np.tile(limit[moved], (n, 1)) for limit in (arm.lower, arm.upper))
     distances, configurations = np.empty((n, 2)), np.empty(starts.shape)
-    inputs = (*known(simulator), lower, upper, starts, goals, resolution, contact, budget)
-    kernels.closest_approach(0, n, *inputs, distances, configurations)
+    inputs = (known(simulator), lower, upper, starts, goals, resolution, contact, budget)
+    bound_distance(0, n, *inputs, distances, configurations)
     return distances[:, 0], distances[:, 1], configurations
 
 
@@ -70,8 +72,8 @@ def turning_joint(make_joint, xyz):
 
 
 def planar_simulator(arm, scene=None, **settings):
-    task = ReachTask(name="planar", benches=("left",), tolerance=TOLERANCE, **settings)
-    return Simulator(arm, task, scene, threads=1)
+    problem = PROBLEMS["left"].replace(arm=arm, scene=scene, tolerance=TOLERANCE, **settings)
+    return Simulator(problem, threads=1)
 
 
 @pytest.fixture(scope="module")
@@ -99,9 +101,9 @@ def walled(make_joint, make_collision, write_robot):
         )
         for k, length in enumerate((INNER, OUTER))
     }
-    wall = Bench(name="left", x=(-1, 1), y=(0.3, 0.5), height=1)
+    wall = Obstacle(name="wall", lower=(-1, 0.3, 0), upper=(1, 0.5, 1))
     arm = Arm.load(write_robot(joints, shapes, tool=f"{OUTER} 0 0"))
-    return planar_simulator(arm, Scene(benches=(wall,)))
+    return planar_simulator(arm, Scene(obstacles=(wall,)))
 
 
 def planar_goals(rng, count, nearest=0.0, farthest=INNER + OUTER, height=0.0):
@@ -199,15 +201,23 @@ class TestPlanarDistance:
         np.testing.assert_array_equal(at, configuration)
 
 
-def planar_steps(start, goal, allowance):
-    """Fewest steps of 64 by the grid of distances, less an allowance for its error; else 65."""
-    few, many = 0, 65
-    while many - few > 1:
-        steps = (few + many) // 2
+def planar_steps(start, goal):
+    """Fewest steps of 64 by the grid of distances, else 65: with its error allowed, and without."""
+
+    @cache
+    def distance(steps):
         lower, upper = np.fmax(start - 0.06 * steps, -3.3), np.fmin(start + 0.06 * steps, 3.3)
-        least, error = planar_distance(lower, upper, goal)
-        few, many = (few, steps) if least - allowance * error <= TOLERANCE else (steps, many)
-    return many
+        return planar_distance(lower, upper, goal)
+
+    def fewest(allowance):
+        few, many = 0, 65
+        while many - few > 1:
+            steps = (few + many) // 2
+            least, error = distance(steps)
+            few, many = (few, steps) if least - allowance * error <= TOLERANCE else (steps, many)
+        return many
+
+    return fewest(1), fewest(0)
 
 
 class TestPlanarSteps:
@@ -217,10 +227,8 @@ class TestPlanarSteps:
         goals = planar_goals(rng, 60, 0.15, 0.85, height=TOLERANCE)
         floors, tight, witnesses = prove_steps(planar, starts, goals)
         assert tight.all()
-        possible, steps = (
-            np.array([planar_steps(*trial, allowance) for trial in zip(starts, goals, strict=True)])
-            for allowance in (1, 0)
-        )
+        trials = zip(starts, goals, strict=True)
+        possible, steps = np.array([planar_steps(*trial) for trial in trials]).T
         assert (floors <= steps).all()
         assert (floors >= possible).all()
         assert (floors == steps).mean() > 0.95
@@ -240,7 +248,7 @@ class TestPlanarSteps:
         floors, tight, _ = prove_steps(planar, np.zeros((1, 2)), goals)
         assert tight[0]
         assert 7 <= floors[0] <= 10
-        assert floors[0] == planar_steps(np.zeros(2), goals[0], 0)
+        assert floors[0] == planar_steps(np.zeros(2), goals[0])[1]
 
     def test_unreachable_goals(self, planar):
         starts = np.random.default_rng(7).uniform(-3.3, 3.3, (20, 2))
@@ -268,8 +276,8 @@ class TestPlanarSteps:
         starts, goals = rng.uniform(-3, 3, (8, 2)), planar_goals(rng, 8, 0.2, 0.8)
         floors, tight = np.full(8, -1), np.zeros(8, dtype=bool)
         limits = (np.full(8, 1), np.full(8, 64))
-        inputs = (*known(planar), starts, goals, planar.step_limit, TOLERANCE, False, BUDGET)
-        kernels.steps_floor(3, 5, *inputs, *limits, floors, tight, starts.copy())
+        inputs = (known(planar), starts, goals, planar.step_limit, TOLERANCE, False, BUDGET)
+        bound_steps(3, 5, *inputs, *limits, floors, tight, starts.copy())
         np.testing.assert_array_equal(floors[[0, 1, 2, 5, 6, 7]], -1)
         np.testing.assert_array_equal(floors[3:5], prove_steps(planar, starts, goals)[0][3:5])
 
@@ -279,9 +287,9 @@ def measured_free(simulator, configurations):
 
     Its verdict alone misses about one contact of a capsule and a box in 100 000, at any depth.
     """
-    model, geometry = simulator.arm.model, simulator.contact_model.geometry
+    model, geometry = simulator.arm.model, simulator.world.contact_model.geometry
     data, geometry_data = model.createData(), geometry.createData()
-    free = ~simulator.contact_model.in_contact(configurations)
+    free = ~simulator.world.contact_model.in_contact(configurations)
     for index in np.flatnonzero(free):
         pin.computeDistances(model, data, geometry, geometry_data, configurations[index])
         free[index] = all(result.min_distance > 0 for result in geometry_data.distanceResults)
@@ -333,7 +341,7 @@ class TestPlanarContact:
         # The grid is coarse: 0.0165 rad, a quarter of a step.
         assert (steps - floors <= 1)[tight].mean() > 0.8
         reached = tight & (floors <= 64)
-        assert not walled.contact_model.in_contact(witnesses[reached]).any()
+        assert not walled.world.contact_model.in_contact(witnesses[reached]).any()
 
     def test_approach_stops_at_the_wall(self, walled, free_grid):
         goals = np.stack(
@@ -350,7 +358,7 @@ class TestPlanarContact:
         assert complete.sum() > 5
         # Whichever way, the outer link stays its radius away from the wall at y = 0.3.
         assert (proven > 0.1 + 0.03 - 0.011)[complete].all()
-        assert not walled.contact_model.in_contact(at).any()
+        assert not walled.world.contact_model.in_contact(at).any()
 
 
 @pytest.fixture(scope="module")
@@ -416,7 +424,7 @@ class TestSearchesDoNotBeatTheFloor:
         rng, closest = np.random.default_rng(15), []
         for i in range(len(starts)):
             drawn = within(lower[i], upper[i], starts[i], rng, 6_000)
-            tools, _ = simulator.screen(drawn)
+            tools, _ = simulator.world.screen(drawn)
             closest.append(np.linalg.norm(tools - goals[i], axis=1).min())
         assert (np.array(closest) > simulator.task.tolerance).all()
         assert min(closest) < 0.08
@@ -494,7 +502,7 @@ class TestSearchesDoNotBeatTheDistance:
 
             assert distance(at[i, :n]) == pytest.approx(found[i], abs=1e-12)
             drawn = within(lower, upper, starts[i], rng, 5000)
-            tools, _ = simulator.screen(drawn)
+            tools, _ = simulator.world.screen(drawn)
             away = np.linalg.norm(tools - goals[i], axis=1)
             limits = list(zip(lower, upper, strict=True))
             descended = [

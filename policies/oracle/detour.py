@@ -3,8 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.kernels import SUBSTEPS
-from kinarm.policies.motion import steps_between
+from kinarm.policies.oracle.motion import steps_between
 from kinarm.simulator import Simulator
 
 EXTENSIONS = 1500
@@ -36,7 +35,7 @@ class Tree:
         self.parents.append(parent)
         return len(self.parents) - 1
 
-    def branch(self, node: int) -> list[NDArray[np.float64]]:
+    def path_to_root(self, node: int) -> list[NDArray[np.float64]]:
         """Nodes from a given one to its root."""
         found = []
         while node >= 0:
@@ -92,7 +91,7 @@ def _connect(
             node = growing.nodes[grown]
             met = _extend(simulator, other, node, np.inf)
             if met is not None and steps_between(simulator, other.nodes[met], node) < 1e-9:
-                near, far = growing.branch(grown)[::-1], other.branch(met)[1:]
+                near, far = growing.path_to_root(grown)[::-1], other.path_to_root(met)[1:]
                 path = np.array(near + far)
                 return path if from_start else path[::-1]
         growing, other, from_start = other, growing, not from_start
@@ -109,25 +108,26 @@ def _extend(
         return nearest
     origin = tree.nodes[nearest]
     towards = origin + min(1.0, longest / distances[nearest]) * (sample - origin)
-    on_the_way = _tested(simulator, origin, towards)
-    free = _free_until(simulator, on_the_way)
+    on_the_way = _tested_configurations(simulator, origin, towards)
+    free = _count_free(simulator, on_the_way)
     return tree.add(on_the_way[free - 1], nearest) if free else None
 
 
-def _tested(
+def _tested_configurations(
     simulator: Simulator, first: NDArray[np.float64], second: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Configurations as far apart as those at which a step is tested, without the first."""
-    count = max(1, int(np.ceil(SUBSTEPS * steps_between(simulator, first, second))))
+    tested_each = simulator.problem.stepping.tested_configurations
+    count = max(1, int(np.ceil(tested_each * steps_between(simulator, first, second))))
     shares = np.arange(1, count + 1)[:, None] / count
     tested: NDArray[np.float64] = first + shares * (second - first)
     tested[-1] = second
     return tested
 
 
-def _free_until(simulator: Simulator, configurations: NDArray[np.float64]) -> int:
+def _count_free(simulator: Simulator, configurations: NDArray[np.float64]) -> int:
     """How many configurations in a row touch nothing."""
-    _, touching = simulator.screen(configurations)
+    _, touching = simulator.world.screen(configurations)
     return int(touching.argmax()) if touching.any() else len(configurations)
 
 
@@ -146,8 +146,8 @@ def _shorten(
         )
         if steps_between(simulator, first, second) > b - a - 1e-6:
             continue
-        tested = _tested(simulator, first, second)
-        if _free_until(simulator, tested) == len(tested):
+        tested = _tested_configurations(simulator, first, second)
+        if _count_free(simulator, tested) == len(tested):
             before, after = path[arrival < a], path[arrival > b]
             path = np.concatenate([before, first[None], second[None], after])
     return path

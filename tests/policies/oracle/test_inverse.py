@@ -9,10 +9,10 @@ from scipy.stats import qmc
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError
 from kinarm.policies import inverse_kinematics
-from kinarm.policies.inverse import evenly_spread, project, solve_within, step_box
-from kinarm.policies.motion import steps_between
+from kinarm.policies.oracle.inverse import evenly_spread, project, solve_within, step_box
+from kinarm.policies.oracle.motion import steps_between
+from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
-from kinarm.task import ReachTask
 
 SHIPPED = ("lrmate200ic_5l", "paper", "paper_flange")
 
@@ -29,7 +29,7 @@ def assert_solutions(simulator, found, start, goal, separation=0.2):
     assert ((found >= arm.lower) & (found <= arm.upper)).all()
     np.testing.assert_array_equal(found[:, n:], np.tile(start[n:], (len(found), 1)))
     assert (tool_distances(simulator, found, goal) <= simulator.task.tolerance).all()
-    assert not simulator.contact_model.in_contact(found).any()
+    assert not simulator.world.contact_model.in_contact(found).any()
     steps = steps_between(simulator, start, found)
     assert (np.diff(steps) >= 0).all()
     assert (steps <= simulator.task.horizon + 1e-9).all()
@@ -43,7 +43,7 @@ def planar(make_joint, write_robot):
     limit = '<limit lower="-2.8" upper="2.8" velocity="5" effort="0"/>'
     joints = [make_joint(xyz="0 0 0.4", limit=limit), make_joint(xyz="0.5 0 0", limit=limit)]
     arm = Arm.load(write_robot(joints, tool="0.3 0 0"))
-    return Simulator(arm, ReachTask(name="planar", benches=("left",), tolerance=1e-3), threads=1)
+    return Simulator(PROBLEMS["left"].replace(arm=arm, tolerance=1e-3), threads=1)
 
 
 def elbow_solutions(goal):
@@ -106,9 +106,8 @@ class TestSolutions:
         found = inverse_kinematics(simulator, np.zeros(6), goal)
         assert found.shape == (0, 6)
 
-    def test_horizon_limits_them(self, shipped_arms):
-        task = ReachTask(name="short", benches=("right",), horizon=6)
-        simulator = Simulator(shipped_arms["paper"], task, threads=1)
+    def test_horizon_limits_them(self):
+        simulator = Simulator(PROBLEMS["right"].replace(horizon=6), threads=1)
         start = np.zeros(6)
         near = simulator.arm.tool_position([0.4, 0.1, 0.1, 0, 0.2, 0])
         found = inverse_kinematics(simulator, start, near)
@@ -134,10 +133,9 @@ class TestSolutions:
 
 
 class TestDeterminism:
-    def test_calls_and_threads_do_not_matter(self, shipped_arms):
+    def test_calls_and_threads_do_not_matter(self):
         start, goal = np.zeros(6), np.array([0.3, -0.6, 0.325])
-        first = Simulator(shipped_arms["paper"], "both", threads=1)
-        second = Simulator(shipped_arms["paper"], "both", threads=2)
+        first, second = (Simulator("both", threads=threads) for threads in (1, 2))
         found = [inverse_kinematics(simulator, start, goal) for simulator in (first, first, second)]
         np.testing.assert_array_equal(found[0], found[1])
         np.testing.assert_array_equal(found[0], found[2])
@@ -189,7 +187,7 @@ class TestSolveWithin:
             assert (q[:5] <= upper[owner]).all()
             away = np.linalg.norm(simulator.arm.tool_position(q) - goals[owner])
             assert away <= tolerances[owner]
-        assert not simulator.contact_model.in_contact(found.configurations).any()
+        assert not simulator.world.contact_model.in_contact(found.configurations).any()
 
     def test_goals_are_treated_alone(self, simulator):
         starts, goals = simulator.sample(np.random.default_rng(6), 6)

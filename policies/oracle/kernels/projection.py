@@ -1,4 +1,4 @@
-"""Moving configurations so that they bring the tool to a goal, within given limits."""
+"""Inverse kinematics: configurations moved until they bring the tool to a goal, within limits."""
 
 import math
 
@@ -9,7 +9,7 @@ from kinarm.chain import Chain
 from kinarm.kernels.compiling import inlined, kernel
 from kinarm.kernels.kinematics import POSE, forward_kinematics, point_jacobian, to_world
 
-LAYOUT = "0236ea918130"
+LAYOUT = "1d397fd0c367"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 ITERATIONS = 24
@@ -51,7 +51,7 @@ def damped_step(
 
 
 @kernel
-def project(
+def damped_least_squares(
     first: int,
     last: int,
     chain: Chain,
@@ -63,7 +63,7 @@ def project(
     configurations: NDArray[np.float64],
     distances: NDArray[np.float64],
 ) -> None:
-    """Move configurations until the tool is within a radius of the goal: damped least squares.
+    """Move configurations until the tool is within a radius of the goal, by damped Newton steps.
 
     Parameters
     ----------
@@ -101,6 +101,8 @@ def project(
             point_jacobian(prismatic, axis, poses, (x, y, z), jacobian)
             # Aimed at half the radius, a step that falls short still arrives.
             share = 1.0 - 0.5 * radius[row] / distance
+            # An axis that rests on a limit and would leave it is taken out of the Jacobian, so that
+            # the others make up for it. That changes their steps: until none is blocked.
             blocked = True
             while blocked:
                 blocked = False
@@ -112,6 +114,7 @@ def project(
                     if outward:
                         jacobian[0, k], jacobian[1, k], jacobian[2, k] = 0.0, 0.0, 0.0
                         blocked = True
+            # Scaled down as a whole, a step keeps its direction, in which the tool nears the goal.
             longest = LONGEST_STEP
             for k in range(n):
                 longest = max(longest, abs(step[k]))

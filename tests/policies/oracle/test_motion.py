@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from kinarm.arm import Arm
-from kinarm.policies.motion import along_path, steps_between, straight, two_segments
-from kinarm.scene import Bench, Scene
+from kinarm.policies.oracle.motion import along_path, steps_between, straight, two_segments
+from kinarm.problem import PROBLEMS
+from kinarm.scene import Scene
 from kinarm.simulator import Simulator
-from kinarm.task import ReachTask
 
 FAR = np.array([0.0, 0.0, 90.0])
 LIMITS = np.array([0.06, 0.02, 0.06])
@@ -26,9 +26,8 @@ def free(make_joint, write_robot):
     )
     joints = [make_joint(), slide, make_joint(xyz="0.3 0 0", axis="0 1 0"), make_joint()]
     arm = Arm.load(write_robot(joints, tool="0 0 0.2"))
-    bench = Bench(name="far", x=(50, 51), y=(50, 51), height=1)
-    task = ReachTask(name="free", benches=("far",), tolerance=1e-6)
-    return Simulator(arm, task, Scene(benches=(bench,), ground=False), threads=1)
+    scene = Scene(obstacles=(), ground=False)
+    return Simulator(PROBLEMS["left"].replace(arm=arm, scene=scene, tolerance=1e-6), threads=1)
 
 
 def drawn(simulator, seed, count, last=0.4):

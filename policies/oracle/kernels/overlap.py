@@ -1,4 +1,8 @@
-"""Proof that the arm touches something throughout a box of configurations."""
+"""Proof that the arm touches something throughout a box of configurations.
+
+Two points prove it, one of each body's axis, or of obstacle or ground, that stay closer than the
+radii however the arm moves in the box. Bodies that are only enclosed by a capsule prove nothing.
+"""
 
 import math
 
@@ -12,9 +16,12 @@ from kinarm.kernels.distance import between_segments, closest_to_box
 from kinarm.kernels.kinematics import point_jacobian, to_world
 from kinarm.kernels.proof import MARGIN
 
+TRIED = 5
+"""Evenly spaced points of an axis that are tried for the deepest one, beside the closest one."""
+
 
 @inlined
-def outside(x: float, y: float, z: float) -> float:
+def distance_from_box(x: float, y: float, z: float) -> float:
     """Distance from a box, given how far a point is beyond it per axis; less than 0 within."""
     if x <= 0.0 and y <= 0.0 and z <= 0.0:
         return max(x, y, z)
@@ -23,7 +30,7 @@ def outside(x: float, y: float, z: float) -> float:
 
 
 @inlined
-def beyond(
+def excess_over_box(
     point: tuple[float, float, float],
     lower: tuple[float, float, float],
     upper: tuple[float, float, float],
@@ -43,15 +50,13 @@ def deepest_point(
     lower: tuple[float, float, float],
     upper: tuple[float, float, float],
 ) -> tuple[float, float, float]:
-    """Point of the segment ab that is deepest in a box, or closest to it: the best of six."""
+    """Point of the segment ab that is deepest in a box, or closest to it: the best of a few."""
     best, share = np.inf, 0.0
-    for k in range(6):
-        t = 0.25 * k
-        if k == 5:
-            t = closest_to_box(a, b, lower, upper)
+    for k in range(TRIED + 1):
+        t = k / (TRIED - 1) if k < TRIED else closest_to_box(a, b, lower, upper)
         x, y, z = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
-        ex, ey, ez = beyond((x, y, z), lower, upper)
-        distance = outside(ex, ey, ez)
+        ex, ey, ez = excess_over_box((x, y, z), lower, upper)
+        distance = distance_from_box(ex, ey, ez)
         if distance < best:
             best, share = distance, t
     return (
@@ -59,6 +64,29 @@ def deepest_point(
         a[1] + share * (b[1] - a[1]),
         a[2] + share * (b[2] - a[2]),
     )
+
+
+@inlined
+def capsules_overlap(
+    a: tuple[float, float, float],
+    b: tuple[float, float, float],
+    c: tuple[float, float, float],
+    d: tuple[float, float, float],
+    radii: tuple[float, float],
+    pair: int,
+    travel: NDArray[np.float64],
+    half: NDArray[np.float64],
+    share: float,
+) -> bool:
+    """Whether capsules about the segments ab and cd overlap throughout a box.
+
+    No two of their points move apart by more than the travel of the pair.
+    """
+    x, y, z = between_segments(a, b, c, d)
+    gap = math.sqrt(x * x + y * y + z * z) - radii[1]
+    for axis in range(half.shape[0]):
+        gap += share * half[axis] * travel[axis, pair]
+    return gap < radii[0]
 
 
 @helper
@@ -71,11 +99,6 @@ def overlaps(
     jacobian: NDArray[np.float64],
 ) -> bool:
     """Whether some pair of bodies is proven to touch throughout a box of configurations.
-
-    Two points prove it, one of each body's axis, or of bench or ground, that stay closer than
-    the radii. Against bench and ground the motion of the point is bounded to second order, as
-    that of the tool in `kinarm.kernels.approach`; between two capsules, by their travel. Bodies
-    that are only enclosed by a capsule prove nothing.
 
     Parameters
     ----------
@@ -99,28 +122,29 @@ def overlaps(
             continue
         a = to_world(poses, link[i], capsules[i, 0], capsules[i, 1], capsules[i, 2])
         b = to_world(poses, link[i], capsules[i, 3], capsules[i, 4], capsules[i, 5])
+        # What only just touches is left to Coal, whose iterations are no more precise.
         radius = capsules[i, 6] - MARGIN
         if kind == BETWEEN_CAPSULES:
             c = to_world(poses, link[j], capsules[j, 0], capsules[j, 1], capsules[j, 2])
             d = to_world(poses, link[j], capsules[j, 3], capsules[j, 4], capsules[j, 5])
-            x, y, z = between_segments(a, b, c, d)
-            gap = math.sqrt(x * x + y * y + z * z) - capsules[j, 6]
-            for axis in range(n):
-                gap += share * half[axis] * travel[axis, pair]
-            if gap < radius:
+            radii = (radius, capsules[j, 6])
+            if capsules_overlap(a, b, c, d, radii, pair, travel, half, share):
                 return True
             continue
+        # A point deep in an obstacle stays in it longest. The ground is a box without end, of which
+        # the lower end of the segment is the deepest point.
         lower, upper = (-np.inf, -np.inf, -np.inf), (np.inf, np.inf, 0.0)
+        point = a if a[2] < b[2] else b
         if kind == WITH_BOX:
             lower = (boxes[j, 0, 0], boxes[j, 0, 1], boxes[j, 0, 2])
             upper = (boxes[j, 1, 0], boxes[j, 1, 1], boxes[j, 1, 2])
-        # The lower end is the deepest point in the ground.
-        point = a if a[2] < b[2] else b
-        if kind == WITH_BOX:
             point = deepest_point(a, b, lower, upper)
-        x, y, z = beyond(point, lower, upper)
-        if outside(x, y, z) >= radius:
+        x, y, z = excess_over_box(point, lower, upper)
+        # Most pairs are apart at the centre already: no need to bound how the point moves.
+        if distance_from_box(x, y, z) >= radius:
             continue
+        # The point's motion along each world axis to first order, by its Jacobian: an arm that
+        # slides along an obstacle does not leave it, however far it goes.
         point_jacobian(prismatic, axes, poses, point, jacobian)
         remainder = 0.0
         for axis in range(min(n, link[i])):
@@ -128,11 +152,13 @@ def overlaps(
             x += width * abs(jacobian[0, axis])
             y += width * abs(jacobian[1, axis])
             z += width * abs(jacobian[2, axis])
+            # The rest is of second order: a revolute axis turns its own motion, and that of every
+            # later axis, by its angle. A pair of axes counts once, an axis with itself by half.
             if not prismatic[axis]:
                 later = 0.5 * width * travel[axis, pair]
                 for other in range(axis + 1, min(n, link[i])):
                     later += share * half[other] * travel[other, pair]
                 remainder += width * later
-        if outside(x, y, z) + remainder < radius:
+        if distance_from_box(x, y, z) + remainder < radius:
             return True
     return False

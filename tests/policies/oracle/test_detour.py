@@ -7,22 +7,22 @@ import pytest
 from configurations import depths
 
 from kinarm.arm import Arm
-from kinarm.policies.detour import Tree, find_detour
-from kinarm.policies.motion import along_path, steps_between, straight
-from kinarm.scene import LEFT_BENCH, RIGHT_BENCH, Bench, Scene
+from kinarm.policies.oracle.detour import Tree, find_detour
+from kinarm.policies.oracle.motion import along_path, steps_between, straight
+from kinarm.problem import PROBLEMS
+from kinarm.scene import PAPER_BENCHES, Obstacle, Scene
 from kinarm.simulator import Simulator
-from kinarm.task import ReachTask
 
-WALL = Bench(name="wall", x=(0.35, 0.8), y=(-0.06, 0.06), height=0.9)
+WALL = Obstacle(name="wall", lower=(0.35, -0.06, 0.0), upper=(0.8, 0.06, 0.9))
 START = np.array([-0.9, 0.3, 0.0, 0.0, 0.2, 0.7])
 END = np.array([0.9, 0.3, 0.0, 0.0, 0.2, 0.7])
 
 
 @pytest.fixture(scope="module")
-def walled(shipped_arms):
+def walled():
     """The default arm with a wall before it, which it has to pass above or behind."""
-    scene = Scene(benches=(RIGHT_BENCH, LEFT_BENCH, WALL))
-    return Simulator(shipped_arms["paper"], "both", scene, threads=1)
+    scene = Scene(obstacles=(*PAPER_BENCHES, WALL))
+    return Simulator(PROBLEMS["both"].replace(scene=scene), threads=1)
 
 
 @pytest.fixture(scope="module")
@@ -34,8 +34,8 @@ def parted(make_joint, make_collision, write_robot):
     )
     joints = [make_joint(xyz="0 0 0.4", limit=limit), make_joint(xyz="0.5 0 0", limit=limit)]
     arm = Arm.load(write_robot(joints, {1: bar}, tool="0.3 0 0"))
-    wall = Bench(name="wall", x=(-1, 1), y=(0.3, 0.4), height=1)
-    return Simulator(arm, ReachTask(name="parted", benches=("wall",)), Scene(benches=(wall,)))
+    wall = Obstacle(name="wall", lower=(-1, 0.3, 0), upper=(1, 0.4, 1))
+    return Simulator(PROBLEMS["left"].replace(arm=arm, scene=Scene(obstacles=(wall,))))
 
 
 def generator(seed=0):
@@ -57,9 +57,9 @@ def length(simulator, path):
 
 def test_the_straight_way_is_blocked(walled):
     ends = np.array([START, END])
-    assert not walled.contact_model.in_contact(ends).any()
+    assert not walled.world.contact_model.in_contact(ends).any()
     way = between(walled, ends)
-    assert walled.contact_model.in_contact(way).mean() > 0.05
+    assert walled.world.contact_model.in_contact(way).mean() > 0.05
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +82,7 @@ class TestAroundTheWall:
         free = []
         for path in detours:
             way = between(walled, path)
-            touching = walled.contact_model.in_contact(way)
+            touching = walled.world.contact_model.in_contact(way)
             free.append(not touching.any())
             assert touching.mean() < 0.03
             assert (depths(walled, way[touching]) < 2e-3).all()
@@ -104,7 +104,7 @@ class TestAroundTheWall:
         assert other.shape != paths[0].shape or (other != paths[0]).any()
 
     def test_threads_do_not_matter(self, walled):
-        other = Simulator(walled.arm, "both", walled.scene, threads=2)
+        other = Simulator(walled.problem, threads=2)
         np.testing.assert_array_equal(
             find_detour(walled, START, END[None], generator(5)),
             find_detour(other, START, END[None], generator(5)),
@@ -138,7 +138,7 @@ class TestEnds:
         # From 0 to 3.0 rad the first link would have to cross the wall; the limits end at 3.1 rad
         # on the other side, too.
         start, end = np.array([0.0, 0.1]), np.array([3.0, 0.1])
-        assert not parted.contact_model.in_contact(np.array([start, end])).any()
+        assert not parted.world.contact_model.in_contact(np.array([start, end])).any()
         assert find_detour(parted, start, end[None], generator()) is None
 
     def test_reachable_end_beside_one_that_is_not(self, parted):
@@ -147,10 +147,10 @@ class TestEnds:
         np.testing.assert_array_equal(path[-1], ends[1])
 
 
-def test_tree_branches_back_to_the_root():
+def test_nodes_lead_back_to_their_root():
     tree = Tree(np.array([[0.0, 0.0], [1.0, 0.0]]))
     first = tree.add(np.array([0.0, 1.0]), 0)
     second = tree.add(np.array([0.0, 2.0]), first)
     assert (first, second) == (2, 3)
-    np.testing.assert_array_equal(tree.branch(second), [[0, 2], [0, 1], [0, 0]])
-    np.testing.assert_array_equal(tree.branch(1), [[1, 0]])
+    np.testing.assert_array_equal(tree.path_to_root(second), [[0, 2], [0, 1], [0, 0]])
+    np.testing.assert_array_equal(tree.path_to_root(1), [[1, 0]])

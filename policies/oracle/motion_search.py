@@ -5,15 +5,15 @@ import hashlib
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.policies.detour import find_detour
-from kinarm.policies.inverse import (
+from kinarm.policies.oracle.detour import find_detour
+from kinarm.policies.oracle.inverse import (
     Solutions,
     evenly_spread,
     inverse_kinematics,
     solve_within,
     step_box,
 )
-from kinarm.policies.motion import along_path, straight, two_segments
+from kinarm.policies.oracle.motion import along_path, straight, two_segments
 from kinarm.simulator import Simulator
 
 SAMPLES = (48, 512)
@@ -25,10 +25,10 @@ VIAS = 128
 DETOURS = 4
 """Detours that are planned for a trial; the shortest one counts."""
 
-NEARER = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
+APPROACHES = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
 """Distances beyond the smallest possible one to which a goal is approached, in turn [m]."""
 
-MISSED = 1000.0
+MISS_COST = 1000.0
 """Cost of a motion that misses the goal without contact, beside its final distance in metres."""
 
 
@@ -132,7 +132,7 @@ class MotionSearch:
         guesses : ndarray, shape (n, n_axes)
             As for `try_steps`.
         """
-        for nearer in NEARER:
+        for nearer in APPROACHES:
             due = np.isinf(self.costs[rows])
             rows, distances = rows[due], distances[due]
             if rows.size == 0:
@@ -198,7 +198,7 @@ class MotionSearch:
     def _replay(self, trials: NDArray[np.int64], actions: NDArray[np.float64]) -> None:
         """Run motions in the simulator, and keep the best of each trial if it is a better one."""
         outcome = self.simulator.rollout_actions(actions, self.starts[trials], self.goals[trials])
-        missed = np.where(outcome.collision, np.inf, MISSED + outcome.distance)
+        missed = np.where(outcome.collision, np.inf, MISS_COST + outcome.distance)
         costs = np.where(outcome.success, outcome.steps, missed)
         order = np.lexsort((costs, trials))
         best = order[np.unique(trials[order], return_index=True)[1]]

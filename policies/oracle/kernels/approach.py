@@ -1,33 +1,31 @@
 """How close the tool can come to a goal within a box of configurations: proof by branch and bound.
 
-A box of configurations with centre c and half-widths h is excluded by a lower bound of the
-distance from the tool p to the goal g. With any unit vector u,
-
-    |p(c + e) - g|  >=  u . (p(c) - g) - sum_i |u . J_i| h_i - 1/2 sum_ij curvature_ij h_i h_j
-
-for all |e_i| <= h_i. A descent to the point of the linear model closest to the goal proposes u;
-the bound holds however u was found. A second bound needs no tool: the origin of the k-th joint
-moves no farther than its swing, and the tool is no farther from it than its length.
-
-Nor does a motion end where the arm touches something. On demand a box is excluded, too, if two
-capsules, or one and a bench or the ground, overlap at its centre by more than they can move within
-it; only bodies that are capsules themselves count. A box that is not excluded is tried at its
-centre and at the point proposed, then halved.
+A box is excluded when a lower bound of the distance over it exceeds what is asked for
+(`kinarm.policies.oracle.kernels.box_bound`). Nor does a motion end where the arm touches
+something: on demand a box is excluded, too, if some pair of bodies is proven to overlap throughout
+it (`kinarm.policies.oracle.kernels.overlap`). A box that is not excluded is tried at its centre and
+where the linear model of the arm comes closest to the goal, then halved.
 """
 
-import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.collision import ContactShapes
-from kinarm.kernels.compiling import helper, inlined, kernel
-from kinarm.kernels.kinematics import POSE, forward_kinematics, point_jacobian, to_world
-from kinarm.kernels.overlap import overlaps
+from kinarm.kernels.compiling import inlined, kernel
+from kinarm.kernels.kinematics import POSE, point_jacobian
 from kinarm.motion_bounds import MotionBounds
+from kinarm.policies.oracle.kernels.box_bound import (
+    joint_bound,
+    linear_bound,
+    model_error,
+    offset_from_goal,
+)
+from kinarm.policies.oracle.kernels.overlap import overlaps
 
-LAYOUT = "0236ea918130"
+LAYOUT = "847240101a0f"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 FOUND, EXCLUDED, EXHAUSTED = range(3)
@@ -39,126 +37,13 @@ ROUNDING = 1e-9
 BOXES = 1024
 """Boxes that can wait at a time; halving one to the resolution of numbers takes fewer."""
 
-SWEEPS = 8
-"""Passes of the descent over the axes."""
 
+class ArmInScene(NamedTuple):
+    """What proofs know of an arm in a scene: its kinematics, motion bounds and contact pairs."""
 
-@helper
-def tool_offset(
-    chain: Chain,
-    q: NDArray[np.float64],
-    goals: NDArray[np.float64],
-    row: int,
-    poses: NDArray[np.float64],
-    offset: NDArray[np.float64],
-) -> float:
-    """Fill in poses and the vector from the goal to the tool; return its length [m]."""
-    prismatic, translation, rotation, axis, tool = chain[:5]
-    forward_kinematics(prismatic, translation, rotation, axis, q, 0, poses)
-    x, y, z = to_world(poses, q.shape[1], tool[0], tool[1], tool[2])
-    offset[0], offset[1], offset[2] = x - goals[row, 0], y - goals[row, 1], z - goals[row, 2]
-    return math.sqrt(offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2])
-
-
-@inlined
-def joint_bound(
-    bounds: MotionBounds,
-    poses: NDArray[np.float64],
-    goals: NDArray[np.float64],
-    row: int,
-    half: NDArray[np.float64],
-) -> float:
-    """Lower bound of the distance over a box, from where the joints can be."""
-    swing, length = bounds.swing, bounds.length
-    bound = 0.0
-    for k in range(half.shape[0]):
-        x = poses[k + 1, 13] - goals[row, 0]
-        y = poses[k + 1, 14] - goals[row, 1]
-        z = poses[k + 1, 15] - goals[row, 2]
-        motion = length[k]
-        for i in range(k + 1):
-            motion += half[i] * swing[i, k]
-        bound = max(bound, math.sqrt(x * x + y * y + z * z) - motion)
-    return bound
-
-
-@inlined
-def linear_bound(
-    jacobian: NDArray[np.float64],
-    offset: NDArray[np.float64],
-    half: NDArray[np.float64],
-    enough: float,
-    step: NDArray[np.float64],
-) -> float:
-    """Lower bound of |offset + J e| over |e_i| <= half_i, and the e that nearly attains it.
-
-    It stops as soon as the bound exceeds ``enough``.
-    """
-    n = half.shape[0]
-    x, y, z = offset[0], offset[1], offset[2]
-    bound = 0.0
-    for i in range(n):
-        step[i] = 0.0
-    for _ in range(SWEEPS):
-        norm = math.sqrt(x * x + y * y + z * z)
-        if norm < 1e-12:
-            break
-        gap = x * offset[0] + y * offset[1] + z * offset[2]
-        for i in range(n):
-            gap -= half[i] * abs(x * jacobian[0, i] + y * jacobian[1, i] + z * jacobian[2, i])
-        bound = max(bound, gap / norm)
-        if bound > enough:
-            break
-        for i in range(n):
-            jx, jy, jz = jacobian[0, i], jacobian[1, i], jacobian[2, i]
-            square = jx * jx + jy * jy + jz * jz
-            if square > 1e-12:
-                moved = step[i] - (x * jx + y * jy + z * jz) / square
-                moved = min(max(moved, -half[i]), half[i])
-                x += (moved - step[i]) * jx
-                y += (moved - step[i]) * jy
-                z += (moved - step[i]) * jz
-                step[i] = moved
-    return bound
-
-
-@inlined
-def model_error(
-    curvature: NDArray[np.float64], half: NDArray[np.float64], spread: NDArray[np.float64]
-) -> float:
-    """Bound of what the linear model misses in a box [m], and what each axis has part in it."""
-    error = 0.0
-    for i in range(half.shape[0]):
-        spread[i] = 0.0
-        for j in range(half.shape[0]):
-            spread[i] += curvature[i, j] * half[j]
-        spread[i] *= half[i]
-        error += 0.5 * spread[i]
-    return error
-
-
-@inlined
-def halve(
-    boxes: NDArray[np.float64],
-    last: int,
-    bound: float,
-    step: NDArray[np.float64],
-    spread: NDArray[np.float64],
-) -> None:
-    """Halve a box along the axis that the model misses most by; the half to come first is last."""
-    n = step.shape[0]
-    widest = 0
-    for i in range(n):
-        if spread[i] > spread[widest]:
-            widest = i
-    middle = 0.5 * (boxes[last, widest] + boxes[last, n + widest])
-    boxes[last, 2 * n] = bound
-    for i in range(2 * n + 1):
-        boxes[last + 1, i] = boxes[last, i]
-    # The half in which the proposed point lies comes first.
-    above, below = (last, last + 1) if step[widest] <= 0.0 else (last + 1, last)
-    boxes[above, widest] = middle
-    boxes[below, n + widest] = middle
+    chain: Chain
+    bounds: MotionBounds
+    shapes: ContactShapes
 
 
 @inlined
@@ -178,15 +63,41 @@ def improves(
     return not contact or not overlaps(chain, shapes, poses, half, 0.0, jacobian)
 
 
+@inlined
+def halve(
+    boxes: NDArray[np.float64],
+    last: int,
+    bound: float,
+    step: NDArray[np.float64],
+    parts: NDArray[np.float64],
+) -> None:
+    """Replace a box by its halves, of which the one with the point proposed is examined first.
+
+    It is cut across the axis that has the largest part in what the linear model misses: that is
+    what keeps the bound from excluding it.
+    """
+    n = step.shape[0]
+    widest = 0
+    for i in range(n):
+        if parts[i] > parts[widest]:
+            widest = i
+    middle = 0.5 * (boxes[last, widest] + boxes[last, n + widest])
+    # What is proven of the whole holds for its halves.
+    boxes[last, 2 * n] = bound
+    for i in range(2 * n + 1):
+        boxes[last + 1, i] = boxes[last, i]
+    # The last box is examined next.
+    above, below = (last, last + 1) if step[widest] <= 0.0 else (last + 1, last)
+    boxes[above, widest] = middle
+    boxes[below, n + widest] = middle
+
+
 @kernel
 def search(
-    chain: Chain,
-    bounds: MotionBounds,
-    shapes: ContactShapes,
+    arm: ArmInScene,
     lower: NDArray[np.float64],
     upper: NDArray[np.float64],
-    goals: NDArray[np.float64],
-    row: int,
+    goal: tuple[float, float, float],
     enough: float,
     resolution: float,
     contact: bool,
@@ -198,14 +109,12 @@ def search(
 
     Parameters
     ----------
-    chain, bounds, shapes
+    arm : ArmInScene
         The arm and its contact pairs.
     lower, upper : ndarray, shape (n,)
         Corners of the box, in the first n axes [rad or m].
-    goals : ndarray, shape (m, 3)
-        Goals [m].
-    row : int
-        Which of them.
+    goal : tuple of float
+        The goal [m].
     enough : float
         Distance at which the search ends [m].
     resolution : float
@@ -218,7 +127,7 @@ def search(
     best : ndarray, shape (1, n_axes)
         A configuration whose axes beyond the first n count. On return, the closest one found.
     boxes : ndarray, shape (BOXES, 2 n + 1)
-        Work space.
+        Work space: corners of the boxes that wait, and the distance proven of each.
 
     Returns
     -------
@@ -229,59 +138,66 @@ def search(
     proven : float
         Lower bound of the distance over the box [m].
     """
+    chain, bounds, shapes = arm
     n, n_axes = lower.shape[0], best.shape[1]
     poses, jacobian, offset = np.empty((n_axes + 1, POSE)), np.empty((3, n)), np.empty(3)
-    half, step, spread, q = np.empty(n), np.empty(n), np.empty(n), best.copy()
+    half, step, parts, q = np.empty(n), np.empty(n), np.empty(n), best.copy()
     boxes[0, :n], boxes[0, n : 2 * n], boxes[0, 2 * n] = lower, upper, 0.0
     waiting, examined = 1, 0
+    # Boxes are excluded beyond the cutoff. It falls with every closer configuration that is found:
+    # what is not closer by the resolution is of no interest.
     closest, proven, cutoff = np.inf, np.inf, enough + ROUNDING
-    while waiting > 0 and closest > enough:
-        if examined >= budget or waiting + 1 >= BOXES:
-            for i in range(waiting):
-                proven = min(proven, boxes[i, 2 * n])
-            return EXHAUSTED, closest, max(min(proven, closest) - ROUNDING, 0.0)
+    # Depth first: a stack of halves stays short, one box for each halving, and leads straight
+    # to where the model expects the goal. A configuration close enough is met long before the
+    # box is searched through, and closer ones lower the cutoff for all boxes that wait.
+    while waiting > 0 and closest > enough and examined < budget and waiting + 1 < BOXES:
         waiting -= 1
         examined += 1
         for i in range(n):
             q[0, i] = 0.5 * (boxes[waiting, i] + boxes[waiting, n + i])
             half[i] = 0.5 * (boxes[waiting, n + i] - boxes[waiting, i])
-        distance = tool_offset(chain, q, goals, row, poses, offset)
+        # Both bounds start from the poses at the centre, so trying the centre costs nothing.
+        distance = offset_from_goal(chain, q, goal, poses, offset)
         if improves(distance, closest, contact, chain, shapes, poses, half, jacobian):
-            closest = distance
-            cutoff = max(enough, closest - resolution) + ROUNDING
+            closest, cutoff = distance, max(enough, distance - resolution) + ROUNDING
             best[0, :n] = q[0, :n]
-        bound = max(boxes[waiting, 2 * n], joint_bound(bounds, poses, goals, row, half))
+        # The bounds in the order of their cost. That of the joints settles large boxes far from
+        # the goal, for which the linear model is of no use; the model settles small ones.
+        bound = max(boxes[waiting, 2 * n], joint_bound(bounds, poses, goal, half))
         if bound <= cutoff:
-            error = model_error(bounds.curvature, half, spread)
-            x, y, z = goals[row, 0], goals[row, 1], goals[row, 2]
-            tool = (x + offset[0], y + offset[1], z + offset[2])
+            error = model_error(bounds.curvature, half, parts)
+            tool = (goal[0] + offset[0], goal[1] + offset[1], goal[2] + offset[2])
             point_jacobian(chain.prismatic, chain.axis, poses, tool, jacobian)
             bound = max(bound, linear_bound(jacobian, offset, half, cutoff + error, step) - error)
         if bound > cutoff:
+            # Nothing in the box comes closer than this.
             proven = min(proven, bound)
             continue
+        # Contact comes last, since it asks about every pair. A box that touches something
+        # throughout holds no configuration that counts: nothing is to be proven of it.
         if contact and overlaps(chain, shapes, poses, half, 1.0, jacobian):
             continue
+        # Where the linear model comes closest to the goal, the arm mostly does, too.
         for i in range(n):
             q[0, i] += step[i]
-        distance = tool_offset(chain, q, goals, row, poses, offset)
+        distance = offset_from_goal(chain, q, goal, poses, offset)
         if improves(distance, closest, contact, chain, shapes, poses, half, jacobian):
-            closest = distance
-            cutoff = max(enough, closest - resolution) + ROUNDING
+            closest, cutoff = distance, max(enough, distance - resolution) + ROUNDING
             best[0, :n] = q[0, :n]
-        halve(boxes, waiting, bound, step, spread)
+        halve(boxes, waiting, bound, step, parts)
         waiting += 2
-    outcome = FOUND if closest <= enough else EXCLUDED
+    outcome = FOUND if closest <= enough else EXCLUDED if waiting == 0 else EXHAUSTED
+    # Of boxes that still wait, no more is known than of those that they are halves of.
+    for i in range(waiting):
+        proven = min(proven, boxes[i, 2 * n])
     return outcome, closest, max(min(proven, closest) - ROUNDING, 0.0)
 
 
 @kernel
-def steps_floor(
+def bound_steps(
     first: int,
     last: int,
-    chain: Chain,
-    bounds: MotionBounds,
-    shapes: ContactShapes,
+    arm: ArmInScene,
     starts: NDArray[np.float64],
     goals: NDArray[np.float64],
     step_limit: NDArray[np.float64],
@@ -290,7 +206,7 @@ def steps_floor(
     budget: int,
     fewest: NDArray[np.int64],
     most: NDArray[np.int64],
-    floors: NDArray[np.int64],
+    lower_bounds: NDArray[np.int64],
     tight: NDArray[np.bool_],
     witnesses: NDArray[np.float64],
 ) -> None:
@@ -300,7 +216,7 @@ def steps_floor(
     ----------
     first, last : int
         Range of rows to work on.
-    chain, bounds, shapes
+    arm : ArmInScene
         The arm and its contact pairs.
     starts : ndarray, shape (m, n_axes)
         Start configurations [rad or m].
@@ -316,7 +232,7 @@ def steps_floor(
         Boxes to examine for each number of steps.
     fewest, most : ndarray of int, shape (m,)
         Numbers of steps to examine; fewer than ``fewest`` are impossible.
-    floors : ndarray of int, shape (m,)
+    lower_bounds : ndarray of int, shape (m,)
         Output: fewer steps are impossible.
     tight : ndarray of bool, shape (m,)
         Output: whether a configuration that counts reaches the goal in that many steps, or none
@@ -328,43 +244,32 @@ def steps_floor(
     lower, upper, best = np.empty(n), np.empty(n), np.empty((1, starts.shape[1]))
     boxes = np.empty((BOXES, 2 * n + 1))
     for row in range(first, last):
-        floors[row], tight[row] = fewest[row], True
-        while floors[row] <= most[row]:
+        goal = (goals[row, 0], goals[row, 1], goals[row, 2])
+        # One step more at a time: boxes that are far too small are excluded at a glance, and none
+        # is searched that is larger than need be.
+        lower_bounds[row], tight[row] = fewest[row], True
+        while lower_bounds[row] <= most[row]:
             best[0] = starts[row]
             for i in range(n):
-                reach = floors[row] * step_limit[i] + ROUNDING
-                lower[i] = max(chain.lower[i], starts[row, i] - reach)
-                upper[i] = min(chain.upper[i], starts[row, i] + reach)
+                reach = lower_bounds[row] * step_limit[i] + ROUNDING
+                lower[i] = max(arm.chain.lower[i], starts[row, i] - reach)
+                upper[i] = min(arm.chain.upper[i], starts[row, i] + reach)
             outcome, _, _ = search(
-                chain,
-                bounds,
-                shapes,
-                lower,
-                upper,
-                goals,
-                row,
-                tolerance,
-                np.inf,
-                contact,
-                budget,
-                best,
-                boxes,
+                arm, lower, upper, goal, tolerance, np.inf, contact, budget, best, boxes
             )
             if outcome != EXCLUDED:
                 tight[row] = outcome == FOUND
                 if outcome == FOUND:
                     witnesses[row] = best[0]
                 break
-            floors[row] += 1
+            lower_bounds[row] += 1
 
 
 @kernel
-def closest_approach(
+def bound_distance(
     first: int,
     last: int,
-    chain: Chain,
-    bounds: MotionBounds,
-    shapes: ContactShapes,
+    arm: ArmInScene,
     lower: NDArray[np.float64],
     upper: NDArray[np.float64],
     starts: NDArray[np.float64],
@@ -381,7 +286,7 @@ def closest_approach(
     ----------
     first, last : int
         Range of rows to work on.
-    chain, bounds, shapes
+    arm : ArmInScene
         The arm and its contact pairs.
     lower, upper : ndarray, shape (m, n)
         Corners of the boxes that the first n axes can reach [rad or m].
@@ -403,20 +308,9 @@ def closest_approach(
     best, boxes = np.empty((1, starts.shape[1])), np.empty((BOXES, 2 * lower.shape[1] + 1))
     for row in range(first, last):
         best[0] = starts[row]
+        goal = (goals[row, 0], goals[row, 1], goals[row, 2])
         _, found, proven = search(
-            chain,
-            bounds,
-            shapes,
-            lower[row],
-            upper[row],
-            goals,
-            row,
-            0.0,
-            resolution,
-            contact,
-            budget,
-            best,
-            boxes,
+            arm, lower[row], upper[row], goal, 0.0, resolution, contact, budget, best, boxes
         )
         distances[row, 0], distances[row, 1] = proven, found
         configurations[row] = best[0]

@@ -2,7 +2,7 @@
 
 For each trial the oracle *proves* bounds and *finds* a motion; the best policy lies between them.
 
-Proven, by branch and bound over all configurations within reach (`kinarm.kernels.approach`):
+Proven, by branch and bound over all configurations within reach:
 
 - the number of steps below which no policy can bring the tool within the tolerance of the goal;
 - where none can within the horizon, a distance that no policy can beat, to a millimetre if the
@@ -25,18 +25,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm import kernels
-from kinarm.arm import DEFAULT_ARM, Arm
+from kinarm._parallel import run_rows
+from kinarm._validation import finite_array
 from kinarm.motion_bounds import MotionBounds
-from kinarm.parallel import run_rows
-from kinarm.policies.inverse import inverse_kinematics, step_box
-from kinarm.policies.motion_search import MotionSearch
-from kinarm.policies.oracle_solution import OracleSolution, OracleSolutions
+from kinarm.policies.oracle.inverse import inverse_kinematics, step_box
+from kinarm.policies.oracle.kernels.approach import ArmInScene, bound_distance, bound_steps
+from kinarm.policies.oracle.motion_search import MotionSearch
+from kinarm.policies.oracle.solution import OracleSolution, OracleSolutions
+from kinarm.problem import ProblemLike
 from kinarm.rollouts import Rollouts
-from kinarm.scene import Scene
 from kinarm.simulator import Simulator
-from kinarm.task import ReachTask
-from kinarm.validation import finite_array
+
+ORACLE_SEMANTICS = "1"
+"""Version of what the oracle proves and finds: raised with every change of its results."""
 
 BUDGET = 100_000
 """Boxes that a proof may examine, for each number of steps."""
@@ -62,14 +63,10 @@ class Oracle:
 
     Parameters
     ----------
-    arm : Arm or str
-        The arm, or what `kinarm.Arm.load` takes.
-    scene : Scene, optional
-        The paper's scene by default.
-    task : ReachTask or str
-        The task; its tolerance and horizon count.
-    simulator : Simulator, optional
-        Used instead of arm, scene and task.
+    problem : ReachProblem, str or Path
+        The problem, its name or its file; its rewards do not matter.
+    threads : int, optional
+        Threads to use; as many as the processors that this process may use by default.
 
     Attributes
     ----------
@@ -77,17 +74,14 @@ class Oracle:
         Where motions are replayed.
     """
 
-    def __init__(
-        self,
-        arm: Arm | str = DEFAULT_ARM,
-        scene: Scene | None = None,
-        task: ReachTask | str = "both",
-        *,
-        simulator: Simulator | None = None,
-    ) -> None:
-        self.simulator = simulator or Simulator(arm, task, scene)
+    def __init__(self, problem: ProblemLike, *, threads: int | None = None) -> None:
+        self.simulator = Simulator(problem, threads=threads)
         chain, n = self.simulator.arm.chain, self.simulator.n_actions
-        self._arm = (chain, MotionBounds.of(chain, n), self.simulator.contact_model.shapes)
+        shapes = self.simulator.world.contact_model.shapes
+        self._arm = ArmInScene(chain, MotionBounds.of(chain, n), shapes)
+
+    def __repr__(self) -> str:
+        return f"Oracle({self.simulator.problem!r})"
 
     def solve(self, start: ArrayLike, goal: ArrayLike) -> OracleSolution:
         """Solve one trial.
@@ -152,61 +146,61 @@ class Oracle:
         lot = _Lot(starts, goals, witnesses=starts.copy())
         # The horizon comes first: most of what is out of reach is settled at once.
         last = np.full(n, horizon)
-        floors, tight = self._steps_floor(lot, np.arange(n), last, last)
-        within = np.flatnonzero(floors <= horizon)
+        steps_bounds, tight = self._bound_steps(lot, np.arange(n), last, last)
+        within = np.flatnonzero(steps_bounds <= horizon)
         ones = np.ones(within.size, dtype=np.int64)
-        floors[within], tight[within] = self._steps_floor(lot, within, ones, last[within])
+        steps_bounds[within], tight[within] = self._bound_steps(lot, within, ones, last[within])
         search = MotionSearch(self.simulator, starts, goals)
         for extra in range(EXTRA_STEPS + 1):
-            search.try_steps(within, floors[within] + extra, lot.witnesses)
+            search.try_steps(within, steps_bounds[within] + extra, lot.witnesses)
         search.try_detours(within)
-        self._count_contact(lot, search, floors, tight)
-        distance_floors = self._approach(lot, search, floors)
+        self._count_contact(lot, search, steps_bounds, tight)
+        distance_bounds = self._approach(lot, search, steps_bounds)
         replay = self.simulator.rollout_actions(search.actions, starts, goals, record=True)
         return OracleSolutions(
             reachable=replay.success,
             tight=tight,
             steps=replay.steps,
-            steps_lower_bound=floors,
+            steps_lower_bound=steps_bounds,
             final_distance=replay.distance,
-            distance_lower_bound=distance_floors,
+            distance_lower_bound=distance_bounds,
             actions=search.actions,
             paths=replay.paths,
-            reasons=self._reasons(replay, floors, distance_floors, search.has_solution),
+            reasons=self._reasons(replay, steps_bounds, distance_bounds, search.has_solution),
         )
 
     def _count_contact(
         self,
         lot: "_Lot",
         search: MotionSearch,
-        floors: NDArray[np.int64],
+        steps_bounds: NDArray[np.int64],
         tight: NDArray[np.bool_],
     ) -> None:
-        """Raise the floors of motions that are slower, and of goals that none reaches."""
+        """Raise the bounds of motions that are slower, and of goals that none reaches."""
         horizon = self.simulator.task.horizon
-        slow = np.flatnonzero(search.reached & (search.steps > floors))
-        floors[slow], tight[slow] = self._steps_floor(
-            lot, slow, floors[slow], search.steps[slow] - 1, contact=True
+        slow = np.flatnonzero(search.reached & (search.steps > steps_bounds))
+        steps_bounds[slow], tight[slow] = self._bound_steps(
+            lot, slow, steps_bounds[slow], search.steps[slow] - 1, contact=True
         )
-        blocked = np.flatnonzero(~search.reached & (floors <= horizon))
+        blocked = np.flatnonzero(~search.reached & (steps_bounds <= horizon))
         last = np.full(blocked.size, horizon)
-        beyond, _ = self._steps_floor(lot, blocked, last, last, contact=True)
+        beyond, _ = self._bound_steps(lot, blocked, last, last, contact=True)
         tight[blocked] = beyond > horizon
-        floors[blocked] = np.where(tight[blocked], beyond, floors[blocked])
+        steps_bounds[blocked] = np.where(tight[blocked], beyond, steps_bounds[blocked])
 
     def _approach(
-        self, lot: "_Lot", search: MotionSearch, floors: NDArray[np.int64]
+        self, lot: "_Lot", search: MotionSearch, steps_bounds: NDArray[np.int64]
     ) -> NDArray[np.float64]:
         """Prove, and seek, how close motions come to the goals that none reaches."""
         task, missed = self.simulator.task, np.flatnonzero(~search.reached)
-        distances = np.zeros(len(floors))
-        distances[missed] = self._distance_floor(lot, missed)
-        out_of_reach = floors > task.horizon
+        distances = np.zeros(len(steps_bounds))
+        distances[missed] = self._bound_distance(lot, missed)
+        out_of_reach = steps_bounds > task.horizon
         distances[out_of_reach] = np.fmax(distances[out_of_reach], task.tolerance)
         search.try_approach(missed, np.fmax(distances[missed], task.tolerance), lot.witnesses)
         return distances
 
-    def _steps_floor(
+    def _bound_steps(
         self,
         lot: "_Lot",
         rows: NDArray[np.int64],
@@ -215,34 +209,34 @@ class Oracle:
         *,
         contact: bool = False,
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Prove how many steps some trials take at least; see `kinarm.kernels.steps_floor`."""
+        """Prove how many steps some trials take at least, and note what attains it."""
         simulator, n = self.simulator, len(rows)
-        floors, tight = np.empty(n, dtype=np.int64), np.empty(n, dtype=bool)
+        lower_bounds, tight = np.empty(n, dtype=np.int64), np.empty(n, dtype=bool)
         witnesses = lot.witnesses[rows]
-        inputs = (*self._arm, lot.starts[rows], lot.goals[rows], simulator.step_limit)
+        inputs = (self._arm, lot.starts[rows], lot.goals[rows], simulator.step_limit)
         limits = (simulator.task.tolerance, contact, BUDGET, fewest, most)
-        arrays = (*inputs, *limits, floors, tight, witnesses)
-        run_rows(kernels.steps_floor, n, BUDGET * n, simulator.threads, *arrays)
+        arrays = (*inputs, *limits, lower_bounds, tight, witnesses)
+        run_rows(bound_steps, n, BUDGET * n, simulator.threads, *arrays)
         lot.witnesses[rows] = witnesses
-        return floors, tight
+        return lower_bounds, tight
 
-    def _distance_floor(self, lot: "_Lot", rows: NDArray[np.int64]) -> NDArray[np.float64]:
+    def _bound_distance(self, lot: "_Lot", rows: NDArray[np.int64]) -> NDArray[np.float64]:
         """Prove how close the tool can come within the horizon, and note where it does."""
         simulator, n = self.simulator, len(rows)
         distances, configurations = np.empty((n, 2)), np.empty((n, simulator.arm.n_axes))
         starts, goals = lot.starts[rows], lot.goals[rows]
         box = step_box(simulator, starts, np.full(n, simulator.task.horizon))
-        inputs = (*self._arm, *box, starts, goals, RESOLUTION, False, BUDGET)
+        inputs = (self._arm, *box, starts, goals, RESOLUTION, False, BUDGET)
         arrays = (*inputs, distances, configurations)
-        run_rows(kernels.closest_approach, n, BUDGET * n, simulator.threads, *arrays)
+        run_rows(bound_distance, n, BUDGET * n, simulator.threads, *arrays)
         lot.witnesses[rows] = configurations
         return distances[:, 0]
 
     def _reasons(
         self,
         replay: Rollouts,
-        floors: NDArray[np.int64],
-        distance_floors: NDArray[np.float64],
+        steps_bounds: NDArray[np.int64],
+        distance_bounds: NDArray[np.float64],
         has_solution: NDArray[np.bool_],
     ) -> NDArray[np.str_]:
         """Say, per trial, why no motion reaches the goal."""
@@ -251,9 +245,9 @@ class Oracle:
         for row, reached in enumerate(replay.success):
             if reached:
                 reasons.append("")
-            elif floors[row] > horizon:
+            elif steps_bounds[row] > horizon:
                 reasons.append(
-                    f"out of reach: proven to stay {distance_floors[row]:.3f} m away or more "
+                    f"out of reach: proven to stay {distance_bounds[row]:.3f} m away or more "
                     f"within {horizon} steps"
                 )
             elif has_solution[row]:

@@ -6,10 +6,12 @@ import pytest
 from configurations import contact_boundary, depths, random_configurations
 from numba import njit
 
-from kinarm import kernels
 from kinarm.arm import Arm
-from kinarm.kernels.overlap import overlaps
-from kinarm.scene import Bench, Scene
+from kinarm.kernels.kinematics import POSE, forward_kinematics
+from kinarm.kernels.rollout import screen
+from kinarm.policies.oracle.kernels.overlap import overlaps
+from kinarm.problem import PROBLEMS
+from kinarm.scene import PAPER_BENCHES, Obstacle, Scene
 from kinarm.simulator import Simulator
 
 CAPSULE_ARMS = ("lrmate200ic_5l", "paper", "paper_flange")
@@ -18,7 +20,7 @@ CAPSULE_ARMS = ("lrmate200ic_5l", "paper", "paper_flange")
 @njit
 def claims_of(chain, shapes, centres, halves, share, poses, jacobian, claimed):
     for i in range(len(centres)):
-        kernels.forward_kinematics(
+        forward_kinematics(
             chain.prismatic, chain.translation, chain.rotation, chain.axis, centres, i, poses
         )
         claimed[i] = overlaps(chain, shapes, poses, halves[i], share, jacobian)
@@ -29,9 +31,9 @@ def claims(simulator, centres, halves=None, share=1.0):
     n = simulator.n_actions
     if halves is None:
         halves, share = np.ones((len(centres), n)), 0.0
-    poses, jacobian = np.empty((simulator.arm.n_axes + 1, kernels.POSE)), np.empty((3, n))
+    poses, jacobian = np.empty((simulator.arm.n_axes + 1, POSE)), np.empty((3, n))
     claimed = np.empty(len(centres), dtype=bool)
-    shapes = simulator.contact_model.shapes
+    shapes = simulator.world.contact_model.shapes
     claims_of(simulator.arm.chain, shapes, centres, halves, share, poses, jacobian, claimed)
     return claimed
 
@@ -62,15 +64,15 @@ def certainly_free(simulator, configurations):
 
     Its verdict alone misses about one contact of a capsule and a box in 100 000, at any depth.
     """
-    free = np.flatnonzero(~simulator.contact_model.in_contact(configurations))
+    free = np.flatnonzero(~simulator.world.contact_model.in_contact(configurations))
     return free[depths(simulator, configurations[free]) < 0]
 
 
 def touching_alone(simulator, configurations):
     """Indices of configurations in which a single pair touches, and its kind."""
-    model, geometry = simulator.arm.model, simulator.contact_model.geometry
+    model, geometry = simulator.arm.model, simulator.world.contact_model.geometry
     data, geometry_data = model.createData(), geometry.createData()
-    kinds = simulator.contact_model.shapes.pairs[:, 0]
+    kinds = simulator.world.contact_model.shapes.pairs[:, 0]
     alone, kind = [], []
     for index, q in enumerate(configurations):
         pin.computeCollisions(model, data, geometry, geometry_data, q, False)
@@ -103,7 +105,7 @@ class TestSingleConfigurations:
     def test_claims_nearly_all_contact_between_capsules(self, simulators, name):
         simulator = simulators[name]
         configurations = random_configurations(simulator, 4, 20_000)
-        touching = simulator.contact_model.in_contact(configurations)
+        touching = simulator.world.contact_model.in_contact(configurations)
         assert touching.sum() > 2000
         assert claims(simulator, configurations)[touching].mean() > 0.99
 
@@ -121,8 +123,8 @@ class TestSingleConfigurations:
         configurations = random_configurations(any_simulator, 6, 20_000)
         n = len(configurations)
         tools, free = np.empty((n, 3)), np.empty(n, dtype=bool)
-        shapes = any_simulator.contact_model.shapes
-        kernels.screen(0, n, any_simulator.arm.chain, shapes, configurations, tools, free)
+        shapes = any_simulator.world.contact_model.shapes
+        screen(0, n, any_simulator.arm.chain, shapes, configurations, tools, free)
         assert not (free & claims(any_simulator, configurations)).any()
 
 
@@ -130,21 +132,22 @@ class TestShapes:
     def test_shapes_that_are_only_enclosed_prove_nothing(self, simulators):
         simulator = simulators["mesh"]
         configurations = random_configurations(simulator, 7, 20_000)
-        assert simulator.contact_model.in_contact(configurations).mean() > 0.05
-        assert not simulator.contact_model.shapes.exact.any()
+        assert simulator.world.contact_model.in_contact(configurations).mean() > 0.05
+        assert not simulator.world.contact_model.shapes.exact.any()
         assert not claims(simulator, configurations).any()
 
     def test_capsules_beside_other_shapes_do(self, simulators):
         simulator = simulators["sliding"]
-        assert simulator.contact_model.shapes.exact.sum() == 2
+        assert simulator.world.contact_model.shapes.exact.sum() == 2
         assert claims(simulator, random_configurations(simulator, 8, 20_000)).sum() > 20
 
     def test_by_hand(self, make_joint, make_collision, write_robot):
         # A ball of 0.1 m that turns at a distance of 0.5 m from a vertical axis, at z = 0.4.
         ball = make_collision('<sphere radius="0.1"/>', xyz="0.5 0 0")
         arm = Arm.load(write_robot([make_joint(xyz="0 0 0.4"), make_joint()], {2: ball}))
-        wall = Bench(name="wall", x=(0.55, 1.0), y=(-1.0, 1.0), height=1.0)
-        simulator = Simulator(arm, "both", Scene(benches=(wall, *Scene().benches)), threads=1)
+        wall = Obstacle(name="wall", lower=(0.55, -1.0, 0.0), upper=(1.0, 1.0, 1.0))
+        scene = Scene(obstacles=(wall, *PAPER_BENCHES))
+        simulator = Simulator(PROBLEMS["both"].replace(arm=arm, scene=scene), threads=1)
         turns = np.array([0.0, 0.3, 0.4, 0.5, 0.6, 1.0])
         configurations = np.stack([turns, 0 * turns], axis=1)
         # The ball reaches the wall as long as 0.5 cos q + 0.1 > 0.55, that is q < 0.451.
@@ -166,7 +169,7 @@ class TestBoxes:
             or [np.zeros((0, any_simulator.arm.n_axes))]
         )
         assert certainly_free(any_simulator, tested).size == 0
-        if any_simulator.contact_model.shapes.exact.all():
+        if any_simulator.world.contact_model.shapes.exact.all():
             assert len(claimed) > 4000
 
     @pytest.mark.parametrize("name", CAPSULE_ARMS)
