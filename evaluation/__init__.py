@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from kinarm.evaluation.evaluations import Evaluation, PooledEvaluation, evaluate, pool
     from kinarm.evaluation.html_report.page import report_page, write_report
     from kinarm.evaluation.plots import distance_histograms, save_figure
-    from kinarm.evaluation.recording import record
+    from kinarm.evaluation.replays.recorder import record
     from kinarm.evaluation.report import evaluation_document
     from kinarm.evaluation.statistics import DistanceStatistics, Share
     from kinarm.evaluation.trials import TrialSet
@@ -47,7 +47,7 @@ __getattr__ = lazy_exports(
         "evaluations": ("Evaluation", "PooledEvaluation", "evaluate", "pool"),
         "html_report.page": ("report_page", "write_report"),
         "plots": ("distance_histograms", "save_figure"),
-        "recording": ("record",),
+        "replays.recorder": ("record",),
         "report": ("evaluation_document",),
         "statistics": ("DistanceStatistics", "Share"),
         "trials": ("TrialSet",),

@@ -12,9 +12,9 @@ from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.report import FORMAT_VERSION
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.library import group_of
+from kinarm.recording import Recording
 from kinarm.simulator import Simulator
 from kinarm.task import load_task
-from kinarm.trajectory import Recording
 
 ENDS = ("outcome", "steps", "final_distance")
 """What has to be the same again."""

@@ -23,14 +23,14 @@ if TYPE_CHECKING:
         WorkerError,
     )
     from kinarm.networks import CompiledPolicy, Networks
+    from kinarm.recording import Recording, load_recordings, save_recordings
     from kinarm.reference import ReferenceSimulator
-    from kinarm.replay import Replay
     from kinarm.rollouts import Rollouts
     from kinarm.scene import Bench, Scene
     from kinarm.simulator import Simulator, StepResult
     from kinarm.task import TASKS, ReachTask, RewardWeights, load_task
-    from kinarm.trajectory import Recording, load_recordings, save_recordings
     from kinarm.vector_env import ReachVectorEnv
+    from kinarm.viewer import ReplayPage
 
 __version__ = "0.1.0"
 
@@ -52,7 +52,7 @@ __all__ = [
     "Recording",
     "RecordingFileError",
     "ReferenceSimulator",
-    "Replay",
+    "ReplayPage",
     "RewardWeights",
     "Rollouts",
     "Scene",
@@ -94,12 +94,12 @@ __getattr__ = lazy_exports(
         ),
         "networks": ("CompiledPolicy", "Networks"),
         "reference": ("ReferenceSimulator",),
-        "replay": ("Replay",),
+        "recording": ("Recording", "load_recordings", "save_recordings"),
         "rollouts": ("Rollouts",),
         "scene": ("Bench", "Scene"),
         "simulator": ("Simulator", "StepResult"),
         "task": ("TASKS", "ReachTask", "RewardWeights", "load_task"),
-        "trajectory": ("Recording", "load_recordings", "save_recordings"),
+        "viewer": ("ReplayPage",),
         "vector_env": ("ReachVectorEnv",),
     },
 )

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 from kinarm.evaluation.html_report.markup import Markup, tag
 from kinarm.evaluation.html_report.worst import WorstTrial
-from kinarm.evaluation.recording import record
-from kinarm.replay import replay
-from kinarm.trajectory import Recording
+from kinarm.evaluation.replays.recorder import record
+from kinarm.recording import Recording
+from kinarm.viewer import replay_page
 
 
 def replay_frame(chosen: Sequence[WorstTrial]) -> Markup:
@@ -22,7 +22,7 @@ def replay_frame(chosen: Sequence[WorstTrial]) -> Markup:
         "iframe",
         title="Replay of the worst trials",
         # The script of the page makes it the content when a reader comes near.
-        data_page=replay(record_trials(chosen), arm=arm).html,
+        data_page=replay_page(record_trials(chosen), arm=arm).html,
     )
 
 

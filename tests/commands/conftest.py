@@ -9,13 +9,14 @@ from typing import NamedTuple
 
 import pytest
 
-from kinarm.evaluation import bench, eval, replay, reproduce  # noqa: A004
+from kinarm.evaluation import bench, eval, reproduce  # noqa: A004
+from kinarm.evaluation.commands import replay
 from kinarm.policies import Policy, ars_recipe, train, train_ars
 
 ROOT = Path(__file__).resolve().parents[2]
 MODULES = {
     "kinarm-eval": "kinarm.evaluation.eval",
-    "kinarm-replay": "kinarm.evaluation.replay",
+    "kinarm-replay": "kinarm.evaluation.commands.replay",
     "kinarm-train": "kinarm.policies.train",
     "kinarm-bench": "kinarm.evaluation.bench",
     "kinarm-reproduce": "kinarm.evaluation.reproduce",

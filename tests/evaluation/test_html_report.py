@@ -22,7 +22,7 @@ from kinarm.evaluation.html_report.page import report_page, write_report
 from kinarm.evaluation.html_report.replays import record_trials
 from kinarm.evaluation.html_report.worst import worst_trials
 from kinarm.evaluation.report import evaluation_document, table_rows
-from kinarm.replay import replay
+from kinarm.viewer import replay_page
 
 PIXEL = 0.051
 """Coordinates are written to a tenth."""
@@ -317,7 +317,7 @@ class TestWorst:
         chosen = [worst for task in tasks.values() for worst in worst_trials(task)]
         simulator = chosen[0].evaluation.trials.simulator
         (frame,) = content(page).findall(".//iframe")
-        expected = replay(record_trials(chosen), arm=simulator.arm).html
+        expected = replay_page(record_trials(chosen), arm=simulator.arm).html
         assert " ".join(frame.get("data-page").split()) == " ".join(expected.split())
         assert frame.get("title")
 

@@ -136,7 +136,7 @@ def test_metadata_name_the_commands_the_licence_and_no_torch(wheel):
         assert f"{folder}licenses/LICENSE" in archive.namelist()
     for line in (
         "kinarm-eval = kinarm.evaluation.eval:main",
-        "kinarm-replay = kinarm.evaluation.replay:main",
+        "kinarm-replay = kinarm.evaluation.commands.replay:main",
         "kinarm-train = kinarm.policies.train:main",
         "kinarm-bench = kinarm.evaluation.bench:main",
         "kinarm-reproduce = kinarm.evaluation.reproduce:main",

@@ -6,7 +6,7 @@ from kinarm.evaluation.entrants import Entrant
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle_solution import OracleSolutions
 from kinarm.policies.provenance import package_versions, source_commit
-from kinarm.trajectory import Recording, record_rollouts
+from kinarm.recording import Recording, record_rollouts
 
 
 def record(

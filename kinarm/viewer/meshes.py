@@ -60,13 +60,13 @@ class Mesh:
         a, b, c = (places[corners[:, k]] for k in range(3))
         weighted = np.cross(b - a, c - a)
         flat = weighted / np.maximum(np.linalg.norm(weighted, axis=1, keepdims=True), 1e-30)
-        normals = _smooth(corners.reshape(-1), weighted, flat)
+        normals = _corner_normals(corners.reshape(-1), weighted, flat)
         keys = np.column_stack([places[corners.reshape(-1)], np.round(normals, 4)])
         unique, inverse = np.unique(keys, axis=0, return_inverse=True)
         return unique[:, :3], unique[:, 3:], inverse.reshape(-1, 3)
 
 
-def _smooth(corners: NDArray[np.int64], weighted: Array, flat: Array) -> Array:
+def _corner_normals(corners: NDArray[np.int64], weighted: Array, flat: Array) -> Array:
     """Mean normal, at each corner of each face, of the faces that meet there without an edge."""
     order = np.argsort(corners, kind="stable")
     counts = np.bincount(corners)
@@ -164,18 +164,20 @@ def box(size: ArrayLike, chamfer: float = 0.0) -> Mesh:
     """A box about the origin with chamfered edges [m]."""
     half = np.asarray(size, dtype=float) / 2
     if chamfer == 0:
-        return _hull(half * _signs())
+        return _convex_hull(half * _cube_corners())
     inset = half - chamfer
-    return _hull(
-        np.concatenate([_signs() * np.where(np.arange(3) == k, half, inset) for k in range(3)])
+    return _convex_hull(
+        np.concatenate(
+            [_cube_corners() * np.where(np.arange(3) == k, half, inset) for k in range(3)]
+        )
     )
 
 
-def _signs() -> Array:
+def _cube_corners() -> Array:
     return np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T
 
 
-def _hull(points: Array) -> Mesh:
+def _convex_hull(points: Array) -> Mesh:
     """Convex hull of points, shape (n, 3)."""
     from scipy.spatial import ConvexHull
 
@@ -241,7 +243,7 @@ def from_coal(shape: coal.CollisionGeometry) -> Mesh:
     if isinstance(shape, coal.Cylinder):
         return cylinder(2 * shape.halfLength, shape.radius, 0.0)
     if isinstance(shape, coal.ConvexBase):
-        return _hull(np.array(shape.points()))
+        return _convex_hull(np.array(shape.points()))
     if isinstance(shape, coal.BVHModelBase):
         corners = [shape.tri_indices(k) for k in range(shape.num_tris)]
         faces = [[int(corner[k]) for k in range(3)] for corner in corners]

@@ -10,11 +10,11 @@ from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.documents import EvaluationDocument
 from kinarm.evaluation.entrants import Entrant, find_entrants
-from kinarm.evaluation.recording import record
+from kinarm.evaluation.replays.recorder import record
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.library import group_of
+from kinarm.recording import Recording, load_recordings
 from kinarm.simulator import Simulator
-from kinarm.trajectory import Recording, load_recordings
 
 PLAYED, SEARCHED = 5, 200
 """Trials that are played by default, and trials among which some are looked for."""

@@ -11,14 +11,13 @@ from meshcat.geometry import Mesh as DrawnMesh
 from numpy.typing import NDArray
 
 from kinarm.arm import Arm
-from kinarm.replay.arm_shapes import arm_parts
-from kinarm.replay.meshes import Mesh, box, capsule, cylinder, tube
-from kinarm.replay.parts import Finish
+from kinarm.recording import Recording
 from kinarm.scene import Scene
-from kinarm.trajectory import Recording
+from kinarm.viewer.arm_shapes import arm_parts
+from kinarm.viewer.meshes import Mesh, box, capsule, cylinder, tube
+from kinarm.viewer.parts import Finish
 
-SUCCESS, COLLISION, HORIZON = 0x0072B2, 0xD55E00, 0xE69F00
-OUTCOME_COLOURS = {"success": SUCCESS, "collision": COLLISION, "horizon": HORIZON}
+OUTCOME_COLOURS = {"success": 0x0072B2, "collision": 0xD55E00, "horizon": 0xE69F00}
 """Distinguishable with any colour vision (Okabe and Ito)."""
 
 FLOOR = Finish(0xE9ECEF, roughness=0.95)
@@ -26,12 +25,12 @@ BENCH = Finish(0xB4BCC6, roughness=0.8)
 BENCH_TOP = Finish(0xCBD2DA, roughness=0.7)
 CUBE = Finish(0x009E73, roughness=0.5)
 HALO = Finish(0x009E73, opacity=0.16, glow=True)
-FLASH = Finish(COLLISION, opacity=0.5, glow=True)
+FLASH = Finish(OUTCOME_COLOURS["collision"], opacity=0.5, glow=True)
 GRID_COLOUR = 0xC6CCD3
 BACKGROUND = [0.93, 0.945, 0.96]
 
 FLOOR_RADIUS, GRID_RADIUS, GRID_STEP = 12.0, 2.0, 0.25
-TOP = 0.02
+SLAB_THICKNESS = 0.02
 """Thickness of the slab that covers a bench [m]."""
 
 TRACE_RADIUS = 0.0042
@@ -45,7 +44,7 @@ CAMERA = {"fov": 32, "position": [-2.4, 1.6, 1.9]}
 """In the frame of three.js, whose y axis points up."""
 
 
-class _Skin(Geometry):
+class _MeshGeometry(Geometry):
     """A mesh with normals, in as few bytes as three.js reads."""
 
     def __init__(self, meshes: Sequence[Mesh]) -> None:
@@ -60,15 +59,15 @@ class _Skin(Geometry):
             "type": "BufferGeometry",
             "data": {
                 "attributes": {
-                    "position": _packed(vertices.astype(np.float32), 3),
-                    "normal": _packed(np.round(127 * normals).astype(np.int8), 3),
+                    "position": _typed_array(vertices.astype(np.float32), 3),
+                    "normal": _typed_array(np.round(127 * normals).astype(np.int8), 3),
                 },
-                "index": _packed(faces.astype(np.uint32), 1),
+                "index": _typed_array(faces.astype(np.uint32), 1),
             },
         }
 
 
-class _Lines(Geometry):
+class _LineGeometry(Geometry):
     """Pairs of points, shape (2n, 3)."""
 
     def __init__(self, points: NDArray[np.float64]) -> None:
@@ -77,12 +76,12 @@ class _Lines(Geometry):
 
     def lower(self, _: dict[str, object]) -> dict[str, object]:
         """Describe it to three.js."""
-        position = _packed(self.points.astype(np.float32), 3)
+        position = _typed_array(self.points.astype(np.float32), 3)
         attributes = {"attributes": {"position": position}}
         return {"uuid": self.uuid, "type": "BufferGeometry", "data": attributes}
 
 
-class _Surface(Material):
+class _FinishMaterial(Material):
     """A finish as a material."""
 
     def __init__(self, finish: Finish) -> None:
@@ -128,7 +127,7 @@ CODES = {
 }
 
 
-def _packed(array: NDArray[np.generic], size: int) -> dict[str, object]:
+def _typed_array(array: NDArray[np.generic], size: int) -> dict[str, object]:
     name, code = CODES[array.dtype.name]
     data = umsgpack.Ext(code, np.ascontiguousarray(array).tobytes())
     return {"itemSize": size, "type": name, "array": data, "normalized": name == "Int8Array"}
@@ -136,7 +135,7 @@ def _packed(array: NDArray[np.generic], size: int) -> dict[str, object]:
 
 def put(window: Visualizer, finish: Finish, *meshes: Mesh) -> None:
     """Show meshes with one finish."""
-    window.set_object(DrawnMesh(_Skin(meshes), _Surface(finish)))
+    window.set_object(DrawnMesh(_MeshGeometry(meshes), _FinishMaterial(finish)))
 
 
 def draw_surroundings(window: Visualizer, scene: Scene) -> None:
@@ -151,11 +150,11 @@ def draw_surroundings(window: Visualizer, scene: Scene) -> None:
     window["sun"]["<object>"].set_property("position", SUN_PLACE)
     if scene.ground:
         put(window["floor"], FLOOR, cylinder(0.002, FLOOR_RADIUS, 0.0).moved((0, 0, -0.002)))
-        grid = LineSegments(_Lines(_grid()), LineBasicMaterial(color=GRID_COLOUR))
+        grid = LineSegments(_LineGeometry(_grid_lines()), LineBasicMaterial(color=GRID_COLOUR))
         window["grid"].set_object(grid)
     for bench in scene.benches:
         size, centre = bench.upper - bench.lower, (bench.lower + bench.upper) / 2
-        top = min(TOP, size[2] / 2)
+        top = min(SLAB_THICKNESS, size[2] / 2)
         slab = box((size[0], size[1], top), 0.2 * top).moved((*centre[:2], size[2] - top / 2))
         body = box((size[0] - 0.03, size[1] - 0.03, size[2] - top))
         body = body.moved((*centre[:2], (size[2] - top) / 2))
@@ -163,7 +162,7 @@ def draw_surroundings(window: Visualizer, scene: Scene) -> None:
         put(window["benches"][bench.name]["body"], BENCH, body)
 
 
-def _grid() -> NDArray[np.float64]:
+def _grid_lines() -> NDArray[np.float64]:
     """Ends of lines within a circle."""
     lines = []
     for across in np.arange(-GRID_RADIUS, GRID_RADIUS + 1e-9, GRID_STEP):

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from kinarm.replay.meshes import Mesh
+from kinarm.viewer.meshes import Mesh
 
 
 class Finish(NamedTuple):

@@ -6,9 +6,9 @@ import coal
 import pinocchio as pin
 
 from kinarm.arm import Arm
-from kinarm.replay import industrial_arm
-from kinarm.replay.meshes import from_coal
-from kinarm.replay.parts import ACCENT, GRAPHITE, PAINT, Finish, Part
+from kinarm.viewer import industrial_arm
+from kinarm.viewer.meshes import from_coal
+from kinarm.viewer.parts import ACCENT, GRAPHITE, PAINT, Finish, Part
 
 MOST_TRIANGLES = 60_000
 """Above this, visual meshes make way for the hulls that decide contact."""
@@ -33,9 +33,9 @@ def arm_parts(arm: Arm) -> tuple[Part, ...]:
     if industrial_arm.fits(arm):
         return tuple(industrial_arm.parts(arm))
     geometry = _visual_shapes(arm)
-    found = [] if geometry is None else _coloured(geometry)
+    found = [] if geometry is None else _painted_parts(geometry)
     if not found or sum(len(part.mesh.faces) for part in found) > MOST_TRIANGLES:
-        found = _plain(arm.geometry)
+        found = _plain_parts(arm.geometry)
     tool = from_coal(coal.Sphere(TOOL_RADIUS)).moved(arm.chain.tool)
     return (*found, Part(arm.n_axes, ACCENT, tool))
 
@@ -48,21 +48,21 @@ def _visual_shapes(arm: Arm) -> pin.GeometryModel | None:
         return None
 
 
-def _coloured(geometry: pin.GeometryModel) -> list[Part]:
+def _painted_parts(geometry: pin.GeometryModel) -> list[Part]:
     """Parts in the colours of their shapes."""
     parts = []
     for shape in geometry.geometryObjects:
         red, green, blue = (round(255 * float(value)) for value in shape.meshColor[:3])
         finish = Finish(red << 16 | green << 8 | blue, roughness=0.45, metalness=0.1)
-        parts.append(_part(shape, finish))
+        parts.append(_shape_part(shape, finish))
     return parts
 
 
-def _plain(geometry: pin.GeometryModel) -> list[Part]:
+def _plain_parts(geometry: pin.GeometryModel) -> list[Part]:
     """Parts in colours of our own."""
-    return [_part(shape, PLAIN[shape.parentJoint % 2]) for shape in geometry.geometryObjects]
+    return [_shape_part(shape, PLAIN[shape.parentJoint % 2]) for shape in geometry.geometryObjects]
 
 
-def _part(shape: pin.GeometryObject, finish: Finish) -> Part:
+def _shape_part(shape: pin.GeometryObject, finish: Finish) -> Part:
     placement, mesh = shape.placement, from_coal(shape.geometry)
     return Part(shape.parentJoint, finish, mesh.moved(placement.translation, placement.rotation))

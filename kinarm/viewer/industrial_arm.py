@@ -10,8 +10,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from kinarm.arm import Arm
-from kinarm.replay.meshes import Mesh, box, capsule, cylinder, housing, lathe, loft
-from kinarm.replay.parts import ACCENT, GRAPHITE, PAINT, STEEL, Part
+from kinarm.viewer.meshes import Mesh, box, capsule, cylinder, housing, lathe, loft
+from kinarm.viewer.parts import ACCENT, GRAPHITE, PAINT, STEEL, Part
 
 TIP = 0.014
 """Radius of the ball at the end of the tool, whose surface is the tool point [m]."""

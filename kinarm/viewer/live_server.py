@@ -139,12 +139,12 @@ class LiveServer:
     async def _serve(self) -> None:
         self._loop = asyncio.get_running_loop()
         self._over = asyncio.Event()
-        self._bridge = self._listen()
+        self._bridge = self._listening_bridge()
         self._started.set()
         await self._over.wait()
         await self._bridge.close()
 
-    def _listen(self) -> _Bridge:
+    def _listening_bridge(self) -> _Bridge:
         """Open the port, or the next free one."""
         last = self.port + PORTS_TRIED
         while True:

@@ -143,6 +143,12 @@ class Recording:
                 f"({self.arm_digest}), not of {arm.name!r} ({arm.digest})"
             )
 
+    def same_trial(self, other: "Recording") -> bool:
+        """Whether another recording has the same start and goal."""
+        return np.array_equal(self.goal, other.goal) and np.array_equal(
+            self.states[0], other.states[0]
+        )
+
     def save(self, path: str | Path) -> None:
         """Write this recording alone to an ``.npz`` file; see `save_recordings`.
 

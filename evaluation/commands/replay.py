@@ -11,7 +11,7 @@ from kinarm.errors import InvalidInputError
 from kinarm.files import check_folder
 
 if TYPE_CHECKING:
-    from kinarm.trajectory import Recording
+    from kinarm.recording import Recording
 
 PROG = "kinarm-replay"
 
@@ -149,14 +149,14 @@ def _write(options: argparse.Namespace, out: Path) -> None:
     """Write the page, and the recordings if that is asked for."""
     from rich.console import Console
 
-    from kinarm.evaluation.choosing import choose, find_recordings
-    from kinarm.replay import replay
-    from kinarm.trajectory import save_recordings
+    from kinarm.evaluation.replays.choosing import choose, find_recordings
+    from kinarm.recording import save_recordings
+    from kinarm.viewer import replay_page
 
     with Console(stderr=True).status("recording; the first run compiles"):
         found = find_recordings(options)
         runs = choose(found, options)
-        page = replay(runs[0], ghosts=runs[1] if len(runs) > 1 else (), arm=found.arm)
+        page = replay_page(runs[0], ghosts=runs[1] if len(runs) > 1 else (), arm=found.arm)
     if options.record is not None:
         save_recordings(options.record, [recording for run in runs for recording in run])
     page.save(out)
@@ -184,10 +184,10 @@ def describe(recording: "Recording") -> str:
 def _go_live(options: argparse.Namespace) -> None:
     """Serve fresh trials until this is interrupted."""
     from kinarm.arm import DEFAULT_ARM, Arm
-    from kinarm.evaluation.choosing import chosen_entrant, chosen_task
-    from kinarm.evaluation.live import follow
-    from kinarm.replay.live import PORT, LiveServer
+    from kinarm.evaluation.replays.choosing import chosen_entrant, chosen_task
+    from kinarm.evaluation.replays.following import follow
     from kinarm.simulator import Simulator
+    from kinarm.viewer.live_server import PORT, LiveServer
 
     arm = Arm.load(options.arm or DEFAULT_ARM)
     entrant = chosen_entrant(options.policy)

@@ -10,13 +10,13 @@ import pinocchio as pin
 
 from kinarm.arm import Arm
 from kinarm.evaluation.entrants import ORACLE, Entrant
-from kinarm.evaluation.recording import record
+from kinarm.evaluation.replays.recorder import record
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle import Oracle
-from kinarm.replay.drawing import aim_camera, draw_arm, draw_goal, draw_surroundings, draw_trace
-from kinarm.replay.live import LiveServer
+from kinarm.recording import Recording, record_rollouts
 from kinarm.simulator import Simulator
-from kinarm.trajectory import Recording, record_rollouts
+from kinarm.viewer.drawing import aim_camera, draw_arm, draw_goal, draw_surroundings, draw_trace
+from kinarm.viewer.live_server import LiveServer
 
 SLOWDOWN = 2.5
 """How much slower than the arm the page shows its motion."""

@@ -14,10 +14,10 @@ import umsgpack
 
 import kinarm
 from kinarm.errors import InvalidInputError, OutputError
-from kinarm.replay import replay
-from kinarm.replay.arm_shapes import arm_parts
-from kinarm.replay.meshes import Mesh, box, capsule, cylinder, housing, lathe, tube
-from kinarm.trajectory import record_rollouts
+from kinarm.recording import record_rollouts
+from kinarm.viewer import replay_page
+from kinarm.viewer.arm_shapes import arm_parts
+from kinarm.viewer.meshes import Mesh, box, capsule, cylinder, housing, lathe, tube
 
 
 def waving(simulator, count=3, seed=0):
@@ -48,27 +48,27 @@ def commands(page):
 
 
 def test_the_same_recordings_give_the_same_bytes(recordings):
-    assert replay(recordings).html == replay(list(recordings)).html
+    assert replay_page(recordings).html == replay_page(list(recordings)).html
 
 
 def test_five_trials_are_small_and_quick(simulator):
     recordings = waving(simulator, 5)
-    replay(recordings[:1])
+    replay_page(recordings[:1])
     began = time.perf_counter()
-    page = replay(recordings)
+    page = replay_page(recordings)
     assert time.perf_counter() - began < 2
     assert len(page.html.encode()) < 1_000_000
 
 
 def test_the_page_refers_to_nothing_outside(recordings):
-    html = replay(recordings).html
+    html = replay_page(recordings).html
     assert "default-src 'none'" in html
     assert re.findall(r'(?:src|href)="(?!data:)[^"]*"', html) == []
-    assert "<!--kinarm:" not in html
+    assert "{{" not in html.split("<script")[0]
 
 
 def test_states_are_there_to_the_last_bit(recordings, simulator):
-    trials = json.loads(unpacked(replay(recordings), "trials"))
+    trials = json.loads(unpacked(replay_page(recordings), "trials"))
     assert [trial["trial"] for trial in trials["trials"]] == [0, 1, 2]
     for trial, recording in zip(trials["trials"], recordings, strict=True):
         assert np.array(trial["runs"][0]["states"]).tobytes() == recording.states.tobytes()
@@ -77,7 +77,7 @@ def test_states_are_there_to_the_last_bit(recordings, simulator):
 
 
 def test_the_scene_is_drawn(recordings):
-    paths = [command["path"] for command in commands(replay(recordings))]
+    paths = [command["path"] for command in commands(replay_page(recordings))]
     for wanted in ("floor", "grid", "benches/right/top", "benches/left/body", "goal/cube", "flash"):
         assert f"/meshcat/{wanted}" in paths
     assert {f"/meshcat/trials/{number}/run" for number in range(3)} <= set(paths)
@@ -85,19 +85,19 @@ def test_the_scene_is_drawn(recordings):
 
 
 def test_ids_are_not_random(recordings):
-    uuids = re.findall(rb"[0-9a-f]{8}-[0-9a-f]{4}-", unpacked(replay(recordings), "scene"))
+    uuids = re.findall(rb"[0-9a-f]{8}-[0-9a-f]{4}-", unpacked(replay_page(recordings), "scene"))
     assert uuids == []
 
 
 def test_ghosts(recordings, simulator):
-    page = replay(recordings, ghosts=waving(simulator, seed=1))
+    page = replay_page(recordings, ghosts=waving(simulator, seed=1))
     runs = json.loads(unpacked(page, "trials"))["trials"][0]["runs"]
     assert [run["policy"] for run in runs] == ["wave-0", "wave-1"]
     assert "<title>wave-0 and wave-1 · kinarm replay</title>" in page.html
 
 
 def test_names_are_escaped(recordings):
-    page = replay(replace(recordings[0], policy="</script><b>&"))
+    page = replay_page(replace(recordings[0], policy="</script><b>&"))
     assert "<title>&lt;/script&gt;&lt;b&gt;&amp; · kinarm replay</title>" in page.html
     assert "</script><b>" not in page.html
 
@@ -105,48 +105,48 @@ def test_names_are_escaped(recordings):
 def test_a_single_state(recordings):
     first = recordings[0]
     still = replace(first, states=first.states[:1], distances=first.distances[:1])
-    replay(replace(still, outcome="horizon", contact=None, contact_point=None, refused=None))
+    replay_page(replace(still, outcome="horizon", contact=None, contact_point=None, refused=None))
 
 
 def test_a_notebook_shows_it(recordings):
-    shown = replay(recordings)._repr_html_()
+    shown = replay_page(recordings)._repr_html_()
     assert shown.startswith('<iframe srcdoc="&lt;!DOCTYPE html&gt;')
     assert shown.count('"') % 2 == 0
 
 
 def test_it_is_written(recordings, tmp_path):
-    page = replay(recordings, tmp_path / "made.html")
+    page = replay_page(recordings, tmp_path / "made.html")
     assert (tmp_path / "made.html").read_text(encoding="utf-8") == page.html
-    assert isinstance(page, kinarm.Replay)
-    assert re.fullmatch(r"Replay\(0\.\d MB of HTML\)", repr(page))
+    assert isinstance(page, kinarm.ReplayPage)
+    assert re.fullmatch(r"ReplayPage\(0\.\d MB of HTML\)", repr(page))
 
 
 def test_it_cannot_be_written(recordings, tmp_path):
     with pytest.raises(OutputError):
-        replay(recordings, tmp_path / "none" / "made.html")
+        replay_page(recordings, tmp_path / "none" / "made.html")
     with pytest.raises(OutputError):
-        replay(recordings, tmp_path)
+        replay_page(recordings, tmp_path)
 
 
 def test_what_cannot_share_a_page(recordings, simulator, simulators):
     with pytest.raises(InvalidInputError, match="no recording"):
-        replay([])
+        replay_page([])
     with pytest.raises(InvalidInputError, match="not of 'paper_flange'"):
-        replay(recordings, arm="paper_flange")
+        replay_page(recordings, arm="paper_flange")
     with pytest.raises(InvalidInputError, match="of arm 'paper_flange'"):
-        replay([*recordings, *waving(simulators["paper_flange"])])
+        replay_page([*recordings, *waving(simulators["paper_flange"])])
     with pytest.raises(InvalidInputError, match="different scenes"):
-        replay([recordings[0], replace(recordings[1], scene=kinarm.Scene(ground=False))])
+        replay_page([recordings[0], replace(recordings[1], scene=kinarm.Scene(ground=False))])
     with pytest.raises(InvalidInputError, match="2 for 3"):
-        replay(recordings, ghosts=recordings[:2])
+        replay_page(recordings, ghosts=recordings[:2])
     with pytest.raises(InvalidInputError, match="cannot be compared"):
-        replay(recordings, ghosts=recordings[::-1])
+        replay_page(recordings, ghosts=recordings[::-1])
 
 
 @pytest.mark.parametrize("name", ["paper", "paper_flange", "lrmate200ic_5l", "sliding", "mesh"])
 def test_any_arm_can_be_drawn(simulators, name):
     simulator = simulators[name]
-    page = replay(waving(simulator), arm=simulator.arm)
+    page = replay_page(waving(simulator), arm=simulator.arm)
     drawn = [command for command in commands(page) if command["type"] == "set_object"]
     assert sum("/arm/" in command["path"] for command in drawn) >= 4
     assert {part.joint for part in arm_parts(simulator.arm)} <= set(range(simulator.arm.n_axes + 1))

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from kinarm.errors import InvalidInputError, KinarmError, OutputError, RecordingFileError
-from kinarm.scene import Bench, Scene
-from kinarm.trajectory import (
+from kinarm.recording import (
     ARRAYS,
     Recording,
     load_recordings,
     record_rollouts,
     save_recordings,
 )
+from kinarm.scene import Bench, Scene
 
 EPISODES = 40
 
