@@ -316,6 +316,7 @@ async function main() {
     select: (index) => player.select(index),
     play: () => player.play(),
     pause: () => player.pause(),
+    lookFrom: (eye, target) => stage.lookFrom(eye, target),
     pose: (name, run) => stage.pose(name, run),
     census: () => stage.census(),
     get state() { return player.state; },

@@ -197,6 +197,17 @@ class Stage {
     viewer.set_dirty();
   }
 
+  /** Look from a place at a target, both in the world [m]; this stays until the view is reset. */
+  lookFrom(eye, target) {
+    const { viewer } = this;
+    viewer.camera.clearViewOffset();
+    viewer.controls.target.set(target[0], target[2], -target[1]);
+    viewer.camera.position.set(eye[0], eye[2], -eye[1]);
+    viewer.controls.update();
+    this.touched = true;
+    viewer.set_dirty();
+  }
+
   select(index) {
     const trial = this.data.trials[index];
     this.trial = trial;
