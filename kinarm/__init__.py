@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from kinarm.problem import PROBLEMS, ReachProblem, Stepping
     from kinarm.recording import Recording, load_recordings, save_recordings
     from kinarm.reference import ReferenceSimulator
-    from kinarm.replay import Replay
-    from kinarm.rollouts import Rollouts
     from kinarm.rollouts import Rollouts, StepResult
     from kinarm.scene import GoalRegion, Obstacle, Scene
     from kinarm.simulator import Simulator
@@ -106,9 +104,7 @@ __getattr__ = lazy_exports(
         "problem": ("PROBLEMS", "ReachProblem", "Stepping"),
         "reference": ("ReferenceSimulator",),
         "recording": ("Recording", "load_recordings", "save_recordings"),
-        "replay": ("Replay",),
         "rollouts": ("Rollouts", "StepResult"),
-        "rollouts": ("Rollouts",),
         "scene": ("GoalRegion", "Obstacle", "Scene"),
         "simulator": ("Simulator",),
         "task": ("REWARD_TERMS", "ReachTask", "RewardWeights"),
