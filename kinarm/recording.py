@@ -1,27 +1,24 @@
 """Recordings: what an arm did in one trial, state by state, in files without pickle."""
 
-import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm._files import CORRUPT, first_line, open_archive, write_atomically
+from kinarm._archive import Archive, load_archive, reading, save_archive
 from kinarm._validation import finite_array, whole_number
-from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, RecordingFileError
+from kinarm.problem import ReachProblem
 from kinarm.rollouts import Rollouts
-from kinarm.scene import Bench, Scene
 from kinarm.simulator import Simulator
 
-FILE_FORMAT = "kinarm-recordings"
-FILE_VERSION = 1
-OUTCOMES = ("success", "collision", "horizon")
+KIND, FORMAT_VERSION = "recording", 2
+OUTCOMES = ("success", "collision", "truncated")
 ARRAYS = ("states", "distances", "goal", "refused", "contact_point")
-"""Fields of a `Recording` that are stored as arrays; the others are stored as JSON."""
+"""Fields of a `Recording` that are stored as arrays."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,14 +29,10 @@ class Recording:
     ----------
     policy : str
         Name of what drove the arm.
-    task : str
-        Name of the task.
+    problem : ReachProblem
+        What was faced, with the hash of its arm.
     trial : int
         Number of the trial in its set.
-    arm, arm_digest : str
-        The arm: its name, and the hash of what the simulator uses of it.
-    scene : Scene
-        Where it stood.
     states : ndarray, shape (steps + 1, n_axes)
         Configurations, from the start to the end [rad or m].
     distances : ndarray, shape (steps + 1,)
@@ -47,13 +40,7 @@ class Recording:
     goal : ndarray, shape (3,)
         Goal position [m].
     outcome : str
-        ``"success"``, ``"collision"`` or ``"horizon"``.
-    tolerance : float
-        The goal counts as reached at this distance or less [m].
-    horizon : int
-        Steps after which the episode would have been truncated.
-    time_step : float
-        Duration of a step [s].
+        ``"success"``, ``"collision"`` or ``"truncated"``.
     contact : tuple of str, optional
         The two bodies that would have touched, if the last move was refused.
     contact_point : ndarray, shape (3,), optional
@@ -72,18 +59,12 @@ class Recording:
     """
 
     policy: str
-    task: str
+    problem: ReachProblem
     trial: int
-    arm: str
-    arm_digest: str
-    scene: Scene = field(default_factory=Scene)
     states: NDArray[np.float64]
     distances: NDArray[np.float64]
     goal: NDArray[np.float64]
     outcome: str
-    tolerance: float
-    horizon: int
-    time_step: float
     contact: tuple[str, str] | None = None
     contact_point: NDArray[np.float64] | None = None
     refused: NDArray[np.float64] | None = None
@@ -94,15 +75,11 @@ class Recording:
         if self.outcome not in OUTCOMES:
             raise InvalidInputError(f"outcome must be one of {OUTCOMES}, got {self.outcome!r}")
         whole_number("trial", self.trial, 0)
-        whole_number("horizon", self.horizon, 1)
-        for name in ("tolerance", "time_step"):
-            if not 0 < getattr(self, name) < float("inf"):
-                raise InvalidInputError(f"{name} must be finite and above 0")
         states = finite_array("states", self.states, (None, None))
-        if not 1 <= len(states) <= self.horizon + 1:
+        horizon = self.problem.task.horizon
+        if not 1 <= len(states) <= horizon + 1:
             raise InvalidInputError(
-                f"states must be 1 to {self.horizon + 1} for a horizon of {self.horizon}, "
-                f"got {len(states)}"
+                f"states must be 1 to {horizon + 1} for a horizon of {horizon}, got {len(states)}"
             )
         shapes = {
             "states": states.shape,
@@ -127,21 +104,6 @@ class Recording:
     def final_distance(self) -> float:
         """Distance from the tool to the goal at the end [m]."""
         return float(self.distances[-1])
-
-    def check_arm(self, arm: Arm) -> None:
-        """See that this is the arm that was recorded.
-
-        Raises
-        ------
-        InvalidInputError
-            If it is another one.
-        """
-        if arm.digest != self.arm_digest:
-            other = "another version of arm" if arm.name == self.arm else "arm"
-            raise InvalidInputError(
-                f"the recording of trial {self.trial} is of {other} {self.arm!r} "
-                f"({self.arm_digest}), not of {arm.name!r} ({arm.digest})"
-            )
 
     def same_trial(self, other: "Recording") -> bool:
         """Whether another recording has the same start and goal."""
@@ -184,20 +146,23 @@ def save_recordings(path: str | Path, recordings: Sequence[Recording]) -> None:
     OutputError
         If the file cannot be written; an existing file is then left as it was.
     """
-    names = [item.name for item in fields(Recording) if item.name not in (*ARRAYS, "scene")]
-    entries = [
-        {**{name: getattr(each, name) for name in names}, "scene": asdict(each.scene)}
-        for each in recordings
-    ]
-    arrays: dict[str, Any] = {
-        "format": np.array(FILE_FORMAT),
-        "version": np.array(FILE_VERSION),
-        "recordings": np.array(json.dumps(entries, sort_keys=True)),
+    problems = list(dict.fromkeys(each.problem for each in recordings))
+    names = [item.name for item in fields(Recording) if item.name not in (*ARRAYS, "problem")]
+    header = {
+        "problems": [problem.to_json() for problem in problems],
+        "recordings": [
+            {name: getattr(each, name) for name in names}
+            | {"problem": problems.index(each.problem)}
+            for each in recordings
+        ],
     }
-    for number, each in enumerate(recordings):
-        values = {f"{name}_{number}": getattr(each, name) for name in ARRAYS}
-        arrays |= {name: value for name, value in values.items() if value is not None}
-    write_atomically(path, lambda file: np.savez_compressed(file, **arrays))
+    values = {
+        f"{name}_{number}": getattr(each, name)
+        for number, each in enumerate(recordings)
+        for name in ARRAYS
+    }
+    arrays = {name: value for name, value in values.items() if value is not None}
+    save_archive(path, KIND, FORMAT_VERSION, arrays, header, compress=True)
 
 
 def load_recordings(path: str | Path) -> list[Recording]:
@@ -206,48 +171,24 @@ def load_recordings(path: str | Path) -> list[Recording]:
     Raises
     ------
     RecordingFileError
-        If the file is missing, truncated, something else, or written by a later version.
+        If the file is missing, truncated, something else, or written by another version.
     """
-    name = str(path)
-    try:
-        with Path(path).open("rb") as file:
-            return _read(name, file)
-    except OSError as error:
-        raise RecordingFileError(f"cannot read recording {name!r}: {error.strerror}") from error
-    except (AttributeError, *CORRUPT) as error:
-        raise RecordingFileError(
-            f"{name!r} is not a complete recording: {first_line(error)}"
-        ) from error
+    archive = load_archive(path, KIND, FORMAT_VERSION, RecordingFileError)
+    with reading(repr(str(path)), KIND, RecordingFileError):
+        return _recordings(archive)
 
 
-def _read(name: str, file: IO[bytes]) -> list[Recording]:
-    content = open_archive(
-        name,
-        file,
-        kind="recording",
-        file_format=FILE_FORMAT,
-        version=FILE_VERSION,
-        error=RecordingFileError,
-    )
-    return [
-        _recording(entries, {part: content.get(f"{part}_{number}") for part in ARRAYS})
-        for number, entries in enumerate(json.loads(str(content["recordings"])))
-    ]
-
-
-def _recording(entries: dict[str, Any], arrays: dict[str, Any]) -> Recording:
-    """Rebuild a recording from what JSON held of it, and its arrays."""
-    scene, contact = entries.pop("scene"), entries.pop("contact")
-    benches = [
-        Bench(**{**bench, "x": tuple(bench["x"]), "y": tuple(bench["y"])})
-        for bench in scene.pop("benches")
-    ]
-    return Recording(
-        **entries,
-        **arrays,
-        contact=tuple(contact) if contact else None,
-        scene=Scene(benches=tuple(benches), **scene),
-    )
+def _recordings(archive: Archive) -> list[Recording]:
+    """Rebuild recordings from what a file holds."""
+    header, recordings = archive.header, []
+    problems = [ReachProblem.from_json(entries) for entries in header["problems"]]
+    for number, entries in enumerate(header["recordings"]):
+        given = {**entries, "problem": problems[entries["problem"]]}
+        given |= {name: archive.arrays.get(f"{name}_{number}") for name in ARRAYS}
+        if given["contact"] is not None:
+            given["contact"] = tuple(given["contact"])
+        recordings.append(Recording(**given))
+    return recordings
 
 
 def record_rollouts(
@@ -283,32 +224,25 @@ def record_rollouts(
     """
     if rollouts.paths.size == 0:
         raise InvalidInputError("these rollouts kept no configurations: make them with record=True")
-    chosen = range(len(rollouts)) if numbers is None else numbers
-    for number in chosen:
+    world, problem = simulator.world, simulator.problem.pinned
+    recordings = []
+    for number in range(len(rollouts)) if numbers is None else numbers:
         if number not in range(len(rollouts)):
             raise InvalidInputError(f"no trial {number}: there are 0 to {len(rollouts) - 1}")
-    recordings = []
-    for number in chosen:
         states = rollouts.paths[number, : rollouts.steps[number] + 1]
         goal = rollouts.goals[number]
         touch = None
         if rollouts.collision[number]:
-            touch = simulator.contact(rollouts.configurations[number], rollouts.targets[number])
+            touch = world.contact(rollouts.configurations[number], rollouts.targets[number])
         recordings.append(
             Recording(
                 policy=policy,
-                task=simulator.task.name,
+                problem=problem,
                 trial=int(number),
-                arm=simulator.arm.name,
-                arm_digest=simulator.arm.digest,
-                scene=simulator.scene,
                 states=states,
-                distances=simulator.distances(states, np.tile(goal, (len(states), 1))),
+                distances=world.distances(states, np.tile(goal, (len(states), 1))),
                 goal=goal,
                 outcome=_outcome(rollouts, number),
-                tolerance=simulator.task.tolerance,
-                horizon=simulator.task.horizon,
-                time_step=simulator.time_step,
                 contact=touch.pair if touch else None,
                 contact_point=touch.point if touch else None,
                 refused=touch.configuration if touch else None,
@@ -322,4 +256,4 @@ def record_rollouts(
 def _outcome(rollouts: Rollouts, number: int) -> str:
     if rollouts.success[number]:
         return "success"
-    return "collision" if rollouts.collision[number] else "horizon"
+    return "collision" if rollouts.collision[number] else "truncated"

@@ -11,18 +11,19 @@ from meshcat.geometry import Mesh as DrawnMesh
 from numpy.typing import NDArray
 
 from kinarm.arm import Arm
+from kinarm.problem import ReachProblem
 from kinarm.recording import Recording
-from kinarm.scene import Scene
+from kinarm.scene import GoalRegion, Obstacle, Scene
 from kinarm.viewer.arm_shapes import arm_parts
 from kinarm.viewer.meshes import Mesh, box, capsule, cylinder, tube
 from kinarm.viewer.parts import Finish
 
-OUTCOME_COLOURS = {"success": 0x0072B2, "collision": 0xD55E00, "horizon": 0xE69F00}
+OUTCOME_COLOURS = {"success": 0x0072B2, "collision": 0xD55E00, "truncated": 0xE69F00}
 """Distinguishable with any colour vision (Okabe and Ito)."""
 
 FLOOR = Finish(0xE9ECEF, roughness=0.95)
-BENCH = Finish(0xB4BCC6, roughness=0.8)
-BENCH_TOP = Finish(0xCBD2DA, roughness=0.7)
+OBSTACLE = Finish(0xB4BCC6, roughness=0.8)
+GOAL_SLAB = Finish(0xCBD2DA, roughness=0.7)
 CUBE = Finish(0x009E73, roughness=0.5)
 HALO = Finish(0x009E73, opacity=0.16, glow=True)
 FLASH = Finish(OUTCOME_COLOURS["collision"], opacity=0.5, glow=True)
@@ -31,7 +32,7 @@ BACKGROUND = [0.93, 0.945, 0.96]
 
 FLOOR_RADIUS, GRID_RADIUS, GRID_STEP = 12.0, 2.0, 0.25
 SLAB_THICKNESS = 0.02
-"""Thickness of the slab that covers a bench [m]."""
+"""Thickness of the slab that covers an obstacle on which goals lie [m]."""
 
 TRACE_RADIUS = 0.0042
 TRACE_SIDES = 6
@@ -139,7 +140,7 @@ def put(window: Visualizer, finish: Finish, *meshes: Mesh) -> None:
 
 
 def draw_surroundings(window: Visualizer, scene: Scene) -> None:
-    """Lights, floor with a grid, and benches."""
+    """Lights, floor with a grid, and obstacles."""
     for path in CLUTTER:
         window[path].set_property("visible", False)
     for path, intensity in DIMMED.items():
@@ -152,14 +153,31 @@ def draw_surroundings(window: Visualizer, scene: Scene) -> None:
         put(window["floor"], FLOOR, cylinder(0.002, FLOOR_RADIUS, 0.0).moved((0, 0, -0.002)))
         grid = LineSegments(_LineGeometry(_grid_lines()), LineBasicMaterial(color=GRID_COLOUR))
         window["grid"].set_object(grid)
-    for bench in scene.benches:
-        size, centre = bench.upper - bench.lower, (bench.lower + bench.upper) / 2
-        top = min(SLAB_THICKNESS, size[2] / 2)
-        slab = box((size[0], size[1], top), 0.2 * top).moved((*centre[:2], size[2] - top / 2))
-        body = box((size[0] - 0.03, size[1] - 0.03, size[2] - top))
-        body = body.moved((*centre[:2], (size[2] - top) / 2))
-        put(window["benches"][bench.name]["top"], BENCH_TOP, slab)
-        put(window["benches"][bench.name]["body"], BENCH, body)
+    for number, obstacle in enumerate(scene.obstacles):
+        _draw_obstacle(window[f"obstacles/{number}"], obstacle, scene)
+
+
+def _draw_obstacle(window: Visualizer, obstacle: Obstacle, scene: Scene) -> None:
+    """A box; where goals lie on it, with a slab like that of a bench."""
+    size, centre = obstacle.size, obstacle.centre
+    if not any(_lies_on(region, obstacle, scene.cube_edge) for region in scene.goal_regions):
+        put(window["body"], OBSTACLE, box(size, 0.04 * size.min()).moved(centre))
+        return
+    top = min(SLAB_THICKNESS, size[2] / 2)
+    inset = np.minimum(0.03, 0.2 * size[:2])
+    slab = box((*size[:2], top), 0.2 * top).moved((0, 0, (size[2] - top) / 2))
+    body = box((*size[:2] - inset, size[2] - top)).moved((0, 0, -top / 2))
+    put(window["top"], GOAL_SLAB, slab.moved(centre))
+    put(window["body"], OBSTACLE, body.moved(centre))
+
+
+def _lies_on(region: GoalRegion, obstacle: Obstacle, edge: float) -> bool:
+    """Whether cubes with a given edge [m], centred in a region, lie on an obstacle."""
+    gap = region.lower[2] - obstacle.upper[2]
+    above = all(
+        region.lower[k] < obstacle.upper[k] and obstacle.lower[k] < region.upper[k] for k in (0, 1)
+    )
+    return above and 0 <= gap <= edge
 
 
 def _grid_lines() -> NDArray[np.float64]:
@@ -177,11 +195,11 @@ def aim_camera(window: Visualizer) -> None:
         window["/Cameras/default/rotated/<object>"].set_property(name, value)
 
 
-def draw_goal(window: Visualizer, scene: Scene, tolerance: float) -> None:
+def draw_goal(window: Visualizer, problem: ReachProblem) -> None:
     """The cube, and a halo within which the goal counts as reached, about the origin."""
-    edge = scene.cube_edge or 0.01
+    edge = problem.scene.cube_edge or 0.01
     put(window["cube"], CUBE, box((edge, edge, edge), 0.08 * edge))
-    put(window["halo"], HALO, capsule(0.0, tolerance))
+    put(window["halo"], HALO, capsule(0.0, problem.task.tolerance))
 
 
 def draw_arm(window: Visualizer, arm: Arm) -> list[Visualizer]:

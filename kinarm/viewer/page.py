@@ -13,9 +13,9 @@ from pathlib import Path
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
+from kinarm._files import write_text
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError
-from kinarm.files import write_text
 from kinarm.recording import Recording
 from kinarm.viewer.player_data import player_data
 from kinarm.viewer.scene_commands import scene_commands
@@ -64,7 +64,6 @@ def replay_page(
     path: str | Path | None = None,
     *,
     ghosts: Sequence[Recording] = (),
-    arm: Arm | str | None = None,
 ) -> ReplayPage:
     """Make a page that plays recordings; the same recordings make the same page.
 
@@ -76,35 +75,36 @@ def replay_page(
         Where to write the page, if at all.
     ghosts : sequence of Recording
         What another policy did in the same trials, to be shown in the same scene.
-    arm : Arm or str, optional
-        The arm that was recorded, where it is not one that ships with kinarm.
 
     Raises
     ------
     InvalidInputError
-        If there is no recording, they cannot share a page, or they are of another arm.
+        If there is no recording, or they cannot share a page.
+    ArmError
+        If the arm that was recorded is not there any more, or has changed.
     OutputError
         If the file cannot be written.
     """
     chosen = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    if not isinstance(arm, Arm):
-        arm = Arm.load(arm or (chosen[0].arm if chosen else "paper"))
-    _check_recordings(chosen, ghosts, arm)
-    page = ReplayPage(_page_html(chosen, ghosts, arm))
+    _check_recordings(chosen, ghosts)
+    page = ReplayPage(_page_html(chosen, ghosts))
     if path is not None:
         page.save(path)
     return page
 
 
-def _check_recordings(
-    recordings: Sequence[Recording], ghosts: Sequence[Recording], arm: Arm
-) -> None:
+def _check_recordings(recordings: Sequence[Recording], ghosts: Sequence[Recording]) -> None:
     """See that recordings can share a page."""
     if not recordings:
         raise InvalidInputError("there is no recording to replay")
-    for recording in (*recordings, *ghosts):
-        recording.check_arm(arm)
-        if recording.scene != recordings[0].scene:
+    first = recordings[0].problem
+    for problem in dict.fromkeys(each.problem for each in (*recordings, *ghosts)):
+        if problem.arm_digest != first.arm_digest:
+            raise InvalidInputError(
+                f"the recordings are of different arms: {first.arm.name!r} ({first.arm_digest}) "
+                f"and {problem.arm.name!r} ({problem.arm_digest})"
+            )
+        if problem.scene != first.scene:
             raise InvalidInputError("the recordings were made in different scenes")
     if ghosts and len(ghosts) != len(recordings):
         raise InvalidInputError(
@@ -118,8 +118,9 @@ def _check_recordings(
             )
 
 
-def _page_html(recordings: Sequence[Recording], ghosts: Sequence[Recording], arm: Arm) -> str:
+def _page_html(recordings: Sequence[Recording], ghosts: Sequence[Recording]) -> str:
     """Fill the template with Meshcat's viewer, the scene, the trials and the player."""
+    arm = Arm.load(recordings[0].problem.arm)
     trials = [[run for run in runs if run is not None] for runs in zip_longest(recordings, ghosts)]
     data = json.dumps(player_data(trials, arm), separators=(",", ":"), sort_keys=True)
     template = Environment(autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True)

@@ -6,7 +6,7 @@ const HOLD = 1.4; // seconds between the end of a trial and the next one
 const BADGES = {
   success: ["Reached", "m5 12.5 4.5 4.5L19 7.5"],
   collision: ["Contact", "M6 6l12 12M18 6 6 18"],
-  horizon: ["Out of time", "M12 6v6.5l4 2.5M12 3a9 9 0 1 0 .01 0"],
+  truncated: ["Out of time", "M12 6v6.5l4 2.5M12 3a9 9 0 1 0 .01 0"],
 };
 
 /* ---------- data ---------- */
@@ -64,7 +64,7 @@ function verdict(run, trial) {
     const pair = run.contact ? run.contact.join(" touches ") : "something touches";
     return `${pair} after ${count(steps, "step")}, ${distance} from the goal`;
   }
-  if (run.outcome === "horizon") {
+  if (run.outcome === "truncated") {
     return `${distance} from the goal after ${count(steps, "step")}`;
   }
   const ratio = steps === trial.floor ? ", as few as possible" : `, ${(steps / trial.floor).toFixed(1)} times what is necessary`;
@@ -72,7 +72,7 @@ function verdict(run, trial) {
 }
 
 function fillCard(trial) {
-  element("eyebrow").textContent = `Task ${trial.task} · trial ${trial.trial}`;
+  element("eyebrow").textContent = `Problem ${trial.problem} · trial ${trial.trial}`;
   element("runs").replaceChildren(...trial.runs.map((run, k) => {
     const row = make("li");
     const name = make("span", { class: "name" });
@@ -123,7 +123,7 @@ class Player {
     this.calm = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
     data.trials.forEach((trial, index) => {
       const words = BADGES[trial.runs[0].outcome][0].toLowerCase();
-      element("trial").append(make("option", { value: index }, `${trial.task} ${trial.trial}: ${words}`));
+      element("trial").append(make("option", { value: index }, `${trial.problem} ${trial.trial}: ${words}`));
     });
     element("trial-choice").hidden = data.trials.length < 2;
     this.connect();
@@ -297,7 +297,7 @@ class Player {
   get state() {
     const run = this.trial.runs[0];
     return {
-      index: this.index, trial: this.trial.trial, task: this.trial.task, policy: run.policy, outcome: run.outcome,
+      index: this.index, trial: this.trial.trial, problem: this.trial.problem, policy: run.policy, outcome: run.outcome,
       frame: Math.floor(this.time), frames: this.frames, playing: this.playing, speed: this.speed, theme: this.theme,
     };
   }

@@ -43,14 +43,14 @@ def player_data(trials: Sequence[Sequence[Recording]], arm: Arm) -> dict[str, An
 
 
 def _trial_data(runs: Sequence[Recording]) -> dict[str, Any]:
-    first = runs[0]
+    first, problem = runs[0], runs[0].problem
     return {
-        "task": first.task,
+        "problem": problem.name,
         "trial": first.trial,
         "goal": first.goal.tolist(),
-        "tolerance": first.tolerance,
-        "horizon": first.horizon,
-        "timeStep": first.time_step,
+        "tolerance": problem.task.tolerance,
+        "horizon": problem.task.horizon,
+        "timeStep": problem.stepping.time_step,
         "floor": first.steps_lower_bound,
         "runs": [_run_data(run) for run in runs],
     }

@@ -40,9 +40,9 @@ def scene_commands(trials: Sequence[Sequence[Recording]], arm: Arm) -> bytes:
     """
     capture = CapturingWindow()
     window = meshcat.Visualizer(window=capture)
-    first = trials[0][0]
-    draw_surroundings(window, first.scene)
-    draw_goal(window["goal"], first.scene, first.tolerance)
+    problem = trials[0][0].problem
+    draw_surroundings(window, problem.scene)
+    draw_goal(window["goal"], problem)
     put(window["flash"], FLASH, capsule(0.0, FLASH_RADIUS))
     draw_arm(window["arm"], arm)
     for number, runs in enumerate(trials):

@@ -1,8 +1,8 @@
 "use strict";
 
 const THEMES = {
-  light: { back: 0xeef1f4, floor: 0xd3d9df, grid: 0xb4bdc7, bench: 0x8f9aa8, top: 0xb3bdc8, ghost: 0x4d5a68, sky: 0.3, sun: 0.62 },
-  dark: { back: 0x1a1f25, floor: 0x171c22, grid: 0x3c4753, bench: 0x3d4752, top: 0x586573, ghost: 0xb4c1ce, sky: 0.22, sun: 0.6 },
+  light: { back: 0xeef1f4, floor: 0xd3d9df, grid: 0xb4bdc7, obstacle: 0x8f9aa8, slab: 0xb3bdc8, ghost: 0x4d5a68, sky: 0.3, sun: 0.62 },
+  dark: { back: 0x1a1f25, floor: 0x171c22, grid: 0x3c4753, obstacle: 0x3d4752, slab: 0x586573, ghost: 0xb4c1ce, sky: 0.22, sun: 0.6 },
 };
 const RIVAL = 0x56b4e9;
 const BEHIND = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 8 }; // gives way to what coincides
@@ -137,9 +137,8 @@ class Stage {
     const paint = (value, node) => node.traverse((mesh) => mesh.material && mesh.material.color.copy(colour(value)));
     paint(look.floor, this.find("floor"));
     paint(look.grid, this.find("grid"));
-    for (const bench of this.find("benches").children) {
-      paint(look.bench, bench.children.find((child) => child.name === "body"));
-      paint(look.top, bench.children.find((child) => child.name === "top"));
+    for (const part of this.find("obstacles").children.flatMap((obstacle) => obstacle.children)) {
+      paint(part.name === "top" ? look.slab : look.obstacle, part);
     }
     this.start.material.color.copy(colour(look.ghost));
     this.sky.intensity = look.sky;
@@ -219,6 +218,7 @@ class Stage {
       Object.assign(this.traces[1].material, { transparent: true, opacity: 0.5 });
     }
     this.find("goal").position.fromArray(trial.goal);
+    this.find("goal", "halo").scale.setScalar(trial.tolerance / this.data.trials[0].tolerance);
     this.start.show(trial.runs[0].states[0]);
     if (this.rival) {
       this.rival.root.visible = trial.runs.length > 1;
