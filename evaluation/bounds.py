@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from kinarm.errors import OutputError
-from kinarm.evaluation.statistics import Share
+from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.trials import TrialSet
 from kinarm.files import CORRUPT, check_folder, write_atomically
 from kinarm.policies import oracle
@@ -115,7 +115,7 @@ def bounds_document(solutions: OracleSolutions) -> dict[str, Any]:
     missed = np.flatnonzero(~solutions.reachable)
     gap = (solutions.steps - solutions.steps_lower_bound)[solutions.reachable]
     return {
-        "success": Share.of(solutions.reachable).to_json(),
+        "success": Estimate.share(solutions.reachable).to_json(),
         "unsolved": [
             {"trial": int(trial), "reason": str(solutions.reasons[trial])} for trial in missed
         ],

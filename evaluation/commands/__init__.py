@@ -1,1 +1,1 @@
-"""Command lines of the evaluation."""
+"""The command lines."""

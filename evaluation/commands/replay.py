@@ -192,8 +192,7 @@ def _go_live(options: argparse.Namespace) -> None:
     arm = Arm.load(options.arm or DEFAULT_ARM)
     entrant = chosen_entrant(options.policy)
     simulator = Simulator(arm, chosen_task([entrant], options.task))
-    if not options.allow_other_arm:
-        entrant.check_arm(arm)
+    entrant.check(arm, allow_other_arm=options.allow_other_arm)
     wanted = options.port or PORT
     with LiveServer(wanted) as server:
         if server.port != wanted:

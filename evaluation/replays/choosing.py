@@ -8,7 +8,7 @@ from pathlib import Path
 from kinarm.arm import DEFAULT_ARM, Arm
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.bounds import oracle_bounds
-from kinarm.evaluation.documents import EvaluationDocument
+from kinarm.evaluation.document import EvaluationDocument
 from kinarm.evaluation.entrants import Entrant, find_entrants
 from kinarm.evaluation.replays.recorder import record
 from kinarm.evaluation.trials import TrialSet

@@ -39,8 +39,7 @@ def record(
     PolicyFileError
         If the policy was trained for another arm and that is not allowed.
     """
-    if not allow_other_arm:
-        entrant.check_arm(trials.simulator.arm)
+    entrant.check(trials.simulator.arm, allow_other_arm=allow_other_arm)
     made = entrant.policy.provenance.to_json() if entrant.policy else None
     return record_rollouts(
         trials.simulator,

@@ -9,20 +9,20 @@ from typing import NamedTuple
 
 import pytest
 
-from kinarm.evaluation import bench, eval, reproduce  # noqa: A004
-from kinarm.evaluation.commands import replay
+from kinarm.evaluation import bench, reproduce
+from kinarm.evaluation.commands import evaluate, replay
 from kinarm.policies import Policy, ars_recipe, train, train_ars
 
 ROOT = Path(__file__).resolve().parents[2]
 MODULES = {
-    "kinarm-eval": "kinarm.evaluation.eval",
+    "kinarm-eval": "kinarm.evaluation.commands.evaluate",
     "kinarm-replay": "kinarm.evaluation.commands.replay",
     "kinarm-train": "kinarm.policies.train",
     "kinarm-bench": "kinarm.evaluation.bench",
     "kinarm-reproduce": "kinarm.evaluation.reproduce",
 }
 MAINS = {
-    "kinarm-eval": eval.main,
+    "kinarm-eval": evaluate.main,
     "kinarm-train": train.main,
     "kinarm-bench": bench.main,
     "kinarm-replay": replay.main,

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinarm.evaluation.evaluations import evaluate
+from kinarm.evaluation.evaluation import evaluate
 from kinarm.policies import Policy, ars_recipe, train_ars
 from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
 

@@ -4,7 +4,7 @@ import pytest
 
 from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.evaluation import Entrant, TrialSet, find_entrants, oracle_bounds, record
-from kinarm.evaluation.evaluations import run_trials
+from kinarm.evaluation.evaluation import run_trials
 from kinarm.simulator import Simulator
 
 

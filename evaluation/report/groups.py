@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.errors import InvalidInputError
-from kinarm.evaluation.evaluations import Evaluation
-from kinarm.evaluation.plots import series_label
-from kinarm.evaluation.report import table_rows
+from kinarm.evaluation.evaluation import Evaluation
+from kinarm.evaluation.figures import series_label
+from kinarm.evaluation.table import table_rows
 from kinarm.scene import Bench
 
 COLOURS = 6
@@ -30,7 +30,7 @@ class Group:
     Attributes
     ----------
     row : dict
-        The row, one of `kinarm.evaluation.report.table_rows`.
+        The row, one of `kinarm.evaluation.table.table_rows`.
     members : tuple of Evaluation
         One per training seed.
     style : str
@@ -86,10 +86,21 @@ class TaskResults:
         return float(self.entry["tolerance"])
 
     @property
+    def oracle_rate(self) -> float | None:
+        """Share of the trials that the oracle solved, if it was asked."""
+        oracle = self.entry["oracle"]
+        return float(oracle["success"]["value"]) if oracle else None
+
+    @property
     def benches(self) -> tuple[Bench, ...]:
         """The benches that goals lie on."""
         simulator = self.groups[0].members[0].trials.simulator
         return tuple(simulator.scene.bench(name) for name in simulator.task.benches)
+
+    @property
+    def pooled(self) -> bool:
+        """Whether several training seeds share a row."""
+        return any(len(group.members) > 1 for group in self.contenders)
 
     @property
     def contenders(self) -> tuple[Group, ...]:

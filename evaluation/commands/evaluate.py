@@ -14,7 +14,7 @@ from kinarm.files import check_folder, write_text
 
 if TYPE_CHECKING:
     from kinarm.evaluation.entrants import Entrant
-    from kinarm.evaluation.evaluations import Evaluation
+    from kinarm.evaluation.evaluation import Evaluation
 
 PROG = "kinarm-eval"
 
@@ -90,7 +90,8 @@ def _evaluate(options: argparse.Namespace, command: str) -> None:
     """From options to table, document and figures."""
     from rich.console import Console
 
-    from kinarm.evaluation.report import evaluation_document, print_table
+    from kinarm.evaluation.document import evaluation_document
+    from kinarm.evaluation.table import print_table
 
     with Console(stderr=True).status("evaluating; the first run compiles") as status:
         evaluations = evaluate_all(options, status.update)
@@ -149,7 +150,7 @@ def evaluate_all(
     """
     from kinarm.arm import Arm
     from kinarm.evaluation.bounds import oracle_bounds
-    from kinarm.evaluation.evaluations import run_trials
+    from kinarm.evaluation.evaluation import run_trials
     from kinarm.evaluation.trials import TrialSet
     from kinarm.simulator import Simulator
     from kinarm.task import load_task
@@ -160,9 +161,8 @@ def evaluate_all(
     _check_names(entrant for entrant, _ in pairs)
     if not pairs:
         raise InvalidInputError("no chosen policy was trained on a task that exists: name a --task")
-    if not options.allow_other_arm:
-        for entrant, _ in pairs:
-            entrant.check_arm(arm)
+    for entrant, _ in pairs:
+        entrant.check(arm, allow_other_arm=options.allow_other_arm)
     for folder in (options.out, options.report):
         if folder is not None:
             check_folder(folder, create=True)
@@ -238,7 +238,7 @@ def pair_with_tasks(
 
 def _write(folder: Path, document: dict[str, Any], evaluations: "list[Evaluation]") -> None:
     """Write the document and the figures."""
-    from kinarm.evaluation.plots import distance_histograms, save_figure
+    from kinarm.evaluation.figures import distance_histograms, save_figure
 
     write_text(folder / "evaluation.json", json.dumps(document, indent=1))
     shown = [e for e in evaluations if e.entrant.algorithm != "oracle"] or evaluations
@@ -252,7 +252,7 @@ def _report(
     report: Callable[[str], object],
 ) -> None:
     """Write the page."""
-    from kinarm.evaluation.html_report.page import write_report
+    from kinarm.evaluation.report.page import write_report
 
     report("writing the report")
     write_report(folder, document, evaluations)

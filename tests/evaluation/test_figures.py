@@ -5,8 +5,8 @@ import pytest
 from matplotlib.patches import StepPatch
 
 from kinarm.evaluation.entrants import BASELINES, Entrant
-from kinarm.evaluation.evaluations import run_trials
-from kinarm.evaluation.plots import distance_histograms, save_figure
+from kinarm.evaluation.evaluation import run_trials
+from kinarm.evaluation.figures import distance_histograms, save_figure
 from kinarm.evaluation.trials import TrialSet
 from kinarm.simulator import Simulator
 from kinarm.task import TASKS

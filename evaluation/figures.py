@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.evaluation.evaluations import Evaluation
+from kinarm.evaluation.evaluation import Evaluation
 from kinarm.files import write_atomically
 
 if TYPE_CHECKING:

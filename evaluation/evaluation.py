@@ -13,16 +13,14 @@ from kinarm.arm import DEFAULT_ARM, Arm
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.entrants import Entrant, find_entrants
-from kinarm.evaluation.statistics import DistanceStatistics, Share
+from kinarm.evaluation.metrics import Outcomes, estimate_metrics
+from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle_solution import OracleSolutions
 from kinarm.policies.policy import Policy
 from kinarm.rollouts import Rollouts
 from kinarm.simulator import PolicyFunction, Simulator
 from kinarm.task import ReachTask
-
-WITHIN = (0.1, 0.2)
-"""Distances whose shares are reported beside success [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,19 +50,23 @@ class Evaluation:
         return self.trials.simulator.task.name
 
     @cached_property
-    def success(self) -> Share:
-        """Share of trials that ended within the tolerance."""
-        return Share.of(self.rollouts.success)
+    def metrics(self) -> dict[str, Estimate]:
+        """Every figure of merit by its name in `kinarm.evaluation.metrics.METRICS`."""
+        return estimate_metrics(Outcomes((self.rollouts,), self.bounds))
 
-    @cached_property
-    def collision(self) -> Share:
+    @property
+    def success(self) -> Estimate:
+        """Share of trials that ended within the tolerance, without contact."""
+        return Estimate.share(self.rollouts.success)
+
+    @property
+    def collision(self) -> Estimate:
         """Share of trials that ended in contact."""
-        return Share.of(self.rollouts.collision)
+        return Estimate.share(self.rollouts.collision)
 
-    @cached_property
-    def distance(self) -> DistanceStatistics:
-        """Statistics of the final distance."""
-        return DistanceStatistics.of(self.rollouts.distance)
+    def within(self, distance: float) -> Estimate:
+        """Share of trials whose final distance is at most ``distance`` [m]."""
+        return Estimate.share(self.rollouts.distance <= distance)
 
     @cached_property
     def contacts(self) -> tuple[tuple[str, str] | None, ...]:
@@ -80,10 +82,7 @@ class Evaluation:
         InvalidInputError
             If the evaluation was made without bounds.
         """
-        if self.bounds is None:
-            raise InvalidInputError(f"{self.entrant.name!r} was evaluated without the oracle")
-        ratio: NDArray[np.float64] = self.rollouts.steps / self.bounds.steps_lower_bound
-        return ratio[self.rollouts.success]
+        return Outcomes((self.rollouts,), self.bounds).step_ratio
 
     @property
     def outcomes(self) -> tuple[str, ...]:
@@ -91,16 +90,13 @@ class Evaluation:
         codes = self.rollouts.success + 2 * self.rollouts.collision
         return tuple(("horizon", "success", "collision")[code] for code in codes)
 
-    def within(self, distance: float) -> Share:
-        """Share of trials whose final distance is at most ``distance`` [m]."""
-        return Share.of(self.rollouts.distance <= distance)
-
     def to_json(self) -> dict[str, Any]:
-        """Summary and every trial, as a dictionary that JSON can hold."""
+        """Figures of merit and every trial, as a dictionary that JSON can hold."""
         return {
-            **_identity(self.entrant.name, self.entrant, self.task),
+            **_rows_head(self.entrant.name, self.entrant, self.task),
             "training_seed": self.entrant.seed,
-            **_figures([self]),
+            "trials": len(self.trials),
+            "metrics": _metrics_json(self.metrics),
             "outcomes": {
                 "final_distance": self.rollouts.distance.tolist(),
                 "steps": self.rollouts.steps.tolist(),
@@ -108,6 +104,9 @@ class Evaluation:
                 "contact": [list(pair) if pair else None for pair in self.contacts],
             },
         }
+
+    def __repr__(self) -> str:
+        return f"Evaluation({_summary(self.entrant.name, self.trials, self.success)})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,22 +132,45 @@ class PooledEvaluation:
     @property
     def success_rates(self) -> tuple[float, ...]:
         """Success of each seed."""
-        return tuple(member.success.rate for member in self.members)
+        return tuple(float(member.rollouts.success.mean()) for member in self.members)
+
+    @cached_property
+    def metrics(self) -> dict[str, Estimate]:
+        """Every figure of merit over all seeds; intervals are those of the trials they share."""
+        rollouts = tuple(member.rollouts for member in self.members)
+        return estimate_metrics(Outcomes(rollouts, self.members[0].bounds))
+
+    @property
+    def spread(self) -> dict[str, dict[str, Any]]:
+        """Extremes, standard deviation and values over the seeds, of the metrics that all have."""
+        spread = {}
+        for name in self.metrics:
+            known = [member.metrics[name].value for member in self.members]
+            each = [value for value in known if value is not None]
+            if len(each) == len(known):
+                deviation = float(np.std(each, ddof=1))
+                spread[name] = {"min": min(each), "max": max(each), "std": deviation, "each": each}
+        return spread
 
     def to_json(self) -> dict[str, Any]:
-        """Summary as a dictionary that JSON can hold."""
-        rates = np.array(self.success_rates)
-        medians = np.array([np.median(member.rollouts.distance) for member in self.members])
+        """Figures of merit as a dictionary that JSON can hold."""
         return {
-            **_identity(self.name, self.members[0].entrant, self.task),
+            **_rows_head(self.name, self.members[0].entrant, self.task),
             "members": [member.entrant.name for member in self.members],
             "training_seeds": [member.entrant.seed for member in self.members],
-            **_figures(self.members),
-            "spread": {"success": _spread(rates), "median_final_distance": _spread(medians)},
+            "trials": len(self.members[0].trials),
+            "metrics": _metrics_json(self.metrics),
+            "spread": self.spread,
         }
 
+    def __repr__(self) -> str:
+        success = Estimate.share(np.array([member.rollouts.success for member in self.members]))
+        summary = _summary(self.name, self.members[0].trials, success)
+        return f"PooledEvaluation({len(self.members)} seeds of {summary})"
 
-def _identity(name: str, entrant: Entrant, task: str) -> dict[str, Any]:
+
+def _rows_head(name: str, entrant: Entrant, task: str) -> dict[str, Any]:
+    """What a row of a document is about."""
     return {
         "policy": name,
         "algorithm": entrant.algorithm,
@@ -158,52 +180,13 @@ def _identity(name: str, entrant: Entrant, task: str) -> dict[str, Any]:
     }
 
 
-def _spread(values: NDArray[np.float64]) -> dict[str, Any]:
-    """Extremes and standard deviation over training seeds."""
-    return {
-        "min": float(values.min()),
-        "max": float(values.max()),
-        "std": float(values.std(ddof=1)),
-        "each": values.tolist(),
-    }
+def _metrics_json(metrics: dict[str, Estimate]) -> dict[str, Any]:
+    return {name: estimate.to_json() for name, estimate in metrics.items()}
 
 
-def _figures(evaluations: Sequence[Evaluation]) -> dict[str, Any]:
-    """The figures of merit of one evaluation, or pooled over several on the same trials."""
-    distance = _stacked([evaluation.rollouts.distance for evaluation in evaluations])
-    steps = _stacked([evaluation.rollouts.steps for evaluation in evaluations])
-    success = _stacked([evaluation.rollouts.success for evaluation in evaluations])
-    collision = _stacked([evaluation.rollouts.collision for evaluation in evaluations])
-    return {
-        "trials": distance.shape[-1],
-        "final_distance": DistanceStatistics.of(distance).to_json(),
-        "success": Share.of(success).to_json(),
-        "within": {str(limit): Share.of(distance <= limit).to_json() for limit in WITHIN},
-        "collision": Share.of(collision).to_json(),
-        "steps": {"mean": float(steps.mean()), "median": float(np.median(steps))},
-        "oracle": _beside_oracle(evaluations, float(success.mean())),
-    }
-
-
-def _beside_oracle(evaluations: Sequence[Evaluation], success: float) -> dict[str, Any] | None:
-    """Figures in relation to the bounds of the trials; None if those are not known."""
-    known = [evaluation.bounds for evaluation in evaluations if evaluation.bounds is not None]
-    if len(known) < len(evaluations):
-        return None
-    possible = float(known[0].reachable.mean())
-    ratios = np.concatenate([evaluation.step_ratio for evaluation in evaluations])
-    return {
-        "relative_success": success / possible if possible else None,
-        "step_ratio": {
-            "trials": ratios.size,
-            "median": float(np.median(ratios)) if ratios.size else None,
-            "p95": float(np.percentile(ratios, 95)) if ratios.size else None,
-        },
-    }
-
-
-def _stacked(arrays: list[NDArray[Any]]) -> NDArray[Any]:
-    return np.stack(arrays) if len(arrays) > 1 else arrays[0]
+def _summary(name: str, trials: TrialSet, success: Estimate) -> str:
+    """What faced which trials, and with what success."""
+    return f"{name} on {len(trials)} trials of {trials.simulator.task.name}, success {success}"
 
 
 def evaluate(
@@ -241,9 +224,9 @@ def evaluate(
     InvalidInputError
         If a number is out of range, or no task is given for something untrained.
     PolicyFileError
-        If the policy cannot be read or was trained for another arm.
+        If the policy cannot be read, was trained for another arm, or does not fit this one.
     """
-    entrant = _as_entrant(policy)
+    entrant = _entrant_of(policy)
     task = task or entrant.trained_on
     if task is None:
         raise InvalidInputError(f"{entrant.name!r} was not trained on a task: name one")
@@ -251,7 +234,7 @@ def evaluate(
     return run_trials(entrant, trial_set, allow_other_arm, oracle=oracle)
 
 
-def _as_entrant(policy: str | Path | Policy | Entrant | PolicyFunction) -> Entrant:
+def _entrant_of(policy: str | Path | Policy | Entrant | PolicyFunction) -> Entrant:
     if isinstance(policy, Entrant):
         return policy
     if isinstance(policy, Policy):
@@ -279,10 +262,10 @@ def run_trials(
     Raises
     ------
     PolicyFileError
-        If it was trained for another arm and that is not allowed.
+        If it was trained for another arm and that is not allowed, or its inputs or actions are
+        not those of this arm.
     """
-    if not allow_other_arm:
-        entrant.check_arm(trials.simulator.arm)
+    entrant.check(trials.simulator.arm, allow_other_arm=allow_other_arm)
     bounds = oracle_bounds(trials) if oracle else None
     return Evaluation(entrant, trials, entrant.run(trials), bounds)
 
