@@ -70,7 +70,6 @@ def report_page(document: dict[str, Any], evaluations: Sequence[Evaluation]) -> 
     """
     tasks = group_results(document, evaluations)
     chosen = [worst_trials(task) for task in tasks]
-    arm = evaluations[0].trials.simulator.arm
     recordings = record_worst([worst for each in chosen for worst in each])
     return page_template().render(
         title=_title(tasks),
