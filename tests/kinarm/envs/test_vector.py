@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-from kinarm.env import ReachEnv
+from kinarm.envs.reach import ReachEnv
+from kinarm.envs.vector import ReachVectorEnv
 from kinarm.errors import InvalidInputError, StartInContactError
-from kinarm.vector_env import ReachVectorEnv
 
 NAME = "kinarm/ReachBoth-v0"
 NUMBER = 7

@@ -1,15 +1,14 @@
-"""The compiled kernels: kinematics against Pinocchio, distance bounds against exact distances."""
+"""Compiled lower bounds of distances against exact distances."""
 
 import math
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from kinarm import kernels
+from kinarm.kernels.distance import box_gap, segment_gap
 
 coordinate = st.floats(-2, 2, allow_subnormal=False).map(lambda x: round(x, 9))
 point = st.tuples(coordinate, coordinate, coordinate)
@@ -23,7 +22,7 @@ UNIT = (1.0, 1.0, 1.0)
 def segment_gaps(a, b, c, d):
     gaps = np.empty(len(a))
     for i in range(len(a)):
-        gaps[i] = kernels.segment_gap(
+        gaps[i] = segment_gap(
             (a[i, 0], a[i, 1], a[i, 2]),
             (b[i, 0], b[i, 1], b[i, 2]),
             (c[i, 0], c[i, 1], c[i, 2]),
@@ -36,42 +35,13 @@ def segment_gaps(a, b, c, d):
 def box_gaps(a, b, low, high):
     gaps = np.empty(len(a))
     for i in range(len(a)):
-        gaps[i] = kernels.box_gap(
+        gaps[i] = box_gap(
             (a[i, 0], a[i, 1], a[i, 2]),
             (b[i, 0], b[i, 1], b[i, 2]),
             (low[i, 0], low[i, 1], low[i, 2]),
             (high[i, 0], high[i, 1], high[i, 2]),
         )
     return gaps
-
-
-@njit
-def observe_all(chain, configurations, goals, poses, observations):
-    distances = np.empty(len(goals))
-    for i in range(len(goals)):
-        kernels.forward_kinematics(
-            chain.prismatic,
-            chain.translation,
-            chain.rotation,
-            chain.axis,
-            configurations,
-            i,
-            poses[i],
-        )
-        distances[i] = kernels.observe(chain.tool, poses[i], goals, i, observations)
-    return distances
-
-
-def observe(simulator, configurations, goals):
-    n, n_axes = configurations.shape
-    poses = np.empty((n, n_axes + 1, kernels.POSE))
-    observations = np.empty((n, simulator.n_observations))
-    distances = observe_all(simulator.arm.chain, configurations, goals, poses, observations)
-    return poses, observations, distances
-
-
-def random_configurations(arm, seed, count):
-    return np.random.default_rng(seed).uniform(arm.lower, arm.upper, (count, arm.n_axes))
 
 
 def point_to_segment(p, a, b):
@@ -111,7 +81,7 @@ def box_distances(a, b, low, high):
         return np.linalg.norm(p - np.clip(p, low, high), axis=1)
 
     left, right = np.zeros(len(a)), np.ones(len(a))
-    for _ in range(120):
+    for _ in range(80):
         first, second = left + (right - left) / 3, right - (right - left) / 3
         nearer = distance(first) < distance(second)
         left, right = np.where(nearer, left, first), np.where(nearer, second, right)
@@ -120,82 +90,6 @@ def box_distances(a, b, low, high):
 
 def rows(*points):
     return [np.array([p], dtype=float) for p in points]
-
-
-class TestForwardKinematics:
-    def test_poses_equal_pinocchio(self, any_simulator):
-        arm = any_simulator.arm
-        configurations = random_configurations(arm, 1, 300)
-        poses, _, _ = observe(any_simulator, configurations, np.zeros((300, 3)))
-        data = arm.model.createData()
-        for q, frames in zip(configurations, poses, strict=True):
-            pin.forwardKinematics(arm.model, data, q)
-            for k in range(1, arm.n_axes + 1):
-                rotation = frames[k, 4:13].reshape(3, 3)
-                np.testing.assert_allclose(rotation, data.oMi[k].rotation, rtol=0, atol=1e-12)
-                position = data.oMi[k].translation
-                np.testing.assert_allclose(frames[k, 13:], position, rtol=0, atol=1e-12)
-
-    def test_quaternions_describe_the_same_rotations(self, any_simulator):
-        arm = any_simulator.arm
-        configurations = random_configurations(arm, 2, 100)
-        poses, _, _ = observe(any_simulator, configurations, np.zeros((100, 3)))
-        for w, x, y, z, *rotation in poses[:, 1:, :13].reshape(-1, 13):
-            assert math.isclose(w * w + x * x + y * y + z * z, 1, abs_tol=1e-12)
-            expected = pin.Quaternion(w, x, y, z).matrix().ravel()
-            np.testing.assert_allclose(rotation, expected, rtol=0, atol=1e-12)
-
-    def test_quaternions_have_no_sign_flips_over_the_range_of_any_axis(self, any_simulator):
-        arm = any_simulator.arm
-        for axis in range(arm.n_axes):
-            path = np.tile(random_configurations(arm, 3, 1), (2001, 1))
-            path[:, axis] = np.linspace(arm.lower[axis], arm.upper[axis], 2001)
-            _, observations, _ = observe(any_simulator, path, np.zeros((2001, 3)))
-            quaternions = observations[:, 6 : 6 + 4 * arm.n_axes].reshape(-1, arm.n_axes, 4)
-            turned = np.linalg.norm(np.diff(quaternions, axis=0), axis=2).max()
-            step = (arm.upper[axis] - arm.lower[axis]) / 2000
-            assert turned <= step / 2 + 1e-9
-            if not arm.chain.prismatic[axis]:
-                assert turned > step / 4
-
-    def test_identity_at_zero(self, simulator):
-        _, observations, _ = observe(simulator, np.zeros((1, 6)), np.zeros((1, 3)))
-        quaternions = observations[0, 6:30].reshape(6, 4)
-        np.testing.assert_array_equal(quaternions, np.tile([1, 0, 0, 0], (6, 1)))
-        heights = observations[0, 30:].reshape(6, 3)[:, 2]
-        np.testing.assert_allclose(heights, [0.33, 0.33, 0.63, 0.705, 0.705, 0.705], atol=1e-12)
-
-
-class TestObservation:
-    def test_parts_equal_pinocchio(self, any_simulator):
-        arm = any_simulator.arm
-        n = arm.n_axes
-        configurations = random_configurations(arm, 4, 200)
-        goals = np.random.default_rng(5).normal(size=(200, 3))
-        _, observations, distances = observe(any_simulator, configurations, goals)
-        data = arm.model.createData()
-        for q, goal, seen, distance in zip(
-            configurations, goals, observations, distances, strict=True
-        ):
-            pin.forwardKinematics(arm.model, data, q)
-            tool = arm.tool_position(q)
-            np.testing.assert_array_equal(seen[:3], goal)
-            np.testing.assert_allclose(seen[3:6], goal - tool, rtol=0, atol=1e-12)
-            positions = np.concatenate([data.oMi[k].translation for k in range(1, n + 1)])
-            np.testing.assert_allclose(seen[6 + 4 * n :], positions, rtol=0, atol=1e-12)
-            assert math.isclose(distance, np.linalg.norm(goal - tool), abs_tol=1e-12)
-
-    def test_equals_the_reference(self, any_simulator):
-        from kinarm.reference import ReferenceSimulator
-
-        reference = ReferenceSimulator(any_simulator)
-        configurations = random_configurations(any_simulator.arm, 6, 200)
-        goals = np.random.default_rng(7).normal(size=(200, 3))
-        _, observations, distances = observe(any_simulator, configurations, goals)
-        for i in range(200):
-            seen, distance = reference.observe(configurations[i], goals[i])
-            np.testing.assert_allclose(observations[i], seen, rtol=0, atol=1e-12)
-            assert math.isclose(distances[i], distance, abs_tol=1e-12)
 
 
 class TestSegmentGap:

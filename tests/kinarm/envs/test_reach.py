@@ -12,9 +12,9 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import kinarm
-from kinarm.env import ReachEnv
-from kinarm.errors import InvalidInputError, SceneError, StartInContactError, UnknownNameError
-from kinarm.registration import ENVIRONMENTS
+from kinarm.envs.reach import ReachEnv
+from kinarm.envs.registration import ENVIRONMENTS
+from kinarm.errors import InvalidInputError, ProblemError, StartInContactError, UnknownNameError
 from kinarm.simulator import Simulator
 from kinarm.task import RewardWeights, load_task
 
@@ -228,9 +228,9 @@ class TestSettings:
             ({"task": "up"}, UnknownNameError, "'up'"),
             ({"arm": "nope"}, UnknownNameError, "'nope'"),
             ({"horizon": 0}, InvalidInputError, "horizon"),
-            ({"start_spread": 2}, SceneError, "start_spread"),
+            ({"start_spread": 2}, ProblemError, "start_spread"),
             ({"reward": {"bonus": 1}}, InvalidInputError, "bonus"),
-            ({"reward": {"success": math.nan}}, SceneError, "success must be finite"),
+            ({"reward": {"success": math.nan}}, ProblemError, "success must be finite"),
             ({"render_mode": "human"}, InvalidInputError, "render_mode must be None"),
         ],
     )
