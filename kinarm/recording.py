@@ -95,6 +95,12 @@ class Recording:
                 value.flags.writeable = False
                 object.__setattr__(self, name, value)
 
+    def __repr__(self) -> str:
+        return (
+            f"Recording({self.policy} in trial {self.trial} of {self.problem.name}: "
+            f"{self.outcome} after {self.steps} steps)"
+        )
+
     @property
     def steps(self) -> int:
         """Steps taken, a refused one included."""

@@ -14,7 +14,7 @@ from kinarm.recording import (
     record_rollouts,
     save_recordings,
 )
-from kinarm.scene import Bench, Scene
+from kinarm.scene import Obstacle, Scene
 
 EPISODES = 40
 
@@ -39,6 +39,11 @@ def recordings(simulator, rollouts):
     )
 
 
+def elsewhere(recording: Recording, **changes: object) -> Recording:
+    """A recording as if another problem had been faced."""
+    return replace(recording, problem=recording.problem.replace(**changes))
+
+
 def same(first: Recording, second: Recording) -> bool:
     """Equal to the last bit."""
     for item in fields(Recording):
@@ -53,7 +58,7 @@ def same(first: Recording, second: Recording) -> bool:
 
 def test_ends_are_those_of_the_rollouts(simulator, rollouts, recordings):
     outcomes = {recording.outcome for recording in recordings}
-    assert outcomes == {"collision", "horizon"}
+    assert outcomes == {"collision", "truncated"}
     assert [each.steps for each in recordings] == rollouts.steps.tolist()
     assert [each.final_distance for each in recordings] == rollouts.distance.tolist()
     assert [each.contact for each in recordings] == list(simulator.contact_pairs(rollouts))
@@ -75,14 +80,14 @@ def test_contact_lies_on_both_bodies(simulator, recordings):
     """The refused configuration touches, and the point lies in the bench that is named."""
     collided = [each for each in recordings if each.contact]
     assert collided
+    benches = {obstacle.name: obstacle for obstacle in simulator.scene.obstacles}
     for each in collided:
-        assert simulator.contact_model.in_contact(each.refused[None])[0]
-        assert not simulator.contact_model.in_contact(each.states[-1][None])[0]
+        assert simulator.world.contact_model.in_contact(each.refused[None])[0]
+        assert not simulator.world.contact_model.in_contact(each.states[-1][None])[0]
         assert (each.states[-1] == each.states[-2]).all()
-        if each.contact[1].endswith(" bench"):
-            bench = simulator.scene.bench(each.contact[1].removesuffix(" bench"))
-            assert (each.contact_point > bench.lower - 0.15).all()
-            assert (each.contact_point < bench.upper + 0.15).all()
+        if bench := benches.get(each.contact[1]):
+            assert (each.contact_point > np.array(bench.lower) - 0.15).all()
+            assert (each.contact_point < np.array(bench.upper) + 0.15).all()
 
 
 def test_success_is_recorded(simulator):
@@ -95,7 +100,13 @@ def test_success_is_recorded(simulator):
     (recording,) = record_rollouts(simulator, rollouts, "wave")
     assert recording.outcome == "success"
     assert recording.steps == 10
-    assert recording.final_distance <= recording.tolerance < recording.distances[-2]
+    assert recording.final_distance <= simulator.task.tolerance < recording.distances[-2]
+
+
+def test_it_is_shown_in_a_line(recordings):
+    steps = recordings[0].steps
+    expected = f"Recording(random in trial 0 of both: collision after {steps} steps)"
+    assert repr(recordings[0]) == expected
 
 
 def test_some_numbers_only(simulator, rollouts, recordings):
@@ -126,8 +137,9 @@ def test_several_survive_a_file(recordings, tmp_path):
 
 
 def test_one_survives_a_file(recordings, tmp_path):
-    scene = Scene(benches=(Bench(name="desk", x=(0, 1), y=(-1, 1), height=0.4),), ground=False)
-    recording = replace(recordings[0], scene=scene)
+    desk = Obstacle(name="desk", lower=(0, -1, 0), upper=(1, 1, 0.4))
+    scene = Scene(obstacles=(desk,), ground=False)
+    recording = elsewhere(recordings[0], scene=scene, tolerance=0.03, time_step=0.01)
     recording.save(tmp_path / "made.npz")
     assert same(recording, Recording.load(tmp_path / "made.npz"))
 
@@ -147,10 +159,9 @@ def test_arrays_are_copied_and_read_only(recordings):
         recording.states[0] = 0
 
 
-def test_another_arm(recordings, shipped_arms):
-    recordings[0].check_arm(shipped_arms["paper"])
-    with pytest.raises(InvalidInputError, match="trial 0 is of arm 'paper'.* not of 'paper_flange"):
-        recordings[0].check_arm(shipped_arms["paper_flange"])
+def test_the_problem_names_the_very_arm(simulator, recordings):
+    assert recordings[0].problem.arm.digest == simulator.arm.digest
+    assert recordings[0].problem.first_difference(simulator.problem) is None
 
 
 @pytest.mark.parametrize(
@@ -158,9 +169,6 @@ def test_another_arm(recordings, shipped_arms):
     [
         ({"outcome": "lost"}, "outcome must be one of"),
         ({"trial": -1}, "trial"),
-        ({"horizon": 3}, "horizon of 3"),
-        ({"tolerance": 0.0}, "tolerance"),
-        ({"time_step": float("nan")}, "time_step"),
         ({"states": np.zeros((0, 6))}, "states"),
         ({"distances": np.zeros(2)}, "distances"),
         ({"goal": [0, np.nan, 0]}, "finite"),
@@ -170,6 +178,11 @@ def test_another_arm(recordings, shipped_arms):
 def test_nonsense_is_refused(recordings, change, words):
     with pytest.raises(InvalidInputError, match=words):
         replace(recordings[0], **change)
+
+
+def test_more_states_than_steps(recordings):
+    with pytest.raises(InvalidInputError, match="horizon of 3"):
+        elsewhere(recordings[0], horizon=3)
 
 
 def test_missing_file(tmp_path):
@@ -207,8 +220,8 @@ def test_a_later_version(recordings, tmp_path):
     path = tmp_path / "made.npz"
     recordings[0].save(path)
     content = dict(np.load(path))
-    np.savez(path, **{**content, "version": np.array(2)})
-    with pytest.raises(RecordingFileError, match="format version 2"):
+    np.savez(path, **{**content, "version": np.array(3)})
+    with pytest.raises(RecordingFileError, match="format version 3"):
         load_recordings(path)
 
 
@@ -216,13 +229,17 @@ def test_missing_entries(recordings, tmp_path):
     path = tmp_path / "made.npz"
     recordings[0].save(path)
     content = dict(np.load(path))
-    entries = json.loads(str(content["recordings"]))
-    del entries[0]["task"]
-    np.savez(path, **{**content, "recordings": np.array(json.dumps(entries))})
+    header = json.loads(str(content["header"]))
+    del header["recordings"][0]["policy"]
+    np.savez(path, **{**content, "header": np.array(json.dumps(header))})
+    with pytest.raises(RecordingFileError, match="policy"):
+        load_recordings(path)
+    del header["problems"][0]["task"]
+    np.savez(path, **{**content, "header": np.array(json.dumps(header))})
     with pytest.raises(RecordingFileError, match="task"):
         load_recordings(path)
-    np.savez(path, **{**content, "recordings": np.array("[1]")})
-    with pytest.raises(RecordingFileError, match="not a complete recording"):
+    np.savez(path, **{**content, "header": np.array("[1]")})
+    with pytest.raises(RecordingFileError, match="not a complete kinarm recording"):
         load_recordings(path)
     del content["states_0"]
     np.savez(path, **content)

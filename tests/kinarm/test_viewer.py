@@ -13,8 +13,9 @@ import pytest
 import umsgpack
 
 import kinarm
-from kinarm.errors import InvalidInputError, OutputError
+from kinarm.errors import ArmError, InvalidInputError, OutputError
 from kinarm.recording import record_rollouts
+from kinarm.scene import Obstacle, Scene
 from kinarm.viewer import replay_page
 from kinarm.viewer.arm_shapes import arm_parts
 from kinarm.viewer.meshes import Mesh, box, capsule, cylinder, housing, lathe, tube
@@ -32,6 +33,11 @@ def waving(simulator, count=3, seed=0):
 @pytest.fixture(scope="module")
 def recordings(simulator):
     return waving(simulator)
+
+
+def elsewhere(recording, **changes):
+    """A recording as if another problem had been faced."""
+    return replace(recording, problem=recording.problem.replace(**changes))
 
 
 def unpacked(page, name):
@@ -78,10 +84,34 @@ def test_states_are_there_to_the_last_bit(recordings, simulator):
 
 def test_the_scene_is_drawn(recordings):
     paths = [command["path"] for command in commands(replay_page(recordings))]
-    for wanted in ("floor", "grid", "benches/right/top", "benches/left/body", "goal/cube", "flash"):
+    for wanted in ("floor", "grid", "obstacles/0/top", "obstacles/1/body", "goal/cube", "flash"):
         assert f"/meshcat/{wanted}" in paths
     assert {f"/meshcat/trials/{number}/run" for number in range(3)} <= set(paths)
     assert "/meshcat/trials/0/ghost" not in paths
+
+
+def test_obstacles_need_no_goals(recordings):
+    """Where goals lie on one, a slab covers it; a post is a box alone."""
+    post = Obstacle(name="post", lower=(0.3, 0.2, 0.1), upper=(0.35, 0.25, 0.6))
+    scene = Scene(obstacles=(post, *Scene().obstacles[:1]))
+    page = replay_page(elsewhere(recordings[0], scene=scene))
+    paths = {command["path"] for command in commands(page)}
+    assert {path for path in paths if "obstacles" in path} == {
+        "/meshcat/obstacles/0/body",
+        "/meshcat/obstacles/1/body",
+        "/meshcat/obstacles/1/top",
+    }
+    bare = Scene(obstacles=(), ground=False)
+    page = replay_page(elsewhere(recordings[0], scene=bare))
+    paths = {command["path"] for command in commands(page)}
+    assert not any("obstacles" in path or "floor" in path for path in paths)
+
+
+def test_an_arm_that_has_changed(recordings):
+    problem = recordings[0].problem
+    other = replace(problem, arm=replace(problem.arm, source="paper_flange"))
+    with pytest.raises(ArmError, match="'paper_flange' is another version"):
+        replay_page(replace(recordings[0], problem=other))
 
 
 def test_ids_are_not_random(recordings):
@@ -105,7 +135,7 @@ def test_names_are_escaped(recordings):
 def test_a_single_state(recordings):
     first = recordings[0]
     still = replace(first, states=first.states[:1], distances=first.distances[:1])
-    replay_page(replace(still, outcome="horizon", contact=None, contact_point=None, refused=None))
+    replay_page(replace(still, outcome="truncated", contact=None, contact_point=None, refused=None))
 
 
 def test_a_notebook_shows_it(recordings):
@@ -131,12 +161,10 @@ def test_it_cannot_be_written(recordings, tmp_path):
 def test_what_cannot_share_a_page(recordings, simulator, simulators):
     with pytest.raises(InvalidInputError, match="no recording"):
         replay_page([])
-    with pytest.raises(InvalidInputError, match="not of 'paper_flange'"):
-        replay_page(recordings, arm="paper_flange")
-    with pytest.raises(InvalidInputError, match="of arm 'paper_flange'"):
+    with pytest.raises(InvalidInputError, match="different arms: 'paper' .* 'paper_flange'"):
         replay_page([*recordings, *waving(simulators["paper_flange"])])
     with pytest.raises(InvalidInputError, match="different scenes"):
-        replay_page([recordings[0], replace(recordings[1], scene=kinarm.Scene(ground=False))])
+        replay_page([recordings[0], elsewhere(recordings[1], scene=Scene(ground=False))])
     with pytest.raises(InvalidInputError, match="2 for 3"):
         replay_page(recordings, ghosts=recordings[:2])
     with pytest.raises(InvalidInputError, match="cannot be compared"):
@@ -146,7 +174,7 @@ def test_what_cannot_share_a_page(recordings, simulator, simulators):
 @pytest.mark.parametrize("name", ["paper", "paper_flange", "lrmate200ic_5l", "sliding", "mesh"])
 def test_any_arm_can_be_drawn(simulators, name):
     simulator = simulators[name]
-    page = replay_page(waving(simulator), arm=simulator.arm)
+    page = replay_page(waving(simulator))
     drawn = [command for command in commands(page) if command["type"] == "set_object"]
     assert sum("/arm/" in command["path"] for command in drawn) >= 4
     assert {part.joint for part in arm_parts(simulator.arm)} <= set(range(simulator.arm.n_axes + 1))
