@@ -265,7 +265,9 @@ def measure_evaluation() -> dict[str, float]:
     """
     from kinarm.evaluation.bounds import CACHE_VARIABLE
 
-    code = "from kinarm.evaluation.eval import main; main(['--trials', '200', '--json'])"
+    code = (
+        "from kinarm.evaluation.commands.evaluate import main; main(['--trials', '200', '--json'])"
+    )
     seconds = []
     with tempfile.TemporaryDirectory() as folder:
         for _ in range(2):

@@ -122,8 +122,9 @@ def _add_option(
         parser.add_argument(flag, action=action, **options)
         return
     if get_origin(hint) is tuple:
-        hint = get_args(hint)[0]
-        options |= {"action": "append"} if item.metadata.get("repeat") else {"nargs": "+"}
+        hint, *others = get_args(hint)
+        count = "+" if Ellipsis in others else 1 + len(others)
+        options |= {"action": "append"} if item.metadata.get("repeat") else {"nargs": count}
     options["metavar"] = item.metadata.get("metavar") or METAVARS.get(hint, "NAME")
     if get_origin(hint) is Literal:
         options["choices"] = get_args(hint)

@@ -1,4 +1,4 @@
-"""Learners, policies and the oracle."""
+"""Policies and the learners that train them."""
 
 import lazy_loader
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from kinarm.errors import InvalidInputError
-from kinarm.evaluation.plots import save_figure
+from kinarm.evaluation.figures import save_figure
 from kinarm.evaluation.reproduction.claims import Claim, assess
 from kinarm.evaluation.reproduction.figures import figure_2, figure_3, learning_curves
 from kinarm.evaluation.reproduction.outcome import OutcomeStore
