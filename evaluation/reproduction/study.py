@@ -21,8 +21,8 @@ SWEEP_PERTURBATIONS = (16, 24, 32)
 SWEEP_ITERATIONS = 300
 """Nine settings that the paper tried on task 1 before it chose those of Table 1 (section 3.3)."""
 
-WITHIN = 0.2
-"""Distance by which the paper judges its policies (section 4) [m]."""
+NEAR = 0.2
+"""Distance within which the paper calls a trial near its goal (section 4) [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,6 +150,13 @@ class Study:
     name: str
     trainings: tuple[Training, ...]
     protocol: Protocol
+
+    @property
+    def warning(self) -> str:
+        """What to say beside its verdicts; empty if they can be trusted."""
+        if self.name == "full":
+            return ""
+        return "A smoke version: nothing was trained to the end, and no verdict means anything."
 
     def readings(self, purpose: Purpose = "ars") -> tuple[Reading, ...]:
         """Readings under which there are trainings for a purpose."""

@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import pytest
 
-from kinarm.evaluation import bench, eval, replay, reproduce  # noqa: A004
+from kinarm.evaluation import eval, replay  # noqa: A004
+from kinarm.evaluation.commands import bench, reproduce
 from kinarm.policies import Policy, ars_recipe, train, train_ars
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -17,8 +18,8 @@ MODULES = {
     "kinarm-eval": "kinarm.evaluation.eval",
     "kinarm-replay": "kinarm.evaluation.replay",
     "kinarm-train": "kinarm.policies.train",
-    "kinarm-bench": "kinarm.evaluation.bench",
-    "kinarm-reproduce": "kinarm.evaluation.reproduce",
+    "kinarm-bench": "kinarm.evaluation.commands.bench",
+    "kinarm-reproduce": "kinarm.evaluation.commands.reproduce",
 }
 MAINS = {
     "kinarm-eval": eval.main,

@@ -4,7 +4,8 @@ import json
 
 import pytest
 
-from kinarm.evaluation import bench, measurements
+from kinarm.evaluation import measurements
+from kinarm.evaluation.commands import bench
 from kinarm.policies import recipes
 
 

@@ -4,6 +4,7 @@ import argparse
 import json
 import sys
 from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,8 +15,8 @@ from kinarm.parallel import available_threads
 
 if TYPE_CHECKING:
     from kinarm.evaluation.reproduction.claims import Claim
-    from kinarm.evaluation.reproduction.outcome import OutcomeStore
     from kinarm.evaluation.reproduction.results import Results
+    from kinarm.evaluation.reproduction.runs import RunStore
     from kinarm.evaluation.reproduction.study import Study
 
 PROG = "kinarm-reproduce"
@@ -71,8 +72,8 @@ def _reproduce(options: argparse.Namespace, command: str) -> None:
     from rich.console import Console
 
     from kinarm.evaluation.reproduction.document import write_all
-    from kinarm.evaluation.reproduction.outcome import OutcomeStore
     from kinarm.evaluation.reproduction.results import Results
+    from kinarm.evaluation.reproduction.runs import RunStore
     from kinarm.evaluation.reproduction.study import full_study, quick_study
     from kinarm.policies.ppo import require_ppo
 
@@ -82,7 +83,7 @@ def _reproduce(options: argparse.Namespace, command: str) -> None:
     folder = options.out or Path("reproduction-quick" if options.quick else "reproduction")
     check_folder(folder, create=True)
     _claim_folder(folder, study)
-    store = OutcomeStore(folder, study.protocol)
+    store = RunStore(folder, study.protocol)
     results = Results.load(study, store)
     try:
         if results.missing:
@@ -94,6 +95,8 @@ def _reproduce(options: argparse.Namespace, command: str) -> None:
             "interrupted; what is finished is kept, and the same command goes on"
         ) from None
     _print(claims)
+    if study.warning:
+        sys.stdout.write(f"{study.warning}\n")
     sys.stdout.write(f"written: {folder / 'REPRODUCTION.md'}, with tables and figures beside it\n")
 
 
@@ -128,21 +131,26 @@ def _claim_folder(folder: Path, study: "Study") -> None:
     write_text(marker, json.dumps({"study": study.name}))
 
 
-def _train(results: "Results", store: "OutcomeStore", jobs: int) -> "Results":
-    """Carry out what is missing, and read all outcomes anew."""
+def _train(results: "Results", store: "RunStore", jobs: int) -> "Results":
+    """Carry out what is missing, the longest first, and read all runs anew."""
     from rich.console import Console
 
+    from kinarm.evaluation.reproduction.executor import LocalExecutor
     from kinarm.evaluation.reproduction.progress import StudyProgress
     from kinarm.evaluation.reproduction.results import Results
-    from kinarm.evaluation.reproduction.workers import carry_out_all
+    from kinarm.evaluation.reproduction.training import carry_out
 
-    study, missing = results.study, results.missing
+    study = results.study
+    missing = sorted(results.missing, key=lambda training: -training.cost)
     console = Console(stderr=True, highlight=False)
-    if results.outcomes:
-        console.print(f"{len(results.outcomes)} of {len(study.trainings)} trainings are finished")
+    if results.runs:
+        console.print(f"{len(results.runs)} of {len(study.trainings)} trainings are finished")
     jobs = min(jobs, len(missing))
-    with StudyProgress(study, missing, console) as progress:
-        carry_out_all(missing, study.protocol, store.folder, jobs, progress)
+    threads = max(1, available_threads() // jobs)
+    work = partial(carry_out, protocol=study.protocol, folder=store.folder, threads=threads)
+    with StudyProgress(study, missing, jobs, console) as progress:
+        for training in LocalExecutor(jobs, threads).carry_out(work, missing):
+            progress.finished(training)
     return Results.load(study, store)
 
 

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.arm import DEFAULT_ARM, Arm
-from kinarm.evaluation.reproduction.outcome import Outcome, OutcomeStore
-from kinarm.evaluation.reproduction.study import Protocol, Reading, Training
+from kinarm.evaluation.entrants import BASELINES
+from kinarm.evaluation.reproduction.runs import RunStore, TrainedRun
+from kinarm.evaluation.reproduction.study import LITERAL, Protocol, Reading, Training
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.ars import ARSState, state_policy, train_ars
 from kinarm.policies.ars_config import ARSConfig
@@ -25,7 +26,11 @@ from kinarm.task import load_task
 
 @cache
 def trial_set(task: str, start_spread: float, trials: int, seed: int) -> TrialSet:
-    """Trials of a task with the starts of a reading, drawn once in a process."""
+    """Trials of a task with the starts of a reading, drawn once in a process.
+
+    Those of one spread and seed are crossed: trial by trial, all tasks have the same start, and
+    goals at the same place of the left or of the right bench.
+    """
     simulator = Simulator(DEFAULT_ARM, load_task(task, start_spread=start_spread))
     return TrialSet.draw(simulator, trials, seed)
 
@@ -79,8 +84,9 @@ def carry_out(training: Training, protocol: Protocol, folder: Path, threads: int
     folder : Path
         The output folder of the reproduction.
     threads : int
-        Threads of the simulator in ARS; the outcome does not depend on it.
+        Threads of the simulator in ARS; the result does not depend on it.
     """
+    _load_kernels()
     config, reading = training.config, training.reading
     iterations = np.linspace(0, config.iterations, protocol.snapshots + 1)[1:].round() - 1
     taker = SnapshotTaker(
@@ -96,7 +102,7 @@ def carry_out(training: Training, protocol: Protocol, folder: Path, threads: int
         policy, curve, _ = train_ppo(config, on_iteration=taker)
     trials = final_trials(config.task, reading, protocol)
     rollouts = trials.simulator.rollout(policy, trials.starts, trials.goals)
-    outcome = Outcome(
+    run = TrainedRun(
         returns=np.array([point.mean_return for point in curve]),
         environment_steps=np.array([point.environment_steps for point in curve]),
         wall_time=np.array(taker.wall_time),
@@ -106,7 +112,13 @@ def carry_out(training: Training, protocol: Protocol, folder: Path, threads: int
         collision=rollouts.collision,
         steps=rollouts.steps,
     )
-    OutcomeStore(folder, protocol).save(training, policy, outcome)
+    RunStore(folder, protocol).save(training, policy, run)
+
+
+@cache
+def _load_kernels() -> None:
+    """Load what is compiled once in a process, before any clock runs."""
+    BASELINES["zero"].run(final_trials("left", LITERAL, Protocol(trials=1)))
 
 
 def _policy_of(training: Training) -> Callable[[Any], Policy]:
