@@ -4,11 +4,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinarm._exports import lazy_exports
-from kinarm.registration import register_environments
+from kinarm.envs.registration import register_environments
 
 if TYPE_CHECKING:
-    from kinarm.arm import Arm, arm_names
-    from kinarm.env import ReachEnv
+    from kinarm.arm import Arm, ArmSpecification, arm_names
+    from kinarm.envs import ReachEnv, ReachVectorEnv
     from kinarm.errors import (
         ArmError,
         InvalidInputError,
@@ -16,37 +16,44 @@ if TYPE_CHECKING:
         MissingExtraError,
         OutputError,
         PolicyFileError,
+        ProblemError,
         RecordingFileError,
-        SceneError,
         StartInContactError,
         UnknownNameError,
         WorkerError,
     )
-    from kinarm.networks import CompiledPolicy, Networks
+    from kinarm.networks import CompiledPolicy, Mirror, Networks
+    from kinarm.problem import PROBLEMS, ReachProblem, Stepping
     from kinarm.reference import ReferenceSimulator
     from kinarm.replay import Replay
     from kinarm.rollouts import Rollouts
-    from kinarm.scene import Bench, Scene
+    from kinarm.scene import GoalRegion, Obstacle, Scene
     from kinarm.simulator import Simulator, StepResult
-    from kinarm.task import TASKS, ReachTask, RewardWeights, load_task
+    from kinarm.task import REWARD_TERMS, ReachTask, RewardWeights
     from kinarm.trajectory import Recording, load_recordings, save_recordings
-    from kinarm.vector_env import ReachVectorEnv
+    from kinarm.world import World
 
 __version__ = "0.1.0"
 
 __all__ = [
-    "TASKS",
+    "PROBLEMS",
+    "REWARD_TERMS",
     "Arm",
     "ArmError",
-    "Bench",
+    "ArmSpecification",
     "CompiledPolicy",
+    "GoalRegion",
     "InvalidInputError",
     "KinarmError",
+    "Mirror",
     "MissingExtraError",
     "Networks",
+    "Obstacle",
     "OutputError",
     "PolicyFileError",
+    "ProblemError",
     "ReachEnv",
+    "ReachProblem",
     "ReachTask",
     "ReachVectorEnv",
     "Recording",
@@ -56,16 +63,16 @@ __all__ = [
     "RewardWeights",
     "Rollouts",
     "Scene",
-    "SceneError",
     "Simulator",
     "StartInContactError",
     "StepResult",
+    "Stepping",
     "UnknownNameError",
     "WorkerError",
+    "World",
     "__version__",
     "arm_names",
     "load_recordings",
-    "load_task",
     "save_recordings",
 ]
 
@@ -77,8 +84,8 @@ def __dir__() -> list[str]:
 __getattr__ = lazy_exports(
     __name__,
     {
-        "arm": ("Arm", "arm_names"),
-        "env": ("ReachEnv",),
+        "arm": ("Arm", "ArmSpecification", "arm_names"),
+        "envs": ("ReachEnv", "ReachVectorEnv"),
         "errors": (
             "ArmError",
             "InvalidInputError",
@@ -87,20 +94,21 @@ __getattr__ = lazy_exports(
             "OutputError",
             "PolicyFileError",
             "RecordingFileError",
-            "SceneError",
+            "ProblemError",
             "StartInContactError",
             "UnknownNameError",
             "WorkerError",
         ),
-        "networks": ("CompiledPolicy", "Networks"),
+        "networks": ("CompiledPolicy", "Mirror", "Networks"),
+        "problem": ("PROBLEMS", "ReachProblem", "Stepping"),
         "reference": ("ReferenceSimulator",),
         "replay": ("Replay",),
         "rollouts": ("Rollouts",),
-        "scene": ("Bench", "Scene"),
+        "scene": ("GoalRegion", "Obstacle", "Scene"),
         "simulator": ("Simulator", "StepResult"),
-        "task": ("TASKS", "ReachTask", "RewardWeights", "load_task"),
+        "task": ("REWARD_TERMS", "ReachTask", "RewardWeights"),
         "trajectory": ("Recording", "load_recordings", "save_recordings"),
-        "vector_env": ("ReachVectorEnv",),
+        "world": ("World",),
     },
 )
 

@@ -1,11 +1,11 @@
 """Robot arms: a Pinocchio model with tool, limits, rated speeds and collision shapes."""
 
 import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import coal
@@ -13,19 +13,63 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from kinarm._validation import finite_array
 from kinarm.chain import Chain
 from kinarm.errors import ArmError, UnknownNameError
 from kinarm.motion_bounds import link_lengths
-from kinarm.validation import finite_array
 
 DEFAULT_ARM = "paper"
-TOOL_FRAME = "tool0"
 
 
 def arm_names() -> tuple[str, ...]:
     """Names of the arms that ship with kinarm."""
     folder = resources.files("kinarm.data") / "arms"
     return tuple(sorted(Path(f.name).stem for f in folder.iterdir() if f.name.endswith(".urdf")))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmSpecification:
+    """Which arm, and what of it the simulator is to use.
+
+    Parameters
+    ----------
+    source : str
+        Name of a shipped arm, or path of a URDF.
+    tool_frame : str
+        Link (frame) whose origin is the tool point.
+    package_dirs : tuple of str
+        Folders that hold the packages which ``package://`` mesh names refer to.
+    actuated : tuple of str
+        Names of the joints that actions move, from the base on; by default all but the trailing
+        ones that cannot move the tool point. The others stay at home.
+    home : tuple of float
+        Reference configuration; zero, clipped to the limits, by default [rad or m].
+    velocity_limits : tuple of float
+        Limits to use instead of the URDF's [rad/s or m/s].
+    digest : str
+        Hash that the arm must have; see `Arm.digest`.
+    """
+
+    source: str = "paper"
+    tool_frame: str = "tool0"
+    package_dirs: tuple[str, ...] = ()
+    actuated: tuple[str, ...] | None = None
+    home: tuple[float, ...] | None = None
+    velocity_limits: tuple[float, ...] | None = None
+    digest: str | None = None
+
+    def resolved(self, folder: Path) -> "ArmSpecification":
+        """The same arm with absolute paths; relative ones start at a folder."""
+        source = self.source
+        if source not in arm_names() and (folder / source).is_file():
+            source = str((folder / source).resolve())
+        folders = tuple(str((folder / each).resolve()) for each in self.package_dirs)
+        return replace(self, source=source, package_dirs=folders)
+
+    @property
+    def name(self) -> str:
+        """Name of the arm: that of a shipped one, or of the file without its ending."""
+        return self.source if self.source in arm_names() else Path(self.source).stem
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,16 +80,14 @@ class Arm:
 
     Attributes
     ----------
-    name : str
-        Name of the arm: that of a shipped one, or of the file without its ending.
+    specification : ArmSpecification
+        What it was made of.
     urdf_path : Path
         The file that it was read from.
     model : pinocchio.Model
         Kinematics.
     geometry : pinocchio.GeometryModel
         Collision shapes: primitives, or convex hulls of meshes; no collision pairs.
-    tool_frame : str
-        Frame whose origin is the tool point.
     n_actuated : int
         Axes that actions move: the first ``n_actuated`` ones; the others stay at `home`.
     home : ndarray, shape (n_axes,)
@@ -54,71 +96,69 @@ class Arm:
         The kinematics as flat arrays, for the compiled simulator.
     """
 
-    name: str
+    specification: ArmSpecification
     urdf_path: Path
     model: pin.Model
     geometry: pin.GeometryModel
-    tool_frame: str
     n_actuated: int
     home: NDArray[np.float64]
     chain: Chain
 
     @classmethod
-    def load(
-        cls,
-        name_or_urdf: str | Path = DEFAULT_ARM,
-        *,
-        tool_frame: str = TOOL_FRAME,
-        n_actuated: int | None = None,
-        home: ArrayLike | None = None,
-        package_dirs: Sequence[str | Path] = (),
-    ) -> "Arm":
+    def load(cls, arm: "ArmSpecification | str | Path" = DEFAULT_ARM, **changes: Any) -> "Arm":
         """Load a shipped arm by name, or any supported arm from a URDF file.
 
         Parameters
         ----------
-        name_or_urdf : str or Path
-            ``"paper"``, ``"paper_flange"``, ``"lrmate200ic_5l"``, or the path of a URDF.
-        tool_frame : str
-            Link (frame) whose origin is the tool point.
-        n_actuated : int, optional
-            How many axes, counted from the base, actions move. By default all but the trailing
-            axes that cannot move the tool point: the paper holds axis 6 for that reason.
-        home : array_like, shape (n_axes,), optional
-            Reference configuration; zero, clipped to the limits, by default.
-        package_dirs : sequence of paths
-            Folders that hold the packages which ``package://`` mesh names refer to.
+        arm : ArmSpecification, str or Path
+            ``"paper"``, ``"paper_flange"``, ``"lrmate200ic_5l"``, the path of a URDF, or a
+            specification.
+        **changes
+            Fields of `ArmSpecification` to replace.
 
         Raises
         ------
         UnknownNameError
             If neither an arm nor a file of that name exists.
         ArmError
-            If the file is malformed or the robot is not a fixed-base serial chain of limited
-            revolute and prismatic joints with rated speeds and a tool frame.
+            If the file is malformed, the robot is not a fixed-base serial chain of limited
+            revolute and prismatic joints with velocity limits and a tool frame, or it does not
+            fit the specification.
         """
-        path, name = _find_urdf(name_or_urdf)
-        model, geometry = _read_urdf(path, [str(folder) for folder in package_dirs])
-        tool_id = _check_supported(model, path, tool_frame)
+        if not isinstance(arm, ArmSpecification):
+            arm = ArmSpecification(source=str(arm))
+        specification = replace(arm, **changes).resolved(Path())
+        path = _find_urdf(specification.source)
+        model, geometry = _read_urdf(path, list(specification.package_dirs))
+        tool_id = _check_supported(model, path, specification.tool_frame)
+        if specification.velocity_limits is not None:
+            model.velocityLimit = _velocity_limits(specification.velocity_limits, model, path)
         chain = Chain.from_model(model, tool_id)
-        if n_actuated is None:
-            n_actuated = chain.n_axes - _trailing_idle_axes(model, chain)
-            if n_actuated == 0:
-                raise ArmError(f"no axis of {path.name} moves the tool frame {tool_frame!r}")
-        if n_actuated not in range(1, chain.n_axes + 1) or not isinstance(n_actuated, int):
-            raise ArmError(
-                f"n_actuated must be a whole number in 1..{chain.n_axes}, got {n_actuated}"
-            )
-        return cls(
-            name=name or path.stem,
+        loaded = cls(
+            specification=specification,
             urdf_path=path,
             model=model,
             geometry=geometry,
-            tool_frame=tool_frame,
-            n_actuated=n_actuated,
-            home=_home(home, chain),
+            n_actuated=_n_actuated(specification, model, chain, path),
+            home=_home(specification.home, chain),
             chain=chain,
         )
+        if specification.digest not in (None, loaded.digest):
+            raise ArmError(
+                f"arm {loaded.name!r} is another version ({loaded.digest}) than the one that was "
+                f"used ({specification.digest})"
+            )
+        return loaded
+
+    @property
+    def name(self) -> str:
+        """Name of the arm: that of a shipped one, or of the file without its ending."""
+        return self.specification.name
+
+    @property
+    def tool_frame(self) -> str:
+        """Frame whose origin is the tool point."""
+        return self.specification.tool_frame
 
     @property
     def n_axes(self) -> int:
@@ -191,19 +231,19 @@ class Arm:
         return f"Arm({self.name!r}, {self.n_axes} axes, {self.n_actuated} actuated)"
 
 
-def _find_urdf(name_or_urdf: str | Path) -> tuple[Path, str | None]:
-    """Resolve a name or path to a file, and the shipped arm's name if it is one."""
-    if isinstance(name_or_urdf, str) and name_or_urdf in arm_names():
+def _find_urdf(source: str) -> Path:
+    """Resolve a name or path to a file."""
+    if source in arm_names():
         with resources.as_file(resources.files("kinarm.data") / "arms") as folder:
-            return folder / f"{name_or_urdf}.urdf", name_or_urdf
-    path = Path(name_or_urdf)
+            return folder / f"{source}.urdf"
+    path = Path(source)
     if path.is_file():
-        return path.resolve(), None
+        return path.resolve()
     if path.is_dir():
-        raise ArmError(f"{str(path)!r} is a folder, not a URDF")
+        raise ArmError(f"{source!r} is a folder, not a URDF")
     if path.suffix == ".urdf" or path.parent != Path():
-        raise ArmError(f"URDF {str(path)!r} does not exist")
-    raise UnknownNameError("arm", str(name_or_urdf), (*arm_names(), "path/to/robot.urdf"))
+        raise ArmError(f"URDF {source!r} does not exist")
+    raise UnknownNameError("arm", source, (*arm_names(), "path/to/robot.urdf"))
 
 
 def _read_urdf(path: Path, package_dirs: list[str]) -> tuple[pin.Model, pin.GeometryModel]:
@@ -308,6 +348,32 @@ def _trailing_idle_axes(model: pin.Model, chain: Chain) -> int:
             return idle
         point = model.jointPlacements[joint + 1].act(point)
     return chain.n_axes
+
+
+def _n_actuated(specification: ArmSpecification, model: pin.Model, chain: Chain, path: Path) -> int:
+    """How many joints actions move: those named, which come first, or all that move the tool."""
+    names, named = list(model.names)[1:], specification.actuated
+    if named is None:
+        n_actuated = chain.n_axes - _trailing_idle_axes(model, chain)
+        if n_actuated == 0:
+            raise ArmError(
+                f"no joint of {path.name} moves the tool frame {specification.tool_frame!r}"
+            )
+        return n_actuated
+    if not named or list(named) != names[: len(named)]:
+        raise ArmError(
+            f"actuated must name the first joints of {path.name} in their order, "
+            f"{', '.join(names)}; got {', '.join(named) or 'none'}"
+        )
+    return len(named)
+
+
+def _velocity_limits(given: tuple[float, ...], model: pin.Model, path: Path) -> NDArray[np.float64]:
+    """Check velocity limits that replace those of the URDF."""
+    limits = finite_array("velocity_limits", given, (model.nv,))
+    if (limits <= 0).any():
+        raise ArmError(f"velocity_limits of {path.name} must be greater than 0, got {list(given)}")
+    return limits
 
 
 def _home(home: ArrayLike | None, chain: Chain) -> NDArray[np.float64]:

@@ -40,7 +40,7 @@ class ContactShapes(NamedTuple):
         The capsule that is or encloses the shape: its end points (3 + 3) in the joint frame and
         its radius [m].
     boxes : ndarray, shape (n_boxes, 2, 3)
-        Lower and upper corners of the benches [m].
+        Lower and upper corners of the obstacles [m].
     pairs : ndarray of int, shape (n_pairs, 3)
         Kind of the pair, index of a shape, and index of the other shape or box.
     travel : ndarray, shape (n_actuated, n_pairs)
@@ -113,7 +113,7 @@ class ContactModel:
         geometry = arm.geometry.copy()
         n_shapes = geometry.ngeoms
         obstacles = _add_scene(geometry, scene)
-        candidates = _candidate_pairs(geometry, n_shapes, len(scene.benches))
+        candidates = _candidate_pairs(geometry, n_shapes, len(scene.obstacles))
         geometry.removeAllCollisionPairs()
         for first, second, _ in candidates:
             geometry.addCollisionPair(pin.CollisionPair(first, second))
@@ -221,12 +221,12 @@ def make_verdicts_reliable(data: pin.GeometryData) -> pin.GeometryData:
 
 
 def _add_scene(geometry: pin.GeometryModel, scene: Scene) -> tuple[str, ...]:
-    """Add benches, then the ground, to a geometry model; return their names."""
+    """Add obstacles, then the ground, to a geometry model; return their names."""
     names = []
-    for bench in scene.benches:
-        placement = pin.SE3(np.eye(3), (bench.lower + bench.upper) / 2)
-        box = coal.Box(*(bench.upper - bench.lower))
-        names.append(f"{bench.name} bench")
+    for obstacle in scene.obstacles:
+        placement = pin.SE3(np.eye(3), obstacle.centre)
+        box = coal.Box(*obstacle.size)
+        names.append(obstacle.name)
         geometry.addGeometryObject(pin.GeometryObject(names[-1], 0, placement, box))
     if scene.ground:
         names.append("ground")
@@ -323,7 +323,7 @@ def _contact_shapes(
     arrays = ContactShapes(
         link=link,
         capsules=np.array([np.hstack(capsule) for capsule in capsules]).reshape(-1, 7),
-        boxes=np.array([(bench.lower, bench.upper) for bench in scene.benches]).reshape(-1, 2, 3),
+        boxes=np.array([(each.lower, each.upper) for each in scene.obstacles]).reshape(-1, 2, 3),
         pairs=np.array(rows, dtype=np.int64).reshape(-1, 3),
         travel=travel,
         exact=np.array([_is_capsule(shape) for shape in objects], dtype=bool),

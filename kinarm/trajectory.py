@@ -9,13 +9,13 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm._files import CORRUPT, first_line, open_archive, write_atomically
+from kinarm._validation import finite_array, whole_number
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, RecordingFileError
-from kinarm.files import CORRUPT, first_line, open_archive, write_atomically
 from kinarm.rollouts import Rollouts
 from kinarm.scene import Bench, Scene
 from kinarm.simulator import Simulator
-from kinarm.validation import finite_array, whole_number
 
 FILE_FORMAT = "kinarm-recordings"
 FILE_VERSION = 1

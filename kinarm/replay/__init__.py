@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from kinarm._files import write_text
 from kinarm.arm import Arm
-from kinarm.files import write_text
 from kinarm.replay.page import build_page, check_recordings
 from kinarm.trajectory import Recording
 

@@ -22,6 +22,7 @@ from kinarm.policies.ars import ARSState, train_ars
 from kinarm.policies.library import load_policy
 from kinarm.policies.oracle import Oracle
 from kinarm.policies.recipes import ars_recipe, ppo_recipe
+from kinarm.problem import PROBLEMS
 from kinarm.rollouts import Rollouts
 from kinarm.semantics import SEMANTICS
 from kinarm.simulator import Simulator
@@ -59,7 +60,7 @@ def trial_digests() -> dict[str, str]:
     found = {}
     for arm in ARMS:
         for task in TASKS:
-            trials = TrialSet.draw(Simulator(arm, task), 200, 0)
+            trials = TrialSet.draw(PROBLEMS[task].replace(arm=arm), 200, 0)
             found[f"trials {arm} {task}"] = digest([trials.starts, trials.goals], 12)
     return found
 
@@ -69,7 +70,7 @@ def rollout_digests() -> dict[str, str]:
     found = {}
     for arm in ARMS:
         for task in TASKS:
-            simulator = Simulator(arm, task)
+            simulator = Simulator(PROBLEMS[task].replace(arm=arm))
             rng = np.random.default_rng(5)
             starts, goals = simulator.sample(rng, EPISODES)
             actions = rng.uniform(-1, 1, (EPISODES, 64, simulator.n_actions))
@@ -132,9 +133,9 @@ def oracle_digests() -> dict[str, str]:
     """What the oracle knows about 200 trials."""
     found = {}
     for arm, task in (("paper", "both"), ("paper_flange", "right"), ("lrmate200ic_5l", "left")):
-        simulator = Simulator(arm, task)
-        trials = TrialSet.draw(simulator, 200, 3)
-        solutions = Oracle(simulator=simulator).solve_batch(trials.starts, trials.goals)
+        problem = PROBLEMS[task].replace(arm=arm)
+        trials = TrialSet.draw(problem, 200, 3)
+        solutions = Oracle(problem).solve_batch(trials.starts, trials.goals)
         found[f"oracle {arm} {task}"] = digest(
             [
                 *(solutions.reachable, solutions.tight, solutions.steps),

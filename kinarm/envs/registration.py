@@ -7,16 +7,16 @@ ENVIRONMENTS = {
     "kinarm/ReachRight-v0": "right",
     "kinarm/ReachBoth-v0": "both",
 }
-"""Ids of the environments and their tasks."""
+"""Ids of the environments and their problems."""
 
 
 def register_environments() -> None:
     """Register the environments that are not registered yet."""
-    for name, task in ENVIRONMENTS.items():
+    for name, problem in ENVIRONMENTS.items():
         if name not in registry:
             register(
                 id=name,
-                entry_point="kinarm.env:ReachEnv",
-                vector_entry_point="kinarm.vector_env:ReachVectorEnv",
-                kwargs={"task": task},
+                entry_point="kinarm.envs.reach:ReachEnv",
+                vector_entry_point="kinarm.envs.vector:ReachVectorEnv",
+                kwargs={"problem": problem},
             )

@@ -8,7 +8,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from kinarm.env import (
+from kinarm._validation import whole_number
+from kinarm.envs.reach import (
     Array,
     action_space,
     make_simulator,
@@ -17,9 +18,10 @@ from kinarm.env import (
 )
 from kinarm.episodes import RUNNING, Episodes
 from kinarm.errors import InvalidInputError
+from kinarm.problem import ProblemLike
 from kinarm.scenarios import ScenarioStream
 from kinarm.simulator import StepResult
-from kinarm.validation import whole_number
+from kinarm.task import REWARD_TERMS
 
 
 class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
@@ -32,14 +34,17 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
     ----------
     num_envs : int
         Number of arms.
+    problem : ReachProblem, str or Path
+        As for `ReachEnv`.
     autoreset_mode : AutoresetMode or str
         ``SameStep`` (default): an episode that ends is replaced at once; its last observation and
         info are in ``final_obs`` and ``final_info``. ``NextStep``: the next call of `step`
         resets it and ignores its action. ``Disabled``: reset it by
         ``reset(options={"reset_mask": mask})``.
-    **settings
-        ``task``, ``arm``, ``scene``, ``reward``, ``tolerance``, ``horizon`` and ``start_spread``
-        as for `ReachEnv`; ``threads`` as for `Simulator`.
+    threads : int, optional
+        As for `kinarm.Simulator`.
+    **overrides
+        As for `ReachEnv`.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012  (as Gymnasium declares it)
@@ -50,9 +55,12 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
     def __init__(
         self,
         num_envs: int = 1,
+        problem: ProblemLike = "right",
         *,
         autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
-        **settings: Any,
+        threads: int | None = None,
+        render_mode: None = None,
+        **overrides: Any,
     ) -> None:
         num_envs = whole_number("num_envs", num_envs, 1)
         try:
@@ -63,7 +71,7 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
                 f"got {autoreset_mode!r}"
             ) from error
         self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
-        self.simulator = make_simulator(**settings)
+        self.simulator = make_simulator(problem, render_mode, threads, overrides)
         self.num_envs = num_envs
         self.single_observation_space = observation_space(self.simulator)
         self.single_action_space = action_space(self.simulator)
@@ -140,13 +148,13 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         """Infos of the arms that moved, with their masks; takes over the arrays of the result."""
         contact = np.full(self.num_envs, None, dtype=object)
         for row in np.flatnonzero(result.collision):
-            contact[row] = self.simulator.contact_pair(episodes.q[row], episodes.target[row])
+            contact[row] = self.simulator.world.contact_pair(episodes.q[row], episodes.target[row])
         infos: dict[str, Any] = {
             "distance": episodes.distance.copy(),
             "success": result.success,
             "collision": result.collision,
             "contact": contact,
-            **{f"reward_{name}": term for name, term in result.terms._asdict().items()},
+            **{f"reward_{name}": result.terms[:, k] for k, name in enumerate(REWARD_TERMS)},
         }
         mask = stepped.copy()
         infos.update({f"_{key}": mask for key in infos if key != "distance"})
@@ -217,4 +225,4 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         return [None if one is None else whole_number("seed", one, 0) for one in seed]
 
     def _stream(self, seed: Any) -> ScenarioStream:
-        return ScenarioStream(self.simulator, np.random.default_rng(seed))
+        return ScenarioStream(self.simulator.world, np.random.default_rng(seed))

@@ -1,27 +1,12 @@
-"""Writing files so that a reader never sees half of one, and what reading damaged ones raises."""
+"""Writing files so that a reader never sees half of one."""
 
 import os
 import tempfile
-import tokenize
-import zipfile
-import zlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 from kinarm.errors import OutputError
-
-CORRUPT = (
-    ValueError,
-    KeyError,
-    TypeError,
-    EOFError,
-    RuntimeError,
-    tokenize.TokenError,
-    zipfile.BadZipFile,
-    zlib.error,
-)
-"""What reading a damaged ``.npz`` raises."""
 
 
 def write_atomically(path: str | Path, write: Callable[[IO[bytes]], object]) -> None:
@@ -56,46 +41,6 @@ def write_text(path: str | Path, text: str) -> None:
     write_atomically(path, lambda file: file.write(text.encode()))
 
 
-def open_archive(
-    name: str, file: IO[bytes], *, kind: str, file_format: str, version: int, error: type[Exception]
-) -> Any:
-    """Open an ``.npz`` file without pickle, and see that it is of our making.
-
-    Parameters
-    ----------
-    name : str
-        Name of the file, for messages.
-    file : binary file
-        The file.
-    kind : str
-        What it should hold, such as ``"policy"``.
-    file_format : str
-        What its entry ``format`` has to say.
-    version : int
-        The latest version that can be read.
-    error : type
-        What to raise.
-
-    Returns
-    -------
-    numpy.lib.npyio.NpzFile
-        Its content.
-    """
-    import numpy as np
-
-    content = np.load(file, allow_pickle=False)
-    if not isinstance(content, np.lib.npyio.NpzFile) or "format" not in content:
-        raise error(f"{name!r} is not a kinarm {kind}")
-    if str(content["format"]) != file_format:
-        raise error(f"{name!r} holds {str(content['format'])!r}, not {file_format!r}")
-    if int(content["version"]) > version:
-        raise error(
-            f"{name!r} has format version {int(content['version'])}; "
-            f"this kinarm reads up to {version}"
-        )
-    return content
-
-
 def first_line(error: BaseException) -> str:
     """What an error says, in one line; its name if it says nothing."""
     return str(error).splitlines()[0] if str(error) else type(error).__name__
@@ -114,24 +59,47 @@ def _write_and_move(target: Path, write: Callable[[IO[bytes]], object]) -> None:
         raise
 
 
-def check_folder(folder: str | Path, *, create: bool = False) -> None:
-    """See that files can be written to a folder, before any work is done for them.
+def check_output(path: str | Path, *, overwrite: bool = False, suffix: str = "") -> None:
+    """See that a file can be written, before any work is done for it; its folder is made.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    overwrite : bool
+        Whether it may exist already.
+    suffix : str
+        What its name has to end in.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written, exists and may not, or has another ending.
+    """
+    file = Path(path)
+    if file.is_dir() or (suffix and file.suffix != suffix):
+        ending = f" that ends in {suffix}" if suffix else ""
+        raise OutputError(f"the output must be a file{ending}, got {str(path)!r}")
+    if file.exists() and not overwrite:
+        raise OutputError(f"{str(path)!r} exists: --overwrite replaces it (overwrite=True)")
+    check_folder(file.parent)
+
+
+def check_folder(folder: str | Path) -> None:
+    """Make a folder if it is missing, and see that files can be written to it.
 
     Parameters
     ----------
     folder : str or Path
         The folder.
-    create : bool
-        Whether to create it if it is missing.
 
     Raises
     ------
     OutputError
-        If it is missing or cannot be written to.
+        If it cannot be made or written to.
     """
     try:
-        if create:
-            Path(folder).mkdir(parents=True, exist_ok=True)
+        Path(folder).mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:

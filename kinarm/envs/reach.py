@@ -1,7 +1,6 @@
 """The Gymnasium environment: one arm."""
 
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import Any, cast
 
 import gymnasium
@@ -9,50 +8,38 @@ import numpy as np
 from gymnasium.spaces import Box, Space
 from numpy.typing import NDArray
 
-from kinarm.arm import DEFAULT_ARM, Arm
+from kinarm._validation import finite_array
 from kinarm.episodes import RUNNING, Episodes
-from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.errors import InvalidInputError
+from kinarm.observation import Ranges, observation_bounds, observation_table
+from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scenarios import ScenarioStream
-from kinarm.scene import Scene
 from kinarm.simulator import Simulator
-from kinarm.task import ReachTask, RewardWeights, load_task
-from kinarm.validation import finite_array
+from kinarm.task import REWARD_TERMS
 
 Array = NDArray[np.float64]
 
 
 def make_simulator(
-    task: ReachTask | str = "right",
-    arm: Arm | str = DEFAULT_ARM,
-    scene: Scene | None = None,
-    *,
-    reward: RewardWeights | Mapping[str, float] | None = None,
-    threads: int | None = None,
-    render_mode: None = None,
-    **settings: Any,
+    problem: ProblemLike, render_mode: None, threads: int | None, overrides: Mapping[str, Any]
 ) -> Simulator:
     """Build the simulator of an environment from the environment's arguments."""
     if render_mode is not None:
         raise InvalidInputError(f"render_mode must be None, got {render_mode!r}")
-    if isinstance(reward, Mapping):
-        terms = [item.name for item in fields(RewardWeights)]
-        for name in reward:
-            if name not in terms:
-                raise UnknownNameError("reward term", name, terms)
-        reward = RewardWeights(**reward)
-    return Simulator(arm, load_task(task, reward=reward, **settings), scene, threads=threads)
+    return Simulator(ReachProblem.load(problem).replace(**overrides), threads=threads)
 
 
 def observation_space(simulator: Simulator) -> Space[Array]:
     """Bounds of an observation: goals to within the tolerance, quaternions to within rounding."""
-    regions = [simulator.scene.goal_region(name) for name in simulator.task.benches]
-    goal_low = np.min([region[0] for region in regions], axis=0) - simulator.task.tolerance
-    goal_high = np.max([region[1] for region in regions], axis=0) + simulator.task.tolerance
-    reach, n_axes = simulator.arm.reach, simulator.arm.n_axes
-    turns, places = np.full(4 * n_axes, 1 + 1e-6), np.full(3 * n_axes, reach)
-    low = np.concatenate([goal_low, goal_low - reach, -turns, -places])
-    high = np.concatenate([goal_high, goal_high + reach, turns, places])
-    return cast("Space[Array]", Box(low, high, dtype=np.float64))
+    task = simulator.task
+    regions = [simulator.scene.goal_region(name) for name in task.goal_regions]
+    ranges = Ranges(
+        goal_lower=np.min([region.lower for region in regions], axis=0) - task.tolerance,
+        goal_upper=np.max([region.upper for region in regions], axis=0) + task.tolerance,
+        reach=simulator.arm.reach,
+    )
+    lower, upper = observation_bounds(ranges, simulator.arm.n_axes)
+    return cast("Space[Array]", Box(lower, upper, dtype=np.float64))
 
 
 def action_space(simulator: Simulator) -> Space[Array]:
@@ -65,16 +52,11 @@ class ReachEnv(gymnasium.Env[Array, Array]):
 
     Parameters
     ----------
-    task : str or ReachTask
-        ``"left"``, ``"right"`` or ``"both"``.
-    arm : str or Arm
-        A shipped arm, the path of a URDF, or an arm.
-    scene : Scene, optional
-        The paper's scene by default.
-    reward : RewardWeights or mapping, optional
-        Weights of the reward terms, such as ``{"success": 1.0}``.
-    tolerance, horizon, start_spread : optional
-        Settings of the task to replace; see `ReachTask`.
+    problem : ReachProblem, str or Path
+        ``"left"``, ``"right"``, ``"both"``, a problem file, or a problem.
+    **overrides
+        What `kinarm.ReachProblem.replace` takes, such as ``arm``, ``tolerance``, ``horizon``,
+        ``start_spread``, or ``reward={"success": 1.0}``.
 
     Notes
     -----
@@ -84,28 +66,21 @@ class ReachEnv(gymnasium.Env[Array, Array]):
 
     **Observation** (6 + 7 axes, 48 for the shipped arms), float64, world frame with z up:
 
-    ======== ============================================================ =========
-    Index    Meaning                                                      Unit
-    ======== ============================================================ =========
-    0-2      position of the goal x, y, z                                 m
-    3-5      goal minus tool point x, y, z                                m
-    6-29     orientation of the six axis frames, quaternion w, x, y, z    1
-    30-47    position of the six axis frames x, y, z                      m
-    ======== ============================================================ =========
+    OBSERVATION_TABLE
 
     Quaternions are composed along the chain, so they have no sign flips over the joint range.
 
     **Reward**: sum of the terms ``reward_progress`` (metres by which the tool came closer),
-    ``reward_closer`` (0, for every step closer), ``reward_collision`` (-1 when a move touches
-    something), ``reward_success`` (0) and ``reward_step`` (0), with the default weights in
-    brackets.
+    ``reward_closer`` (0, for every step closer), ``reward_step`` (0), ``reward_collision`` (-1
+    when a move touches something) and ``reward_success`` (0), with the default weights in
+    brackets; see `kinarm.RewardWeights`.
 
     **Start**: each actuated axis uniform within its limits, rejected until the arm touches
     nothing and the tool is farther from the goal than the tolerance. Goals are uniform over the
-    benches of the task. ``reset(options={"start": q, "goal": p})`` sets either.
+    regions of the task. ``reset(options={"start": q, "goal": p})`` sets either.
 
     **End**: terminated when the tool is within 0.05 m of the goal, or when a move would touch the
-    ground, a bench or the arm itself (the move is refused); truncated after 64 steps.
+    ground, an obstacle or the arm itself (the move is refused); truncated after 64 steps.
 
     **Info**: ``distance`` [m]; and after a step ``success``, ``collision``, ``contact`` (names of
     the two bodies that would have touched, or None) and the five reward terms.
@@ -117,27 +92,12 @@ class ReachEnv(gymnasium.Env[Array, Array]):
 
     def __init__(
         self,
-        task: ReachTask | str = "right",
-        arm: Arm | str = DEFAULT_ARM,
-        scene: Scene | None = None,
+        problem: ProblemLike = "right",
         *,
-        reward: RewardWeights | Mapping[str, float] | None = None,
-        tolerance: float | None = None,
-        horizon: int | None = None,
-        start_spread: float | None = None,
         render_mode: None = None,
+        **overrides: Any,
     ) -> None:
-        self.simulator = make_simulator(
-            task,
-            arm,
-            scene,
-            reward=reward,
-            threads=1,
-            render_mode=render_mode,
-            tolerance=tolerance,
-            horizon=horizon,
-            start_spread=start_spread,
-        )
+        self.simulator = make_simulator(problem, render_mode, 1, overrides)
         self.observation_space = observation_space(self.simulator)
         self.action_space = action_space(self.simulator)
         self._stream: ScenarioStream | None = None
@@ -149,7 +109,7 @@ class ReachEnv(gymnasium.Env[Array, Array]):
         """Begin an episode; ``options`` may set ``start`` and ``goal``."""
         super().reset(seed=seed)
         if self._stream is None or seed is not None:
-            self._stream = ScenarioStream(self.simulator, self.np_random)
+            self._stream = ScenarioStream(self.simulator.world, self.np_random)
         start, goal = pick_scenario(options, *self._stream.next())
         self._episode = self.simulator.reset([start], [goal])
         return self._episode.observation[0].copy(), {"distance": float(self._episode.distance[0])}
@@ -163,13 +123,16 @@ class ReachEnv(gymnasium.Env[Array, Array]):
         result = self.simulator.step(episode, chosen[None])
         contact = None
         if result.collision[0]:
-            contact = self.simulator.contact_pair(episode.q[0], episode.target[0])
+            contact = self.simulator.world.contact_pair(episode.q[0], episode.target[0])
         info = {
             "distance": float(episode.distance[0]),
             "success": bool(result.success[0]),
             "collision": bool(result.collision[0]),
             "contact": contact,
-            **{f"reward_{name}": float(term[0]) for name, term in result.terms._asdict().items()},
+            **{
+                f"reward_{name}": term
+                for name, term in zip(REWARD_TERMS, result.terms[0].tolist(), strict=True)
+            },
         }
         return (
             episode.observation[0].copy(),
@@ -178,6 +141,22 @@ class ReachEnv(gymnasium.Env[Array, Array]):
             bool(result.truncated[0]),
             info,
         )
+
+
+def _rst_table(rows: "list[tuple[str, ...]]") -> str:
+    """Lay out rows, the first of which are headings, as a table in a docstring."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = [
+        " ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+    rule = " ".join("=" * width for width in widths)
+    return "\n    ".join([rule, lines[0], rule, *lines[1:], rule])
+
+
+ReachEnv.__doc__ = (ReachEnv.__doc__ or "").replace(
+    "OBSERVATION_TABLE", _rst_table([("Index", "Meaning", "Unit"), *observation_table(6)])
+)
 
 
 def pick_scenario(
