@@ -12,10 +12,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from kinarm.parallel import available_threads
+from kinarm._parallel import available_threads
 
 if TYPE_CHECKING:
     from kinarm.policies.policy import Policy
+    from kinarm.problem import ReachProblem
     from kinarm.simulator import Simulator
 
 BATCHES = (48, 512, 4096)
@@ -29,10 +30,6 @@ class Timing(NamedTuple):
     median: float
     best: float
 
-    def to_json(self) -> dict[str, float]:
-        """As a dictionary that JSON can hold."""
-        return {"median": self.median, "best": self.best}
-
 
 def measure(policy_name: str, repetitions: int, *, ppo: bool = False) -> dict[str, Any]:
     """Measure everything.
@@ -40,7 +37,7 @@ def measure(policy_name: str, repetitions: int, *, ppo: bool = False) -> dict[st
     Parameters
     ----------
     policy_name : str
-        Trained policy to run.
+        Trained policy to run, on the problem that it is for.
     repetitions : int
         How often each figure is measured.
     ppo : bool
@@ -56,8 +53,8 @@ def measure(policy_name: str, repetitions: int, *, ppo: bool = False) -> dict[st
     from kinarm.simulator import Simulator
 
     policy = load_policy(policy_name)
-    simulator = Simulator(task=policy.provenance.task)
-    policy.check_arm(simulator.arm)
+    problem = policy.problem
+    simulator = Simulator(problem)
     rollouts = measure_rollouts(simulator, policy, repetitions)
     reference = measure_reference(simulator, policy, repetitions)
     fast = next(row for row in rollouts if _is_headline(row))
@@ -68,14 +65,14 @@ def measure(policy_name: str, repetitions: int, *, ppo: bool = False) -> dict[st
         "policy": policy_name,
         "repetitions": repetitions,
         "rollouts": rollouts,
-        "reference": reference.to_json(),
+        "reference": reference._asdict(),
         "speed_up_over_reference": fast["steps_per_second"]["median"] / reference.median,
-        "vector_environment": measure_vector_env(policy, repetitions).to_json(),
-        "single_environment": measure_single_env(policy, repetitions).to_json(),
-        "table_1_training": measure_training(policy.provenance.task, min(repetitions, 3)),
-        "oracle": measure_oracle(policy.provenance.task, min(repetitions, 3)),
+        "vector_environment": measure_vector_env(problem, repetitions)._asdict(),
+        "single_environment": measure_single_env(problem, repetitions)._asdict(),
+        "table_1_training": measure_training(problem, min(repetitions, 3)),
+        "oracle": measure_oracle(problem, min(repetitions, 3)),
         "evaluation": measure_evaluation(),
-        **({"ppo_training": measure_ppo(policy.provenance.task)} if ppo else {}),
+        **({"ppo_training": measure_ppo(problem)} if ppo else {}),
     }
 
 
@@ -114,10 +111,9 @@ def measure_batch(
     """Steps per second of one batch size."""
     import numpy as np
 
-    from kinarm.kernels import SUBSTEPS
-
     rng = np.random.default_rng(batch)
     starts, goals = simulator.sample(rng, batch)
+    tested = simulator.problem.stepping.tested_configurations
     actions = rng.uniform(-1, 1, (batch, simulator.task.horizon, simulator.n_actions))
 
     def run_random() -> int:
@@ -130,7 +126,7 @@ def measure_batch(
     for name, run in (("random", run_random), ("trained", run_trained)):
         judged_before = simulator.judged
         steps = run()
-        judged_share = (simulator.judged - judged_before) / (SUBSTEPS * steps)
+        judged_share = (simulator.judged - judged_before) / (tested * steps)
         for threads in sorted({1, available_threads()}):
             simulator.threads = threads
             rows.append(
@@ -138,7 +134,7 @@ def measure_batch(
                     "batch": batch,
                     "actions": name,
                     "threads": threads,
-                    "steps_per_second": timed(run, repetitions).to_json(),
+                    "steps_per_second": timed(run, repetitions)._asdict(),
                     "judged_share": judged_share,
                 }
             )
@@ -161,13 +157,13 @@ def measure_reference(simulator: "Simulator", policy: "Policy", repetitions: int
     return timed(run, repetitions)
 
 
-def measure_vector_env(policy: "Policy", repetitions: int) -> Timing:
+def measure_vector_env(problem: "ReachProblem", repetitions: int) -> Timing:
     """Steps per second of the native batch environment, on random actions."""
-    import gymnasium
     import numpy as np
 
-    name = f"kinarm/Reach{policy.provenance.task.title()}-v0"
-    env = gymnasium.make_vec(name, num_envs=VECTOR_ENVS)
+    from kinarm.envs import ReachVectorEnv
+
+    env = ReachVectorEnv(VECTOR_ENVS, problem)
     env.reset(seed=0)
     shape = (200, *(env.action_space.shape or ()))
     actions = np.random.default_rng(0).uniform(-1, 1, shape)
@@ -180,13 +176,13 @@ def measure_vector_env(policy: "Policy", repetitions: int) -> Timing:
     return timed(run, repetitions)
 
 
-def measure_single_env(policy: "Policy", repetitions: int) -> Timing:
+def measure_single_env(problem: "ReachProblem", repetitions: int) -> Timing:
     """Steps per second of the single environment without wrappers, on random actions."""
     import numpy as np
 
-    from kinarm.env import ReachEnv
+    from kinarm.envs import ReachEnv
 
-    env = ReachEnv(policy.provenance.task)
+    env = ReachEnv(problem)
     env.reset(seed=0)
     actions = np.random.default_rng(0).uniform(-1, 1, (2000, env.simulator.n_actions))
 
@@ -200,14 +196,13 @@ def measure_single_env(policy: "Policy", repetitions: int) -> Timing:
     return timed(run, repetitions)
 
 
-def measure_training(task: str, repetitions: int) -> dict[str, Any]:
+def measure_training(problem: "ReachProblem", repetitions: int) -> dict[str, Any]:
     """Time and steps of a training with Table 1's settings."""
-    from kinarm.policies.ars import train_ars
-    from kinarm.policies.recipes import ars_recipe
+    from kinarm.policies.learners import recipe, train_policy
 
     seconds, steps = [], 0
     for _ in range(repetitions):
-        result = train_ars(ars_recipe("paper", task=task))
+        result = train_policy(recipe("ars", "paper", problem=problem))
         seconds.append(result.curve[-1].wall_time)
         steps = result.curve[-1].environment_steps
     return {
@@ -216,23 +211,23 @@ def measure_training(task: str, repetitions: int) -> dict[str, Any]:
     }
 
 
-def measure_oracle(task: str, repetitions: int) -> dict[str, Any]:
+def measure_oracle(problem: "ReachProblem", repetitions: int) -> dict[str, Any]:
     """Trials that the oracle solves per second."""
     import numpy as np
 
     from kinarm.policies.oracle import Oracle
 
-    oracle = Oracle(task=task)
+    oracle = Oracle(problem)
     starts, goals = oracle.simulator.sample(np.random.default_rng(0), ORACLE_TRIALS)
 
     def run() -> int:
         oracle.solve_batch(starts, goals)
         return ORACLE_TRIALS
 
-    return {"trials": ORACLE_TRIALS, "trials_per_second": timed(run, repetitions).to_json()}
+    return {"trials": ORACLE_TRIALS, "trials_per_second": timed(run, repetitions)._asdict()}
 
 
-def measure_ppo(task: str) -> dict[str, Any]:
+def measure_ppo(problem: "ReachProblem") -> dict[str, Any]:
     """Time, steps and the simulator's share of a training with PPO's tuned recipe.
 
     Returns
@@ -241,20 +236,19 @@ def measure_ppo(task: str) -> dict[str, Any]:
         Figures that JSON can hold, or under ``skipped`` why there are none.
     """
     from kinarm.errors import MissingExtraError
-    from kinarm.policies.ppo import train_ppo
-    from kinarm.policies.recipes import ppo_recipe
+    from kinarm.policies.learners import recipe, train_policy
 
-    config = ppo_recipe("tuned", task=task)
+    config = recipe("ppo", "tuned", problem=problem)
     try:
-        train_ppo(replace(config, iterations=1))  # imports torch and compiles
+        train_policy(replace(config, iterations=1))  # imports torch and compiles
     except MissingExtraError as error:
         return {"skipped": str(error)}
-    result = train_ppo(config)
+    result = train_policy(config)
     seconds = result.curve[-1].wall_time
     return {
         "seconds": seconds,
         "environment_steps": result.curve[-1].environment_steps,
-        "simulator_share": result.simulator_time / seconds,
+        "simulator_share": result.state.simulator_time / seconds,
     }
 
 
@@ -265,7 +259,9 @@ def measure_evaluation() -> dict[str, float]:
     """
     from kinarm.evaluation.bounds import CACHE_VARIABLE
 
-    code = "from kinarm.evaluation.eval import main; main(['--trials', '200', '--json'])"
+    code = (
+        "from kinarm.evaluation.commands.evaluate import main; main(['--trials', '200', '--json'])"
+    )
     seconds = []
     with tempfile.TemporaryDirectory() as folder:
         for _ in range(2):

@@ -4,17 +4,20 @@ import argparse
 import json
 import sys
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kinarm.command_line import Parser, command_text, run_command, whole_number
+from kinarm._command_line import Parser, add_options, command_text, request_of, run_command
+from kinarm._files import check_folder, write_text
+from kinarm._parallel import available_threads
+from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
-from kinarm.files import check_folder, write_text
-from kinarm.parallel import available_threads
 
 if TYPE_CHECKING:
     from kinarm.evaluation.reproduction.claims import Claim
+    from kinarm.evaluation.reproduction.executor import Executor
     from kinarm.evaluation.reproduction.results import Results
     from kinarm.evaluation.reproduction.runs import RunStore
     from kinarm.evaluation.reproduction.study import Study
@@ -33,6 +36,96 @@ examples:
 """
 
 
+@dataclass(frozen=True, kw_only=True)
+class ReproductionRequest:
+    """Train everything that the paper trained, and judge its claims.
+
+    Parameters
+    ----------
+    out : Path
+        Output folder: reproduction, or reproduction-quick with --quick.
+    jobs : int
+        Trainings at a time; one a processor.
+    quick : bool
+        A smoke version of everything, whose results mean nothing.
+    ppo : bool
+        Compare with PPO.
+
+    Raises
+    ------
+    InvalidInputError
+        If there are no jobs.
+    """
+
+    out: Path | None = None
+    jobs: int | None = None
+    quick: bool = False
+    ppo: bool = True
+
+    def __post_init__(self) -> None:
+        if self.jobs is not None:
+            whole_number("jobs", self.jobs, 1)
+
+    @property
+    def folder(self) -> Path:
+        """Where the files go."""
+        return self.out or Path("reproduction-quick" if self.quick else "reproduction")
+
+    @property
+    def study(self) -> "Study":
+        """What is trained."""
+        from kinarm.evaluation.reproduction.study import full_study, quick_study
+
+        return (quick_study if self.quick else full_study)(ppo=self.ppo)
+
+    def run(
+        self, executor: "Executor | None" = None, command: str | None = None
+    ) -> "tuple[Claim, ...]":
+        """Train what is missing, and write what it came to.
+
+        Parameters
+        ----------
+        executor : Executor, optional
+            Where trainings are carried out; the processors of this machine if it is left out.
+        command : str, optional
+            What to record as the command that made the files; this request if it is left out.
+
+        Returns
+        -------
+        tuple of Claim
+            The claims under the literal reading.
+
+        Raises
+        ------
+        KinarmError
+            If the extra ``ppo`` is missing, the folder holds another study or cannot be written
+            to, or a worker ends unexpectedly.
+        """
+        from rich.console import Console
+
+        from kinarm.evaluation.reproduction.document import write_all
+        from kinarm.evaluation.reproduction.results import Results
+        from kinarm.evaluation.reproduction.runs import RunStore
+        from kinarm.policies.learners import find_learner
+
+        if self.ppo:
+            find_learner("ppo").check_installed()
+        study, folder = self.study, self.folder
+        check_folder(folder)
+        _claim_folder(folder, study)
+        store = RunStore(folder, study.protocol)
+        results = Results.load(study, store)
+        try:
+            if results.missing:
+                results = _train(results, store, self.jobs or available_threads(), executor)
+            with Console(stderr=True).status("bounding what could be reached, drawing figures"):
+                return write_all(results, store, command or repr(self))
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(
+                "interrupted; what is finished is kept, and the same command goes on"
+            ) from None
+
+
 def build_parser() -> Parser:
     """The options of the command."""
     parser = Parser(
@@ -41,63 +134,23 @@ def build_parser() -> Parser:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="DIR",
-        help="output folder (reproduction, or reproduction-quick with --quick)",
-    )
-    parser.add_argument(
-        "--jobs",
-        type=whole_number(1),
-        default=available_threads(),
-        metavar="N",
-        help="trainings at a time (one a processor)",
-    )
-    parser.add_argument("--quick", action="store_true", help="a smoke version of everything")
-    parser.add_argument("--no-ppo", dest="ppo", action="store_false", help="leave PPO out")
+    add_options(parser, ReproductionRequest)
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line."""
-    run_command(
-        PROG,
-        lambda: _reproduce(build_parser().parse_args(arguments), command_text(PROG, arguments)),
-    )
+    run_command(PROG, lambda: _reproduce(arguments))
 
 
-def _reproduce(options: argparse.Namespace, command: str) -> None:
-    """Train what is missing, then write what it came to."""
-    from rich.console import Console
-
-    from kinarm.evaluation.reproduction.document import write_all
-    from kinarm.evaluation.reproduction.results import Results
-    from kinarm.evaluation.reproduction.runs import RunStore
-    from kinarm.evaluation.reproduction.study import full_study, quick_study
-    from kinarm.policies.ppo import require_ppo
-
-    if options.ppo:
-        require_ppo()
-    study = (quick_study if options.quick else full_study)(ppo=options.ppo)
-    folder = options.out or Path("reproduction-quick" if options.quick else "reproduction")
-    check_folder(folder, create=True)
-    _claim_folder(folder, study)
-    store = RunStore(folder, study.protocol)
-    results = Results.load(study, store)
-    try:
-        if results.missing:
-            results = _train(results, store, options.jobs)
-        with Console(stderr=True).status("bounding what could be reached, drawing figures"):
-            claims = write_all(results, store, command)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(
-            "interrupted; what is finished is kept, and the same command goes on"
-        ) from None
-    _print(claims)
-    if study.warning:
-        sys.stdout.write(f"{study.warning}\n")
-    sys.stdout.write(f"written: {folder / 'REPRODUCTION.md'}, with tables and figures beside it\n")
+def _reproduce(arguments: Sequence[str] | None) -> None:
+    """Run a request, and print its verdicts."""
+    request = request_of(build_parser().parse_args(arguments), ReproductionRequest)
+    _print(request.run(command=command_text(PROG, arguments)))
+    if request.study.warning:
+        sys.stdout.write(f"{request.study.warning}\n")
+    page = request.folder / "REPRODUCTION.md"
+    sys.stdout.write(f"written: {page}, with tables and figures beside it\n")
 
 
 def _print(claims: "Iterable[Claim]") -> None:
@@ -131,7 +184,9 @@ def _claim_folder(folder: Path, study: "Study") -> None:
     write_text(marker, json.dumps({"study": study.name}))
 
 
-def _train(results: "Results", store: "RunStore", jobs: int) -> "Results":
+def _train(
+    results: "Results", store: "RunStore", jobs: int, executor: "Executor | None"
+) -> "Results":
     """Carry out what is missing, the longest first, and read all runs anew."""
     from rich.console import Console
 
@@ -149,7 +204,7 @@ def _train(results: "Results", store: "RunStore", jobs: int) -> "Results":
     threads = max(1, available_threads() // jobs)
     work = partial(carry_out, protocol=study.protocol, folder=store.folder, threads=threads)
     with StudyProgress(study, missing, jobs, console) as progress:
-        for training in LocalExecutor(jobs, threads).carry_out(work, missing):
+        for training in (executor or LocalExecutor(jobs, threads)).carry_out(work, missing):
             progress.finished(training)
     return Results.load(study, store)
 
