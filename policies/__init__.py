@@ -5,55 +5,61 @@ from typing import TYPE_CHECKING
 from kinarm._exports import lazy_exports
 
 if TYPE_CHECKING:
-    from kinarm.policies.ars import ARSResult, ARSState, train_ars
-    from kinarm.policies.ars_config import ARSConfig
-    from kinarm.policies.checkpoint import (
-        load_checkpoint,
-        load_ppo_checkpoint,
-        save_checkpoint,
-        save_ppo_checkpoint,
-    )
+    from kinarm.policies.ars.config import ARSConfig
+    from kinarm.policies.ars.state import ARSState
+    from kinarm.policies.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+    from kinarm.policies.config import TrainingConfig
     from kinarm.policies.curve import CurvePoint
     from kinarm.policies.inverse import inverse_kinematics
+    from kinarm.policies.learners import (
+        Learner,
+        TrainingResult,
+        TrainingState,
+        find_learner,
+        learner_names,
+        register_learner,
+        state_policy,
+        train_policy,
+    )
     from kinarm.policies.library import load_policy, policy_names
     from kinarm.policies.normalizer import Normalizer
     from kinarm.policies.oracle import Oracle
     from kinarm.policies.oracle_solution import OracleSolution, OracleSolutions
     from kinarm.policies.policy import Layer, Policy
-    from kinarm.policies.ppo import PPOResult, train_ppo
-    from kinarm.policies.ppo_config import PPOConfig
-    from kinarm.policies.ppo_state import PPOState
+    from kinarm.policies.ppo.config import PPOConfig
+    from kinarm.policies.ppo.state import PPOState
     from kinarm.policies.provenance import Provenance
-    from kinarm.policies.recipes import ARS_RECIPES, PPO_RECIPES, ars_recipe, ppo_recipe
+    from kinarm.policies.recipes import recipe
 
 __all__ = [
-    "ARS_RECIPES",
-    "PPO_RECIPES",
     "ARSConfig",
-    "ARSResult",
     "ARSState",
+    "Checkpoint",
     "CurvePoint",
     "Layer",
+    "Learner",
     "Normalizer",
     "Oracle",
     "OracleSolution",
     "OracleSolutions",
     "PPOConfig",
-    "PPOResult",
     "PPOState",
     "Policy",
     "Provenance",
-    "ars_recipe",
+    "TrainingConfig",
+    "TrainingResult",
+    "TrainingState",
+    "find_learner",
     "inverse_kinematics",
+    "learner_names",
     "load_checkpoint",
     "load_policy",
-    "load_ppo_checkpoint",
     "policy_names",
-    "ppo_recipe",
+    "recipe",
+    "register_learner",
     "save_checkpoint",
-    "save_ppo_checkpoint",
-    "train_ars",
-    "train_ppo",
+    "state_policy",
+    "train_policy",
 ]
 
 
@@ -64,25 +70,30 @@ def __dir__() -> list[str]:
 __getattr__ = lazy_exports(
     __name__,
     {
-        "ars": ("ARSResult", "ARSState", "train_ars"),
-        "ars_config": ("ARSConfig",),
-        "checkpoint": (
-            "load_checkpoint",
-            "load_ppo_checkpoint",
-            "save_checkpoint",
-            "save_ppo_checkpoint",
-        ),
+        "ars.config": ("ARSConfig",),
+        "ars.state": ("ARSState",),
+        "checkpoint": ("Checkpoint", "load_checkpoint", "save_checkpoint"),
+        "config": ("TrainingConfig",),
         "curve": ("CurvePoint",),
         "inverse": ("inverse_kinematics",),
+        "learners": (
+            "Learner",
+            "TrainingResult",
+            "TrainingState",
+            "find_learner",
+            "learner_names",
+            "register_learner",
+            "state_policy",
+            "train_policy",
+        ),
         "library": ("load_policy", "policy_names"),
         "normalizer": ("Normalizer",),
         "oracle": ("Oracle",),
         "oracle_solution": ("OracleSolution", "OracleSolutions"),
         "policy": ("Layer", "Policy"),
-        "ppo": ("PPOResult", "train_ppo"),
-        "ppo_config": ("PPOConfig",),
-        "ppo_state": ("PPOState",),
+        "ppo.config": ("PPOConfig",),
+        "ppo.state": ("PPOState",),
         "provenance": ("Provenance",),
-        "recipes": ("ARS_RECIPES", "PPO_RECIPES", "ars_recipe", "ppo_recipe"),
+        "recipes": ("recipe",),
     },
 )

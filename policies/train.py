@@ -3,11 +3,10 @@
 import argparse
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from kinarm.command_line import Parser, finite_number, run_command, whole_number
 from kinarm.errors import InvalidInputError, KinarmError, PolicyFileError
@@ -34,28 +33,6 @@ examples:
   kinarm-train ppo --task both --recipe tuned --seed 3 --out b.npz   our best policy
   kinarm-train ppo --out b.npz --resume                              go on where it stopped
 """
-
-
-class Learner(NamedTuple):
-    """What the command needs of a learner.
-
-    Attributes
-    ----------
-    name : str
-        Its name on the command line.
-    recipe : callable
-        Looks settings up by name, with replacements.
-    train : callable
-        Trains, given settings, the state to go on from, and what to call with every state.
-    save, load : callable
-        Write and read checkpoints.
-    """
-
-    name: str
-    recipe: Callable[..., Any]
-    train: Callable[..., Any]
-    save: Callable[[Path, Any, Any], None]
-    load: Callable[[Path], tuple[Any, Any]]
 
 
 def build_parser() -> Parser:
@@ -132,24 +109,27 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _train(options: argparse.Namespace) -> None:
     """From options to a policy file and its learning curve."""
     from kinarm.policies.curve import write_curve
+    from kinarm.policies.learners import find_learner, train_policy
 
     out: Path = options.out
     if out.suffix != ".npz" or out.is_dir():
         raise InvalidInputError(f"--out must be a file that ends in .npz, got {str(out)!r}")
     check_folder(out.parent)
-    learner = _ars() if options.learner == "ars" else _ppo(options.tensorboard)
-    config, state = _beginning(options, learner)
-    if learner.name == "ppo" and options.tensorboard is not None:
+    find_learner(options.learner).check_installed()
+    config, state = _beginning(options)
+    logs = {}
+    if getattr(options, "tensorboard", None) is not None:
         check_folder(options.tensorboard, create=True)
-    keeper = CheckpointKeeper(learner, config, checkpoint_path(out))
-    with TrainingProgress(learner.name, config) as progress:
+        logs["tensorboard"] = options.tensorboard
+    keeper = CheckpointKeeper(config, checkpoint_path(out))
+    with TrainingProgress(options.learner, config) as progress:
 
         def on_iteration(state: Any) -> None:
             progress.update(state)
             keeper.update(state)
 
         try:
-            result = learner.train(config, state=state, on_iteration=on_iteration)
+            result = train_policy(config, state=state, on_iteration=on_iteration, **logs)
         except KeyboardInterrupt:
             raise KeyboardInterrupt(keeper.save_on_interrupt()) from None
     try:
@@ -162,39 +142,10 @@ def _train(options: argparse.Namespace) -> None:
     sys.stdout.write(f"{_summary(result.curve)}; written: {out}, {curve_path(out)}\n")
 
 
-def _ars() -> Learner:
-    """Augmented Random Search."""
-    from kinarm.policies.ars import train_ars
-    from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
-    from kinarm.policies.recipes import ars_recipe
-
-    return Learner(
-        name="ars",
-        recipe=ars_recipe,
-        train=train_ars,
-        save=save_checkpoint,
-        load=load_checkpoint,
-    )
-
-
-def _ppo(tensorboard: Path | None) -> Learner:
-    """Proximal Policy Optimization, if what it needs is installed."""
-    from kinarm.policies.checkpoint import load_ppo_checkpoint, save_ppo_checkpoint
-    from kinarm.policies.ppo import require_ppo, train_ppo
-    from kinarm.policies.recipes import ppo_recipe
-
-    require_ppo(tensorboard=tensorboard is not None)
-    return Learner(
-        name="ppo",
-        recipe=ppo_recipe,
-        train=partial(train_ppo, tensorboard=tensorboard),
-        save=save_ppo_checkpoint,
-        load=load_ppo_checkpoint,
-    )
-
-
-def _beginning(options: argparse.Namespace, learner: Learner) -> tuple[Any, Any]:
+def _beginning(options: argparse.Namespace) -> tuple[Any, Any]:
     """Settings and state to begin with: from the command line, or from a checkpoint."""
+    from kinarm.policies.checkpoint import load_checkpoint
+    from kinarm.policies.learners import learner_of, recipe
     from kinarm.policies.mirror import task_mirror
 
     if options.arm is not None and Path(options.arm).is_file():
@@ -207,13 +158,15 @@ def _beginning(options: argparse.Namespace, learner: Learner) -> tuple[Any, Any]
                 f"{str(checkpoint)!r} holds an unfinished training: go on with --resume, "
                 "or delete it"
             )
-        config = learner.recipe(settings.pop("recipe", "paper"), **settings)
+        config = recipe(options.learner, settings.pop("recipe", "paper"), **settings)
         # Refuses what cannot be trained before any output is made.
         task_mirror(config.symmetric, config.simulator())
         return config, None
     if not checkpoint.exists():
         raise PolicyFileError(f"nothing to resume: there is no {str(checkpoint)!r}")
-    config, state = learner.load(checkpoint)
+    config, state = load_checkpoint(checkpoint)
+    if (other := learner_of(config).name) != options.learner:
+        raise InvalidInputError(f"{str(checkpoint)!r} is of the learner {other}")
     if settings.get("recipe") == config.recipe.removesuffix("*"):
         del settings["recipe"]
     if replace(config, **settings) != config:
@@ -247,8 +200,8 @@ def curve_path(out: Path) -> Path:
 class CheckpointKeeper:
     """Saves the latest state every few seconds and on demand."""
 
-    def __init__(self, learner: Learner, config: Any, path: Path) -> None:
-        self._learner, self._config, self._path = learner, config, path
+    def __init__(self, config: Any, path: Path) -> None:
+        self._config, self._path = config, path
         self._saved_at = time.monotonic()
         self._state: Any = None
 
@@ -268,8 +221,10 @@ class CheckpointKeeper:
 
     def save(self) -> None:
         """Save the latest state."""
+        from kinarm.policies.checkpoint import save_checkpoint
+
         if self._state is not None:
-            self._learner.save(self._path, self._config, self._state)
+            save_checkpoint(self._path, self._config, self._state)
             self._saved_at = time.monotonic()
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from kinarm.evaluation import eval, replay  # noqa: A004
 from kinarm.evaluation.commands import bench, reproduce
-from kinarm.policies import Policy, ars_recipe, train, train_ars
+from kinarm.policies import Policy, recipe, train, train_policy
 
 ROOT = Path(__file__).resolve().parents[2]
 MODULES = {
@@ -82,7 +82,7 @@ def run_outside(command: Callable[..., list[str]]) -> Callable[..., Answer]:
 @pytest.fixture(scope="session")
 def policy() -> Policy:
     """A policy for ``right``, hardly trained."""
-    return train_ars(ars_recipe("paper", task="right", iterations=5)).policy
+    return train_policy(recipe("ars", "paper", task="right", iterations=5)).policy
 
 
 @pytest.fixture(scope="session")
@@ -96,6 +96,6 @@ def policy_folder(policy: Policy, tmp_path_factory: pytest.TempPathFactory) -> P
         "flange": {"task": "right", "arm": "paper_flange"},
     }
     for name, settings in others.items():
-        config = ars_recipe("paper", iterations=2, **settings)
-        train_ars(config).policy.save(folder / f"{name}.npz")
+        config = recipe("ars", "paper", iterations=2, **settings)
+        train_policy(config).policy.save(folder / f"{name}.npz")
     return folder

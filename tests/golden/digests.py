@@ -18,10 +18,11 @@ from typing import Any
 import numpy as np
 
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.ars import ARSState, train_ars
+from kinarm.policies.ars.state import ARSState
+from kinarm.policies.learners import train_policy
 from kinarm.policies.library import load_policy
 from kinarm.policies.oracle import Oracle
-from kinarm.policies.recipes import ars_recipe, ppo_recipe
+from kinarm.policies.recipes import recipe
 from kinarm.problem import PROBLEMS
 from kinarm.rollouts import Rollouts
 from kinarm.semantics import SEMANTICS
@@ -90,14 +91,14 @@ def rollout_digests() -> dict[str, str]:
 def ars_digests() -> dict[str, str]:
     """Ten iterations of Augmented Random Search."""
     found = {}
-    for recipe in ("paper", "tuned", "brs"):
+    for name in ("paper", "tuned", "brs"):
         for task in TASKS:
             states: list[ARSState] = []
-            config = replace(ars_recipe(recipe, task=task, seed=2), iterations=10)
-            result = train_ars(config, on_iteration=states.append)
+            config = replace(recipe("ars", name, problem=task, seed=2), iterations=10)
+            result = train_policy(config, on_iteration=states.append)
             state = states[-1]
             curve = [point[:4] for point in state.curve]
-            found[f"ars {recipe} {task}"] = digest(
+            found[f"ars {name} {task}"] = digest(
                 [
                     *(state.theta, state.normalizer.mean, state.normalizer.squares, curve),
                     *result.policy.networks().weights,
@@ -108,18 +109,17 @@ def ars_digests() -> dict[str, str]:
 
 def ppo_digests() -> dict[str, str]:
     """Three iterations of PPO, which follow torch's kernels: the same on one machine only."""
-    from kinarm.policies.ppo import train_ppo
-    from kinarm.policies.ppo_state import PPOState
+    from kinarm.policies.ppo.state import PPOState
 
     found = {}
-    for recipe, task in (("paper", "right"), ("tuned", "left"), ("tuned", "both")):
+    for name, task in (("paper", "right"), ("tuned", "left"), ("tuned", "both")):
         states: list[PPOState] = []
-        train_ppo(
-            replace(ppo_recipe(recipe, task=task, seed=2), iterations=3),
+        train_policy(
+            replace(recipe("ppo", name, problem=task, seed=2), iterations=3),
             on_iteration=states.append,
         )
         state = states[-1]
-        found[f"ppo {recipe} {task}"] = digest(
+        found[f"ppo {name} {task}"] = digest(
             [
                 *(state.parameters, state.first_moment, state.second_moment),
                 *(state.normalizer.mean, state.normalizer.squares, *state.episodes),

@@ -1,7 +1,6 @@
 """The simulator as a vectorised environment of Stable-Baselines3."""
 
 import time
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,19 +10,19 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from kinarm.episodes import RUNNING, SUCCESS, TRUNCATED, Episodes
 from kinarm.errors import InvalidInputError
-from kinarm.policies.mirror import Mirror
+from kinarm.networks import Mirror
 from kinarm.policies.normalizer import Normalizer, input_scale
-from kinarm.policies.ppo_state import EpisodeStates
+from kinarm.policies.ppo.state import EpisodeStates
 from kinarm.simulator import Simulator
 
 
-class BatchRecord(NamedTuple):
-    """What happened in a `BatchEnv`.
+class EndedEpisodes(NamedTuple):
+    """The episodes that ended in an `SB3VecEnv` since the last look.
 
     Attributes
     ----------
     returns : list of float
-        Returns of the episodes that ended.
+        Their returns.
     successes : list of bool
         Whether they reached the goal.
     time : float
@@ -35,10 +34,10 @@ class BatchRecord(NamedTuple):
     time: float
 
 
-class BatchEnv(VecEnv):
+class SB3VecEnv(VecEnv):
     """Many arms, stepped by one call of the compiled simulator.
 
-    Observations are normalised; episodes that end are replaced at once. With a mirror, an arm
+    Episodes that end are replaced at once. With a mirror, an arm
     whose goal lies to the left is seen in the mirror, and its actions are reflected likewise, so
     that a learner only ever meets goals to the right.
 
@@ -48,12 +47,15 @@ class BatchEnv(VecEnv):
         Arm, scene, task and reward.
     num_envs : int
         Number of arms.
-    normalizer : Normalizer
-        Statistics of the observations as the learner sees them.
     rng : numpy.random.Generator
         Draws starts and goals.
     mirror : Mirror, optional
         Reflection that sends goals on the left to the right.
+
+    Attributes
+    ----------
+    start_spread : float
+        Scales the range of the start configurations of episodes to come.
 
     Notes
     -----
@@ -67,13 +69,13 @@ class BatchEnv(VecEnv):
         simulator: Simulator,
         num_envs: int,
         *,
-        normalizer: Normalizer,
         rng: np.random.Generator,
         mirror: Mirror | None = None,
     ) -> None:
         self.simulator, self.rng, self.mirror = simulator, rng, mirror
+        self.start_spread = simulator.task.start_spread
         self.render_mode = None
-        self._mean, self._scale = normalizer.mean, input_scale(normalizer.std)
+        self.normalize_by(Normalizer.empty(simulator.n_observations))
         seen = Box(-np.inf, np.inf, (simulator.n_observations,), dtype=np.float32)
         moved = Box(-1.0, 1.0, (simulator.n_actions,), dtype=np.float32)
         super().__init__(num_envs, seen, moved)
@@ -85,8 +87,12 @@ class BatchEnv(VecEnv):
 
     def reset(self) -> NDArray[np.float32]:
         """Begin all episodes anew; returns observations, shape (num_envs, n_observations)."""
-        self._episodes = self.simulator.reset(*self.simulator.sample(self.rng, self.num_envs))
-        return self._seen(self._episodes.observation)
+        self._episodes = self.simulator.reset(*self._scenarios(self.num_envs))
+        return self._normalized(self._episodes.observation)
+
+    def _scenarios(self, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Starts and goals of new episodes."""
+        return self.simulator.sample(self.rng, count, start_spread=self.start_spread)
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Take note of the actions, shape (num_envs, n_actions), for `step_wait`."""
@@ -106,23 +112,25 @@ class BatchEnv(VecEnv):
         infos : list of dict
         """
         began = time.perf_counter()
-        episodes = self._running()
-        result = self.simulator.step(episodes, self._meant(episodes.observation))
+        episodes = self._begun_episodes()
+        result = self.simulator.step(episodes, self._simulator_actions(episodes.observation))
         dones = episodes.status != RUNNING
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         ended = np.flatnonzero(dones)
         if ended.size:
-            for row, info in zip(ended.tolist(), self._ends(episodes, ended), strict=True):
+            for row, info in zip(
+                ended.tolist(), self._infos_of_ended(episodes, ended), strict=True
+            ):
                 infos[row] = info
-            episodes.q[ended], episodes.goal[ended] = self.simulator.sample(self.rng, ended.size)
+            episodes.q[ended], episodes.goal[ended] = self._scenarios(ended.size)
             self.simulator.begin(episodes, ended)
-        observations = self._seen(episodes.observation)
+        observations = self._normalized(episodes.observation)
         self._time += time.perf_counter() - began
         return observations, result.reward.astype(np.float32), dones, infos
 
-    def _ends(self, episodes: Episodes, rows: NDArray[np.int64]) -> list[dict[str, Any]]:
+    def _infos_of_ended(self, episodes: Episodes, rows: NDArray[np.int64]) -> list[dict[str, Any]]:
         """Infos of episodes that ended, which are also put on record."""
-        final = self._seen(episodes.observation[rows])
+        final = self._normalized(episodes.observation[rows])
         truncated = (episodes.status[rows] == TRUNCATED).tolist()
         successes = (episodes.status[rows] == SUCCESS).tolist()
         returns, lengths = episodes.total[rows].tolist(), episodes.steps[rows].tolist()
@@ -138,38 +146,38 @@ class BatchEnv(VecEnv):
             for k in range(rows.size)
         ]
 
-    def take_record(self) -> BatchRecord:
+    def take_ended(self) -> EndedEpisodes:
         """What happened since the last call."""
-        record = BatchRecord(self._returns, self._successes, self._time)
+        record = EndedEpisodes(self._returns, self._successes, self._time)
         self._returns, self._successes, self._time = [], [], 0.0
         return record
 
-    def _running(self) -> Episodes:
+    def _begun_episodes(self) -> Episodes:
         if self._episodes is None:
             raise InvalidInputError("the environment was never begun: call reset()")
         return self._episodes
 
-    def _seen(self, observations: NDArray[np.float64]) -> NDArray[np.float32]:
+    def _normalized(self, observations: NDArray[np.float64]) -> NDArray[np.float32]:
         """Observations as the learner sees them."""
         if self.mirror is not None:
-            observations = self.mirror.to_the_right(observations)
+            observations = self.mirror.from_the_right(observations)
         seen: NDArray[np.float32] = ((observations - self._mean) * self._scale).astype(np.float32)
         return seen
 
-    def _meant(self, observations: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _simulator_actions(self, observations: NDArray[np.float64]) -> NDArray[np.float64]:
         """The learner's actions, given what it saw, as the simulator needs them."""
         if self.mirror is None:
             return self._actions
-        left = self.mirror.seen_on_the_left(observations)
+        left = self.mirror.on_the_left(observations)
         return np.where(left[:, None], self._actions * self.mirror.actions, self._actions)
 
-    def spread_starts(self, spread: float) -> None:
-        """From now on, scale the range of the start configurations by this factor in [0, 1]."""
-        self.simulator.task = replace(self.simulator.task, start_spread=spread)
+    def normalize_by(self, normalizer: Normalizer) -> None:
+        """From now on, normalise observations by these statistics, of what the learner sees."""
+        self._mean, self._scale = normalizer.mean, input_scale(normalizer.std)
 
     def states(self) -> EpisodeStates:
         """Copy what the running episodes depend on."""
-        episodes = self._running()
+        episodes = self._begun_episodes()
         return EpisodeStates(
             episodes.q.copy(), episodes.goal.copy(), episodes.steps.copy(), episodes.total.copy()
         )
@@ -179,7 +187,7 @@ class BatchEnv(VecEnv):
         episodes = self.simulator.reset(states.q, states.goal)
         episodes.steps[:], episodes.total[:] = states.steps, states.total
         self._episodes = episodes
-        return self._seen(episodes.observation)
+        return self._normalized(episodes.observation)
 
     def close(self) -> None:
         """Nothing to release."""

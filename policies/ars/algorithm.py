@@ -1,109 +1,44 @@
 """Augmented Random Search (paper, Algorithm 1 and Table 1; Mania, Guy and Recht 2018)."""
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.arm import Arm
-from kinarm.errors import InvalidInputError
-from kinarm.networks import Networks
-from kinarm.policies.ars_config import ARSConfig
+from kinarm.networks import Mirror, Networks
+from kinarm.policies.ars.config import ARSConfig
+from kinarm.policies.ars.state import ARSState
 from kinarm.policies.curve import CurvePoint
-from kinarm.policies.mirror import Mirror, task_mirror
+from kinarm.policies.mirror import commuting_weights, task_mirror
 from kinarm.policies.normalizer import Normalizer, fold_normalizer
 from kinarm.policies.policy import Layer, Policy
 from kinarm.policies.provenance import Provenance
 from kinarm.simulator import Simulator
+from kinarm.world import World
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ARSState:
-    """Everything that the next iteration depends on.
-
-    Attributes
-    ----------
-    theta : ndarray, shape (n_actions, n_observations)
-        Parameters of the policy.
-    normalizer : Normalizer
-        Statistics mu and Sigma of the observations.
-    generator : dict
-        State of the random generator.
-    curve : tuple of CurvePoint
-        One point per finished iteration.
-    """
-
-    theta: NDArray[np.float64]
-    normalizer: Normalizer
-    generator: dict[str, Any]
-    curve: tuple[CurvePoint, ...] = field(default=())
-
-    @property
-    def iteration(self) -> int:
-        """Number of finished iterations."""
-        return len(self.curve)
-
-    @property
-    def environment_steps(self) -> int:
-        """Steps taken so far."""
-        return self.curve[-1].environment_steps if self.curve else 0
-
-    @property
-    def wall_time(self) -> float:
-        """Time spent so far [s]."""
-        return self.curve[-1].wall_time if self.curve else 0.0
-
-
-class ARSResult(NamedTuple):
-    """A trained policy and how it came about.
-
-    Attributes
-    ----------
-    policy : Policy
-        The trained policy.
-    curve : tuple of CurvePoint
-        One point per iteration.
-    """
-
-    policy: Policy
-    curve: tuple[CurvePoint, ...]
-
-
-def train_ars(
-    config: ARSConfig,
-    *,
-    state: ARSState | None = None,
-    on_iteration: Callable[[ARSState], object] | None = None,
-    threads: int | None = None,
-) -> ARSResult:
-    """Train a linear policy.
+class ARSTraining:
+    """A training under way; all that changes is in the `ARSState`.
 
     Parameters
     ----------
     config : ARSConfig
         The settings.
-    state : ARSState, optional
-        Where to go on; the result equals that of an uninterrupted training bit for bit.
-    on_iteration : callable, optional
-        Called with the state after every iteration.
     threads : int, optional
         Threads of the simulator; the result does not depend on it.
     """
-    simulator = config.simulator(threads)
-    state = state or initial_state(config, simulator)
-    shape = (simulator.n_actions, simulator.n_observations)
-    if state.theta.shape != shape:
-        raise InvalidInputError(f"the state to resume has shape {state.theta.shape}, not {shape}")
-    mirror = task_mirror(config.symmetric, simulator)
-    began = time.perf_counter() - state.wall_time
-    while state.iteration < config.iterations:
-        state = ars_iteration(config, simulator, state, began, mirror)
-        if on_iteration is not None:
-            on_iteration(state)
-    return ARSResult(state_policy(config, simulator.arm, state, mirror), state.curve)
+
+    def __init__(self, config: ARSConfig, threads: int | None = None) -> None:
+        self.config, self.simulator = config, config.simulator(threads)
+        self.mirror = task_mirror(config.symmetric, self.simulator.world)
+
+    def initial_state(self) -> ARSState:
+        """State before the first iteration."""
+        return initial_state(self.config, self.simulator)
+
+    def iterate(self, state: ARSState) -> ARSState:
+        """One pass through the loop of Algorithm 1."""
+        return ars_iteration(self.config, self.simulator, state, self.mirror)
 
 
 def initial_state(config: ARSConfig, simulator: Simulator) -> ARSState:
@@ -119,7 +54,6 @@ def ars_iteration(
     config: ARSConfig,
     simulator: Simulator,
     state: ARSState,
-    began: float,
     mirror: Mirror | None = None,
 ) -> ARSState:
     """One pass through the loop of Algorithm 1.
@@ -132,8 +66,6 @@ def ars_iteration(
         Where episodes are run.
     state : ARSState
         State before the iteration.
-    began : float
-        Reading of ``time.perf_counter`` when the training began [s].
     mirror : Mirror, optional
         Reflection that the policy has to commute with.
 
@@ -143,14 +75,13 @@ def ars_iteration(
         State after it. The statistics are frozen within an iteration: they are updated at its
         end with all observations of its episodes.
     """
-    rng = np.random.default_rng()
-    rng.bit_generator.state = state.generator
+    began, rng = time.perf_counter(), state.random_generator()
     N, theta, normalizer = config.directions, state.theta, state.normalizer
     delta = rng.standard_normal((N, *theta.shape))
     if mirror is not None:
-        delta *= mirror.weights
+        delta *= commuting_weights(mirror)
     candidates = np.concatenate([theta + config.noise * delta, theta - config.noise * delta])
-    starts, goals = draw_scenarios(config, simulator, rng)
+    starts, goals = shared_scenarios(config, simulator, rng)
     rollouts = simulator.rollout(
         linear_networks(candidates, policy_normalizer(config, normalizer, mirror)),
         starts,
@@ -165,7 +96,7 @@ def ars_iteration(
         std_return=float(rollouts.returns.std()),
         success=float(rollouts.success.mean()),
         environment_steps=state.environment_steps + int(rollouts.steps.sum()),
-        wall_time=time.perf_counter() - began,
+        wall_time=state.wall_time + time.perf_counter() - began,
     )
     return ARSState(
         theta=theta,
@@ -175,7 +106,7 @@ def ars_iteration(
     )
 
 
-def draw_scenarios(
+def shared_scenarios(
     config: ARSConfig, simulator: Simulator, rng: np.random.Generator
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Draw the starts and goals of an iteration's episodes, shared as configured.
@@ -261,10 +192,9 @@ def ars_step(
     return step_size / (b * sigma) * step
 
 
-def state_policy(
-    config: ARSConfig, arm: Arm, state: ARSState, mirror: Mirror | None = None
-) -> Policy:
+def linear_policy(config: ARSConfig, state: ARSState) -> Policy:
     """Freeze a state of the training into a policy."""
+    mirror = task_mirror(config.symmetric, World(config.problem, threads=1))
     n_actions, n_observations = state.theta.shape
     normalizer = policy_normalizer(config, state.normalizer, mirror)
     normalizer = normalizer or Normalizer.empty(n_observations)
@@ -272,5 +202,5 @@ def state_policy(
         mean=normalizer.mean,
         std=normalizer.std,
         layers=(Layer(state.theta, np.zeros(n_actions)),),
-        provenance=Provenance.of("ars", config, arm, state.environment_steps),
+        provenance=Provenance.of("ars", config, state.environment_steps),
     )

@@ -1,12 +1,13 @@
 """State of a PPO training between two iterations."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.policies.curve import CurvePoint
+from kinarm.errors import InvalidInputError
+from kinarm.policies.learners import TrainingState
 from kinarm.policies.normalizer import Normalizer
 
 
@@ -32,10 +33,10 @@ class EpisodeStates(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PPOState:
+class PPOState(TrainingState):
     """Everything that the next iteration depends on.
 
-    Attributes
+    Parameters
     ----------
     parameters : ndarray of float32, shape (n_parameters,)
         Parameters of actor and critic, in the order of the policy of Stable-Baselines3.
@@ -45,10 +46,15 @@ class PPOState:
         Statistics by which observations are normalised.
     episodes : EpisodeStates
         The episodes that are under way.
-    curve : tuple of CurvePoint
-        One point per finished iteration.
     simulator_time : float
         Time spent in the simulator so far [s].
+    curve : tuple of CurvePoint
+        One point per finished iteration.
+
+    Raises
+    ------
+    InvalidInputError
+        If a training could not go on from it.
     """
 
     parameters: NDArray[np.float32]
@@ -56,20 +62,20 @@ class PPOState:
     second_moment: NDArray[np.float32]
     normalizer: Normalizer
     episodes: EpisodeStates
-    curve: tuple[CurvePoint, ...] = field(default=())
     simulator_time: float = 0.0
 
-    @property
-    def iteration(self) -> int:
-        """Number of finished iterations."""
-        return len(self.curve)
-
-    @property
-    def environment_steps(self) -> int:
-        """Steps taken so far."""
-        return self.curve[-1].environment_steps if self.curve else 0
-
-    @property
-    def wall_time(self) -> float:
-        """Time spent so far [s]."""
-        return self.curve[-1].wall_time if self.curve else 0.0
+    def __post_init__(self) -> None:
+        vectors = (self.parameters, self.first_moment, self.second_moment)
+        if len({vector.shape for vector in vectors}) > 1 or self.parameters.ndim != 1:
+            raise InvalidInputError(
+                f"parameters and moments have the shapes {[vector.shape for vector in vectors]}"
+            )
+        if not all(vector.dtype == np.float32 and np.isfinite(vector).all() for vector in vectors):
+            raise InvalidInputError("parameters and moments must be finite, of single precision")
+        if len({len(array) for array in self.episodes}) > 1:
+            raise InvalidInputError(
+                f"episodes have the shapes {[array.shape for array in self.episodes]}"
+            )
+        mean, squares = self.normalizer.mean, self.normalizer.squares
+        if mean.shape != squares.shape or mean.ndim != 1:
+            raise InvalidInputError(f"statistics have the shapes {mean.shape}, {squares.shape}")

@@ -16,12 +16,9 @@ from kinarm.errors import InvalidInputError
 from kinarm.policies.curve import CurvePoint
 from kinarm.policies.mirror import task_mirror
 from kinarm.policies.normalizer import Normalizer
-from kinarm.policies.policy import Layer, Policy
-from kinarm.policies.ppo_config import PPOConfig
-from kinarm.policies.ppo_env import BatchEnv
-from kinarm.policies.ppo_state import PPOState
-from kinarm.policies.provenance import Provenance
-from kinarm.policies.symmetric_layers import symmetric_layers
+from kinarm.policies.ppo.config import PPOConfig
+from kinarm.policies.ppo.state import PPOState
+from kinarm.policies.ppo.vec_env import SB3VecEnv
 
 NORMALIZED_OVER = 10_000
 """Random starts whose observations are the statistics of the normaliser."""
@@ -52,48 +49,44 @@ def seed_iteration(seed: int, iteration: int) -> np.random.Generator:
     return np.random.default_rng(children[2])
 
 
-class PPOLearner:
+class PPOTraining:
     """Environment and model of a training; all that changes is in the `PPOState`.
+
+    It runs on one thread: its networks and batches are small, and so the result does not depend
+    on the number of processors. Several seeds are best trained by as many processes.
 
     Parameters
     ----------
     config : PPOConfig
         The settings.
-    normalizer : Normalizer
-        Statistics by which observations are normalised.
     tensorboard : str or Path, optional
-        Folder for logs.
+        Folder for the logs of Stable-Baselines3.
     """
 
-    def __init__(
-        self, config: PPOConfig, normalizer: Normalizer, tensorboard: str | Path | None = None
-    ) -> None:
+    @alone_in_torch()
+    def __init__(self, config: PPOConfig, tensorboard: str | Path | None = None) -> None:
+        rng = seed_iteration(config.seed, 0)
+        simulator = config.simulator(threads=1)
+        mirror = task_mirror(config.symmetric, simulator.world)
         self.config = config
-        simulator = config.simulator()
-        self.env = BatchEnv(
-            simulator,
-            config.arms,
-            normalizer=normalizer,
-            rng=np.random.default_rng(),
-            mirror=task_mirror(config.symmetric, simulator),
-        )
+        self.env = SB3VecEnv(simulator, config.n_envs, rng=rng, mirror=mirror)
         self._learning_rate = config.learning_rate
         self.model = PPO(
             "MlpPolicy",
             self.env,
-            n_steps=config.rollout_steps,
-            batch_size=config.minibatch,
-            n_epochs=config.epochs,
+            n_steps=config.n_steps,
+            batch_size=config.batch_size,
+            n_epochs=config.n_epochs,
             learning_rate=lambda _: self._learning_rate,
             gamma=config.gamma,
             gae_lambda=config.gae_lambda,
             clip_range=config.clip_range,
-            ent_coef=config.entropy_weight,
-            vf_coef=config.value_weight,
+            ent_coef=config.ent_coef,
+            vf_coef=config.vf_coef,
             max_grad_norm=config.max_grad_norm,
             policy_kwargs={
-                "net_arch": list(config.hidden),
-                "log_std_init": config.initial_log_std,
+                "net_arch": list(config.net_arch),
+                "log_std_init": config.log_std_init,
             },
             device="cpu",
         )
@@ -101,58 +94,44 @@ class PPOLearner:
         if tensorboard is not None:
             outputs.append(TensorBoardOutputFormat(str(tensorboard)))
         self.model.set_logger(Logger(folder=None, output_formats=outputs))
+        self._first_parameters = self.parameters()
 
-    @classmethod
-    def initial_state(cls, config: PPOConfig) -> PPOState:
+    @alone_in_torch()
+    def initial_state(self) -> PPOState:
         """State before the first iteration; the normaliser has seen random starts."""
-        rng = seed_iteration(config.seed, 0)
-        simulator = config.simulator()
-        observations = simulator.observe(*simulator.sample(rng, NORMALIZED_OVER))
-        mirror = task_mirror(config.symmetric, simulator)
-        if mirror is not None:
-            observations = mirror.to_the_right(observations)
-        learner = cls(config, Normalizer.of(observations))
-        learner.env.rng = rng
-        learner.env.spread_starts(config.start_spread_at(0.0))
-        learner.env.reset()
-        parameters = learner.parameters()
+        env, rng = self.env, seed_iteration(self.config.seed, 0)
+        observations = env.simulator.world.observe(*env.simulator.sample(rng, NORMALIZED_OVER))
+        if env.mirror is not None:
+            observations = env.mirror.from_the_right(observations)
+        env.rng = rng
+        env.start_spread = self.config.start_spread_at(0.0)
+        env.reset()
         return PPOState(
-            parameters=parameters,
-            first_moment=np.zeros_like(parameters),
-            second_moment=np.zeros_like(parameters),
+            parameters=self._first_parameters,
+            first_moment=np.zeros_like(self._first_parameters),
+            second_moment=np.zeros_like(self._first_parameters),
             normalizer=Normalizer.of(observations),
-            episodes=learner.env.states(),
+            episodes=env.states(),
         )
 
-    def iterate(self, state: PPOState, began: float) -> PPOState:
-        """One rollout and one update.
-
-        Parameters
-        ----------
-        state : PPOState
-            State before the iteration.
-        began : float
-            Reading of ``time.perf_counter`` when the training began [s].
-
-        Returns
-        -------
-        PPOState
-            State after it.
-        """
+    @alone_in_torch()
+    def iterate(self, state: PPOState) -> PPOState:
+        """One rollout and one update."""
+        began = time.perf_counter()
         config, model, env = self.config, self.model, self.env
         env.rng = seed_iteration(config.seed, state.iteration + 1)
         self.load(state)
         done = state.iteration / config.iterations
         self._learning_rate = config.learning_rate_at(done)
-        env.spread_starts(config.start_spread_at(done))
+        env.start_spread = config.start_spread_at(done)
         model.learn(config.steps_per_iteration, reset_num_timesteps=False)
-        returns, successes, simulator_time = env.take_record()
+        returns, successes, simulator_time = env.take_ended()
         point = CurvePoint(
             mean_return=float(np.mean(returns)) if returns else float("nan"),
             std_return=float(np.std(returns)) if returns else float("nan"),
             success=float(np.mean(successes)) if successes else float("nan"),
             environment_steps=model.num_timesteps,
-            wall_time=time.perf_counter() - began,
+            wall_time=state.wall_time + time.perf_counter() - began,
         )
         first_moment, second_moment = self._moments()
         return PPOState(
@@ -175,14 +154,14 @@ class PPOLearner:
         """
         config, model = self.config, self.model
         sizes = (len(state.parameters), len(state.episodes.goal))
-        expected = (len(self.parameters()), config.arms)
+        expected = (len(self.parameters()), config.n_envs)
         if sizes != expected:
             raise InvalidInputError(
                 f"the state to resume has {sizes[0]} parameters and {sizes[1]} arms, "
                 f"not {expected[0]} and {expected[1]}"
             )
-        epochs = state.iteration * config.epochs
-        updates = epochs * config.steps_per_iteration // config.minibatch
+        epochs = state.iteration * config.n_epochs
+        updates = epochs * config.steps_per_iteration // config.batch_size
         weights = list(model.policy.parameters())
         vector_to_parameters(torch.tensor(state.parameters), weights)
         moments = (state.first_moment, state.second_moment)
@@ -195,6 +174,7 @@ class PPOLearner:
                 "exp_avg_sq": second.view_as(weight),
             }
         model.num_timesteps, model._n_updates = state.environment_steps, epochs
+        self.env.normalize_by(state.normalizer)
         model._last_obs = self.env.restore(state.episodes)
         model._last_episode_starts = state.episodes.steps == 0
 
@@ -211,24 +191,3 @@ class PPOLearner:
     def _flat(tensors: list[torch.Tensor]) -> NDArray[np.float32]:
         vector: NDArray[np.float32] = parameters_to_vector(tensors).numpy().copy()
         return vector
-
-    def policy(self, state: PPOState) -> Policy:
-        """Freeze the actor of a state into a policy, which takes its mean action."""
-        self.load(state)
-        actor = self.model.policy
-        parts = [*actor.mlp_extractor.policy_net.modules(), actor.action_net]
-        layers = tuple(
-            Layer(part.weight.detach().numpy(), part.bias.detach().numpy())
-            for part in parts
-            if isinstance(part, torch.nn.Linear)
-        )
-        mean, std = state.normalizer.mean, state.normalizer.std
-        if self.env.mirror is not None:
-            layers = symmetric_layers(layers, mean, std, self.env.mirror)
-        config, arm = self.config, self.env.simulator.arm
-        return Policy(
-            mean=mean,
-            std=std,
-            layers=layers,
-            provenance=Provenance.of("ppo", config, arm, state.environment_steps),
-        )

@@ -13,7 +13,7 @@ from kinarm.env import ReachEnv
 from kinarm.errors import InvalidInputError
 from kinarm.policies.mirror import Mirror
 from kinarm.policies.normalizer import Normalizer
-from kinarm.policies.ppo_env import BatchEnv
+from kinarm.policies.ppo.vec_env import SB3VecEnv
 from kinarm.simulator import Simulator
 from kinarm.task import RewardWeights, load_task
 
@@ -33,13 +33,14 @@ def make_env(normalizer):
     def make(seed=0, *, number=NUMBER, mirrored=False, **settings):
         task = load_task("both", **{"reward": REWARD, "tolerance": 0.5, **settings})
         simulator = Simulator("paper", task, threads=1)
-        return BatchEnv(
+        env = SB3VecEnv(
             simulator,
             number,
-            normalizer=normalizer,
             rng=np.random.default_rng(seed),
             mirror=Mirror.of(simulator) if mirrored else None,
         )
+        env.normalize_by(normalizer)
+        return env
 
     return make
 
@@ -173,7 +174,7 @@ def test_states_are_copies(make_env):
     np.testing.assert_array_equal(states.q, before)
 
 
-def test_the_record_holds_every_episode_once(make_env):
+def test_what_ended_holds_every_episode_once(make_env):
     env = make_env(5)
     env.reset()
     rng = np.random.default_rng(0)
@@ -183,10 +184,10 @@ def test_the_record_holds_every_episode_once(make_env):
             if info:
                 returns.append(info["episode"]["r"])
                 successes.append(info["is_success"])
-    record = env.take_record()
+    record = env.take_ended()
     assert (record.returns, record.successes) == (returns, successes)
     assert record.time > 0
-    assert env.take_record() == ([], [], 0.0)
+    assert env.take_ended() == ([], [], 0.0)
 
 
 class TestMirror:
