@@ -7,7 +7,7 @@ from kinarm._exports import lazy_exports
 from kinarm.envs.registration import register_environments
 
 if TYPE_CHECKING:
-    from kinarm.arm import Arm, ArmSpecification, arm_names
+    from kinarm.arm import Arm, ArmSpecification
     from kinarm.envs import ReachEnv, ReachVectorEnv
     from kinarm.errors import (
         ArmError,
@@ -26,11 +26,12 @@ if TYPE_CHECKING:
     from kinarm.problem import PROBLEMS, ReachProblem, Stepping
     from kinarm.reference import ReferenceSimulator
     from kinarm.replay import Replay
-    from kinarm.rollouts import Rollouts
+    from kinarm.rollouts import Rollouts, StepResult
     from kinarm.scene import GoalRegion, Obstacle, Scene
-    from kinarm.simulator import Simulator, StepResult
+    from kinarm.simulator import Simulator
     from kinarm.task import REWARD_TERMS, ReachTask, RewardWeights
     from kinarm.trajectory import Recording, load_recordings, save_recordings
+    from kinarm.urdf import arm_names
     from kinarm.world import World
 
 __version__ = "0.1.0"
@@ -84,7 +85,7 @@ def __dir__() -> list[str]:
 __getattr__ = lazy_exports(
     __name__,
     {
-        "arm": ("Arm", "ArmSpecification", "arm_names"),
+        "arm": ("Arm", "ArmSpecification"),
         "envs": ("ReachEnv", "ReachVectorEnv"),
         "errors": (
             "ArmError",
@@ -103,11 +104,12 @@ __getattr__ = lazy_exports(
         "problem": ("PROBLEMS", "ReachProblem", "Stepping"),
         "reference": ("ReferenceSimulator",),
         "replay": ("Replay",),
-        "rollouts": ("Rollouts",),
+        "rollouts": ("Rollouts", "StepResult"),
         "scene": ("GoalRegion", "Obstacle", "Scene"),
-        "simulator": ("Simulator", "StepResult"),
+        "simulator": ("Simulator",),
         "task": ("REWARD_TERMS", "ReachTask", "RewardWeights"),
         "trajectory": ("Recording", "load_recordings", "save_recordings"),
+        "urdf": ("arm_names",),
         "world": ("World",),
     },
 )

@@ -94,7 +94,7 @@ def _add_option(
 ) -> None:
     """Add the option of one field, or those of a nested dataclass."""
     hint = alternatives(type_hints(kind)[item.name])[0]
-    if is_dataclass(hint):
+    if isinstance(hint, type) and is_dataclass(hint):
         for inner in init_fields(hint).values():
             _add_option(parser, hint, inner, f"{prefix}{item.name}.")
         return

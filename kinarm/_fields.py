@@ -163,7 +163,6 @@ def alternatives(hint: Any) -> tuple[Any, ...]:
     return (hint,)
 
 
-@cache
 def type_hints(kind: type) -> dict[str, Any]:
     """Resolved types of the fields of a dataclass."""
     return get_type_hints(kind)

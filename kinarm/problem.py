@@ -8,7 +8,7 @@ import hashlib
 import json
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -262,7 +262,7 @@ def _specification(arm: Arm | ArmSpecification | str | Path) -> ArmSpecification
     return Arm.load(arm).specification
 
 
-PARTS = {
+PARTS: dict[str, Callable[[Any], Any]] = {
     "name": str,
     "arm": _specification,
     "scene": lambda scene: scene if isinstance(scene, Scene) else ReachProblem.load(scene).scene,
@@ -320,48 +320,3 @@ def _flattened(value: Any, path: str = "") -> dict[str, Any]:
         for name, part in parts.items()
         for leaf, entry in _flattened(part, name).items()
     }
-
-
-@dataclass(frozen=True, kw_only=True)
-class ProblemOptions:
-    """Which problem: the options that all commands share.
-
-    Parameters
-    ----------
-    problem : str
-        Left, right, both, or a problem file.
-    arm : str
-        Another arm: its name, or a URDF.
-    task : str
-        The task of another problem, by its name or file.
-    scene : str
-        The scene of another problem, by its name or file.
-    tolerance : float
-        Distance at which a goal counts as reached [m].
-    horizon : int
-        Steps after which an episode is truncated.
-    start_spread : float
-        Scales the range of the start configurations, from 0 (home) to 1 (all).
-    """
-
-    problem: str | None = None
-    arm: str | None = None
-    task: str | None = None
-    scene: str | None = None
-    tolerance: float | None = None
-    horizon: int | None = None
-    start_spread: float | None = None
-
-    def resolve(self, default: ProblemLike = "right") -> ReachProblem:
-        """The problem that the options make of a default one.
-
-        Raises
-        ------
-        KinarmError
-            If a name or file cannot be used, or a number is out of range.
-        """
-        changed = {name: getattr(self, name) for name in init_fields(ProblemOptions)}
-        named = changed.pop("problem")
-        if named is None and self.task is not None:
-            named = changed.pop("task")
-        return ReachProblem.load(named or default).replace(**changed)

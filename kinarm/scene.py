@@ -48,12 +48,14 @@ class Obstacle:
     @property
     def size(self) -> NDArray[np.float64]:
         """Lengths of its edges [m], shape (3,)."""
-        return np.array(self.upper) - np.array(self.lower)
+        size: NDArray[np.float64] = np.array(self.upper) - np.array(self.lower)
+        return size
 
     @property
     def centre(self) -> NDArray[np.float64]:
         """Its centre in the world [m], shape (3,)."""
-        return (np.array(self.lower) + np.array(self.upper)) / 2
+        centre: NDArray[np.float64] = (np.array(self.lower) + np.array(self.upper)) / 2
+        return centre
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,7 +1,6 @@
 """The simulator: a problem, stepped in batches of episodes."""
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +13,7 @@ from kinarm.errors import InvalidInputError, StartInContactError
 from kinarm.kernels.rollout import advance, begin, refuse
 from kinarm.networks import CompiledPolicy, Networks, network_control, table_control
 from kinarm.problem import ProblemLike, ReachProblem
-from kinarm.rollouts import Rollouts
+from kinarm.rollouts import Rollouts, StepResult
 from kinarm.scenarios import draw_scenarios
 from kinarm.scene import Scene
 from kinarm.task import ReachTask
@@ -22,32 +21,6 @@ from kinarm.world import World
 
 PolicyFunction = Callable[[NDArray[np.float64]], ArrayLike]
 """Maps observations, shape (n, n_observations), to actions, shape (n, n_actuated)."""
-
-
-class StepResult(NamedTuple):
-    """Outcome of one step of n episodes; arrays of shape (n,).
-
-    Attributes
-    ----------
-    reward : ndarray
-        Sum of the terms.
-    terms : ndarray, shape (n, n_terms)
-        The weighted terms, in the order of `kinarm.task.REWARD_TERMS`; zero for episodes that
-        were over before.
-    success, collision, truncated : ndarray of bool
-        How the step ended; all false for episodes that go on or were over before.
-    """
-
-    reward: NDArray[np.float64]
-    terms: NDArray[np.float64]
-    success: NDArray[np.bool_]
-    collision: NDArray[np.bool_]
-    truncated: NDArray[np.bool_]
-
-    @property
-    def terminated(self) -> NDArray[np.bool_]:
-        """Success or collision."""
-        return self.success | self.collision
 
 
 class Simulator:
@@ -288,20 +261,7 @@ class Simulator:
     def check_scenarios(
         self, starts: ArrayLike, goals: ArrayLike
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Validate starts and goals.
-
-        Returns
-        -------
-        starts : ndarray, shape (n, n_axes)
-            Configurations [rad or m].
-        goals : ndarray, shape (n, 3)
-            Goal positions [m].
-
-        Raises
-        ------
-        InvalidInputError
-            If a shape is wrong, an entry is not finite or a start is beyond the limits.
-        """
+        """Copy starts and goals, or refuse them as `reset` does."""
         q = finite_array("starts", starts, (None, self.arm.n_axes))
         goal = finite_array("goals", goals, (len(q), 3))
         outside = ((q < self.arm.lower) | (q > self.arm.upper)).any(axis=1)

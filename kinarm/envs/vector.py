@@ -19,8 +19,8 @@ from kinarm.envs.reach import (
 from kinarm.episodes import RUNNING, Episodes
 from kinarm.errors import InvalidInputError
 from kinarm.problem import ProblemLike
+from kinarm.rollouts import StepResult
 from kinarm.scenarios import ScenarioStream
-from kinarm.simulator import StepResult
 from kinarm.task import REWARD_TERMS
 
 
