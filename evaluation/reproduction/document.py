@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from kinarm._files import write_text
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.plots import save_figure
 from kinarm.evaluation.reproduction.claims import Claim, assess
@@ -27,7 +28,6 @@ from kinarm.evaluation.reproduction.tables import (
     speed_table,
     sweep_table,
 )
-from kinarm.files import write_text
 from kinarm.policies.provenance import package_versions
 
 FIGURES: dict[str, Callable[[Results], Any]] = {
@@ -108,7 +108,7 @@ def runs_csv(results: Results) -> str:
         writer.writerow(
             [
                 training.name,
-                *(training.purpose, config.task, config.seed, training.reading.name),
+                *(training.purpose, config.problem.name, config.seed, training.reading.name),
                 int(run.environment_steps[-1]),
                 *(float(np.mean(distance <= limit)) for limit in (0.05, 0.1, 0.2)),
                 *(f"{value:.4f}" for value in (distance.mean(), np.median(distance))),

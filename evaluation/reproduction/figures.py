@@ -11,7 +11,7 @@ from kinarm.evaluation.plots import BIN_WIDTH, COLOURS
 from kinarm.evaluation.reproduction.results import Results
 from kinarm.evaluation.reproduction.runs import TrainedRun
 from kinarm.evaluation.reproduction.study import LEARNERS, NEAR, Purpose
-from kinarm.task import TASKS
+from kinarm.problem import PROBLEMS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,8 +32,8 @@ NARROWEST = 0.005
 
 def figure_2(results: Results) -> "Figure":
     """Training rewards and final distances of ARS, a row per task (paper, Figure 2)."""
-    figure, panels = _panels((9.0, 8.4), len(TASKS), 2, sharex="col", sharey="col")
-    for number, (task, row) in enumerate(zip(TASKS, panels, strict=True), start=1):
+    figure, panels = _panels((9.0, 8.4), len(PROBLEMS), 2, sharex="col", sharey="col")
+    for number, (task, row) in enumerate(zip(PROBLEMS, panels, strict=True), start=1):
         runs = results.select("ars", task)
         _rewards(row[0], runs)
         _histograms(row[1], runs)
@@ -71,8 +71,8 @@ def figure_3(results: Results) -> "Figure":
     The oracle's is drawn behind them: what could be reached. Heights are square roots, so that
     broad and narrow densities can be told apart beside each other.
     """
-    figure, panels = _panels((7.5, 8.4), len(TASKS), 1, sharex=True)
-    for number, (task, axes) in enumerate(zip(TASKS, panels[:, 0], strict=True), start=1):
+    figure, panels = _panels((7.5, 8.4), len(PROBLEMS), 1, sharex=True)
+    for number, (task, axes) in enumerate(zip(PROBLEMS, panels[:, 0], strict=True), start=1):
         distance = np.linspace(0.0, SHOWN_DISTANCE, 481)
         highest = 0.0
         for learner, style in STYLES.items():
@@ -133,9 +133,9 @@ def learning_curves(results: Results, against: Literal["steps", "time"]) -> "Fig
     against : {"steps", "time"}
         Whether progress is shown against environment steps or against wall time.
     """
-    figure, panels = _panels((10.5, 6.4), 2, len(TASKS), sharex=True, sharey="row")
+    figure, panels = _panels((10.5, 6.4), 2, len(PROBLEMS), sharex=True, sharey="row")
     label, across = ACROSS[against]
-    for task, (above, below) in zip(TASKS, panels.T, strict=True):
+    for task, (above, below) in zip(PROBLEMS, panels.T, strict=True):
         for learner, style in STYLES.items():
             if runs := results.select(learner, task):
                 x = np.array([across(run) for run in runs])

@@ -41,7 +41,7 @@ class Term(NamedTuple):
         What every training seed got in every trial.
     trials : hashable
         Names the trials. Crossed ones have one name: terms were measured on the same trials, or
-        trial by trial on variants of them, such as mirror images.
+        trial by trial on variants of them, such as the same places of another bench.
     """
 
     weight: float
@@ -53,10 +53,10 @@ def contrast(terms: Sequence[Term]) -> Estimate:
     """Weighted sum of means over seeds and trials.
 
     Seeds and trials are crossed random effects: all seeds of a recipe face the same trials, and so
-    may several recipes, or recipes on tasks that are mirror images. The variance is the sum of that
-    of the seeds' means, in each term, and that of the trials' weighted means, in each set of
-    crossed trials; what is particular to a seed on a trial is in both, which errs on the wide
-    side. The interval is Student's, with the degrees of freedom of
+    may several recipes, also on tasks whose trials differ in nothing but the bench. The variance is
+    the sum of that of the seeds' means, in each term, and that of the trials' weighted means, in
+    each set of crossed trials; what is particular to a seed on a trial is in both, which errs on
+    the wide side. The interval is Student's, with the degrees of freedom of
     Welch and Satterthwaite.
 
     Parameters

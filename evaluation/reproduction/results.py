@@ -10,7 +10,7 @@ from kinarm.evaluation.reproduction.runs import RunStore, TrainedRun
 from kinarm.evaluation.reproduction.study import LITERAL, Purpose, Reading, Study, Training
 from kinarm.evaluation.reproduction.training import final_trials
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.ars_config import ARSConfig
+from kinarm.policies.ars.config import ARSConfig
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class Results:
             for training, run in self.runs.items()
             if training.purpose == purpose
             and training.reading == reading
-            and task in (None, training.config.task)
+            and task in (None, training.config.problem.name)
         ]
 
     def distances(
@@ -70,4 +70,4 @@ class Results:
 
     def trial_set(self, task: str, reading: Reading = LITERAL) -> TrialSet:
         """What the final policies faced."""
-        return final_trials(task, reading, self.study.protocol)
+        return final_trials(reading.problem(task), self.study.protocol)

@@ -4,21 +4,21 @@ import hashlib
 import json
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.errors import PolicyFileError
+from kinarm._archive import CORRUPT, load_archive, save_archive
+from kinarm._files import write_text
+from kinarm.errors import KinarmError, PolicyFileError
 from kinarm.evaluation.reproduction.study import Protocol, Training
-from kinarm.files import CORRUPT, write_atomically, write_text
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import package_versions
 from kinarm.semantics import SEMANTICS
 
-FORMAT = "kinarm-outcome-1"
+KIND, FORMAT_VERSION = "trained run", 1
 PPO_PACKAGES = ("torch", "stable-baselines3")
 
 
@@ -128,40 +128,34 @@ class RunStore:
         arrays = dict(vars(run))
         wall_time = arrays.pop("wall_time").round(4).tolist()
         write_text(self._timing_path(training), json.dumps(wall_time))
-        arrays["identity"] = np.array(self._identity(training))
-        arrays["policy_digest"] = np.array(_digest(self.policy_path(training)))
-        write_atomically(self._run_path(training), partial(np.savez_compressed, **arrays))
+        header = self._header(training)
+        save_archive(self._run_path(training), KIND, FORMAT_VERSION, arrays, header, compress=True)
 
     def load(self, training: Training) -> TrainedRun | None:
         """Read a finished training; None if it is not finished, incomplete or of other settings."""
         try:
             wall_time = np.array(json.loads(self._timing_path(training).read_text()), dtype=float)
-            with (
-                self._run_path(training).open("rb") as opened,
-                np.load(opened, allow_pickle=False) as file,
-            ):
-                arrays: dict[str, Any] = dict(file)
-            known = str(arrays.pop("identity")) == self._identity(training)
-            intact = str(arrays.pop("policy_digest")) == _digest(self.policy_path(training))
+            path = self._run_path(training)
+            header, arrays = load_archive(path, KIND, FORMAT_VERSION, KinarmError)
+            fits = header == self._header(training)
             run = TrainedRun(**arrays, wall_time=wall_time)
-        except (OSError, *CORRUPT):
+        except (OSError, KinarmError, *CORRUPT):
             return None
-        complete = len(run.wall_time) == len(run.returns)
-        return run if known and intact and complete else None
+        return run if fits and len(run.wall_time) == len(run.returns) else None
 
-    def _identity(self, training: Training) -> str:
-        """Everything that a run depends on, as JSON."""
+    def _header(self, training: Training) -> dict[str, Any]:
+        """Everything that a run depends on, and the hash of its policy."""
         versions = package_versions()
         if training.purpose != "ppo":
             versions = {name: v for name, v in versions.items() if name not in PPO_PACKAGES}
-        entries = {
-            "format": FORMAT,
+        policy = self.policy_path(training).read_bytes()
+        return {
             "semantics": SEMANTICS,
-            **training.to_json(),
+            "training": training.to_json(),
             "protocol": asdict(self.protocol),
             "versions": versions,
+            "policy": hashlib.sha256(policy).hexdigest(),
         }
-        return json.dumps(entries, sort_keys=True)
 
     def commits(self, trainings: Iterable[Training]) -> tuple[str, ...]:
         """Commits at which finished trainings were made."""
@@ -172,7 +166,3 @@ class RunStore:
             except PolicyFileError:
                 continue
         return tuple(sorted(made - {""}))
-
-
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -10,7 +10,7 @@ from kinarm.evaluation.reproduction.claims import LEVELS, Claim, steps_to_levels
 from kinarm.evaluation.reproduction.results import Results
 from kinarm.evaluation.reproduction.runs import TrainedRun
 from kinarm.evaluation.reproduction.study import LEARNERS, LITERAL, NEAR, Reading
-from kinarm.task import TASKS
+from kinarm.problem import PROBLEMS
 
 MARKS = {"holds": "holds", "does not hold": "no", "undecided": "?"}
 
@@ -48,7 +48,7 @@ def claims_table(claims: Iterable[Claim]) -> str:
 def learners_table(results: Results) -> str:
     """Final policies of every learner next to what could be reached; means over seeds."""
     rows: list[list[str]] = []
-    for number, task in enumerate(TASKS, start=1):
+    for number, task in enumerate(PROBLEMS, start=1):
         trials, name = results.trial_set(task), f"{number}: {task}"
         bounds = oracle_bounds(trials)
         final, possible = bounds.final_distance, float(bounds.reachable.mean())
@@ -110,7 +110,7 @@ def speed_table(results: Results) -> str:
     """Environment steps after which levels of success were first seen; medians over seeds."""
     shown = [purpose for purpose in LEARNERS if results.select(purpose)]
     rows = []
-    for task in TASKS:
+    for task in PROBLEMS:
         steps = [steps_to_levels(results.select(purpose, task)) for purpose in shown]
         for number, (distance, share) in enumerate(LEVELS):
             cells = (_median_cell(learner[number]) for learner in steps)
@@ -135,7 +135,7 @@ def readings_table(results: Results, claims: Mapping[Reading, Sequence[Claim]]) 
     rows = []
     for reading, judged in claims.items():
         verdicts = {claim.name: claim.verdict for claim in judged}
-        near = (np.mean(results.distances("ars", task, reading) <= NEAR) for task in TASKS)
+        near = (np.mean(results.distances("ars", task, reading) <= NEAR) for task in PROBLEMS)
         rows.append(
             (
                 *(f"{reading.start_spread:g}", reading.reward, reading.sharing),
