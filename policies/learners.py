@@ -210,19 +210,35 @@ def train_policy(
     InvalidInputError
         If the state is not one of such a training.
     """
+    training = begin_training(config, **options)
+    return run_training(config, training, state=state, on_iteration=on_iteration)
+
+
+def begin_training(config: TrainingConfig, **options: Any) -> Training[Any]:
+    """Prepare a training, and refuse what cannot be trained; see `train_policy`."""
     learner = learner_of(config)
     learner.check_installed()
     for option in options:
         if option not in learner.options:
             raise InvalidInputError(f"{learner.name} has no option {option!r}")
-    training = learner.begin(config, **options)
+    return learner.begin(config, **options)
+
+
+def run_training(
+    config: TrainingConfig,
+    training: Training[Any],
+    *,
+    state: TrainingState | None = None,
+    on_iteration: Callable[[Any], object] | None = None,
+) -> TrainingResult:
+    """Iterate until the training is complete; see `train_policy`."""
     if state is None:
         state = training.initial_state()
     while state.iteration < config.iterations:
         state = training.iterate(state)
         if on_iteration is not None:
             on_iteration(state)
-    return TrainingResult(learner.policy(config, state), state.curve, state)
+    return TrainingResult(state_policy(config, state), state.curve, state)
 
 
 def state_policy(config: TrainingConfig, state: TrainingState) -> "Policy":
