@@ -198,7 +198,8 @@ def measure_single_env(problem: "ReachProblem", repetitions: int) -> Timing:
 
 def measure_training(problem: "ReachProblem", repetitions: int) -> dict[str, Any]:
     """Time and steps of a training with Table 1's settings."""
-    from kinarm.policies.learners import recipe, train_policy
+    from kinarm.policies.learners import train_policy
+    from kinarm.policies.recipes import recipe
 
     seconds, steps = [], 0
     for _ in range(repetitions):
@@ -236,7 +237,8 @@ def measure_ppo(problem: "ReachProblem") -> dict[str, Any]:
         Figures that JSON can hold, or under ``skipped`` why there are none.
     """
     from kinarm.errors import MissingExtraError
-    from kinarm.policies.learners import recipe, train_policy
+    from kinarm.policies.learners import train_policy
+    from kinarm.policies.recipes import recipe
 
     config = recipe("ppo", "tuned", problem=problem)
     try:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import time
@@ -12,7 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinarm.errors import WorkerError
+from kinarm.errors import InvalidInputError, WorkerError
+from kinarm.evaluation.commands.reproduce import ReproductionRequest
 from kinarm.evaluation.reproduction.executor import LocalExecutor
 from kinarm.evaluation.reproduction.study import quick_study
 
@@ -87,6 +89,33 @@ class TestQuick:
         answer = run_outside("kinarm-reproduce", *QUICK, cwd=folder.parent)
         assert "29 of 30 trainings are finished" in answer.err
         assert contents(folder) == before
+
+
+class InThisProcess:
+    """An executor as simple as can be."""
+
+    def __init__(self):
+        self.names = []
+
+    def carry_out(self, work, tasks):
+        for task in tasks:
+            work(task)
+            self.names.append(task.name)
+            yield task
+
+
+def test_python_gets_the_same_from_a_request_and_another_executor(reference, tmp_path):
+    """Nothing is left to do in a copy without two of the runs but these two."""
+    folder = tmp_path / "copy"
+    shutil.copytree(reference[0], folder)
+    for name in ("ars-left-seed0", "ars-both-seed1"):
+        (folder / "runs" / f"{name}.npz").unlink()
+    executor = InThisProcess()
+    request = ReproductionRequest(quick=True, ppo=False, out=folder)
+    claims = request.run(executor, command="kinarm-reproduce --quick --no-ppo --jobs 2")
+    assert sorted(executor.names) == ["ars-both-seed1", "ars-left-seed0"]
+    assert contents(folder) == contents(reference[0])
+    assert claims[0].name == "ars-left"
 
 
 @pytest.mark.slow
@@ -203,6 +232,8 @@ class TestBadInput:
         assert answer.out == ""
 
     def test_jobs(self, run):
+        with pytest.raises(InvalidInputError, match="jobs"):
+            ReproductionRequest(jobs=0)
         self.check(run("kinarm-reproduce", "--jobs", 0), "must be a whole number of at least 1")
 
     def test_folder_of_another_study(self, run, tmp_path):
@@ -222,7 +253,7 @@ class TestBadInput:
         self.check(answer, "cannot write")
 
     def test_without_the_extra(self, run, tmp_path, monkeypatch):
-        monkeypatch.setattr("kinarm.policies.ppo.find_spec", lambda _: None)
+        monkeypatch.setattr("kinarm.policies.learners.find_spec", lambda _: None)
         answer = run("kinarm-reproduce", "--quick", "--out", tmp_path)
         self.check(answer, "pip install 'kinarm[ppo]'")
         assert list(tmp_path.iterdir()) == []

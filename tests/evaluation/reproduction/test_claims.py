@@ -35,8 +35,8 @@ def as_the_paper_says(training):
         return made_up(distance, np.tile(distance[:10], (4, 1)))
     base = 0.1 if training.purpose == "ars" else 0.05
     distance = base + np.abs(noise(training))
-    if training.purpose == "ars" and config.task == "both":
-        trials = final_trials("both", training.reading, Protocol())
+    if training.purpose == "ars" and config.problem.name == "both":
+        trials = final_trials(config.problem, Protocol())
         poor = (trials.goals[:, 1] > 0) == bool(config.seed % 2)
         distance = distance + 0.5 * poor
     return made_up(distance, learnt_at(0 if training.purpose == "ars" else 2))
@@ -50,7 +50,7 @@ def the_other_way_round(training):
         distance = 0.5 - better + noise(training)
         return made_up(distance, np.tile(distance[:10], (4, 1)))
     base = 0.5 if training.purpose == "ars" else 0.7
-    distance = base - 0.1 * (config.task == "both") + noise(training)
+    distance = base - 0.1 * (config.problem.name == "both") + noise(training)
     return made_up(distance, learnt_at(2 if training.purpose == "ars" else 0))
 
 
@@ -106,7 +106,8 @@ def test_trials_of_all_tasks_are_crossed(start_spread):
     """What `contrast` is told of them: one start, and one place of the goal on its bench."""
     reading = Reading(start_spread=start_spread)
     left, right, both = (
-        final_trials(task, reading, Protocol(trials=50)) for task in ("left", "right", "both")
+        final_trials(reading.problem(task), Protocol(trials=50))
+        for task in ("left", "right", "both")
     )
     bench_to_bench = np.array([0.0, 1.3, 0.0])
     np.testing.assert_allclose(left.goals, right.goals + bench_to_bench)

@@ -12,12 +12,12 @@ from kinarm.evaluation.reproduction.runs import RunStore
 from kinarm.evaluation.reproduction.study import Protocol, Study, Training
 from kinarm.evaluation.reproduction.training import carry_out
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies import Policy, ars_recipe, train_ars
-from kinarm.simulator import Simulator
+from kinarm.policies import Policy, recipe, train_policy
+from kinarm.problem import PROBLEMS
 
 PROTOCOL = Protocol(trials=12, snapshots=3, snapshot_trials=5)
 TRAINING = Training(
-    purpose="ars", config=ars_recipe("paper", task="left", iterations=7, directions=12)
+    purpose="ars", config=recipe("ars", "paper", problem="left", iterations=7, directions=12)
 )
 
 
@@ -30,11 +30,11 @@ def store(tmp_path):
 class TestCarryOut:
     def test_the_run_is_that_of_the_training(self, store):
         run = store.load(TRAINING)
-        result = train_ars(TRAINING.config)
+        result = train_policy(TRAINING.config)
         np.testing.assert_array_equal(run.returns, [p.mean_return for p in result.curve])
         steps = [point.environment_steps for point in result.curve]
         np.testing.assert_array_equal(run.environment_steps, steps)
-        trials = TrialSet.draw(Simulator("paper", "left"), 12, seed=0)
+        trials = TrialSet.draw(PROBLEMS["left"], 12, seed=0)
         rollouts = trials.simulator.rollout(result.policy, trials.starts, trials.goals)
         np.testing.assert_array_equal(run.distance, rollouts.distance)
         np.testing.assert_array_equal(run.collision, rollouts.collision)
@@ -45,9 +45,9 @@ class TestCarryOut:
     def test_snapshots_are_policies_in_the_course_of_it(self, store):
         run = store.load(TRAINING)
         assert run.snapshots.tolist() == [1, 4, 6]
-        trials = TrialSet.draw(Simulator("paper", "left"), 5, seed=1)
+        trials = TrialSet.draw(PROBLEMS["left"], 5, seed=1)
         for row, iteration in enumerate(run.snapshots):
-            policy = train_ars(replace(TRAINING.config, iterations=int(iteration) + 1)).policy
+            policy = train_policy(replace(TRAINING.config, iterations=int(iteration) + 1)).policy
             rollouts = trials.simulator.rollout(policy, trials.starts, trials.goals)
             np.testing.assert_allclose(run.snapshot_distance[row], rollouts.distance, atol=1e-6)
 
@@ -75,7 +75,7 @@ class TestStore:
         assert store.load(TRAINING) is None
 
     def test_a_policy_of_another_training_is_noticed(self, store):
-        train_ars(replace(TRAINING.config, seed=5)).policy.save(store.policy_path(TRAINING))
+        train_policy(replace(TRAINING.config, seed=5)).policy.save(store.policy_path(TRAINING))
         assert store.load(TRAINING) is None
 
     def test_other_settings_are_another_training(self, store):
