@@ -9,7 +9,6 @@ from typing import Any
 
 from kinarm._command_line import Parser, add_options, request_of, run_command
 from kinarm._validation import whole_number
-from kinarm.evaluation.measurements import VECTOR_ENVS, measure
 
 PROG = "kinarm-bench"
 
@@ -56,6 +55,8 @@ class BenchmarkRequest:
         KinarmError
             If the policy cannot be used.
         """
+        from kinarm.evaluation.measurements import measure
+
         return measure(self.policy, self.repetitions, ppo=self.ppo)
 
 
@@ -88,6 +89,8 @@ def _bench(options: argparse.Namespace) -> None:
 def _table(document: dict[str, Any]) -> Any:
     """The figures as a table."""
     from rich.table import Table
+
+    from kinarm.evaluation.measurements import VECTOR_ENVS
 
     table = Table(title=f"kinarm-bench, policy {document['policy']}", title_justify="left")
     table.add_column("what")

@@ -2,6 +2,7 @@
 
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +62,9 @@ def carry_out(training: Training, protocol: Protocol, folder: Path, threads: int
             rollouts = _face(state_policy(config, state), trials)
             distance.append(rollouts.distance.astype(np.float32))
 
-    options = {"threads": threads} if "threads" in learner_of(config).options else {}
+    options: dict[str, Any] = (
+        {"threads": threads} if "threads" in learner_of(config).options else {}
+    )
     policy, curve, _ = train_policy(config, on_iteration=judge, **options)
     final = _face(policy, final_trials(config.problem, protocol))
     run = TrainedRun(

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from kinarm.evaluation import measurements
-from kinarm.policies import recipes
+from kinarm.policies import recipe
 from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
 
@@ -26,15 +26,15 @@ def document(train_novice, tmp_path_factory):
 
 def shrink(patch: pytest.MonkeyPatch) -> None:
     """Fewer batch sizes and trials, and a short training."""
-    recipe, run = recipes.recipe, subprocess.run
+    run = subprocess.run
 
     def run_less(command, **settings):
-        *words, last = command
-        return run([*words, last.replace("'200'", "'1', '--policy', 'zero'")], **settings)
+        fewer = ["1" if word == "200" else word for word in command]
+        return run([*fewer, "--policy", "zero"], **settings)
 
     patch.setattr(measurements, "BATCHES", (6, 512))
     patch.setattr(measurements, "ORACLE_TRIALS", 4)
-    patch.setattr(recipes, "recipe", partial(recipe, iterations=3))
+    patch.setattr(measurements, "recipe", partial(recipe, iterations=3))
     patch.setattr(subprocess, "run", run_less)
 
 
@@ -131,12 +131,11 @@ def test_timing_divides_steps_by_time_and_leaves_out_the_first_run(monkeypatch):
 def test_measured_steps_are_steps_taken(monkeypatch, train_novice):
     """The rate of trained rollouts counts the steps of the episodes, not their horizon."""
     counted = []
-    monkeypatch.setattr(measurements, "BATCHES", (32,))
     monkeypatch.setattr(
         measurements, "timed", lambda run, _: counted.append(run()) or measurements.Timing(1, 1)
     )
     simulator, policy = Simulator("right", threads=1), train_novice("right")
-    measurements.measure_rollouts(simulator, policy, 1)
+    measurements.measure_rollouts(simulator, policy, 32, 1)
     starts, goals = simulator.sample(np.random.default_rng(32), 32)
     steps = int(simulator.rollout(policy, starts, goals).steps.sum())
     assert steps < 32 * 64
@@ -157,7 +156,7 @@ class TestPPO:
     def training(self, monkeypatch):
         pytest.importorskip("stable_baselines3")
         tiny = {"iterations": 3, "n_envs": 4, "batch_size": 64, "net_arch": (8, 8)}
-        monkeypatch.setattr(recipes, "recipe", partial(recipes.recipe, **tiny))
+        monkeypatch.setattr(measurements, "recipe", partial(recipe, **tiny))
         return measurements.measure_ppo(PROBLEMS["left"])
 
     def test_share_of_the_simulator(self, training):
