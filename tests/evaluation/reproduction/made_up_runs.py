@@ -1,10 +1,10 @@
-"""Outcomes of trainings that never took place."""
+"""Runs of trainings that never took place."""
 
 from typing import Any
 
 import numpy as np
 
-from kinarm.evaluation.reproduction.outcome import Outcome
+from kinarm.evaluation.reproduction.runs import TrainedRun
 
 SNAPSHOTS, SNAPSHOT_TRIALS = 4, 10
 
@@ -13,11 +13,11 @@ def made_up(
     distance: np.ndarray[Any, Any],
     snapshots: np.ndarray[Any, Any] | None = None,
     steps_per_iteration: int = 1000,
-) -> Outcome:
-    """An outcome with given final distances and distances at four snapshots."""
+) -> TrainedRun:
+    """A run with given final distances and distances at four snapshots."""
     if snapshots is None:
         snapshots = np.ones((SNAPSHOTS, SNAPSHOT_TRIALS))
-    return Outcome(
+    return TrainedRun(
         returns=np.linspace(0, 1, SNAPSHOTS),
         environment_steps=steps_per_iteration * np.arange(1, SNAPSHOTS + 1),
         wall_time=np.linspace(0.1, 1, SNAPSHOTS),

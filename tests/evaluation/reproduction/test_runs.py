@@ -1,55 +1,55 @@
-"""Outcomes on disk: complete and of the same settings, or not there at all."""
+"""Trained runs on disk: complete and of the same settings, or not there at all."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from outcomes import made_up
+from made_up_runs import made_up
 
-from kinarm.evaluation.reproduction import outcome as outcome_module
-from kinarm.evaluation.reproduction.outcome import OutcomeStore
-from kinarm.evaluation.reproduction.results import Results, distances_after, steps_to_level
+from kinarm.evaluation.reproduction import runs
+from kinarm.evaluation.reproduction.results import Results
+from kinarm.evaluation.reproduction.runs import RunStore
 from kinarm.evaluation.reproduction.study import Protocol, Study, Training
-from kinarm.evaluation.reproduction.training_run import carry_out
+from kinarm.evaluation.reproduction.training import carry_out
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies import Policy, ars_recipe, train_ars
-from kinarm.simulator import Simulator
+from kinarm.policies import Policy, recipe, train_policy
+from kinarm.problem import PROBLEMS
 
 PROTOCOL = Protocol(trials=12, snapshots=3, snapshot_trials=5)
 TRAINING = Training(
-    purpose="ars", config=ars_recipe("paper", task="left", iterations=7, directions=12)
+    purpose="ars", config=recipe("ars", "paper", problem="left", iterations=7, directions=12)
 )
 
 
 @pytest.fixture
 def store(tmp_path):
     carry_out(TRAINING, PROTOCOL, tmp_path, threads=1)
-    return OutcomeStore(tmp_path, PROTOCOL)
+    return RunStore(tmp_path, PROTOCOL)
 
 
 class TestCarryOut:
-    def test_outcome_is_that_of_the_training(self, store):
-        outcome = store.load(TRAINING)
-        result = train_ars(TRAINING.config)
-        np.testing.assert_array_equal(outcome.returns, [p.mean_return for p in result.curve])
+    def test_the_run_is_that_of_the_training(self, store):
+        run = store.load(TRAINING)
+        result = train_policy(TRAINING.config)
+        np.testing.assert_array_equal(run.returns, [p.mean_return for p in result.curve])
         steps = [point.environment_steps for point in result.curve]
-        np.testing.assert_array_equal(outcome.environment_steps, steps)
-        trials = TrialSet.draw(Simulator("paper", "left"), 12, seed=0)
+        np.testing.assert_array_equal(run.environment_steps, steps)
+        trials = TrialSet.draw(PROBLEMS["left"], 12, seed=0)
         rollouts = trials.simulator.rollout(result.policy, trials.starts, trials.goals)
-        np.testing.assert_array_equal(outcome.distance, rollouts.distance)
-        np.testing.assert_array_equal(outcome.collision, rollouts.collision)
-        np.testing.assert_array_equal(outcome.steps, rollouts.steps)
+        np.testing.assert_array_equal(run.distance, rollouts.distance)
+        np.testing.assert_array_equal(run.collision, rollouts.collision)
+        np.testing.assert_array_equal(run.steps, rollouts.steps)
         saved = Policy.load(store.policy_path(TRAINING))
         np.testing.assert_array_equal(saved.layers[0].weights, result.policy.layers[0].weights)
 
     def test_snapshots_are_policies_in_the_course_of_it(self, store):
-        outcome = store.load(TRAINING)
-        assert outcome.snapshots.tolist() == [1, 4, 6]
-        trials = TrialSet.draw(Simulator("paper", "left"), 5, seed=1)
-        for row, iteration in enumerate(outcome.snapshots):
-            policy = train_ars(replace(TRAINING.config, iterations=int(iteration) + 1)).policy
+        run = store.load(TRAINING)
+        assert run.snapshots.tolist() == [1, 4, 6]
+        trials = TrialSet.draw(PROBLEMS["left"], 5, seed=1)
+        for row, iteration in enumerate(run.snapshots):
+            policy = train_policy(replace(TRAINING.config, iterations=int(iteration) + 1)).policy
             rollouts = trials.simulator.rollout(policy, trials.starts, trials.goals)
-            np.testing.assert_allclose(outcome.snapshot_distance[row], rollouts.distance, atol=1e-6)
+            np.testing.assert_allclose(run.snapshot_distance[row], rollouts.distance, atol=1e-6)
 
     def test_wall_time_grows(self, store):
         times = store.load(TRAINING).wall_time
@@ -59,7 +59,7 @@ class TestCarryOut:
 
 class TestStore:
     def test_nothing_is_there_at_first(self, tmp_path):
-        assert OutcomeStore(tmp_path, PROTOCOL).load(TRAINING) is None
+        assert RunStore(tmp_path, PROTOCOL).load(TRAINING) is None
 
     @pytest.mark.parametrize("kept", [0.0, 0.3, 0.9, 0.999])
     @pytest.mark.parametrize("folder", ["policies", "runs", "timing"])
@@ -75,7 +75,7 @@ class TestStore:
         assert store.load(TRAINING) is None
 
     def test_a_policy_of_another_training_is_noticed(self, store):
-        train_ars(replace(TRAINING.config, seed=5)).policy.save(store.policy_path(TRAINING))
+        train_policy(replace(TRAINING.config, seed=5)).policy.save(store.policy_path(TRAINING))
         assert store.load(TRAINING) is None
 
     def test_other_settings_are_another_training(self, store):
@@ -83,18 +83,18 @@ class TestStore:
         longer = replace(TRAINING, config=replace(TRAINING.config, iterations=8))
         assert longer.name == TRAINING.name
         assert store.load(longer) is None
-        other = OutcomeStore(store.folder, replace(PROTOCOL, trials=13))
+        other = RunStore(store.folder, replace(PROTOCOL, trials=13))
         assert other.load(TRAINING) is None
 
-    def test_other_sources_are_another_training(self, store, monkeypatch):
-        monkeypatch.setattr(outcome_module, "sources_digest", lambda: "changed")
+    def test_other_semantics_are_another_training(self, store, monkeypatch):
+        monkeypatch.setattr(runs, "SEMANTICS", "another")
         assert store.load(TRAINING) is None
 
     def test_ppos_packages_do_not_concern_ars(self, store, monkeypatch):
-        versions = outcome_module.package_versions()
-        monkeypatch.setattr(outcome_module, "package_versions", lambda: {**versions, "torch": "0"})
+        versions = runs.package_versions()
+        monkeypatch.setattr(runs, "package_versions", lambda: {**versions, "torch": "0"})
         assert store.load(TRAINING) is not None
-        monkeypatch.setattr(outcome_module, "package_versions", lambda: {**versions, "numpy": "0"})
+        monkeypatch.setattr(runs, "package_versions", lambda: {**versions, "numpy": "0"})
         assert store.load(TRAINING) is None
 
 
@@ -104,19 +104,19 @@ def test_results_know_what_is_missing(store):
     results = Results.load(study, store)
     assert results.missing == (other,)
     assert results.distances("ars", "left").shape == (1, 12)
-    assert results.select("ars", "right") == {}
+    assert results.select("ars", "right") == []
 
 
 class TestSnapshots:
-    OUTCOME = made_up(np.ones(3), np.array([[0.5, 0.5], [0.2, 0.5], [0.1, 0.1], [0.3, 0.3]]))
+    RUN = made_up(np.ones(3), np.array([[0.5, 0.5], [0.2, 0.5], [0.1, 0.1], [0.3, 0.3]]))
 
     @pytest.mark.parametrize(
         ("distance", "share", "steps"),
         [(0.5, 1.0, 1000), (0.2, 0.5, 2000), (0.2, 0.75, 3000), (0.05, 0.25, float("inf"))],
     )
     def test_steps_to_level(self, distance, share, steps):
-        assert steps_to_level(self.OUTCOME, distance, share) == steps
+        assert self.RUN.steps_to_level(distance, share) == steps
 
     @pytest.mark.parametrize(("steps", "distance"), [(4000, 0.3), (3999, 0.1), (10, 0.5)])
-    def test_distances_after(self, steps, distance):
-        assert distances_after(self.OUTCOME, steps)[1] == pytest.approx(distance)
+    def test_distance_after(self, steps, distance):
+        assert self.RUN.distance_after(steps)[1] == pytest.approx(distance)

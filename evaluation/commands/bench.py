@@ -4,30 +4,66 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
-from kinarm.command_line import Parser, run_command, whole_number
-from kinarm.evaluation.measurements import VECTOR_ENVS, measure
+from kinarm._command_line import Parser, add_options, request_of, run_command
+from kinarm._validation import whole_number
 
 PROG = "kinarm-bench"
+
+
+@dataclass(frozen=True, kw_only=True)
+class BenchmarkRequest:
+    """Measure how fast kinarm is on this machine.
+
+    Parameters
+    ----------
+    repetitions : int
+        How often each figure is measured.
+    policy : str
+        Trained policy to run, on the problem that it is for.
+    ppo : bool
+        Time a training with PPO as well, a minute or two.
+    json : bool
+        Print JSON on standard output.
+
+    Raises
+    ------
+    InvalidInputError
+        If there are no repetitions.
+    """
+
+    repetitions: int = 7
+    policy: str = field(default="ars-tuned-right", metadata={"metavar": "NAME_OR_FILE"})
+    ppo: bool = False
+    json: bool = False
+
+    def __post_init__(self) -> None:
+        whole_number("repetitions", self.repetitions, 1)
+
+    def run(self) -> dict[str, Any]:
+        """Measure everything.
+
+        Returns
+        -------
+        dict
+            Figures that JSON can hold: rates [steps/s], shares, and times [s].
+
+        Raises
+        ------
+        KinarmError
+            If the policy cannot be used.
+        """
+        from kinarm.evaluation.measurements import measure
+
+        return measure(self.policy, self.repetitions, ppo=self.ppo)
 
 
 def build_parser() -> Parser:
     """The options of the command."""
     parser = Parser(prog=PROG, description="Measure how fast kinarm is on this machine.")
-    parser.add_argument(
-        "--repetitions", type=whole_number(1), default=7, metavar="N", help="per figure (7)"
-    )
-    parser.add_argument(
-        "--policy",
-        default="ars-tuned-right",
-        metavar="NAME_OR_FILE",
-        help="trained policy to run (ars-tuned-right)",
-    )
-    parser.add_argument(
-        "--ppo", action="store_true", help="time a training with PPO as well (a minute or two)"
-    )
-    parser.add_argument("--json", action="store_true", help="print JSON on standard output")
+    add_options(parser, BenchmarkRequest)
     return parser
 
 
@@ -37,9 +73,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _bench(options: argparse.Namespace) -> None:
-    """From options to figures."""
-    document = measure(options.policy, options.repetitions, ppo=options.ppo)
-    if options.json:
+    """Run a request, and print its figures."""
+    request = request_of(options, BenchmarkRequest)
+    document = request.run()
+    if request.json:
         json.dump(document, sys.stdout)
         sys.stdout.write("\n")
         return
@@ -52,6 +89,8 @@ def _bench(options: argparse.Namespace) -> None:
 def _table(document: dict[str, Any]) -> Any:
     """The figures as a table."""
     from rich.table import Table
+
+    from kinarm.evaluation.measurements import VECTOR_ENVS
 
     table = Table(title=f"kinarm-bench, policy {document['policy']}", title_justify="left")
     table.add_column("what")
@@ -76,33 +115,29 @@ def _table(document: dict[str, Any]) -> Any:
     table.add_section()
     table.add_row(
         f"training of Table 1 ({training['environment_steps'] / 1e6:.1f} million steps)",
-        *(f"{training['seconds'][name]:.2f} s" for name in ("median", "best")),
+        *(f"{training['seconds'][name]:.2f} s" for name in RATES),
     )
-    if "ppo_training" in document:
-        for row in _ppo_rows(document["ppo_training"]):
-            table.add_row(*row)
+    for row in _ppo_rows(document.get("ppo_training")):
+        table.add_row(*row)
+    oracle = document["oracle"]
     table.add_row(
-        f"oracle, {document['oracle']['trials']} trials of a task",
-        *(
-            f"{document['oracle']['trials'] / document['oracle']['trials_per_second'][name]:.1f} s"
-            for name in ("median", "best")
-        ),
+        f"oracle, {oracle['trials']} trials of a task",
+        *(f"{oracle['trials'] / oracle['trials_per_second'][name]:.1f} s" for name in RATES),
     )
     evaluation = document["evaluation"]
-    memory = f"{evaluation['peak_memory_mb']:.0f} MB"
-    table.add_row(
-        "kinarm-eval --trials 200, bounds unknown",
-        f"{evaluation['seconds_without_bounds']:.1f} s",
-        memory,
-    )
-    table.add_row(
-        "kinarm-eval --trials 200, bounds known", f"{evaluation['seconds']:.1f} s", memory
-    )
+    for known, name in (("unknown", "seconds_without_bounds"), ("known", "seconds")):
+        table.add_row(
+            f"kinarm-eval --trials 200, bounds {known}",
+            f"{evaluation[name]:.1f} s",
+            f"{evaluation['peak_memory_mb']:.0f} MB",
+        )
     return table
 
 
-def _ppo_rows(training: dict[str, Any]) -> list[tuple[str, ...]]:
-    """Rows of the training with PPO, which is timed once."""
+def _ppo_rows(training: dict[str, Any] | None) -> list[tuple[str, ...]]:
+    """Rows of the training with PPO, which is timed once if at all."""
+    if training is None:
+        return []
     if "skipped" in training:
         return [("training with PPO", "skipped"), (training["skipped"],)]
     steps = training["environment_steps"] / 1e6
@@ -112,8 +147,11 @@ def _ppo_rows(training: dict[str, Any]) -> list[tuple[str, ...]]:
     ]
 
 
+RATES = ("median", "best")
+
+
 def _rates(timing: dict[str, float]) -> list[str]:
-    return [f"{timing[name]:,.0f} steps/s" for name in ("median", "best")]
+    return [f"{timing[name]:,.0f} steps/s" for name in RATES]
 
 
 if __name__ == "__main__":

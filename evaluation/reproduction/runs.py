@@ -2,28 +2,28 @@
 
 import hashlib
 import json
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
-from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.errors import PolicyFileError
-from kinarm.evaluation import trials
+from kinarm._archive import CORRUPT, load_archive, save_archive
+from kinarm._files import write_text
+from kinarm.errors import KinarmError, PolicyFileError
 from kinarm.evaluation.reproduction.study import Protocol, Training
-from kinarm.files import CORRUPT, write_atomically, write_text
-from kinarm.policies import oracle
 from kinarm.policies.policy import Policy
-from kinarm.policies.provenance import hash_sources, package_versions
+from kinarm.policies.provenance import package_versions
+from kinarm.semantics import SEMANTICS
 
-FORMAT = "kinarm-outcome-1"
+KIND, FORMAT_VERSION = "trained run", 1
 PPO_PACKAGES = ("torch", "stable-baselines3")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Outcome:
+class TrainedRun:
     """What a training came to; all distances are in metres.
 
     Attributes
@@ -60,11 +60,35 @@ class Outcome:
         """Environment steps at the snapshots, shape (n_snapshots,)."""
         return self.environment_steps[self.snapshots]
 
+    def steps_to_level(self, distance: float, share: float) -> float:
+        """Environment steps at the first snapshot that ended near often enough.
 
-class OutcomeStore:
-    """The folder in which the outcomes of a study lie.
+        Parameters
+        ----------
+        distance : float
+            What counts as near [m].
+        share : float
+            In which share of the snapshot's trials.
 
-    An outcome consists of the policy, its wall times and ``runs/NAME.npz``, written in this order:
+        Returns
+        -------
+        float
+            The steps; infinity if there is no such snapshot.
+        """
+        reached = (self.snapshot_distance <= distance).mean(axis=1) >= share
+        return float(self.snapshot_steps[reached.argmax()]) if reached.any() else float("inf")
+
+    def distance_after(self, environment_steps: float) -> NDArray[np.float32]:
+        """Final distances at the last snapshot within a number of steps, or at the first [m]."""
+        within = int(np.count_nonzero(self.snapshot_steps <= environment_steps))
+        last: NDArray[np.float32] = self.snapshot_distance[max(within - 1, 0)]
+        return last
+
+
+class RunStore:
+    """The folder in which the trained runs of a study lie.
+
+    A run consists of the policy, its wall times and ``runs/NAME.npz``, written in this order:
     where the last is complete and fits the others, the training is finished. Wall times are kept
     apart, so that all other files depend on the settings alone.
 
@@ -90,7 +114,7 @@ class OutcomeStore:
     def _timing_path(self, training: Training) -> Path:
         return self.folder / "timing" / f"{training.name}.json"
 
-    def save(self, training: Training, policy: Policy, outcome: Outcome) -> None:
+    def save(self, training: Training, policy: Policy, run: TrainedRun) -> None:
         """Write a finished training.
 
         Raises
@@ -98,49 +122,42 @@ class OutcomeStore:
         OutputError
             If a file cannot be written.
         """
-        paths = (self.policy_path, self._timing_path, self._run_path)
-        for path in paths:
+        for path in (self.policy_path, self._timing_path, self._run_path):
             path(training).parent.mkdir(parents=True, exist_ok=True)
         policy.save(self.policy_path(training))
-        arrays = {**vars(outcome)}
+        arrays = dict(vars(run))
         wall_time = arrays.pop("wall_time").round(4).tolist()
         write_text(self._timing_path(training), json.dumps(wall_time))
-        arrays["identity"] = np.array(self._identity(training))
-        arrays["policy_digest"] = np.array(_digest(self.policy_path(training)))
-        write_atomically(self._run_path(training), partial(np.savez_compressed, **arrays))
+        header = self._header(training)
+        save_archive(self._run_path(training), KIND, FORMAT_VERSION, arrays, header, compress=True)
 
-    def load(self, training: Training) -> Outcome | None:
+    def load(self, training: Training) -> TrainedRun | None:
         """Read a finished training; None if it is not finished, incomplete or of other settings."""
         try:
             wall_time = np.array(json.loads(self._timing_path(training).read_text()), dtype=float)
-            with (
-                self._run_path(training).open("rb") as opened,
-                np.load(opened, allow_pickle=False) as file,
-            ):
-                arrays: dict[str, Any] = dict(file)
-            known = str(arrays.pop("identity")) == self._identity(training)
-            intact = str(arrays.pop("policy_digest")) == _digest(self.policy_path(training))
-            outcome = Outcome(**arrays, wall_time=wall_time)
-        except (OSError, *CORRUPT):
+            path = self._run_path(training)
+            header, arrays = load_archive(path, KIND, FORMAT_VERSION, KinarmError)
+            fits = header == self._header(training)
+            run = TrainedRun(**arrays, wall_time=wall_time)
+        except (OSError, KinarmError, *CORRUPT):
             return None
-        complete = len(outcome.wall_time) == len(outcome.returns)
-        return outcome if known and intact and complete else None
+        return run if fits and len(run.wall_time) == len(run.returns) else None
 
-    def _identity(self, training: Training) -> str:
-        """Everything that an outcome depends on, as JSON."""
+    def _header(self, training: Training) -> dict[str, Any]:
+        """Everything that a run depends on, and the hash of its policy."""
         versions = package_versions()
         if training.purpose != "ppo":
             versions = {name: v for name, v in versions.items() if name not in PPO_PACKAGES}
-        entries = {
-            "format": FORMAT,
-            **training.to_json(),
+        policy = self.policy_path(training).read_bytes()
+        return {
+            "semantics": SEMANTICS,
+            "training": training.to_json(),
             "protocol": asdict(self.protocol),
             "versions": versions,
-            "sources": sources_digest(),
+            "policy": hashlib.sha256(policy).hexdigest(),
         }
-        return json.dumps(entries, sort_keys=True)
 
-    def commits(self, trainings: tuple[Training, ...]) -> tuple[str, ...]:
+    def commits(self, trainings: Iterable[Training]) -> tuple[str, ...]:
         """Commits at which finished trainings were made."""
         made = set()
         for training in trainings:
@@ -149,14 +166,3 @@ class OutcomeStore:
             except PolicyFileError:
                 continue
         return tuple(sorted(made - {""}))
-
-
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-@cache
-def sources_digest() -> str:
-    """Hash of the sources of simulator, learners and trials."""
-    policies = Path(oracle.__file__).parent.glob("*.py")
-    return hash_sources(*sorted(policies), Path(trials.__file__))[:16]
