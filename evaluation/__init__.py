@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from kinarm.evaluation.evaluation import Evaluation, PooledEvaluation, evaluate, pool
     from kinarm.evaluation.figures import distance_histograms, save_figure
     from kinarm.evaluation.metrics import METRICS, Metric, Outcomes
-    from kinarm.evaluation.recording import record
+    from kinarm.evaluation.replays.recorder import record
     from kinarm.evaluation.report.page import report_page, write_report
     from kinarm.evaluation.statistics import Estimate
     from kinarm.evaluation.trials import TrialSet
@@ -52,7 +52,7 @@ __getattr__ = lazy_exports(
         "evaluation": ("Evaluation", "PooledEvaluation", "evaluate", "pool"),
         "figures": ("distance_histograms", "save_figure"),
         "metrics": ("METRICS", "Metric", "Outcomes"),
-        "recording": ("record",),
+        "replays.recorder": ("record",),
         "report.page": ("report_page", "write_report"),
         "statistics": ("Estimate",),
         "trials": ("TrialSet",),

@@ -17,9 +17,9 @@ from kinarm.evaluation.trials import TrialSet
 from kinarm.files import first_line
 from kinarm.policies.library import group_of
 from kinarm.policies.provenance import package_versions, source_commit
+from kinarm.recording import Recording
 from kinarm.simulator import Simulator
 from kinarm.task import load_task
-from kinarm.trajectory import Recording
 from kinarm.validation import finite_array
 
 FORMAT_VERSION = 2

@@ -17,8 +17,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from kinarm.arm import Arm
+from kinarm.capsules import enclosing_capsule, is_capsule
 from kinarm.chain import Chain
-from kinarm.errors import ArmError
 from kinarm.motion_bounds import point_speed
 from kinarm.scene import Scene
 
@@ -40,7 +40,7 @@ class ContactShapes(NamedTuple):
         The capsule that is or encloses the shape: its end points (3 + 3) in the joint frame and
         its radius [m].
     boxes : ndarray, shape (n_boxes, 2, 3)
-        Lower and upper corners of the benches [m].
+        Lower and upper corners of the obstacles [m].
     pairs : ndarray of int, shape (n_pairs, 3)
         Kind of the pair, index of a shape, and index of the other shape or box.
     travel : ndarray, shape (n_actuated, n_pairs)
@@ -56,14 +56,6 @@ class ContactShapes(NamedTuple):
     pairs: NDArray[np.int64]
     travel: NDArray[np.float64]
     exact: NDArray[np.bool_]
-
-
-class Capsule(NamedTuple):
-    """A segment with a radius, in the frame of the joint that carries it."""
-
-    start: NDArray[np.float64]
-    end: NDArray[np.float64]
-    radius: float
 
 
 class Contact(NamedTuple):
@@ -113,7 +105,7 @@ class ContactModel:
         geometry = arm.geometry.copy()
         n_shapes = geometry.ngeoms
         obstacles = _add_scene(geometry, scene)
-        candidates = _candidate_pairs(geometry, n_shapes, len(scene.benches))
+        candidates = _candidate_pairs(geometry, n_shapes, len(scene.obstacles))
         geometry.removeAllCollisionPairs()
         for first, second, _ in candidates:
             geometry.addCollisionPair(pin.CollisionPair(first, second))
@@ -221,12 +213,12 @@ def make_verdicts_reliable(data: pin.GeometryData) -> pin.GeometryData:
 
 
 def _add_scene(geometry: pin.GeometryModel, scene: Scene) -> tuple[str, ...]:
-    """Add benches, then the ground, to a geometry model; return their names."""
+    """Add obstacles, then the ground, to a geometry model; return their names."""
     names = []
-    for bench in scene.benches:
-        placement = pin.SE3(np.eye(3), (bench.lower + bench.upper) / 2)
-        box = coal.Box(*(bench.upper - bench.lower))
-        names.append(f"{bench.name} bench")
+    for obstacle in scene.obstacles:
+        placement = pin.SE3(np.eye(3), obstacle.centre)
+        box = coal.Box(*obstacle.size)
+        names.append(obstacle.name)
         geometry.addGeometryObject(pin.GeometryObject(names[-1], 0, placement, box))
     if scene.ground:
         names.append("ground")
@@ -323,18 +315,14 @@ def _contact_shapes(
     arrays = ContactShapes(
         link=link,
         capsules=np.array([np.hstack(capsule) for capsule in capsules]).reshape(-1, 7),
-        boxes=np.array([(bench.lower, bench.upper) for bench in scene.benches]).reshape(-1, 2, 3),
+        boxes=np.array([(each.lower, each.upper) for each in scene.obstacles]).reshape(-1, 2, 3),
         pairs=np.array(rows, dtype=np.int64).reshape(-1, 3),
         travel=travel,
-        exact=np.array([_is_capsule(shape) for shape in objects], dtype=bool),
+        exact=np.array([is_capsule(shape) for shape in objects], dtype=bool),
     )
     for array in arrays:
         array.flags.writeable = False
     return arrays
-
-
-def _is_capsule(shape: pin.GeometryObject) -> bool:
-    return isinstance(shape.geometry, coal.Capsule | coal.Sphere)
 
 
 def _keeps_height(chain: Chain, axis: int) -> bool:
@@ -344,53 +332,3 @@ def _keeps_height(chain: Chain, axis: int) -> bool:
     w, x, y, z = chain.rotation[0]
     world_axis = pin.Quaternion(w, x, y, z).matrix() @ chain.axis[0]
     return bool(np.hypot(world_axis[0], world_axis[1]) < 1e-12)
-
-
-def enclosing_capsule(shape: pin.GeometryObject) -> Capsule:
-    """Capsule that equals a capsule or sphere, or encloses any other shape.
-
-    Parameters
-    ----------
-    shape : pinocchio.GeometryObject
-        Capsule, sphere, cylinder, box or convex hull.
-
-    Returns
-    -------
-    Capsule
-        In the frame of the shape's parent joint.
-
-    Raises
-    ------
-    ArmError
-        For any other kind of shape.
-    """
-    body = shape.geometry
-    if isinstance(body, coal.Sphere):
-        local = Capsule(np.zeros(3), np.zeros(3), float(body.radius))
-    elif isinstance(body, coal.Capsule | coal.Cylinder):
-        half = np.array([0.0, 0.0, float(body.halfLength)])
-        local = Capsule(-half, half, float(body.radius))
-    elif isinstance(body, coal.Box):
-        signs = np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T
-        local = _capsule_around(signs * body.halfSide)
-    elif isinstance(body, coal.ConvexBase):
-        local = _capsule_around(np.array(body.points()))
-    else:
-        raise ArmError(f"collision shape {shape.name!r} is a {type(body).__name__}: not supported")
-    placement = shape.placement
-    return Capsule(placement.act(local.start), placement.act(local.end), local.radius)
-
-
-def _capsule_around(points: NDArray[np.float64]) -> Capsule:
-    """Capsule along the longest principal direction of a set of points, shape (n, 3)."""
-    centre = (points.min(axis=0) + points.max(axis=0)) / 2
-    _, _, directions = np.linalg.svd(points - centre, full_matrices=False)
-    direction = directions[0]
-    along = (points - centre) @ direction
-    across = np.linalg.norm(points - centre - along[:, None] * direction, axis=1)
-    radius = float(across.max()) * (1 + 1e-9)
-    cap = np.sqrt(np.maximum(radius**2 - across**2, 0.0))
-    low, high = float((along + cap).min()), float((along - cap).max())
-    if low > high:
-        low = high = (low + high) / 2
-    return Capsule(centre + low * direction, centre + high * direction, radius)

@@ -5,26 +5,39 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm.observation import observation_size
+from kinarm.task import REWARD_TERMS
+
 RUNNING, PAUSED, SUCCESS, COLLISION, TRUNCATED = range(5)
 """States of an episode."""
 
 
-def observation_size(n_axes: int) -> int:
-    """Length of an observation: goal, goal - tool, and quaternion and position of every axis."""
-    return 6 + 7 * n_axes
+LINEAR, TANH, RELU = range(3)
+"""Activation functions of networks."""
 
 
 class Rules(NamedTuple):
-    """Task and motion limits as the kernels need them."""
+    """Task and motion limits as the kernels need them.
+
+    Attributes
+    ----------
+    step_limit : ndarray, shape (n_actuated,)
+        Largest move of each joint in a step [rad or m].
+    tested : int
+        Configurations at which the motion of a step is tested for contact.
+    tolerance : float
+        The goal counts as reached at this distance or less [m].
+    horizon : int
+        Steps after which an episode is truncated.
+    reward : ndarray, shape (n_terms,)
+        Weights of the reward terms.
+    """
 
     step_limit: NDArray[np.float64]
+    tested: int
     tolerance: float
     horizon: int
-    progress: float
-    closer: float
-    collision: float
-    success: float
-    step: float
+    reward: NDArray[np.float64]
 
 
 class Control(NamedTuple):
@@ -38,6 +51,12 @@ class Control(NamedTuple):
         Layer after layer, the weights (inputs x outputs) and then the bias.
     policy : ndarray of int, shape (n_episodes,)
         Which row of ``weights`` an episode uses.
+    activation, output : int
+        Function between layers and after the last one, whose values are then clipped.
+    observation_signs, action_signs : ndarray, shape (n_observations,) and (n_actuated,), or (0,)
+        The reflection by which the networks see goals on the left, if they do.
+    side : int
+        Entry of the observation that is positive where the goal lies on the left.
     actions : ndarray, shape (n_episodes, n_steps, n_actuated)
         The table; a table of one step serves every step.
     """
@@ -45,6 +64,11 @@ class Control(NamedTuple):
     layers: NDArray[np.int64]
     weights: NDArray[np.float64]
     policy: NDArray[np.int64]
+    activation: int
+    output: int
+    observation_signs: NDArray[np.float64]
+    action_signs: NDArray[np.float64]
+    side: int
     actions: NDArray[np.float64]
 
 
@@ -73,8 +97,10 @@ class Episodes(NamedTuple):
         Goal position [m].
     observation : ndarray, shape (n, n_observations)
         Observation of the current state.
-    distance, previous_distance : ndarray, shape (n,)
-        From the tool to the goal, now and before the last step [m].
+    distance : ndarray, shape (n,)
+        From the tool to the goal [m].
+    terms : ndarray, shape (n, n_terms)
+        Weighted terms of the last reward.
     total : ndarray, shape (n,)
         Return: sum of rewards.
     moments : ndarray, shape (n, 2, n_observations) or (0, 2, n_observations)
@@ -96,7 +122,7 @@ class Episodes(NamedTuple):
     goal: NDArray[np.float64]
     observation: NDArray[np.float64]
     distance: NDArray[np.float64]
-    previous_distance: NDArray[np.float64]
+    terms: NDArray[np.float64]
     total: NDArray[np.float64]
     moments: NDArray[np.float64]
     shift: NDArray[np.float64]
@@ -146,7 +172,7 @@ class Episodes(NamedTuple):
             goal=np.array(goals),
             observation=np.zeros((n, n_observations)),
             distance=np.zeros(n),
-            previous_distance=np.zeros(n),
+            terms=np.zeros((n, len(REWARD_TERMS))),
             total=np.zeros(n),
             moments=np.zeros((collected, 2, n_observations)),
             shift=np.zeros(n_observations) if shift is None else np.array(shift),

@@ -4,7 +4,7 @@
 
     KinarmError
     ├── ArmError            a robot description is missing, malformed or not supported
-    ├── SceneError          a scene or task that cannot be built, or offers no legal start
+    ├── ProblemError        a scene, task or problem that cannot be built, or is another one
     ├── InvalidInputError   an argument with the wrong shape, range or a non-finite entry
     │   └── UnknownNameError    a name that does not exist; lists the ones that do
     ├── StartInContactError a start configuration that touches something
@@ -37,8 +37,8 @@ class ArmError(KinarmError):
     """A robot description is missing, malformed or describes what kinarm cannot simulate."""
 
 
-class SceneError(KinarmError):
-    """A scene or task is inconsistent, or no contact-free start exists in it."""
+class ProblemError(KinarmError):
+    """A problem is inconsistent, offers no contact-free start, or is not the one expected."""
 
 
 class InvalidInputError(KinarmError, ValueError):

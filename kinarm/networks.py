@@ -1,15 +1,16 @@
 """Sources of actions for the compiled simulator: batches of dense networks, and tables."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol, Union, runtime_checkable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple, Protocol, Union, get_args, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm.episodes import Control
-from kinarm.errors import InvalidInputError
-from kinarm.validation import finite_array
+from kinarm._validation import finite_array
+from kinarm.episodes import LINEAR, RELU, TANH, Control
+from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.observation import GOAL_SIDE
 
 
 @runtime_checkable
@@ -20,9 +21,45 @@ class CompiledPolicy(Protocol):
         """The policy as a batch of one network, its normaliser included."""
 
 
+ACTIVATIONS: dict[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
+    "linear": lambda values: values,
+    "tanh": np.tanh,
+    "relu": lambda values: np.maximum(values, 0.0),
+}
+"""Activation functions by name, as the kernels apply them."""
+
+Activation = Literal["linear", "tanh", "relu"]
+CODES = {"linear": LINEAR, "tanh": TANH, "relu": RELU}
+
+
+class Mirror(NamedTuple):
+    """Signs that the reflection y -> -y gives to each number.
+
+    Attributes
+    ----------
+    observations : ndarray, shape (n_observations,)
+        Signs of the entries of an observation.
+    actions : ndarray, shape (n_actions,)
+        Signs of the entries of an action.
+    """
+
+    observations: NDArray[np.float64]
+    actions: NDArray[np.float64]
+
+    def on_the_left(self, observations: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which observations, shape (n, n_observations), have a goal to the left of the arm."""
+        left: NDArray[np.bool_] = observations[:, GOAL_SIDE] > 0
+        return left
+
+    def from_the_right(self, observations: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Reflect those observations, shape (n, n_observations), whose goal lies to the left."""
+        left = self.on_the_left(observations)
+        return np.where(left[:, None], observations * self.observations, observations)
+
+
 @dataclass(frozen=True, eq=False)
 class Networks:
-    """Networks of equal layer widths: tanh between layers, output clipped to [-1, 1].
+    """Dense networks of equal layer widths, whose output is clipped to [-1, 1].
 
     Attributes
     ----------
@@ -30,6 +67,11 @@ class Networks:
         Widths, from the observation to the action.
     weights : ndarray, shape (n_networks, n_parameters)
         Per network, layer after layer: weights (inputs x outputs, row by row), then the bias.
+    activation, output : {"linear", "tanh", "relu"}
+        Function between the layers, and after the last one before the clip.
+    mirror : Mirror or None
+        Reflection in which the networks see goals on the left, and act; None if they see all
+        goals as they are.
 
     Raises
     ------
@@ -39,6 +81,9 @@ class Networks:
 
     layers: NDArray[np.int64]
     weights: NDArray[np.float64]
+    activation: Activation = "tanh"
+    output: Activation = "linear"
+    mirror: Mirror | None = None
 
     def __post_init__(self) -> None:
         widths = np.asarray(self.layers)
@@ -48,6 +93,7 @@ class Networks:
         object.__setattr__(self, "layers", widths.astype(np.int64))
         weights = finite_array("weights", self.weights, (None, n_parameters))
         object.__setattr__(self, "weights", weights)
+        check_activations(self.activation, self.output)
 
     @classmethod
     def linear(cls, matrices: NDArray[np.float64], biases: NDArray[np.float64]) -> "Networks":
@@ -85,10 +131,20 @@ class Networks:
                 f"or a function, got {policies!r}"
             )
         batch = [policy.networks() for policy in policies]
-        shapes = {tuple(networks.layers.tolist()) for networks in batch}
-        if len(shapes) > 1:
-            raise InvalidInputError(f"policies of one rollout must share layers, got {shapes}")
-        return cls(batch[0].layers, np.concatenate([networks.weights for networks in batch]))
+        first = batch[0]
+        for other in batch[1:]:
+            if first.form != other.form:
+                raise InvalidInputError(
+                    "policies of one rollout must share layers, functions and mirror, got "
+                    f"{first.form[0]} and {other.form[0]}"
+                )
+        return replace(first, weights=np.concatenate([networks.weights for networks in batch]))
+
+    @property
+    def form(self) -> tuple[object, ...]:
+        """Everything but the weights, to compare."""
+        signs = () if self.mirror is None else (tuple(part.tolist()) for part in self.mirror)
+        return tuple(self.layers.tolist()), self.activation, self.output, tuple(signs)
 
 
 def network_control(
@@ -132,11 +188,41 @@ def network_control(
         whole = index.shape == (n,) and np.issubdtype(index.dtype, np.integer)
         if not whole or (n and not 0 <= index.min() <= index.max() < count):
             raise InvalidInputError(f"policy_index must hold {n} whole numbers in 0..{count - 1}")
-    no_table = np.zeros((0, 0, 0))
-    return Control(networks.layers, networks.weights, index.astype(np.int64), no_table)
+    return _control(networks, index.astype(np.int64), np.zeros((0, 0, 0)))
 
 
 def table_control(actions: NDArray[np.float64]) -> Control:
     """Take actions from a table, shape (n, n_steps, n_actions); one step serves every step."""
-    nothing = np.zeros(0, dtype=np.int64)
-    return Control(nothing, np.zeros((0, 0)), nothing, actions)
+    return _control(None, np.zeros(0, dtype=np.int64), actions)
+
+
+def _control(
+    networks: Networks | None, policy: NDArray[np.int64], actions: NDArray[np.float64]
+) -> Control:
+    """Arrange networks or a table for the kernels."""
+    mirror = None if networks is None else networks.mirror
+    nothing = np.zeros(0)
+    return Control(
+        layers=np.zeros(0, dtype=np.int64) if networks is None else networks.layers,
+        weights=np.zeros((0, 0)) if networks is None else networks.weights,
+        policy=policy,
+        activation=CODES["linear" if networks is None else networks.activation],
+        output=CODES["linear" if networks is None else networks.output],
+        observation_signs=nothing if mirror is None else mirror.observations,
+        action_signs=nothing if mirror is None else mirror.actions,
+        side=GOAL_SIDE,
+        actions=actions,
+    )
+
+
+def check_activations(*names: str) -> None:
+    """Refuse unknown activation functions.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such function.
+    """
+    for name in names:
+        if name not in CODES:
+            raise UnknownNameError("activation function", name, get_args(Activation))

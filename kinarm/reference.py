@@ -50,14 +50,15 @@ class ReferenceSimulator:
     Parameters
     ----------
     simulator : Simulator
-        Whose arm, scene, task and time step to use.
+        Whose problem to use.
     """
 
     def __init__(self, simulator: Simulator) -> None:
         self.arm: Arm = simulator.arm
         self.task = simulator.task
         self.step_limit = simulator.step_limit
-        self.contact_model = simulator.contact_model
+        self.contact_model = simulator.world.contact_model
+        self.tested = simulator.problem.stepping.tested_configurations
         self._data = self.arm.model.createData()
         self._geometry_data = make_verdicts_reliable(self.contact_model.geometry.createData())
 
@@ -141,10 +142,10 @@ class ReferenceSimulator:
     def first_contact(
         self, q: NDArray[np.float64], target: NDArray[np.float64]
     ) -> tuple[str, str] | None:
-        """First pair that touches at the four tested configurations of a step, or None."""
+        """First pair that touches at the tested configurations of a step, or None."""
         model, geometry = self.arm.model, self.contact_model.geometry
-        for k in (1, 2, 3, 4):
-            tested = target if k == 4 else q + k / 4 * (target - q)
+        for k in range(1, self.tested + 1):
+            tested = target if k == self.tested else q + k / self.tested * (target - q)
             if pin.computeCollisions(
                 model, self._data, geometry, self._geometry_data, tested, True
             ):

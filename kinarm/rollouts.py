@@ -1,11 +1,38 @@
-"""The outcome of finished episodes."""
+"""The outcome of a step, and of finished episodes."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.episodes import COLLISION, SUCCESS, Episodes
+
+
+class StepResult(NamedTuple):
+    """Outcome of one step of n episodes; arrays of shape (n,).
+
+    Attributes
+    ----------
+    reward : ndarray
+        Sum of the terms.
+    terms : ndarray, shape (n, n_terms)
+        The weighted terms, in the order of `kinarm.task.REWARD_TERMS`; zero for episodes that
+        were over before.
+    success, collision, truncated : ndarray of bool
+        How the step ended; all false for episodes that go on or were over before.
+    """
+
+    reward: NDArray[np.float64]
+    terms: NDArray[np.float64]
+    success: NDArray[np.bool_]
+    collision: NDArray[np.bool_]
+    truncated: NDArray[np.bool_]
+
+    @property
+    def terminated(self) -> NDArray[np.bool_]:
+        """Success or collision."""
+        return self.success | self.collision
 
 
 @dataclass(frozen=True, eq=False)

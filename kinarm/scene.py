@@ -1,61 +1,104 @@
-"""The world around the arm: the ground, the benches and where cubes may lie."""
+"""The world around the arm: the ground, solid boxes, and where goals may lie."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.errors import SceneError, UnknownNameError
+from kinarm.errors import ProblemError, UnknownNameError
+
+Point = tuple[float, float, float]
+
+
+def _check_box(what: str, lower: Point, upper: Point, *, flat: bool) -> None:
+    """Refuse a box whose corners are not finite or that is empty; a flat one has an area."""
+    if not all(math.isfinite(number) for number in (*lower, *upper)):
+        raise ProblemError(f"{what} has a corner that is not finite: {lower} to {upper}")
+    extents = [high - low for low, high in zip(lower, upper, strict=True)]
+    if min(extents) < 0 or sum(extent > 0 for extent in extents) < (2 if flat else 3):
+        wanted = "lower <= upper, and < along two axes at least" if flat else "lower < upper"
+        raise ProblemError(f"{what} is empty: {lower} to {upper}; expected {wanted}")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bench:
-    """A solid box that stands on the ground.
+class Obstacle:
+    """A solid box, its edges along the axes of the world.
 
     Parameters
     ----------
     name : str
-        How tasks and contact reports call it.
-    x, y : tuple of float
-        Lower and upper bound of the footprint [m], in world coordinates.
-    height : float
-        Height of the top above the ground [m].
+        How contact reports call it.
+    lower, upper : tuple of float
+        Opposite corners in the world frame [m].
+
+    Raises
+    ------
+    ProblemError
+        If it is empty or a corner is not finite.
     """
 
     name: str
-    x: tuple[float, float]
-    y: tuple[float, float]
-    height: float
+    lower: Point
+    upper: Point
 
     def __post_init__(self) -> None:
-        numbers = (*self.x, *self.y, self.height)
-        if not all(math.isfinite(number) for number in numbers):
-            raise SceneError(f"bench {self.name!r} has a bound that is not finite: {numbers}")
-        if self.x[0] >= self.x[1] or self.y[0] >= self.y[1] or self.height <= 0:
-            raise SceneError(
-                f"bench {self.name!r} is empty: x {self.x}, y {self.y}, height {self.height}; "
-                "expected lower < upper and height > 0"
-            )
+        _check_box(f"obstacle {self.name!r}", self.lower, self.upper, flat=False)
 
     @property
-    def lower(self) -> NDArray[np.float64]:
-        """Lower corner [m], shape (3,)."""
-        return np.array([self.x[0], self.y[0], 0.0])
+    def size(self) -> NDArray[np.float64]:
+        """Lengths of its edges [m], shape (3,)."""
+        size: NDArray[np.float64] = np.array(self.upper) - np.array(self.lower)
+        return size
 
     @property
-    def upper(self) -> NDArray[np.float64]:
-        """Upper corner [m], shape (3,)."""
-        return np.array([self.x[1], self.y[1], self.height])
+    def centre(self) -> NDArray[np.float64]:
+        """Its centre in the world [m], shape (3,)."""
+        centre: NDArray[np.float64] = (np.array(self.lower) + np.array(self.upper)) / 2
+        return centre
 
 
-RIGHT_BENCH = Bench(name="right", x=(-0.5, 0.5), y=(-0.75, -0.55), height=0.3)
-LEFT_BENCH = Bench(name="left", x=(-0.5, 0.5), y=(0.55, 0.75), height=0.3)
+@dataclass(frozen=True, kw_only=True)
+class GoalRegion:
+    """A box, or a rectangle, over which goals are uniform.
+
+    Parameters
+    ----------
+    name : str
+        How tasks call it.
+    lower, upper : tuple of float
+        Opposite corners in the world frame [m].
+
+    Raises
+    ------
+    ProblemError
+        If it has neither volume nor area, or a corner is not finite.
+    """
+
+    name: str
+    lower: Point
+    upper: Point
+
+    def __post_init__(self) -> None:
+        _check_box(f"goal region {self.name!r}", self.lower, self.upper, flat=True)
+
+
+PAPER_BENCHES = (
+    Obstacle(name="right bench", lower=(-0.5, -0.75, 0.0), upper=(0.5, -0.55, 0.3)),
+    Obstacle(name="left bench", lower=(-0.5, 0.55, 0.0), upper=(0.5, 0.75, 0.3)),
+)
+"""The paper's benches (section 3.3)."""
+
+PAPER_GOALS = (
+    GoalRegion(name="right", lower=(-0.5, -0.75, 0.325), upper=(0.5, -0.55, 0.325)),
+    GoalRegion(name="left", lower=(-0.5, 0.55, 0.325), upper=(0.5, 0.75, 0.325)),
+)
+"""Centres of cubes that lie on the paper's benches."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """Ground, benches and the size of the cube to reach.
+    """Ground, obstacles and goal regions.
 
     The world frame has z up, x forward (the arm's zero heading) and y to the left; the base of
     the arm stands at the origin. The default is the paper's scene (section 3.3): two benches to
@@ -63,50 +106,44 @@ class Scene:
 
     Parameters
     ----------
-    benches : tuple of Bench
-        Obstacles that can carry a cube.
     ground : bool
         Whether the half-space z < 0 is solid.
     cube_edge : float
-        Edge of the cube [m]. The cube is a goal, not an obstacle: its centre lies half an edge
-        above the bench.
+        Edge of the cube that marks a goal, which is no obstacle [m].
+    obstacles : tuple of Obstacle
+        Solid boxes, whether goals lie on them or not.
+    goal_regions : tuple of GoalRegion
+        Where goals may lie.
+
+    Raises
+    ------
+    ProblemError
+        If two obstacles or two goal regions have the same name, or a number is out of range.
     """
 
-    benches: tuple[Bench, ...] = field(default=(RIGHT_BENCH, LEFT_BENCH))
     ground: bool = True
     cube_edge: float = 0.05
+    obstacles: tuple[Obstacle, ...] = PAPER_BENCHES
+    goal_regions: tuple[GoalRegion, ...] = PAPER_GOALS
 
     def __post_init__(self) -> None:
-        names = [bench.name for bench in self.benches]
-        if len(set(names)) != len(names):
-            raise SceneError(f"bench names must differ, got {names}")
+        for what, members in (("obstacle", self.obstacles), ("goal region", self.goal_regions)):
+            names = [member.name for member in members]
+            for name in names:
+                if names.count(name) > 1:
+                    raise ProblemError(f"two {what}s are called {name!r}")
         if not (math.isfinite(self.cube_edge) and self.cube_edge >= 0):
-            raise SceneError(f"cube_edge must be at least 0 m, got {self.cube_edge}")
+            raise ProblemError(f"cube_edge must be at least 0 m, got {self.cube_edge}")
 
-    def bench(self, name: str) -> Bench:
-        """Look a bench up by name.
+    def goal_region(self, name: str) -> GoalRegion:
+        """Look a goal region up by name.
 
         Raises
         ------
         UnknownNameError
-            If the scene has no such bench.
+            If the scene has no such region.
         """
-        for bench in self.benches:
-            if bench.name == name:
-                return bench
-        raise UnknownNameError("bench", name, (bench.name for bench in self.benches))
-
-    def goal_region(self, bench_name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return where the centre of a cube on a bench can be.
-
-        Returns
-        -------
-        lower, upper : ndarray, shape (3,)
-            Corners of the region [m]; its height is a single value.
-        """
-        bench = self.bench(bench_name)
-        height = bench.height + self.cube_edge / 2
-        return (
-            np.array([bench.x[0], bench.y[0], height]),
-            np.array([bench.x[1], bench.y[1], height]),
-        )
+        for region in self.goal_regions:
+            if region.name == name:
+                return region
+        raise UnknownNameError("goal region", name, (region.name for region in self.goal_regions))

@@ -3,98 +3,73 @@
 The reflection y -> -y maps the right bench to the left one and an arm that is symmetric about its
 x-z plane to itself, with axes that turn about x or z reversed. In kinarm's observations and actions
 it only changes signs. A linear policy commutes with it exactly if its weights vanish wherever the
-signs of input and output disagree: it then does on one bench what it does on the other.
+signs of input and output disagree: it then does on one bench what it does on the other. Any other
+network does so if it sees goals on the left in the mirror; see `kinarm.Networks`.
 """
-
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.errors import InvalidInputError
-from kinarm.scene import Bench, Scene
-from kinarm.simulator import Simulator
+from kinarm.networks import Mirror
+from kinarm.observation import observation_signs
+from kinarm.problem import ReachProblem
+from kinarm.scene import Point
+from kinarm.world import World
 
 TESTED_CONFIGURATIONS = 16
 ACCURACY = 1e-9
-GOAL_Y = 1
-"""Index of the goal's y coordinate in an observation."""
 
 
-class Mirror(NamedTuple):
-    """Signs that the reflection gives to each number.
+def commuting_weights(mirror: Mirror) -> NDArray[np.bool_]:
+    """Where a linear policy that commutes with a reflection may have weights.
 
-    Attributes
+    Parameters
     ----------
-    axes : ndarray, shape (n_axes,)
-        Signs of the axis positions.
-    observations : ndarray, shape (n_observations,)
-        Signs of the entries of an observation.
-    actions : ndarray, shape (n_actions,)
-        Signs of the entries of an action.
+    mirror : Mirror
+        The reflection.
+
+    Returns
+    -------
+    ndarray of bool, shape (n_actions, n_observations)
     """
+    return np.outer(mirror.actions, mirror.observations) > 0
 
-    axes: NDArray[np.float64]
-    observations: NDArray[np.float64]
-    actions: NDArray[np.float64]
 
-    @property
-    def weights(self) -> NDArray[np.bool_]:
-        """Where a linear policy that commutes with the reflection may have weights.
+def find_mirror(world: World) -> Mirror:
+    """Find the signs for an arm, and check them with forward kinematics.
 
-        Shape (n_actions, n_observations).
-        """
-        return np.outer(self.actions, self.observations) > 0
-
-    def seen_on_the_left(self, observations: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Which observations, shape (n, n_observations), have a goal to the left of the arm."""
-        left: NDArray[np.bool_] = observations[:, GOAL_Y] > 0
-        return left
-
-    def to_the_right(self, observations: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Reflect those observations, shape (n, n_observations), whose goal lies to the left."""
-        left = self.seen_on_the_left(observations)
-        return np.where(left[:, None], observations * self.observations, observations)
-
-    @classmethod
-    def of(cls, simulator: Simulator) -> "Mirror":
-        """Find the signs for an arm, and check them with forward kinematics.
-
-        Raises
-        ------
-        InvalidInputError
-            If the reflection does not map the arm's motions to themselves.
-        """
-        arm = simulator.arm
-        polar = np.array([1.0, -1.0, 1.0])
-        along_y = np.abs(arm.chain.axis[:, 1]) > 0.5
-        axes = np.where(along_y ^ arm.chain.prismatic, 1.0, -1.0)
-        quaternion = np.array([1.0, -1.0, 1.0, -1.0])
-        observations = np.concatenate(
-            [polar, polar, np.tile(quaternion, arm.n_axes), np.tile(polar, arm.n_axes)]
+    Raises
+    ------
+    InvalidInputError
+        If the reflection does not map the arm's motions to themselves.
+    """
+    arm = world.arm
+    along_y = np.abs(arm.chain.axis[:, 1]) > 0.5
+    axes = np.where(along_y ^ arm.chain.prismatic, 1.0, -1.0)
+    mirror = Mirror(observation_signs(arm.n_axes), axes[: arm.n_actuated])
+    if not _is_mirror(mirror, axes, world):
+        raise InvalidInputError(
+            f"arm {arm.name!r} is not its own mirror image: train it without symmetric"
         )
-        mirror = cls(axes, observations, axes[: arm.n_actuated])
-        if not mirror._fits(simulator):
-            raise InvalidInputError(
-                f"arm {arm.name!r} is not its own mirror image: train it without symmetric"
-            )
-        return mirror
-
-    def _fits(self, simulator: Simulator) -> bool:
-        """Whether mirrored configurations lead to mirrored observations, limits included."""
-        arm = simulator.arm
-        limits = np.sort(np.array([self.axes * arm.lower, self.axes * arm.upper]), axis=0)
-        if not np.allclose(limits, [arm.lower, arm.upper], rtol=0, atol=ACCURACY):
-            return False
-        rng = np.random.default_rng(0)
-        q = rng.uniform(arm.lower, arm.upper, (TESTED_CONFIGURATIONS, arm.n_axes))
-        goals = rng.normal(size=(TESTED_CONFIGURATIONS, 3))
-        seen = simulator.observe(q, goals)
-        mirrored = simulator.observe(self.axes * q, goals * self.observations[:3])
-        return np.allclose(mirrored, seen * self.observations, rtol=0, atol=ACCURACY)
+    return mirror
 
 
-def task_mirror(symmetric: bool, simulator: Simulator) -> Mirror | None:
+def _is_mirror(mirror: Mirror, axes: NDArray[np.float64], world: World) -> bool:
+    """Whether mirrored configurations lead to mirrored observations, limits included."""
+    arm = world.arm
+    limits = np.sort(np.array([axes * arm.lower, axes * arm.upper]), axis=0)
+    if not np.allclose(limits, [arm.lower, arm.upper], rtol=0, atol=ACCURACY):
+        return False
+    rng = np.random.default_rng(0)
+    q = rng.uniform(arm.lower, arm.upper, (TESTED_CONFIGURATIONS, arm.n_axes))
+    goals = rng.normal(size=(TESTED_CONFIGURATIONS, 3))
+    seen = world.observe(q, goals)
+    reflected = world.observe(axes * q, goals * (1.0, -1.0, 1.0))
+    return np.allclose(reflected, seen * mirror.observations, rtol=0, atol=ACCURACY)
+
+
+def task_mirror(symmetric: bool, world: World) -> Mirror | None:
     """Reflection that a policy has to commute with, if it is to and the task is its own image.
 
     Raises
@@ -102,17 +77,19 @@ def task_mirror(symmetric: bool, simulator: Simulator) -> Mirror | None:
     InvalidInputError
         If the reflection does not map the arm's motions to themselves.
     """
-    if not (symmetric and is_symmetric(simulator.scene, simulator.task.benches)):
-        return None
-    return Mirror.of(simulator)
+    return find_mirror(world) if symmetric and is_symmetric(world.problem) else None
 
 
-def is_symmetric(scene: Scene, benches: tuple[str, ...]) -> bool:
-    """Whether the reflection maps a scene, and the benches that carry cubes, to themselves."""
-    chosen = [scene.bench(name) for name in benches]
-    return _closed_under_reflection(scene.benches) and _closed_under_reflection(chosen)
+def is_symmetric(problem: ReachProblem) -> bool:
+    """Whether the reflection maps obstacles and goals, with their weights, to themselves."""
+    task, scene = problem.task, problem.scene
+    weights = task.goal_weights or (1.0,) * len(task.goal_regions)
+    regions = [scene.goal_region(name) for name in task.goal_regions]
+    goals = {(region.lower, region.upper, w) for region, w in zip(regions, weights, strict=True)}
+    obstacles = {(obstacle.lower, obstacle.upper, 1.0) for obstacle in scene.obstacles}
+    return all(boxes == {_reflected(*box) for box in boxes} for boxes in (goals, obstacles))
 
 
-def _closed_under_reflection(benches: "tuple[Bench, ...] | list[Bench]") -> bool:
-    boxes = {(bench.x, bench.y, bench.height) for bench in benches}
-    return boxes == {(x, (-y[1], -y[0]), height) for x, y, height in boxes}
+def _reflected(lower: Point, upper: Point, weight: float) -> tuple[Point, Point, float]:
+    """Mirror image of a box."""
+    return (lower[0], -upper[1], lower[2]), (upper[0], -lower[1], upper[2]), weight

@@ -1,24 +1,24 @@
 """One class for every trained policy: a normaliser, dense layers and a clip."""
 
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kinarm._archive import load_archive, reading, save_archive
+from kinarm._validation import finite_array
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError
-from kinarm.files import CORRUPT, first_line, open_archive, write_atomically
-from kinarm.networks import Networks
+from kinarm.networks import ACTIVATIONS, Activation, Mirror, Networks, check_activations
+from kinarm.observation import observation_layout
 from kinarm.policies.normalizer import fold_normalizer, input_scale
 from kinarm.policies.provenance import Provenance
-from kinarm.validation import finite_array
+from kinarm.problem import ReachProblem
 
-FILE_FORMAT = "kinarm-policy"
-FILE_VERSION = 1
+FORMAT_VERSION = 2
 
 
 class Layer(NamedTuple):
@@ -36,7 +36,7 @@ class Layer(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Policy:
-    """Maps observations to actions: normalise, dense layers with tanh between, clip to [-1, 1].
+    """Maps observations to actions: normalise, dense layers, clip to [-1, 1].
 
     A linear policy has one layer. Inputs that were constant in training have weight zero.
 
@@ -47,7 +47,11 @@ class Policy:
     layers : tuple of Layer
         From the observation to the action.
     provenance : Provenance
-        Where it comes from.
+        Where it comes from, and the problem that it was made for.
+    activation, output : {"linear", "tanh", "relu"}
+        Function between the layers, and after the last one before the clip.
+    mirror : Mirror, optional
+        Reflection in which it sees goals on the left, and acts.
 
     Raises
     ------
@@ -59,8 +63,12 @@ class Policy:
     std: NDArray[np.float64]
     layers: tuple[Layer, ...]
     provenance: Provenance
+    activation: Activation = "tanh"
+    output: Activation = "linear"
+    mirror: Mirror | None = None
 
     def __post_init__(self) -> None:
+        check_activations(self.activation, self.output)
         if not self.layers:
             raise InvalidInputError("a policy needs at least one layer")
         mean = finite_array("mean", self.mean, (None,))
@@ -74,11 +82,30 @@ class Policy:
             layers.append(
                 Layer(weights, finite_array(f"bias of layer {number}", layer.bias, (width,)))
             )
-        for array in (mean, std, *(array for layer in layers for array in layer)):
+        mirror = None
+        if self.mirror is not None:
+            mirror = Mirror(
+                finite_array("mirror of observations", self.mirror.observations, mean.shape),
+                finite_array("mirror of actions", self.mirror.actions, (width,)),
+            )
+        for array in (mean, std, *(array for layer in layers for array in layer), *(mirror or ())):
             array.flags.writeable = False
         object.__setattr__(self, "mean", mean)
         object.__setattr__(self, "std", std)
         object.__setattr__(self, "layers", tuple(layers))
+        object.__setattr__(self, "mirror", mirror)
+
+    def __repr__(self) -> str:
+        made, widths = self.provenance, "-".join(str(len(layer.bias)) for layer in self.layers)
+        return (
+            f"Policy({made.algorithm} {made.recipe}, problem {self.problem.name!r}, seed "
+            f"{made.seed}, layers {self.n_observations}-{widths})"
+        )
+
+    @property
+    def problem(self) -> ReachProblem:
+        """The problem that it was made for."""
+        return self.provenance.problem
 
     @property
     def n_observations(self) -> int:
@@ -105,10 +132,17 @@ class Policy:
         """
         given = np.asarray(observations, dtype=float)
         shape = (self.n_observations,) if given.ndim == 1 else (None, self.n_observations)
-        x = (finite_array("observations", given, shape) - self.mean) * input_scale(self.std)
+        x = np.atleast_2d(finite_array("observations", given, shape))
+        left = np.zeros(len(x), dtype=bool)
+        if self.mirror is not None:
+            left, x = self.mirror.on_the_left(x), self.mirror.from_the_right(x)
+        x = (x - self.mean) * input_scale(self.std)
         for number, layer in enumerate(self.layers):
-            x = (np.tanh(x) if number else x) @ layer.weights.T + layer.bias
-        return np.clip(x, -1.0, 1.0)
+            x = (ACTIVATIONS[self.activation](x) if number else x) @ layer.weights.T + layer.bias
+        actions = np.clip(ACTIVATIONS[self.output](x), -1.0, 1.0)
+        if self.mirror is not None:
+            actions = np.where(left[:, None], actions * self.mirror.actions, actions)
+        return actions[0] if given.ndim == 1 else actions
 
     @cached_property
     def _networks(self) -> Networks:
@@ -116,7 +150,8 @@ class Policy:
         layers = (first, *self.layers[1:])
         flat = [part for weights, bias in layers for part in (weights.T.reshape(-1), bias)]
         widths = [self.n_observations, *(len(layer.bias) for layer in layers)]
-        return Networks(np.array(widths, dtype=np.int64), np.concatenate(flat)[None])
+        form = (self.activation, self.output, self.mirror)
+        return Networks(np.array(widths, dtype=np.int64), np.concatenate(flat)[None], *form)
 
     def networks(self) -> Networks:
         """The policy in the form that the compiled simulator runs, normaliser folded in."""
@@ -130,11 +165,11 @@ class Policy:
         PolicyFileError
             If the arm differs in anything that the simulator uses.
         """
-        trained = self.provenance
-        if trained.arm_digest != arm.digest:
-            other = "another version of arm" if trained.arm == arm.name else "arm"
+        trained = self.problem.arm
+        if self.problem.arm_digest != arm.digest:
+            other = "another version of arm" if trained.name == arm.name else "arm"
             raise PolicyFileError(
-                f"the policy was trained for {other} {trained.arm!r}, not for {arm.name!r}"
+                f"the policy was trained for {other} {trained.name!r}, not for {arm.name!r}"
             )
 
     def save(self, path: str | Path) -> None:
@@ -145,17 +180,18 @@ class Policy:
         OutputError
             If the file cannot be written; an existing file is then left as it was.
         """
-        arrays: dict[str, Any] = {
-            "format": np.array(FILE_FORMAT),
-            "version": np.array(FILE_VERSION),
-            "provenance": np.array(json.dumps(self.provenance.to_json(), sort_keys=True)),
-            "mean": self.mean,
-            "std": self.std,
+        header = {
+            "provenance": self.provenance.to_json(),
+            "observation": observation_layout(),
+            "activation": self.activation,
+            "output": self.output,
         }
+        arrays = {"mean": self.mean, "std": self.std}
         for number, layer in enumerate(self.layers):
-            arrays[f"weights_{number}"] = layer.weights
-            arrays[f"bias_{number}"] = layer.bias
-        write_atomically(path, lambda file: np.savez(file, **arrays))
+            arrays |= {f"weights_{number}": layer.weights, f"bias_{number}": layer.bias}
+        if self.mirror is not None:
+            arrays |= {f"mirror_{name}": part for name, part in self.mirror._asdict().items()}
+        save_archive(path, "policy", FORMAT_VERSION, arrays, header)
 
     @classmethod
     def load(cls, path: str | Path) -> "Policy":
@@ -164,36 +200,27 @@ class Policy:
         Raises
         ------
         PolicyFileError
-            If the file is missing, truncated, not a policy, or written by a later version.
+            If the file is missing, truncated, not a policy, written by another version, or made
+            for observations of another layout.
         """
-        name = str(path)
-        try:
-            with Path(path).open("rb") as file:
-                return cls._read(name, file)
-        except OSError as error:
-            raise PolicyFileError(f"cannot read policy {name!r}: {error.strerror}") from error
-        except CORRUPT as error:
-            raise PolicyFileError(
-                f"{name!r} is not a complete kinarm policy: {first_line(error)}"
-            ) from error
-
-    @classmethod
-    def _read(cls, name: str, file: IO[bytes]) -> "Policy":
-        content = open_archive(
-            name,
-            file,
-            kind="policy",
-            file_format=FILE_FORMAT,
-            version=FILE_VERSION,
-            error=PolicyFileError,
-        )
-        n_layers = sum(key.startswith("weights_") for key in content.files)
-        return cls(
-            mean=content["mean"],
-            std=content["std"],
-            layers=tuple(
-                Layer(content[f"weights_{number}"], content[f"bias_{number}"])
-                for number in range(n_layers)
-            ),
-            provenance=Provenance.from_json(json.loads(str(content["provenance"]))),
-        )
+        header, arrays = load_archive(path, "policy", FORMAT_VERSION, PolicyFileError)
+        with reading(repr(str(path)), "policy", PolicyFileError):
+            if header["observation"] != observation_layout():
+                raise PolicyFileError(
+                    f"{str(path)!r} understands observations of layout "
+                    f"{header['observation']!r}, not {observation_layout()!r}"
+                )
+            n_layers = sum(name.startswith("weights_") for name in arrays)
+            mirror = [arrays.get(f"mirror_{name}") for name in Mirror._fields]
+            return cls(
+                mean=arrays["mean"],
+                std=arrays["std"],
+                layers=tuple(
+                    Layer(arrays[f"weights_{number}"], arrays[f"bias_{number}"])
+                    for number in range(n_layers)
+                ),
+                provenance=Provenance.from_json(header["provenance"]),
+                activation=header["activation"],
+                output=header["output"],
+                mirror=None if mirror[0] is None else Mirror(*mirror),
+            )

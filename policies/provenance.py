@@ -1,26 +1,37 @@
 """Where a policy comes from."""
 
-import hashlib
 import platform
 import subprocess
-from dataclasses import asdict, dataclass, field, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
-import kinarm
-from kinarm.errors import InvalidInputError
-
-if TYPE_CHECKING:
-    from kinarm.arm import Arm
-    from kinarm.policies.ars_config import ARSConfig
-    from kinarm.policies.ppo_config import PPOConfig
+from kinarm._fields import from_plain, to_plain
+from kinarm.problem import ReachProblem
 
 RECORDED_PACKAGES = (
     *("kinarm", "numpy", "numba", "pin", "coal", "gymnasium", "scipy"),
     *("torch", "stable-baselines3"),
 )
+
+
+class Config(Protocol):
+    """What the settings of every learner say."""
+
+    @property
+    def problem(self) -> ReachProblem:
+        """The problem that the policy is for."""
+
+    @property
+    def recipe(self) -> str:
+        """Name of the settings."""
+
+    @property
+    def seed(self) -> int:
+        """Seed of the training."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,16 +44,14 @@ class Provenance:
         Such as ``"ars"``.
     recipe : str
         Name of the settings that it was trained with.
-    task : str
-        Task that it was trained on.
-    arm, arm_digest : str
-        Arm that it was trained for: name, and hash of what the simulator uses of it.
+    problem : ReachProblem
+        The problem that it is for, with the hash of its arm.
     seed : int
         Seed of the training.
     environment_steps : int
         Steps that the training took.
     config : dict
-        All settings of the learner.
+        All settings of the learner, but for the problem.
     versions : dict
         Versions of the packages that matter.
     commit : str
@@ -51,9 +60,7 @@ class Provenance:
 
     algorithm: str
     recipe: str
-    task: str
-    arm: str
-    arm_digest: str
+    problem: ReachProblem
     seed: int
     environment_steps: int
     config: dict[str, Any] = field(default_factory=dict)
@@ -61,41 +68,35 @@ class Provenance:
     commit: str = ""
 
     @classmethod
-    def of(
-        cls, algorithm: str, config: "ARSConfig | PPOConfig", arm: "Arm", environment_steps: int
-    ) -> "Provenance":
+    def of(cls, algorithm: str, config: Config, environment_steps: int) -> "Provenance":
         """Record a training that took place here and now, with these settings."""
+        settings = to_plain(config)
         return cls(
             algorithm=algorithm,
             recipe=config.recipe,
-            task=config.task,
-            arm=arm.name,
-            arm_digest=arm.digest,
+            problem=config.problem.pinned,
             seed=config.seed,
             environment_steps=environment_steps,
-            config=asdict(config),
+            config={name: value for name, value in settings.items() if name != "problem"},
             versions=package_versions(),
             commit=source_commit(),
         )
 
     def to_json(self) -> dict[str, Any]:
         """As a dictionary that JSON can hold."""
-        return asdict(self)
+        entries: dict[str, Any] = to_plain(self)
+        return entries
 
     @classmethod
-    def from_json(cls, entries: dict[str, Any]) -> "Provenance":
+    def from_json(cls, entries: Mapping[str, Any]) -> "Provenance":
         """Rebuild what `to_json` returned.
 
         Raises
         ------
         InvalidInputError
-            If an entry is missing or unknown.
+            If an entry is missing, unknown or wrong.
         """
-        expected = {item.name for item in fields(cls)}
-        if set(entries) != expected:
-            wrong = ", ".join(sorted(expected ^ set(entries)))
-            raise InvalidInputError(f"the provenance has missing or unknown entries: {wrong}")
-        return cls(**entries)
+        return from_plain(cls, entries, "provenance")
 
 
 def package_versions() -> dict[str, str]:
@@ -113,16 +114,6 @@ def _package_versions() -> tuple[tuple[str, str], ...]:
         except metadata.PackageNotFoundError:
             continue
     return tuple(versions.items())
-
-
-def hash_sources(*others: Path) -> str:
-    """Hash of the simulator's sources, and of others in the given order."""
-    simulator = Path(kinarm.__file__).parent
-    sources = (*sorted(simulator.glob("*.py")), *sorted(simulator.glob("kernels/*.py")), *others)
-    content = hashlib.sha256()
-    for source in sources:
-        content.update(source.read_bytes())
-    return content.hexdigest()
 
 
 @cache

@@ -12,7 +12,7 @@ from kinarm.evaluation.report.groups import TaskResults, group_results
 from kinarm.evaluation.report.worst import record_worst, worst_row, worst_trials
 from kinarm.evaluation.table import SPREAD_PRIORITY, Column, metric_cell, metric_columns
 from kinarm.files import check_folder, write_text
-from kinarm.replay import replay
+from kinarm.viewer import replay_page
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -70,7 +70,6 @@ def report_page(document: dict[str, Any], evaluations: Sequence[Evaluation]) -> 
     """
     tasks = group_results(document, evaluations)
     chosen = [worst_trials(task) for task in tasks]
-    arm = evaluations[0].trials.simulator.arm
     recordings = record_worst([worst for each in chosen for worst in each])
     return page_template().render(
         title=_title(tasks),
@@ -82,7 +81,7 @@ def report_page(document: dict[str, Any], evaluations: Sequence[Evaluation]) -> 
             (task, [worst_row(task, worst) for worst in each])
             for task, each in zip(tasks, chosen, strict=True)
         ],
-        replay=replay(recordings, arm=arm).html,
+        replay=replay_page(recordings).html,
     )
 
 

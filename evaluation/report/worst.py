@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from kinarm.evaluation.evaluation import Evaluation
-from kinarm.evaluation.recording import record
+from kinarm.evaluation.replays.recorder import record
 from kinarm.evaluation.report.groups import Group, TaskResults
 from kinarm.evaluation.report.maps import OUTCOMES
-from kinarm.trajectory import Recording
+from kinarm.recording import Recording
 
 BEST_GROUPS = 4
 """Groups of a task whose worst trials are shown."""

@@ -1,4 +1,4 @@
-"""Forward kinematics, Jacobian and observation."""
+"""Forward kinematics and Jacobian."""
 
 import math
 
@@ -130,29 +130,3 @@ def point_jacobian(
             jacobian[0, k] = wy * rz - wz * ry
             jacobian[1, k] = wz * rx - wx * rz
             jacobian[2, k] = wx * ry - wy * rx
-
-
-@inlined
-def observe(
-    tool: NDArray[np.float64],
-    poses: NDArray[np.float64],
-    goals: NDArray[np.float64],
-    row: int,
-    observations: NDArray[np.float64],
-) -> float:
-    """Fill in a row of the observations and return the distance from the tool to the goal [m].
-
-    The order is goal (3), goal - tool (3), quaternions (4 n_axes), positions (3 n_axes).
-    """
-    n_axes = poses.shape[0] - 1
-    x, y, z = to_world(poses, n_axes, tool[0], tool[1], tool[2])
-    gx, gy, gz = goals[row, 0], goals[row, 1], goals[row, 2]
-    dx, dy, dz = gx - x, gy - y, gz - z
-    observations[row, 0], observations[row, 1], observations[row, 2] = gx, gy, gz
-    observations[row, 3], observations[row, 4], observations[row, 5] = dx, dy, dz
-    for k in range(n_axes):
-        for i in range(4):
-            observations[row, 6 + 4 * k + i] = poses[k + 1, i]
-        for i in range(3):
-            observations[row, 6 + 4 * n_axes + 3 * k + i] = poses[k + 1, 13 + i]
-    return math.sqrt(dx * dx + dy * dy + dz * dz)

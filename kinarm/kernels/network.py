@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm.episodes import RELU, TANH, Control
 from kinarm.kernels.compiling import inlined
 
 NARROW = 16
@@ -70,47 +71,63 @@ def wide_layer(
 
 
 @inlined
-def dense(
-    layers: NDArray[np.int64],
-    weights: NDArray[np.float64],
-    policy: int,
+def activate(kind: int, values: NDArray[np.float64], row: int, n: int) -> None:
+    """Apply an activation function to the first n entries of a row."""
+    if kind == TANH:
+        for j in range(n):
+            values[row, j] = math.tanh(values[row, j])
+    elif kind == RELU:
+        for j in range(n):
+            values[row, j] = max(values[row, j], 0.0)
+
+
+@inlined
+def act(
+    control: Control,
     observations: NDArray[np.float64],
-    row: int,
-    hidden: NDArray[np.float64],
+    e: int,
+    work: NDArray[np.float64],
     action: NDArray[np.float64],
 ) -> None:
-    """Evaluate a network: tanh between layers, output clipped to [-1, 1].
+    """Let an episode's network choose its action.
+
+    A network with a mirror has learnt goals on the right alone: for a goal on the left it is
+    given the reflected observation, and its action is reflected in turn.
 
     Parameters
     ----------
-    layers : ndarray of int, shape (n_layers + 1,)
-        Widths.
-    weights : ndarray, shape (n_policies, n_parameters)
-        Layer after layer: weights (inputs x outputs), then the bias.
-    policy : int
-        Which row of ``weights``.
-    observations : ndarray, shape (n, n_observations)
+    control : Control
+        The networks.
+    observations : ndarray, shape (n_episodes, n_observations)
         Inputs.
-    row : int
-        Which row of ``observations``.
-    hidden : ndarray, shape (2, widest layer)
-        Work space.
+    e : int
+        Episode.
+    work : ndarray, shape (3, widest layer)
+        Work space: two layers by turns, and a reflected observation.
     action : ndarray, shape (n_actions,)
-        The output.
+        Output, in [-1, 1].
     """
-    offset = 0
-    n_layers = layers.shape[0] - 1
+    layers, weights, policy = control.layers, control.weights, control.policy[e]
+    n_layers, offset = layers.shape[0] - 1, 0
+    signs = control.observation_signs
+    reflected = signs.shape[0] > 0 and observations[e, control.side] > 0.0
+    inputs, source = observations, e
+    if reflected:
+        inputs, source = work, 2
+        for i in range(signs.shape[0]):
+            work[2, i] = signs[i] * observations[e, i]
     for layer in range(n_layers):
         n_in, n_out = layers[layer], layers[layer + 1]
         sink = (layer + 1) % 2
-        inputs, source = (observations, row) if layer == 0 else (hidden, layer % 2)
         if n_out < NARROW:
-            narrow_layer(weights, policy, offset, n_in, n_out, inputs, source, hidden, sink)
+            narrow_layer(weights, policy, offset, n_in, n_out, inputs, source, work, sink)
         else:
-            wide_layer(weights, policy, offset, n_in, n_out, inputs, source, hidden, sink)
-        if layer < n_layers - 1:
-            for j in range(n_out):
-                hidden[sink, j] = math.tanh(hidden[sink, j])
+            wide_layer(weights, policy, offset, n_in, n_out, inputs, source, work, sink)
+        last = layer == n_layers - 1
+        activate(control.output if last else control.activation, work, sink, n_out)
+        inputs, source = work, sink
         offset += (n_in + 1) * n_out
     for j in range(action.shape[0]):
-        action[j] = min(max(hidden[n_layers % 2, j], -1.0), 1.0)
+        action[j] = min(max(work[n_layers % 2, j], -1.0), 1.0)
+        if reflected:
+            action[j] *= control.action_signs[j]

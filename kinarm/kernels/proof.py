@@ -1,7 +1,7 @@
 """Proof that a step is free of contact.
 
-A step moves the arm from q to q' and is tested at the four configurations q + k/4 (q' - q). Each
-tested pair of bodies carries a *slack*: a certified lower bound of its distance at q. Slack that
+A step moves the arm from q to q' and is tested at n configurations q + k/n (q' - q). Each tested
+pair of bodies carries a *slack*: a certified lower bound of its distance at q. Slack that
 outlasts the largest possible motion of a step proves it; else the pair's distance at q' is bounded
 anew, and only if that is not enough, at the configurations between.
 """
@@ -14,9 +14,6 @@ from kinarm.collision import ContactShapes
 from kinarm.kernels.compiling import inlined
 from kinarm.kernels.distance import clearance
 from kinarm.kernels.kinematics import forward_kinematics
-
-SUBSTEPS = 4
-"""Configurations at which the motion of a step is tested."""
 
 MARGIN = 1e-6
 """Distance below which freedom is not claimed [m]: the tolerance of Coal's iterations."""
@@ -71,6 +68,7 @@ def prove_step(
     row: int,
     chain: Chain,
     shapes: ContactShapes,
+    tested: int,
     q: NDArray[np.float64],
     target: NDArray[np.float64],
     slack: NDArray[np.float64],
@@ -88,6 +86,8 @@ def prove_step(
         Which episode.
     chain, shapes
         The arm and its contact pairs.
+    tested : int
+        Configurations n at which the motion of a step is tested.
     q, target, slack, motion : ndarray
         As `spend_slack` took and left them; on return, ``slack`` is renewed.
     poses : ndarray, shape (n_axes + 1, POSE)
@@ -113,21 +113,21 @@ def prove_step(
         after = clearance(pair, pairs, capsules, link, boxes, poses)
         slack[row, pair] = after
         if not is_apart(after):
-            doubt |= 1 << (SUBSTEPS - 1)
+            doubt |= 1 << (tested - 1)
         unproven = 0
-        for k in range(1, SUBSTEPS):
-            share = k / SUBSTEPS
+        for k in range(1, tested):
+            share = k / tested
             left = before - share * motion[pair]
             right = after - (1.0 - share) * motion[pair]
             unproven |= 0 if is_apart(max(left, right)) else 1 << (k - 1)
         listed[0, n_open], listed[1, n_open] = pair, unproven
         n_open += 0 if unproven == 0 else 1
         open_between |= unproven
-    for k in range(1, SUBSTEPS):
+    for k in range(1, tested):
         bit = 1 << (k - 1)
         if open_between & bit:
             for axis in range(n_axes):
-                middle[0, axis] = q[row, axis] + k / SUBSTEPS * (target[row, axis] - q[row, axis])
+                middle[0, axis] = q[row, axis] + k / tested * (target[row, axis] - q[row, axis])
             forward_kinematics(prismatic, translation, rotation, axes, middle, 0, between)
             for index in range(n_open):
                 if listed[1, index] & bit and not is_apart(

@@ -9,14 +9,16 @@ from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.collision import ContactShapes
-from kinarm.episodes import PAUSED, RUNNING, SUCCESS, TRUNCATED, Control, Episodes, Rules
+from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Control, Episodes, Rules
 from kinarm.kernels.compiling import kernel
 from kinarm.kernels.distance import clearance
-from kinarm.kernels.kinematics import POSE, forward_kinematics, observe, to_world
-from kinarm.kernels.network import dense
+from kinarm.kernels.kinematics import POSE, forward_kinematics, to_world
+from kinarm.kernels.network import act
+from kinarm.kernels.observing import observe
 from kinarm.kernels.proof import is_apart, prove_step, spend_slack
+from kinarm.kernels.reward import add_reward
 
-LAYOUT = "0236ea918130"
+LAYOUT = "44e27401f131"
 """Hash of what is compiled in from other files; a test tells when to renew it.
 
 Numba's disk cache notices changes only in this file, so changing this line is what makes it
@@ -85,9 +87,10 @@ def begin(
         forward_kinematics(prismatic, translation, rotation, axes, q, e, poses)
         distance = observe(tool, poses, episodes.goal, e, episodes.observation)
         episodes.distance[e] = distance
-        episodes.previous_distance[e] = distance
         episodes.steps[e] = 0
         episodes.total[e] = 0.0
+        for term in range(episodes.terms.shape[1]):
+            episodes.terms[e, term] = 0.0
         episodes.cleared[e] = False
         episodes.status[e] = RUNNING
         for pair in range(pairs.shape[0]):
@@ -115,25 +118,25 @@ def advance(
     free of contact.
     """
     prismatic, translation, rotation, axes, tool, lower, upper = chain[:7]
-    layers, weights, policy, actions = control
+    layers, actions = control.layers, control.actions
     status, steps, stop, q, target, doubt, cleared, slack, goal, observation, distance = episodes[
         :11
     ]
-    previous, total, moments, shift, path = episodes[11:]
+    terms, total, moments, shift, path = episodes[11:]
     step_limit, travel = rules.step_limit, shapes.travel
     n_axes, n_actuated, n_observations = q.shape[1], step_limit.shape[0], observation.shape[1]
     poses, between = np.empty((n_axes + 1, POSE)), np.empty((n_axes + 1, POSE))
     motion, middle = np.empty(slack.shape[1]), np.empty((1, n_axes))
     listed = np.empty((2, slack.shape[1] + 1), dtype=np.int64)
-    widest = 1
+    widest = n_observations
     for layer in range(layers.shape[0]):
         widest = max(widest, layers[layer])
-    hidden, action = np.empty((2, widest)), np.empty(n_actuated)
+    hidden, action = np.empty((3, widest)), np.empty(n_actuated)
     for e in range(first, last):
         while status[e] == RUNNING and steps[e] < stop[e]:
             if not cleared[e]:
                 if layers.shape[0] > 0:
-                    dense(layers, weights, policy[e], observation, e, hidden, action)
+                    act(control, observation, e, hidden, action)
                 else:
                     column = steps[e] if actions.shape[1] > 1 else 0
                     for axis in range(n_actuated):
@@ -149,7 +152,18 @@ def advance(
             forward_kinematics(prismatic, translation, rotation, axes, target, e, poses)
             if not cleared[e] and spend_slack(e, travel, q, target, slack, motion):
                 doubt[e] = prove_step(
-                    e, chain, shapes, q, target, slack, motion, poses, between, middle, listed
+                    e,
+                    chain,
+                    shapes,
+                    rules.tested,
+                    q,
+                    target,
+                    slack,
+                    motion,
+                    poses,
+                    between,
+                    middle,
+                    listed,
                 )
                 if doubt[e] != 0:
                     status[e] = PAUSED
@@ -157,12 +171,11 @@ def advance(
             cleared[e] = False
             before = distance[e]
             after = observe(tool, poses, goal, e, observation)
-            previous[e], distance[e] = before, after
+            distance[e] = after
             steps[e] += 1
-            toward = (after < before) - (after > before)
-            total[e] += rules.progress * (before - after) + rules.closer * toward + rules.step
-            if after <= rules.tolerance:
-                total[e] += rules.success
+            reached = after <= rules.tolerance
+            add_reward(rules.reward, before, after, False, reached, terms, total, e)
+            if reached:
                 status[e] = SUCCESS
             elif steps[e] >= rules.horizon:
                 status[e] = TRUNCATED
@@ -170,3 +183,27 @@ def advance(
                 q[e, axis] = target[e, axis]
                 if path.shape[0] > 0:
                     path[e, steps[e], axis] = q[e, axis]
+
+
+@kernel
+def refuse(rows: NDArray[np.int64], rules: Rules, episodes: Episodes) -> None:
+    """End episodes whose step touches something: the arm stays where it is.
+
+    Parameters
+    ----------
+    rows : ndarray of int
+        Which episodes.
+    rules : Rules
+        Task and motion limits.
+    episodes : Episodes
+        Changed in place.
+    """
+    for index in range(rows.shape[0]):
+        e = rows[index]
+        episodes.status[e] = COLLISION
+        episodes.steps[e] += 1
+        distance = episodes.distance[e]
+        add_reward(rules.reward, distance, distance, True, False, episodes.terms, episodes.total, e)
+        if episodes.path.shape[0] > 0:
+            for joint in range(episodes.q.shape[1]):
+                episodes.path[e, episodes.steps[e], joint] = episodes.q[e, joint]

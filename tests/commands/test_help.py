@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = {
     "kinarm-eval": "kinarm.evaluation.commands.evaluate",
-    "kinarm-replay": "kinarm.evaluation.replay",
+    "kinarm-replay": "kinarm.evaluation.commands.replay",
     "kinarm-train": "kinarm.policies.train",
     "kinarm-bench": "kinarm.evaluation.bench",
     "kinarm-reproduce": "kinarm.evaluation.reproduce",

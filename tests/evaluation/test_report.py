@@ -20,7 +20,7 @@ from kinarm.evaluation.report.maps import fates, level
 from kinarm.evaluation.report.page import page_template, report_page, write_report
 from kinarm.evaluation.report.worst import record_worst, worst_trials
 from kinarm.evaluation.table import table_rows
-from kinarm.replay import replay
+from kinarm.viewer import replay_page
 
 PIXEL = 0.051
 """Coordinates are written to a tenth."""
@@ -349,9 +349,8 @@ class TestWorst:
 
     def test_replay_is_part_of_the_page(self, page, tasks):
         chosen = [worst for task in tasks.values() for worst in worst_trials(task)]
-        simulator = chosen[0].evaluation.trials.simulator
         (frame,) = content(page).findall(".//iframe")
-        expected = replay(record_worst(chosen), arm=simulator.arm).html
+        expected = replay_page(record_worst(chosen)).html
         assert " ".join(frame.get("data-page").split()) == " ".join(expected.split())
         assert frame.get("title")
 

@@ -1,0 +1,193 @@
+"""What the command lines share: options from dataclasses, one-line errors, exit statuses."""
+
+import argparse
+import math
+import os
+import re
+import shlex
+import sys
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import MISSING, Field, is_dataclass
+from pathlib import Path
+from typing import Any, Literal, NoReturn, TypeVar, get_args, get_origin
+
+from kinarm._fields import alternatives, expected, init_fields, summary_of, type_hints
+from kinarm.errors import KinarmError
+
+Request = TypeVar("Request")
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser that reports bad usage in one line and exits with status 2."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print one line on standard error and exit."""
+        self.exit(2, f"{self.prog}: {' '.join(message.split())} (see {self.prog} --help)\n")
+
+
+def run_command(prog: str, command: Callable[[], None]) -> NoReturn:
+    """Run a command line and turn its outcome into an exit status.
+
+    Status 0 is success, 1 a failure of the machine, 2 bad input, 130 an interruption; all but
+    success come with one line on standard error. A reader that closes the pipe is no failure.
+    """
+    sys.exit(_status(prog, command))
+
+
+def _status(prog: str, command: Callable[[], None]) -> int:
+    """Run a command and flush what it printed."""
+    try:
+        try:
+            command()
+        except SystemExit as leaving:
+            sys.stdout.flush()
+            return leaving.code if isinstance(leaving.code, int) else 0
+        sys.stdout.flush()
+    except KinarmError as error:
+        return _report(prog, str(error), error.exit_status)
+    except BrokenPipeError:
+        _discard_output()
+    except OSError as error:
+        _discard_output()
+        return _report(prog, f"{error.filename or 'standard output'}: {error.strerror}", 1)
+    except KeyboardInterrupt as interruption:
+        return _report(prog, str(interruption) or "interrupted", 130)
+    return 0
+
+
+def _discard_output() -> None:
+    """Let what is still buffered for standard output go nowhere, so that exiting is quiet."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _report(prog: str, message: str, status: int) -> int:
+    sys.stderr.write(f"{prog}: {' '.join(message.split())}\n")
+    return status
+
+
+def add_options(
+    parser: argparse._ActionsContainer,
+    kind: type,
+    *,
+    skip: Collection[str] = (),
+    negatable: bool = False,
+) -> None:
+    """Add an option for every field of a dataclass; only those that are given are parsed.
+
+    Names, types and help come from the dataclass and its docstring. A field's metadata may hold
+    ``flag`` (another name of the option, or one without dashes for a positional argument),
+    ``metavar``, and ``repeat`` (a tuple is collected from repetitions of the option). The fields
+    of a nested dataclass get its name as a prefix, such as ``--reward-success``.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser or group
+        What to add them to.
+    kind : type
+        The dataclass.
+    skip : collection of str
+        Fields to leave out.
+    negatable : bool
+        Whether there is an option ``--no-x`` also for what is false by default.
+    """
+    for name, item in init_fields(kind).items():
+        if name not in skip:
+            _add_option(parser, kind, item, negatable=negatable)
+
+
+def _add_option(
+    parser: argparse._ActionsContainer,
+    kind: type,
+    item: Field[Any],
+    prefix: str = "",
+    negatable: bool = False,
+) -> None:
+    """Add the option of one field, or those of a nested dataclass."""
+    hint = alternatives(type_hints(kind)[item.name])[0]
+    if isinstance(hint, type) and is_dataclass(hint):
+        for inner in init_fields(hint).values():
+            _add_option(parser, hint, inner, f"{prefix}{item.name}.", negatable=True)
+        return
+    name = f"{prefix}{item.name}"
+    flag = item.metadata.get("flag", "--" + re.sub(r"[._]", "-", name))
+    options: dict[str, Any] = {"default": argparse.SUPPRESS, "help": _help(kind, item)}
+    if flag.startswith("--"):
+        options["dest"] = name
+        options["required"] = item.default is MISSING and item.default_factory is MISSING
+    elif item.default is not MISSING:
+        options["nargs"] = "?"
+    if hint is bool:
+        negative = item.default is True and "flag" not in item.metadata
+        action = argparse.BooleanOptionalAction if negatable or negative else "store_true"
+        parser.add_argument(flag, action=action, **options)
+        return
+    if get_origin(hint) is tuple:
+        hint, *others = get_args(hint)
+        count = "+" if Ellipsis in others else 1 + len(others)
+        options |= {"action": "append"} if item.metadata.get("repeat") else {"nargs": count}
+    options["metavar"] = item.metadata.get("metavar") or METAVARS.get(hint, "NAME")
+    if get_origin(hint) is Literal:
+        options["choices"] = get_args(hint)
+        del options["metavar"]
+    parser.add_argument(flag, type=_parser_of(hint), **options)
+
+
+METAVARS = {int: "N", float: "X", Path: "FILE"}
+
+
+def _help(kind: type, item: Field[Any]) -> str:
+    """Description of a field and its default, as argparse formats it."""
+    default = item.default
+    said = summary_of(kind, item.name).replace("`", "")
+    if isinstance(default, bool) or default in (None, (), MISSING):
+        return said.replace("%", "%%")
+    shown = " ".join(map(str, default)) if isinstance(default, tuple) else default
+    return f"{said} ({shown})".replace("%", "%%")
+
+
+def _parser_of(hint: Any) -> Callable[[str], Any]:
+    """Argument type: refuses texts that are not of a type."""
+
+    def parse(text: str) -> Any:
+        try:
+            value = hint(text) if hint in (int, float) else text
+        except ValueError:
+            value = math.nan
+        if isinstance(value, float) and not math.isfinite(value):
+            wanted = "a finite number" if hint is float else expected(hint)
+            raise argparse.ArgumentTypeError(f"must be {wanted}, got {text!r}")
+        return Path(text) if hint is Path else value
+
+    return parse
+
+
+def given_options(options: argparse.Namespace, kind: type) -> dict[str, Any]:
+    """What the command line gives of a dataclass's fields; nested ones as mappings.
+
+    Parameters
+    ----------
+    options : Namespace
+        What a parser with the options of `add_options` parsed.
+    kind : type
+        The dataclass.
+    """
+    given: dict[str, Any] = {}
+    for name, value in vars(options).items():
+        outer, _, inner = name.partition(".")
+        if outer not in init_fields(kind):
+            continue
+        if inner:
+            given.setdefault(outer, {})[inner] = value
+        else:
+            given[name] = tuple(value) if isinstance(value, list) else value
+    return given
+
+
+def request_of(options: argparse.Namespace, kind: type[Request]) -> Request:
+    """Build the dataclass of what the command line gives; the rest has its defaults."""
+    return kind(**given_options(options, kind))
+
+
+def command_text(prog: str, arguments: Sequence[str] | None) -> str:
+    """The command as typed, for the record."""
+    return shlex.join([prog, *(sys.argv[1:] if arguments is None else arguments)])

@@ -1,0 +1,200 @@
+"""Frozen dataclasses from plain values and back: what TOML, JSON and command lines hold.
+
+A dataclass says once what its fields are called, which type and default they have and, in the
+Parameters of its docstring, what they mean; files, messages and options follow from that.
+"""
+
+import json
+import re
+import types
+from collections.abc import Mapping
+from dataclasses import MISSING, Field, fields, is_dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from kinarm.errors import InvalidInputError, KinarmError
+
+T = TypeVar("T")
+
+PARAMETER = re.compile(r"^(\w+(?:, \w+)*) :", re.MULTILINE)
+UNIT = re.compile(r"\[([^\]]+)\]$")
+SCALARS = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
+
+
+def to_plain(value: Any) -> Any:
+    """Turn a dataclass into what TOML and JSON hold; fields that are None are left out."""
+    if is_dataclass(value):
+        given = ((item.name, getattr(value, item.name)) for item in fields(value))
+        return {name: to_plain(entry) for name, entry in given if entry is not None}
+    if isinstance(value, Mapping):
+        return {str(key): to_plain(entry) for key, entry in value.items()}
+    if isinstance(value, tuple | list):
+        return [to_plain(entry) for entry in value]
+    if isinstance(value, np.generic):
+        return value.item()
+    return str(value) if isinstance(value, Path) else value
+
+
+def to_toml(entries: Mapping[str, Any], path: str = "") -> str:
+    """Write a mapping of plain values as TOML: its values first, then its tables."""
+    values = {key: entry for key, entry in entries.items() if not _is_table(entry)}
+    text = "".join(f"{key} = {_toml_value(entry)}\n" for key, entry in values.items())
+    for key, entry in entries.items():
+        if isinstance(entry, Mapping):
+            text += f"\n[{path}{key}]\n{to_toml(entry, f'{path}{key}.')}"
+        elif _is_table(entry):
+            for row in entry:
+                text += f"\n[[{path}{key}]]\n{to_toml(row, f'{path}{key}.')}"
+    return text
+
+
+def _is_table(entry: object) -> bool:
+    rows = isinstance(entry, list) and bool(entry) and isinstance(entry[0], Mapping)
+    return rows or isinstance(entry, Mapping)
+
+
+def _toml_value(entry: object) -> str:
+    """Write one value; what JSON writes of texts, numbers and lists is TOML, too."""
+    return json.dumps(entry, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def from_plain(kind: type[T], entries: object, where: str, path: str = "") -> T:
+    """Build a dataclass of plain values, and say what is wrong with them if it cannot be.
+
+    Parameters
+    ----------
+    kind : type
+        A dataclass.
+    entries : mapping
+        Plain values by the names of the fields; those with a default may be missing.
+    where : str
+        Where they come from, for messages, such as the name of a file.
+    path : str
+        Names of the tables around them, each followed by a dot.
+
+    Raises
+    ------
+    InvalidInputError
+        If a key is unknown or missing, or a value has the wrong type or is refused by the
+        dataclass; in one line that names the source, the key and what is expected.
+    """
+    if not isinstance(entries, Mapping):
+        table = path.removesuffix(".") or "it"
+        raise InvalidInputError(f"{where}: {table} must be a table, got {entries!r}")
+    known = init_fields(kind)
+    for key in entries:
+        if key not in known:
+            raise InvalidInputError(
+                f"{where}: unknown key '{path}{key}'; available: {', '.join(known)}"
+            )
+    for name, item in known.items():
+        if name not in entries and item.default is MISSING and item.default_factory is MISSING:
+            raise InvalidInputError(f"{where}: '{path}{name}' is missing: {summary_of(kind, name)}")
+    hints = type_hints(kind)
+    values = {
+        name: _value(hints[name], entry, where, f"{path}{name}", kind)
+        for name, entry in entries.items()
+    }
+    try:
+        return kind(**values)
+    except KinarmError as error:
+        if isinstance(error, InvalidInputError) and str(error).startswith(f"{where}: "):
+            raise
+        raise InvalidInputError(f"{where}: {path and path[:-1] + ': '}{error}") from error
+
+
+def _value(hint: Any, entry: Any, where: str, path: str, kind: type) -> Any:
+    """Convert a plain value to what a type hint asks for."""
+    choices = alternatives(hint)
+    for choice in choices:
+        if is_dataclass(choice) and isinstance(choice, type) and isinstance(entry, Mapping):
+            return from_plain(choice, entry, where, f"{path}.")
+    hint = choices[0]
+    origin, arguments = get_origin(hint), get_args(hint)
+    if origin is tuple and isinstance(entry, list | tuple):
+        each = arguments[:1] * len(entry) if arguments[-1] is Ellipsis else arguments
+        if len(each) == len(entry):
+            return tuple(
+                _value(part, value, where, f"{path}[{number}]", kind)
+                for number, (part, value) in enumerate(zip(each, entry, strict=True))
+            )
+    elif origin is dict and isinstance(entry, Mapping):
+        return dict(entry)
+    elif origin is Literal:
+        if entry in arguments:
+            return entry
+    elif is_scalar(hint, entry):
+        return hint(entry)
+    raise InvalidInputError(
+        f"{where}: {path} must be {expected(hint)}{_unit(kind, path)}, got {entry!r}"
+    )
+
+
+def is_scalar(hint: Any, entry: object) -> bool:
+    """Whether a plain value is one of a type: a whole number is a number, a truth value is none."""
+    if hint in (str, Path):
+        return isinstance(entry, str | Path)
+    if hint is bool or isinstance(entry, bool):
+        return hint is bool and isinstance(entry, bool)
+    return isinstance(entry, int | float) if hint is float else type(entry) is hint
+
+
+def expected(hint: Any) -> str:
+    """What a type hint asks for, in words."""
+    origin, arguments = get_origin(hint), get_args(hint)
+    if origin is Literal:
+        return f"one of {', '.join(map(str, arguments))}"
+    if origin is tuple:
+        if arguments[-1] is Ellipsis:
+            return f"a list, each entry {expected(arguments[0])}"
+        return f"a list of {len(arguments)}, each {expected(arguments[0])}"
+    if is_dataclass(hint) or origin is dict:
+        return "a table"
+    return SCALARS.get(hint, "a path")
+
+
+def alternatives(hint: Any) -> tuple[Any, ...]:
+    """Types of a union without None, or the type itself."""
+    if get_origin(hint) in (Union, types.UnionType):
+        return tuple(part for part in get_args(hint) if part is not type(None))
+    return (hint,)
+
+
+def type_hints(kind: type) -> dict[str, Any]:
+    """Resolved types of the fields of a dataclass."""
+    return get_type_hints(kind)
+
+
+def init_fields(kind: type) -> dict[str, Field[Any]]:
+    """Fields of a dataclass that can be given, by name."""
+    return {item.name: item for item in fields(kind) if item.init}
+
+
+@cache
+def field_docs(kind: type) -> dict[str, str]:
+    """What the Parameters of a dataclass, and of its bases, say about its fields."""
+    found: dict[str, str] = {}
+    for base in reversed(kind.__mro__):
+        text = re.sub(r"(?m)^    ", "", base.__dict__.get("__doc__") or "")
+        _, _, section = text.partition("Parameters\n----------\n")
+        section = re.split(r"\n\n\w+\n-+\n", section)[0]
+        parts = PARAMETER.split(section)[1:]
+        for names, body in zip(parts[::2], parts[1::2], strict=True):
+            description = " ".join(body.partition("\n")[2].split())
+            found |= dict.fromkeys(names.split(", "), description)
+    return found
+
+
+def summary_of(kind: type, name: str) -> str:
+    """First sentence of what is said about a field, without its full stop."""
+    return re.split(r"\.(?:\s|$)", field_docs(kind).get(name, name))[0]
+
+
+def _unit(kind: type, path: str) -> str:
+    """Unit of a field as its description states it, in brackets; nothing if it has none."""
+    name = path.rpartition(".")[2].partition("[")[0]
+    unit = UNIT.search(summary_of(kind, name))
+    return f" [{unit.group(1)}]" if unit else ""

@@ -1,0 +1,329 @@
+"""The problem: an arm, a scene, a task and how it is stepped, as one value.
+
+Everything that simulates, trains, bounds, evaluates, records or stores takes a problem and names
+it.
+"""
+
+import hashlib
+import json
+import math
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from kinarm._fields import from_plain, init_fields, to_plain, to_toml
+from kinarm._files import first_line, write_text
+from kinarm._validation import whole_number
+from kinarm.arm_specification import ArmSpecification
+from kinarm.errors import InvalidInputError, ProblemError, UnknownNameError
+from kinarm.scene import Scene
+from kinarm.task import ReachTask, RewardWeights
+
+if TYPE_CHECKING:
+    from kinarm.arm import Arm
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stepping:
+    """How time passes.
+
+    Parameters
+    ----------
+    time_step : float
+        Duration of a step [s].
+    tested_configurations : int
+        Evenly spaced configurations at which the motion of a step is tested for contact, its
+        end included.
+
+    Raises
+    ------
+    ProblemError
+        If the time step is not a positive number.
+    InvalidInputError
+        If the number of configurations is none from 1 to 32.
+    """
+
+    time_step: float = 0.02
+    tested_configurations: int = 4
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.time_step) and self.time_step > 0):
+            raise ProblemError(f"time_step must be finite and above 0 s, got {self.time_step}")
+        whole_number("tested_configurations", self.tested_configurations, 1)
+        if self.tested_configurations > 32:
+            raise InvalidInputError(
+                f"tested_configurations must be at most 32, got {self.tested_configurations}"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReachProblem:
+    """What is to be reached, with which arm, among what, and under which rules.
+
+    Parameters
+    ----------
+    name : str
+        How tables, files and messages call it.
+    arm : ArmSpecification
+        The arm.
+    scene : Scene
+        Ground, obstacles and goal regions.
+    task : ReachTask
+        Goals, endings, starts and rewards.
+    stepping : Stepping
+        How time passes.
+
+    Raises
+    ------
+    UnknownNameError
+        If the scene has no goal region that the task names.
+    """
+
+    name: str
+    arm: ArmSpecification = field(default_factory=ArmSpecification)
+    scene: Scene = field(default_factory=Scene)
+    task: ReachTask
+    stepping: Stepping = field(default_factory=Stepping)
+
+    def __post_init__(self) -> None:
+        available = [region.name for region in self.scene.goal_regions]
+        for name in self.task.goal_regions:
+            if name not in available:
+                raise UnknownNameError("goal region in task.goal_regions:", name, available)
+
+    def __repr__(self) -> str:
+        goals = " and ".join(self.task.goal_regions)
+        return f"ReachProblem({self.name!r}, arm {self.arm.name!r}, goals {goals})"
+
+    @classmethod
+    def load(cls, problem: "ProblemLike") -> "ReachProblem":
+        """Find a problem by name, or read it from a file.
+
+        Parameters
+        ----------
+        problem : str, Path or ReachProblem
+            ``"left"``, ``"right"`` or ``"both"``, the paper's tasks 1, 2 and 3; the path of a
+            TOML file; or a problem, which is returned as it is.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such problem.
+        InvalidInputError
+            If the file cannot be used; in one line that names file, key and what is expected.
+        """
+        if isinstance(problem, ReachProblem):
+            return problem
+        if str(problem) in PROBLEMS:
+            return PROBLEMS[str(problem)]
+        path = Path(problem)
+        if path.suffix == ".toml" or path.is_file() or path.parent != Path():
+            return _read_problem(path)
+        raise UnknownNameError("problem", str(problem), (*PROBLEMS, "path/to/problem.toml"))
+
+    def replace(self, **overrides: Any) -> "ReachProblem":
+        """Change some parts of it.
+
+        Parameters
+        ----------
+        **overrides
+            ``name``; ``arm`` (a name, a path or a specification), ``scene`` and ``task`` (of
+            another problem, by name, file or as they are), ``stepping``; ``reward`` (weights, or
+            a mapping of those that change); or any field of the task or of the stepping, such as
+            ``tolerance``. None leaves what there is.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such part or field.
+        KinarmError
+            If a value cannot be used.
+        """
+        given = {name: value for name, value in overrides.items() if value is not None}
+        changes: dict[str, Any] = {}
+        for name, convert in PARTS.items():
+            if name in given:
+                changes[name] = convert(given.pop(name))
+        task, stepping = changes.get("task", self.task), changes.get("stepping", self.stepping)
+        if isinstance(given.get("reward"), Mapping):
+            weights = dict(given["reward"])
+            _check_names("reward term", weights, RewardWeights)
+            given["reward"] = replace(task.reward, **weights)
+        of_task = {name: given.pop(name) for name in init_fields(ReachTask) if name in given}
+        of_stepping = {name: given.pop(name) for name in init_fields(Stepping) if name in given}
+        _check_names("setting of a problem", given, ReachProblem, ReachTask, Stepping)
+        changes["task"] = replace(task, **of_task)
+        changes["stepping"] = replace(stepping, **of_stepping)
+        return replace(self, **changes)
+
+    @cached_property
+    def arm_digest(self) -> str:
+        """Hash of what the simulator uses of the arm."""
+        from kinarm.arm import Arm
+
+        return self.arm.digest or Arm.load(self.arm).digest
+
+    @property
+    def pinned(self) -> "ReachProblem":
+        """The same problem, whose arm must have the hash that it has now."""
+        return self.replace(arm=replace(self.arm, digest=self.arm_digest))
+
+    @cached_property
+    def digest(self) -> str:
+        """Hash of everything that behaviour depends on; the name is not part of it."""
+        # Built anew, so that 1 and 1.0 are the same.
+        entries = {**self.from_json(self.to_json()).to_json(), "arm": self.arm_digest}
+        del entries["name"]
+        text = json.dumps(entries, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+    def first_difference(self, other: "ReachProblem") -> str | None:
+        """Say where another problem first differs in what behaviour depends on.
+
+        Returns
+        -------
+        str or None
+            Such as ``"task.tolerance is 0.03, not 0.05"``, with the own value last.
+        """
+        if self.arm_digest != other.arm_digest:
+            version = "another version of " if self.arm.name == other.arm.name else ""
+            return f"arm is {version}{other.arm.name!r}, not {self.arm.name!r}"
+        ours, theirs = (_flattened(to_plain(problem)) for problem in (self, other))
+        for key in dict.fromkeys((*ours, *theirs)):
+            here, there = ours.get(key, "missing"), theirs.get(key, "missing")
+            if here != there and key != "name" and not key.startswith("arm."):
+                return f"{key} is {there}, not {here}"
+        return None
+
+    def check_same(self, other: "ReachProblem", what: str) -> None:
+        """Refuse another problem.
+
+        Parameters
+        ----------
+        other : ReachProblem
+            The problem that ``what`` is of.
+        what : str
+            What it is that should be of this problem, for the message.
+
+        Raises
+        ------
+        ProblemError
+            If anything that behaviour depends on differs; names the first field that does.
+        """
+        difference = self.first_difference(other)
+        if difference is not None:
+            raise ProblemError(f"{what} is of another problem: {difference}")
+
+    def to_json(self) -> dict[str, Any]:
+        """As a dictionary that JSON can hold; `from_json` reads it without loss."""
+        entries: dict[str, Any] = to_plain(self)
+        return entries
+
+    @classmethod
+    def from_json(cls, entries: object, where: str = "problem") -> "ReachProblem":
+        """Rebuild what `to_json` returned.
+
+        Raises
+        ------
+        InvalidInputError
+            If an entry is missing, unknown or wrong; names it and where it comes from.
+        """
+        return from_plain(cls, entries, where)
+
+    def to_toml(self) -> str:
+        """As the text of a problem file; `load` reads it without loss."""
+        return to_toml(self.to_json())
+
+    def save(self, path: str | Path) -> None:
+        """Write a problem file.
+
+        Raises
+        ------
+        OutputError
+            If it cannot be written.
+        """
+        write_text(path, self.to_toml())
+
+
+ProblemLike = ReachProblem | str | Path
+"""A problem, its name, or the path of its file."""
+
+PROBLEMS = {
+    "left": ReachProblem(name="left", task=ReachTask(goal_regions=("left",))),
+    "right": ReachProblem(name="right", task=ReachTask(goal_regions=("right",))),
+    "both": ReachProblem(name="both", task=ReachTask(goal_regions=("left", "right"))),
+}
+"""The paper's tasks 1, 2 and 3 by name."""
+
+
+def _specification(arm: "Arm | ArmSpecification | str | Path") -> ArmSpecification:
+    from kinarm.arm import Arm
+
+    if isinstance(arm, Arm):
+        return arm.specification
+    if isinstance(arm, ArmSpecification):
+        return arm.resolved(Path())
+    return Arm.load(arm).specification
+
+
+PARTS: dict[str, Callable[[Any], Any]] = {
+    "name": str,
+    "arm": _specification,
+    "scene": lambda scene: scene if isinstance(scene, Scene) else ReachProblem.load(scene).scene,
+    "task": lambda task: task if isinstance(task, ReachTask) else ReachProblem.load(task).task,
+    "stepping": lambda stepping: stepping,
+}
+"""How `ReachProblem.replace` understands what it is given for a part."""
+
+
+def _check_names(what: str, given: Mapping[str, Any], *kinds: type) -> None:
+    """Refuse names that none of some dataclasses has."""
+    available = [item.name for kind in kinds for item in fields(kind)]
+    for name in given:
+        if name not in available:
+            raise UnknownNameError(what, name, available)
+
+
+def _read_problem(path: Path) -> ReachProblem:
+    """Read a problem file; what it leaves out is that of the problem ``base``."""
+    name = str(path)
+    try:
+        entries = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InvalidInputError(f"cannot read problem {name!r}: {error.strerror}") from error
+    except (ValueError, RecursionError) as error:
+        raise InvalidInputError(f"{name}: not a problem file: {first_line(error)}") from error
+    base = entries.pop("base", "right")
+    if base not in PROBLEMS:
+        raise InvalidInputError(f"{name}: base must be one of {', '.join(PROBLEMS)}, got {base!r}")
+    given = {"name": path.stem, **entries}
+    problem = from_plain(ReachProblem, _merged(to_plain(PROBLEMS[base]), given), name)
+    return replace(problem, arm=problem.arm.resolved(path.resolve().parent))
+
+
+def _merged(below: Any, above: Any) -> Any:
+    """Tables merged key by key; everything else from above."""
+    if not (isinstance(below, Mapping) and isinstance(above, Mapping)):
+        return above
+    keys = dict.fromkeys((*below, *above))
+    return {
+        key: _merged(below.get(key, above.get(key)), above.get(key, below.get(key))) for key in keys
+    }
+
+
+def _flattened(value: Any, path: str = "") -> dict[str, Any]:
+    """Values of nested tables and lists by their paths, such as ``scene.obstacles[0].name``."""
+    if isinstance(value, Mapping):
+        parts = {f"{path}.{key}" if path else key: entry for key, entry in value.items()}
+    elif isinstance(value, list):
+        parts = {f"{path}[{number}]": entry for number, entry in enumerate(value)}
+    else:
+        return {path: value}
+    return {
+        leaf: entry
+        for name, part in parts.items()
+        for leaf, entry in _flattened(part, name).items()
+    }

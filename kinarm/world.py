@@ -1,0 +1,174 @@
+"""The world of a problem: arm and scene, and what can be asked about configurations in it."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm._parallel import available_threads, run_rows
+from kinarm._validation import finite_array, whole_number
+from kinarm.arm import Arm
+from kinarm.collision import Contact, ContactModel
+from kinarm.episodes import Episodes
+from kinarm.kernels.rollout import begin, screen
+from kinarm.observation import observation_size
+from kinarm.problem import ProblemLike, ReachProblem
+
+
+class World:
+    """An arm in a scene.
+
+    Parameters
+    ----------
+    problem : ReachProblem, str or Path
+        The problem, its name or its file.
+    threads : int, optional
+        Threads for large batches; as many as the processors that this process may use by default.
+
+    Attributes
+    ----------
+    problem : ReachProblem
+        What it was built from.
+    arm : Arm
+        The arm.
+    contact_model : ContactModel
+        Shapes that may touch.
+    """
+
+    def __init__(self, problem: ProblemLike, *, threads: int | None = None) -> None:
+        self.problem = ReachProblem.load(problem)
+        self.threads = (
+            available_threads() if threads is None else whole_number("threads", threads, 1)
+        )
+        self.arm = Arm.load(self.problem.arm)
+        self.contact_model = ContactModel.build(self.arm, self.problem.scene)
+
+    @property
+    def n_observations(self) -> int:
+        """Length of an observation."""
+        return observation_size(self.arm.n_axes)
+
+    @property
+    def n_actions(self) -> int:
+        """Length of an action."""
+        return self.arm.n_actuated
+
+    def observe(
+        self, configurations: NDArray[np.float64], goals: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Observations of configurations, whether or not they touch something.
+
+        Parameters
+        ----------
+        configurations : ndarray, shape (n, n_axes)
+            Axis positions [rad or m].
+        goals : ndarray, shape (n, 3)
+            Goal positions [m].
+
+        Returns
+        -------
+        ndarray, shape (n, n_observations)
+        """
+        return self._begun_at(configurations, goals).observation
+
+    def distances(
+        self, configurations: NDArray[np.float64], goals: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Distances from the tool to goals, as in episodes.
+
+        Parameters
+        ----------
+        configurations : ndarray, shape (n, n_axes)
+            Axis positions [rad or m].
+        goals : ndarray, shape (n, 3)
+            Goal positions [m].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Distances [m].
+        """
+        return self._begun_at(configurations, goals).distance
+
+    def screen(
+        self, configurations: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Find tool points, and which configurations touch something.
+
+        Parameters
+        ----------
+        configurations : ndarray, shape (n, n_axes)
+            Axis positions [rad or m].
+
+        Returns
+        -------
+        tools : ndarray, shape (n, 3)
+            Tool points [m].
+        touching : ndarray of bool, shape (n,)
+        """
+        n = len(configurations)
+        tools, proven = np.empty((n, 3)), np.empty(n, dtype=bool)
+        arrays = (self.arm.chain, self.contact_model.shapes, configurations, tools, proven)
+        run_rows(screen, n, n, self.threads, *arrays)
+        touching = ~proven
+        touching[touching] = self.contact_model.in_contact(configurations[touching])
+        return tools, touching
+
+    def contact(
+        self, configuration: NDArray[np.float64], target: NDArray[np.float64]
+    ) -> Contact | None:
+        """Describe the first contact on the way of a step, or return None.
+
+        Parameters
+        ----------
+        configuration, target : ndarray, shape (n_axes,)
+            Ends of the step [rad or m].
+        """
+        tested = self.substeps(configuration[None], target[None])[0]
+        touching = np.flatnonzero(self.contact_model.in_contact(tested))
+        return self.contact_model.contact(tested[touching[0]]) if touching.size else None
+
+    def contact_pair(
+        self, configuration: NDArray[np.float64], target: NDArray[np.float64]
+    ) -> tuple[str, str] | None:
+        """Name the first two bodies that touch on the way of a step, or None.
+
+        Parameters
+        ----------
+        configuration, target : ndarray, shape (n_axes,)
+            Ends of the step [rad or m].
+        """
+        contact = self.contact(configuration, target)
+        return contact.pair if contact else None
+
+    def substeps(
+        self, configurations: NDArray[np.float64], targets: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Configurations at which the motion of a step is tested for contact.
+
+        Parameters
+        ----------
+        configurations, targets : ndarray, shape (n, n_axes)
+            Ends of the steps [rad or m].
+
+        Returns
+        -------
+        ndarray, shape (n, n_tested, n_axes)
+            Evenly spaced; the last one is the target.
+        """
+        n_tested = self.problem.stepping.tested_configurations
+        shares = np.arange(1, n_tested) / n_tested
+        inner = configurations[:, None] + shares[:, None] * (targets - configurations)[:, None]
+        return np.concatenate([inner, targets[:, None]], axis=1)
+
+    def _begun_at(
+        self, configurations: NDArray[np.float64], goals: NDArray[np.float64]
+    ) -> Episodes:
+        """Episodes that begin at configurations, whether or not those touch something."""
+        episodes = Episodes.allocate(
+            finite_array("configurations", configurations, (None, self.arm.n_axes)),
+            finite_array("goals", goals, (len(configurations), 3)),
+            n_pairs=len(self.contact_model.shapes.pairs),
+            horizon=1,
+        )
+        arrays = (np.arange(len(configurations)), self.arm.chain, self.contact_model.shapes)
+        begin(0, len(configurations), *arrays, episodes)
+        return episodes
