@@ -104,7 +104,7 @@ def _add_option(
     if flag.startswith("--"):
         options["dest"] = name
     elif item.default is not MISSING:
-        options["nargs"] = "?"
+        options |= {"nargs": "?", "default": item.default}  # argparse would parse SUPPRESS
     if hint is bool:
         negative = item.default is True and "flag" not in item.metadata
         action = argparse.BooleanOptionalAction if prefix or negative else "store_true"
