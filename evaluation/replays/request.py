@@ -12,6 +12,7 @@ from kinarm.errors import InvalidInputError
 from kinarm.problem_options import ProblemOptions
 
 if TYPE_CHECKING:
+    from kinarm.evaluation.replays.candidates import Runs
     from kinarm.recording import Recording
     from kinarm.viewer import ReplayPage
 
@@ -133,11 +134,22 @@ class ReplayRequest(ProblemOptions):
             return None
         return self._write(report)
 
+    def recordings(self) -> "Runs":
+        """Make or read what is to be played: a list for the policy, or one for each of two.
+
+        Raises
+        ------
+        KinarmError
+            If a file, name or number cannot be used.
+        """
+        from kinarm.evaluation.replays.candidates import find_candidates
+        from kinarm.evaluation.replays.choosing import choose
+
+        return choose(find_candidates(self), self)
+
     def _write(self, report: Callable[[str], object]) -> "ReplayPage":
         from rich.console import Console
 
-        from kinarm.evaluation.replays.candidates import find_candidates
-        from kinarm.evaluation.replays.choosing import choose
         from kinarm.recording import save_recordings
         from kinarm.viewer import replay_page
 
@@ -146,7 +158,7 @@ class ReplayRequest(ProblemOptions):
         if self.record is not None:
             check_output(self.record, overwrite=self.overwrite, suffix=".npz")
         with Console(stderr=True).status("recording; the first run compiles"):
-            runs = choose(find_candidates(self), self)
+            runs = self.recordings()
             page = replay_page(runs[0], ghosts=runs[1] if len(runs) > 1 else ())
         if self.record is not None:
             save_recordings(self.record, [recording for run in runs for recording in run])
