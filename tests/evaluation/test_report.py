@@ -349,7 +349,6 @@ class TestWorst:
 
     def test_replay_is_part_of_the_page(self, page, tasks):
         chosen = [worst for task in tasks.values() for worst in worst_trials(task)]
-        simulator = chosen[0].evaluation.trials.simulator
         (frame,) = content(page).findall(".//iframe")
         expected = replay_page(record_worst(chosen)).html
         assert " ".join(frame.get("data-page").split()) == " ".join(expected.split())
