@@ -114,7 +114,7 @@ def _evaluated_candidates(
         recordings = record(entrant or first_entrant(row["policy"]), trials, allow_other_arm=True)
         document.check_same(row, recordings)
         runs.append(recordings)
-    known = document.floors(problem)
+    known = document.floors(row["problem"])
     if known is None:
         return Candidates(runs, _solved_bounds(trials), PLAYED)
     return Candidates(runs, lambda numbers: [known[number] for number in numbers], PLAYED)
