@@ -22,9 +22,9 @@ from kinarm.policies import (
 )
 
 ROOT = Path(__file__).resolve().parents[2]
-TINY = {"arms": 4, "rollout_steps": 16, "minibatch": 32, "epochs": 2, "hidden": (8, 8)}
+TINY = {"n_envs": 4, "n_steps": 16, "batch_size": 32, "n_epochs": 2, "net_arch": (8, 8)}
 TINY_OPTIONS = (
-    *("--arms", 4, "--rollout-steps", 16, "--minibatch", 32, "--epochs", 2),
+    *("--arms", 4, "--rollout-steps", 16, "--batch_size", 32, "--epochs", 2),
     *("--hidden", 8, 8),
 )
 TRAIN_WITH_FREQUENT_CHECKPOINTS = """
@@ -73,13 +73,13 @@ def test_every_setting_reaches_the_training(run, tmp_path):
         "arm": "paper_flange",
         "seed": 7,
         "iterations": 2,
-        "arms": 6,
-        "rollout_steps": 10,
-        "minibatch": 30,
-        "epochs": 3,
+        "n_envs": 6,
+        "n_steps": 10,
+        "batch_size": 30,
+        "n_epochs": 3,
         "learning_rate": 0.002,
         "gamma": 0.9,
-        "entropy_weight": 0.01,
+        "ent_coef": 0.01,
         "tolerance": 0.04,
         "success_bonus": 0.25,
         "collision_penalty": -2.0,
@@ -93,7 +93,7 @@ def test_every_setting_reaches_the_training(run, tmp_path):
     assert run("kinarm-train", "ppo", *arguments, "--out", out).status == 0
     made = Policy.load(out).provenance
     assert {name: made.config[name] for name in settings} == settings
-    assert (made.config["hidden"], made.config["symmetric"]) == ([7, 6], False)
+    assert (made.config["net_arch"], made.config["symmetric"]) == ([7, 6], False)
     assert (made.algorithm, made.recipe, made.task) == ("ppo", "tuned*", "both")
     assert (made.seed, made.environment_steps) == (7, 120)
 
