@@ -96,6 +96,11 @@ def test_weights_replace_those_of_the_task_if_the_recipe_has_none():
     assert changed.reward == RewardWeights(step=-0.5, success=2.0)
 
 
+def test_unknown_weight():
+    with pytest.raises(UnknownNameError, match="'bonus'; available: progress, closer, step"):
+        recipe("ars", reward={"bonus": 1})
+
+
 @pytest.mark.parametrize("weights", [{"collision": 2.0}, {"success": -1.0}])
 def test_rewarding_contact_or_punishing_success_is_refused(weights):
     with pytest.raises(KinarmError, match="other sign"):
