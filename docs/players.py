@@ -7,7 +7,7 @@ from sphinx.util.docutils import SphinxDirective
 
 from kinarm import Simulator
 from kinarm.evaluation import TrialSet, find_entrants, oracle_bounds, record
-from kinarm.replay import Replay, replay
+from kinarm.viewer import ReplayPage, replay_page
 
 
 def numbers(text: str) -> list[int]:
@@ -15,7 +15,7 @@ def numbers(text: str) -> list[int]:
     return [int(word) for word in text.split()]
 
 
-def make_replay(policy: str, task: str, trials: list[int], ghost: str | None) -> Replay:
+def make_replay(policy: str, task: str, trials: list[int], ghost: str | None) -> ReplayPage:
     """Let one or two policies face some trials."""
     faced = TrialSet.draw(Simulator("paper", task), max(trials) + 1, seed=0)
     bounds = oracle_bounds(faced)
@@ -24,7 +24,7 @@ def make_replay(policy: str, task: str, trials: list[int], ghost: str | None) ->
         for name in (policy, ghost)
         if name is not None
     ]
-    return replay(runs[0], ghosts=runs[1] if len(runs) > 1 else ())
+    return replay_page(runs[0], ghosts=runs[1] if len(runs) > 1 else ())
 
 
 class KinarmReplay(SphinxDirective):

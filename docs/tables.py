@@ -10,7 +10,7 @@ from sphinx.util.docutils import SphinxDirective
 from kinarm import Arm, Simulator, arm_names
 from kinarm.collision import enclosing_capsule
 from kinarm.evaluation.reproduction.tables import markdown
-from kinarm.policies import ARS_RECIPES, PPO_RECIPES
+from kinarm.policies import find_learner
 
 
 def numbers(values: np.ndarray) -> str:
@@ -84,8 +84,8 @@ TABLES = {
     "arm": lambda: arm_table("paper"),
     "capsules": lambda: capsule_table("paper"),
     "arms": arms_table,
-    "ars-recipes": lambda: recipe_table(ARS_RECIPES),
-    "ppo-recipes": lambda: recipe_table(PPO_RECIPES),
+    "ars-recipes": lambda: recipe_table(find_learner("ars").recipes),
+    "ppo-recipes": lambda: recipe_table(find_learner("ppo").recipes),
 }
 
 

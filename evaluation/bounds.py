@@ -14,7 +14,7 @@ import numpy as np
 from kinarm._archive import load_archive, save_archive
 from kinarm._files import check_folder
 from kinarm.errors import InvalidInputError, OutputError
-from kinarm.evaluation.statistics import Share
+from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle import ORACLE_SEMANTICS, Oracle, OracleSolutions, Progress
 from kinarm.policies.provenance import package_versions
@@ -139,7 +139,7 @@ def bounds_document(solutions: OracleSolutions) -> dict[str, Any]:
     missed = np.flatnonzero(~solutions.reachable)
     gap = (solutions.steps - solutions.steps_lower_bound)[solutions.reachable]
     return {
-        "success": Share.of(solutions.reachable).to_json(),
+        "success": Estimate.share(solutions.reachable).to_json(),
         "unsolved": [
             {"trial": int(trial), "reason": str(solutions.reasons[trial])} for trial in missed
         ],

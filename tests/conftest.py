@@ -8,7 +8,7 @@ import pytest
 from hypothesis import settings
 
 from kinarm.arm import Arm
-from kinarm.problem import PROBLEMS
+from kinarm.problem import ReachProblem
 from kinarm.simulator import Simulator
 
 settings.register_profile("repeatable", derandomize=True, database=None, deadline=None)
@@ -186,15 +186,15 @@ def mesh_arm(tmp_path_factory: pytest.TempPathFactory) -> Arm:
 def simulators(
     shipped_arms: dict[str, Arm], sliding_arm: Arm, mesh_arm: Arm
 ) -> dict[str, Simulator]:
-    """One single-threaded simulator per arm, goals on both benches."""
+    """One single-threaded simulator per arm, problem ``both``."""
     arms = {**shipped_arms, "sliding": sliding_arm, "mesh": mesh_arm}
-    problems = {name: PROBLEMS["both"].replace(arm=arm) for name, arm in arms.items()}
-    return {name: Simulator(problem, threads=1) for name, problem in problems.items()}
+    both = ReachProblem.load("both")
+    return {name: Simulator(both.replace(arm=arm), threads=1) for name, arm in arms.items()}
 
 
 @pytest.fixture(scope="session")
 def simulator(simulators: dict[str, Simulator]) -> Simulator:
-    """The default arm, goals on both benches."""
+    """The default arm, problem ``both``."""
     return simulators["paper"]
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinarm.trajectory import load_recordings, save_recordings
+from kinarm.recording import load_recordings, save_recordings
 
 QUICK = ("--no-oracle",)
 

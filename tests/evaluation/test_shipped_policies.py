@@ -8,7 +8,7 @@ import pytest
 
 from kinarm.arm import Arm
 from kinarm.evaluation.entrants import find_entrants
-from kinarm.evaluation.evaluations import run_trials
+from kinarm.evaluation.evaluation import run_trials
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies import ars_recipe, load_policy, policy_names, ppo_recipe
 from kinarm.policies.mirror import Mirror
