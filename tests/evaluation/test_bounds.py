@@ -428,7 +428,7 @@ def test_document_tells_the_bounds_of_every_trial(hard):
 def test_document_sums_up_the_bounds(hard):
     solutions = list(oracle_bounds(hard))
     document = bounds_document(oracle_bounds(hard))
-    assert document["success"]["rate"] == sum(s.reachable for s in solutions) / 12
+    assert document["success"]["value"] == sum(s.reachable for s in solutions) / 12
     assert document["tight_share"] == sum(s.tight for s in solutions) / 12
     columns = {
         "steps": [s.steps for s in solutions],
@@ -460,13 +460,13 @@ def test_document_says_why_trials_are_not_solved(hard):
 
 def test_document_of_solved_trials_lists_none(solutions):
     assert bounds_document(solutions)["unsolved"] == []
-    assert bounds_document(solutions)["success"]["rate"] == 1
+    assert bounds_document(solutions)["success"]["value"] == 1
 
 
 def test_document_of_hopeless_trials_has_no_gap(folder):
     document = bounds_document(oracle_bounds(draw(horizon=1)))
     assert json.loads(json.dumps(document, allow_nan=False)) == document
-    assert (document["success"]["rate"], document["gap"]) == (0, None)
+    assert (document["success"]["value"], document["gap"]) == (0, None)
     assert [entry["trial"] for entry in document["unsolved"]] == [0, 1, 2]
     assert document["steps"]["max"] == 1
     assert document["steps_lower_bound"]["mean"] == 2
