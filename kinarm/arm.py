@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from kinarm._fields import check_fields
 from kinarm._validation import finite_array
 from kinarm.chain import Chain
 from kinarm.errors import ArmError
@@ -51,11 +52,15 @@ class ArmSpecification:
     velocity_limits: tuple[float, ...] | None = None
     digest: str | None = None
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+
     def resolved(self, folder: Path) -> "ArmSpecification":
         """The same arm with absolute paths; relative ones start at a folder."""
-        source = self.source
-        if source not in arm_names() and (folder / source).is_file():
-            source = str((folder / source).resolve())
+        source, path = self.source, folder / self.source
+        is_path = Path(source).suffix == ".urdf" or Path(source).parent != Path()
+        if source not in arm_names() and (is_path or path.is_file()):
+            source = str(path.resolve())
         folders = tuple(str((folder / each).resolve()) for each in self.package_dirs)
         return replace(self, source=source, package_dirs=folders)
 

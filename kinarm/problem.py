@@ -14,7 +14,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from kinarm._fields import from_plain, init_fields, to_plain, to_toml
+from kinarm._fields import check_fields, from_plain, init_fields, to_plain, to_toml
 from kinarm._files import first_line, write_text
 from kinarm._validation import whole_number
 from kinarm.arm import Arm, ArmSpecification
@@ -47,6 +47,7 @@ class Stepping:
     tested_configurations: int = 4
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if not (math.isfinite(self.time_step) and self.time_step > 0):
             raise ProblemError(f"time_step must be finite and above 0 s, got {self.time_step}")
         whole_number("tested_configurations", self.tested_configurations, 1)
@@ -86,6 +87,7 @@ class ReachProblem:
     stepping: Stepping = field(default_factory=Stepping)
 
     def __post_init__(self) -> None:
+        check_fields(self)
         available = [region.name for region in self.scene.goal_regions]
         for name in self.task.goal_regions:
             if name not in available:
@@ -169,8 +171,7 @@ class ReachProblem:
     @cached_property
     def digest(self) -> str:
         """Hash of everything that behaviour depends on; the name is not part of it."""
-        # Built anew, so that 1 and 1.0 are the same.
-        entries = {**self.from_json(self.to_json()).to_json(), "arm": self.arm_digest}
+        entries = {**self.to_json(), "arm": self.arm_digest}
         del entries["name"]
         text = json.dumps(entries, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
