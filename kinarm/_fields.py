@@ -153,7 +153,7 @@ def _value(hint: Any, entry: Any, where: str, path: str, kind: type) -> Any:
             return entry
     elif is_scalar(hint, entry):
         with suppress(OverflowError):
-            return hint(entry)
+            return float(entry) + 0.0 if hint is float else hint(entry)  # without negative zeros
     wanted = f"{path} must be {expected(hint)}{_unit(kind, path)}, got {entry!r}"
     raise InvalidInputError(f"{where}: {wanted}" if where else wanted)
 

@@ -142,20 +142,21 @@ class ReachProblem:
             If a value cannot be used.
         """
         given = {name: value for name, value in overrides.items() if value is not None}
-        changes: dict[str, Any] = {}
+        changes = _taken(given, ReachProblem)
         for name, convert in PARTS.items():
-            if name in given:
-                changes[name] = convert(given.pop(name))
+            if name in changes:
+                changes[name] = convert(changes[name])
         task, stepping = changes.get("task", self.task), changes.get("stepping", self.stepping)
         if isinstance(given.get("reward"), Mapping):
             weights = dict(given["reward"])
             _check_names("reward term", weights, RewardWeights)
             given["reward"] = replace(task.reward, **weights)
-        of_task = {name: given.pop(name) for name in init_fields(ReachTask) if name in given}
-        of_stepping = {name: given.pop(name) for name in init_fields(Stepping) if name in given}
+        of_task, of_stepping = _taken(given, ReachTask), _taken(given, Stepping)
         _check_names("setting of a problem", given, ReachProblem, ReachTask, Stepping)
-        changes["task"] = replace(task, **of_task)
-        changes["stepping"] = replace(stepping, **of_stepping)
+        if of_task:
+            changes["task"] = replace(task, **of_task)
+        if of_stepping:
+            changes["stepping"] = replace(stepping, **of_stepping)
         return replace(self, **changes)
 
     @cached_property
@@ -264,13 +265,16 @@ def _specification(arm: Arm | ArmSpecification | str | Path) -> ArmSpecification
 
 
 PARTS: dict[str, Callable[[Any], Any]] = {
-    "name": str,
     "arm": _specification,
     "scene": lambda scene: scene if isinstance(scene, Scene) else ReachProblem.load(scene).scene,
     "task": lambda task: task if isinstance(task, ReachTask) else ReachProblem.load(task).task,
-    "stepping": lambda stepping: stepping,
 }
-"""How `ReachProblem.replace` understands what it is given for a part."""
+"""How `ReachProblem.replace` understands what it is given for some parts."""
+
+
+def _taken(given: dict[str, Any], kind: type) -> dict[str, Any]:
+    """Fields of a dataclass among what is given, which loses them."""
+    return {name: given.pop(name) for name in init_fields(kind) if name in given}
 
 
 def _check_names(what: str, given: Mapping[str, Any], *kinds: type) -> None:
@@ -291,7 +295,7 @@ def _read_problem(path: Path) -> ReachProblem:
     except (ValueError, RecursionError) as error:
         raise InvalidInputError(f"{name}: not a problem file: {first_line(error)}") from error
     base = entries.pop("base", "right")
-    if base not in PROBLEMS:
+    if not isinstance(base, str) or base not in PROBLEMS:
         raise InvalidInputError(f"{name}: base must be one of {', '.join(PROBLEMS)}, got {base!r}")
     given = {"name": path.stem, **entries}
     problem = from_plain(ReachProblem, _merged(to_plain(PROBLEMS[base]), given), name)
