@@ -108,7 +108,7 @@ def common_palette(pictures: list[Image.Image]) -> Image.Image:
 
 def main() -> None:
     """Record, photograph and write the animation."""
-    motions = record_motions(Simulator("paper", "both"), load_policy(POLICY))
+    motions = record_motions(Simulator("both"), load_policy(POLICY))
     pictures = photograph(motions)
     save_animation(pictures, OUT)
     print(f"{OUT}: {len(pictures)} frames, {OUT.stat().st_size / 1e6:.2f} MB")

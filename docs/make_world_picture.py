@@ -84,7 +84,7 @@ def point_out(axes: Axes, text: str, place: ArrayLike, offset: tuple[float, floa
 
 def main() -> None:
     """Photograph the arm and put rulers and labels on the picture."""
-    simulator = Simulator("paper", "right")
+    simulator = Simulator("right")
     figure = plt.figure(figsize=(9.6, 6.4), dpi=100 * SCALE)
     axes = figure.add_axes((0, 0, 1, 1))
     axes.imshow(photograph(simulator))

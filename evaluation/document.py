@@ -262,6 +262,4 @@ def check_fields(where: str, entries: Any, fields: Mapping[str, Any]) -> None:
         if field not in entries:
             raise InvalidInputError(f"{where} lacks {field!r}")
         if not isinstance(entries[field], kind):
-            raise InvalidInputError(
-                f"{where} has a {field!r} of another kind: {entries[field]!r:.40}"
-            )
+            raise InvalidInputError(f"{where} has no such {field!r} as it should")

@@ -11,7 +11,7 @@ LEVEL = 0.95
 RESAMPLES = 1000
 BOOTSTRAP_SEED = 0
 
-NUMBERS_AT_ONCE = 2_000_000
+NUMBERS_AT_ONCE = 400_000
 """How many trial numbers are resampled at once, so that many trials do not fill the memory."""
 
 Interval = tuple[float, float]

@@ -13,11 +13,10 @@ to the oracle, which shows how they could have ended.
 # ------
 # A :py:class:`~kinarm.Recording` holds the states that the simulator went through.
 
-from kinarm import Simulator
 from kinarm.evaluation import TrialSet, find_entrants, oracle_bounds, record
 from kinarm.viewer import replay_page
 
-trials = TrialSet.draw(Simulator("paper", "right"), trials=200, seed=0)
+trials = TrialSet.draw("right", trials=200, seed=0)
 bounds = oracle_bounds(trials)
 (policy,) = find_entrants("ars-tuned-right-seed0")
 (oracle,) = find_entrants("oracle")

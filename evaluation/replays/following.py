@@ -2,7 +2,7 @@
 
 import itertools
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -43,9 +43,8 @@ def follow(
     entrant: Entrant,
     simulator: Simulator,
     seed: int,
-    report: Callable[[Recording], object],
-) -> None:
-    """Show trials until this is interrupted.
+) -> Iterator[Recording]:
+    """Show one trial after the other, without end, and hand out its recording.
 
     Parameters
     ----------
@@ -54,16 +53,14 @@ def follow(
     entrant : Entrant
         What drives the arm.
     simulator : Simulator
-        Arm, scene and task.
+        What is faced.
     seed : int
         Seed of the first trial; the next ones count up.
-    report : callable
-        Called after each trial.
     """
     window, arm = server.window, simulator.arm
     draw_surroundings(window, simulator.scene)
     aim_camera(window)
-    draw_goal(window["goal"], simulator.scene, simulator.task.tolerance)
+    draw_goal(window["goal"], simulator.problem)
     frames = draw_arm(window["arm"], arm)
     for recording in fresh_recordings(entrant, simulator, seed):
         goal = np.eye(4)
@@ -73,9 +70,9 @@ def follow(
         for state in recording.states:
             for frame, placement in zip(frames[1:], joint_placements(arm, state), strict=True):
                 frame.set_transform(placement)
-            time.sleep(SLOWDOWN * recording.time_step)
+            time.sleep(SLOWDOWN * simulator.problem.stepping.time_step)
         draw_trace(window["trace"], arm, recording)
-        report(recording)
+        yield recording
         time.sleep(REST)
 
 

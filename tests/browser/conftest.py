@@ -96,7 +96,7 @@ def open_page(browser: object) -> Iterator[Callable[..., Watched]]:
 @pytest.fixture(scope="session")
 def recorded() -> list[Recording]:
     """Three random motions in ``both``, one of which collides."""
-    simulator = Simulator(task="both", threads=1)
+    simulator = Simulator("both", threads=1)
     count = 24
     starts, goals = simulator.sample(np.random.default_rng(0), count)
     shape = (count, simulator.task.horizon, simulator.n_actions)

@@ -74,7 +74,7 @@ def test_pixels_are_drawn(watched):
 def test_the_card_says_what_happens(watched, recorded):
     collided = recorded[2]
     show(watched, 2, 3)
-    assert text(watched, "#eyebrow") == f"Task both · trial {collided.trial}"
+    assert text(watched, "#eyebrow") == f"Problem both · trial {collided.trial}"
     assert text(watched, "#runs .name") == "wave"
     assert text(watched, "#runs .badge") == "Contact"
     assert " touches ".join(collided.contact) in text(watched, "#runs .note")

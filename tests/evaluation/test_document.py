@@ -8,10 +8,13 @@ import pytest
 from rich.console import Console
 
 from kinarm.arm import Arm
+from kinarm.errors import InvalidInputError
 from kinarm.evaluation.bounds import bounds_document
+from kinarm.evaluation.document import EvaluationDocument, evaluation_document
 from kinarm.evaluation.entrants import ORACLE, Entrant
-from kinarm.evaluation.evaluations import evaluate, run_trials
-from kinarm.evaluation.report import evaluation_document, print_table
+from kinarm.evaluation.evaluation import evaluate, run_trials
+from kinarm.evaluation.metrics import METRICS, Metric
+from kinarm.evaluation.table import print_table
 from kinarm.reference import ReferenceSimulator
 from kinarm.simulator import Simulator
 
@@ -21,11 +24,7 @@ RESULT_FIELDS = {
     "recipe": str,
     "task": str,
     "trials": int,
-    "final_distance": dict,
-    "success": dict,
-    "within": dict,
-    "collision": dict,
-    "steps": dict,
+    "metrics": dict,
 }
 
 
@@ -87,12 +86,12 @@ def test_every_result_has_every_field(document):
     for row in (*document["results"], *document["pooled"]):
         for name, kind in RESULT_FIELDS.items():
             assert type(row[name]) is kind, name
-        assert {"mean", "median", "iqm", "p95", "max", "ci95"} <= set(row["final_distance"])
-        assert set(row["final_distance"]["ci95"]) == {"mean", "median", "iqm", "p95"}
-        assert set(row["within"]) == {"0.1", "0.2"}
-        assert {"mean", "median"} <= set(row["steps"])
-        for share in (row["success"], row["collision"], *row["within"].values()):
-            assert 0 <= share["ci95"][0] <= share["rate"] <= share["ci95"][1] <= 1
+        assert list(row["metrics"]) == list(METRICS)
+        for name, metric in METRICS.items():
+            value, ci95 = row["metrics"][name]["value"], row["metrics"][name]["ci95"]
+            assert (ci95 is not None) == (metric.interval is not None), name
+            if ci95:
+                assert ci95[0] <= value <= ci95[1], name
 
 
 def test_protocol_tells_how_it_was_done(document, evaluations):
@@ -113,7 +112,10 @@ def test_every_trial_of_every_result_is_listed(document):
         lengths = {len(column) for column in (entry["starts"], entry["goals"], *outcomes.values())}
         assert lengths == {row["trials"]}
         assert {"final_distance", "steps", "outcome", "contact"} <= set(outcomes)
-        assert row["success"]["rate"] == outcomes["outcome"].count("success") / row["trials"]
+        assert (
+            row["metrics"]["success"]["value"]
+            == outcomes["outcome"].count("success") / row["trials"]
+        )
         for outcome, contact in zip(outcomes["outcome"], outcomes["contact"], strict=True):
             assert (contact is not None) == (outcome == "collision")
 
@@ -138,7 +140,7 @@ def test_training_seeds_are_recorded(document):
 
 def test_table_has_a_column_per_figure(document):
     headings = list(shown(document)[0])
-    figures = ("success", "seeds", "0.1", "0.2", "median", "mean", "p95", "contact", "steps")
+    figures = ("success", "over seeds", "0.1", "0.2", "median", "mean", "p95", "contact", "steps")
     for name in ("task", "policy", *figures, "of oracle", "step ratio"):
         assert any(name in heading for heading in headings), name
 
@@ -150,29 +152,27 @@ def test_table_has_a_row_per_recipe_and_baseline(document):
 
 def test_table_shows_the_figures_of_the_document(document):
     row = next(row for row in shown(document) if row["policy"] == "made-right")
-    pooled = document["pooled"][0]
-    low, high = (100 * end for end in pooled["success"]["ci95"])
-    for end in (100 * pooled["success"]["rate"], low, high):
+    figures, spread = document["pooled"][0]["metrics"], document["pooled"][0]["spread"]
+    low, high = (100 * end for end in figures["success"]["ci95"])
+    for end in (100 * figures["success"]["value"], low, high):
         assert f"{end:.1f}" in row["success %"]
-    assert row["<= 0.1 m"] == f"{100 * pooled['within']['0.1']['rate']:.1f}"
-    assert row["<= 0.2 m"] == f"{100 * pooled['within']['0.2']['rate']:.1f}"
-    assert row["median m"].startswith(f"{pooled['final_distance']['median']:.3f} ")
-    assert row["mean m"] == f"{pooled['final_distance']['mean']:.3f}"
-    assert row["contact %"] == f"{100 * pooled['collision']['rate']:.1f}"
-    worst, best = (100 * pooled["spread"]["success"][end] for end in ("min", "max"))
-    assert row["seeds: range %"] == f"3: {worst:.1f}..{best:.1f}"
+    assert row["<= 0.1 m"] == f"{100 * figures['within_0.1']['value']:.1f}"
+    assert row["<= 0.2 m"] == f"{100 * figures['within_0.2']['value']:.1f}"
+    assert row["median m"].startswith(f"{figures['median_distance']['value']:.3f} ")
+    assert row["mean m"] == f"{figures['mean_distance']['value']:.3f}"
+    assert row["contact %"] == f"{100 * figures['collision']['value']:.1f}"
+    worst, best = (100 * spread["success"][end] for end in ("min", "max"))
+    assert row["over seeds %"] == f"{worst:.1f}..{best:.1f} (3 seeds)"
 
 
 def test_results_stand_beside_the_oracle(bounded_document, bounded_evaluations):
     assert json.loads(json.dumps(bounded_document, allow_nan=False)) == bounded_document
     for row, evaluation in zip(bounded_document["results"], bounded_evaluations, strict=False):
         ratios = evaluation.step_ratio
-        assert row["oracle"]["relative_success"] == row["success"]["rate"]
-        assert row["oracle"]["step_ratio"] == {
-            "trials": len(ratios),
-            "median": np.median(ratios) if len(ratios) else None,
-            "p95": np.percentile(ratios, 95) if len(ratios) else None,
-        }
+        figures = {name: entry["value"] for name, entry in row["metrics"].items()}
+        assert figures["relative_success"] == figures["success"]
+        assert figures["step_ratio"] == (np.median(ratios) if len(ratios) else None)
+        assert figures["step_ratio_p95"] == (np.percentile(ratios, 95) if len(ratios) else None)
 
 
 def test_protocol_tells_the_bounds_of_its_tasks(bounded_document, bounded_evaluations):
@@ -187,16 +187,17 @@ def test_protocol_tells_the_bounds_of_its_tasks(bounded_document, bounded_evalua
 def test_without_bounds_there_are_none(evaluations):
     document = evaluation_document(evaluations, "")
     assert all(entry["oracle"] is None for entry in document["protocol"]["tasks"].values())
-    assert all(row["oracle"] is None for row in (*document["results"], *document["pooled"]))
+    for row in (*document["results"], *document["pooled"]):
+        assert row["metrics"]["relative_success"]["value"] is None
     assert {row["of oracle %"] + row["step ratio"] for row in shown(document)} == {""}
 
 
 def test_table_shows_the_bounds(bounded_document):
     rows = {(row["task"], row["policy"]): row for row in shown(bounded_document)}
-    pooled = bounded_document["pooled"][0]["oracle"]
+    pooled = bounded_document["pooled"][0]["metrics"]
     row = rows["right", "made-right"]
-    assert row["of oracle %"] == f"{100 * pooled['relative_success']:.1f}"
-    median, p95 = (pooled["step_ratio"][name] for name in ("median", "p95"))
+    assert row["of oracle %"] == f"{100 * pooled['relative_success']['value']:.1f}"
+    median, p95 = (pooled[name]["value"] for name in ("step_ratio", "step_ratio_p95"))
     assert row["step ratio"] == f"{median:.2f} (p95 {p95:.2f})"
     assert (rows["right", "zero"]["of oracle %"], rows["right", "zero"]["step ratio"]) == (
         "0.0",
@@ -215,8 +216,8 @@ def test_table_has_one_row_a_task_for_the_oracle(bounded_document):
 
 
 def test_table_is_sorted_by_success(document):
-    rates = {row["policy"]: row["success"]["rate"] for row in document["results"]}
-    rates |= {row["policy"]: row["success"]["rate"] for row in document["pooled"]}
+    rows = (*document["results"], *document["pooled"])
+    rates = {row["policy"]: row["metrics"]["success"]["value"] for row in rows}
     right = [rates[row["policy"]] for row in shown(document) if row["task"] == "right"]
     assert right == sorted(right, reverse=True)
     assert right[0] > right[-1]
@@ -256,3 +257,66 @@ def test_markdown_holds_the_same_rows_at_every_width(document):
         names = cells(heading, "|")
         rows = [dict(zip(names, cells(line, "|"), strict=True)) for line in lines]
         assert rows == shown(document)
+
+
+def test_a_new_metric_is_one_entry(evaluations, monkeypatch):
+    """Documents and tables show whatever the table of metrics holds."""
+    metric = Metric(
+        meaning="share of trials that end within half a metre",
+        formula=lambda trials: (trials.distance <= 0.5).mean(axis=-1),
+        unit="%",
+        interval="Wilson",
+        heading="<= 0.5 m",
+        digits=1,
+        spread_heading="spread of it %",
+    )
+    monkeypatch.setitem(METRICS, "within_0.5", metric)
+    again = [type(each)(each.entrant, each.trials, each.rollouts) for each in evaluations]
+    document = evaluation_document(again, "")
+    for row, evaluation in zip(document["results"], again, strict=True):
+        assert row["metrics"]["within_0.5"] == evaluation.within(0.5).to_json()
+    rates = [100 * each.within(0.5).value for each in again[:3]]
+    row = next(row for row in shown(document) if row["policy"] == "made-right")
+    assert row["<= 0.5 m"] == f"{sum(rates) / 3:.1f}"
+    assert row["spread of it %"] == f"{min(rates):.1f}..{max(rates):.1f} (3 seeds)"
+
+
+@pytest.fixture
+def stored(evaluations, tmp_path):
+    """A document in a file, and a function that changes it there."""
+    path = tmp_path / "evaluation.json"
+    document = json.loads(json.dumps(evaluation_document(evaluations, "")))
+
+    def store(change=lambda document: None):
+        changed = json.loads(json.dumps(document))
+        change(changed)
+        path.write_text(json.dumps(changed))
+        return path
+
+    return store
+
+
+def test_a_document_is_read_as_it_was_written(stored, evaluations):
+    document = EvaluationDocument.load(stored())
+    trials = document.trials("right", Arm.load())
+    assert trials.digest == evaluations[0].trials.digest
+    assert document.result("made-right", None)["policy"] == "made-right-seed0"
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda d: d.pop("results"), "it lacks 'results'"),
+        (lambda d: d["protocol"].pop("seed"), "protocol lacks 'seed'"),
+        (lambda d: d["protocol"]["tasks"]["left"].pop("goals"), "task 'left' lacks 'goals'"),
+        (lambda d: d["protocol"]["tasks"]["left"].update(horizon="64"), "task 'left'.*'horizon'"),
+        (lambda d: d["protocol"]["tasks"]["left"]["goals"].append([1]), "goals of 'left'"),
+        (lambda d: d["results"][2].update(task="up"), "result 2 is of the unknown task 'up'"),
+        (lambda d: d["results"][1]["outcomes"]["steps"].pop(), "result 1 .* different lengths"),
+        (lambda d: d["results"].insert(0, 3), "result 0 is no object"),
+        (lambda d: d["protocol"].update(format_version=9), "format version 9; this kinarm reads"),
+    ],
+)
+def test_a_damaged_document_is_refused_with_the_place(stored, change, words):
+    with pytest.raises(InvalidInputError, match=rf"evaluation\.json' .*{words}"):
+        EvaluationDocument.load(stored(change))

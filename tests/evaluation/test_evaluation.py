@@ -10,7 +10,7 @@ import pytest
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError, SceneError, UnknownNameError
 from kinarm.evaluation.entrants import BASELINES, ORACLE, Entrant, find_entrants
-from kinarm.evaluation.evaluations import evaluate, pool, run_trials
+from kinarm.evaluation.evaluation import evaluate, pool, run_trials
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle import Oracle
 from kinarm.reference import ReferenceSimulator
@@ -25,6 +25,14 @@ from kinarm.evaluation import *
 modules = [n for n in kinarm.evaluation.__all__ if isinstance(globals()[n], types.ModuleType)]
 assert not modules, f"these names are modules: {modules}"
 """
+
+
+COMPARED = ("relative_success", "step_ratio", "step_ratio_p95")
+
+
+def oracle_figures(evaluation):
+    """Figures that compare with the oracle, in documents."""
+    return [evaluation.to_json()["metrics"][name]["value"] for name in COMPARED]
 
 
 def test_public_names_are_what_they_say():
@@ -54,15 +62,16 @@ def test_episodes_are_those_of_the_reference(skilled, skilled_evaluation):
 def test_figures_are_those_of_the_episodes(skilled_evaluation):
     distance = np.array(skilled_evaluation.rollouts.distance)
     outcomes = skilled_evaluation.outcomes
-    figures = skilled_evaluation.to_json()
-    assert figures["trials"] == 60
-    assert figures["success"]["rate"] == outcomes.count("success") / 60
-    assert figures["collision"]["rate"] == outcomes.count("collision") / 60
-    assert figures["within"]["0.1"]["rate"] == sum(distance <= 0.1) / 60
-    assert figures["within"]["0.2"]["rate"] == sum(distance <= 0.2) / 60
-    assert figures["final_distance"]["mean"] == pytest.approx(sum(distance) / 60)
-    assert figures["final_distance"]["max"] == max(distance)
-    assert figures["steps"]["mean"] == pytest.approx(sum(skilled_evaluation.rollouts.steps) / 60)
+    document = skilled_evaluation.to_json()
+    figures = {name: entry["value"] for name, entry in document["metrics"].items()}
+    assert document["trials"] == 60
+    assert figures["success"] == outcomes.count("success") / 60
+    assert figures["collision"] == outcomes.count("collision") / 60
+    assert figures["within_0.1"] == sum(distance <= 0.1) / 60
+    assert figures["within_0.2"] == sum(distance <= 0.2) / 60
+    assert figures["mean_distance"] == pytest.approx(sum(distance) / 60)
+    assert figures["max_distance"] == max(distance)
+    assert figures["mean_steps"] == pytest.approx(sum(skilled_evaluation.rollouts.steps) / 60)
 
 
 def test_success_is_the_share_within_the_tolerance(skilled_evaluation):
@@ -74,16 +83,17 @@ def test_success_is_the_share_within_the_tolerance(skilled_evaluation):
 
 
 def test_shares_within_rise_with_the_distance(skilled_evaluation):
-    rates = [skilled_evaluation.within(d).rate for d in (0, 0.05, 0.1, 0.2, 0.5, 5)]
+    rates = [skilled_evaluation.within(d).value for d in (0, 0.05, 0.1, 0.2, 0.5, 5)]
     assert rates == sorted(rates)
     assert (rates[0], rates[-1]) == (0, 1)
 
 
 def test_attributes_agree_with_the_document(skilled_evaluation):
     document = skilled_evaluation.to_json()
-    assert document["success"] == skilled_evaluation.success.to_json()
-    assert document["collision"] == skilled_evaluation.collision.to_json()
-    assert document["final_distance"] == skilled_evaluation.distance.to_json()
+    for name in ("success", "collision"):
+        estimate = getattr(skilled_evaluation, name)
+        assert document["metrics"][name] == estimate.to_json()
+        assert skilled_evaluation.metrics[name] == estimate
     assert document["task"] == skilled_evaluation.task == "right"
 
 
@@ -186,7 +196,7 @@ def test_a_task_of_ones_own(skilled):
         evaluate(skilled, load_task("right", tolerance=tolerance), trials=40)
         for tolerance in (0.02, 0.2)
     )
-    assert strict.success.rate < lax.success.rate
+    assert strict.success.value < lax.success.value
     assert lax.trials.simulator.task.tolerance == 0.2
 
 
@@ -257,21 +267,23 @@ def test_a_single_seed_is_not_pooled(evaluations):
 
 def test_pooled_figures_are_those_of_all_seeds(evaluations):
     members = evaluations[:3]
-    figures = pool(evaluations)[0].to_json()
+    document = pool(evaluations)[0].to_json()
+    figures = {name: entry["value"] for name, entry in document["metrics"].items()}
     distance = np.concatenate([member.rollouts.distance for member in members])
     steps = np.concatenate([member.rollouts.steps for member in members])
-    assert figures["trials"] == 60
-    assert figures["final_distance"]["mean"] == pytest.approx(distance.mean())
-    assert figures["final_distance"]["median"] == pytest.approx(np.median(distance))
-    assert figures["final_distance"]["max"] == distance.max()
-    assert figures["success"]["rate"] == pytest.approx(np.mean(distance <= 0.05))
-    assert figures["within"]["0.2"]["rate"] == pytest.approx(np.mean(distance <= 0.2))
-    assert figures["steps"] == {"mean": pytest.approx(steps.mean()), "median": np.median(steps)}
+    assert document["trials"] == 60
+    assert figures["mean_distance"] == pytest.approx(distance.mean())
+    assert figures["median_distance"] == pytest.approx(np.median(distance))
+    assert figures["max_distance"] == distance.max()
+    assert figures["success"] == pytest.approx(np.mean(distance <= 0.05))
+    assert figures["within_0.2"] == pytest.approx(np.mean(distance <= 0.2))
+    assert figures["mean_steps"] == pytest.approx(steps.mean())
+    assert figures["median_steps"] == np.median(steps)
 
 
 def test_pooled_spread_is_over_the_seeds(evaluations):
     pooled = pool(evaluations)[0]
-    rates = [member.success.rate for member in evaluations[:3]]
+    rates = [member.success.value for member in evaluations[:3]]
     medians = [sorted(member.rollouts.distance)[29:31] for member in evaluations[:3]]
     spread = pooled.to_json()["spread"]
     assert spread["success"]["each"] == list(pooled.success_rates) == rates
@@ -279,13 +291,14 @@ def test_pooled_spread_is_over_the_seeds(evaluations):
     mean = sum(rates) / 3
     deviation = (sum((rate - mean) ** 2 for rate in rates) / 2) ** 0.5
     assert spread["success"]["std"] == pytest.approx(deviation)
-    assert spread["median_final_distance"]["each"] == pytest.approx([sum(m) / 2 for m in medians])
+    assert spread["median_distance"]["each"] == pytest.approx([sum(m) / 2 for m in medians])
+    assert not {"step_ratio", "relative_success"} & set(spread)
 
 
 def test_pooled_interval_is_no_narrower_than_its_trials_allow(evaluations):
     """60 trials with the pooled rate have a Wilson interval at least this wide."""
-    success = pool(evaluations)[0].to_json()["success"]
-    p, z, n = success["rate"], 1.959963984540054, 60
+    success = pool(evaluations)[0].to_json()["metrics"]["success"]
+    p, z, n = success["value"], 1.959963984540054, 60
     half = z * (p * (1 - p) / n + z**2 / (4 * n**2)) ** 0.5 / (1 + z**2 / n)
     assert success["ci95"][1] - success["ci95"][0] >= 2 * half - 1e-12
 
@@ -304,11 +317,8 @@ def test_step_ratio_is_that_of_the_trials_that_succeeded(bounded):
     ]
     assert 0 < len(expected) < 60
     assert bounded.step_ratio.tolist() == expected
-    assert bounded.to_json()["oracle"]["step_ratio"] == {
-        "trials": len(expected),
-        "median": np.median(expected),
-        "p95": np.percentile(expected, 95),
-    }
+    assert bounded.metrics["step_ratio"].value == np.median(expected)
+    assert bounded.metrics["step_ratio_p95"].value == np.percentile(expected, 95)
 
 
 @pytest.mark.parametrize("reached", [range(60), range(0, 60, 3), [7]])
@@ -316,33 +326,27 @@ def test_relative_success_is_the_ratio_of_two_rates(bounded, reached):
     reachable = np.isin(np.arange(60), list(reached))
     made = replace(bounded, bounds=replace(bounded.bounds, reachable=reachable))
     successes, possible = bounded.outcomes.count("success"), len(reached)
-    relative = made.to_json()["oracle"]["relative_success"]
+    relative = made.metrics["relative_success"].value
     assert relative == pytest.approx((successes / 60) / (possible / 60))
 
 
 def test_a_policy_that_never_succeeds_has_no_step_ratio():
     evaluation = evaluate("zero", "right", trials=4, oracle=True)
     assert evaluation.step_ratio.shape == (0,)
-    assert evaluation.to_json()["oracle"] == {
-        "relative_success": 0,
-        "step_ratio": {"trials": 0, "median": None, "p95": None},
-    }
+    assert oracle_figures(evaluation) == [0, None, None]
 
 
 @pytest.mark.parametrize("name", ["oracle", "zero"])
 def test_where_the_oracle_reaches_nothing_there_is_nothing_to_compare_with(name):
     evaluation = evaluate(name, load_task("right", horizon=1), trials=4, oracle=True)
     assert not evaluation.bounds.reachable.any()
-    assert evaluation.to_json()["oracle"] == {
-        "relative_success": None,
-        "step_ratio": {"trials": 0, "median": None, "p95": None},
-    }
+    assert oracle_figures(evaluation) == [None, None, None]
 
 
 def test_without_the_oracle_there_are_no_bounds(skilled_evaluation):
     assert skilled_evaluation.bounds is None
-    assert skilled_evaluation.to_json()["oracle"] is None
-    with pytest.raises(InvalidInputError, match="'skilled' was evaluated without the oracle"):
+    assert oracle_figures(skilled_evaluation) == [None, None, None]
+    with pytest.raises(InvalidInputError, match="there are no bounds"):
         _ = skilled_evaluation.step_ratio
 
 
@@ -353,8 +357,9 @@ def test_evaluations_are_made_without_the_oracle_unless_asked_for(skilled, monke
 
 def test_the_oracle_changes_nothing_but_the_bounds(skilled_evaluation, bounded):
     alone, beside = skilled_evaluation.to_json(), bounded.to_json()
-    assert alone.pop("oracle") is None
-    assert set(beside.pop("oracle")) == {"relative_success", "step_ratio"}
+    for name in COMPARED:
+        assert alone["metrics"].pop(name) == {"value": None, "ci95": None}
+        assert beside["metrics"].pop(name)["value"] is not None
     assert alone == beside
 
 
@@ -372,7 +377,7 @@ def test_the_oracle_evaluated_by_name():
 
 def test_the_oracle_evaluated_without_bounds():
     evaluation = evaluate("oracle", task="right", trials=5, seed=5)
-    assert evaluation.success.rate == 1
+    assert evaluation.success.value == 1
     assert evaluation.bounds is None
 
 
@@ -384,9 +389,8 @@ def test_the_oracle_has_no_task_of_its_own():
 def test_the_oracle_is_all_that_is_possible_where_not_everything_is():
     evaluation = evaluate("oracle", "right", trials=12, seed=2, arm="paper_flange", oracle=True)
     solved = int(evaluation.bounds.reachable.sum())
-    assert 0 < evaluation.success.rate == solved / 12 < 1
-    beside = evaluation.to_json()["oracle"]
-    assert (beside["relative_success"], beside["step_ratio"]["trials"]) == (1, solved)
+    assert 0 < evaluation.success.value == solved / 12 < 1
+    assert (evaluation.metrics["relative_success"].value, evaluation.step_ratio.size) == (1, solved)
 
 
 @pytest.mark.parametrize(
@@ -426,18 +430,40 @@ def test_a_policy_for_another_arm_is_refused_before_the_oracle_is_asked(skilled,
 
 def test_pooled_step_ratio_is_over_all_seeds(trials):
     members = [run_trials(e, trials, oracle=True) for e in find_entrants("ars-tuned-right")]
-    beside = pool(members)[0].to_json()["oracle"]
+    relative, median, p95 = oracle_figures(pool(members)[0])
     ratios = [
         member.rollouts.steps[trial] / member.bounds.steps_lower_bound[trial]
         for member in members
         for trial in np.flatnonzero(member.rollouts.success)
     ]
     assert 60 < len(ratios) < 240
-    assert beside["step_ratio"]["trials"] == len(ratios)
-    assert beside["step_ratio"]["median"] == pytest.approx(np.median(ratios))
-    assert beside["step_ratio"]["p95"] == pytest.approx(np.percentile(ratios, 95))
-    assert beside["relative_success"] == pytest.approx(len(ratios) / 240)
+    assert median == pytest.approx(np.median(ratios))
+    assert p95 == pytest.approx(np.percentile(ratios, 95))
+    assert relative == pytest.approx(len(ratios) / 240)
 
 
 def test_pooled_figures_without_bounds_have_none(evaluations):
-    assert pool(evaluations)[0].to_json()["oracle"] is None
+    assert oracle_figures(pool(evaluations)[0]) == [None, None, None]
+
+
+def test_texts_of_evaluations_are_one_readable_line(evaluations, trials):
+    assert repr(trials) == f"TrialSet(60 trials of right, arm paper, seed 5: {trials.digest})"
+    assert repr(evaluations[3]).startswith("Evaluation(zero on 60 trials of right, success 0 (0..")
+    (pooled,) = pool(evaluations)
+    assert repr(pooled).startswith("PooledEvaluation(3 seeds of made-right on 60 trials of right,")
+    for made in (trials, pooled, *evaluations, *(each.entrant for each in evaluations)):
+        assert len(repr(made)) < 130
+        assert "\n" not in repr(made)
+
+
+def test_a_policy_that_does_not_fit_is_refused_before_bounds_are_solved(skilled, monkeypatch):
+    narrow = replace(skilled, mean=skilled.mean[1:], std=skilled.std[1:], layers=fewer(skilled))
+    monkeypatch.setattr(Oracle, "solve_batch", None)
+    with pytest.raises(PolicyFileError, match=r"maps 47 observations to 5 actions; arm 'paper'"):
+        evaluate(narrow, trials=2, seed=77, oracle=True)
+
+
+def fewer(policy):
+    """Layers that take one observation less."""
+    first, *others = policy.layers
+    return (first._replace(weights=first.weights[:, 1:]), *others)

@@ -5,7 +5,7 @@ import pytest
 from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.evaluation import Entrant, TrialSet, find_entrants, oracle_bounds, record
 from kinarm.evaluation.evaluation import run_trials
-from kinarm.simulator import Simulator
+from kinarm.problem import ReachProblem
 
 
 @pytest.mark.parametrize("name", ["skilled", "random", "zero", "oracle"])
@@ -36,16 +36,16 @@ def test_functions_are_recorded(trials):
     entrant = Entrant.from_function("still", lambda observations: observations[:, :5] * 0)
     (recording,) = record(entrant, trials, [0])
     assert (recording.states == trials.starts[0]).all()
-    assert recording.outcome == "horizon"
+    assert recording.outcome == "truncated"
 
 
 def test_another_arm(skilled):
-    trials = TrialSet.draw(Simulator("paper_flange", "right"), 1, seed=0)
+    trials = TrialSet.draw(ReachProblem.load("right").replace(arm="paper_flange"), 1, seed=0)
     entrant = Entrant.from_policy("skilled", skilled)
     with pytest.raises(PolicyFileError, match="trained for arm 'paper'"):
         record(entrant, trials)
     (recording,) = record(entrant, trials, allow_other_arm=True)
-    assert recording.arm == "paper_flange"
+    assert recording.problem.arm.name == "paper_flange"
 
 
 def test_no_such_trial(trials):

@@ -11,17 +11,15 @@ import numpy as np
 import pytest
 
 from kinarm.errors import InvalidInputError, OutputError
+from kinarm.evaluation.document import evaluation_document
 from kinarm.evaluation.entrants import BASELINES, ORACLE, Entrant
-from kinarm.evaluation.evaluations import evaluate, run_trials
-from kinarm.evaluation.html_report import histograms, maps, profiles, summary
-from kinarm.evaluation.html_report.axes import Axis, log_ticks
-from kinarm.evaluation.html_report.groups import COLOURS, DASHES, group_results
-from kinarm.evaluation.html_report.maps import fates, level
-from kinarm.evaluation.html_report.markup import Markup, join, number, tag
-from kinarm.evaluation.html_report.page import report_page, write_report
-from kinarm.evaluation.html_report.replays import record_trials
-from kinarm.evaluation.html_report.worst import worst_trials
-from kinarm.evaluation.report import evaluation_document, table_rows
+from kinarm.evaluation.evaluation import evaluate, run_trials
+from kinarm.evaluation.report import charts, maps
+from kinarm.evaluation.report.groups import COLOURS, DASHES, group_results
+from kinarm.evaluation.report.maps import fates, level
+from kinarm.evaluation.report.page import page_template, report_page, write_report
+from kinarm.evaluation.report.worst import record_worst, worst_trials
+from kinarm.evaluation.table import table_rows
 from kinarm.viewer import replay_page
 
 PIXEL = 0.051
@@ -69,14 +67,19 @@ def rows_of(page: str, task: str) -> list[ElementTree.Element]:
     return content(page).findall(f".//section[@id='{task}']//table[@class='summary']/tbody/tr")
 
 
-def series(chart: Markup, name: str) -> ElementTree.Element:
-    found = ElementTree.fromstring(chart).find(f".//g[@data-series='{name}']")
-    assert found is not None
-    return found
+def shapes(drawing, name: str, classes: str):
+    """Shapes of a chart that belong to a policy."""
+    return [s for s in drawing.shapes if s.series == name and s.classes == classes]
+
+
+def drawn_map(task, group) -> ElementTree.Element:
+    """The map of a group."""
+    template = page_template().environment.get_template("map.html")
+    return ElementTree.fromstring(template.module.bench_map(task, group))
 
 
 def coordinates(path: str) -> np.ndarray:
-    return np.array(re.findall(r"(-?[\d.]+),(-?[\d.]+)", path), dtype=float)
+    return np.array(re.findall(r"(-?[\d.]+)[ ,](-?[\d.]+)", path), dtype=float)
 
 
 def wilson(hits: int, trials: int) -> tuple[float, float]:
@@ -94,26 +97,28 @@ class TestTable:
             assert names == [row["policy"] for row in table_rows(document, task)]
 
     def test_figures_are_those_of_the_document(self, page, document):
-        pooled = document["pooled"][0]
+        pooled, spread = document["pooled"][0]["metrics"], document["pooled"][0]["spread"]
         row = next(row for row in rows_of(page, "right") if text_of(row.find("th")) == "made-right")
         cells = {cell.get("data-label"): list(cell.itertext()) for cell in row.findall("td")}
         low, high = (100 * end for end in pooled["success"]["ci95"])
-        rate = 100 * pooled["success"]["rate"]
+        rate = 100 * pooled["success"]["value"]
         assert cells["success %"] == [f"{rate:.1f}", f"{low:.1f}\N{EN DASH}{high:.1f}"]
-        assert cells["of oracle %"] == [f"{100 * pooled['oracle']['relative_success']:.1f}"]
-        worst, best = (100 * pooled["spread"]["success"][end] for end in ("min", "max"))
-        assert cells["seeds: range %"] == [f"{worst:.1f}\N{EN DASH}{best:.1f}", "3 seeds"]
-        assert cells["median m"][0] == f"{pooled['final_distance']['median']:.3f}"
-        assert cells["contact %"] == [f"{100 * pooled['collision']['rate']:.1f}"]
+        assert cells["of oracle %"] == [f"{100 * pooled['relative_success']['value']:.1f}"]
+        worst, best = (100 * spread["success"][end] for end in ("min", "max"))
+        assert cells["over seeds %"] == [f"{worst:.1f}\N{EN DASH}{best:.1f}", "3 seeds"]
+        assert cells["median m"][0] == f"{pooled['median_distance']['value']:.3f}"
+        assert cells["contact %"] == [f"{100 * pooled['collision']['value']:.1f}"]
         assert cells["step ratio"] == [
-            f"{pooled['oracle']['step_ratio']['median']:.2f}",
-            f"p95 {pooled['oracle']['step_ratio']['p95']:.2f}",
+            f"{pooled['step_ratio']['value']:.2f}",
+            f"p95 {pooled['step_ratio_p95']['value']:.2f}",
         ]
 
     def test_intervals_are_drawn_to_scale(self, document):
-        share = document["pooled"][0]["success"]
-        bar = ElementTree.fromstring(summary.interval_bar(share, 0.75, "colour0"))
-        assert float(bar.find("circle").get("cx")) == pytest.approx(120 * share["rate"], abs=PIXEL)
+        parts = page_template().environment.get_template("parts.html").module
+        row = document["pooled"][0]
+        bar = ElementTree.fromstring(parts.interval_bar(row, 0.75, "colour0"))
+        share = row["metrics"]["success"]
+        assert float(bar.find("circle").get("cx")) == pytest.approx(120 * share["value"], abs=PIXEL)
         drawn = {path.get("class"): path.get("d") for path in bar.findall("path")}
         ends = [float(end) for end in re.findall(r"[MH]([\d.]+)", drawn["interval"])]
         assert ends == pytest.approx([120 * end for end in share["ci95"]], abs=PIXEL)
@@ -131,48 +136,65 @@ class TestTable:
         for task in document["protocol"]["tasks"]:
             row = next(r for r in table_rows(document, task) if r["algorithm"] == "ars")
             card = re.search(rf'<a href="#{task}" class="card">.*?</a>', page, re.DOTALL)[0]
-            assert f">{100 * row['success']['rate']:.1f}<" in card
+            assert f">{100 * row['metrics']['success']['value']:.1f}<" in card
             assert f"reached by {row['policy']} " in card
 
 
+def places(limits):
+    """Where distances lie across a profile chart."""
+    low, high = log(limits[0]), log(limits[-1])
+    inside = charts.WIDTH - charts.LEFT - charts.RIGHT
+    return charts.LEFT + (np.log(limits) - low) / (high - low) * inside
+
+
 class TestProfile:
+    BOTTOM = charts.PROFILE_HEIGHT - charts.BELOW
+    SPAN = BOTTOM - 14
+
     @pytest.mark.parametrize("name", ["made-right", "zero", "oracle"])
     def test_line_is_the_share_within_each_distance(self, right, name):
         group = next(group for group in right.groups if group.name == name)
-        line = series(profiles.profile_chart(right), name).find("path[@class='line']")
-        xs, ys = coordinates(line.get("d")).T
-        limits = profiles.profile_limits(right)
+        (line,) = shapes(charts.profile_chart(right), name, "line")
+        limits = charts.profile_limits(right)
         share = [np.mean(group.distances <= limit) for limit in limits]
-        span = profiles.BOTTOM - profiles.TOP
-        np.testing.assert_allclose((profiles.BOTTOM - ys) / span, share, atol=PIXEL / span)
-        low, high = log(limits[0]), log(limits[-1])
-        expected = profiles.LEFT + (np.log(limits) - low) / (high - low) * (
-            profiles.RIGHT - profiles.LEFT
+        xs, ys = coordinates(line.path).T
+        # Points that lie on a straight line may be left out.
+        np.testing.assert_allclose(
+            (self.BOTTOM - ys) / self.SPAN, np.interp(xs, places(limits), share), atol=0.01
         )
-        np.testing.assert_allclose(xs, expected, atol=PIXEL)
+        for edge in (0, -1):
+            assert xs[edge] == pytest.approx(places(limits)[edge], abs=PIXEL)
 
     def test_band_is_wilsons_interval_widened_to_whole_hits(self, right):
         group = next(group for group in right.groups if group.name == "made-right")
-        band = series(profiles.profile_chart(right), "made-right").find("path[@class='band']")
-        there, back = np.split(coordinates(band.get("d")), 2)
-        trials, span = group.distances.shape[1], profiles.BOTTOM - profiles.TOP
-        for place, limit in enumerate(profiles.profile_limits(right)):
+        (band,) = shapes(charts.profile_chart(right), "made-right", "band")
+        limits, trials = charts.profile_limits(right), group.distances.shape[1]
+        there, back = np.split(coordinates(band.path)[: 2 * len(limits)], 2)
+        tolerance = PIXEL / self.SPAN
+        for place, limit in enumerate(limits):
             hits = (group.distances <= limit).sum() / len(group.members)
             low, high = wilson(int(hits), trials)[0], wilson(int(np.ceil(hits)), trials)[1]
-            assert (profiles.BOTTOM - there[place, 1]) / span == pytest.approx(
-                high, abs=PIXEL / span
-            )
-            assert (profiles.BOTTOM - back[-1 - place, 1]) / span == pytest.approx(
-                low, abs=PIXEL / span
-            )
+            drawn = [(self.BOTTOM - y) / self.SPAN for y in (back[-1 - place, 1], there[place, 1])]
+            assert drawn == pytest.approx([low, high], abs=tolerance)
 
     def test_tolerance_and_the_distances_of_the_table_are_exact(self, right):
-        assert {0.05, 0.1, 0.2} <= set(profiles.profile_limits(right))
+        assert {0.05, 0.1, 0.2} <= set(charts.profile_limits(right))
 
     def test_everything_ends_at_the_top(self, right):
         for group in right.groups:
-            line = series(profiles.profile_chart(right), group.name).find("path[@class='line']")
-            assert coordinates(line.get("d"))[-1, 1] == profiles.TOP
+            (line,) = shapes(charts.profile_chart(right), group.name, "line")
+            assert coordinates(line.path)[-1, 1] == 14
+
+    def test_ticks(self):
+        assert charts.log_ticks(0.01, 1.6) == [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0]
+        assert charts.log_ticks(0.003, 0.011) == [0.005, 0.01]
+
+    def test_the_style_sheet_has_the_last_word(self, right):
+        """Charts bring no colours or fonts of their own."""
+        drawing = charts.profile_chart(right)
+        chart = page_template().environment.get_template("parts.html").module.chart(drawing)
+        assert not re.search(r"#[0-9a-f]{6}|font|style=", chart)
+        assert drawing.description in chart
 
 
 class TestHistogram:
@@ -184,19 +206,30 @@ class TestHistogram:
             np.mean((low <= distances) & (distances < high))
             for low, high in ((0, 0.05), (0.05, 0.1), (0.1, 5.0))
         ]
-        assert histograms.bin_shares(group, edges) == pytest.approx(expected)
+        assert charts.bin_shares(group, edges) == pytest.approx(expected)
 
     def test_bars_show_every_trial(self, right):
+        drawing = charts.histogram_chart(right)
         for group in right.groups:
-            bars = series(histograms.histogram_chart(right), group.name).find("g[@class='bars']")
-            shares = [float(bar.find("title").text.split(": ")[1].split()[0]) for bar in bars]
+            bars = shapes(drawing, group.name, "bars")
+            shares = [float(bar.title.split(": ")[1].split()[0]) for bar in bars]
             assert sum(shares) == pytest.approx(100, abs=0.005 * len(shares))
+
+    def test_bars_are_as_high_as_the_root_of_their_share(self, right):
+        drawing = charts.histogram_chart(right)
+        row = (drawing.height - charts.BELOW) / len(right.groups)
+        for group in right.groups:
+            for bar in shapes(drawing, group.name, "bars"):
+                heights = coordinates(bar.path)[:, 1]
+                share = float(bar.title.split(": ")[1].split()[0]) / 100
+                expected = row * charts.ROW_HEIGHT * sqrt(share)
+                assert np.ptp(heights) == pytest.approx(expected, abs=0.3)
 
 
 class TestMap:
     def test_markers_lie_at_the_goals(self, right):
         group = right.contenders[0]
-        drawn = ElementTree.fromstring(maps.bench_map(right, group))
+        drawn = drawn_map(right, group)
         view = maps.View.of(right.benches)
         goals = group.members[0].trials.goals
         markers = {}
@@ -212,7 +245,7 @@ class TestMap:
 
     def test_markers_have_the_colour_and_shape_of_what_happened(self, right):
         group = right.contenders[0]
-        drawn = ElementTree.fromstring(maps.bench_map(right, group))
+        drawn = drawn_map(right, group)
         results = fates(group)
         seen = set()
         for marker in drawn.findall("path"):
@@ -227,9 +260,10 @@ class TestMap:
 
     def test_many_trials_leave_a_map_light(self, right, monkeypatch):
         monkeypatch.setattr(maps, "MARKERS", 7)
-        drawn = maps.bench_map(right, right.contenders[0])
-        assert drawn.count("<title>trial ") == 7
-        assert "<title>trial 6," in drawn
+        markers = maps.markers(right, right.contenders[0])
+        assert sorted(marker.title.split(",")[0] for marker in markers) == [
+            f"trial {number}" for number in range(7)
+        ]
 
     def test_fate_is_the_worst_over_the_seeds(self, right):
         group = right.contenders[0]
@@ -241,7 +275,7 @@ class TestMap:
             assert fate.outcome == worst
 
     def test_bench_and_base_are_to_scale(self, right):
-        drawn = ElementTree.fromstring(maps.bench_map(right, right.contenders[0]))
+        drawn = drawn_map(right, right.contenders[0])
         (bench,), view = right.benches, maps.View.of(right.benches)
         rect, base = drawn.find("rect"), drawn.find("circle")
         assert float(rect.get("width")) == pytest.approx((bench.y[1] - bench.y[0]) * maps.SCALE)
@@ -256,8 +290,8 @@ class TestMap:
         group, (bench,) = right.contenders[0], right.benches
         goals = group.members[0].trials.goals
         width = (bench.x[1] - bench.x[0]) / maps.SLICES
-        for place, share in enumerate(maps.failure_shares(group, bench)):
-            low = bench.x[0] + place * width
+        for place, ((low, high), share) in enumerate(maps.failure_shares(group, bench)):
+            assert (low, high) == pytest.approx((bench.x[0] + place * width, low + width))
             inside = (low <= goals[:, 0]) & (goals[:, 0] < low + width)
             failed = [not o for m in group.members for o in m.rollouts.success[inside]]
             assert share == (pytest.approx(np.mean(failed)) if failed else None)
@@ -303,7 +337,7 @@ class TestWorst:
         chosen = [worst for task in tasks.values() for worst in worst_trials(task)]
         rows = content(page).findall(".//section[@id='worst']//tbody/tr")
         assert [row.get("data-replay") for row in rows] == [str(n) for n in range(len(chosen))]
-        for recording, worst in zip(record_trials(chosen), chosen, strict=True):
+        for recording, worst in zip(record_worst(chosen), chosen, strict=True):
             _, evaluation, trial = worst
             assert (recording.policy, recording.task, recording.trial) == (
                 evaluation.entrant.name,
@@ -316,7 +350,7 @@ class TestWorst:
     def test_replay_is_part_of_the_page(self, page, tasks):
         chosen = [worst for task in tasks.values() for worst in worst_trials(task)]
         (frame,) = content(page).findall(".//iframe")
-        expected = replay_page(record_trials(chosen)).html
+        expected = replay_page(record_worst(chosen)).html
         assert " ".join(frame.get("data-page").split()) == " ".join(expected.split())
         assert frame.get("title")
 
@@ -360,7 +394,7 @@ class TestPage:
             assert hidden == "true" or (role == "img" and drawing.get("aria-label"))
 
     def test_classes_are_in_the_style_sheet(self, page):
-        styles = (resources.files("kinarm.evaluation.html_report") / "page.css").read_text()
+        styles = (resources.files("kinarm.evaluation.report") / "templates/page.css").read_text()
         for kind, count in (("colour", COLOURS), ("d", maps.LEVELS)):
             for place in range(count):
                 assert f".{kind}{place} {{" in styles
@@ -370,7 +404,7 @@ class TestPage:
             assert f".{name} .line" in styles
 
     def test_dark_and_light_have_the_same_variables(self):
-        styles = (resources.files("kinarm.evaluation.html_report") / "page.css").read_text()
+        styles = (resources.files("kinarm.evaluation.report") / "templates/page.css").read_text()
         light, *dark = (
             set(re.findall(r"(--\w+):", block))
             for block in re.findall(r"\{([^{}]*--page:[^{}]*)\}", styles)
@@ -429,36 +463,3 @@ class TestWriting:
         (tmp_path / "file").write_text("mine")
         with pytest.raises(OutputError, match="file"):
             write_report(tmp_path / "file", document, faced)
-
-
-class TestMarkup:
-    def test_text_is_escaped_and_markup_is_not(self):
-        assert tag("p", "a < b & c", tag("b", "d")) == "<p>a &lt; b &amp; c<b>d</b></p>"
-        assert tag("p", title='"a" & <b>') == '<p title="&quot;a&quot; &amp; &lt;b&gt;"></p>'
-
-    def test_attributes(self):
-        made = tag("path", class_="line", data_series="x", cx=1.26, cy=None, viewBox="0 0 1 1")
-        assert made == '<path class="line" data-series="x" cx="1.3" viewBox="0 0 1 1"></path>'
-
-    def test_content_may_be_nested_or_missing(self):
-        assert join("a", None, ["<", [tag("i")]], (tag("b"),)) == "a&lt;<i></i><b></b>"
-
-    @pytest.mark.parametrize(
-        ("value", "text"), [(1.0, "1"), (-0.01, "0"), (0.25, "0.2"), (-3.46, "-3.5"), (10, "10")]
-    )
-    def test_numbers_are_short(self, value, text):
-        assert number(value) == text
-
-
-class TestAxis:
-    def test_ends_and_middle(self):
-        assert Axis(0.01, 1, 10, 30, "log")(0.1) == pytest.approx(20)
-        assert Axis(0, 1, 40, 0, "sqrt")(0.25) == pytest.approx(20)
-        assert Axis(2, 4, 0, 10)(np.array([2.0, 3.0, 4.0])) == pytest.approx([0, 5, 10])
-
-    def test_what_is_beyond_goes_to_the_end(self):
-        assert Axis(0.01, 1, 10, 30, "log")(np.array([0.0, 5.0])) == pytest.approx([10, 30])
-
-    def test_ticks(self):
-        assert log_ticks(0.01, 1.6) == [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0]
-        assert log_ticks(0.003, 0.011) == [0.005, 0.01]

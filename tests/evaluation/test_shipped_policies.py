@@ -95,5 +95,5 @@ def test_tuned_policies_reach(group, floor):
     """300 trials with a seed not used in training; the mean over training seeds."""
     task = group.rpartition("-")[2]
     trials = TrialSet.draw(Simulator(task=task), 300, seed=12345)
-    rates = [run_trials(entrant, trials).success.rate for entrant in find_entrants(group)]
+    rates = [run_trials(entrant, trials).success.value for entrant in find_entrants(group)]
     assert sum(rates) / len(rates) >= floor, rates
