@@ -11,7 +11,7 @@ from kinarm import Arm, Simulator, arm_names
 from kinarm.collision import enclosing_capsule
 from kinarm.evaluation import METRICS
 from kinarm.evaluation.reproduction.tables import markdown
-from kinarm.policies import ARS_RECIPES, PPO_RECIPES
+from kinarm.policies import find_learner
 
 
 def numbers(values: np.ndarray) -> str:
@@ -95,8 +95,8 @@ TABLES = {
     "capsules": lambda: capsule_table("paper"),
     "arms": arms_table,
     "metrics": metrics_table,
-    "ars-recipes": lambda: recipe_table(ARS_RECIPES),
-    "ppo-recipes": lambda: recipe_table(PPO_RECIPES),
+    "ars-recipes": lambda: recipe_table(find_learner("ars").recipes),
+    "ppo-recipes": lambda: recipe_table(find_learner("ppo").recipes),
 }
 
 

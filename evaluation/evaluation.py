@@ -16,7 +16,7 @@ from kinarm.evaluation.entrants import Entrant, find_entrants
 from kinarm.evaluation.metrics import Outcomes, estimate_metrics
 from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.oracle_solution import OracleSolutions
+from kinarm.policies.oracle.solution import OracleSolutions
 from kinarm.policies.policy import Policy
 from kinarm.rollouts import Rollouts
 from kinarm.simulator import PolicyFunction, Simulator

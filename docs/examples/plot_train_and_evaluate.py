@@ -9,21 +9,21 @@ seen, beside random actions.
 # %%
 # Train
 # -----
-# :py:func:`~kinarm.policies.ars_recipe` returns settings by name, with replacements. All perturbed
+# :py:func:`~kinarm.policies.recipe` returns settings by name, with replacements. All perturbed
 # policies of an iteration face the same four starts and goals, success earns a bonus, and the step
-# size falls linearly to zero. :py:func:`~kinarm.policies.train_ars` returns the policy and one
+# size falls linearly to zero. :py:func:`~kinarm.policies.train_policy` returns the policy and one
 # point of the learning curve per iteration.
 
 import matplotlib.pyplot as plt
 import numpy as np
 
 from kinarm.evaluation import evaluate
-from kinarm.policies import ars_recipe, train_ars
+from kinarm.policies import recipe, train_policy
 
-config = ars_recipe(
-    "tuned", task="right", iterations=800, episodes=4, collision_penalty=-1.0, seed=0
+config = recipe(
+    "ars", "tuned", task="right", iterations=800, episodes=4, collision_penalty=-1.0, seed=0
 )
-result = train_ars(config)
+result = train_policy(config)
 
 steps = np.array([point.environment_steps for point in result.curve]) / 1e6
 returns = np.array([point.mean_return for point in result.curve])

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from kinarm.evaluation.entrants import Entrant
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.oracle_solution import OracleSolutions
+from kinarm.policies.oracle.solution import OracleSolutions
 from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.recording import Recording, record_rollouts
 

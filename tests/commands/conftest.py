@@ -9,17 +9,16 @@ from typing import NamedTuple
 
 import pytest
 
-from kinarm.evaluation import bench, reproduce
-from kinarm.evaluation.commands import evaluate, replay
-from kinarm.policies import Policy, ars_recipe, train, train_ars
+from kinarm.evaluation.commands import bench, evaluate, replay, reproduce
+from kinarm.policies import Policy, recipe, train, train_policy
 
 ROOT = Path(__file__).resolve().parents[2]
 MODULES = {
     "kinarm-eval": "kinarm.evaluation.commands.evaluate",
     "kinarm-replay": "kinarm.evaluation.commands.replay",
     "kinarm-train": "kinarm.policies.train",
-    "kinarm-bench": "kinarm.evaluation.bench",
-    "kinarm-reproduce": "kinarm.evaluation.reproduce",
+    "kinarm-bench": "kinarm.evaluation.commands.bench",
+    "kinarm-reproduce": "kinarm.evaluation.commands.reproduce",
 }
 MAINS = {
     "kinarm-eval": evaluate.main,
@@ -82,7 +81,7 @@ def run_outside(command: Callable[..., list[str]]) -> Callable[..., Answer]:
 @pytest.fixture(scope="session")
 def policy() -> Policy:
     """A policy for ``right``, hardly trained."""
-    return train_ars(ars_recipe("paper", task="right", iterations=5)).policy
+    return train_policy(recipe("ars", "paper", task="right", iterations=5)).policy
 
 
 @pytest.fixture(scope="session")
@@ -96,6 +95,6 @@ def policy_folder(policy: Policy, tmp_path_factory: pytest.TempPathFactory) -> P
         "flange": {"task": "right", "arm": "paper_flange"},
     }
     for name, settings in others.items():
-        config = ars_recipe("paper", iterations=2, **settings)
-        train_ars(config).policy.save(folder / f"{name}.npz")
+        config = recipe("ars", "paper", iterations=2, **settings)
+        train_policy(config).policy.save(folder / f"{name}.npz")
     return folder

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from kinarm.evaluation.evaluation import evaluate
-from kinarm.policies import Policy, ars_recipe, train_ars
+from kinarm.policies import Policy, recipe, train_policy
 from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -57,7 +57,7 @@ def stop_after(iteration: int, config, path: Path) -> None:
             raise StoppedError
 
     with pytest.raises(StoppedError):
-        train_ars(config, on_iteration=stop)
+        train_policy(config, on_iteration=stop)
 
 
 def test_policy_and_curve_are_those_of_the_library(run, tmp_path):
@@ -67,7 +67,7 @@ def test_policy_and_curve_are_those_of_the_library(run, tmp_path):
     )
     assert answer.status == 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["p.curve.csv", "p.npz"]
-    expected = train_ars(ars_recipe("paper", task="left", seed=3, iterations=6))
+    expected = train_policy(recipe("ars", "paper", task="left", seed=3, iterations=6))
     check_equal(Policy.load(out), expected.policy)
     rows = read_curve(tmp_path / "p.curve.csv")
     assert [int(row["iteration"]) for row in rows] == [1, 2, 3, 4, 5, 6]
@@ -126,14 +126,14 @@ def test_an_earlier_policy_is_replaced(run, tmp_path):
     assert Policy.load(out).provenance.seed == 1
 
 
-@pytest.mark.parametrize("recipe", ["paper", "tuned", "v1"])
+@pytest.mark.parametrize("name", ["paper", "tuned", "v1"])
 @pytest.mark.parametrize("stopped_after", [1, 7])
-def test_resumed_is_uninterrupted(run, tmp_path, recipe, stopped_after):
-    config = ars_recipe(recipe, iterations=9, directions=4, top_directions=4, episodes=2)
+def test_resumed_is_uninterrupted(run, tmp_path, name, stopped_after):
+    config = recipe("ars", name, iterations=9, directions=4, top_directions=4, episodes=2)
     out = tmp_path / "p.npz"
     stop_after(stopped_after, config, tmp_path / "p.checkpoint.npz")
     assert run("kinarm-train", "ars", "--out", out, "--resume").status == 0
-    expected = train_ars(config)
+    expected = train_policy(config)
     check_equal(Policy.load(out), expected.policy)
     rows = read_curve(tmp_path / "p.curve.csv")
     assert [float(row["mean_return"]) for row in rows] == [p.mean_return for p in expected.curve]
@@ -141,7 +141,7 @@ def test_resumed_is_uninterrupted(run, tmp_path, recipe, stopped_after):
 
 
 def test_the_clock_goes_on_when_resumed(run, tmp_path):
-    config = ars_recipe("paper", iterations=5)
+    config = recipe("ars", "paper", iterations=5)
     stop_after(3, config, tmp_path / "p.checkpoint.npz")
     run("kinarm-train", "ars", "--out", tmp_path / "p.npz", "--resume")
     times = [float(row["wall_time"]) for row in read_curve(tmp_path / "p.curve.csv")]
@@ -149,7 +149,7 @@ def test_the_clock_goes_on_when_resumed(run, tmp_path):
 
 
 def test_naming_the_same_settings_again_is_fine(run, tmp_path):
-    stop_after(2, ars_recipe("tuned", iterations=3, seed=5), tmp_path / "p.checkpoint.npz")
+    stop_after(2, recipe("ars", "tuned", iterations=3, seed=5), tmp_path / "p.checkpoint.npz")
     arguments = ("--recipe", "tuned", "--seed", 5, "--iterations", 3, "--resume")
     assert run("kinarm-train", "ars", "--out", tmp_path / "p.npz", *arguments).status == 0
     assert Policy.load(tmp_path / "p.npz").provenance.recipe == "tuned*"
@@ -170,7 +170,7 @@ def test_naming_the_same_settings_again_is_fine(run, tmp_path):
 def test_other_settings_are_refused_when_resuming(run, tmp_path, option, value):
     """A setting that would be ignored is an error, and the checkpoint stays as it is."""
     checkpoint = tmp_path / "p.checkpoint.npz"
-    stop_after(2, ars_recipe("paper", iterations=4), checkpoint)
+    stop_after(2, recipe("ars", "paper", iterations=4), checkpoint)
     before = checkpoint.read_bytes()
     answer = run("kinarm-train", "ars", "--out", tmp_path / "p.npz", "--resume", option, value)
     assert (answer.status, answer.out) == (2, "")
@@ -183,7 +183,7 @@ def test_other_settings_are_refused_when_resuming(run, tmp_path, option, value):
 @pytest.mark.parametrize("damage", ["truncated", "policy", "text"])
 def test_an_unusable_checkpoint_is_refused(run, tmp_path, policy, damage):
     checkpoint = tmp_path / "p.checkpoint.npz"
-    stop_after(2, ars_recipe("paper", iterations=4), checkpoint)
+    stop_after(2, recipe("ars", "paper", iterations=4), checkpoint)
     whole = checkpoint.read_bytes()
     if damage == "policy":
         policy.save(checkpoint)
@@ -246,12 +246,12 @@ def test_ctrl_c_and_resume_give_the_uninterrupted_policy(run, tmp_path):
 
     assert run("kinarm-train", "ars", "--out", out, "--resume").status == 0
     assert not checkpoint.exists()
-    check_equal(Policy.load(out), train_ars(ars_recipe("paper", **LONG)).policy)
+    check_equal(Policy.load(out), train_policy(recipe("ars", "paper", **LONG)).policy)
 
 
 def test_an_unfinished_training_is_not_overwritten(run, tmp_path):
     checkpoint = tmp_path / "p.checkpoint.npz"
-    stop_after(2, ars_recipe("paper", iterations=4), checkpoint)
+    stop_after(2, recipe("ars", "paper", iterations=4), checkpoint)
     before = checkpoint.read_bytes()
     answer = run("kinarm-train", "ars", "--iterations", 2, "--out", tmp_path / "p.npz")
     assert (answer.status, answer.out, len(answer.err.splitlines())) == (2, "", 1)

@@ -15,10 +15,10 @@ pytest.importorskip("stable_baselines3")
 from kinarm.evaluation.evaluation import evaluate
 from kinarm.policies import (
     Policy,
-    load_ppo_checkpoint,
-    ppo_recipe,
-    save_ppo_checkpoint,
-    train_ppo,
+    load_checkpoint,
+    recipe,
+    save_checkpoint,
+    train_policy,
 )
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -47,8 +47,8 @@ def check_equal(one: Policy, other: Policy) -> None:
 def leave_checkpoint(path: Path, config) -> None:
     """Leave the checkpoint of a training that was stopped after two iterations."""
     states = []
-    train_ppo(config, on_iteration=states.append)
-    save_ppo_checkpoint(path, config, states[1])
+    train_policy(config, on_iteration=states.append)
+    save_checkpoint(path, config, states[1])
 
 
 def test_policy_and_curve_are_those_of_the_library(run, tmp_path):
@@ -59,7 +59,7 @@ def test_policy_and_curve_are_those_of_the_library(run, tmp_path):
     assert len(answer.out.splitlines()) == 1
     assert str(out) in answer.out
     assert sorted(path.name for path in tmp_path.iterdir()) == ["p.curve.csv", "p.npz"]
-    expected = train_ppo(ppo_recipe("paper", task="both", seed=3, iterations=4, **TINY))
+    expected = train_policy(recipe("ppo", "paper", task="both", seed=3, iterations=4, **TINY))
     check_equal(Policy.load(out), expected.policy)
     with (tmp_path / "p.curve.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
@@ -107,14 +107,14 @@ def test_a_trained_policy_can_be_evaluated(run, tmp_path):
     assert evaluation.entrant.algorithm == "ppo"
 
 
-@pytest.mark.parametrize("recipe", ["paper", "tuned"])
-def test_resumed_is_uninterrupted(run, tmp_path, recipe):
-    config = ppo_recipe(recipe, iterations=5, **TINY)
+@pytest.mark.parametrize("name", ["paper", "tuned"])
+def test_resumed_is_uninterrupted(run, tmp_path, name):
+    config = recipe("ppo", name, iterations=5, **TINY)
     out = tmp_path / "p.npz"
     leave_checkpoint(tmp_path / "p.checkpoint.npz", config)
-    answer = run("kinarm-train", "ppo", "--out", out, "--resume", "--recipe", recipe, "--seed", 0)
+    answer = run("kinarm-train", "ppo", "--out", out, "--resume", "--recipe", name, "--seed", 0)
     assert answer.status == 0, answer.err
-    check_equal(Policy.load(out), train_ppo(config).policy)
+    check_equal(Policy.load(out), train_policy(config).policy)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["p.curve.csv", "p.npz"]
 
 
@@ -123,7 +123,7 @@ def test_resumed_is_uninterrupted(run, tmp_path, recipe):
 )
 def test_other_settings_are_refused_when_resuming(run, tmp_path, change):
     checkpoint = tmp_path / "p.checkpoint.npz"
-    leave_checkpoint(checkpoint, ppo_recipe("paper", iterations=3, **TINY))
+    leave_checkpoint(checkpoint, recipe("ppo", "paper", iterations=3, **TINY))
     before = checkpoint.read_bytes()
     answer = run("kinarm-train", "ppo", "--out", tmp_path / "p.npz", "--resume", *change)
     assert (answer.status, answer.out, len(answer.err.splitlines())) == (2, "", 1)
@@ -132,10 +132,10 @@ def test_other_settings_are_refused_when_resuming(run, tmp_path, change):
 
 
 def test_learners_do_not_resume_each_other(run, tmp_path):
-    leave_checkpoint(tmp_path / "p.checkpoint.npz", ppo_recipe("paper", iterations=3, **TINY))
+    leave_checkpoint(tmp_path / "p.checkpoint.npz", recipe("ppo", "paper", iterations=3, **TINY))
     answer = run("kinarm-train", "ars", "--out", tmp_path / "p.npz", "--resume")
     assert (answer.status, answer.out, len(answer.err.splitlines())) == (2, "", 1)
-    assert "not a checkpoint" in answer.err
+    assert "is of the learner ppo" in answer.err
 
 
 def test_ctrl_c_and_resume_give_the_uninterrupted_policy(run, tmp_path):
@@ -149,7 +149,7 @@ def test_ctrl_c_and_resume_give_the_uninterrupted_policy(run, tmp_path):
         stderr=subprocess.PIPE,
         text=True,
     )
-    while not (checkpoint.exists() and load_ppo_checkpoint(checkpoint)[1].iteration >= 10):
+    while not (checkpoint.exists() and load_checkpoint(checkpoint)[1].iteration >= 10):
         assert process.poll() is None, process.stderr.read()
         time.sleep(0.02)
     process.send_signal(signal.SIGINT)
@@ -159,7 +159,9 @@ def test_ctrl_c_and_resume_give_the_uninterrupted_policy(run, tmp_path):
     assert errors.splitlines()[-1].startswith("kinarm-train: interrupted after")
     assert not out.exists()
     assert run("kinarm-train", "ppo", "--out", out, "--resume").status == 0
-    check_equal(Policy.load(out), train_ppo(ppo_recipe("paper", iterations=150, **TINY)).policy)
+    check_equal(
+        Policy.load(out), train_policy(recipe("ppo", "paper", iterations=150, **TINY)).policy
+    )
 
 
 def test_tensorboard(run, tmp_path):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinarm.networks import Networks
-from kinarm.policies import ARSConfig, train_ars
+from kinarm.policies import ARSConfig, train_policy
 from kinarm.reference import ReferenceSimulator
 from kinarm.simulator import Simulator
 from kinarm.task import ReachTask, RewardWeights
@@ -31,7 +31,7 @@ def long_reach():
 def trained_networks(count, seed):
     """A linear policy after a short training, with several gains."""
     config = ARSConfig(sharing="iteration", episodes=2, iterations=300, step_size=0.05)
-    trained = train_ars(config).policy.networks()
+    trained = train_policy(config).policy.networks()
     gains = np.random.default_rng(seed).uniform(0.8, 1.2, (count, 1))
     return Networks(trained.layers, trained.weights * gains)
 

@@ -138,8 +138,8 @@ def test_metadata_name_the_commands_the_licence_and_no_torch(wheel):
         "kinarm-eval = kinarm.evaluation.commands.evaluate:main",
         "kinarm-replay = kinarm.evaluation.commands.replay:main",
         "kinarm-train = kinarm.policies.train:main",
-        "kinarm-bench = kinarm.evaluation.bench:main",
-        "kinarm-reproduce = kinarm.evaluation.reproduce:main",
+        "kinarm-bench = kinarm.evaluation.commands.bench:main",
+        "kinarm-reproduce = kinarm.evaluation.commands.reproduce:main",
     ):
         assert line in commands
     assert "License-Expression: BSD-2-Clause" in metadata

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinarm.errors import InvalidInputError
-from kinarm.policies import ARSConfig, train_ars
+from kinarm.policies import ARSConfig, train_policy
 from kinarm.policies.mirror import Mirror, is_symmetric
 from kinarm.policies.normalizer import Normalizer
 from kinarm.scene import LEFT_BENCH, RIGHT_BENCH, Bench, Scene
@@ -61,7 +61,7 @@ def test_statistics_are_those_of_the_data_and_its_mirror_image():
 
 
 def test_symmetric_policy_does_on_one_side_what_it_does_on_the_other(mirror):
-    policy = train_ars(TINY).policy
+    policy = train_policy(TINY).policy
     simulator = Simulator("paper", "both", threads=1)
     starts, goals = simulator.sample(np.random.default_rng(2), 100)
     first = simulator.rollout(policy, starts, goals, record=True)
@@ -72,14 +72,14 @@ def test_symmetric_policy_does_on_one_side_what_it_does_on_the_other(mirror):
 
 
 def test_symmetric_policy_has_half_the_parameters(mirror):
-    weights = train_ars(TINY).policy.layers[0].weights
+    weights = train_policy(TINY).policy.layers[0].weights
     np.testing.assert_array_equal(weights[~mirror.weights], 0)
     assert (weights[mirror.weights] != 0).mean() > 0.8
     assert mirror.weights.mean() == pytest.approx(0.5, abs=0.1)
 
 
 def test_single_bench_is_trained_without_symmetry(mirror):
-    weights = train_ars(replace(TINY, task="right")).policy.layers[0].weights
+    weights = train_policy(replace(TINY, task="right")).policy.layers[0].weights
     assert (weights[~mirror.weights] != 0).any()
 
 

@@ -98,7 +98,7 @@ for name in policies.__all__:
     getattr(policies, name)
 from kinarm.errors import MissingExtraError
 try:
-    policies.train_ppo(policies.ppo_recipe("tuned"))
+    policies.train_policy(policies.recipe("ppo", "tuned"))
 except MissingExtraError as error:
     print(error)
 """

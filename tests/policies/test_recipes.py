@@ -6,17 +6,17 @@ import pytest
 
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.policies import (
-    ARS_RECIPES,
-    PPO_RECIPES,
     ARSConfig,
     PPOConfig,
-    ars_recipe,
-    ppo_recipe,
+    find_learner,
+    recipe,
 )
+
+ARS_RECIPES, PPO_RECIPES = find_learner("ars").recipes, find_learner("ppo").recipes
 
 
 def test_paper_is_table_1():
-    config = ars_recipe("paper")
+    config = recipe("ars", "paper")
     assert (config.step_size, config.noise) == (0.02, 0.03)
     assert (config.directions, config.top_directions) == (24, 12)
     assert (config.horizon, config.iterations) == (64, 800)
@@ -28,7 +28,7 @@ def test_paper_is_table_1():
 
 
 def test_paper_is_the_default():
-    assert ars_recipe("paper", recipe="custom") == ARSConfig()
+    assert recipe("ars", "paper", recipe="custom") == ARSConfig()
 
 
 def test_names():
@@ -38,7 +38,7 @@ def test_names():
 
 
 def test_v1_and_brs_lack_the_augmentations():
-    v1, brs = ars_recipe("v1"), ars_recipe("brs")
+    v1, brs = recipe("ars", "v1"), recipe("ars", "brs")
     assert (v1.normalize, v1.scale_by_deviation) == (False, True)
     assert (brs.normalize, brs.scale_by_deviation) == (False, False)
     for config in (v1, brs):
@@ -46,49 +46,55 @@ def test_v1_and_brs_lack_the_augmentations():
 
 
 def test_settings_replace_those_of_the_recipe():
-    config = ars_recipe("tuned", task="both", seed=4, iterations=None)
+    config = recipe("ars", "tuned", task="both", seed=4, iterations=None)
     assert (config.task, config.seed) == ("both", 4)
     assert config.iterations == ARS_RECIPES["tuned"].iterations
 
 
 def test_unknown_recipe_lists_the_recipes():
     with pytest.raises(UnknownNameError, match="unknown recipe 'best'; available: paper, tuned"):
-        ars_recipe("best")
+        recipe("ars", "best")
+
+
+def test_unknown_learner_lists_the_learners():
+    with pytest.raises(UnknownNameError, match="unknown learner 'sac'; available: ars, ppo"):
+        recipe("sac", "paper")
 
 
 def test_unknown_setting_is_refused():
-    with pytest.raises((InvalidInputError, TypeError), match="learning_rate"):
-        ars_recipe("paper", learning_rate=1)
+    words = "unknown setting of ars 'learning_rate'; available: task, arm, seed"
+    with pytest.raises(UnknownNameError, match=words):
+        recipe("ars", "paper", learning_rate=1)
 
 
 def test_bad_setting_is_refused():
     with pytest.raises(InvalidInputError, match="directions"):
-        ars_recipe("paper", directions=0)
+        recipe("ars", "paper", directions=0)
 
 
 def test_a_changed_recipe_says_so():
-    assert ars_recipe("tuned", task="left", seed=3, arm="paper_flange").recipe == "tuned"
-    assert ars_recipe("tuned", noise=0.5).recipe == "tuned*"
-    assert ars_recipe("tuned", noise=0.5, recipe="mine").recipe == "mine"
-    assert ars_recipe("tuned", noise=ARS_RECIPES["tuned"].noise).recipe == "tuned"
+    assert recipe("ars", "tuned", task="left", seed=3, arm="paper_flange").recipe == "tuned"
+    assert recipe("ars", "tuned", noise=0.5).recipe == "tuned*"
+    assert recipe("ars", "tuned", noise=0.5, recipe="mine").recipe == "mine"
+    assert recipe("ars", "tuned", noise=ARS_RECIPES["tuned"].noise).recipe == "tuned"
 
 
 def test_tuned_adapts_to_two_benches():
-    assert ars_recipe("tuned", task="both").collision_penalty == -1
-    assert ars_recipe("tuned", task="right").collision_penalty == -2
-    assert ars_recipe("tuned", task="both", collision_penalty=-3.0).collision_penalty == -3
+    assert recipe("ars", "tuned", task="both").collision_penalty == -1
+    assert recipe("ars", "tuned", task="right").collision_penalty == -2
+    assert recipe("ars", "tuned", task="both", collision_penalty=-3.0).collision_penalty == -3
 
 
 class TestPPO:
     @pytest.mark.parametrize("name", ["paper", "tuned"])
     def test_all_take_the_papers_steps(self, name):
-        config = ppo_recipe(name, task="both", seed=2)
+        config = recipe("ppo", name, task="both", seed=2)
         assert config.environment_steps == 1_200_000
         assert (config.recipe, config.task, config.seed) == (name, "both", 2)
         assert config.horizon == 64
 
     def test_paper_has_the_papers_reward(self):
-        config = ppo_recipe("paper")
+        config = recipe("ppo", "paper")
         assert (config.collision_penalty, config.success_bonus, config.step_reward) == (-1, 0, 0)
         assert (config.tolerance, config.start_spread) == (0.05, 1)
         assert config.start_spread_at(0) == 1
@@ -101,7 +107,7 @@ class TestPPO:
             name: parameter.default
             for name, parameter in inspect.signature(sb3.PPO.__init__).parameters.items()
         }
-        config = ppo_recipe("paper")
+        config = recipe("ppo", "paper")
         for ours, theirs in {
             "learning_rate": "learning_rate",
             "epochs": "n_epochs",
@@ -123,8 +129,8 @@ class TestPPO:
 
     def test_unknown_recipe_lists_the_recipes(self):
         with pytest.raises(UnknownNameError, match="unknown recipe 'v1'; available: paper, tuned"):
-            ppo_recipe("v1")
+            recipe("ppo", "v1")
 
     def test_a_changed_recipe_says_so(self):
-        assert ppo_recipe("tuned", gamma=0.5).recipe == "tuned*"
-        assert ppo_recipe("tuned", gamma=None, iterations=600).recipe == "tuned"
+        assert recipe("ppo", "tuned", gamma=0.5).recipe == "tuned*"
+        assert recipe("ppo", "tuned", gamma=None, iterations=600).recipe == "tuned"
