@@ -12,6 +12,9 @@ from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.policies.learners import Learner, find_learner
 from kinarm.problem import ReachProblem
 
+PER_TRAINING = ("problem", "seed")
+"""Settings that vary from one training with a recipe to the next."""
+
 
 def recipe(learner: str, name_or_file: str | Path = "paper", **changes: Any) -> Any:
     """Look settings up, adapt them to the problem and replace some of them.
@@ -45,7 +48,7 @@ def recipe(learner: str, name_or_file: str | Path = "paper", **changes: Any) -> 
         if change not in available:
             raise UnknownNameError(f"setting of {learner}", change, available)
     given = {key: value for key, value in changes.items() if value is not None}
-    circumstances = {key: given.pop(key) for key in ("problem", "seed") if key in given}
+    circumstances = {key: given.pop(key) for key in PER_TRAINING if key in given}
     if str(name_or_file).endswith(".toml"):
         standard = _read_recipe(found, Path(name_or_file), circumstances)
     else:

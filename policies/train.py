@@ -22,7 +22,7 @@ from kinarm.policies.learners import (
     run_training,
 )
 from kinarm.policies.recipes import recipe
-from kinarm.problem import ProblemOptions
+from kinarm.problem_options import ProblemOptions
 
 if TYPE_CHECKING:
     from kinarm.policies.checkpoint import Checkpoint
@@ -247,7 +247,7 @@ def _add_learner(parsers: "argparse._SubParsersAction[Parser]", learner: Learner
     parser = parsers.add_parser(
         learner.name,
         help=learner.title,
-        description=f"Train a policy with {learner.title}.",
+        description=f"Train a policy with {learner.title}. Recipes: {', '.join(learner.recipes)}.",
         epilog=(needs if learner.extra else "") + EPILOG.format(name=learner.name),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

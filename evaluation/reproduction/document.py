@@ -14,7 +14,7 @@ import numpy as np
 
 from kinarm._files import write_text
 from kinarm.errors import InvalidInputError
-from kinarm.evaluation.plots import save_figure
+from kinarm.evaluation.figures import save_figure
 from kinarm.evaluation.reproduction.claims import Claim, assess
 from kinarm.evaluation.reproduction.figures import figure_2, figure_3, learning_curves
 from kinarm.evaluation.reproduction.results import Results

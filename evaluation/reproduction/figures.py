@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.evaluation.bounds import oracle_bounds
-from kinarm.evaluation.plots import BIN_WIDTH, COLOURS
+from kinarm.evaluation.figures import BIN_WIDTH, COLOURS
 from kinarm.evaluation.reproduction.results import Results
 from kinarm.evaluation.reproduction.runs import TrainedRun
 from kinarm.evaluation.reproduction.study import LEARNERS, NEAR, Purpose

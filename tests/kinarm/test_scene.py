@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from kinarm.errors import SceneError, UnknownNameError
+from kinarm.errors import ProblemError, UnknownNameError
 from kinarm.scene import Bench, Scene
 
 
@@ -56,7 +56,7 @@ def test_unknown_bench_lists_the_benches():
     ],
 )
 def test_empty_bench_is_refused(changes):
-    with pytest.raises(SceneError, match="bench 'table' is empty.*expected lower < upper"):
+    with pytest.raises(ProblemError, match="bench 'table' is empty.*expected lower < upper"):
         bench(**changes)
 
 
@@ -64,18 +64,18 @@ def test_empty_bench_is_refused(changes):
     "changes", [{"x": (float("nan"), 1.0)}, {"y": (0.0, float("inf"))}, {"height": float("inf")}]
 )
 def test_bench_must_be_finite(changes):
-    with pytest.raises(SceneError, match="bench 'table' has a bound that is not finite"):
+    with pytest.raises(ProblemError, match="bench 'table' has a bound that is not finite"):
         bench(**changes)
 
 
 def test_bench_names_must_differ():
-    with pytest.raises(SceneError, match=r"names must differ, got \['table', 'table'\]"):
+    with pytest.raises(ProblemError, match=r"names must differ, got \['table', 'table'\]"):
         Scene(benches=(bench(), bench(height=1.0)))
 
 
 @pytest.mark.parametrize("edge", [-0.01, float("nan"), float("inf")])
 def test_cube_edge_must_be_a_length(edge):
-    with pytest.raises(SceneError, match="cube_edge"):
+    with pytest.raises(ProblemError, match="cube_edge"):
         Scene(cube_edge=edge)
 
 

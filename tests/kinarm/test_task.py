@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from kinarm.errors import InvalidInputError, SceneError, UnknownNameError
+from kinarm.errors import InvalidInputError, ProblemError, UnknownNameError
 from kinarm.scene import Scene
 from kinarm.task import TASKS, ReachTask, RewardWeights, load_task, reward_terms
 
@@ -39,14 +39,14 @@ def test_three_tasks_with_the_papers_settings():
     ],
 )
 def test_impossible_settings_are_refused(settings, message):
-    with pytest.raises(SceneError, match=message):
+    with pytest.raises(ProblemError, match=message):
         reach(**settings)
 
 
 @pytest.mark.parametrize("term", ["progress", "collision", "success", "step"])
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
 def test_reward_weights_must_be_finite(term, value):
-    with pytest.raises(SceneError, match=f"reward weight {term} must be finite"):
+    with pytest.raises(ProblemError, match=f"reward weight {term} must be finite"):
         RewardWeights(**{term: value})
 
 
@@ -127,7 +127,7 @@ class TestLoadTask:
             load_task("left", horizons=3)
 
     def test_bad_override_is_refused(self):
-        with pytest.raises(SceneError, match="tolerance"):
+        with pytest.raises(ProblemError, match="tolerance"):
             load_task("left", tolerance=0)
 
 
