@@ -11,7 +11,7 @@ from sphinx import addnodes
 from sphinx.application import Sphinx
 
 mpl.use("Agg")  # examples run without a display
-sys.path.insert(0, str(Path(__file__).parent))  # extensions, and drawing.py for the examples
+sys.path.insert(0, str(Path(__file__).parent))  # extensions
 
 import kinarm
 

@@ -9,6 +9,7 @@ from sphinx.util.docutils import SphinxDirective
 
 from kinarm import Arm, Simulator, arm_names
 from kinarm.collision import enclosing_capsule
+from kinarm.evaluation import METRICS
 from kinarm.evaluation.reproduction.tables import markdown
 from kinarm.policies import find_learner
 from kinarm.task import RewardWeights
@@ -90,10 +91,20 @@ def recipe_table(recipes: dict[str, object]) -> str:
     return markdown(["setting", *(f"`{name}`" for name in recipes)], rows)
 
 
+def metrics_table() -> str:
+    """The figures of merit."""
+    rows = [
+        [f"`{name}`", metric.meaning, metric.unit, metric.interval or "", metric.heading]
+        for name, metric in METRICS.items()
+    ]
+    return markdown(["name", "meaning", "unit", "interval (95 %)", "column"], rows)
+
+
 TABLES = {
     "arm": lambda: arm_table("paper"),
     "capsules": lambda: capsule_table("paper"),
     "arms": arms_table,
+    "metrics": metrics_table,
     "ars-recipes": lambda: recipe_table(find_learner("ars").recipes),
     "ppo-recipes": lambda: recipe_table(find_learner("ppo").recipes),
 }

@@ -6,21 +6,25 @@ from kinarm._exports import lazy_exports
 
 if TYPE_CHECKING:
     from kinarm.evaluation.bounds import oracle_bounds
+    from kinarm.evaluation.document import EvaluationDocument, evaluation_document
     from kinarm.evaluation.entrants import Entrant, find_entrants
-    from kinarm.evaluation.evaluations import Evaluation, PooledEvaluation, evaluate, pool
-    from kinarm.evaluation.html_report.page import report_page, write_report
-    from kinarm.evaluation.plots import distance_histograms, save_figure
-    from kinarm.evaluation.recording import record
-    from kinarm.evaluation.report import evaluation_document
-    from kinarm.evaluation.statistics import DistanceStatistics, Share
+    from kinarm.evaluation.evaluation import Evaluation, PooledEvaluation, evaluate, pool
+    from kinarm.evaluation.figures import distance_histograms, save_figure
+    from kinarm.evaluation.metrics import METRICS, Metric, Outcomes
+    from kinarm.evaluation.replays.recorder import record
+    from kinarm.evaluation.report.page import report_page, write_report
+    from kinarm.evaluation.statistics import Estimate
     from kinarm.evaluation.trials import TrialSet
 
 __all__ = [
-    "DistanceStatistics",
+    "METRICS",
     "Entrant",
+    "Estimate",
     "Evaluation",
+    "EvaluationDocument",
+    "Metric",
+    "Outcomes",
     "PooledEvaluation",
-    "Share",
     "TrialSet",
     "distance_histograms",
     "evaluate",
@@ -43,13 +47,14 @@ __getattr__ = lazy_exports(
     __name__,
     {
         "bounds": ("oracle_bounds",),
+        "document": ("EvaluationDocument", "evaluation_document"),
         "entrants": ("Entrant", "find_entrants"),
-        "evaluations": ("Evaluation", "PooledEvaluation", "evaluate", "pool"),
-        "html_report.page": ("report_page", "write_report"),
-        "plots": ("distance_histograms", "save_figure"),
-        "recording": ("record",),
-        "report": ("evaluation_document",),
-        "statistics": ("DistanceStatistics", "Share"),
+        "evaluation": ("Evaluation", "PooledEvaluation", "evaluate", "pool"),
+        "figures": ("distance_histograms", "save_figure"),
+        "metrics": ("METRICS", "Metric", "Outcomes"),
+        "replays.recorder": ("record",),
+        "report.page": ("report_page", "write_report"),
+        "statistics": ("Estimate",),
         "trials": ("TrialSet",),
     },
 )

@@ -7,7 +7,8 @@ from typing import Protocol
 import numpy as np
 
 from kinarm.arm import Arm
-from kinarm.errors import UnknownNameError
+from kinarm.episodes import observation_size
+from kinarm.errors import PolicyFileError, UnknownNameError
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.trials import TrialSet, trial_generator
 from kinarm.networks import Networks
@@ -58,16 +59,38 @@ class Entrant:
     policy: Policy | None = None
     source: Path | None = None
 
-    def check_arm(self, arm: Arm) -> None:
-        """See that the policy, if there is one, was trained for an arm.
+    def check(self, arm: Arm, *, allow_other_arm: bool = False) -> None:
+        """See that the policy, if there is one, can drive an arm.
+
+        Parameters
+        ----------
+        arm : Arm
+            The arm.
+        allow_other_arm : bool
+            Whether it may face an arm that it was not trained for.
 
         Raises
         ------
         PolicyFileError
-            If it was trained for another one.
+            If it was trained for another one, or does not fit it.
         """
-        if self.policy is not None:
+        if self.policy is None:
+            return
+        if not allow_other_arm:
             self.policy.check_arm(arm)
+        widths = (self.policy.n_observations, self.policy.n_actions)
+        expected = (observation_size(arm.n_axes), arm.n_actuated)
+        if widths != expected:
+            raise PolicyFileError(
+                "policy {!r} maps {} observations to {} actions; arm {!r} has {} and {}".format(
+                    self.name, *widths, arm.name, *expected
+                )
+            )
+
+    def __repr__(self) -> str:
+        trained = f" trained on {self.trained_on}" if self.trained_on else ""
+        source = f", {str(self.source)!r}" if self.source else ""
+        return f"Entrant({self.name!r}: {self.algorithm} {self.recipe}{trained}{source})"
 
     @classmethod
     def from_policy(cls, name: str, policy: Policy, source: Path | None = None) -> "Entrant":

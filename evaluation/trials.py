@@ -68,6 +68,10 @@ class TrialSet:
     def __len__(self) -> int:
         return len(self.starts)
 
+    def __repr__(self) -> str:
+        task, arm = self.simulator.task.name, self.simulator.arm.name
+        return f"TrialSet({len(self)} trials of {task}, arm {arm}, seed {self.seed}: {self.digest})"
+
     @property
     def digest(self) -> str:
         """Hash of the starts and goals and of the rules under which they are faced."""

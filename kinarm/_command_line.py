@@ -115,15 +115,16 @@ def _add_option(
         options["dest"] = name
         options["required"] = item.default is MISSING and item.default_factory is MISSING
     elif item.default is not MISSING:
-        options["nargs"] = "?"
+        options |= {"nargs": "?", "default": item.default}  # argparse would parse SUPPRESS
     if hint is bool:
         negative = item.default is True and "flag" not in item.metadata
         action = argparse.BooleanOptionalAction if negatable or negative else "store_true"
         parser.add_argument(flag, action=action, **options)
         return
     if get_origin(hint) is tuple:
-        hint = get_args(hint)[0]
-        options |= {"action": "append"} if item.metadata.get("repeat") else {"nargs": "+"}
+        hint, *others = get_args(hint)
+        count = "+" if Ellipsis in others else 1 + len(others)
+        options |= {"action": "append"} if item.metadata.get("repeat") else {"nargs": count}
     options["metavar"] = item.metadata.get("metavar") or METAVARS.get(hint, "NAME")
     if get_origin(hint) is Literal:
         options["choices"] = get_args(hint)

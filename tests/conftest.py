@@ -8,6 +8,7 @@ import pytest
 from hypothesis import settings
 
 from kinarm.arm import Arm
+from kinarm.problem import ReachProblem
 from kinarm.simulator import Simulator
 
 settings.register_profile("repeatable", derandomize=True, database=None, deadline=None)
@@ -185,14 +186,15 @@ def mesh_arm(tmp_path_factory: pytest.TempPathFactory) -> Arm:
 def simulators(
     shipped_arms: dict[str, Arm], sliding_arm: Arm, mesh_arm: Arm
 ) -> dict[str, Simulator]:
-    """One single-threaded simulator per arm, task ``both``."""
+    """One single-threaded simulator per arm, problem ``both``."""
     arms = {**shipped_arms, "sliding": sliding_arm, "mesh": mesh_arm}
-    return {name: Simulator(arm, "both", threads=1) for name, arm in arms.items()}
+    both = ReachProblem.load("both")
+    return {name: Simulator(both.replace(arm=arm), threads=1) for name, arm in arms.items()}
 
 
 @pytest.fixture(scope="session")
 def simulator(simulators: dict[str, Simulator]) -> Simulator:
-    """The default arm, task ``both``."""
+    """The default arm, problem ``both``."""
     return simulators["paper"]
 
 

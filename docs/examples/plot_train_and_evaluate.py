@@ -61,9 +61,9 @@ evaluations = {
 for name, evaluation in evaluations.items():
     low, high = evaluation.success.ci95
     print(
-        f"{name:8} success {evaluation.success.rate:.0%} ({low:.0%} to {high:.0%}), "
-        f"median final distance {evaluation.distance.median:.3f} m, "
-        f"collisions {evaluation.collision.rate:.0%}"
+        f"{name:8} success {evaluation.success.value:.0%} ({low:.0%} to {high:.0%}), "
+        f"median final distance {evaluation.metrics['median_distance'].value:.3f} m, "
+        f"collisions {evaluation.collision.value:.0%}"
     )
 
 figure, axes = plt.subplots(figsize=(6.4, 3.8), layout="constrained")

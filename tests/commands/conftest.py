@@ -9,20 +9,20 @@ from typing import NamedTuple
 
 import pytest
 
-from kinarm.evaluation import bench, eval, replay, reproduce  # noqa: A004
+from kinarm.evaluation.commands import bench, evaluate, replay, reproduce
 from kinarm.policies import Policy, recipe, train, train_policy
 from kinarm.problem import PROBLEMS
 
 ROOT = Path(__file__).resolve().parents[2]
 MODULES = {
-    "kinarm-eval": "kinarm.evaluation.eval",
-    "kinarm-replay": "kinarm.evaluation.replay",
+    "kinarm-eval": "kinarm.evaluation.commands.evaluate",
+    "kinarm-replay": "kinarm.evaluation.commands.replay",
     "kinarm-train": "kinarm.policies.train",
-    "kinarm-bench": "kinarm.evaluation.bench",
-    "kinarm-reproduce": "kinarm.evaluation.reproduce",
+    "kinarm-bench": "kinarm.evaluation.commands.bench",
+    "kinarm-reproduce": "kinarm.evaluation.commands.reproduce",
 }
 MAINS = {
-    "kinarm-eval": eval.main,
+    "kinarm-eval": evaluate.main,
     "kinarm-train": train.main,
     "kinarm-bench": bench.main,
     "kinarm-replay": replay.main,

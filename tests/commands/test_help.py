@@ -10,8 +10,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = {
-    "kinarm-eval": "kinarm.evaluation.eval",
-    "kinarm-replay": "kinarm.evaluation.replay",
+    "kinarm-eval": "kinarm.evaluation.commands.evaluate",
+    "kinarm-replay": "kinarm.evaluation.commands.replay",
     "kinarm-train": "kinarm.policies.train",
     "kinarm-bench": "kinarm.evaluation.bench",
     "kinarm-reproduce": "kinarm.evaluation.reproduce",

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinarm.evaluation.evaluations import evaluate
+from kinarm.evaluation.evaluation import evaluate
 from kinarm.policies import Policy, recipe, train_policy
 from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
 from kinarm.policies.train import TrainRequest

@@ -12,7 +12,7 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 
-from kinarm.evaluation.evaluations import evaluate
+from kinarm.evaluation.evaluation import evaluate
 from kinarm.policies import (
     Policy,
     load_checkpoint,

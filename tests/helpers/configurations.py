@@ -11,7 +11,7 @@ def random_configurations(simulator, seed, count):
 
 def contact_boundary(simulator, seed, count):
     """Pairs of configurations, free and touching, that are closer than 1e-9 to each other."""
-    judge = simulator.contact_model.in_contact
+    judge = simulator.world.contact_model.in_contact
     candidates = random_configurations(simulator, seed, 8 * count)
     touching = judge(candidates)
     n = min(count, touching.sum(), (~touching).sum())
@@ -25,7 +25,7 @@ def contact_boundary(simulator, seed, count):
 
 def depths(simulator, configurations):
     """How deep the deepest pair overlaps, according to Coal; less than 0 if nothing touches [m]."""
-    model, geometry = simulator.arm.model, simulator.contact_model.geometry
+    model, geometry = simulator.arm.model, simulator.world.contact_model.geometry
     data, geometry_data = model.createData(), geometry.createData()
     found = []
     for q in configurations:

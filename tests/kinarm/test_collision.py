@@ -29,14 +29,14 @@ CAPSULE_ARMS = ("lrmate200ic_5l", "paper", "paper_flange")
 def proven_free(simulator, configurations):
     n = len(configurations)
     tools, proven = np.empty((n, 3)), np.empty(n, dtype=bool)
-    shapes = simulator.contact_model.shapes
+    shapes = simulator.world.contact_model.shapes
     kernels.screen(0, n, simulator.arm.chain, shapes, configurations, tools, proven)
     return proven
 
 
 def in_contact(simulator, configurations):
     """Ask Coal one configuration at a time, without a broad phase."""
-    model, geometry = simulator.arm.model, simulator.contact_model.geometry
+    model, geometry = simulator.arm.model, simulator.world.contact_model.geometry
     data, geometry_data = model.createData(), make_verdicts_reliable(geometry.createData())
     return np.array(
         [
@@ -55,7 +55,7 @@ def jittered(configurations, seed):
 class TestPairs:
     def test_shipped_arms_have_28(self, simulators):
         for name in CAPSULE_ARMS:
-            assert len(simulators[name].contact_model.pair_names) == 28
+            assert len(simulators[name].world.contact_model.pair_names) == 28
 
     def test_names_of_the_default_arm(self, simulator):
         links = ["base", "shoulder", "upper_arm", "elbow", "forearm", "wrist", "hand"]
@@ -64,7 +64,7 @@ class TestPairs:
         expected |= {
             (link, world) for link in links[2:] for world in ("right bench", "left bench", "ground")
         }
-        assert set(simulator.contact_model.pair_names) == expected
+        assert set(simulator.world.contact_model.pair_names) == expected
 
     def test_scene_without_obstacles_leaves_the_arm_alone(self):
         model = ContactModel.build(Arm.load("paper"), Scene(benches=(), ground=False))
@@ -83,7 +83,7 @@ class TestPairs:
         assert ("link_1", "left bench") in ContactModel.build(arm, Scene()).pair_names
 
     def test_contact_pair_names_what_touches(self, simulator):
-        model = simulator.contact_model
+        model = simulator.world.contact_model
         assert model.contact_pair(np.zeros(6)) is None
         down = np.deg2rad([0, 140, -72, 0, 0, 0])
         first, second = model.contact_pair(down)
@@ -99,7 +99,7 @@ class TestPairs:
 
     def test_judge_equals_single_queries(self, any_simulator):
         configurations = random_configurations(any_simulator, 1, 2000)
-        verdicts = any_simulator.contact_model.in_contact(configurations)
+        verdicts = any_simulator.world.contact_model.in_contact(configurations)
         np.testing.assert_array_equal(verdicts, in_contact(any_simulator, configurations))
         assert 0.05 < verdicts.mean() < 0.95
 
@@ -107,34 +107,35 @@ class TestPairs:
         free, hit = contact_boundary(any_simulator, 16, 1000)
         near = jittered(np.concatenate([free, hit]), 17)
         order = np.random.default_rng(18).permutation(len(near))
-        judge = any_simulator.contact_model.in_contact
+        judge = any_simulator.world.contact_model.in_contact
         verdicts = judge(near)
         np.testing.assert_array_equal(judge(near[order]), verdicts[order])
         np.testing.assert_array_equal(in_contact(any_simulator, near), verdicts)
 
     def test_no_configurations(self, simulator):
-        assert simulator.contact_model.in_contact(np.zeros((0, 6))).shape == (0,)
+        assert simulator.world.contact_model.in_contact(np.zeros((0, 6))).shape == (0,)
 
     def test_contact_pair_agrees_with_the_judge(self, any_simulator):
-        model = any_simulator.contact_model
+        model = any_simulator.world.contact_model
         configurations = random_configurations(any_simulator, 2, 500)
         verdicts = model.in_contact(configurations)
         pairs = [model.contact_pair(q) for q in configurations]
         assert [pair is not None for pair in pairs] == verdicts.tolist()
 
     def test_pickles(self, simulator):
-        copy = pickle.loads(pickle.dumps(simulator.contact_model))
+        copy = pickle.loads(pickle.dumps(simulator.world.contact_model))
         configurations = random_configurations(simulator, 3, 200)
-        assert copy.pair_names == simulator.contact_model.pair_names
+        assert copy.pair_names == simulator.world.contact_model.pair_names
         np.testing.assert_array_equal(
-            copy.in_contact(configurations), simulator.contact_model.in_contact(configurations)
+            copy.in_contact(configurations),
+            simulator.world.contact_model.in_contact(configurations),
         )
 
     def test_mirror_image_has_the_same_verdict(self, simulator):
         configurations = random_configurations(simulator, 4, 2000)
         mirrored = configurations * [-1, 1, 1, -1, 1, -1]
-        verdicts = simulator.contact_model.in_contact(configurations)
-        np.testing.assert_array_equal(verdicts, simulator.contact_model.in_contact(mirrored))
+        verdicts = simulator.world.contact_model.in_contact(configurations)
+        np.testing.assert_array_equal(verdicts, simulator.world.contact_model.in_contact(mirrored))
 
 
 def surface_points(geometry, rng, count):
@@ -226,7 +227,7 @@ class TestEnclosingCapsule:
 
 def capsule_points(simulator, shape, poses):
     """Points of a capsule's segment in the world, shape (n, 5, 3)."""
-    shapes = simulator.contact_model.shapes
+    shapes = simulator.world.contact_model.shapes
     ends = shapes.capsules[shape, :6].reshape(2, 3)
     points = ends[0] + np.linspace(0, 1, 5)[:, None] * (ends[1] - ends[0])
     return np.array([[pose.act(point) for point in points] for pose in poses[shapes.link[shape]]])
@@ -244,7 +245,7 @@ def link_poses(simulator, configurations):
 
 class TestTravel:
     def test_bounds_the_relative_motion_of_every_pair(self, any_simulator):
-        arm, shapes = any_simulator.arm, any_simulator.contact_model.shapes
+        arm, shapes = any_simulator.arm, any_simulator.world.contact_model.shapes
         moved = arm.n_actuated
         rng = np.random.default_rng(5)
         before = random_configurations(any_simulator, 6, 150)
@@ -278,7 +279,7 @@ class TestTravel:
         assert tightest > 0.9
 
     def test_turning_the_base_leaves_heights_alone(self, simulator):
-        shapes = simulator.contact_model.shapes
+        shapes = simulator.world.contact_model.shapes
         ground = shapes.pairs[:, 0] == WITH_GROUND
         np.testing.assert_array_equal(shapes.travel[0, ground], 0)
         assert (shapes.travel[0, ~ground & (shapes.link[shapes.pairs[:, 1]] > 1)] >= 0).all()
@@ -288,7 +289,7 @@ class TestProof:
     def test_never_clears_a_random_configuration_that_touches(self, any_simulator):
         configurations = random_configurations(any_simulator, 7, 60_000)
         proven = proven_free(any_simulator, configurations)
-        touching = any_simulator.contact_model.in_contact(configurations)
+        touching = any_simulator.world.contact_model.in_contact(configurations)
         assert not (proven & touching).any()
         assert proven.sum() > 0.3 * (~touching).sum()
 
@@ -296,7 +297,7 @@ class TestProof:
         for end in contact_boundary(any_simulator, 8, 4000):
             near = np.concatenate([end, *(jittered(end, seed) for seed in range(4))])
             proven = proven_free(any_simulator, near)
-            touching = any_simulator.contact_model.in_contact(near)
+            touching = any_simulator.world.contact_model.in_contact(near)
             assert 0.05 < touching.mean() <= 1
             assert not (proven & touching).any()
 
@@ -305,7 +306,7 @@ class TestProof:
             simulator = simulators[name]
             free, _ = contact_boundary(simulator, 9, 1500)
             near = jittered(free, 10)
-            model, geometry = simulator.arm.model, simulator.contact_model.geometry
+            model, geometry = simulator.arm.model, simulator.world.contact_model.geometry
             data, geometry_data = model.createData(), geometry.createData()
             apart = np.array(
                 [
@@ -331,7 +332,7 @@ class TestProof:
         ends = random_configurations(simulator, seed, 2)
         line = ends[0] + np.linspace(0, 1, 500)[:, None] * (ends[1] - ends[0])
         proven = proven_free(simulator, line)
-        assert not (proven & simulator.contact_model.in_contact(line)).any()
+        assert not (proven & simulator.world.contact_model.in_contact(line)).any()
 
 
 def doubted_steps(simulator, starts, actions):
@@ -342,7 +343,7 @@ def doubted_steps(simulator, starts, actions):
     from kinarm.episodes import PAUSED, Control
 
     control = Control(no_index, np.zeros((0, 0)), no_index, actions[:, None])
-    shapes, rules = simulator.contact_model.shapes, simulator._rules
+    shapes, rules = simulator.world.contact_model.shapes, simulator._rules
     kernels.advance(0, len(starts), simulator.arm.chain, shapes, rules, control, episodes)
     paused = episodes.status == PAUSED
     bits = episodes.doubt[:, None] >> np.arange(4) & 1
@@ -356,7 +357,7 @@ def steps_near_contact(simulator, seed, count):
     arm = simulator.arm
     near = np.clip(jittered(free, seed), arm.lower, arm.upper)
     starts = np.concatenate([free, near])
-    starts = starts[~simulator.contact_model.in_contact(starts)]
+    starts = starts[~simulator.world.contact_model.in_contact(starts)]
     actions = rng.normal(size=(len(starts), arm.n_actuated))
     return starts, actions * 10.0 ** rng.uniform(-3, 0.5, (len(starts), 1))
 
@@ -367,7 +368,7 @@ class TestStepProof:
         episodes, doubted = doubted_steps(any_simulator, starts, actions)
         tested = substeps(starts, episodes.target)
         for k in range(4):
-            touching = any_simulator.contact_model.in_contact(tested[:, k])
+            touching = any_simulator.world.contact_model.in_contact(tested[:, k])
             assert not (touching & ~doubted[:, k]).any()
         assert doubted.any(axis=1).sum() > 100
 
@@ -395,7 +396,7 @@ class TestStepProof:
         starts, goals = any_simulator.sample(rng, 600)
         actions = np.repeat(rng.uniform(-1, 1, (600, 8, any_simulator.n_actions)), 8, axis=1)
         rollouts = any_simulator.rollout_actions(actions, starts, goals, record=True)
-        judge = any_simulator.contact_model.in_contact
+        judge = any_simulator.world.contact_model.in_contact
         moves = rollouts.steps - rollouts.collision
         for path, count in zip(rollouts.paths, moves, strict=True):
             if count:
@@ -424,7 +425,7 @@ def test_bench_in_the_way_is_an_obstacle(simulator):
 )
 def test_deep_contacts_that_coal_overlooks_by_default_are_found(simulators, configuration):
     q = np.fromstring(configuration, sep=" ")
-    model = simulators["paper"].contact_model
+    model = simulators["paper"].world.contact_model
     data, distances = model.arm.model.createData(), model.geometry.createData()
     pin.computeDistances(model.arm.model, data, model.geometry, distances, q)
     assert min(result.min_distance for result in distances.distanceResults) < -0.02

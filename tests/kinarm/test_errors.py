@@ -12,8 +12,8 @@ from kinarm.errors import (
     MissingExtraError,
     OutputError,
     PolicyFileError,
+    ProblemError,
     RecordingFileError,
-    SceneError,
     StartInContactError,
     UnknownNameError,
     WorkerError,
@@ -21,7 +21,7 @@ from kinarm.errors import (
 
 EXAMPLES = [
     ArmError("no arm"),
-    SceneError("no scene"),
+    ProblemError("no scene"),
     InvalidInputError("no input"),
     UnknownNameError("task", "up", ("left", "right")),
     StartInContactError(3, ("hand", "ground")),

@@ -5,8 +5,8 @@ import stat
 
 import pytest
 
+from kinarm._files import check_folder, write_atomically
 from kinarm.errors import OutputError
-from kinarm.files import check_folder, write_atomically
 
 
 def test_writes_the_content(tmp_path):

@@ -5,7 +5,7 @@ import threading
 import numpy as np
 import pytest
 
-from kinarm.parallel import available_threads, run_rows
+from kinarm._parallel import available_threads, run_rows
 
 
 @pytest.mark.parametrize("n", [1, 2, 7, 255, 256, 1000])

@@ -1,4 +1,4 @@
-"""Rollouts, steps, sampling: semantics, determinism and refusals."""
+"""Rollouts and steps: semantics, determinism and refusals."""
 
 import copy
 import math
@@ -6,14 +6,14 @@ import pickle
 
 import numpy as np
 import pytest
+from simulators import changed
 
 from kinarm.episodes import COLLISION, RUNNING
-from kinarm.errors import InvalidInputError, SceneError, StartInContactError, UnknownNameError
+from kinarm.errors import InvalidInputError, StartInContactError, UnknownNameError
 from kinarm.networks import Networks
 from kinarm.reference import ReferenceSimulator
-from kinarm.scene import Bench, Scene
-from kinarm.simulator import Simulator, substeps
-from kinarm.task import ReachTask, RewardWeights
+from kinarm.simulator import Simulator
+from kinarm.task import REWARD_TERMS
 
 HOME = np.zeros((1, 6))
 FAR_GOAL = np.array([[0.0, 5.0, 5.0]])
@@ -39,11 +39,6 @@ def assert_identical(first, second, rows=slice(None)):
         np.testing.assert_array_equal(getattr(first, name)[rows], getattr(second, name))
 
 
-def with_reward(simulator, **weights):
-    task = ReachTask(name="test", benches=("right",), reward=RewardWeights(**weights))
-    return Simulator(simulator.arm, task, threads=1)
-
-
 @pytest.fixture(scope="module")
 def scenarios(simulator):
     return simulator.sample(np.random.default_rng(0), 600)
@@ -52,16 +47,15 @@ def scenarios(simulator):
 @pytest.fixture(scope="module")
 def rewarded(simulator):
     """A simulator in which each reward term is non-zero."""
-    return with_reward(
-        simulator, progress=2.0, closer=0.125, collision=-3.0, success=5.0, step=-0.25
-    )
+    weights = {"progress": 2.0, "closer": 0.125, "step": -0.25, "collision": -3.0, "success": 5.0}
+    return changed(simulator, reward=weights)
 
 
 class TestDeterminism:
     def test_threads_do_not_matter(self, simulator, scenarios):
         networks = linear_policies(simulator, 600, 1)
         results = [
-            Simulator(simulator.arm, "both", threads=threads).rollout(
+            Simulator(simulator.problem, threads=threads).rollout(
                 networks, *scenarios, record=True, shift=np.ones(48)
             )
             for threads in (1, 2, 3)
@@ -90,7 +84,7 @@ class TestDeterminism:
 
     def test_threads_do_not_change_what_is_drawn(self, simulator):
         draws = [
-            Simulator(simulator.arm, "both", threads=threads).sample(np.random.default_rng(5), 3000)
+            Simulator(simulator.problem, threads=threads).sample(np.random.default_rng(5), 3000)
             for threads in (1, 2)
         ]
         np.testing.assert_array_equal(draws[0][0], draws[1][0])
@@ -163,14 +157,6 @@ class TestAgreement:
             np.testing.assert_allclose(rollouts.moments[i, 0], seen.sum(axis=0), atol=1e-10)
             np.testing.assert_allclose(rollouts.moments[i, 1], (seen**2).sum(axis=0), atol=1e-10)
 
-    def test_observe_equals_the_reference(self, simulator):
-        rng = np.random.default_rng(26)
-        q = rng.uniform(simulator.arm.lower, simulator.arm.upper, (50, 6))
-        goals = rng.normal(size=(50, 3))
-        reference = ReferenceSimulator(simulator)
-        expected = [reference.observe(*pair)[0] for pair in zip(q, goals, strict=True)]
-        np.testing.assert_allclose(simulator.observe(q, goals), expected, rtol=0, atol=1e-12)
-
     def test_rewards_sum_to_the_return(self, rewarded):
         rng = np.random.default_rng(13)
         starts, goals = rewarded.sample(rng, 100)
@@ -179,11 +165,7 @@ class TestAgreement:
         for _ in range(64):
             running = episodes.status == RUNNING
             result = rewarded.step(episodes, rng.uniform(-1, 1, (100, 5)))
-            terms = result.terms
-            np.testing.assert_allclose(
-                result.reward,
-                terms.progress + terms.closer + terms.collision + terms.success + terms.step,
-            )
+            np.testing.assert_array_equal(result.reward, result.terms.sum(axis=1))
             total += np.where(running, result.reward, 0)
         np.testing.assert_allclose(total, episodes.total, atol=1e-12)
 
@@ -191,7 +173,7 @@ class TestAgreement:
         rollouts = simulator.rollout(linear_policies(simulator, 600, 14), *scenarios)
         pairs = simulator.contact_pairs(rollouts)
         assert [pair is not None for pair in pairs] == rollouts.collision.tolist()
-        assert set(pairs) - {None} <= set(simulator.contact_model.pair_names)
+        assert set(pairs) - {None} <= set(simulator.world.contact_model.pair_names)
 
 
 class TestStep:
@@ -202,11 +184,14 @@ class TestStep:
         angle = math.radians(7)
         tool = 0.625 * np.array([math.cos(angle), math.sin(angle)])
         after = math.hypot(0.625 - tool[0], 1.0 - tool[1])
-        assert result.terms.progress[0] == pytest.approx(2 * (1.0 - after))
-        assert result.terms.step[0] == -0.25
-        assert result.terms.success[0] == 0
-        assert result.terms.collision[0] == 0
-        assert result.terms.closer[0] == 0.125
+        terms = dict(zip(REWARD_TERMS, result.terms[0], strict=True))
+        assert terms == {
+            "progress": pytest.approx(2 * (1.0 - after)),
+            "closer": 0.125,
+            "step": -0.25,
+            "collision": 0,
+            "success": 0,
+        }
         assert result.reward[0] == pytest.approx(2 * (1.0 - after) + 0.125 - 0.25)
 
     def test_success_by_hand(self, rewarded):
@@ -230,7 +215,7 @@ class TestStep:
         assert result.collision[0]
         assert result.terminated[0]
         assert result.reward[0] == -3.25
-        assert result.terms.progress[0] == 0
+        assert result.terms[0].tolist() == [0, 0, -0.25, -3, 0]
 
     def test_contact_beats_success(self, simulator):
         # The first refused move of a fall would end at this goal.
@@ -270,8 +255,7 @@ class TestStep:
 
     def test_horizon_truncates(self, simulator):
         for horizon in (1, 3):
-            task = ReachTask(name="short", benches=("right",), horizon=horizon)
-            short = Simulator(simulator.arm, task, threads=1)
+            short = changed(simulator, horizon=horizon)
             episodes = short.reset(HOME, FAR_GOAL)
             flags = [
                 bool(short.step(episodes, np.zeros((1, 5))).truncated[0]) for _ in range(horizon)
@@ -283,8 +267,7 @@ class TestStep:
             assert not rollouts.collision[0]
 
     def test_success_at_the_horizon_is_no_truncation(self, simulator):
-        task = ReachTask(name="short", benches=("right",), horizon=1, tolerance=0.5)
-        short = Simulator(simulator.arm, task, threads=1)
+        short = changed(simulator, horizon=1, tolerance=0.5)
         result = short.step(short.reset(HOME, [[0.6, 0, 0.7]]), np.zeros((1, 5)))
         assert result.success[0]
         assert not result.truncated[0]
@@ -303,109 +286,16 @@ class TestStep:
         assert result.reward[0] == 0
 
     def test_time_step_scales_the_motion(self, simulator):
-        slow = Simulator(simulator.arm, "right", time_step=0.01, threads=1)
+        slow = changed(simulator, time_step=0.01)
         np.testing.assert_allclose(slow.step_limit, simulator.step_limit / 2)
         np.testing.assert_allclose(np.rad2deg(simulator.step_limit), [7, 7, 8, 9, 9])
-
-    def test_substeps_are_evenly_spaced_and_end_at_the_target(self):
-        q, target = np.array([[0.0, 1.0]]), np.array([[0.4, 0.2]])
-        tested = substeps(q, target)
-        np.testing.assert_allclose(tested[0], [[0.1, 0.8], [0.2, 0.6], [0.3, 0.4], [0.4, 0.2]])
-        np.testing.assert_array_equal(tested[:, 3], target)
-
-
-class TestSample:
-    def test_starts_are_free_and_away_from_the_goal(self, any_simulator):
-        starts, goals = any_simulator.sample(np.random.default_rng(15), 1500)
-        assert not any_simulator.contact_model.in_contact(starts).any()
-        tools = np.array([any_simulator.arm.tool_position(q) for q in starts[:300]])
-        distances = np.linalg.norm(tools - goals[:300], axis=1)
-        assert (distances > any_simulator.task.tolerance).all()
-        assert ((starts >= any_simulator.arm.lower) & (starts <= any_simulator.arm.upper)).all()
-
-    def test_starts_near_the_goal_are_rejected(self, simulator):
-        task = ReachTask(name="wide", benches=("right",), tolerance=0.8)
-        wide = Simulator(simulator.arm, task, threads=1)
-        starts, goals = wide.sample(np.random.default_rng(16), 200)
-        tools = np.array([wide.arm.tool_position(q) for q in starts])
-        assert (np.linalg.norm(tools - goals, axis=1) > 0.8).all()
-
-    def test_same_seed_same_scenarios(self, simulator):
-        first, second, other = (
-            simulator.sample(np.random.default_rng(seed), 20) for seed in (1, 1, 2)
-        )
-        np.testing.assert_array_equal(first[0], second[0])
-        np.testing.assert_array_equal(first[1], second[1])
-        assert (first[0][:, 0] != other[0][:, 0]).all()
-
-    def test_goals_lie_on_the_benches_half_on_each(self, simulator):
-        _, goals = simulator.sample(np.random.default_rng(17), 8000)
-        assert (goals[:, 2] == 0.325).all()
-        assert (np.abs(goals[:, 0]) <= 0.5).all()
-        assert ((np.abs(goals[:, 1]) >= 0.55) & (np.abs(goals[:, 1]) <= 0.75)).all()
-        # Six standard deviations of a fair coin.
-        assert abs((goals[:, 1] > 0).mean() - 0.5) < 6 * 0.5 / math.sqrt(8000)
-
-    @pytest.mark.parametrize(("name", "side"), [("left", 1), ("right", -1)])
-    def test_goals_are_uniform_over_a_bench(self, simulator, name, side):
-        from scipy import stats
-
-        _, goals = Simulator(simulator.arm, name, threads=1).sample(np.random.default_rng(18), 4000)
-        across = side * goals[:, 1]
-        assert stats.kstest(goals[:, 0], stats.uniform(-0.5, 1).cdf).pvalue > 1e-4
-        assert stats.kstest(across, stats.uniform(0.55, 0.2).cdf).pvalue > 1e-4
-
-    def test_starts_fill_the_limits(self, simulator):
-        starts, _ = simulator.sample(np.random.default_rng(19), 4000)
-        share = (starts - simulator.arm.lower) / (simulator.arm.upper - simulator.arm.lower)
-        assert (share[:, :5].min(axis=0) < 0.05).all()
-        assert (share[:, [0, 3, 4]].max(axis=0) > 0.98).all()
-        np.testing.assert_array_equal(starts[:, 5], 0)
-
-    def test_start_spread_scales_the_range_about_home(self, simulator):
-        home = np.array([0.3, 0.1, 0.2, -0.4, 0.5, 0])
-        from kinarm.arm import Arm
-
-        task = ReachTask(name="near", benches=("right",), start_spread=0.1)
-        near = Simulator(Arm.load("paper", home=home), task, threads=1)
-        starts, _ = near.sample(np.random.default_rng(20), 3000)
-        low = home + 0.1 * (near.arm.lower - home)
-        high = home + 0.1 * (near.arm.upper - home)
-        moved = slice(0, 5)
-        assert (starts[:, moved] >= low[moved]).all()
-        assert (starts[:, moved] <= high[moved]).all()
-        np.testing.assert_allclose(starts[:, moved].min(axis=0), low[moved], atol=0.01)
-        np.testing.assert_allclose(starts[:, moved].max(axis=0), high[moved], atol=0.01)
-
-    def test_no_spread_starts_at_home(self, simulator):
-        task = ReachTask(name="home", benches=("right",), start_spread=0)
-        starts, goals = Simulator(simulator.arm, task).sample(np.random.default_rng(21), 50)
-        np.testing.assert_array_equal(starts, np.zeros((50, 6)))
-        assert len(np.unique(goals, axis=0)) == 50
-
-    def test_nothing_to_draw(self, simulator):
-        starts, goals = simulator.sample(np.random.default_rng(22), 0)
-        assert starts.shape == (0, 6)
-        assert goals.shape == (0, 3)
-
-    def test_bench_around_the_arm_leaves_no_start(self, simulator):
-        block = Bench(name="block", x=(-1, 1), y=(-1, 1), height=2)
-        task = ReachTask(name="buried", benches=("block",))
-        buried = Simulator(simulator.arm, task, Scene(benches=(block,)))
-        with pytest.raises(SceneError, match="no contact-free start .* block bench"):
-            buried.sample(np.random.default_rng(23), 3)
-
-    def test_goal_at_the_only_start_is_refused(self, simulator):
-        task = ReachTask(name="there", benches=("right",), start_spread=0, tolerance=5)
-        with pytest.raises(SceneError, match="the tool already is at the goal"):
-            Simulator(simulator.arm, task).sample(np.random.default_rng(24), 1)
 
 
 class TestRefusals:
     def test_start_in_contact_names_the_pair(self, simulator):
         starts = np.zeros((3, 6))
         starts[1] = np.deg2rad([0, 110, -60, 0, 0, 0])
-        pair = simulator.contact_model.contact_pair(starts[1])
+        pair = simulator.world.contact_model.contact_pair(starts[1])
         with pytest.raises(StartInContactError) as caught:
             simulator.rollout(linear_policies(simulator, 1, 0), starts, np.tile(FAR_GOAL, (3, 1)))
         assert caught.value.index == 1
@@ -497,29 +387,23 @@ class TestRefusals:
         with pytest.raises(InvalidInputError, match="shift"):
             simulator.rollout(linear_policies(simulator, 1, 0), HOME, FAR_GOAL, shift=shift)
 
-    @pytest.mark.parametrize("time_step", [0, -0.02, np.nan, np.inf])
-    def test_bad_time_step(self, simulator, time_step):
-        with pytest.raises(InvalidInputError, match="time_step"):
-            Simulator(simulator.arm, time_step=time_step)
-
     @pytest.mark.parametrize("threads", [0, -1])
     def test_bad_threads(self, simulator, threads):
         with pytest.raises(InvalidInputError, match="threads must be a whole number of at least 1"):
-            Simulator(simulator.arm, threads=threads)
+            Simulator("right", threads=threads)
 
-    def test_task_on_a_bench_that_the_scene_lacks(self, simulator):
-        with pytest.raises(UnknownNameError, match="bench 'right'"):
-            Simulator(simulator.arm, "right", Scene(benches=()))
-
-    def test_unknown_names(self):
-        with pytest.raises(UnknownNameError, match="'nope'"):
-            Simulator("nope")
+    def test_unknown_problem(self):
         with pytest.raises(UnknownNameError, match="'up'.*left, right, both"):
-            Simulator("paper", "up")
+            Simulator("up")
+
+    @pytest.mark.parametrize("part", ["problem", "task", "arm", "scene", "n_actions"])
+    def test_simulator_and_problem_cannot_drift_apart(self, simulator, part):
+        with pytest.raises(AttributeError):
+            setattr(simulator, part, None)
 
 
 def test_coal_is_asked_only_where_freedom_is_not_proven(simulator):
-    idle = Simulator(simulator.arm, "right", threads=1)
+    idle = Simulator("right", threads=1)
     idle.rollout_actions(np.zeros((1, 64, 5)), HOME, FAR_GOAL)
     assert idle.judged == 0
     idle.rollout_actions(np.tile([0.0, 1, 0, 0, 0], (1, 64, 1)), HOME, FAR_GOAL)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from kinarm._validation import finite_array
 from kinarm.errors import InvalidInputError
-from kinarm.validation import finite_array
 
 
 def test_gives_a_contiguous_float_copy():

@@ -2,22 +2,22 @@
 
 import itertools
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 
-from kinarm.arm import Arm
-from kinarm.policies import Layer, Policy, Provenance
+from kinarm.policies.policy import Layer, Policy
+from kinarm.policies.provenance import Provenance
+from kinarm.problem import ReachProblem
 
 
 @pytest.fixture(scope="session")
-def provenance(shipped_arms: dict[str, Arm]) -> Provenance:
+def provenance() -> Provenance:
     return Provenance(
         algorithm="test",
         recipe="none",
-        task="right",
-        arm="paper",
-        arm_digest=shipped_arms["paper"].digest,
+        problem=ReachProblem.load("right").pinned,
         seed=3,
         environment_steps=17,
         config={"alpha": 0.25, "names": ["a", "b"]},
@@ -30,7 +30,7 @@ def provenance(shipped_arms: dict[str, Arm]) -> Provenance:
 def make_policy(provenance: Provenance) -> Callable[..., Policy]:
     """Build a policy with random numbers and the given widths between 48 inputs and 5 outputs."""
 
-    def make(*hidden: int, seed: int = 0, constant: int = 0) -> Policy:
+    def make(*hidden: int, seed: int = 0, constant: int = 0, **settings: Any) -> Policy:
         rng = np.random.default_rng(seed)
         widths = [48, *hidden, 5]
         std = rng.uniform(0.1, 2, 48)
@@ -43,6 +43,7 @@ def make_policy(provenance: Provenance) -> Callable[..., Policy]:
                 for n_in, n_out in itertools.pairwise(widths)
             ),
             provenance=provenance,
+            **settings,
         )
 
     return make

@@ -84,7 +84,7 @@ def test_single_bench_is_trained_without_symmetry(mirror):
 
 
 def test_observations_reflected_to_the_right(mirror, simulator):
-    seen = simulator.observe(*simulator.sample(np.random.default_rng(3), 50))
+    seen = simulator.world.observe(*simulator.sample(np.random.default_rng(3), 50))
     left = mirror.seen_on_the_left(seen)
     np.testing.assert_array_equal(left, seen[:, 1] > 0)
     assert 10 < left.sum() < 40

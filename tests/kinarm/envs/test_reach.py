@@ -1,0 +1,324 @@
+"""The single environment: Gymnasium's contract, determinism, settings and errors."""
+
+import copy
+import json
+import math
+import pickle
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import kinarm
+from kinarm.envs.reach import ReachEnv
+from kinarm.envs.registration import ENVIRONMENTS
+from kinarm.errors import InvalidInputError, ProblemError, StartInContactError, UnknownNameError
+from kinarm.simulator import Simulator
+from kinarm.task import RewardWeights, load_task
+
+HOME = np.zeros(6)
+
+
+def bitwise_episode(env, seed, steps=80):
+    """Everything that an environment returns, over several episodes."""
+    seen = [env.reset(seed=seed)]
+    env.action_space.seed(seed)
+    for _ in range(steps):
+        result = env.step(env.action_space.sample())
+        seen.append(result)
+        if result[2] or result[3]:
+            seen.append(env.reset())
+    return seen
+
+
+def assert_bitwise_equal(first, second):
+    assert len(first) == len(second)
+    for a, b in zip(first, second, strict=True):
+        np.testing.assert_array_equal(a[0], b[0])
+        assert a[1:] == b[1:]
+
+
+@pytest.fixture(scope="module")
+def env():
+    return gymnasium.make("kinarm/ReachRight-v0").unwrapped
+
+
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+class TestContract:
+    def test_gymnasium_checker(self, name):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            check_env(gymnasium.make(name).unwrapped)
+
+    def test_stable_baselines_checker(self, name):
+        checker = pytest.importorskip("stable_baselines3.common.env_checker")
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "Your action space has dtype float64")
+            checker.check_env(gymnasium.make(name).unwrapped)
+
+    def test_same_seed_same_bits(self, name):
+        first, second = gymnasium.make(name), gymnasium.make(name)
+        assert_bitwise_equal(bitwise_episode(first, 7), bitwise_episode(second, 7))
+
+    def test_other_seed_other_episode(self, name):
+        env = gymnasium.make(name)
+        assert not np.array_equal(env.reset(seed=1)[0], env.reset(seed=2)[0])
+
+    def test_observations_stay_in_the_space(self, name):
+        env = gymnasium.make(name)
+        for result in bitwise_episode(env, 3, steps=200):
+            assert env.observation_space.contains(result[0])
+
+    def test_goals_lie_on_the_benches_of_the_task(self, name):
+        env = gymnasium.make(name)
+        env.reset(seed=0)
+        sides = {float(np.sign(env.reset()[0][1])) for _ in range(30)}
+        expected = {"left": {1.0}, "right": {-1.0}, "both": {-1.0, 1.0}}
+        assert sides == expected[ENVIRONMENTS[name]]
+
+
+class TestSpaces:
+    def test_shapes_and_types(self, env):
+        assert env.action_space == gymnasium.spaces.Box(-1, 1, (5,), np.float64)
+        assert env.observation_space.shape == (48,)
+        assert env.observation_space.dtype == np.float64
+
+    def test_follow_the_arm(self, mesh_arm):
+        env = ReachEnv("both", mesh_arm)
+        assert env.observation_space.shape == (6 + 7 * 4,)
+        assert env.action_space.shape == (4,)
+        observation, _ = env.reset(seed=0)
+        assert env.observation_space.contains(observation)
+
+
+class TestEpisode:
+    def test_observation_parts(self, env):
+        goal = np.array([0.1, -0.6, 0.325])
+        observation, info = env.reset(options={"start": HOME, "goal": goal})
+        np.testing.assert_array_equal(observation[:3], goal)
+        np.testing.assert_allclose(observation[3:6], goal - [0.625, 0, 0.705], atol=1e-12)
+        np.testing.assert_array_equal(observation[6:30].reshape(6, 4)[:, 0], 1)
+        assert info["distance"] == pytest.approx(np.linalg.norm(observation[3:6]))
+
+    def test_info_and_reward_terms(self, env):
+        env.reset(options={"start": HOME, "goal": [0.625, 1, 0.705]})
+        _, reward, terminated, truncated, info = env.step(np.array([1.0, 0, 0, 0, 0]))
+        assert set(info) == {
+            "distance",
+            "success",
+            "collision",
+            "contact",
+            *(f"reward_{term}" for term in ("progress", "closer", "collision", "success", "step")),
+        }
+        assert reward == sum(value for key, value in info.items() if key.startswith("reward_"))
+        angle = math.radians(7)
+        distance = math.dist((0.625, 1), (0.625 * math.cos(angle), 0.625 * math.sin(angle)))
+        assert info["distance"] == pytest.approx(distance)
+        assert reward == pytest.approx(1 - distance)
+        assert info["contact"] is None
+        assert not terminated
+        assert not truncated
+        assert type(reward) is float
+        assert type(terminated) is bool
+        assert type(truncated) is bool
+
+    def test_contact_ends_and_is_named(self, env):
+        env.reset(options={"start": HOME, "goal": [0, 5, 5]})
+        for _ in range(64):
+            _, reward, terminated, truncated, info = env.step([0, 1, 0, 0, 0])
+            if terminated:
+                break
+        assert info["collision"]
+        assert info["contact"] == ("hand", "ground")
+        assert info["reward_collision"] == -1
+        assert reward == -1
+        assert not truncated
+        assert not info["success"]
+
+    def test_success_ends(self, env):
+        goal = env.simulator.arm.tool_position([math.radians(7), 0, 0, 0, 0, 0])
+        env.reset(options={"start": HOME, "goal": goal})
+        _, _, terminated, truncated, info = env.step([1, 0, 0, 0, 0])
+        assert terminated
+        assert not truncated
+        assert info["success"]
+        assert info["distance"] == pytest.approx(0, abs=1e-12)
+
+    def test_horizon_truncates(self, env):
+        env.reset(options={"start": HOME, "goal": [0, 5, 5]})
+        flags = [env.step(np.zeros(5))[2:4] for _ in range(64)]
+        assert flags == [(False, False)] * 63 + [(False, True)]
+
+    def test_returned_arrays_are_not_overwritten(self, env):
+        first, _ = env.reset(seed=0)
+        kept = first.copy()
+        env.step(np.ones(5))
+        np.testing.assert_array_equal(first, kept)
+
+    def test_larger_actions_are_clipped(self, env):
+        options = {"start": HOME, "goal": [0, 5, 5]}
+        env.reset(options=options)
+        expected = env.step([1, -1, 0, 0, 0])[0]
+        env.reset(options=options)
+        np.testing.assert_array_equal(env.step([9, -9, 0, 0, 0])[0], expected)
+
+
+class TestSeeding:
+    def test_unseeded_resets_go_on_with_the_stream(self, env):
+        goals = [env.reset(seed=4)[0][:3], *(env.reset()[0][:3] for _ in range(10))]
+        again = [env.reset(seed=4)[0][:3], *(env.reset()[0][:3] for _ in range(10))]
+        np.testing.assert_array_equal(goals, again)
+        assert len(np.unique(goals, axis=0)) == 11
+
+    def test_actions_do_not_influence_later_scenarios(self, env):
+        env.reset(seed=5)
+        expected = env.reset()[0]
+        env.reset(seed=5)
+        env.step(np.ones(5))
+        np.testing.assert_array_equal(env.reset()[0], expected)
+
+    def test_unseeded_environments_differ(self):
+        first, second = ReachEnv(), ReachEnv()
+        assert not np.array_equal(first.reset()[0], second.reset()[0])
+
+    def test_global_generator_is_left_alone(self, env):
+        before = np.random.get_state()[1].copy()  # noqa: NPY002
+        env.reset(seed=6)
+        env.step(np.zeros(5))
+        np.testing.assert_array_equal(np.random.get_state()[1], before)  # noqa: NPY002
+
+
+class TestSettings:
+    def test_keyword_overrides(self):
+        env = gymnasium.make(
+            "kinarm/ReachLeft-v0",
+            arm="lrmate200ic_5l",
+            reward={"success": 2.0, "step": -0.1},
+            start_spread=0.0,
+            horizon=3,
+            tolerance=0.01,
+        ).unwrapped
+        assert env.simulator.arm.name == "lrmate200ic_5l"
+        task = env.simulator.task
+        assert (task.horizon, task.tolerance, task.start_spread) == (3, 0.01, 0)
+        assert task.reward == RewardWeights(success=2, step=-0.1)
+        env.reset(seed=0)
+        np.testing.assert_array_equal(env.simulator.arm.home, np.zeros(6))
+        results = [env.step(np.zeros(5)) for _ in range(3)]
+        assert results[-1][3]
+        assert results[0][1] == pytest.approx(-0.1)
+
+    def test_reward_object_and_task_object(self):
+        env = ReachEnv(load_task("both", horizon=5), reward=RewardWeights(progress=3))
+        assert env.simulator.task.horizon == 5
+        assert env.simulator.task.reward.progress == 3
+
+    def test_settings_survive_the_spec(self):
+        env = gymnasium.make("kinarm/ReachBoth-v0", horizon=9, reward={"success": 1.0})
+        text = env.spec.to_json()
+        json.loads(text)
+        again = gymnasium.make(gymnasium.envs.registration.EnvSpec.from_json(text))
+        assert again.unwrapped.simulator.task == env.unwrapped.simulator.task
+
+    @pytest.mark.parametrize(
+        ("settings", "error", "message"),
+        [
+            ({"task": "up"}, UnknownNameError, "'up'"),
+            ({"arm": "nope"}, UnknownNameError, "'nope'"),
+            ({"horizon": 0}, InvalidInputError, "horizon"),
+            ({"start_spread": 2}, ProblemError, "start_spread"),
+            ({"reward": {"bonus": 1}}, InvalidInputError, "bonus"),
+            ({"reward": {"success": math.nan}}, ProblemError, "success must be finite"),
+            ({"render_mode": "human"}, InvalidInputError, "render_mode must be None"),
+        ],
+    )
+    def test_bad_settings_are_refused(self, settings, error, message):
+        with pytest.raises(error, match=message):
+            ReachEnv(**settings)
+
+    def test_documented(self):
+        for words in ("Observation", "Reward", "Versions", "metres", "terminated"):
+            assert words in ReachEnv.__doc__
+
+
+class TestErrors:
+    def test_step_before_reset(self):
+        with pytest.raises(InvalidInputError, match="call reset"):
+            ReachEnv().step(np.zeros(5))
+
+    def test_step_after_the_end(self):
+        env = ReachEnv(horizon=1)
+        env.reset(seed=0)
+        env.step(np.zeros(5))
+        with pytest.raises(InvalidInputError, match="call reset"):
+            env.step(np.zeros(5))
+
+    @pytest.mark.parametrize("action", [np.zeros(6), np.zeros((1, 5)), 0.0, [np.nan] * 5])
+    def test_bad_action(self, env, action):
+        env.reset(seed=0)
+        with pytest.raises(InvalidInputError, match="action must"):
+            env.step(action)
+
+    def test_bad_action_changes_nothing(self, env):
+        env.reset(seed=0)
+        expected = env.step(np.ones(5))[0]
+        env.reset(seed=0)
+        with pytest.raises(InvalidInputError):
+            env.step(np.full(5, np.nan))
+        np.testing.assert_array_equal(env.step(np.ones(5))[0], expected)
+
+    @pytest.mark.parametrize(
+        ("options", "message"),
+        [
+            ({"starts": HOME}, "unknown reset options.*'starts'.*start, goal"),
+            ({"start": np.zeros(5)}, "start must have shape"),
+            ({"goal": [0, 0, np.nan]}, "goal must be finite"),
+            ({"start": np.full(6, 9.0)}, "outside the limits"),
+        ],
+    )
+    def test_bad_options(self, env, options, message):
+        with pytest.raises(InvalidInputError, match=message):
+            env.reset(seed=0, options=options)
+
+    def test_start_in_contact(self, env):
+        start = np.deg2rad([0, 110, -60, 0, 0, 0])
+        with pytest.raises(StartInContactError, match="touches"):
+            env.reset(options={"start": start})
+
+
+def pickled(env):
+    return pickle.loads(pickle.dumps(env))
+
+
+class TestCopies:
+    def test_simulator_pickles(self, env):
+        simulator = pickle.loads(pickle.dumps(env.simulator))
+        assert isinstance(simulator, Simulator)
+        draws = [s.sample(np.random.default_rng(0), 5) for s in (simulator, env.simulator)]
+        np.testing.assert_array_equal(draws[0][0], draws[1][0])
+
+    @pytest.mark.parametrize("duplicate", [copy.deepcopy, pickled])
+    def test_copies_continue_alike(self, duplicate):
+        env = ReachEnv("both")
+        env.reset(seed=8)
+        env.step(np.ones(5) / 3)
+        other = duplicate(env)
+        for _ in range(20):
+            first, second = env.step(np.ones(5) / 3), other.step(np.ones(5) / 3)
+            np.testing.assert_array_equal(first[0], second[0])
+            assert first[1:] == second[1:]
+            if first[2] or first[3]:
+                break
+        np.testing.assert_array_equal(env.reset()[0], other.reset()[0])
+
+
+def test_registration_is_part_of_the_import():
+    assert kinarm.__version__
+    assert set(ENVIRONMENTS) <= set(gymnasium.registry)
+    assert ENVIRONMENTS == {
+        "kinarm/ReachLeft-v0": "left",
+        "kinarm/ReachRight-v0": "right",
+        "kinarm/ReachBoth-v0": "both",
+    }

@@ -1,0 +1,261 @@
+"""The native batch environment held against a loop of single ones."""
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+from kinarm.envs.reach import ReachEnv
+from kinarm.envs.vector import ReachVectorEnv
+from kinarm.errors import InvalidInputError, StartInContactError
+
+NAME = "kinarm/ReachBoth-v0"
+NUMBER = 7
+
+
+def native(mode, number=NUMBER, **settings):
+    return gymnasium.make_vec(NAME, num_envs=number, autoreset_mode=mode, **settings)
+
+
+def looped(mode, number=NUMBER, **settings):
+    return SyncVectorEnv(
+        [lambda: ReachEnv("both", **settings)] * number, autoreset_mode=AutoresetMode(mode)
+    )
+
+
+def assert_same_infos(batch, loop):
+    """Equal entries; what only the batch holds is masked out everywhere."""
+    assert set(loop) <= set(batch)
+    for key in set(batch) - set(loop):
+        assert not batch[key if key.startswith("_") else f"_{key}"].any()
+    for key in loop:
+        compare_entry(key, batch[key], loop[key])
+
+
+def compare_entry(key, first, second):
+    if isinstance(first, dict):
+        assert_same_infos(first, second)
+        return
+    assert first.dtype == second.dtype, key
+    if key == "final_obs":
+        for a, b in zip(first, second, strict=True):
+            assert (a is None) == (b is None)
+            np.testing.assert_array_equal(a, b)
+    else:
+        np.testing.assert_array_equal(first, second, err_msg=key)
+
+
+def assert_same_results(first, second):
+    for a, b in zip(first[:-1], second[:-1], strict=True):
+        assert a.dtype == b.dtype
+        np.testing.assert_array_equal(a, b)
+    assert_same_infos(first[-1], second[-1])
+
+
+@pytest.mark.parametrize("mode", ["SameStep", "NextStep"])
+class TestAutoreset:
+    @pytest.mark.parametrize("horizon", [64, 3])
+    def test_equals_a_loop_of_single_environments(self, mode, horizon):
+        batch, loop = native(mode, horizon=horizon), looped(mode, horizon=horizon)
+        rng = np.random.default_rng(0)
+        assert_same_results(batch.reset(seed=3), loop.reset(seed=3))
+        ends = np.zeros(2, dtype=int)
+        for _ in range(250):
+            actions = rng.uniform(-1.2, 1.2, (NUMBER, 5))
+            first, second = batch.step(actions), loop.step(actions)
+            assert_same_results(first, second)
+            ends += [first[2].sum(), first[3].sum()]
+        assert (ends > 5).all()
+        assert_same_results(batch.reset(), loop.reset())
+
+    def test_successes_are_reported_alike(self, mode):
+        settings = {"tolerance": 0.4, "reward": {"success": 2.0, "step": -0.1}}
+        batch, loop = native(mode, **settings), looped(mode, **settings)
+        rng = np.random.default_rng(1)
+        assert_same_results(batch.reset(seed=5), loop.reset(seed=5))
+        successes = 0
+        for _ in range(40):
+            actions = rng.uniform(-1, 1, (NUMBER, 5))
+            for _ in range(8):
+                first, second = batch.step(actions), loop.step(actions)
+                assert_same_results(first, second)
+                successes += first[-1].get("final_info", first[-1])["success"].sum()
+        assert successes > 2
+
+    def test_metadata_says_so(self, mode):
+        assert native(mode).metadata["autoreset_mode"] == AutoresetMode(mode)
+
+
+class TestSameStep:
+    def test_is_the_default(self):
+        assert ReachVectorEnv().metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
+
+    def test_final_observation_belongs_to_the_ended_episode(self):
+        batch = native("SameStep", horizon=2)
+        first, _ = batch.reset(seed=0)
+        batch.step(np.zeros((NUMBER, 5)))
+        observations, _, _, truncated, infos = batch.step(np.zeros((NUMBER, 5)))
+        assert truncated.all()
+        for final, start, new in zip(infos["final_obs"], first, observations, strict=True):
+            np.testing.assert_array_equal(final, start)
+            assert not np.array_equal(final, new)
+        assert infos["_final_info"].all()
+        np.testing.assert_allclose(
+            infos["final_info"]["distance"], np.linalg.norm(first[:, 3:6], axis=1)
+        )
+        np.testing.assert_allclose(infos["distance"], np.linalg.norm(observations[:, 3:6], axis=1))
+
+
+class TestDisabled:
+    def test_reset_mask_equals_a_loop_of_single_environments(self):
+        batch, loop = native("Disabled", horizon=12), looped("Disabled", horizon=12)
+        rng = np.random.default_rng(2)
+        assert_same_results(batch.reset(seed=9), loop.reset(seed=9))
+        resets = 0
+        for _ in range(120):
+            actions = rng.uniform(-1, 1, (NUMBER, 5))
+            first, second = batch.step(actions), loop.step(actions)
+            assert_same_results(first, second)
+            ended = first[2] | first[3]
+            if ended.any():
+                resets += 1
+                options = {"reset_mask": ended}
+                renewed = batch.reset(options=dict(options)), loop.reset(options=dict(options))
+                assert_same_results(*renewed)
+        assert resets > 5
+
+    def test_step_of_an_ended_episode_is_refused(self):
+        batch = native("Disabled", horizon=1)
+        batch.reset(seed=0)
+        batch.step(np.zeros((NUMBER, 5)))
+        with pytest.raises(InvalidInputError, match=r"\[0, 1, 2, 3, 4, 5, 6\] are over"):
+            batch.step(np.zeros((NUMBER, 5)))
+
+    @pytest.mark.parametrize(
+        "mask", [np.zeros(NUMBER, dtype=bool), np.ones(3, dtype=bool), np.ones(NUMBER), True]
+    )
+    def test_bad_mask(self, mask):
+        batch = native("Disabled")
+        batch.reset(seed=0)
+        with pytest.raises(InvalidInputError, match="reset_mask must hold 7 booleans"):
+            batch.reset(options={"reset_mask": mask})
+
+
+class TestSeeding:
+    def test_sub_environment_i_is_a_single_one_with_seed_plus_i(self):
+        observations, _ = native("SameStep").reset(seed=11)
+        for i in range(NUMBER):
+            np.testing.assert_array_equal(observations[i], ReachEnv("both").reset(seed=11 + i)[0])
+
+    def test_list_of_seeds(self):
+        seeds = [5, 5, 1, 0, 2, 9, 5]
+        observations, _ = native("SameStep").reset(seed=seeds)
+        np.testing.assert_array_equal(observations[0], observations[1])
+        np.testing.assert_array_equal(observations[2], ReachEnv("both").reset(seed=1)[0])
+
+    def test_unseeded_batches_differ(self):
+        first, second = (native("SameStep").reset()[0] for _ in range(2))
+        assert (first[:, 0] != second[:, 0]).all()
+
+    def test_batch_size_does_not_matter(self):
+        small, large = native("SameStep", 3), native("SameStep", 200)
+        observations = small.reset(seed=0)[0], large.reset(seed=0)[0][:3]
+        np.testing.assert_array_equal(*observations)
+        actions = np.random.default_rng(3).uniform(-1, 1, (40, 200, 5))
+        for action in actions:
+            first, second = small.step(action[:3]), large.step(action)
+            np.testing.assert_array_equal(first[0], second[0][:3])
+            np.testing.assert_array_equal(first[1], second[1][:3])
+
+    def test_threads_do_not_matter(self):
+        results = []
+        for threads in (1, 2):
+            batch = ReachVectorEnv(2048, task="both", threads=threads)
+            seen = [batch.reset(seed=1)[0]]
+            rng = np.random.default_rng(4)
+            seen += [batch.step(rng.uniform(-1, 1, (2048, 5)))[0] for _ in range(5)]
+            results.append(np.array(seen))
+        np.testing.assert_array_equal(*results)
+
+
+class TestOptions:
+    def test_one_start_and_goal_for_all(self):
+        goal = [0.1, 0.6, 0.325]
+        observations, _ = native("SameStep").reset(
+            seed=0, options={"start": np.zeros(6), "goal": goal}
+        )
+        np.testing.assert_array_equal(observations[:, :3], np.tile(goal, (NUMBER, 1)))
+        np.testing.assert_array_equal(observations[0], observations[-1])
+
+    def test_unknown_option(self):
+        with pytest.raises(InvalidInputError, match="unknown reset options"):
+            native("SameStep").reset(options={"begin": 1})
+
+    def test_failed_reset_leaves_no_half_begun_episodes(self):
+        batch, untouched = native("SameStep"), native("SameStep")
+        batch.reset(seed=0)
+        untouched.reset(seed=0)
+        with pytest.raises(StartInContactError):
+            batch.reset(options={"start": np.deg2rad([0, 110, -60, 0, 0, 0])})
+        actions = np.full((NUMBER, 5), 0.1)
+        try:
+            observations = batch.step(actions)[0]
+        except InvalidInputError:
+            return  # asking for a new reset is as good as going on
+        np.testing.assert_array_equal(observations, untouched.step(actions)[0])
+
+
+class TestErrors:
+    def test_step_before_reset(self):
+        with pytest.raises(InvalidInputError, match="call reset"):
+            native("SameStep").step(np.zeros((NUMBER, 5)))
+
+    @pytest.mark.parametrize(
+        ("settings", "message"),
+        [
+            ({"num_envs": 0}, "num_envs must be a whole number of at least 1"),
+            ({"autoreset_mode": "Later"}, "autoreset_mode must be one of.*NextStep.*'Later'"),
+            ({"render_mode": "human"}, "render_mode must be None"),
+        ],
+    )
+    def test_bad_settings(self, settings, message):
+        with pytest.raises(InvalidInputError, match=message):
+            ReachVectorEnv(**settings)
+
+    @pytest.mark.parametrize("seed", [[1, 2], []])
+    def test_wrong_number_of_seeds(self, seed):
+        with pytest.raises(InvalidInputError, match="seed must hold 7 numbers"):
+            native("SameStep").reset(seed=seed)
+
+    @pytest.mark.parametrize("seed", [-1, [-1] * NUMBER])
+    def test_negative_seed(self, seed):
+        with pytest.raises(InvalidInputError, match="seed"):
+            native("SameStep").reset(seed=seed)
+
+    @pytest.mark.parametrize(
+        "actions", [np.zeros(5), np.zeros((NUMBER, 4)), np.full((NUMBER, 5), np.nan)]
+    )
+    def test_bad_actions(self, actions):
+        batch = native("SameStep")
+        batch.reset(seed=0)
+        with pytest.raises(InvalidInputError, match="actions must"):
+            batch.step(actions)
+
+
+def test_spaces_are_batched():
+    batch = native("SameStep")
+    assert batch.single_observation_space.shape == (48,)
+    assert batch.observation_space.shape == (NUMBER, 48)
+    assert batch.action_space.shape == (NUMBER, 5)
+    assert isinstance(batch, ReachVectorEnv)
+
+
+def test_returned_arrays_are_not_overwritten():
+    batch = native("SameStep")
+    first, _ = batch.reset(seed=0)
+    second = batch.step(np.ones((NUMBER, 5)))
+    kept = [first.copy(), second[0].copy(), second[1].copy()]
+    batch.step(np.ones((NUMBER, 5)))
+    np.testing.assert_array_equal(kept[0], first)
+    np.testing.assert_array_equal(kept[1], second[0])
+    np.testing.assert_array_equal(kept[2], second[1])

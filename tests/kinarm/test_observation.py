@@ -1,0 +1,151 @@
+"""The observation: its table, held against Pinocchio, the reference and reflections by hand."""
+
+import itertools
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from configurations import random_configurations
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kinarm.observation import (
+    GOAL_SIDE,
+    OBSERVATION,
+    Ranges,
+    observation_bounds,
+    observation_layout,
+    observation_signs,
+    observation_size,
+    observation_table,
+    part_slices,
+)
+from kinarm.reference import ReferenceSimulator
+
+REFLECTION = np.array([1.0, -1.0, 1.0])
+
+
+@pytest.fixture
+def situations(any_simulator):
+    """Random configurations and goals of an arm, and the observations of them."""
+    q = random_configurations(any_simulator, 1, 200)
+    goals = np.random.default_rng(2).normal(size=(200, 3))
+    return q, goals, any_simulator.world.observe(q, goals)
+
+
+class TestParts:
+    def test_equal_pinocchio(self, any_simulator, situations):
+        arm, world = any_simulator.arm, any_simulator.world
+        places = part_slices(arm.n_axes)
+        data = arm.model.createData()
+        distances = world.distances(*situations[:2])
+        for q, goal, seen, distance in zip(*situations, distances, strict=True):
+            pin.forwardKinematics(arm.model, data, q)
+            tool = arm.tool_position(q)
+            np.testing.assert_array_equal(seen[places["goal"]], goal)
+            offset = seen[places["goal_minus_tool"]]
+            np.testing.assert_allclose(offset, goal - tool, rtol=0, atol=1e-12)
+            positions = np.concatenate([data.oMi[k + 1].translation for k in range(arm.n_axes)])
+            np.testing.assert_allclose(seen[places["position"]], positions, rtol=0, atol=1e-12)
+            quaternions = seen[places["orientation"]].reshape(-1, 4)
+            for k, (w, x, y, z) in enumerate(quaternions):
+                rotation = pin.Quaternion(w, x, y, z).matrix()
+                np.testing.assert_allclose(rotation, data.oMi[k + 1].rotation, rtol=0, atol=1e-12)
+            assert distance == pytest.approx(np.linalg.norm(goal - tool), abs=1e-12)
+
+    def test_equal_the_reference(self, any_simulator, situations):
+        reference = ReferenceSimulator(any_simulator)
+        distances = any_simulator.world.distances(*situations[:2])
+        for q, goal, seen, distance in zip(*situations, distances, strict=True):
+            expected, expected_distance = reference.observe(q, goal)
+            np.testing.assert_allclose(seen, expected, rtol=0, atol=1e-12)
+            assert distance == pytest.approx(expected_distance, abs=1e-12)
+
+    def test_at_zero(self, simulator):
+        seen = simulator.world.observe(np.zeros((1, 6)), np.zeros((1, 3)))[0]
+        np.testing.assert_array_equal(seen[6:30].reshape(6, 4), np.tile([1, 0, 0, 0], (6, 1)))
+        heights = seen[30:].reshape(6, 3)[:, 2]
+        np.testing.assert_allclose(heights, [0.33, 0.33, 0.63, 0.705, 0.705, 0.705], atol=1e-12)
+
+
+class TestTable:
+    @pytest.mark.parametrize("n_joints", [1, 3, 6, 7])
+    def test_parts_fill_the_observation_one_after_the_other(self, n_joints):
+        slices = list(part_slices(n_joints).values())
+        assert slices[0].start == 0
+        for before, after in itertools.pairwise(slices):
+            assert before.stop == after.start
+        assert slices[-1].stop == observation_size(n_joints) == 6 + 7 * n_joints
+        assert len(observation_signs(n_joints)) == observation_size(n_joints)
+
+    def test_length_is_that_of_the_kernel(self, any_simulator, situations):
+        n = observation_size(any_simulator.arm.n_axes)
+        assert situations[2].shape == (200, n)
+        assert any_simulator.n_observations == any_simulator.world.n_observations == n
+
+    def test_layout_names_version_parts_and_lengths(self):
+        assert observation_layout() == ("1: goal 3, goal_minus_tool 3, orientation 4n, position 3n")
+
+    def test_names_are_unique(self):
+        assert len({part.name for part in OBSERVATION}) == len(OBSERVATION)
+
+    def test_table_for_people(self):
+        rows = observation_table(6)
+        assert [row[0] for row in rows] == ["0-2", "3-5", "6-29", "30-47"]
+        assert [row[2] for row in rows] == ["m", "m", "1", "m"]
+        assert all(row[1] for row in rows)
+
+    def test_goal_side_is_the_y_of_the_goal(self):
+        goal = part_slices(6)["goal"]
+        assert goal.start + 1 == GOAL_SIDE
+        assert observation_signs(6)[GOAL_SIDE] == -1
+
+
+class TestSigns:
+    def test_are_those_of_the_reflection_by_pinocchio(self, any_simulator, situations):
+        """A frame R, p reflected about y = 0 is S R S, S p with S = diag(1, -1, 1)."""
+        arm = any_simulator.arm
+        places, signs = part_slices(arm.n_axes), observation_signs(arm.n_axes)
+        data = arm.model.createData()
+        for q, goal, seen in zip(*situations, strict=True):
+            reflected = seen * signs
+            pin.forwardKinematics(arm.model, data, q)
+            np.testing.assert_array_equal(reflected[places["goal"]], REFLECTION * goal)
+            offset = REFLECTION * (goal - arm.tool_position(q))
+            np.testing.assert_allclose(reflected[places["goal_minus_tool"]], offset, atol=1e-12)
+            positions = reflected[places["position"]].reshape(-1, 3)
+            quaternions = reflected[places["orientation"]].reshape(-1, 4)
+            for k, (w, x, y, z) in enumerate(quaternions):
+                rotation = REFLECTION[:, None] * data.oMi[k + 1].rotation * REFLECTION
+                np.testing.assert_allclose(
+                    pin.Quaternion(w, x, y, z).matrix(), rotation, rtol=0, atol=1e-12
+                )
+                np.testing.assert_allclose(
+                    positions[k], REFLECTION * data.oMi[k + 1].translation, atol=1e-12
+                )
+
+    def test_reflecting_twice_changes_nothing(self):
+        assert set(np.abs(observation_signs(6))) == {1.0}
+
+
+class TestBounds:
+    @settings(max_examples=40)
+    @given(st.integers(0, 2**32 - 1), st.sampled_from(["paper", "lrmate200ic_5l", "sliding"]))
+    def test_contain_every_observation(self, simulators, seed, name):
+        world, rng = simulators[name].world, np.random.default_rng(seed)
+        lower = rng.normal(size=3)
+        upper = lower + rng.random(3)
+        ranges = Ranges(goal_lower=lower, goal_upper=upper, reach=world.arm.reach)
+        low, high = observation_bounds(ranges, world.arm.n_axes)
+        q = rng.uniform(world.arm.lower, world.arm.upper, (50, world.arm.n_axes))
+        seen = world.observe(q, rng.uniform(lower, upper, (50, 3)))
+        assert (seen >= low).all()
+        assert (seen <= high).all()
+
+    def test_by_hand(self):
+        lower, upper = np.array([0.0, -1, 2]), np.array([1.0, 0, 3])
+        low, high = observation_bounds(Ranges(lower, upper, 0.5), 1)
+        np.testing.assert_array_equal(low[:6], [0, -1, 2, -0.5, -1.5, 1.5])
+        np.testing.assert_array_equal(high[:6], [1, 0, 3, 1.5, 0.5, 3.5])
+        np.testing.assert_allclose([low[6:10], high[6:10]], [[-1] * 4, [1] * 4], atol=2e-6)
+        np.testing.assert_array_equal([low[10:], high[10:]], [[-0.5] * 3, [0.5] * 3])

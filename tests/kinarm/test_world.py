@@ -1,0 +1,113 @@
+"""What can be asked about configurations, held against Pinocchio and Coal."""
+
+import numpy as np
+import pytest
+from configurations import contact_boundary, random_configurations
+
+from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.problem import ReachProblem
+from kinarm.scene import Obstacle, Scene
+from kinarm.world import World
+
+FALLING = np.deg2rad([0, 110, -60, 0, 0, 0])
+
+
+def test_of_a_name_a_problem_or_a_file(tmp_path):
+    problem = ReachProblem.load("left").replace(name="mine", arm="paper_flange")
+    problem.save(tmp_path / "mine.toml")
+    for given in ("left", problem, tmp_path / "mine.toml"):
+        world = World(given, threads=1)
+        assert world.problem == ReachProblem.load(given)
+        assert world.arm.name == world.problem.arm.name
+    with pytest.raises(UnknownNameError, match="problem 'up'; available: left, right, both"):
+        World("up")
+
+
+def test_screening_equals_pinocchio_and_coal(any_simulator):
+    world = any_simulator.world
+    q = random_configurations(any_simulator, 1, 1500)
+    q = np.concatenate([q, *contact_boundary(any_simulator, 2, 400)])
+    tools, touching = world.screen(q)
+    np.testing.assert_array_equal(touching, world.contact_model.in_contact(q))
+    assert 0.05 < touching.mean() < 0.95
+    for configuration, tool in zip(q[:200], tools, strict=False):
+        np.testing.assert_allclose(tool, world.arm.tool_position(configuration), atol=1e-12)
+
+
+def test_threads_do_not_matter(simulator):
+    q = random_configurations(simulator, 3, 3000)
+    alone, together = (World(simulator.problem, threads=n).screen(q) for n in (1, 3))
+    np.testing.assert_array_equal(alone[0], together[0])
+    np.testing.assert_array_equal(alone[1], together[1])
+
+
+class TestObserve:
+    @pytest.mark.parametrize(
+        ("configurations", "goals", "message"),
+        [
+            (np.zeros((2, 5)), np.zeros((2, 3)), r"configurations must have shape \(n, 6\)"),
+            (np.zeros((2, 6)), np.zeros((1, 3)), r"goals must have shape \(2, 3\)"),
+            (np.full((1, 6), np.nan), np.zeros((1, 3)), "configurations must be finite"),
+        ],
+    )
+    def test_bad_input(self, simulator, configurations, goals, message):
+        for ask in (simulator.world.observe, simulator.world.distances):
+            with pytest.raises(InvalidInputError, match=message):
+                ask(configurations, goals)
+
+    def test_touching_configurations_are_observed_like_others(self, simulator):
+        seen = simulator.world.observe(FALLING[None], np.ones((1, 3)))
+        np.testing.assert_allclose(seen[0, 3:6], 1 - simulator.arm.tool_position(FALLING))
+
+    def test_equals_the_beginning_of_an_episode(self, simulator):
+        starts, goals = simulator.sample(np.random.default_rng(4), 50)
+        episodes = simulator.reset(starts, goals)
+        np.testing.assert_array_equal(simulator.world.observe(starts, goals), episodes.observation)
+        np.testing.assert_array_equal(simulator.world.distances(starts, goals), episodes.distance)
+
+
+class TestContact:
+    def test_none_where_nothing_touches(self, simulator):
+        assert simulator.world.contact(np.zeros(6), np.full(6, 0.01)) is None
+        assert simulator.world.contact_pair(np.zeros(6), np.full(6, 0.01)) is None
+
+    def test_first_on_the_way_is_described(self, simulator):
+        world = simulator.world
+        contact = world.contact(np.zeros(6), FALLING)
+        tested = world.substeps(np.zeros((1, 6)), FALLING[None])[0]
+        touching = world.contact_model.in_contact(tested)
+        first = tested[touching.argmax()]
+        np.testing.assert_array_equal(contact.configuration, first)
+        assert contact.pair == world.contact_pair(np.zeros(6), FALLING)
+        assert contact.pair == world.contact_model.contact_pair(first)
+        assert contact.point.shape == (3,)
+
+    def test_ends_alone_do_not_tell(self, simulator):
+        """A post stands in the middle of the way."""
+        post = Obstacle(name="post", lower=(0.5, -0.01, 0), upper=(0.52, 0.01, 1))
+        problem = simulator.problem.replace(scene=Scene(obstacles=(post,)))
+        q, target = np.deg2rad([[-40, 0, 0, 0, 0, 0], [40, 0, 0, 0, 0, 0]])
+        found = {
+            n: World(problem.replace(tested_configurations=n), threads=1).contact_pair(q, target)
+            for n in (1, 2, 16)
+        }
+        assert found[1] is None
+        assert "post" in found[2]
+        assert "post" in found[16]
+
+
+class TestSubsteps:
+    def test_are_evenly_spaced_and_end_at_the_target(self, simulator):
+        q, target = np.array([[0.0, 1.0]]), np.array([[0.4, 0.2]])
+        tested = simulator.world.substeps(q, target)
+        np.testing.assert_allclose(tested[0], [[0.1, 0.8], [0.2, 0.6], [0.3, 0.4], [0.4, 0.2]])
+        np.testing.assert_array_equal(tested[:, 3], target)
+
+    @pytest.mark.parametrize("n", [1, 2, 5, 32])
+    def test_as_many_as_the_problem_says(self, simulator, n):
+        world = World(simulator.problem.replace(tested_configurations=n))
+        q, target = random_configurations(simulator, 5, 14).reshape(2, 7, 6)
+        tested = world.substeps(q, target)
+        expected = np.linspace(q, target, n + 1, axis=1)[:, 1:]
+        np.testing.assert_allclose(tested, expected, rtol=0, atol=1e-14)
+        np.testing.assert_array_equal(tested[:, -1], target)
