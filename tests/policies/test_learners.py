@@ -15,6 +15,7 @@ from kinarm.policies import (
     Normalizer,
     Policy,
     Provenance,
+    TrainingConfig,
     TrainingState,
     find_learner,
     learner_names,
@@ -26,17 +27,18 @@ from kinarm.policies import (
     state_policy,
     train_policy,
 )
-from kinarm.simulator import Simulator
 
 
 @dataclass(frozen=True, kw_only=True)
-class ToyConfig:
-    """Settings of a random search that keeps the best matrix of all that it tried."""
+class ToyConfig(TrainingConfig):
+    """Settings of a random search that keeps the best matrix of all that it tried.
 
-    task: str = "right"
-    arm: str = "paper"
-    seed: int = 0
-    recipe: str = "custom"
+    Parameters
+    ----------
+    noise : float
+        Standard deviation of the steps.
+    """
+
     iterations: int = 5
     noise: float = 0.1
 
@@ -53,7 +55,7 @@ class ToyTraining:
     """Tries one matrix per iteration, on the same scenarios."""
 
     def __init__(self, config: ToyConfig) -> None:
-        self.config, self.simulator = config, Simulator(config.arm, config.task, threads=1)
+        self.config, self.simulator = config, config.simulator(threads=1)
         self.scenarios = self.simulator.sample(np.random.default_rng(config.seed), 20)
 
     def initial_state(self) -> ToyState:
@@ -78,13 +80,12 @@ class ToyTraining:
 
 
 def policy_of(config: ToyConfig, state: ToyState) -> Policy:
-    arm = Simulator(config.arm, config.task, threads=1).arm
     seen = Normalizer.empty(state.theta.shape[1])
     return Policy(
         mean=seen.mean,
         std=seen.std,
         layers=(Layer(state.theta, np.zeros(len(state.theta))),),
-        provenance=Provenance.of("toy", config, arm, state.environment_steps),
+        provenance=Provenance.of("toy", config, state.environment_steps),
     )
 
 
@@ -132,7 +133,7 @@ def test_settings_of_nobody():
 
 def test_a_learner_of_ones_own_trains(toy):
     states = []
-    result = train_policy(recipe("toy", task="left", seed=4), on_iteration=states.append)
+    result = train_policy(recipe("toy", problem="left", seed=4), on_iteration=states.append)
     assert [state.iteration for state in states] == [1, 2, 3, 4, 5]
     assert result.policy.provenance.algorithm == "toy"
     assert result.state is states[-1]
