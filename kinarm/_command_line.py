@@ -113,7 +113,8 @@ def _add_option(
     if get_origin(hint) is tuple:
         hint = get_args(hint)[0]
         options |= {"action": "append"} if item.metadata.get("repeat") else {"nargs": "+"}
-    options["metavar"] = item.metadata.get("metavar") or METAVARS.get(hint, "NAME")
+    usual = METAVARS.get(hint, "NAME") if flag.startswith("--") else flag
+    options["metavar"] = item.metadata.get("metavar", usual)
     if get_origin(hint) is Literal:
         options["choices"] = get_args(hint)
         del options["metavar"]
@@ -137,6 +138,8 @@ def _parser_of(hint: Any) -> Callable[[str], Any]:
     """Argument type: refuses texts that are not of a type."""
 
     def parse(text: str) -> Any:
+        if text is argparse.SUPPRESS:  # a positional argument that is not given
+            return text
         try:
             value = hint(text) if hint in (int, float) else text
         except ValueError:
