@@ -121,7 +121,7 @@ def _table(document: dict[str, Any]) -> Any:
         table.add_row(*row)
     oracle = document["oracle"]
     table.add_row(
-        f"oracle, {oracle['trials']} trials of a task",
+        f"oracle, {oracle['trials']} trials",
         *(f"{oracle['trials'] / oracle['trials_per_second'][name]:.1f} s" for name in RATES),
     )
     evaluation = document["evaluation"]
