@@ -57,7 +57,7 @@ def test_learners_have_help_of_their_own(run, learner):
         ),
         (
             "kinarm-replay",
-            "--policy --compare --problem --task --trial --worst --collisions --trials --seed --arm "
+            "--policy --compare --problem --task --arm --trial --worst --collisions --trials --seed "
             "--allow-other-arm --no-oracle --out --record --overwrite --live --port --no-browser",
         ),
         ("kinarm-bench", "--repetitions --policy --ppo --json"),
