@@ -12,6 +12,7 @@ from kinarm.collision import enclosing_capsule
 from kinarm.evaluation import METRICS
 from kinarm.evaluation.reproduction.tables import markdown
 from kinarm.policies import find_learner
+from kinarm.task import RewardWeights
 
 
 def numbers(values: np.ndarray) -> str:
@@ -70,11 +71,20 @@ def arms_table() -> str:
     return markdown([*header, "speeds [deg/s]"], rows)
 
 
+def setting_text(value: object) -> str:
+    """A setting as a table shows it; of reward weights those that are not the default."""
+    if not isinstance(value, RewardWeights):
+        return "the task's" if value is None else f"{value}"
+    default = RewardWeights()
+    weights = {item.name: getattr(value, item.name) for item in fields(value)}
+    return ", ".join(f"{n} {w:g}" for n, w in weights.items() if w != getattr(default, n))
+
+
 def recipe_table(recipes: dict[str, object]) -> str:
     """Settings of a learner's recipes."""
-    skipped = ("task", "arm", "seed", "recipe")
+    skipped = ("problem", "seed", "recipe")
     rows = [
-        [f"`{item.name}`", *(f"{getattr(c, item.name)}" for c in recipes.values())]
+        [f"`{item.name}`", *(setting_text(getattr(c, item.name)) for c in recipes.values())]
         for item in fields(next(iter(recipes.values())))
         if item.name not in skipped
     ]

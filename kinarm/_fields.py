@@ -8,6 +8,7 @@ import json
 import re
 import types
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import cache
 from pathlib import Path
@@ -106,12 +107,37 @@ def from_plain(kind: type[T], entries: object, where: str, path: str = "") -> T:
         raise InvalidInputError(f"{where}: {path and path[:-1] + ': '}{error}") from error
 
 
+def check_fields(given: Any) -> None:
+    """Make the fields of a frozen dataclass what its annotations say, or refuse them.
+
+    To be called first in ``__post_init__``: lists and arrays become tuples, and numbers become
+    Python's, whole where whole ones are asked for.
+
+    Raises
+    ------
+    InvalidInputError
+        If a value has the wrong type; names the field and what is expected.
+    """
+    kind = type(given)
+    hints = type_hints(kind)
+    for name in init_fields(kind):
+        value = _value(hints[name], getattr(given, name), "", name, kind)
+        object.__setattr__(given, name, value)
+
+
 def _value(hint: Any, entry: Any, where: str, path: str, kind: type) -> Any:
-    """Convert a plain value to what a type hint asks for."""
+    """Convert a value to what a type hint asks for."""
     choices = alternatives(hint)
+    if isinstance(entry, np.ndarray | np.generic):
+        entry = entry.tolist()
+    if entry is None and choices != (hint,):
+        return None
     for choice in choices:
-        if is_dataclass(choice) and isinstance(choice, type) and isinstance(entry, Mapping):
-            return from_plain(choice, entry, where, f"{path}.")
+        if is_dataclass(choice) and isinstance(choice, type):
+            if isinstance(entry, choice):
+                return entry
+            if isinstance(entry, Mapping):
+                return from_plain(choice, entry, where, f"{path}.")
     hint = choices[0]
     origin, arguments = get_origin(hint), get_args(hint)
     if origin is tuple and isinstance(entry, list | tuple):
@@ -127,10 +153,10 @@ def _value(hint: Any, entry: Any, where: str, path: str, kind: type) -> Any:
         if entry in arguments:
             return entry
     elif is_scalar(hint, entry):
-        return hint(entry)
-    raise InvalidInputError(
-        f"{where}: {path} must be {expected(hint)}{_unit(kind, path)}, got {entry!r}"
-    )
+        with suppress(OverflowError):
+            return float(entry) + 0.0 if hint is float else hint(entry)  # without negative zeros
+    wanted = f"{path} must be {expected(hint)}{_unit(kind, path)}, got {entry!r}"
+    raise InvalidInputError(f"{where}: {wanted}" if where else wanted)
 
 
 def is_scalar(hint: Any, entry: object) -> bool:

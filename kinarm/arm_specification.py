@@ -4,6 +4,8 @@ from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 
+from kinarm._fields import check_fields
+
 
 def arm_names() -> tuple[str, ...]:
     """Names of the arms that ship with kinarm."""
@@ -42,11 +44,15 @@ class ArmSpecification:
     velocity_limits: tuple[float, ...] | None = None
     digest: str | None = None
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+
     def resolved(self, folder: Path) -> "ArmSpecification":
         """The same arm with absolute paths; relative ones start at a folder."""
-        source = self.source
-        if source not in arm_names() and (folder / source).is_file():
-            source = str((folder / source).resolve())
+        source, path = self.source, folder / self.source
+        is_path = Path(source).suffix == ".urdf" or Path(source).parent != Path()
+        if source not in arm_names() and (is_path or path.is_file()):
+            source = str(path.resolve())
         folders = tuple(str((folder / each).resolve()) for each in self.package_dirs)
         return replace(self, source=source, package_dirs=folders)
 

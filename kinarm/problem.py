@@ -14,7 +14,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from kinarm._fields import from_plain, init_fields, to_plain, to_toml
+from kinarm._fields import check_fields, from_plain, init_fields, to_plain, to_toml
 from kinarm._files import first_line, write_text
 from kinarm._validation import whole_number
 from kinarm.arm_specification import ArmSpecification
@@ -50,6 +50,7 @@ class Stepping:
     tested_configurations: int = 4
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if not (math.isfinite(self.time_step) and self.time_step > 0):
             raise ProblemError(f"time_step must be finite and above 0 s, got {self.time_step}")
         whole_number("tested_configurations", self.tested_configurations, 1)
@@ -89,6 +90,7 @@ class ReachProblem:
     stepping: Stepping = field(default_factory=Stepping)
 
     def __post_init__(self) -> None:
+        check_fields(self)
         available = [region.name for region in self.scene.goal_regions]
         for name in self.task.goal_regions:
             if name not in available:
@@ -143,20 +145,21 @@ class ReachProblem:
             If a value cannot be used.
         """
         given = {name: value for name, value in overrides.items() if value is not None}
-        changes: dict[str, Any] = {}
+        changes = _taken(given, ReachProblem)
         for name, convert in PARTS.items():
-            if name in given:
-                changes[name] = convert(given.pop(name))
+            if name in changes:
+                changes[name] = convert(changes[name])
         task, stepping = changes.get("task", self.task), changes.get("stepping", self.stepping)
         if isinstance(given.get("reward"), Mapping):
             weights = dict(given["reward"])
             _check_names("reward term", weights, RewardWeights)
             given["reward"] = replace(task.reward, **weights)
-        of_task = {name: given.pop(name) for name in init_fields(ReachTask) if name in given}
-        of_stepping = {name: given.pop(name) for name in init_fields(Stepping) if name in given}
+        of_task, of_stepping = _taken(given, ReachTask), _taken(given, Stepping)
         _check_names("setting of a problem", given, ReachProblem, ReachTask, Stepping)
-        changes["task"] = replace(task, **of_task)
-        changes["stepping"] = replace(stepping, **of_stepping)
+        if of_task:
+            changes["task"] = replace(task, **of_task)
+        if of_stepping:
+            changes["stepping"] = replace(stepping, **of_stepping)
         return replace(self, **changes)
 
     @cached_property
@@ -174,8 +177,7 @@ class ReachProblem:
     @cached_property
     def digest(self) -> str:
         """Hash of everything that behaviour depends on; the name is not part of it."""
-        # Built anew, so that 1 and 1.0 are the same.
-        entries = {**self.from_json(self.to_json()).to_json(), "arm": self.arm_digest}
+        entries = {**self.to_json(), "arm": self.arm_digest}
         del entries["name"]
         text = json.dumps(entries, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -270,13 +272,16 @@ def _specification(arm: "Arm | ArmSpecification | str | Path") -> ArmSpecificati
 
 
 PARTS: dict[str, Callable[[Any], Any]] = {
-    "name": str,
     "arm": _specification,
     "scene": lambda scene: scene if isinstance(scene, Scene) else ReachProblem.load(scene).scene,
     "task": lambda task: task if isinstance(task, ReachTask) else ReachProblem.load(task).task,
-    "stepping": lambda stepping: stepping,
 }
-"""How `ReachProblem.replace` understands what it is given for a part."""
+"""How `ReachProblem.replace` understands what it is given for some parts."""
+
+
+def _taken(given: dict[str, Any], kind: type) -> dict[str, Any]:
+    """Fields of a dataclass among what is given, which loses them."""
+    return {name: given.pop(name) for name in init_fields(kind) if name in given}
 
 
 def _check_names(what: str, given: Mapping[str, Any], *kinds: type) -> None:
@@ -297,7 +302,7 @@ def _read_problem(path: Path) -> ReachProblem:
     except (ValueError, RecursionError) as error:
         raise InvalidInputError(f"{name}: not a problem file: {first_line(error)}") from error
     base = entries.pop("base", "right")
-    if base not in PROBLEMS:
+    if not isinstance(base, str) or base not in PROBLEMS:
         raise InvalidInputError(f"{name}: base must be one of {', '.join(PROBLEMS)}, got {base!r}")
     given = {"name": path.stem, **entries}
     problem = from_plain(ReachProblem, _merged(to_plain(PROBLEMS[base]), given), name)

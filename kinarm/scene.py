@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm._fields import check_fields
 from kinarm.errors import ProblemError, UnknownNameError
 
 Point = tuple[float, float, float]
@@ -43,6 +44,7 @@ class Obstacle:
     upper: Point
 
     def __post_init__(self) -> None:
+        check_fields(self)
         _check_box(f"obstacle {self.name!r}", self.lower, self.upper, flat=False)
 
     @property
@@ -80,6 +82,7 @@ class GoalRegion:
     upper: Point
 
     def __post_init__(self) -> None:
+        check_fields(self)
         _check_box(f"goal region {self.name!r}", self.lower, self.upper, flat=True)
 
 
@@ -127,6 +130,7 @@ class Scene:
     goal_regions: tuple[GoalRegion, ...] = PAPER_GOALS
 
     def __post_init__(self) -> None:
+        check_fields(self)
         for what, members in (("obstacle", self.obstacles), ("goal region", self.goal_regions)):
             names = [member.name for member in members]
             for name in names:

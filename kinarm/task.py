@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm._fields import check_fields
 from kinarm._validation import whole_number
 from kinarm.errors import ProblemError
 from kinarm.scene import Scene
@@ -44,10 +45,11 @@ class RewardWeights:
     allow_perverse: bool = False
 
     def __post_init__(self) -> None:
+        check_fields(self)
         for name in REWARD_TERMS:
             value = getattr(self, name)
-            if not isinstance(value, int | float | np.number) or not math.isfinite(value):
-                raise ProblemError(f"reward weight {name} must be finite, got {value!r}")
+            if not math.isfinite(value):
+                raise ProblemError(f"reward weight {name} must be finite, got {value}")
         for name, sign, deed in (
             ("collision", -1, "rewards contact"),
             ("success", 1, "punishes it"),
@@ -103,6 +105,7 @@ class ReachTask:
     reward: RewardWeights = field(default_factory=RewardWeights)
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if not self.goal_regions:
             raise ProblemError("a task needs at least one goal region")
         if len(set(self.goal_regions)) < len(self.goal_regions):

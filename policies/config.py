@@ -1,11 +1,12 @@
 """Settings that every learner has, and checks that settings share."""
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from numbers import Real
 from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 
-from kinarm._fields import type_hints
+from kinarm._fields import alternatives, init_fields, type_hints
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
 from kinarm.problem import PROBLEMS, ReachProblem
@@ -21,6 +22,45 @@ Schedule = Literal["constant", "linear"]
 def scheduled(value: float, schedule: Schedule, done: float) -> float:
     """Value of a setting after this share of the training."""
     return value if schedule == "constant" else value * (1 - done)
+
+
+POSITIVE = {"must": "be greater than 0", "holds": lambda value: value > 0}
+NOT_NEGATIVE = {"must": "not be negative", "holds": lambda value: value >= 0}
+SHARE = {"must": "lie in [0, 1]", "holds": lambda value: 0 <= value <= 1}
+"""What a number must be: metadata of a field."""
+
+
+def checked(name: str, value: Any, hint: Any, demands: Mapping[str, Any]) -> Any:
+    """Return a setting, in Python's own type, or refuse it.
+
+    Parameters
+    ----------
+    name : str
+        Name of the setting.
+    value : object
+        Its value.
+    hint : type
+        Type that it must have; numbers, choices and tuples of whole numbers are checked.
+    demands : mapping
+        What a number must be, such as `POSITIVE`; for whole numbers ``at_least``, by default 1.
+
+    Raises
+    ------
+    InvalidInputError
+        If the value has another type or is out of range.
+    """
+    if hint is int:
+        return whole_number(name, value, demands.get("at_least", 1))
+    if hint == tuple[int, ...]:
+        return tuple(whole_number(name, each, 1) for each in value)
+    if get_origin(hint) is Literal and value not in get_args(hint):
+        raise InvalidInputError(f"{name} must be one of {', '.join(get_args(hint))}, got {value!r}")
+    if hint is not float:
+        return value
+    finite = isinstance(value, Real) and math.isfinite(value)
+    if not (finite and ("holds" not in demands or demands["holds"](value))):
+        raise InvalidInputError(f"{name} must {demands.get('must', 'be finite')}, got {value}")
+    return float(value)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,37 +83,17 @@ class TrainingConfig:
 
     problem: ReachProblem = PROBLEMS["right"]
     reward: RewardWeights | None = None
-    seed: int = 0
+    seed: int = field(default=0, metadata={"at_least": 0})
     recipe: str = "custom"
     iterations: int = 1
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "problem", ReachProblem.load(self.problem))
-        self._check_whole_numbers(("seed",), at_least=0)
-        self._check_whole_numbers(("iterations",))
-        for name, hint in type_hints(type(self)).items():
-            if get_origin(hint) is Literal and getattr(self, name) not in get_args(hint):
-                choices = ", ".join(get_args(hint))
-                raise InvalidInputError(
-                    f"{name} must be one of {choices}, got {getattr(self, name)!r}"
-                )
-
-    def _check_whole_numbers(self, names: Iterable[str], at_least: int = 1) -> None:
-        """Refuse what is no whole number, and make Python's integers of NumPy's."""
-        for name in names:
-            number = whole_number(name, getattr(self, name), at_least)
-            object.__setattr__(self, name, number)
-
-    def _check_above_zero(self, names: Iterable[str]) -> None:
-        for name in names:
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise InvalidInputError(f"{name} must be greater than 0, got {value}")
-
-    def _check_shares(self, names: Iterable[str]) -> None:
-        for name in names:
-            if not 0 <= getattr(self, name) <= 1:
-                raise InvalidInputError(f"{name} must lie in [0, 1], got {getattr(self, name)}")
+        hints = type_hints(type(self))
+        for name, item in init_fields(type(self)).items():
+            hint, value = alternatives(hints[name])[0], getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, checked(name, value, hint, item.metadata))
 
     @property
     def training_problem(self) -> ReachProblem:
@@ -90,7 +110,6 @@ class TrainingConfig:
         """Replace fields; a mapping for the reward replaces the weights that it names."""
         given = dict(changes)
         if isinstance(given.get("reward"), Mapping):
-            problem = ReachProblem.load(given.get("problem", self.problem))
-            weights = self.reward or problem.task.reward
-            given["reward"] = replace(weights, **given["reward"])
+            problem = self.training_problem.replace(reward=given["reward"])
+            given["reward"] = problem.task.reward
         return replace(self, **given)

@@ -54,7 +54,9 @@ def recipe(learner: str, name_or_file: str | Path = "paper", **changes: Any) -> 
     else:
         standard = _named_recipe(found, str(name_or_file), circumstances)
     made = standard.changed(given)
-    return made if made == standard else replace(made, **{"recipe": f"{made.recipe}*", **given})
+    if made == standard:
+        return made
+    return replace(made, recipe=given.get("recipe", f"{standard.recipe}*"))
 
 
 def _named_recipe(learner: Learner[Any, Any], name: str, circumstances: Mapping[str, Any]) -> Any:

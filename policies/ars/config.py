@@ -1,10 +1,10 @@
 """Settings of Augmented Random Search."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from kinarm.errors import InvalidInputError
-from kinarm.policies.config import Schedule, TrainingConfig, scheduled
+from kinarm.policies.config import POSITIVE, Schedule, TrainingConfig, scheduled
 
 Sharing = Literal["none", "pair", "iteration"]
 
@@ -42,9 +42,9 @@ class ARSConfig(TrainingConfig):
     """
 
     iterations: int = 800
-    step_size: float = 0.02
+    step_size: float = field(default=0.02, metadata=POSITIVE)
     step_size_schedule: Schedule = "constant"
-    noise: float = 0.03
+    noise: float = field(default=0.03, metadata=POSITIVE)
     directions: int = 24
     top_directions: int = 12
     symmetric: bool = False
@@ -55,8 +55,6 @@ class ARSConfig(TrainingConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._check_whole_numbers(("directions", "top_directions", "episodes"))
-        self._check_above_zero(("step_size", "noise"))
         if self.top_directions > self.directions:
             raise InvalidInputError(
                 f"top_directions must be at most directions ({self.directions}), "

@@ -1,11 +1,16 @@
 """Settings of Proximal Policy Optimization."""
 
-import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
-from kinarm.policies.config import Schedule, TrainingConfig, scheduled
+from kinarm.policies.config import (
+    NOT_NEGATIVE,
+    POSITIVE,
+    SHARE,
+    Schedule,
+    TrainingConfig,
+    scheduled,
+)
 from kinarm.problem import ReachProblem
 
 
@@ -69,37 +74,24 @@ class PPOConfig(TrainingConfig):
     batch_size: int = 500
     n_epochs: int = 10
     net_arch: tuple[int, ...] = (64, 64)
-    learning_rate: float = 3e-4
+    learning_rate: float = field(default=3e-4, metadata=POSITIVE)
     learning_rate_schedule: Schedule = "constant"
-    gamma: float = 0.99
-    gae_lambda: float = 0.95
-    clip_range: float = 0.2
-    ent_coef: float = 0.0
-    vf_coef: float = 0.5
-    max_grad_norm: float = 0.5
+    gamma: float = field(default=0.99, metadata=SHARE)
+    gae_lambda: float = field(default=0.95, metadata=SHARE)
+    clip_range: float = field(default=0.2, metadata=POSITIVE)
+    ent_coef: float = field(default=0.0, metadata=NOT_NEGATIVE)
+    vf_coef: float = field(default=0.5, metadata=NOT_NEGATIVE)
+    max_grad_norm: float = field(default=0.5, metadata=POSITIVE)
     log_std_init: float = 0.0
-    training_tolerance: float | None = None
+    training_tolerance: float | None = field(default=None, metadata=POSITIVE)
     symmetric: bool = False
-    initial_start_spread: float = 1.0
-    widening: float = 0.0
+    initial_start_spread: float = field(default=1.0, metadata=SHARE)
+    widening: float = field(default=0.0, metadata=SHARE)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._check_whole_numbers(("n_envs", "n_steps", "batch_size", "n_epochs"))
         if not self.net_arch:
             raise InvalidInputError("net_arch must name at least one layer")
-        widths = tuple(whole_number("net_arch", width, 1) for width in self.net_arch)
-        object.__setattr__(self, "net_arch", widths)
-        self._check_above_zero(("learning_rate", "clip_range", "max_grad_norm"))
-        if self.training_tolerance is not None:
-            self._check_above_zero(("training_tolerance",))
-        self._check_shares(("gamma", "gae_lambda", "initial_start_spread", "widening"))
-        for name in ("ent_coef", "vf_coef"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0):
-                raise InvalidInputError(f"{name} must not be negative, got {value}")
-        if not math.isfinite(self.log_std_init):
-            raise InvalidInputError(f"log_std_init must be finite, got {self.log_std_init}")
         if self.batch_size == 1 or self.steps_per_iteration % self.batch_size:
             raise InvalidInputError(
                 f"batch_size must be above 1 and divide the {self.steps_per_iteration} steps of a "

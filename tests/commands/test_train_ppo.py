@@ -20,12 +20,13 @@ from kinarm.policies import (
     save_checkpoint,
     train_policy,
 )
+from kinarm.problem import PROBLEMS
 
 ROOT = Path(__file__).resolve().parents[2]
-TINY = {"arms": 4, "rollout_steps": 16, "minibatch": 32, "epochs": 2, "hidden": (8, 8)}
+TINY = {"n_envs": 4, "n_steps": 16, "batch_size": 32, "n_epochs": 2, "net_arch": (8, 8)}
 TINY_OPTIONS = (
-    *("--arms", 4, "--rollout-steps", 16, "--minibatch", 32, "--epochs", 2),
-    *("--hidden", 8, 8),
+    *("--n-envs", 4, "--n-steps", 16, "--batch-size", 32, "--n-epochs", 2),
+    *("--net-arch", 8, 8),
 )
 TRAIN_WITH_FREQUENT_CHECKPOINTS = """
 import signal, sys
@@ -59,7 +60,7 @@ def test_policy_and_curve_are_those_of_the_library(run, tmp_path):
     assert len(answer.out.splitlines()) == 1
     assert str(out) in answer.out
     assert sorted(path.name for path in tmp_path.iterdir()) == ["p.curve.csv", "p.npz"]
-    expected = train_policy(recipe("ppo", "paper", task="both", seed=3, iterations=4, **TINY))
+    expected = train_policy(recipe("ppo", "paper", problem="both", seed=3, iterations=4, **TINY))
     check_equal(Policy.load(out), expected.policy)
     with (tmp_path / "p.curve.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
@@ -69,32 +70,29 @@ def test_policy_and_curve_are_those_of_the_library(run, tmp_path):
 
 def test_every_setting_reaches_the_training(run, tmp_path):
     settings = {
-        "task": "both",
-        "arm": "paper_flange",
         "seed": 7,
         "iterations": 2,
-        "arms": 6,
-        "rollout_steps": 10,
-        "minibatch": 30,
-        "epochs": 3,
+        "n_envs": 6,
+        "n_steps": 10,
+        "batch_size": 30,
+        "n_epochs": 3,
         "learning_rate": 0.002,
         "gamma": 0.9,
-        "entropy_weight": 0.01,
-        "tolerance": 0.04,
-        "success_bonus": 0.25,
-        "collision_penalty": -2.0,
-        "step_reward": -0.01,
-        "start_spread": 0.5,
+        "ent_coef": 0.01,
+        "training_tolerance": 0.04,
         "learning_rate_schedule": "constant",
     }
     options = [word for k, v in settings.items() for word in (f"--{k.replace('_', '-')}", v)]
     out = tmp_path / "p.npz"
-    arguments = ("--recipe", "tuned", "--hidden", 7, 6, "--no-symmetric", *options)
+    arguments = ("--recipe", "tuned", "--net-arch", 7, 6, "--no-symmetric", *options)
+    arguments += ("--task", "both", "--arm", "paper_flange", "--reward-step", -0.01)
     assert run("kinarm-train", "ppo", *arguments, "--out", out).status == 0
     made = Policy.load(out).provenance
     assert {name: made.config[name] for name in settings} == settings
-    assert (made.config["hidden"], made.config["symmetric"]) == ([7, 6], False)
-    assert (made.algorithm, made.recipe, made.task) == ("ppo", "tuned*", "both")
+    assert (made.config["net_arch"], made.config["symmetric"]) == ([7, 6], False)
+    assert (made.algorithm, made.recipe) == ("ppo", "tuned*")
+    assert made.problem == PROBLEMS["both"].replace(arm="paper_flange").pinned
+    assert (made.config["reward"]["step"], made.config["reward"]["success"]) == (-0.01, 5.0)
     assert (made.seed, made.environment_steps) == (7, 120)
 
 
@@ -103,7 +101,7 @@ def test_a_trained_policy_can_be_evaluated(run, tmp_path):
     arguments = ("--recipe", "tuned", "--task", "both", "--iterations", 2, *TINY_OPTIONS)
     assert run("kinarm-train", "ppo", *arguments, "--out", out).status == 0
     evaluation = evaluate(out, trials=3)
-    assert (evaluation.task, len(evaluation.rollouts)) == ("both", 3)
+    assert (evaluation.problem.name, len(evaluation.rollouts)) == ("both", 3)
     assert evaluation.entrant.algorithm == "ppo"
 
 
@@ -119,7 +117,7 @@ def test_resumed_is_uninterrupted(run, tmp_path, name):
 
 
 @pytest.mark.parametrize(
-    "change", [("--task", "left"), ("--gamma", 0.5), ("--hidden", 9, 9), ("--recipe", "tuned")]
+    "change", [("--task", "left"), ("--gamma", 0.5), ("--net-arch", 9, 9), ("--recipe", "tuned")]
 )
 def test_other_settings_are_refused_when_resuming(run, tmp_path, change):
     checkpoint = tmp_path / "p.checkpoint.npz"
@@ -127,7 +125,7 @@ def test_other_settings_are_refused_when_resuming(run, tmp_path, change):
     before = checkpoint.read_bytes()
     answer = run("kinarm-train", "ppo", "--out", tmp_path / "p.npz", "--resume", *change)
     assert (answer.status, answer.out, len(answer.err.splitlines())) == (2, "", 1)
-    assert change[0].strip("-") in answer.err
+    assert {"--task": "goal_regions"}.get(change[0], change[0][2:].replace("-", "_")) in answer.err
     assert checkpoint.read_bytes() == before
 
 

@@ -6,6 +6,7 @@ from importlib.util import find_spec
 
 import pytest
 from digests import (
+    RAISE,
     RECORDED,
     ars_digests,
     changed,
@@ -18,13 +19,11 @@ from digests import (
     trial_digests,
 )
 
+from kinarm.policies.oracle import ORACLE_SEMANTICS
 from kinarm.semantics import SEMANTICS
 
 RECORD = json.loads(RECORDED.read_text())
-ANEW = (
-    "results changed: if that is meant, raise SEMANTICS in kinarm/semantics.py "
-    "and run python tests/golden/digests.py --record"
-)
+ANEW = f"results changed: {RAISE}, and run python tests/golden/digests.py --record"
 
 
 @pytest.mark.parametrize("found", [trial_digests, rollout_digests, ars_digests, oracle_digests])
@@ -41,14 +40,21 @@ def test_ppo_is_as_recorded_where_it_was_recorded() -> None:
 
 
 def test_they_were_recorded_under_this_version() -> None:
-    assert RECORD["semantics"] == SEMANTICS, "run python tests/golden/digests.py --record"
+    versions = (RECORD["semantics"], RECORD["oracle_semantics"])
+    expected = (SEMANTICS, ORACLE_SEMANTICS)
+    assert versions == expected, "run python tests/golden/digests.py --record"
 
 
 def test_they_were_not_edited_by_hand() -> None:
     assert RECORD["seal"] == seal(RECORD), "run python tests/golden/digests.py --record"
 
 
-OLD = {"semantics": SEMANTICS, "machine": "here", "digests": {"trials": "a", "ppo x": "b"}}
+OLD = {
+    "semantics": SEMANTICS,
+    "oracle_semantics": ORACLE_SEMANTICS,
+    "machine": "here",
+    "digests": {"trials": "a", "ppo x": "b"},
+}
 
 
 class TestRecordingAnew:
@@ -59,6 +65,15 @@ class TestRecordingAnew:
         made = renewed({**OLD, "semantics": "0"}, digests, "here")
         assert made["digests"] == digests
         assert made["seal"] == seal(made)
+
+    def test_other_bounds_need_another_version_of_the_oracle_alone(self) -> None:
+        old = {**OLD, "digests": {**OLD["digests"], "oracle x": "c"}}
+        digests = {**OLD["digests"], "oracle x": "d"}
+        with pytest.raises(SystemExit, match="oracle x"):
+            renewed(old, digests, "here")
+        assert renewed({**old, "oracle_semantics": "0"}, digests, "here")["digests"] == digests
+        with pytest.raises(SystemExit, match="trials"):
+            renewed({**old, "oracle_semantics": "0"}, {**digests, "trials": "z"}, "here")
 
     def test_further_digests_do_not(self) -> None:
         digests = {**OLD["digests"], "oracle": "c"}

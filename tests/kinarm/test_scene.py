@@ -1,91 +1,134 @@
-"""Benches, scenes and goal regions."""
+"""Obstacles, goal regions and scenes."""
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
 
-from kinarm.errors import ProblemError, UnknownNameError
-from kinarm.scene import Bench, Scene
+from kinarm.errors import InvalidInputError, ProblemError, UnknownNameError
+from kinarm.scene import GoalRegion, Obstacle, Scene
 
 
-def bench(**changes):
-    return Bench(**{"name": "table", "x": (0.0, 1.0), "y": (-1.0, 0.5), "height": 0.4, **changes})
+def obstacle(**changes):
+    return Obstacle(**{"name": "table", "lower": (0, -1, 0), "upper": (1, 0.5, 0.4), **changes})
 
 
-def test_default_scene_is_the_papers():
-    scene = Scene()
-    assert scene.ground
-    assert scene.cube_edge == 0.05
-    right, left = scene.bench("right"), scene.bench("left")
-    np.testing.assert_array_equal(right.lower, [-0.5, -0.75, 0])
-    np.testing.assert_array_equal(right.upper, [0.5, -0.55, 0.3])
-    np.testing.assert_array_equal(left.lower, [-0.5, 0.55, 0])
-    np.testing.assert_array_equal(left.upper, [0.5, 0.75, 0.3])
+def region(**changes):
+    return GoalRegion(**{"name": "top", "lower": (0, -1, 0.4), "upper": (1, 0.5, 0.4), **changes})
 
 
-def test_benches_are_mirror_images():
-    right, left = Scene().bench("right"), Scene().bench("left")
-    assert right.x == left.x
-    assert right.y == (-left.y[1], -left.y[0])
+class TestPapersScene:
+    def test_ground_and_two_benches(self):
+        scene = Scene()
+        assert scene.ground
+        assert scene.cube_edge == 0.05
+        right, left = scene.obstacles
+        assert (right.name, left.name) == ("right bench", "left bench")
+        assert (right.lower, right.upper) == ((-0.5, -0.75, 0), (0.5, -0.55, 0.3))
+        assert (left.lower, left.upper) == ((-0.5, 0.55, 0), (0.5, 0.75, 0.3))
+
+    def test_goals_are_centres_of_cubes_on_the_benches(self):
+        scene = Scene()
+        for bench in scene.obstacles:
+            goals = scene.goal_region(bench.name.removesuffix(" bench"))
+            height = bench.upper[2] + scene.cube_edge / 2
+            assert goals.lower == (*bench.lower[:2], pytest.approx(height))
+            assert goals.upper == (*bench.upper[:2], pytest.approx(height))
+
+    def test_sides_are_mirror_images(self):
+        for right, left in (Scene().obstacles, Scene().goal_regions):
+            assert (right.name[:5], left.name[:4]) == ("right", "left")
+            assert (left.lower[0], left.lower[2]) == (right.lower[0], right.lower[2])
+            assert (left.lower[1], left.upper[1]) == (-right.upper[1], -right.lower[1])
 
 
-def test_cube_centre_lies_half_an_edge_above_the_bench():
-    lower, upper = Scene().goal_region("left")
-    np.testing.assert_allclose(lower, [-0.5, 0.55, 0.325])
-    np.testing.assert_allclose(upper, [0.5, 0.75, 0.325])
-    high, _ = Scene(benches=(bench(),), cube_edge=0.2).goal_region("table")
-    np.testing.assert_allclose(high, [0, -1, 0.5])
+def test_size_and_centre():
+    np.testing.assert_allclose(obstacle().size, [1, 1.5, 0.4])
+    np.testing.assert_allclose(obstacle().centre, [0.5, -0.25, 0.2])
 
 
-def test_unknown_bench_lists_the_benches():
-    with pytest.raises(UnknownNameError, match="bench 'middle'; available: right, left"):
-        Scene().bench("middle")
-    with pytest.raises(UnknownNameError, match="bench 'middle'"):
+def test_unknown_goal_region_lists_those_that_are():
+    with pytest.raises(UnknownNameError, match="goal region 'middle'; available: right, left"):
         Scene().goal_region("middle")
 
 
 @pytest.mark.parametrize(
-    "changes",
+    "upper", [(0, 0.5, 0.4), (1, -1, 0.4), (1, 0.5, 0), (-1, 0.5, 0.4), (1, -2, 0.4)]
+)
+def test_empty_obstacle_is_refused(upper):
+    with pytest.raises(ProblemError, match="obstacle 'table' is empty.*expected lower < upper"):
+        obstacle(upper=upper)
+
+
+@pytest.mark.parametrize("upper", [(1, -1, 0.4), (0, -1, 0.4), (0, -1, 0.9), (1, -2, 0.4)])
+def test_goal_region_without_area_is_refused(upper):
+    with pytest.raises(ProblemError, match="goal region 'top' is empty.*along two axes at least"):
+        region(upper=upper)
+
+
+def test_goal_region_may_be_flat_or_thick():
+    assert region().upper[2] == 0.4
+    assert region(upper=(1, 0.5, 0.9)).upper[2] == 0.9
+    assert region(lower=(0, -1, 0), upper=(0, 1, 1)).lower[0] == 0
+
+
+@pytest.mark.parametrize("make", [obstacle, region])
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("corner", ["lower", "upper"])
+def test_corners_must_be_finite(make, bad, corner):
+    with pytest.raises(ProblemError, match="(table|top)' has a corner that is not finite"):
+        make(**{corner: (0.5, bad, 0.4)})
+
+
+@pytest.mark.parametrize("make", [obstacle, region])
+@pytest.mark.parametrize(
+    ("corner", "message"),
     [
-        {"x": (1.0, 0.0)},
-        {"x": (0.0, 0.0)},
-        {"y": (0.5, -1.0)},
-        {"height": 0},
-        {"height": -0.3},
+        ((0, 1), r"lower must be a list of 3, each a number \[m\], got \(0, 1\)"),
+        ((0, 1, "2"), r"lower\[2\] must be a number \[m\], got '2'"),
+        (5, "lower must be a list of 3"),
+        ((0, 1, None), r"lower\[2\] must be a number"),
     ],
 )
-def test_empty_bench_is_refused(changes):
-    with pytest.raises(ProblemError, match="bench 'table' is empty.*expected lower < upper"):
-        bench(**changes)
+def test_corners_are_three_numbers(make, corner, message):
+    with pytest.raises(InvalidInputError, match=message):
+        make(lower=corner)
 
 
-@pytest.mark.parametrize(
-    "changes", [{"x": (float("nan"), 1.0)}, {"y": (0.0, float("inf"))}, {"height": float("inf")}]
-)
-def test_bench_must_be_finite(changes):
-    with pytest.raises(ProblemError, match="bench 'table' has a bound that is not finite"):
-        bench(**changes)
+@pytest.mark.parametrize("given", [[0, -1, 0], np.array([0, -1, 0]), (np.float32(0), -1, 0)])
+def test_corners_become_tuples_of_floats(given):
+    made = obstacle(lower=given)
+    assert made == obstacle()
+    assert hash(made) == hash(obstacle())
+    assert {type(number) for number in (*made.lower, *made.upper)} == {float}
 
 
-def test_bench_names_must_differ():
-    with pytest.raises(ProblemError, match=r"names must differ, got \['table', 'table'\]"):
-        Scene(benches=(bench(), bench(height=1.0)))
+def test_names_must_differ():
+    with pytest.raises(ProblemError, match="two obstacles are called 'table'"):
+        Scene(obstacles=(obstacle(), obstacle(upper=(2, 2, 2))))
+    with pytest.raises(ProblemError, match="two goal regions are called 'top'"):
+        Scene(goal_regions=(region(), region()))
 
 
-@pytest.mark.parametrize("edge", [-0.01, float("nan"), float("inf")])
+def test_an_obstacle_and_the_goals_on_it_may_share_a_name():
+    scene = Scene(obstacles=(obstacle(),), goal_regions=(region(name="table"),))
+    assert scene.goal_region("table").name == "table"
+
+
+@pytest.mark.parametrize("edge", [-0.01, math.nan, math.inf])
 def test_cube_edge_must_be_a_length(edge):
     with pytest.raises(ProblemError, match="cube_edge"):
         Scene(cube_edge=edge)
 
 
-@pytest.mark.parametrize("value", [Scene(), Scene().bench("left")])
+@pytest.mark.parametrize("value", [Scene(), obstacle(), region()])
 def test_frozen(value):
     with pytest.raises(dataclasses.FrozenInstanceError):
         value.name = "other"
 
 
 def test_equal_scenes_compare_and_hash_equal():
-    assert Scene(benches=(bench(),)) == Scene(benches=(bench(),))
+    assert Scene(obstacles=[obstacle()]) == Scene(obstacles=(obstacle(),))
     assert hash(Scene()) == hash(Scene())
     assert Scene(ground=False) != Scene()

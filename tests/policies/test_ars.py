@@ -5,22 +5,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinarm.errors import InvalidInputError, KinarmError, UnknownNameError
+from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.policies import ARSConfig, Policy, state_policy, train_policy
 from kinarm.policies.ars.algorithm import (
+    ARSTraining,
     ars_iteration,
     ars_step,
-    initial_state,
     linear_networks,
     shared_scenarios,
     top_directions,
 )
 from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
-from kinarm.policies.mirror import task_mirror
+from kinarm.policies.mirror import commuting_weights, task_mirror
 from kinarm.policies.normalizer import Normalizer
+from kinarm.problem import PROBLEMS
 from kinarm.reference import ReferenceSimulator
+from kinarm.task import RewardWeights
+from kinarm.world import World
 
-TINY = ARSConfig(directions=4, top_directions=2, iterations=6, horizon=8, seed=5)
+SHORT = PROBLEMS["right"].replace(horizon=8)
+TINY = ARSConfig(problem=SHORT, directions=4, top_directions=2, iterations=6, seed=5)
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +38,7 @@ def random_round(seed, directions=6):
 
 
 def run(config, simulator, iterations, state=None):
-    states = [state or initial_state(config, simulator)]
+    states = [state or ARSTraining(config, threads=1).initial_state()]
     for _ in range(iterations):
         states.append(ars_iteration(config, simulator, states[-1]))
     return states
@@ -180,8 +184,8 @@ class TestIteration:
         variance = np.maximum(second / count - combined**2, 0)
         np.testing.assert_allclose(after.normalizer.std**2, variance, atol=1e-10)
 
-    def test_first_state_is_zero(self, tiny_simulator):
-        state = initial_state(TINY, tiny_simulator)
+    def test_first_state_is_zero(self):
+        state = ARSTraining(TINY, threads=1).initial_state()
         np.testing.assert_array_equal(state.theta, np.zeros((5, 48)))
         np.testing.assert_array_equal(state.normalizer.std, np.ones(48))
         assert (state.iteration, state.environment_steps, state.wall_time) == (0, 0, 0.0)
@@ -261,7 +265,7 @@ class TestTraining:
         assert not np.array_equal(first.layers[0].weights, second.layers[0].weights)
 
     def test_threads_do_not_matter(self):
-        config = replace(TINY, directions=24, horizon=64, iterations=4)
+        config = replace(TINY, directions=24, problem=PROBLEMS["right"], iterations=4)
         assert_same_policy(
             train_policy(config, threads=1).policy, train_policy(config, threads=2).policy
         )
@@ -299,11 +303,12 @@ class TestTraining:
     def test_provenance_says_how(self, shipped_arms):
         result = train_policy(replace(TINY, recipe="mine"))
         trained = result.policy.provenance
-        assert (trained.algorithm, trained.recipe, trained.task) == ("ars", "mine", "right")
-        assert (trained.arm, trained.seed) == ("paper", 5)
-        assert trained.arm_digest == shipped_arms["paper"].digest
+        assert (trained.algorithm, trained.recipe, trained.seed) == ("ars", "mine", 5)
+        assert trained.problem == TINY.problem.pinned
+        assert trained.problem.arm.digest == shipped_arms["paper"].digest
         assert trained.environment_steps == result.curve[-1].environment_steps
-        assert ARSConfig(**trained.config) == replace(TINY, recipe="mine")
+        settings = {**trained.config, "problem": SHORT}
+        assert ARSConfig(**settings) == replace(TINY, recipe="mine")
         assert "numpy" in trained.versions
 
     def test_linear_schedule_falls_to_zero(self):
@@ -312,16 +317,25 @@ class TestTraining:
         assert ARSConfig(step_size=0.4).step_size_at(700) == 0.4
 
     def test_weights_reach_the_simulator(self):
-        config = replace(
-            TINY, collision_penalty=-3, success_bonus=2, step_reward=-0.1, start_spread=0.5
-        )
+        weights = RewardWeights(collision=-3, success=2, step=-0.1)
+        config = replace(TINY, reward=weights, problem=SHORT.replace(start_spread=0.5))
         task = config.simulator().task
-        assert (task.reward.collision, task.reward.success, task.reward.step) == (-3, 2, -0.1)
+        assert task.reward == weights
         assert (task.horizon, task.start_spread) == (8, 0.5)
+
+    def test_without_weights_those_of_the_task_count(self):
+        weights = RewardWeights(success=3)
+        config = replace(TINY, problem=SHORT.replace(reward=weights))
+        assert config.simulator().task.reward == weights
+
+    def test_the_policy_is_for_the_problem_without_the_weights(self):
+        config = replace(TINY, reward=RewardWeights(success=3), iterations=1)
+        assert train_policy(config).policy.problem.digest == SHORT.digest
 
     @pytest.mark.slow
     @pytest.mark.parametrize(
-        "settings", [{}, {"step_size_schedule": "linear", "success_bonus": 0.5}]
+        "settings",
+        [{}, {"step_size_schedule": "linear", "reward": RewardWeights(success=0.5)}],
     )
     def test_short_training_beats_standing_still_by_far(self, settings):
         config = ARSConfig(
@@ -354,7 +368,9 @@ class TestResume:
         assert_same_policy(resumed.policy, whole.policy)
 
     def test_equals_with_shared_scenarios_and_a_schedule(self, tmp_path):
-        config = replace(TINY, sharing="pair", step_size_schedule="linear", episodes=2, task="both")
+        config = replace(
+            TINY, sharing="pair", step_size_schedule="linear", episodes=2, problem="both"
+        )
         seen = []
         whole = train_policy(config, on_iteration=seen.append)
         save_checkpoint(tmp_path / "run.ckpt", config, seen[2])
@@ -385,7 +401,6 @@ class TestConfig:
             ({"iterations": 1.5}, "iterations"),
             ({"directions": 24.5}, "directions"),
             ({"episodes": 0}, "episodes"),
-            ({"horizon": -1}, "horizon"),
             ({"step_size": 0}, "step_size must be greater than 0, got 0"),
             ({"step_size": float("nan")}, "step_size"),
             ({"noise": -0.1}, "noise"),
@@ -399,30 +414,13 @@ class TestConfig:
         with pytest.raises(InvalidInputError, match=message):
             ARSConfig(**settings)
 
-    def test_unknown_task_and_arm(self):
-        with pytest.raises(UnknownNameError, match="task 'up'.*left, right, both"):
-            train_policy(replace(TINY, task="up"))
-        with pytest.raises(UnknownNameError, match="arm 'nope'"):
-            train_policy(replace(TINY, arm="nope"))
-
-    @pytest.mark.parametrize(
-        "name",
-        [
-            "progress_reward",
-            "closer_reward",
-            "collision_penalty",
-            "success_bonus",
-            "step_reward",
-            "start_spread",
-        ],
-    )
-    def test_settings_that_are_not_finite(self, name):
-        with pytest.raises(KinarmError, match="nan"):
-            train_policy(replace(TINY, **{name: float("nan")}))
+    def test_unknown_problem(self):
+        with pytest.raises(UnknownNameError, match="problem 'up'.*left, right, both"):
+            replace(TINY, problem="up")
 
     def test_other_arm(self):
-        result = train_policy(replace(TINY, arm="paper_flange", iterations=1))
-        assert result.policy.provenance.arm == "paper_flange"
+        config = replace(TINY, problem=SHORT.replace(arm="paper_flange"), iterations=1)
+        assert train_policy(config).policy.problem.arm.name == "paper_flange"
 
     def test_trained_policy_survives_its_file(self, tmp_path):
         policy = train_policy(TINY).policy
@@ -445,16 +443,16 @@ class TestMirror:
     """Of a policy that treats mirror images alike, at any time of its training."""
 
     def test_snapshots_have_it(self):
-        config = replace(TINY, task="both", symmetric=True)
+        config = replace(TINY, problem="both", symmetric=True)
         states = []
         train_policy(config, on_iteration=states.append)
-        mirror = task_mirror(True, config.simulator(threads=1))
+        mirror = task_mirror(True, World(config.problem))
         for state in states:
             policy = state_policy(config, state)
             np.testing.assert_array_equal(policy.mean[mirror.observations < 0], 0)
-            assert (policy.layers[0].weights[~mirror.weights] == 0).all()
+            assert (policy.layers[0].weights[~commuting_weights(mirror)] == 0).all()
 
     def test_the_last_one_is_the_result(self):
-        config = replace(TINY, task="both", symmetric=True)
+        config = replace(TINY, problem="both", symmetric=True)
         result = train_policy(config)
         assert_same_policy(state_policy(config, result.state), result.policy)

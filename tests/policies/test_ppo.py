@@ -12,6 +12,7 @@ pytest.importorskip("stable_baselines3")
 
 import torch
 
+from kinarm._fields import from_plain
 from kinarm.errors import InvalidInputError, MissingExtraError
 from kinarm.policies import (
     PPOConfig,
@@ -22,23 +23,27 @@ from kinarm.policies import (
     train_policy,
 )
 from kinarm.policies.ppo.learner import PPOTraining, alone_in_torch, seed_iteration
+from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
+from kinarm.task import RewardWeights
 
 TINY = PPOConfig(
-    task="both",
-    arms=6,
-    rollout_steps=20,
-    minibatch=40,
-    epochs=3,
+    problem="both",
+    n_envs=6,
+    n_steps=20,
+    batch_size=40,
+    n_epochs=3,
     iterations=5,
-    hidden=(12, 10),
+    net_arch=(12, 10),
     learning_rate_schedule="linear",
     seed=5,
 )
 CONFIGS = {
     "plain": TINY,
     "symmetric": replace(TINY, symmetric=True),
-    "right": replace(TINY, task="right", success_bonus=1.0, tolerance=0.3),
+    "right": replace(
+        TINY, problem="right", reward=RewardWeights(success=1.0), training_tolerance=0.3
+    ),
 }
 
 
@@ -78,15 +83,16 @@ class TestAdvantages:
 
     @pytest.fixture
     def collect(self):
-        def collect(**settings):
+        def collect(horizon, **settings):
             config = PPOConfig(
-                arms=2,
-                rollout_steps=3,
-                minibatch=6,
+                n_envs=2,
+                n_steps=3,
+                batch_size=6,
                 gamma=self.GAMMA,
                 gae_lambda=self.LAMBDA,
-                step_reward=self.REWARD,
-                initial_log_std=-30.0,
+                problem=PROBLEMS["right"].replace(horizon=horizon),
+                reward=RewardWeights(step=self.REWARD),
+                log_std_init=-30.0,
                 **settings,
             )
             training = PPOTraining(config)
@@ -127,7 +133,7 @@ class TestAdvantages:
         whole = Simulator.sample
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(Simulator, "sample", near_goals(whole))
-            advantages = collect(horizon=64, tolerance=0.3).advantages
+            advantages = collect(horizon=64, training_tolerance=0.3).advantages
         # delta = r - V at every step, each of which ends an episode.
         np.testing.assert_allclose(advantages, self.REWARD - self.VALUE, atol=1e-5)
 
@@ -135,9 +141,9 @@ class TestAdvantages:
 def near_goals(sample):
     """Draw as the simulator does, but put every goal 0.1 m above the tool."""
 
-    def draw(simulator, rng, count):
-        starts, _ = sample(simulator, rng, count)
-        tools, _ = simulator.screen(starts)
+    def draw(simulator, rng, count, **settings):
+        starts, _ = sample(simulator, rng, count, **settings)
+        tools, _ = simulator.world.screen(starts)
         return starts, tools + np.array([0, 0, 0.1])
 
     return draw
@@ -174,7 +180,7 @@ class TestResuming:
         assert_same_policies(again.policy, result.policy)
         assert again.curve == result.curve or np.isnan(again.curve[0].mean_return)
 
-    @pytest.mark.parametrize(("setting", "value"), [("hidden", (12, 11)), ("arms", 12)])
+    @pytest.mark.parametrize(("setting", "value"), [("net_arch", (12, 11)), ("n_envs", 12)])
     def test_state_of_another_training_is_refused(self, trained, setting, value):
         config, _, states = trained
         with pytest.raises(InvalidInputError, match="the state to resume has"):
@@ -193,23 +199,28 @@ class TestResult:
 
     def test_curve_is_of_the_episodes_that_ended(self):
         """Without a move every episode lasts to the horizon and returns 8 step rewards."""
-        config = replace(TINY, initial_log_std=-30.0, horizon=8, step_reward=-0.5)
+        config = replace(
+            TINY,
+            problem=PROBLEMS["both"].replace(horizon=8),
+            reward=RewardWeights(step=-0.5),
+            log_std_init=-30.0,
+        )
         first = train_policy(replace(config, iterations=1)).curve[0]
         assert first.mean_return == pytest.approx(-4, abs=0.02)
         assert first.std_return < 0.02
         assert first.success == 0
 
     def test_curve_without_ended_episodes_is_not_a_number(self):
-        config = replace(TINY, rollout_steps=2, minibatch=12, iterations=1, initial_log_std=-30.0)
+        config = replace(TINY, n_steps=2, batch_size=12, iterations=1, log_std_init=-30.0)
         point = train_policy(config).curve[0]
         assert np.isnan([point.mean_return, point.std_return, point.success]).all()
 
     def test_provenance(self, trained):
         config, result, _ = trained
         made = result.policy.provenance
-        assert (made.algorithm, made.task, made.seed) == ("ppo", config.task, 5)
-        assert made.config["hidden"] == (12, 10)
-        assert PPOConfig(**made.config) == config
+        assert (made.algorithm, made.seed) == ("ppo", 5)
+        assert made.problem == config.problem.pinned
+        assert from_plain(PPOConfig, made.config, "it") == replace(config, problem="right")
         assert {"torch", "stable-baselines3"} <= set(made.versions)
 
     def test_policy_survives_its_file(self, trained, tmp_path):
@@ -217,7 +228,7 @@ class TestResult:
         result.policy.save(tmp_path / "p.npz")
         loaded = type(result.policy).load(tmp_path / "p.npz")
         assert_same_policies(loaded, result.policy)
-        assert PPOConfig(**loaded.provenance.config) == PPOConfig(**result.policy.provenance.config)
+        assert loaded.provenance == result.policy.provenance
 
 
 def predicted(training, observations):
@@ -238,8 +249,8 @@ def test_policy_acts_like_the_model(trained):
         training.model.policy.action_net.weight.mul_(100)
     state = replace(states[-1], parameters=training.parameters())
     policy = state_policy(config, state)
-    simulator = Simulator(task=config.task, threads=1)
-    observations = simulator.observe(*simulator.sample(np.random.default_rng(0), 500))
+    simulator = Simulator(config.problem, threads=1)
+    observations = simulator.world.observe(*simulator.sample(np.random.default_rng(0), 500))
     expected = predicted(training, observations)
     assert 0.01 < (np.abs(expected) == 1).mean() < 0.99
     np.testing.assert_allclose(policy(observations), expected, rtol=0, atol=1e-5)
@@ -249,7 +260,7 @@ def test_compiled_rollouts_follow_the_model(trained):
     config, result, states = trained
     training = PPOTraining(config)
     training.load(states[-1])
-    simulator = Simulator(task=config.task, threads=1)
+    simulator = Simulator(config.problem, threads=1)
     starts, goals = simulator.sample(np.random.default_rng(1), 50)
     compiled = simulator.rollout(result.policy, starts, goals)
     stepped = simulator.rollout(lambda seen: predicted(training, seen), starts, goals)
@@ -260,7 +271,12 @@ def test_compiled_rollouts_follow_the_model(trained):
 def test_starts_spread_out_as_configured():
     """From home at the beginning, over the whole range from half of the training on."""
     config = replace(
-        TINY, iterations=9, initial_start_spread=0.0, widening=0.5, horizon=2, tolerance=0.01
+        TINY,
+        iterations=9,
+        problem=PROBLEMS["both"].replace(horizon=2),
+        initial_start_spread=0.0,
+        widening=0.5,
+        training_tolerance=0.01,
     )
     assert [config.start_spread_at(done) for done in (0, 0.25, 0.5, 1)] == [0, 0.5, 1, 1]
     states = [PPOTraining(config).initial_state()]
@@ -322,21 +338,21 @@ class TestTensorBoard:
 def test_learns():
     """A tenth of the paper's steps bring the tool within centimetres of the goals."""
     config = PPOConfig(
-        arms=125,
-        rollout_steps=16,
-        minibatch=1000,
+        n_envs=125,
+        n_steps=16,
+        batch_size=1000,
         iterations=60,
         learning_rate=2e-3,
         learning_rate_schedule="linear",
         gamma=0.9,
-        initial_log_std=-0.7,
-        tolerance=0.03,
-        success_bonus=1.0,
+        log_std_init=-0.7,
+        training_tolerance=0.03,
+        reward=RewardWeights(success=1.0),
     )
     beginning = PPOTraining(config).initial_state()
     untrained = state_policy(config, beginning)
     trained = train_policy(config).policy
-    simulator = Simulator(task="right", threads=1)
+    simulator = Simulator("right", threads=1)
     starts, goals = simulator.sample(np.random.default_rng(0), 500)
     before = simulator.rollout(untrained, starts, goals)
     after = simulator.rollout(trained, starts, goals)

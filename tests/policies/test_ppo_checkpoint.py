@@ -18,7 +18,7 @@ from kinarm.policies import (
 )
 from kinarm.policies.ppo.state import EpisodeStates
 
-CONFIG = PPOConfig(task="left", hidden=(9, 8), arms=3, rollout_steps=4, minibatch=6)
+CONFIG = PPOConfig(problem="left", net_arch=(9, 8), n_envs=3, n_steps=4, batch_size=6)
 
 
 @pytest.fixture(scope="module")
@@ -99,9 +99,7 @@ def test_missing_file(tmp_path):
     refused(tmp_path / "gone.ckpt")
 
 
-@pytest.mark.parametrize(
-    "key", ["learner", "config", "state.first_moment", "state.episodes.q", "state.curve"]
-)
+@pytest.mark.parametrize("key", ["header", "state.first_moment", "state.episodes.q", "state.curve"])
 def test_missing_entry(saved, key):
     spoil(saved, **{key: None})
     refused(saved)
@@ -118,7 +116,7 @@ def test_missing_entry(saved, key):
         {"state.normalizer.mean": np.zeros((48, 1))},
         {"state.normalizer.squares": np.zeros(3)},
         {"state.curve": np.zeros((2, 3))},
-        {"config": np.array("{")},
+        {"header": np.array("{")},
     ],
     ids=lambda entries: next(iter(entries)),
 )
@@ -134,6 +132,7 @@ def test_later_version(saved):
 
 def test_impossible_setting_is_named(saved):
     with np.load(saved) as file:
-        config = json.loads(str(file["config"]))
-    spoil(saved, config=np.array(json.dumps({**config, "minibatch": 7})))
-    refused(saved, "minibatch")
+        header = json.loads(str(file["header"]))
+    header["config"]["batch_size"] = 7
+    spoil(saved, header=np.array(json.dumps(header)))
+    refused(saved, "batch_size")

@@ -10,7 +10,7 @@ TRAIN = """
 from dataclasses import replace
 from kinarm.policies import recipe, train_policy
 for name in ("paper", "tuned"):
-    config = replace(recipe("ars", name, task="both", seed=1), iterations=10)
+    config = replace(recipe("ars", name, problem="both", seed=1), iterations=10)
     networks = train_policy(config).policy.networks()
     print(networks.weights.tobytes().hex())
 """

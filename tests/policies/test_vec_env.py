@@ -9,35 +9,38 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.env_checker import check_env
 from stable_baselines3.common.vec_env import VecCheckNan, VecMonitor
 
-from kinarm.env import ReachEnv
+from kinarm.envs import ReachEnv
 from kinarm.errors import InvalidInputError
-from kinarm.policies.mirror import Mirror
+from kinarm.policies.mirror import find_mirror
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.ppo.vec_env import SB3VecEnv
+from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
-from kinarm.task import RewardWeights, load_task
+from kinarm.task import RewardWeights
 
 NUMBER = 7
+AXES = np.array([-1.0, 1.0, 1.0, -1.0, 1.0, -1.0])
+"""Signs of the axes in the mirror."""
 REWARD = RewardWeights(success=2.0, step=-0.1)
 END_KEYS = {"terminal_observation", "TimeLimit.truncated", "is_success", "episode"}
 
 
 @pytest.fixture(scope="module")
 def normalizer():
-    simulator = Simulator(task="both", threads=1)
-    return Normalizer.of(simulator.observe(*simulator.sample(np.random.default_rng(1), 500)))
+    simulator = Simulator("both", threads=1)
+    return Normalizer.of(simulator.world.observe(*simulator.sample(np.random.default_rng(1), 500)))
 
 
 @pytest.fixture
 def make_env(normalizer):
     def make(seed=0, *, number=NUMBER, mirrored=False, **settings):
-        task = load_task("both", **{"reward": REWARD, "tolerance": 0.5, **settings})
-        simulator = Simulator("paper", task, threads=1)
+        overrides = {"reward": REWARD, "tolerance": 0.5, **settings}
+        simulator = Simulator(PROBLEMS["both"].replace(**overrides), threads=1)
         env = SB3VecEnv(
             simulator,
             number,
             rng=np.random.default_rng(seed),
-            mirror=Mirror.of(simulator) if mirrored else None,
+            mirror=find_mirror(simulator.world) if mirrored else None,
         )
         env.normalize_by(normalizer)
         return env
@@ -47,8 +50,7 @@ def make_env(normalizer):
 
 def begin_single(env, row):
     """A `ReachEnv` in the situation of one arm at its start."""
-    states, task = env.states(), env.simulator.task
-    single = ReachEnv(task.name, reward=REWARD, tolerance=task.tolerance, horizon=task.horizon)
+    states, single = env.states(), ReachEnv(env.simulator.problem)
     start = {"start": states.q[row], "goal": states.goal[row]}
     return single, single.reset(seed=0, options=start)[0]
 
@@ -121,10 +123,10 @@ def test_passes_the_checks_of_stable_baselines3(make_env):
     assert model.num_timesteps == 2 * 32 * NUMBER
 
 
-@pytest.mark.parametrize("task", ["left", "right", "both"])
+@pytest.mark.parametrize("problem", ["left", "right", "both"])
 @pytest.mark.filterwarnings("ignore:Your action space has dtype float64")
-def test_single_environment_passes_their_check(task):
-    check_env(ReachEnv(task))
+def test_single_environment_passes_their_check(problem):
+    check_env(ReachEnv(problem))
 
 
 def test_same_generator_same_episodes(make_env):
@@ -201,8 +203,8 @@ class TestMirror:
         """The same situation and its mirror image, under the same actions."""
         first, second = make_env(mirrored=True), make_env(mirrored=True)
         first.reset()
-        states, mirror = first.states(), first.mirror
-        image = states._replace(q=states.q * mirror.axes, goal=states.goal * [1, -1, 1])
+        states = first.states()
+        image = states._replace(q=states.q * AXES, goal=states.goal * [1, -1, 1])
         second.restore(image)
         running = np.ones(NUMBER, dtype=bool)
         rng = np.random.default_rng(1)
