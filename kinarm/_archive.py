@@ -117,8 +117,9 @@ def load_archive(path: str | Path, kind: str, version: int, error: type[KinarmEr
         content = np.load(file, allow_pickle=False)
         if not isinstance(content, np.lib.npyio.NpzFile) or "format" not in content:
             raise error(f"{name} is not a kinarm {kind}")
-        if str(content["format"]) != wanted:
-            raise error(f"{name} holds {str(content['format'])!r}, not {wanted!r}")
+        held = str(content["format"])
+        if held != wanted:
+            raise error(f"{name} holds {held[:40]!r}, not {wanted!r}")
         found = int(content["version"])
         if found != version:
             age = "a later" if found > version else "an earlier"

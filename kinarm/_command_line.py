@@ -125,7 +125,8 @@ def _add_option(
         hint, *others = get_args(hint)
         count = "+" if Ellipsis in others else 1 + len(others)
         options |= {"action": "append"} if item.metadata.get("repeat") else {"nargs": count}
-    options["metavar"] = item.metadata.get("metavar") or METAVARS.get(hint, "NAME")
+    usual = METAVARS.get(hint, "NAME") if flag.startswith("--") else flag
+    options["metavar"] = item.metadata.get("metavar", usual)
     if get_origin(hint) is Literal:
         options["choices"] = get_args(hint)
         del options["metavar"]
@@ -149,6 +150,8 @@ def _parser_of(hint: Any) -> Callable[[str], Any]:
     """Argument type: refuses texts that are not of a type."""
 
     def parse(text: str) -> Any:
+        if text is argparse.SUPPRESS:  # a positional argument that is not given
+            return text
         try:
             value = hint(text) if hint in (int, float) else text
         except ValueError:

@@ -119,8 +119,9 @@ def check_fields(given: Any) -> None:
         If a value has the wrong type; names the field and what is expected.
     """
     kind = type(given)
-    for name, hint in type_hints(kind).items():
-        value = _value(hint, getattr(given, name), "", name, kind)
+    hints = type_hints(kind)
+    for name in init_fields(kind):
+        value = _value(hints[name], getattr(given, name), "", name, kind)
         object.__setattr__(given, name, value)
 
 

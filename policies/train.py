@@ -69,10 +69,10 @@ class TrainRequest(ProblemOptions):
     recipe: str | None = field(default=None, metadata={"metavar": "NAME_OR_FILE"})
     seed: int | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
-    out: Path = field(metadata={"metavar": "FILE.npz"})
+    out: Path | str = field(metadata={"metavar": "FILE.npz"})
     resume: bool = False
     overwrite: bool = False
-    tensorboard: Path | None = field(default=None, metadata={"metavar": "FOLDER"})
+    tensorboard: Path | str | None = field(default=None, metadata={"metavar": "FOLDER"})
 
     def run(self) -> TrainingResult:
         """Train, and write the policy and its learning curve.

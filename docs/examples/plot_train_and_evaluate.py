@@ -21,7 +21,7 @@ from kinarm.evaluation import evaluate
 from kinarm.policies import recipe, train_policy
 
 config = recipe(
-    "ars", "tuned", task="right", iterations=800, episodes=4, collision_penalty=-1.0, seed=0
+    "ars", "tuned", problem="right", iterations=800, episodes=4, reward={"collision": -1.0}
 )
 result = train_policy(config)
 

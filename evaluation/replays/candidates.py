@@ -66,7 +66,7 @@ def faced_problem(entrants: Sequence[Entrant], options: ProblemOptions) -> Reach
     InvalidInputError
         If no entrant was trained and no option names a problem.
     """
-    trained = [entrant.policy.problem for entrant in entrants if entrant.policy is not None]
+    trained = [entrant.problem for entrant in entrants if entrant.problem is not None]
     if not trained and options.problem is None and options.task is None:
         raise InvalidInputError(f"{entrants[0].name!r} was not trained: name a --problem")
     return options.resolve(trained[0] if trained else "right")
@@ -109,12 +109,11 @@ def _evaluated_candidates(
         if name is not None and Path(name).suffix == ".npz":
             entrant = first_entrant(name)
         row = document.result(entrant.name if entrant else name, problem)
-        problem = row["problem"]
-        trials = document.trials(problem)
+        problem, trials = row["problem"], document.trials(row["problem"])
         recordings = record(entrant or first_entrant(row["policy"]), trials, allow_other_arm=True)
         document.check_same(row, recordings)
         runs.append(recordings)
-    known = document.floors(problem)
+    known = document.floors(trials.problem.name)
     if known is None:
         return Candidates(runs, _solved_bounds(trials), PLAYED)
     return Candidates(runs, lambda numbers: [known[number] for number in numbers], PLAYED)

@@ -27,10 +27,11 @@ REST = 1.2
 
 def fresh_recordings(entrant: Entrant, simulator: Simulator, seed: int) -> Iterator[Recording]:
     """Record one trial after the other, without end; each has a seed of its own."""
+    oracle = Oracle(simulator.problem)
     for number in itertools.count():
-        trials = TrialSet.draw(simulator, 1, seed + number)
+        trials = TrialSet.draw(simulator.problem, 1, seed + number)
         if entrant is ORACLE:  # solved here, so that no bounds are kept of every trial
-            actions = Oracle(simulator=simulator).solve_batch(trials.starts, trials.goals).actions
+            actions = oracle.solve_batch(trials.starts, trials.goals).actions
             rollouts = simulator.rollout_actions(actions, trials.starts, trials.goals, record=True)
             (recording,) = record_rollouts(simulator, rollouts, entrant.name)
         else:

@@ -100,10 +100,13 @@ class ReplayRequest(ProblemOptions):
                 raise InvalidInputError(f"{given[0]} and {given[1]} exclude each other")
         if self.port is not None and not self.live:
             raise InvalidInputError("--port goes with --live")
-        for mode, names in (("--live", NOT_LIVE), ("trials from a file", NOT_FROM_FILE)):
-            given = self._given(names)
-            if given and (self.live if mode == "--live" else self.source is not None):
-                raise InvalidInputError(f"{given[0]} does not go with {mode}")
+        self._refuse("--live", NOT_LIVE if self.live else ())
+        self._refuse("trials from a file", NOT_FROM_FILE if self.source else ())
+
+    def _refuse(self, mode: str, names: Sequence[str]) -> None:
+        """Refuse fields that mean nothing in a mode."""
+        for option in self._given(names):
+            raise InvalidInputError(f"{option} does not go with {mode}")
 
     def _given(self, names: Sequence[str]) -> list[str]:
         """Options of the fields that are given."""

@@ -1,7 +1,6 @@
 """Draw an arm and its scene into a Meshcat window: a page in the making, or a live one."""
 
 from collections import defaultdict
-from collections.abc import Sequence
 
 import numpy as np
 import umsgpack
@@ -45,41 +44,22 @@ CAMERA = {"fov": 32, "position": [-2.4, 1.6, 1.9]}
 """In the frame of three.js, whose y axis points up."""
 
 
-class _MeshGeometry(Geometry):
-    """A mesh with normals, in as few bytes as three.js reads."""
+class _BufferGeometry(Geometry):
+    """Points with attributes, in as few bytes as three.js reads; triangles if there are faces."""
 
-    def __init__(self, meshes: Sequence[Mesh]) -> None:
+    def __init__(
+        self, faces: NDArray[np.int64] | None = None, **attributes: NDArray[np.generic]
+    ) -> None:
         super().__init__()
-        self.mesh = Mesh.joined(meshes)
-
-    def lower(self, _: dict[str, object]) -> dict[str, object]:
-        """Describe it to three.js."""
-        vertices, normals, faces = self.mesh.with_normals()
-        return {
-            "uuid": self.uuid,
-            "type": "BufferGeometry",
-            "data": {
-                "attributes": {
-                    "position": _typed_array(vertices.astype(np.float32), 3),
-                    "normal": _typed_array(np.round(127 * normals).astype(np.int8), 3),
-                },
-                "index": _typed_array(faces.astype(np.uint32), 1),
-            },
+        self.data: dict[str, object] = {
+            "attributes": {name: _typed_array(array, 3) for name, array in attributes.items()}
         }
-
-
-class _LineGeometry(Geometry):
-    """Pairs of points, shape (2n, 3)."""
-
-    def __init__(self, points: NDArray[np.float64]) -> None:
-        super().__init__()
-        self.points = points
+        if faces is not None:
+            self.data["index"] = _typed_array(faces.astype(np.uint32), 1)
 
     def lower(self, _: dict[str, object]) -> dict[str, object]:
         """Describe it to three.js."""
-        position = _typed_array(self.points.astype(np.float32), 3)
-        attributes = {"attributes": {"position": position}}
-        return {"uuid": self.uuid, "type": "BufferGeometry", "data": attributes}
+        return {"uuid": self.uuid, "type": "BufferGeometry", "data": self.data}
 
 
 class _FinishMaterial(Material):
@@ -136,7 +116,10 @@ def _typed_array(array: NDArray[np.generic], size: int) -> dict[str, object]:
 
 def put(window: Visualizer, finish: Finish, *meshes: Mesh) -> None:
     """Show meshes with one finish."""
-    window.set_object(DrawnMesh(_MeshGeometry(meshes), _FinishMaterial(finish)))
+    vertices, normals, faces = Mesh.joined(meshes).with_normals()
+    position, normal = vertices.astype(np.float32), np.round(127 * normals).astype(np.int8)
+    geometry = _BufferGeometry(faces, position=position, normal=normal)
+    window.set_object(DrawnMesh(geometry, _FinishMaterial(finish)))
 
 
 def draw_surroundings(window: Visualizer, scene: Scene) -> None:
@@ -151,8 +134,8 @@ def draw_surroundings(window: Visualizer, scene: Scene) -> None:
     window["sun"]["<object>"].set_property("position", SUN_PLACE)
     if scene.ground:
         put(window["floor"], FLOOR, cylinder(0.002, FLOOR_RADIUS, 0.0).moved((0, 0, -0.002)))
-        grid = LineSegments(_LineGeometry(_grid_lines()), LineBasicMaterial(color=GRID_COLOUR))
-        window["grid"].set_object(grid)
+        grid = _BufferGeometry(position=_grid_lines().astype(np.float32))
+        window["grid"].set_object(LineSegments(grid, LineBasicMaterial(color=GRID_COLOUR)))
     for number, obstacle in enumerate(scene.obstacles):
         _draw_obstacle(window[f"obstacles/{number}"], obstacle, scene)
 

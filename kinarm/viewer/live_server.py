@@ -3,7 +3,6 @@
 import asyncio
 import errno
 import threading
-from types import TracebackType
 from typing import Any
 
 import tornado.web
@@ -121,12 +120,7 @@ class LiveServer:
     def __enter__(self) -> "LiveServer":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _run(self) -> None:

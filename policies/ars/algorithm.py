@@ -33,21 +33,17 @@ class ARSTraining:
         self.mirror = task_mirror(config.symmetric, self.simulator.world)
 
     def initial_state(self) -> ARSState:
-        """State before the first iteration."""
-        return initial_state(self.config, self.simulator)
+        """State before the first iteration: theta = 0, mu = 0, Sigma = I."""
+        n_actions, n_observations = self.simulator.n_actions, self.simulator.n_observations
+        return ARSState(
+            theta=np.zeros((n_actions, n_observations)),
+            normalizer=Normalizer.empty(n_observations),
+            generator=dict(np.random.default_rng(self.config.seed).bit_generator.state),
+        )
 
     def iterate(self, state: ARSState) -> ARSState:
         """One pass through the loop of Algorithm 1."""
         return ars_iteration(self.config, self.simulator, state, self.mirror)
-
-
-def initial_state(config: ARSConfig, simulator: Simulator) -> ARSState:
-    """State before the first iteration: theta = 0, mu = 0, Sigma = I."""
-    return ARSState(
-        theta=np.zeros((simulator.n_actions, simulator.n_observations)),
-        normalizer=Normalizer.empty(simulator.n_observations),
-        generator=dict(np.random.default_rng(config.seed).bit_generator.state),
-    )
 
 
 def ars_iteration(
@@ -91,6 +87,7 @@ def ars_iteration(
     )
     returns = rollouts.returns.reshape(2, N, config.episodes).mean(axis=2)
     theta = theta + ars_step(config, delta, returns, config.step_size_at(state.iteration))
+    normalizer = normalizer.updated(rollouts.moments, rollouts.steps)
     point = CurvePoint(
         mean_return=float(rollouts.returns.mean()),
         std_return=float(rollouts.returns.std()),
@@ -100,7 +97,7 @@ def ars_iteration(
     )
     return ARSState(
         theta=theta,
-        normalizer=normalizer.updated(rollouts.moments, rollouts.steps),
+        normalizer=normalizer,
         generator=dict(rng.bit_generator.state),
         curve=(*state.curve, point),
     )

@@ -47,6 +47,6 @@ class ARSState(TrainingState):
 
     def random_generator(self) -> np.random.Generator:
         """A generator in the state that the next iteration begins with."""
-        rng = np.random.default_rng()
+        rng = np.random.default_rng(0)
         rng.bit_generator.state = self.generator
         return rng

@@ -6,10 +6,14 @@ import coal
 import numpy as np
 import pytest
 
-from kinarm.arm import Arm, arm_names
-from kinarm.collision import enclosing_capsule
+from kinarm.arm import Arm, ArmSpecification
+from kinarm.capsules import enclosing_capsule
 from kinarm.errors import ArmError, InvalidInputError, KinarmError, UnknownNameError
+from kinarm.problem import ReachProblem
+from kinarm.simulator import Simulator
+from kinarm.urdf import arm_names
 
+AXIS_NAMES = tuple(f"axis_{number}" for number in range(1, 7))
 CENTRED = '<limit lower="-1" upper="1" velocity="2" effort="0"/>'
 
 # The arm's data sheet: origins, axes, limits [deg], speeds [deg/s], capsules (ends and radius).
@@ -161,11 +165,12 @@ class TestDigest:
     def test_differs_between_arms(self, shipped_arms):
         assert len({arm.digest for arm in shipped_arms.values()}) == 3
 
-    def test_depends_on_home_and_on_the_actuated_axes(self, shipped_arms):
+    def test_depends_on_home_velocity_limits_and_the_actuated_axes(self, shipped_arms):
         known = {shipped_arms["paper"].digest}
-        known.add(Arm.load("paper", n_actuated=6).digest)
+        known.add(Arm.load("paper", actuated=AXIS_NAMES).digest)
         known.add(Arm.load("paper", home=[0.1, 0, 0, 0, 0, 0]).digest)
-        assert len(known) == 3
+        known.add(Arm.load("paper", velocity_limits=[1, 1, 1, 1, 1, 1]).digest)
+        assert len(known) == 4
 
     @pytest.mark.parametrize(
         ("old", "new"),
@@ -258,14 +263,29 @@ class TestGenericRobots:
         path = write_robot([make_joint(axis="0 1 0"), make_joint("prismatic")], tool="0 0 0.1")
         assert Arm.load(path).n_actuated == 2
 
-    def test_actuated_axes_can_be_overridden(self):
-        assert Arm.load("paper", n_actuated=6).n_actuated == 6
-        assert Arm.load("paper", n_actuated=1).n_actuated == 1
+    def test_actuated_axes_can_be_named(self):
+        assert Arm.load("paper", actuated=AXIS_NAMES).n_actuated == 6
+        assert Arm.load("paper", actuated=AXIS_NAMES[:1]).n_actuated == 1
 
-    @pytest.mark.parametrize("count", [0, -1, 7, 2.5, 5.0])
-    def test_impossible_number_of_actuated_axes_is_refused(self, count):
-        with pytest.raises(ArmError, match=r"n_actuated must .*1\.\.6.*got"):
-            Arm.load("paper", n_actuated=count)
+    @pytest.mark.parametrize(
+        "named", [(), ("axis_2",), ("axis_2", "axis_1"), ("axis_1", "axis_3"), ("axis_7",)]
+    )
+    def test_other_axes_than_the_first_ones_are_refused(self, named):
+        with pytest.raises(ArmError, match="actuated must name the first joints of paper.urdf"):
+            Arm.load("paper", actuated=named)
+
+    def test_velocity_limits_can_be_given(self):
+        limits = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+        arm = Arm.load("paper", velocity_limits=limits)
+        np.testing.assert_array_equal(arm.speed, limits)
+        np.testing.assert_array_equal(arm.model.velocityLimit, limits)
+        simulator = Simulator(ReachProblem.load("right").replace(arm=arm), threads=1)
+        np.testing.assert_allclose(simulator.step_limit, 0.02 * np.array(limits[:5]))
+
+    @pytest.mark.parametrize("limits", [(1,) * 5, (1,) * 7, (1, 1, 1, 1, 1, 0), (-1,) * 6])
+    def test_impossible_velocity_limits_are_refused(self, limits):
+        with pytest.raises(KinarmError, match="velocity_limits"):
+            Arm.load("paper", velocity_limits=limits)
 
     @pytest.mark.parametrize("home", [[0, 0], [np.nan] * 6, [0, 3, 0, 0, 0, 0], ["x"] * 6])
     def test_impossible_home_is_refused(self, home):
@@ -301,6 +321,71 @@ class TestGenericRobots:
     def test_collision_in_a_comment_is_no_shape(self, make_joint, write_robot):
         path = write_robot([make_joint()], {1: "<!-- <collision> to be measured -->"})
         assert Arm.load(path).geometry.ngeoms == 0
+
+
+class TestSpecification:
+    def test_is_kept_by_the_arm(self):
+        given = ArmSpecification(source="paper_flange", home=(0.1, 0, 0, 0, 0, 0))
+        arm = Arm.load(given, actuated=AXIS_NAMES[:3])
+        assert arm.specification == ArmSpecification(
+            source="paper_flange", home=(0.1, 0, 0, 0, 0, 0), actuated=AXIS_NAMES[:3]
+        )
+        assert Arm.load(arm.specification).digest == arm.digest
+        assert arm.name == "paper_flange"
+
+    def test_values_become_what_is_annotated(self, tmp_path):
+        given = ArmSpecification(
+            source=tmp_path / "robot.urdf",
+            package_dirs=[tmp_path],
+            home=np.zeros(6),
+            velocity_limits=[1, 2],
+            actuated=["axis_1"],
+        )
+        assert given == ArmSpecification(
+            source=str(tmp_path / "robot.urdf"),
+            package_dirs=(str(tmp_path),),
+            home=(0.0,) * 6,
+            velocity_limits=(1.0, 2.0),
+            actuated=("axis_1",),
+        )
+        assert hash(given)
+        assert given.name == "robot"
+
+    @pytest.mark.parametrize(
+        ("changes", "message"),
+        [
+            ({"source": 3}, "source must be a text"),
+            ({"home": "zero"}, r"home must be a list, each entry a number \[rad or m\]"),
+            ({"actuated": 5}, "actuated must be a list, each entry a text, got 5"),
+            ({"package_dirs": "meshes"}, "package_dirs must be a list"),
+            ({"tool_frame": None}, "tool_frame must be a text"),
+        ],
+    )
+    def test_wrong_types_are_refused(self, changes, message):
+        with pytest.raises(InvalidInputError, match=message):
+            ArmSpecification(**changes)
+
+    def test_relative_paths_start_at_a_folder(self, tmp_path):
+        given = ArmSpecification(source="robot.urdf", package_dirs=("meshes", "/opt/meshes"))
+        assert given.resolved(tmp_path) == ArmSpecification(
+            source=str(tmp_path / "robot.urdf"),
+            package_dirs=(str(tmp_path / "meshes"), "/opt/meshes"),
+        )
+
+    @pytest.mark.parametrize("name", ["paper", "nope"])
+    def test_names_are_no_paths(self, tmp_path, name):
+        assert ArmSpecification(source=name).resolved(tmp_path).source == name
+
+    def test_a_shipped_name_wins_over_a_file(self, tmp_path, monkeypatch):
+        (tmp_path / "paper").write_text("")
+        monkeypatch.chdir(tmp_path)
+        assert Arm.load("paper").name == "paper"
+
+    def test_pinned_digest_has_to_hold(self, shipped_arms):
+        digest = shipped_arms["paper"].digest
+        assert Arm.load("paper", digest=digest).digest == digest
+        with pytest.raises(ArmError, match=f"'paper_flange' is another version .*{digest}"):
+            Arm.load("paper_flange", digest=digest)
 
 
 class TestRefusals:

@@ -2,26 +2,26 @@
 
 import pickle
 
-import coal
 import numpy as np
 import pinocchio as pin
 import pytest
 from configurations import contact_boundary, random_configurations
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from simulators import changed
 
-from kinarm import kernels
 from kinarm.arm import Arm
 from kinarm.collision import (
     BETWEEN_CAPSULES,
     WITH_GROUND,
     ContactModel,
-    enclosing_capsule,
     make_verdicts_reliable,
 )
-from kinarm.errors import ArmError
-from kinarm.scene import Bench, Scene
-from kinarm.simulator import substeps
+from kinarm.episodes import PAUSED
+from kinarm.kernels.rollout import advance, screen
+from kinarm.networks import table_control
+from kinarm.reference import ReferenceSimulator
+from kinarm.scene import Obstacle, Scene
 
 CAPSULE_ARMS = ("lrmate200ic_5l", "paper", "paper_flange")
 
@@ -30,7 +30,7 @@ def proven_free(simulator, configurations):
     n = len(configurations)
     tools, proven = np.empty((n, 3)), np.empty(n, dtype=bool)
     shapes = simulator.world.contact_model.shapes
-    kernels.screen(0, n, simulator.arm.chain, shapes, configurations, tools, proven)
+    screen(0, n, simulator.arm.chain, shapes, configurations, tools, proven)
     return proven
 
 
@@ -67,7 +67,7 @@ class TestPairs:
         assert set(simulator.world.contact_model.pair_names) == expected
 
     def test_scene_without_obstacles_leaves_the_arm_alone(self):
-        model = ContactModel.build(Arm.load("paper"), Scene(benches=(), ground=False))
+        model = ContactModel.build(Arm.load("paper"), Scene(obstacles=(), ground=False))
         assert len(model.pair_names) == 13
         assert not any(
             "bench" in name or name == "ground" for pair in model.pair_names for name in pair
@@ -92,7 +92,7 @@ class TestPairs:
 
     def test_hand_that_reaches_down_touches_the_ground(self):
         # Leaning forward by 90 degrees with the forearm pointing down lowers the tool below z = 0.
-        model = ContactModel.build(Arm.load("paper"), Scene(benches=()))
+        model = ContactModel.build(Arm.load("paper"), Scene(obstacles=()))
         q = np.deg2rad([0, 60, -30, 0, 0, 0])
         assert Arm.load("paper").tool_position(q)[2] < 0
         assert model.contact_pair(q)[1] == "ground"
@@ -136,93 +136,6 @@ class TestPairs:
         mirrored = configurations * [-1, 1, 1, -1, 1, -1]
         verdicts = simulator.world.contact_model.in_contact(configurations)
         np.testing.assert_array_equal(verdicts, simulator.world.contact_model.in_contact(mirrored))
-
-
-def surface_points(geometry, rng, count):
-    """Points of a shape's surface, in its own frame."""
-    directions = rng.normal(size=(count, 3))
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    if isinstance(geometry, coal.Sphere):
-        return geometry.radius * directions
-    if isinstance(geometry, coal.Box):
-        corners = rng.choice([-1.0, 1.0], size=(count, 3))
-        return corners * geometry.halfSide
-    along = rng.choice([-1.0, 1.0], size=(count, 1)) * [[0, 0, geometry.halfLength]]
-    if isinstance(geometry, coal.Capsule):
-        return geometry.radius * directions + along
-    flat = directions * [1, 1, 0]
-    return geometry.radius * flat / np.linalg.norm(flat, axis=1, keepdims=True) + along
-
-
-def distance_from_segment(points, capsule):
-    along = capsule.end - capsule.start
-    t = (points - capsule.start) @ along / max(along @ along, 1e-300)
-    nearest = capsule.start + np.clip(t, 0, 1)[:, None] * along
-    return np.linalg.norm(points - nearest, axis=1)
-
-
-def placed(geometry, seed):
-    return pin.GeometryObject("shape", 1, pin.SE3.Random(), geometry)
-
-
-class TestEnclosingCapsule:
-    @pytest.mark.parametrize(
-        "geometry",
-        [
-            coal.Sphere(0.1),
-            coal.Capsule(0.1, 0.5),
-            coal.Cylinder(0.1, 0.5),
-            coal.Cylinder(0.5, 0.1),
-            coal.Box(0.1, 0.2, 0.7),
-            coal.Box(0.3, 0.3, 0.3),
-            coal.Box(0.5, 0.5, 0.01),
-        ],
-        ids=lambda geometry: type(geometry).__name__,
-    )
-    def test_encloses_the_surface(self, geometry):
-        pin.seed(0)
-        for seed in range(5):
-            shape = placed(geometry, seed)
-            points = surface_points(geometry, np.random.default_rng(seed), 2000)
-            world = points @ shape.placement.rotation.T + shape.placement.translation
-            capsule = enclosing_capsule(shape)
-            assert (distance_from_segment(world, capsule) <= capsule.radius + 1e-12).all()
-
-    def test_equals_capsules_and_spheres(self):
-        capsule = enclosing_capsule(
-            pin.GeometryObject("shape", 1, pin.SE3.Identity(), coal.Capsule(0.1, 0.5))
-        )
-        np.testing.assert_allclose([capsule.start, capsule.end], [[0, 0, -0.25], [0, 0, 0.25]])
-        assert capsule.radius == 0.1
-        ball = enclosing_capsule(
-            pin.GeometryObject("shape", 1, pin.SE3.Identity(), coal.Sphere(0.2))
-        )
-        np.testing.assert_array_equal([ball.start, ball.end], np.zeros((2, 3)))
-        assert ball.radius == 0.2
-
-    def test_encloses_random_hulls_without_waste(self):
-        rng = np.random.default_rng(0)
-        for _ in range(30):
-            points = rng.normal(size=(40, 3)) * rng.uniform(0.01, 1, 3)
-            vertices = coal.StdVec_Vec3s()
-            vertices.extend(list(points))
-            hull = coal.Convex.convexHull(vertices, False, "Qt")
-            capsule = enclosing_capsule(pin.GeometryObject("hull", 1, pin.SE3.Identity(), hull))
-            distances = distance_from_segment(points, capsule)
-            assert distances.max() <= capsule.radius + 1e-9
-            assert capsule.radius <= np.ptp(points, axis=0).max()
-
-    def test_meshes_of_an_arm_are_enclosed(self, mesh_arm):
-        for shape in mesh_arm.geometry.geometryObjects:
-            if isinstance(shape.geometry, coal.ConvexBase):
-                points = np.array([shape.placement.act(p) for p in shape.geometry.points()])
-                capsule = enclosing_capsule(shape)
-                assert (distance_from_segment(points, capsule) <= capsule.radius + 1e-12).all()
-
-    def test_unsupported_shape_is_refused(self):
-        shape = pin.GeometryObject("cone_0", 1, pin.SE3.Identity(), coal.Cone(0.1, 0.2))
-        with pytest.raises(ArmError, match="'cone_0' is a Cone"):
-            enclosing_capsule(shape)
 
 
 def capsule_points(simulator, shape, poses):
@@ -339,14 +252,11 @@ def doubted_steps(simulator, starts, actions):
     """Advance by one step without asking Coal: episodes and the doubt about their substeps."""
     episodes = simulator.reset(starts, np.tile([0.0, 0.0, 5.0], (len(starts), 1)))
     np.copyto(episodes.stop, 1)
-    no_index = np.zeros(0, dtype=np.int64)
-    from kinarm.episodes import PAUSED, Control
-
-    control = Control(no_index, np.zeros((0, 0)), no_index, actions[:, None])
+    control = table_control(actions[:, None])
     shapes, rules = simulator.world.contact_model.shapes, simulator._rules
-    kernels.advance(0, len(starts), simulator.arm.chain, shapes, rules, control, episodes)
+    advance(0, len(starts), simulator.arm.chain, shapes, rules, control, episodes)
     paused = episodes.status == PAUSED
-    bits = episodes.doubt[:, None] >> np.arange(4) & 1
+    bits = episodes.doubt[:, None] >> np.arange(rules.tested) & 1
     return episodes, paused[:, None] & bits.astype(bool)
 
 
@@ -366,11 +276,21 @@ class TestStepProof:
     def test_flags_every_tested_configuration_that_touches(self, any_simulator):
         starts, actions = steps_near_contact(any_simulator, 11, 8000)
         episodes, doubted = doubted_steps(any_simulator, starts, actions)
-        tested = substeps(starts, episodes.target)
+        tested = any_simulator.world.substeps(starts, episodes.target)
         for k in range(4):
             touching = any_simulator.world.contact_model.in_contact(tested[:, k])
             assert not (touching & ~doubted[:, k]).any()
         assert doubted.any(axis=1).sum() > 100
+
+    @pytest.mark.parametrize("n", [1, 3, 32])
+    def test_flags_them_whatever_their_number(self, simulator, n):
+        other = changed(simulator, tested_configurations=n, time_step=0.1)
+        starts, actions = steps_near_contact(other, 19, 1500)
+        episodes, doubted = doubted_steps(other, starts, actions)
+        tested = other.world.substeps(starts, episodes.target)
+        touching = other.world.contact_model.in_contact(tested.reshape(-1, 6)).reshape(-1, n)
+        assert not (touching & ~doubted).any()
+        assert touching.any(axis=0).all()
 
     def test_clears_steps_far_from_contact(self, simulator):
         starts, _ = simulator.sample(np.random.default_rng(12), 2000)
@@ -379,8 +299,6 @@ class TestStepProof:
         assert doubted.any(axis=1).mean() < 0.1
 
     def test_agrees_with_the_reference_on_the_first_contact(self, any_simulator):
-        from kinarm.reference import ReferenceSimulator
-
         reference = ReferenceSimulator(any_simulator)
         starts, actions = steps_near_contact(any_simulator, 14, 400)
         episodes, doubted = doubted_steps(any_simulator, starts, actions)
@@ -397,21 +315,21 @@ class TestStepProof:
         actions = np.repeat(rng.uniform(-1, 1, (600, 8, any_simulator.n_actions)), 8, axis=1)
         rollouts = any_simulator.rollout_actions(actions, starts, goals, record=True)
         judge = any_simulator.world.contact_model.in_contact
+        substeps = any_simulator.world.substeps
         moves = rollouts.steps - rollouts.collision
         for path, count in zip(rollouts.paths, moves, strict=True):
             if count:
-                assert not judge(
-                    substeps(path[:count], path[1 : count + 1]).reshape(-1, path.shape[1])
-                ).any()
+                tested = substeps(path[:count], path[1 : count + 1])
+                assert not judge(tested.reshape(-1, path.shape[1])).any()
         refused = substeps(rollouts.configurations, rollouts.targets)[rollouts.collision]
         assert rollouts.collision.sum() > 20
         assert all(judge(tested).any() for tested in refused)
 
 
-def test_bench_in_the_way_is_an_obstacle(simulator):
-    wall = Bench(name="wall", x=(0.3, 0.6), y=(-0.2, 0.2), height=1.0)
-    model = ContactModel.build(simulator.arm, Scene(benches=(wall,)))
-    assert "wall bench" in model.contact_pair(np.zeros(6))
+def test_box_in_the_way_is_an_obstacle(simulator):
+    wall = Obstacle(name="wall", lower=(0.3, -0.2, 0), upper=(0.6, 0.2, 1))
+    model = ContactModel.build(simulator.arm, Scene(obstacles=(wall,)))
+    assert "wall" in model.contact_pair(np.zeros(6))
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from kinarm.errors import (
 
 EXAMPLES = [
     ArmError("no arm"),
-    ProblemError("no scene"),
+    ProblemError("no problem"),
     InvalidInputError("no input"),
     UnknownNameError("task", "up", ("left", "right")),
     StartInContactError(3, ("hand", "ground")),

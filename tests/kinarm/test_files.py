@@ -1,11 +1,17 @@
-"""Atomic writing."""
+"""Atomic writing, and seeing beforehand that a file can be written."""
 
 import os
 import stat
 
 import pytest
 
-from kinarm._files import check_folder, write_atomically
+from kinarm._files import (
+    check_folder,
+    check_output,
+    first_line,
+    write_atomically,
+    write_text,
+)
 from kinarm.errors import OutputError
 
 
@@ -85,15 +91,61 @@ class TestCheckFolder:
         check_folder(tmp_path)
         assert list(tmp_path.iterdir()) == []
 
-    def test_missing_folder_is_created_only_if_asked(self, tmp_path):
-        with pytest.raises(OutputError, match="new"):
-            check_folder(tmp_path / "new")
-        assert not (tmp_path / "new").exists()
-        check_folder(tmp_path / "new", create=True)
-        assert (tmp_path / "new").is_dir()
+    def test_missing_folders_are_made(self, tmp_path):
+        check_folder(tmp_path / "new" / "newer")
+        assert (tmp_path / "new" / "newer").is_dir()
 
     def test_file_in_the_way(self, tmp_path):
         (tmp_path / "file").write_text("")
-        for create in (False, True):
-            with pytest.raises(OutputError, match="file"):
-                check_folder(tmp_path / "file", create=create)
+        for folder in (tmp_path / "file", tmp_path / "file" / "below"):
+            with pytest.raises(OutputError, match="cannot write to .*file"):
+                check_folder(folder)
+
+
+class TestCheckOutput:
+    def test_leaves_nothing_behind(self, tmp_path):
+        check_output(tmp_path / "new.npz", suffix=".npz")
+        assert list(tmp_path.iterdir()) == []
+
+    def test_makes_the_folder(self, tmp_path):
+        check_output(tmp_path / "a" / "b" / "new.npz")
+        assert list((tmp_path / "a").glob("**/*")) == [tmp_path / "a" / "b"]
+
+    def test_existing_file_has_to_be_given_up(self, tmp_path):
+        path = tmp_path / "old.npz"
+        path.write_text("old")
+        with pytest.raises(OutputError, match=r"old.npz' exists: --overwrite replaces it"):
+            check_output(path)
+        check_output(path, overwrite=True)
+        assert path.read_text() == "old"
+
+    @pytest.mark.parametrize("overwrite", [False, True])
+    def test_folder_is_no_file(self, tmp_path, overwrite):
+        with pytest.raises(OutputError, match="the output must be a file, got"):
+            check_output(tmp_path, overwrite=overwrite)
+        with pytest.raises(OutputError, match="the output must be a file that ends in .npz, got"):
+            check_output(tmp_path, overwrite=overwrite, suffix=".npz")
+
+    @pytest.mark.parametrize("name", ["policy", "policy.npy", "policy.npz.txt", ".npz"])
+    def test_other_endings_are_refused(self, tmp_path, name):
+        with pytest.raises(OutputError, match=f"ends in .npz, got .*{name}"):
+            check_output(tmp_path / "new" / name, suffix=".npz")
+        assert not (tmp_path / "new").exists()
+
+    def test_folder_that_cannot_be_made(self, tmp_path):
+        (tmp_path / "file").write_text("")
+        with pytest.raises(OutputError, match="cannot write to .*file"):
+            check_output(tmp_path / "file" / "policy.npz")
+
+
+def test_texts_are_written_in_utf_8(tmp_path):
+    write_text(tmp_path / "text", "10 \u00b5m\n")
+    assert (tmp_path / "text").read_bytes() == b"10 \xc2\xb5m\n"
+
+
+@pytest.mark.parametrize(
+    ("error", "line"),
+    [(ValueError("one\ntwo"), "one"), (ValueError(), "ValueError"), (KeyError("k"), "'k'")],
+)
+def test_first_line_of_an_error(error, line):
+    assert first_line(error) == line

@@ -1,13 +1,11 @@
 """Batches of networks."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
-from kinarm.errors import InvalidInputError
-from kinarm.kernels import dense
-from kinarm.networks import CompiledPolicy, Networks
+from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.networks import CompiledPolicy, Mirror, Networks
+from kinarm.observation import observation_signs
 
 
 class Offering:
@@ -69,18 +67,67 @@ def test_compiled_deep_network_equals_numpy(simulator):
     np.testing.assert_allclose(rollouts.paths[first, 1, :5], expected[first], rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("n_actions", [1, 4, 6])
-@pytest.mark.parametrize("width", [3, 15, 16, 40])
-def test_layers_of_any_width_are_evaluated(n_actions, width):
-    """Narrow and wide layers take different ways through the kernel."""
-    rng = np.random.default_rng(width)
-    widths = [9, width, width + 1, n_actions]
-    parts = [rng.normal(size=(i + 1, o)) / 3 for i, o in pairwise(widths)]
-    x = rng.normal(size=9)
-    expected = x
-    for number, part in enumerate(parts):
-        expected = (np.tanh(expected) if number else expected) @ part[:-1] + part[-1]
-    action, hidden = np.empty(n_actions), np.empty((2, max(widths)))
-    weights = np.concatenate([part.reshape(-1) for part in parts])[None]
-    dense(np.array(widths), weights, 0, x[None], 0, hidden, action)
-    np.testing.assert_allclose(action, np.clip(expected, -1, 1), rtol=0, atol=1e-12)
+@pytest.mark.parametrize(
+    ("layers", "weights", "message"),
+    [
+        ([3], np.zeros((1, 0)), "at least two widths"),
+        ([3, 0], np.zeros((1, 0)), "at least two widths"),
+        ([[3, 2]], np.zeros((1, 8)), "at least two widths"),
+        ([3, 2], np.zeros((1, 9)), r"weights must have shape \(n, 8\), got \(1, 9\)"),
+        ([3, 2], np.full((1, 8), np.nan), "weights must be finite"),
+    ],
+)
+def test_weights_have_to_fit_the_layers(layers, weights, message):
+    with pytest.raises(InvalidInputError, match=message):
+        Networks(np.array(layers), weights)
+
+
+@pytest.mark.parametrize("name", ["activation", "output"])
+def test_unknown_function_lists_those_that_are(name):
+    with pytest.raises(UnknownNameError, match="function 'sine'; available: linear, tanh, relu"):
+        Networks(np.array([3, 2]), np.zeros((1, 8)), **{name: "sine"})
+
+
+class TestForm:
+    """What policies of one rollout have to share."""
+
+    @pytest.fixture
+    def settings(self):
+        return {"activation": "relu", "output": "tanh", "mirror": Mirror(-np.ones(3), np.ones(2))}
+
+    def make(self, seed, **settings):
+        weights = np.random.default_rng(seed).normal(size=(1, 8))
+        return Offering(Networks(np.array([3, 2]), weights, **settings))
+
+    def test_is_kept_by_a_batch(self, settings):
+        batch = Networks.collect([self.make(seed, **settings) for seed in range(4)])
+        assert batch.weights.shape == (4, 8)
+        assert batch.form == self.make(0, **settings).networks().form
+
+    @pytest.mark.parametrize(
+        "change",
+        [
+            {"activation": "tanh"},
+            {"output": "linear"},
+            {"mirror": None},
+            {"mirror": Mirror(-np.ones(3), -np.ones(2))},
+        ],
+    )
+    def test_mixtures_are_refused(self, settings, change):
+        policies = [self.make(0, **settings), self.make(1, **{**settings, **change})]
+        with pytest.raises(InvalidInputError, match="must share layers, functions and mirror"):
+            Networks.collect(policies)
+
+
+class TestMirror:
+    def test_reflects_what_has_its_goal_on_the_left(self, simulator):
+        signs = observation_signs(6)
+        mirror = Mirror(signs, np.ones(5))
+        seen = simulator.world.observe(*simulator.sample(np.random.default_rng(3), 50))
+        left = mirror.on_the_left(seen)
+        np.testing.assert_array_equal(left, seen[:, 1] > 0)
+        assert 10 < left.sum() < 40
+        reflected = mirror.from_the_right(seen)
+        np.testing.assert_array_equal(reflected[~left], seen[~left])
+        np.testing.assert_array_equal(reflected[left], seen[left] * signs)
+        assert not mirror.on_the_left(reflected).any()

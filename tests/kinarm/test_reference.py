@@ -1,21 +1,26 @@
 """The slow reference by hand, and the compiled rollouts held against it."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from simulators import changed
 
-from kinarm.networks import Networks
-from kinarm.policies import ARSConfig, train_policy
+from kinarm.networks import ACTIVATIONS, Networks
+from kinarm.policies.library import load_policy
+from kinarm.problem import ReachProblem
 from kinarm.reference import ReferenceSimulator
+from kinarm.scene import GoalRegion, Obstacle, Scene
 from kinarm.simulator import Simulator
 from kinarm.task import ReachTask, RewardWeights
 
 REWARD = RewardWeights(progress=1.5, closer=0.03, collision=-0.7, success=0.4, step=-0.01)
 
 
-def task(**settings):
-    return ReachTask(name="test", benches=("right",), reward=REWARD, **settings)
+def simulator_of(problem="right", **overrides):
+    """A simulator in which each reward term counts."""
+    return Simulator(ReachProblem.load(problem).replace(reward=REWARD, **overrides), threads=1)
 
 
 def still(_):
@@ -24,38 +29,47 @@ def still(_):
 
 @pytest.fixture(scope="module")
 def long_reach():
-    """The default arm with a wide tolerance, so that good policies succeed often."""
-    return Simulator("paper", task(tolerance=0.1), threads=1)
+    """The default arm with a wide tolerance, so that good policies succeed often.
+
+    Policies may rest at the limits, where rounding decides what is closer: that is not rewarded.
+    """
+    return changed(simulator_of(tolerance=0.1), reward={"closer": 0})
 
 
-def trained_networks(count, seed):
-    """A linear policy after a short training, with several gains."""
-    config = ARSConfig(sharing="iteration", episodes=2, iterations=300, step_size=0.05)
-    trained = train_policy(config).policy.networks()
-    gains = np.random.default_rng(seed).uniform(0.8, 1.2, (count, 1))
-    return Networks(trained.layers, trained.weights * gains)
+def trained_networks(name, count, seed):
+    """A shipped policy, more and more disturbed."""
+    trained = load_policy(name).networks()
+    spread = np.linspace(0, 0.4, count)[:, None]
+    gains = 1 + spread * np.random.default_rng(seed).normal(size=(count, trained.weights.size))
+    return replace(trained, weights=trained.weights * gains)
 
 
-def random_networks(simulator, count, seed, hidden=()):
+def random_networks(simulator, count, seed, hidden=(), **functions):
     rng = np.random.default_rng(seed)
     widths = [simulator.n_observations, *hidden, simulator.n_actions]
     parts = []
     for n_in, n_out in itertools.pairwise(widths):
         parts.append(rng.normal(size=(count, n_in * n_out)) * 2 / np.sqrt(n_in))
         parts.append(rng.normal(size=(count, n_out)) / 4)
-    return Networks(np.array(widths), np.concatenate(parts, axis=1))
+    return Networks(np.array(widths), np.concatenate(parts, axis=1), **functions)
 
 
 def evaluate(networks, index, observation):
-    """One network in plain numpy."""
-    x, offset, widths = observation, 0, networks.layers
+    """One network in plain NumPy."""
+    x, offset, widths, mirror = observation, 0, networks.layers, networks.mirror
+    left = mirror is not None and observation[1] > 0
+    x = mirror.observations * x if left else x
     for n_in, n_out in itertools.pairwise(widths):
-        x = np.tanh(x) if offset else x
+        x = ACTIVATIONS[networks.activation](x) if offset else x
         size = n_in * n_out
         weights = networks.weights[index, offset : offset + size].reshape(n_in, n_out)
-        x = x @ weights + networks.weights[index, offset + size : offset + size + n_out]
+        x = (
+            np.einsum("i,ij->j", x, weights)
+            + networks.weights[index, offset + size : offset + size + n_out]
+        )
         offset += size + n_out
-    return x
+    action = np.clip(ACTIVATIONS[networks.output](x), -1, 1)
+    return mirror.actions * action if left else action
 
 
 def scripted(table):
@@ -161,16 +175,17 @@ class TestCompiledRolloutsEqualTheReference:
 
     def test_trained_policies(self, long_reach):
         # Closed loops amplify the rounding in which the two evaluations of a network differ.
-        ends = compare_networks(long_reach, trained_networks(20, 5), 6, 500, atol=1e-9)
+        networks = trained_networks("ars-tuned-right-seed0", 20, 5)
+        ends = compare_networks(long_reach, networks, 6, 500, atol=1e-9)
         success, collision, count = ends
         assert success > 100
         assert collision > 20
         assert count - success - collision > 20
 
     @pytest.mark.parametrize("name", ["paper", "paper_flange", "lrmate200ic_5l"])
-    @pytest.mark.parametrize("task_name", ["left", "right"])
-    def test_action_tables(self, shipped_arms, name, task_name):
-        simulator = Simulator(shipped_arms[name], task_name, threads=1)
+    @pytest.mark.parametrize("problem", ["left", "right"])
+    def test_action_tables(self, name, problem):
+        simulator = simulator_of(problem, arm=name)
         ends = compare_actions(simulator, 7, 250)
         assert ends[1] > 15
 
@@ -182,11 +197,54 @@ class TestCompiledRolloutsEqualTheReference:
         assert 10 < ends[1] < 190
 
 
-def test_short_episodes_of_other_time_steps(shipped_arms):
-    simulator = Simulator(
-        shipped_arms["paper"], task(horizon=7, tolerance=0.4), time_step=0.1, threads=1
-    )
+def test_short_episodes_of_other_time_steps():
+    simulator = simulator_of(horizon=7, tolerance=0.4, time_step=0.1)
     success, collision, count = compare_actions(simulator, 11, 200, held=3)
     assert collision > 5
     assert success > 1
     assert count > collision + success
+
+
+@pytest.mark.parametrize("tested", [1, 2, 5, 32])
+def test_other_numbers_of_tested_configurations(tested):
+    """Steps are long, so that the number matters."""
+    simulator = simulator_of(horizon=12, time_step=0.08, tested_configurations=tested)
+    _, collision, count = compare_actions(simulator, 12, 150, held=3)
+    assert 10 < collision < count - 10
+
+
+def test_fewer_tested_configurations_miss_contacts():
+    collisions = [
+        compare_actions(simulator_of(horizon=2, time_step=0.1, tested_configurations=n), 13, 200)[1]
+        for n in (1, 32)
+    ]
+    assert collisions[0] < collisions[1]
+
+
+def test_obstacles_and_thick_goal_regions_of_ones_own():
+    post = Obstacle(name="post", lower=(0.45, -0.03, 0), upper=(0.5, 0.03, 1))
+    ahead = GoalRegion(name="ahead", lower=(0.35, -0.4, 0.3), upper=(0.6, 0.4, 0.8))
+    scene = Scene(obstacles=(post,), goal_regions=(ahead,))
+    problem = ReachProblem(name="post", scene=scene, task=ReachTask(goal_regions=("ahead",)))
+    simulator = simulator_of(problem, tolerance=0.15, horizon=32)
+    success, collision, _ = compare_actions(simulator, 14, 150)
+    assert success > 5
+    assert collision > 5
+
+
+@pytest.mark.parametrize("output", ["linear", "tanh", "relu"])
+@pytest.mark.parametrize("activation", ["linear", "tanh", "relu"])
+def test_activation_and_output_functions(simulator, activation, output):
+    networks = random_networks(
+        simulator, 10, 15, hidden=(18, 7), activation=activation, output=output
+    )
+    ends = compare_networks(simulator, networks, 16, 30)
+    assert ends[1] > 5
+
+
+@pytest.mark.parametrize("name", ["ppo-tuned-both-seed0", "ars-tuned-both-seed0"])
+def test_shipped_policies(name):
+    """One of PPO, which has a mirror, and one of ARS."""
+    simulator = simulator_of("both")
+    ends = compare_networks(simulator, trained_networks(name, 10, 17), 18, 60, atol=1e-9)
+    assert (ends > 5).all()

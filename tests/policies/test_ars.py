@@ -8,9 +8,9 @@ import pytest
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.policies import ARSConfig, Policy, state_policy, train_policy
 from kinarm.policies.ars.algorithm import (
+    ARSTraining,
     ars_iteration,
     ars_step,
-    initial_state,
     linear_networks,
     shared_scenarios,
     top_directions,
@@ -38,7 +38,7 @@ def random_round(seed, directions=6):
 
 
 def run(config, simulator, iterations, state=None):
-    states = [state or initial_state(config, simulator)]
+    states = [state or ARSTraining(config, threads=1).initial_state()]
     for _ in range(iterations):
         states.append(ars_iteration(config, simulator, states[-1]))
     return states
@@ -184,8 +184,8 @@ class TestIteration:
         variance = np.maximum(second / count - combined**2, 0)
         np.testing.assert_allclose(after.normalizer.std**2, variance, atol=1e-10)
 
-    def test_first_state_is_zero(self, tiny_simulator):
-        state = initial_state(TINY, tiny_simulator)
+    def test_first_state_is_zero(self):
+        state = ARSTraining(TINY, threads=1).initial_state()
         np.testing.assert_array_equal(state.theta, np.zeros((5, 48)))
         np.testing.assert_array_equal(state.normalizer.std, np.ones(48))
         assert (state.iteration, state.environment_steps, state.wall_time) == (0, 0, 0.0)

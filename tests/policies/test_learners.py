@@ -1,22 +1,15 @@
-"""The contract of learners, held by one that is written here: one module, one registration."""
+"""The registry of learners, and its contract held by the toy of the docs: one file, one line."""
 
+import importlib.util
 import sys
-from dataclasses import dataclass
-from types import ModuleType
+from pathlib import Path
 
-import numpy as np
 import pytest
 
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.policies import (
-    CurvePoint,
-    Layer,
-    Learner,
-    Normalizer,
     Policy,
-    Provenance,
     TrainingConfig,
-    TrainingState,
     find_learner,
     learner_names,
     learners,
@@ -25,90 +18,30 @@ from kinarm.policies import (
     register_learner,
     save_checkpoint,
     state_policy,
+    train,
     train_policy,
 )
 
-
-@dataclass(frozen=True, kw_only=True)
-class ToyConfig(TrainingConfig):
-    """Settings of a random search that keeps the best matrix of all that it tried.
-
-    Parameters
-    ----------
-    noise : float
-        Standard deviation of the steps.
-    """
-
-    iterations: int = 5
-    noise: float = 0.1
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ToyState(TrainingState):
-    """The best matrix so far."""
-
-    theta: np.ndarray
-    best: float
-
-
-class ToyTraining:
-    """Tries one matrix per iteration, on the same scenarios."""
-
-    def __init__(self, config: ToyConfig) -> None:
-        self.config, self.simulator = config, config.simulator(threads=1)
-        self.scenarios = self.simulator.sample(np.random.default_rng(config.seed), 20)
-
-    def initial_state(self) -> ToyState:
-        shape = (self.simulator.n_actions, self.simulator.n_observations)
-        return ToyState(theta=np.zeros(shape), best=-np.inf)
-
-    def iterate(self, state: ToyState) -> ToyState:
-        rng = np.random.default_rng([self.config.seed, state.iteration])
-        theta = state.theta + self.config.noise * rng.normal(size=state.theta.shape)
-        policy = policy_of(self.config, ToyState(theta=theta, best=0.0))
-        rollouts = self.simulator.rollout(policy, *self.scenarios)
-        score = float(rollouts.returns.mean())
-        point = CurvePoint(
-            mean_return=score,
-            std_return=float(rollouts.returns.std()),
-            success=float(rollouts.success.mean()),
-            environment_steps=state.environment_steps + int(rollouts.steps.sum()),
-            wall_time=state.wall_time,
-        )
-        kept = theta if score > state.best else state.theta
-        return ToyState(theta=kept, best=max(score, state.best), curve=(*state.curve, point))
-
-
-def policy_of(config: ToyConfig, state: ToyState) -> Policy:
-    seen = Normalizer.empty(state.theta.shape[1])
-    return Policy(
-        mean=seen.mean,
-        std=seen.std,
-        layers=(Layer(state.theta, np.zeros(len(state.theta))),),
-        provenance=Provenance.of("toy", config, state.environment_steps),
-    )
-
-
-LEARNER = Learner(
-    name="toy",
-    title="Random search",
-    config=ToyConfig,
-    state=ToyState,
-    recipes={"paper": ToyConfig(recipe="paper")},
-    begin=ToyTraining,
-    policy=policy_of,
-)
+TOY = Path(__file__).resolve().parents[2] / "docs" / "extending" / "toy_learner.py"
 
 
 @pytest.fixture
 def toy(monkeypatch):
-    """The learner of this file, registered."""
-    module = ModuleType("toy_learner")
-    module.LEARNER = LEARNER
+    """The module of the toy, registered."""
+    specification = importlib.util.spec_from_file_location("toy_learner", TOY)
+    module = importlib.util.module_from_spec(specification)
     monkeypatch.setitem(sys.modules, "toy_learner", module)
+    specification.loader.exec_module(module)
     monkeypatch.setattr(learners, "_MODULES", dict(learners._MODULES))
     register_learner("toy", "toy_learner")
-    return LEARNER
+    return module
+
+
+def command(*arguments):
+    """Run ``kinarm-train toy``; returns its exit status."""
+    with pytest.raises(SystemExit) as stopped:
+        train.main(["toy", *map(str, arguments)])
+    return stopped.value.code
 
 
 def test_names():
@@ -127,40 +60,61 @@ def test_unknown_learner():
 
 
 def test_settings_of_nobody():
-    with pytest.raises(InvalidInputError, match="expected settings of ars, ppo, got ToyConfig"):
-        train_policy(ToyConfig())
+    with pytest.raises(InvalidInputError, match="expected settings of ars, ppo, got Training"):
+        train_policy(TrainingConfig())
 
 
-def test_a_learner_of_ones_own_trains(toy):
+def test_the_library_trains_it(toy):
     states = []
-    result = train_policy(recipe("toy", problem="left", seed=4), on_iteration=states.append)
+    config = recipe("toy", problem="left", seed=4, iterations=5)
+    result = train_policy(config, on_iteration=states.append)
     assert [state.iteration for state in states] == [1, 2, 3, 4, 5]
     assert result.policy.provenance.algorithm == "toy"
+    assert result.policy.problem.name == "left"
     assert result.state is states[-1]
-    assert (result.state.theta == result.policy.layers[0].weights).all()
+    assert result.state.score == max(point.mean_return for point in result.curve)
 
 
 @pytest.mark.parametrize("stopped_after", [0, 2, 5])
 def test_its_checkpoints_resume_exactly(toy, tmp_path, stopped_after):
-    config = recipe("toy", noise=0.2)
-    states = [ToyTraining(config).initial_state()]
+    config = recipe("toy", "wide", iterations=5)
+    states = [toy.ToyTraining(config).initial_state()]
     whole = train_policy(config, on_iteration=states.append)
     save_checkpoint(tmp_path / "c.npz", config, states[stopped_after])
     loaded, state = load_checkpoint(tmp_path / "c.npz")
-    assert (loaded, state.iteration, state.best) == (
-        config,
-        stopped_after,
-        states[stopped_after].best,
-    )
+    assert (loaded, state.iteration) == (config, stopped_after)
+    assert state.score == states[stopped_after].score
     resumed = train_policy(loaded, state=state)
-    assert resumed.curve == whole.curve
+    assert [point[:4] for point in resumed.curve] == [point[:4] for point in whole.curve]
     assert resumed.policy.layers[0].weights.tobytes() == whole.policy.layers[0].weights.tobytes()
     assert resumed.policy.provenance == whole.policy.provenance
 
 
+def test_the_command_trains_it_and_goes_on(toy, tmp_path, capsys):
+    out = tmp_path / "p.npz"
+    config = recipe("toy", "wide", iterations=4, seed=3)
+    states = []
+    whole = train_policy(config, on_iteration=states.append)
+    save_checkpoint(tmp_path / "p.checkpoint.npz", config, states[1])
+    assert command("--out", out, "--resume") == 0
+    again = ("--recipe", "wide", "--iterations", 4, "--seed", 3)
+    assert command("--out", tmp_path / "q.npz", *again) == 0
+    for path in (out, tmp_path / "q.npz"):
+        weights = Policy.load(path).layers[0].weights
+        assert weights.tobytes() == whole.policy.layers[0].weights.tobytes()
+    assert "4 iterations" in capsys.readouterr().out
+
+
+def test_its_settings_are_options_with_help(toy, capsys):
+    assert command("--help") == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "--episodes N Episodes whose mean return judges a policy (20)" in text
+    assert "--noise X Standard deviation by which" in text
+
+
 def test_its_states_are_policies(toy):
     config = recipe("toy")
-    state = ToyTraining(config).initial_state()
+    state = toy.ToyTraining(config).initial_state()
     assert state_policy(config, state).provenance.recipe == "paper"
 
 

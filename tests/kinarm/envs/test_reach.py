@@ -15,8 +15,11 @@ import kinarm
 from kinarm.envs.reach import ReachEnv
 from kinarm.envs.registration import ENVIRONMENTS
 from kinarm.errors import InvalidInputError, ProblemError, StartInContactError, UnknownNameError
+from kinarm.observation import observation_table
+from kinarm.problem import ReachProblem
+from kinarm.scene import GoalRegion, Scene
 from kinarm.simulator import Simulator
-from kinarm.task import RewardWeights, load_task
+from kinarm.task import REWARD_TERMS, RewardWeights
 
 HOME = np.zeros(6)
 
@@ -74,6 +77,7 @@ class TestContract:
     def test_goals_lie_on_the_benches_of_the_task(self, name):
         env = gymnasium.make(name)
         env.reset(seed=0)
+        assert env.unwrapped.simulator.problem == ReachProblem.load(ENVIRONMENTS[name])
         sides = {float(np.sign(env.reset()[0][1])) for _ in range(30)}
         expected = {"left": {1.0}, "right": {-1.0}, "both": {-1.0, 1.0}}
         assert sides == expected[ENVIRONMENTS[name]]
@@ -85,8 +89,28 @@ class TestSpaces:
         assert env.observation_space.shape == (48,)
         assert env.observation_space.dtype == np.float64
 
+    def test_are_those_of_the_table(self, env):
+        task, reach = env.simulator.task, env.simulator.arm.reach
+        region = env.simulator.scene.goal_region("right")
+        margin = np.full(3, task.tolerance)
+        lower, upper = env.observation_space.low, env.observation_space.high
+        np.testing.assert_allclose(lower[:3], region.lower - margin)
+        np.testing.assert_allclose(upper[:3], region.upper + margin)
+        np.testing.assert_allclose(lower[3:6], region.lower - margin - reach)
+        np.testing.assert_allclose(upper[3:6], region.upper + margin + reach)
+        np.testing.assert_allclose([lower[30:], upper[30:]], [[-reach] * 18, [reach] * 18])
+
+    def test_follow_the_goal_regions(self):
+        thick = GoalRegion(name="thick", lower=(0.2, -0.2, 0.2), upper=(0.6, 0.2, 0.9))
+        scene = Scene(obstacles=(), goal_regions=(thick, *Scene().goal_regions))
+        env = ReachEnv("left", scene=scene, goal_regions=("thick", "left"), tolerance=0.1)
+        np.testing.assert_allclose(env.observation_space.low[:3], [-0.6, -0.3, 0.1])
+        np.testing.assert_allclose(env.observation_space.high[:3], [0.7, 0.85, 1.0])
+        for seed in range(20):
+            assert env.observation_space.contains(env.reset(seed=seed)[0])
+
     def test_follow_the_arm(self, mesh_arm):
-        env = ReachEnv("both", mesh_arm)
+        env = ReachEnv("both", arm=mesh_arm)
         assert env.observation_space.shape == (6 + 7 * 4,)
         assert env.action_space.shape == (4,)
         observation, _ = env.reset(seed=0)
@@ -110,7 +134,7 @@ class TestEpisode:
             "success",
             "collision",
             "contact",
-            *(f"reward_{term}" for term in ("progress", "closer", "collision", "success", "step")),
+            *(f"reward_{term}" for term in REWARD_TERMS),
         }
         assert reward == sum(value for key, value in info.items() if key.startswith("reward_"))
         angle = math.radians(7)
@@ -210,10 +234,18 @@ class TestSettings:
         assert results[-1][3]
         assert results[0][1] == pytest.approx(-0.1)
 
-    def test_reward_object_and_task_object(self):
-        env = ReachEnv(load_task("both", horizon=5), reward=RewardWeights(progress=3))
-        assert env.simulator.task.horizon == 5
-        assert env.simulator.task.reward.progress == 3
+    def test_problem_and_reward_objects(self):
+        problem = ReachProblem.load("both").replace(horizon=5)
+        env = ReachEnv(problem, reward=RewardWeights(progress=3))
+        assert env.simulator.problem == problem.replace(reward={"progress": 3})
+
+    def test_problem_file(self, tmp_path):
+        problem = ReachProblem.load("both").replace(name="file", time_step=0.01)
+        problem.save(tmp_path / "file.toml")
+        for given in (tmp_path / "file.toml", str(tmp_path / "file.toml")):
+            assert ReachEnv(given).simulator.problem == problem
+            made = gymnasium.make("kinarm/ReachLeft-v0", problem=given)
+            assert made.unwrapped.simulator.problem == problem
 
     def test_settings_survive_the_spec(self):
         env = gymnasium.make("kinarm/ReachBoth-v0", horizon=9, reward={"success": 1.0})
@@ -225,7 +257,10 @@ class TestSettings:
     @pytest.mark.parametrize(
         ("settings", "error", "message"),
         [
+            ({"problem": "up"}, UnknownNameError, "'up'"),
             ({"task": "up"}, UnknownNameError, "'up'"),
+            ({"horizons": 3}, UnknownNameError, "setting of a problem 'horizons'"),
+            ({"reward": {"collision": 1}}, ProblemError, "rewards contact"),
             ({"arm": "nope"}, UnknownNameError, "'nope'"),
             ({"horizon": 0}, InvalidInputError, "horizon"),
             ({"start_spread": 2}, ProblemError, "start_spread"),
@@ -241,6 +276,13 @@ class TestSettings:
     def test_documented(self):
         for words in ("Observation", "Reward", "Versions", "metres", "terminated"):
             assert words in ReachEnv.__doc__
+        for term in REWARD_TERMS:
+            assert f"``reward_{term}``" in ReachEnv.__doc__
+
+    def test_docstring_holds_the_table_of_the_observation(self):
+        words = " ".join(ReachEnv.__doc__.split())
+        for row in observation_table(6):
+            assert " ".join(row) in words
 
 
 class TestErrors:

@@ -170,10 +170,10 @@ class TestSeeding:
     def test_threads_do_not_matter(self):
         results = []
         for threads in (1, 2):
-            batch = ReachVectorEnv(2048, task="both", threads=threads)
+            batch = ReachVectorEnv(1100, "both", threads=threads)
             seen = [batch.reset(seed=1)[0]]
             rng = np.random.default_rng(4)
-            seen += [batch.step(rng.uniform(-1, 1, (2048, 5)))[0] for _ in range(5)]
+            seen += [batch.step(rng.uniform(-1, 1, (1100, 5)))[0] for _ in range(5)]
             results.append(np.array(seen))
         np.testing.assert_array_equal(*results)
 
@@ -216,6 +216,8 @@ class TestErrors:
             ({"num_envs": 0}, "num_envs must be a whole number of at least 1"),
             ({"autoreset_mode": "Later"}, "autoreset_mode must be one of.*NextStep.*'Later'"),
             ({"render_mode": "human"}, "render_mode must be None"),
+            ({"problem": "up"}, "unknown problem 'up'"),
+            ({"horizons": 3}, "unknown setting of a problem 'horizons'"),
         ],
     )
     def test_bad_settings(self, settings, message):
@@ -240,6 +242,12 @@ class TestErrors:
         batch.reset(seed=0)
         with pytest.raises(InvalidInputError, match="actions must"):
             batch.step(actions)
+
+
+def test_problems_and_overrides_are_those_of_single_environments():
+    settings = {"arm": "paper_flange", "reward": {"success": 2.0}, "horizon": 5}
+    batch = ReachVectorEnv(2, "both", **settings)
+    assert batch.simulator.problem == ReachEnv("both", **settings).simulator.problem
 
 
 def test_spaces_are_batched():

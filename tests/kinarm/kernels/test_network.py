@@ -1,0 +1,109 @@
+"""Compiled networks of all widths and functions, mirrored or not, against NumPy."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numba import njit
+
+from kinarm.kernels.network import NARROW, act
+from kinarm.networks import Mirror, Networks, network_control
+
+FUNCTIONS = {"linear": lambda x: x, "tanh": np.tanh, "relu": lambda x: np.where(x > 0, x, 0.0)}
+
+
+@njit
+def act_all(control, observations, work, actions):
+    for e in range(len(observations)):
+        act(control, observations, e, work, actions[e])
+
+
+def compiled(networks, observations):
+    """Actions of networks, one for each observation or one for all."""
+    count, widths = len(observations), (networks.layers[0], networks.layers[-1])
+    control = network_control(networks, None, count, widths)
+    actions = np.full((count, widths[1]), np.nan)
+    act_all(control, observations, np.full((3, max(networks.layers)), np.nan), actions)
+    return actions
+
+
+def random_networks(widths, count=1, seed=0, **settings):
+    rng = np.random.default_rng(seed)
+    parts = [rng.normal(size=(count, (i + 1) * o)) / np.sqrt(i) for i, o in pairwise(widths)]
+    return Networks(np.array(widths), np.concatenate(parts, axis=1), **settings)
+
+
+def in_numpy(networks, x, index=0):
+    """What a network answers, clipped, without a mirror."""
+    start = 0
+    for n_in, n_out in pairwise(networks.layers):
+        part = networks.weights[index, start : start + (n_in + 1) * n_out].reshape(n_in + 1, n_out)
+        x = (FUNCTIONS[networks.activation](x) if start else x) @ part[:-1] + part[-1]
+        start += part.size
+    return np.clip(FUNCTIONS[networks.output](x), -1, 1)
+
+
+@pytest.mark.parametrize("n_actions", [1, 4, 6])
+@pytest.mark.parametrize("width", [3, NARROW - 1, NARROW, 40])
+def test_layers_of_any_width(n_actions, width):
+    """Narrow and wide layers take different ways through the kernel."""
+    networks = random_networks([9, width, width + 1, n_actions])
+    x = np.random.default_rng(width).normal(size=(20, 9))
+    actions = compiled(networks, x)
+    np.testing.assert_allclose(actions, in_numpy(networks, x), rtol=0, atol=1e-12)
+    assert (np.abs(actions) < 1).any()
+
+
+@pytest.mark.parametrize("output", FUNCTIONS)
+@pytest.mark.parametrize("activation", FUNCTIONS)
+@pytest.mark.parametrize("hidden", [(), (7,), (20, 6)])
+def test_functions_between_and_after_the_layers(hidden, activation, output):
+    networks = random_networks([8, *hidden, 5], activation=activation, output=output)
+    x = np.random.default_rng(1).normal(size=(50, 8))
+    expected = in_numpy(networks, x)
+    np.testing.assert_allclose(compiled(networks, x), expected, rtol=0, atol=1e-12)
+    assert expected.std() > 0.1
+
+
+def test_each_observation_has_its_own_network():
+    networks = random_networks([6, 5, 3], count=10)
+    x = np.random.default_rng(2).normal(size=(10, 6))
+    expected = [in_numpy(networks, row, index) for index, row in enumerate(x)]
+    np.testing.assert_allclose(compiled(networks, x), expected, rtol=0, atol=1e-12)
+
+
+class TestMirror:
+    """The y of the goal, entry 1, tells the side: positive is left."""
+
+    @pytest.fixture
+    def mirror(self):
+        return Mirror(np.array([1.0, -1, 1, -1, 1, 1, -1]), np.array([-1.0, 1, -1]))
+
+    @pytest.mark.parametrize("hidden", [(), (6,), (20, 5)])
+    @pytest.mark.parametrize(("activation", "output"), [("tanh", "linear"), ("relu", "tanh")])
+    def test_goals_on_the_left_are_seen_in_it(self, mirror, hidden, activation, output):
+        settings = {"activation": activation, "output": output}
+        plain = random_networks([7, *hidden, 3], **settings)
+        mirrored = random_networks([7, *hidden, 3], **settings, mirror=mirror)
+        x = np.random.default_rng(3).normal(size=(60, 7))
+        left = x[:, 1] > 0
+        actions = compiled(mirrored, x)
+        assert 10 < left.sum() < 50
+        np.testing.assert_array_equal(actions[~left], compiled(plain, x)[~left])
+        image = compiled(plain, x * mirror.observations) * mirror.actions
+        np.testing.assert_array_equal(actions[left], image[left])
+        by_hand = in_numpy(plain, x[left] * mirror.observations) * mirror.actions
+        np.testing.assert_allclose(actions[left], by_hand, rtol=0, atol=1e-12)
+
+    def test_a_goal_straight_ahead_is_seen_as_it_is(self, mirror):
+        x = np.random.default_rng(4).normal(size=(5, 7))
+        x[:, 1] = [0.0, -0.0, 0.0, 1e-300, -1e-300]
+        plain, mirrored = random_networks([7, 3]), random_networks([7, 3], mirror=mirror)
+        same = (compiled(plain, x) == compiled(mirrored, x)).all(axis=1)
+        assert same.tolist() == [True, True, True, False, True]
+
+    def test_observations_are_left_as_they_are(self, mirror):
+        x = np.random.default_rng(5).normal(size=(20, 7))
+        kept = x.copy()
+        compiled(random_networks([7, 9, 3], mirror=mirror), x)
+        np.testing.assert_array_equal(x, kept)

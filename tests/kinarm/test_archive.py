@@ -1,0 +1,239 @@
+"""Archives: what is written comes back, and anything else is refused in one line."""
+
+import gc
+import io
+import pickle
+import zipfile
+
+import numpy as np
+import pytest
+
+from kinarm._archive import load_archive, reading, save_archive
+from kinarm.errors import InvalidInputError, OutputError, PolicyFileError, RecordingFileError
+
+ARRAYS = {
+    "numbers": np.linspace(0, 1, 40).reshape(8, 5),
+    "flags": np.array([True, False]),
+    "names": np.array(["a", "é"]),
+    "nothing": np.zeros((0, 3)),
+}
+HEADER = {"name": "né", "count": 3, "list": [1, 2.5, None], "table": {"a": True}}
+
+
+@pytest.fixture
+def saved(tmp_path):
+    """An archive, to be spoilt."""
+    path = tmp_path / "thing.npz"
+    save_archive(path, "test thing", 3, ARRAYS, HEADER)
+    return path
+
+
+def load(path, **changes):
+    expected = {"kind": "test thing", "version": 3, "error": PolicyFileError, **changes}
+    return load_archive(path, **expected)
+
+
+def refused(path, message, **changes):
+    error = changes.get("error", PolicyFileError)
+    with pytest.raises(error, match=message) as caught:
+        load(path, **changes)
+    gc.collect()  # a file left open is reported here, not in a later test
+    assert path.name in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 500
+
+
+def rewritten(path, **changes):
+    """The same archive with some entries replaced, or left out if they are None."""
+    with np.load(path, allow_pickle=False) as file:
+        entries = dict(file) | changes
+    np.savez(path, **{name: entry for name, entry in entries.items() if entry is not None})
+    return path
+
+
+@pytest.mark.parametrize("compress", [False, True])
+def test_what_is_written_comes_back(tmp_path, compress):
+    path = tmp_path / "thing"
+    save_archive(path, "test thing", 3, ARRAYS, HEADER, compress=compress)
+    header, arrays = load(path)
+    assert header == HEADER
+    assert list(arrays) == list(ARRAYS)
+    for name, array in ARRAYS.items():
+        assert arrays[name].dtype == array.dtype
+        np.testing.assert_array_equal(arrays[name], array)
+
+
+def test_same_content_same_bytes(saved, tmp_path):
+    again = tmp_path / "again.npz"
+    save_archive(again, "test thing", 3, ARRAYS, dict(reversed(HEADER.items())))
+    assert again.read_bytes() == saved.read_bytes()
+
+
+def test_numpy_reads_it_without_pickle(saved):
+    with np.load(saved, allow_pickle=False) as file:
+        assert str(file["format"]) == "kinarm-test-thing"
+        assert int(file["version"]) == 3
+        assert all(file[name].dtype != object for name in file.files)
+
+
+def test_a_failed_write_leaves_the_old_file(saved):
+    before = saved.read_bytes()
+    with pytest.raises(TypeError):
+        save_archive(saved, "test thing", 3, ARRAYS, {"name": object()})
+    assert saved.read_bytes() == before
+    assert list(saved.parent.iterdir()) == [saved]
+
+
+def test_missing_folder(tmp_path):
+    with pytest.raises(OutputError, match="cannot write"):
+        save_archive(tmp_path / "gone" / "thing.npz", "test thing", 3, {}, {})
+
+
+class TestMismatch:
+    def test_missing(self, tmp_path):
+        refused(tmp_path / "gone.npz", "cannot read test thing .*No such file")
+
+    def test_folder(self, tmp_path):
+        refused(tmp_path, "cannot read test thing .*directory")
+
+    def test_another_kind(self, saved):
+        refused(saved, "holds 'kinarm-test-thing', not 'kinarm-policy'", kind="policy")
+
+    def test_error_of_the_given_type(self, saved):
+        refused(saved, "holds", kind="recording", error=RecordingFileError)
+
+    @pytest.mark.parametrize(("version", "age"), [(2, "a later"), (4, "an earlier")])
+    def test_another_version(self, saved, version, age):
+        message = f"has format version 3, of {age} kinarm; this one reads {version}"
+        refused(saved, message, version=version)
+
+    def test_foreign_npz(self, saved):
+        np.savez(saved, weights=np.zeros(3))
+        refused(saved, "is not a kinarm test thing")
+
+    def test_npy(self, tmp_path):
+        np.save(tmp_path / "array.npy", np.zeros(3))
+        refused(tmp_path / "array.npy", "is not a kinarm test thing")
+
+    @pytest.mark.parametrize("name", ["version", "header"])
+    def test_missing_entry(self, saved, name):
+        refused(rewritten(saved, **{name: None}), "is not a complete kinarm test thing")
+
+    @pytest.mark.parametrize(
+        ("name", "entry"),
+        [
+            ("version", np.array("one")),
+            ("version", np.zeros(2)),
+            ("version", np.array(np.nan)),
+            ("header", np.array("{")),
+            ("header", np.array("[" * 10_000)),
+            ("header", np.array("[]")),
+            ("header", np.array("3")),
+            ("header", np.zeros(3)),
+            ("format", np.array("something-else")),
+            ("format", np.zeros(3)),
+            ("numbers", np.array([{}], dtype=object)),
+            ("format", np.array([{}], dtype=object)),
+        ],
+    )
+    def test_bad_entry(self, saved, name, entry):
+        refused(rewritten(saved, **{name: entry}), "thing")
+
+
+class TestDamage:
+    @pytest.mark.parametrize("compress", [False, True])
+    def test_truncated_anywhere(self, saved, compress):
+        save_archive(saved, "test thing", 3, ARRAYS, HEADER, compress=compress)
+        content = saved.read_bytes()
+        for length in range(0, len(content), 97):
+            saved.write_bytes(content[:length])
+            with pytest.raises(PolicyFileError, match=f"^[^\n]*{saved.name}[^\n]*$"):
+                load(saved)
+        gc.collect()
+
+    @pytest.mark.parametrize("compress", [False, True])
+    def test_flipped_bits_are_noticed_or_harmless(self, saved, compress):
+        save_archive(saved, "test thing", 3, ARRAYS, HEADER, compress=compress)
+        content = saved.read_bytes()
+        noticed = 0
+        for place in range(0, len(content), 41):
+            spoilt = bytearray(content)
+            spoilt[place] ^= 0xA5
+            saved.write_bytes(spoilt)
+            try:
+                header, arrays = load(saved)
+            except PolicyFileError:
+                noticed += 1
+                continue
+            assert header == HEADER
+            for name in set(arrays) & set(ARRAYS):
+                np.testing.assert_array_equal(arrays[name], ARRAYS[name])
+        gc.collect()
+        assert noticed > 20
+
+    def test_random_bytes_in_place_of_entries(self, saved):
+        rng = np.random.default_rng(0)
+        for name in ("format.npy", "version.npy", "header.npy"):
+            content = {entry: zipfile.ZipFile(saved).read(entry) for entry in names_of(saved)}
+            content[name] = rng.bytes(200)
+            spoilt = saved.with_name(f"spoilt-{name}.npz")
+            with zipfile.ZipFile(spoilt, "w") as file:
+                for entry, data in content.items():
+                    file.writestr(entry, data)
+            refused(spoilt, "thing")
+
+    @pytest.mark.parametrize(
+        "content",
+        [
+            b"",
+            b"hello\n",
+            b"\x00" * 100,
+            b"PK\x03\x04junk",
+            b"\x93NUMPY\x01\x00",
+            pickle.dumps({"format": "kinarm-test-thing"}),
+        ],
+    )
+    def test_other_content(self, saved, content):
+        saved.write_bytes(content)
+        refused(saved, "thing")
+
+    def test_pickles_are_never_run(self, saved, tmp_path):
+        class Trap:
+            def __reduce__(self):
+                return (tmp_path.joinpath("sprung").write_text, ("",))
+
+        array = io.BytesIO()
+        np.save(array, np.array([Trap()], dtype=object), allow_pickle=True)
+        with zipfile.ZipFile(saved, "a") as file:
+            file.writestr("trap.npy", array.getvalue())
+        refused(saved, "thing")
+        saved.write_bytes(pickle.dumps(Trap()))
+        refused(saved, "thing")
+        assert not (tmp_path / "sprung").exists()
+
+
+def names_of(path):
+    with zipfile.ZipFile(path) as file:
+        return file.namelist()
+
+
+class TestReading:
+    @pytest.mark.parametrize(
+        ("raised", "message"),
+        [
+            (KeyError("mean"), "'a' is not a complete kinarm policy: 'mean'"),
+            (ValueError("one\ntwo"), "'a' is not a complete kinarm policy: one"),
+            (InvalidInputError("bad"), "'a' is not a complete kinarm policy: bad"),
+            (FileNotFoundError(2, "gone"), "cannot read policy 'a': gone"),
+            (PolicyFileError("as it is"), "as it is"),
+        ],
+    )
+    def test_turns_what_is_raised_into_one_line(self, raised, message):
+        with pytest.raises(PolicyFileError) as caught, reading("'a'", "policy", PolicyFileError):
+            raise raised
+        assert str(caught.value) == message
+
+    @pytest.mark.parametrize("raised", [KeyboardInterrupt, AssertionError])
+    def test_lets_other_things_pass(self, raised):
+        with pytest.raises(raised), reading("'a'", "policy", PolicyFileError):
+            raise raised

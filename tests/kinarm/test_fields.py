@@ -1,0 +1,277 @@
+"""Dataclasses from plain values and back, and what their docstrings say about them."""
+
+import json
+import math
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kinarm._fields import (
+    check_fields,
+    expected,
+    field_docs,
+    from_plain,
+    init_fields,
+    summary_of,
+    to_plain,
+    to_toml,
+)
+from kinarm.errors import InvalidInputError, ProblemError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wheel:
+    """A wheel.
+
+    Parameters
+    ----------
+    radius : float
+        From the hub to the ground [m]. Larger ones are slower.
+    spokes : int
+        Number of spokes.
+    """
+
+    radius: float
+    spokes: int = 28
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if self.radius <= 0:
+            raise ProblemError(f"radius must be above 0 m, got {self.radius}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bicycle:
+    """A bicycle.
+
+    Parameters
+    ----------
+    name : str
+        What it is called.
+    wheels : tuple of Wheel
+        Front and rear.
+    saddle, handlebar : tuple of float
+        Where they are [m].
+    gears : tuple of int
+        Teeth of each.
+    colour : {"red", "blue"}
+        Colour of the frame.
+    bell : bool
+        Whether it has one.
+    picture : Path
+        File that shows it.
+    spare : Wheel, optional
+        Another wheel.
+    notes : dict
+        Anything else.
+
+    Raises
+    ------
+    ProblemError
+        Never.
+    """
+
+    name: str
+    wheels: tuple[Wheel, ...] = ()
+    saddle: tuple[float, float] = (0.0, 1.0)
+    handlebar: tuple[float, float] = (0.5, 1.0)
+    gears: tuple[int, ...] = (11, 13)
+    colour: Literal["red", "blue"] = "red"
+    bell: bool = True
+    picture: Path | None = None
+    spare: Wheel | None = None
+    notes: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tandem(Bicycle):
+    """A bicycle for two.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the riders.
+    """
+
+    names: tuple[str, ...] = ("a", "b")
+
+
+wheels = st.builds(Wheel, radius=st.floats(1e-6, 1e6), spokes=st.integers(-(2**63), 2**63 - 1))
+numbers = st.floats(allow_nan=False, allow_infinity=False)
+bicycles = st.builds(
+    Bicycle,
+    name=st.text(),
+    wheels=st.lists(wheels, max_size=3).map(tuple),
+    saddle=st.tuples(numbers, numbers),
+    gears=st.lists(st.integers(-(2**63), 2**63 - 1)).map(tuple),
+    colour=st.sampled_from(["red", "blue"]),
+    bell=st.booleans(),
+    picture=st.none() | st.text("abc/. ", min_size=1).map(Path),
+    spare=st.none() | wheels,
+)
+
+
+class TestRoundTrip:
+    @given(bicycles)
+    def test_json_and_toml_are_without_loss(self, bicycle):
+        plain = to_plain(bicycle)
+        assert from_plain(Bicycle, json.loads(json.dumps(plain)), "it") == bicycle
+        assert from_plain(Bicycle, tomllib.loads(to_toml(plain)), "it") == bicycle
+
+    def test_what_is_none_is_left_out(self):
+        assert to_plain(Bicycle(name="a", bell=False)) == {
+            "name": "a",
+            "wheels": [],
+            "saddle": [0.0, 1.0],
+            "handlebar": [0.5, 1.0],
+            "gears": [11, 13],
+            "colour": "red",
+            "bell": False,
+            "notes": {},
+        }
+
+    def test_values_of_numpy_are_those_of_python(self):
+        plain = to_plain({"a": np.float64(0.5), "b": (np.int64(3), np.bool_(True)), 5: Path("x")})
+        assert plain == {"a": 0.5, "b": [3, True], "5": "x"}
+        assert [type(entry) for entry in (plain["a"], *plain["b"])] == [float, int, bool]
+
+    def test_toml_has_values_before_tables(self):
+        text = to_toml({"table": {"b": 1, "rows": [{"c": 2}, {"c": 3}]}, "a": [1.5], "d": []})
+        assert text == (
+            "a = [1.5]\nd = []\n\n[table]\nb = 1\n"
+            "\n[[table.rows]]\nc = 2\n\n[[table.rows]]\nc = 3\n"
+        )
+
+
+class TestFromPlain:
+    def build(self, **changes):
+        return from_plain(Bicycle, {"name": "a", **changes}, "shed.toml")
+
+    def test_what_is_missing_has_its_default(self):
+        assert self.build() == Bicycle(name="a")
+
+    def test_nested(self):
+        made = self.build(wheels=[{"radius": 1}, {"radius": 0.5, "spokes": 3}], spare={"radius": 2})
+        assert made.wheels == (Wheel(radius=1.0), Wheel(radius=0.5, spokes=3))
+        assert made.spare == Wheel(radius=2)
+
+    @pytest.mark.parametrize(
+        ("changes", "message"),
+        [
+            ({"pedals": 2}, "unknown key 'pedals'; available: name, wheels, saddle"),
+            ({"name": 3}, "name must be a text, got 3"),
+            ({"gears": [1, 2.5]}, r"gears\[1\] must be a whole number, got 2.5"),
+            ({"gears": [True]}, r"gears\[0\] must be a whole number, got True"),
+            ({"gears": 11}, "gears must be a list, each entry a whole number, got 11"),
+            ({"gears": "11"}, "gears must be a list, each entry a whole number, got '11'"),
+            ({"saddle": [1]}, r"saddle must be a list of 2, each a number \[m\], got \[1\]"),
+            ({"handlebar": [1, "x"]}, r"handlebar\[1\] must be a number \[m\], got 'x'"),
+            ({"colour": "pink"}, "colour must be one of red, blue, got 'pink'"),
+            ({"colour": ["red"]}, "colour must be one of red, blue"),
+            ({"bell": 1}, "bell must be true or false, got 1"),
+            ({"picture": 1}, "picture must be a path, got 1"),
+            ({"spare": 1}, "spare must be a table, got 1"),
+            ({"notes": []}, r"notes must be a table, got \[\]"),
+            ({"wheels": [{"spokes": 3}]}, r"'wheels\[0\].radius' is missing: From the hub to"),
+            ({"wheels": [{"radius": 1, "rim": 1}]}, r"unknown key 'wheels\[0\].rim'; av.*radius"),
+            ({"wheels": [{"radius": "x"}]}, r"wheels\[0\].radius must be a number \[m\], got 'x'"),
+            ({"wheels": [1]}, r"wheels\[0\] must be a table, got 1"),
+            ({"wheels": [{"radius": -1}]}, r"wheels\[0\]: radius must be above 0 m, got -1"),
+            ({"spare": {"radius": 0}}, "spare: radius must be above 0 m, got 0"),
+            ({"saddle": [0, 10**400]}, r"saddle\[1\] must be a number"),
+        ],
+    )
+    def test_one_line_names_source_key_and_what_is_expected(self, changes, message):
+        with pytest.raises(InvalidInputError, match=f"^shed.toml: {message}") as caught:
+            self.build(**changes)
+        assert "\n" not in str(caught.value)
+
+    def test_missing_key(self):
+        with pytest.raises(InvalidInputError, match=r"^it: 'name' is missing: What it is called$"):
+            from_plain(Bicycle, {}, "it")
+
+    @pytest.mark.parametrize("entries", [3, None, "name", [("name", "a")]])
+    def test_no_table(self, entries):
+        with pytest.raises(InvalidInputError, match="^it: it must be a table, got"):
+            from_plain(Bicycle, entries, "it")
+
+
+class TestCheckFields:
+    def test_values_become_what_is_annotated(self):
+        made = Bicycle(
+            name="a",
+            wheels=[Wheel(radius=1), {"radius": 2}],
+            saddle=np.array([1, 2]),
+            gears=[np.int64(11)],
+            bell=np.bool_(False),
+            picture="a.png",
+        )
+        assert made == Bicycle(
+            name="a",
+            wheels=(Wheel(radius=1.0), Wheel(radius=2.0)),
+            saddle=(1.0, 2.0),
+            gears=(11,),
+            bell=False,
+            picture=Path("a.png"),
+        )
+        assert type(made.gears[0]) is int
+        assert type(made.saddle[0]) is float
+
+    def test_zeros_lose_their_sign(self):
+        assert math.copysign(1, Bicycle(name="a", saddle=(-0.0, 0)).saddle[0]) == 1
+
+    @pytest.mark.parametrize(
+        ("changes", "message"),
+        [
+            ({"name": None}, "^name must be a text, got None"),
+            ({"colour": "pink"}, "^colour must be one of red, blue, got 'pink'"),
+            ({"saddle": np.zeros(3)}, r"^saddle must be a list of 2, each a number \[m\]"),
+            ({"gears": (11.0,)}, r"^gears\[0\] must be a whole number, got 11.0"),
+            ({"spare": Bicycle(name="b")}, "^spare must be a table, got Bicycle"),
+        ],
+    )
+    def test_wrong_types_are_refused(self, changes, message):
+        with pytest.raises(InvalidInputError, match=message):
+            Bicycle(**{"name": "a", **changes})
+
+
+class TestDocs:
+    def test_descriptions_of_the_fields(self):
+        docs = field_docs(Bicycle)
+        assert list(docs) == list(init_fields(Bicycle))
+        assert docs["saddle"] == docs["handlebar"] == "Where they are [m]."
+        assert docs["notes"] == "Anything else."
+
+    def test_bases_count(self):
+        assert field_docs(Tandem)["names"] == "Of the riders."
+        assert field_docs(Tandem)["bell"] == "Whether it has one."
+
+    def test_summaries_are_first_sentences(self):
+        assert summary_of(Wheel, "radius") == "From the hub to the ground [m]"
+        assert summary_of(Bicycle, "unheard_of") == "unheard_of"
+
+    @pytest.mark.parametrize(
+        ("hint", "words"),
+        [
+            (int, "a whole number"),
+            (float, "a number"),
+            (str, "a text"),
+            (bool, "true or false"),
+            (Path, "a path"),
+            (Wheel, "a table"),
+            (tuple[float, float], "a list of 2, each a number"),
+            (tuple[str, ...], "a list, each entry a text"),
+            (Literal["a", "b"], "one of a, b"),
+        ],
+    )
+    def test_types_in_words(self, hint, words):
+        assert expected(hint) == words
