@@ -8,19 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from kinarm.arm import Arm
+from kinarm._files import first_line
+from kinarm._validation import finite_array
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.bounds import bounds_document
+from kinarm.evaluation.entrants import check_names
 from kinarm.evaluation.evaluation import Evaluation, pool
 from kinarm.evaluation.statistics import BOOTSTRAP_SEED, LEVEL, RESAMPLES
 from kinarm.evaluation.trials import TrialSet
-from kinarm.files import first_line
 from kinarm.policies.library import group_of
 from kinarm.policies.provenance import package_versions, source_commit
+from kinarm.problem import ReachProblem
 from kinarm.recording import Recording
 from kinarm.simulator import Simulator
-from kinarm.task import load_task
-from kinarm.validation import finite_array
 
 FORMAT_VERSION = 2
 
@@ -34,29 +34,31 @@ def evaluation_document(evaluations: Sequence[Evaluation], command: str) -> dict
     Parameters
     ----------
     evaluations : sequence of Evaluation
-        Made with one trial set per task.
+        Made with one trial set per problem.
     command : str
         The command that made them.
 
     Returns
     -------
     dict
-        ``protocol`` (trials per task with their hash and bounds, arm, versions, commit, command),
-        ``results`` (one per policy and task, with the outcome of every trial) and ``pooled``
-        (one per recipe and task with several training seeds).
+        ``protocol`` (problems, their trials with hash and bounds, versions, commit, command),
+        ``results`` (one per policy and problem, with the outcome of every trial) and ``pooled``
+        (one per recipe and problem with several training seeds).
+
+    Raises
+    ------
+    InvalidInputError
+        If two policies on a problem, or two problems, have the same name.
     """
-    trial_sets = {e.task: e.trials for e in evaluations}
-    bounds = {e.task: bounds_document(e.bounds) for e in evaluations if e.bounds is not None}
+    check_names((each.entrant, each.problem) for each in evaluations)
     any_set = evaluations[0].trials
-    arm = any_set.simulator.arm
+    facing = {each.problem.name: each for each in reversed(evaluations)}
     return {
         "protocol": {
             "format_version": FORMAT_VERSION,
             "command": command,
             "trials": len(any_set),
             "seed": any_set.seed,
-            "arm": arm.name,
-            "arm_digest": arm.digest,
             "intervals": {
                 "level": LEVEL,
                 "shares": "Wilson",
@@ -64,22 +66,26 @@ def evaluation_document(evaluations: Sequence[Evaluation], command: str) -> dict
                 "resamples": RESAMPLES,
                 "bootstrap_seed": BOOTSTRAP_SEED,
             },
-            "tasks": {
-                task: {
-                    "trial_set_hash": trials.digest,
-                    "tolerance": trials.simulator.task.tolerance,
-                    "horizon": trials.simulator.task.horizon,
-                    "starts": trials.starts.tolist(),
-                    "goals": trials.goals.tolist(),
-                    "oracle": bounds.get(task),
-                }
-                for task, trials in trial_sets.items()
-            },
+            "problems": {name: _problem_entry(facing[name]) for name in reversed(facing)},
             "versions": package_versions(),
             "commit": source_commit(),
         },
         "results": [evaluation.to_json() for evaluation in evaluations],
         "pooled": [pooled.to_json() for pooled in pool(evaluations)],
+    }
+
+
+def _problem_entry(evaluation: Evaluation) -> dict[str, Any]:
+    """What was faced, and what any policy could do there."""
+    trials, bounds = evaluation.trials, evaluation.bounds
+    return {
+        "arm": trials.simulator.arm.name,
+        "problem": trials.problem.pinned.to_json(),
+        "digest": trials.problem.digest,
+        "trial_set_hash": trials.digest,
+        "starts": trials.starts.tolist(),
+        "goals": trials.goals.tolist(),
+        "oracle": bounds_document(bounds) if bounds is not None else None,
     }
 
 
@@ -92,9 +98,9 @@ class EvaluationDocument:
     name : str
         Name of the file.
     protocol : dict
-        Arm and trials.
+        Problems and trials.
     results : list of dict
-        One for each policy and task.
+        One for each policy and problem.
     """
 
     name: str
@@ -108,7 +114,7 @@ class EvaluationDocument:
         Raises
         ------
         InvalidInputError
-            If the file is missing, damaged, something else, or written by a later version.
+            If the file is missing, damaged, something else, or of another version.
         """
         name = str(path)
         try:
@@ -120,7 +126,7 @@ class EvaluationDocument:
                 check_document(content)
         except OSError as error:
             raise InvalidInputError(f"cannot read {name!r}: {error.strerror}") from error
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise InvalidInputError(
                 f"{name!r} is not an evaluation of kinarm-eval: {first_line(error)}"
             ) from error
@@ -130,59 +136,64 @@ class EvaluationDocument:
             )
         return cls(name, content["protocol"], content["results"])
 
-    def result(self, policy: str | None, task: str | None) -> dict[str, Any]:
-        """Find the result of a policy, or of a group's first seed, on a task.
+    def result(self, policy: str | None, problem: str | None) -> dict[str, Any]:
+        """Find the result of a policy, or of a group's first seed, on a problem.
 
         Raises
         ------
         InvalidInputError
             If there is none, or several that fit.
         """
-        fitting = [row for row in self.results if task in (None, row["task"])]
+        fitting = [row for row in self.results if problem in (None, row["problem"])]
         if policy is None:
             named = [row for row in fitting if row["trained_on"] is not None] or fitting
             if len(named) != 1:
-                choices = ", ".join(f"{row['policy']} on {row['task']}" for row in named)
+                choices = ", ".join(f"{row['policy']} on {row['problem']}" for row in named)
                 raise InvalidInputError(
-                    f"{self.name!r} holds several results, choose with --policy and --task: "
-                    f"{choices or 'none on this task'}"
+                    f"{self.name!r} holds several results, choose with --policy and --problem: "
+                    f"{choices or 'none on this problem'}"
                 )
             return named[0]
-        for same in (
-            lambda row: row["policy"] == policy,
-            lambda row: group_of(row["policy"]) == policy,
-        ):
+        for known_as in (str, group_of):
             for row in fitting:
-                if same(row):
+                if known_as(row["policy"]) == policy:
                     return row
         raise UnknownNameError("policy", policy, dict.fromkeys(row["policy"] for row in fitting))
 
-    def trials(self, task: str, arm: Arm) -> TrialSet:
-        """The trials of a task, as they were faced.
+    def problem(self, name: str) -> ReachProblem:
+        """One of the problems that were faced.
 
         Raises
         ------
         InvalidInputError
-            If the arm is another one, or starts and goals do not match their hash.
+            If it cannot be read.
         """
-        protocol, entry = self.protocol, self.protocol["tasks"][task]
-        if protocol["arm_digest"] != arm.digest:
-            raise InvalidInputError(
-                f"{self.name!r} is of arm {protocol['arm']!r} ({protocol['arm_digest']}), "
-                f"not of {arm.name!r} ({arm.digest})"
-            )
-        rules = load_task(task, tolerance=entry["tolerance"], horizon=entry["horizon"])
+        entry = self.protocol["problems"][name]
+        return ReachProblem.from_json(entry["problem"], f"{self.name}: problem {name}")
+
+    def trials(self, problem: str) -> TrialSet:
+        """The trials of a problem, as they were faced.
+
+        Raises
+        ------
+        InvalidInputError
+            If problem, starts and goals do not match their hash.
+        KinarmError
+            If the arm is missing or another one by now.
+        """
+        entry = self.protocol["problems"][problem]
+        simulator = Simulator(self.problem(problem))
         starts, goals = np.array(entry["starts"]), np.array(entry["goals"])
-        trials = TrialSet(Simulator(arm, rules), protocol["seed"], starts, goals)
+        trials = TrialSet(simulator, self.protocol["seed"], starts, goals)
         if trials.digest != entry["trial_set_hash"]:
             raise InvalidInputError(
-                f"the trials of {task} in {self.name!r} do not match their hash"
+                f"the trials of {problem} in {self.name!r} do not match their hash"
             )
         return trials
 
-    def floors(self, task: str) -> list[int] | None:
-        """Proven numbers of steps of a task's trials, if the evaluation had them."""
-        oracle = self.protocol["tasks"][task]["oracle"]
+    def floors(self, problem: str) -> list[int] | None:
+        """Proven numbers of steps of a problem's trials, if the evaluation had them."""
+        oracle = self.protocol["problems"][problem]["oracle"]
         return oracle["trials"]["steps_lower_bound"] if oracle else None
 
     def check_same(self, row: dict[str, Any], recordings: list[Recording]) -> None:
@@ -203,20 +214,17 @@ class EvaluationDocument:
                 )
 
 
-NUMBER, NULL = (int, float), type(None)
+NULL = type(None)
 
-PROTOCOL_FIELDS = {"arm": str, "arm_digest": str, "seed": int, "tasks": dict}
-
-TASK_FIELDS = {
+PROBLEM_FIELDS = {
+    "problem": dict,
     "trial_set_hash": str,
-    "tolerance": NUMBER,
-    "horizon": int,
     "starts": list,
     "goals": list,
     "oracle": (dict, NULL),
 }
 
-RESULT_FIELDS = {"policy": str, "task": str, "trained_on": (str, NULL), "outcomes": dict}
+RESULT_FIELDS = {"policy": str, "problem": str, "trained_on": (str, NULL), "outcomes": dict}
 
 
 def check_document(content: dict[str, Any]) -> None:
@@ -232,18 +240,21 @@ def check_document(content: dict[str, Any]) -> None:
     InvalidInputError
         If something is missing or of another kind, with the place where that is.
     """
-    protocol = content["protocol"]
-    check_fields("protocol", protocol, PROTOCOL_FIELDS)
-    for task, entry in protocol["tasks"].items():
-        check_fields(f"task {task!r}", entry, TASK_FIELDS)
+    problems = content["protocol"].get("problems")
+    check_fields("protocol", content["protocol"], {"seed": int, "problems": dict})
+    for name, entry in problems.items():
+        check_fields(f"problem {name!r}", entry, PROBLEM_FIELDS)
         for part in ("starts", "goals"):
-            finite_array(f"{part} of {task!r}", entry[part], (None, None))
+            finite_array(f"{part} of {name!r}", entry[part], (None, None))
+        if entry["oracle"]:
+            check_fields(f"oracle of {name!r}", entry["oracle"], {"trials": dict})
+            check_fields("its trials", entry["oracle"]["trials"], {"steps_lower_bound": list})
     for number, row in enumerate(content["results"]):
         where = f"result {number}"
         check_fields(where, row, RESULT_FIELDS)
         check_fields(where, row["outcomes"], dict.fromkeys(ENDS, list))
-        if row["task"] not in protocol["tasks"]:
-            raise InvalidInputError(f"{where} is of the unknown task {row['task']!r}")
+        if row["problem"] not in problems:
+            raise InvalidInputError(f"{where} is of the unknown problem {row['problem']!r}")
         if len({len(row["outcomes"][part]) for part in ENDS}) > 1:
             raise InvalidInputError(f"{where} has outcomes of different lengths")
 

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.arm import DEFAULT_ARM, Arm
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.entrants import Entrant, find_entrants
@@ -18,14 +17,14 @@ from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle.solution import OracleSolutions
 from kinarm.policies.policy import Policy
+from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.rollouts import Rollouts
-from kinarm.simulator import PolicyFunction, Simulator
-from kinarm.task import ReachTask
+from kinarm.simulator import PolicyFunction
 
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """How one policy did on one task.
+    """How one policy did on one problem.
 
     Attributes
     ----------
@@ -45,9 +44,9 @@ class Evaluation:
     bounds: OracleSolutions | None = None
 
     @property
-    def task(self) -> str:
-        """Name of the task."""
-        return self.trials.simulator.task.name
+    def problem(self) -> ReachProblem:
+        """What was faced."""
+        return self.trials.problem
 
     @cached_property
     def metrics(self) -> dict[str, Estimate]:
@@ -86,14 +85,14 @@ class Evaluation:
 
     @property
     def outcomes(self) -> tuple[str, ...]:
-        """``"success"``, ``"collision"`` or ``"horizon"``, per trial."""
+        """``"success"``, ``"collision"`` or ``"truncated"``, per trial."""
         codes = self.rollouts.success + 2 * self.rollouts.collision
-        return tuple(("horizon", "success", "collision")[code] for code in codes)
+        return tuple(("truncated", "success", "collision")[code] for code in codes)
 
     def to_json(self) -> dict[str, Any]:
         """Figures of merit and every trial, as a dictionary that JSON can hold."""
         return {
-            **_rows_head(self.entrant.name, self.entrant, self.task),
+            **_rows_head(self.entrant.name, self.entrant, self.problem),
             "training_seed": self.entrant.seed,
             "trials": len(self.trials),
             "metrics": _metrics_json(self.metrics),
@@ -125,9 +124,9 @@ class PooledEvaluation:
     members: tuple[Evaluation, ...]
 
     @property
-    def task(self) -> str:
-        """Name of the task."""
-        return self.members[0].task
+    def problem(self) -> ReachProblem:
+        """What was faced."""
+        return self.members[0].problem
 
     @property
     def success_rates(self) -> tuple[float, ...]:
@@ -155,7 +154,7 @@ class PooledEvaluation:
     def to_json(self) -> dict[str, Any]:
         """Figures of merit as a dictionary that JSON can hold."""
         return {
-            **_rows_head(self.name, self.members[0].entrant, self.task),
+            **_rows_head(self.name, self.members[0].entrant, self.problem),
             "members": [member.entrant.name for member in self.members],
             "training_seeds": [member.entrant.seed for member in self.members],
             "trials": len(self.members[0].trials),
@@ -169,14 +168,14 @@ class PooledEvaluation:
         return f"PooledEvaluation({len(self.members)} seeds of {summary})"
 
 
-def _rows_head(name: str, entrant: Entrant, task: str) -> dict[str, Any]:
+def _rows_head(name: str, entrant: Entrant, problem: ReachProblem) -> dict[str, Any]:
     """What a row of a document is about."""
     return {
         "policy": name,
         "algorithm": entrant.algorithm,
         "recipe": entrant.recipe,
-        "task": task,
-        "trained_on": entrant.trained_on,
+        "problem": problem.name,
+        "trained_on": entrant.problem.name if entrant.problem else None,
     }
 
 
@@ -186,18 +185,18 @@ def _metrics_json(metrics: dict[str, Estimate]) -> dict[str, Any]:
 
 def _summary(name: str, trials: TrialSet, success: Estimate) -> str:
     """What faced which trials, and with what success."""
-    return f"{name} on {len(trials)} trials of {trials.simulator.task.name}, success {success}"
+    return f"{name} on {len(trials)} trials of {trials.problem.name}, success {success}"
 
 
 def evaluate(
     policy: str | Path | Policy | Entrant | PolicyFunction,
-    task: str | ReachTask | None = None,
+    problem: ProblemLike | None = None,
     trials: int = 200,
     seed: int = 0,
     *,
-    arm: str | Arm = DEFAULT_ARM,
     allow_other_arm: bool = False,
     oracle: bool = False,
+    **overrides: Any,
 ) -> Evaluation:
     """Put one policy to the trials (paper, section 3.3: 200 random goals, 64 steps each).
 
@@ -206,31 +205,31 @@ def evaluate(
     policy : str, Path, Policy, Entrant or function
         A shipped policy, a baseline or the oracle by name (a group's first seed), a file, a
         policy, or a function from observations (n, n_observations) to actions (n, n_actions).
-    task : str or ReachTask, optional
-        The task; by default the one that the policy was trained on.
+    problem : ReachProblem, str or Path, optional
+        What it faces; by default the problem that the policy was trained for.
     trials : int
         Number of trials.
     seed : int
         Seed of the trials.
-    arm : str or Arm
-        The arm.
     allow_other_arm : bool
         Whether a policy may face an arm that it was not trained for.
     oracle : bool
         Whether to bound what any policy could do in the trials; see `Evaluation.bounds`.
+    **overrides
+        Changes of the problem, such as ``tolerance``; see `ReachProblem.replace`.
 
     Raises
     ------
     InvalidInputError
-        If a number is out of range, or no task is given for something untrained.
+        If a number is out of range, or no problem is given for something untrained.
     PolicyFileError
         If the policy cannot be read, was trained for another arm, or does not fit this one.
     """
     entrant = _entrant_of(policy)
-    task = task or entrant.trained_on
-    if task is None:
-        raise InvalidInputError(f"{entrant.name!r} was not trained on a task: name one")
-    trial_set = TrialSet.draw(Simulator(arm, task), trials, seed)
+    faced = problem if problem is not None else entrant.problem
+    if faced is None:
+        raise InvalidInputError(f"{entrant.name!r} was not trained for a problem: name one")
+    trial_set = TrialSet.draw(ReachProblem.load(faced).replace(**overrides), trials, seed)
     return run_trials(entrant, trial_set, allow_other_arm, oracle=oracle)
 
 
@@ -239,7 +238,7 @@ def _entrant_of(policy: str | Path | Policy | Entrant | PolicyFunction) -> Entra
         return policy
     if isinstance(policy, Policy):
         made = policy.provenance
-        return Entrant.from_policy(f"{made.algorithm}-{made.recipe}-{made.task}", policy)
+        return Entrant.from_policy(f"{made.algorithm}-{made.recipe}-{policy.problem.name}", policy)
     if isinstance(policy, str | Path):
         return find_entrants(policy)[0]
     return Entrant.from_function(getattr(policy, "__name__", "function"), policy)
@@ -271,11 +270,12 @@ def run_trials(
 
 
 def pool(evaluations: Sequence[Evaluation]) -> tuple[PooledEvaluation, ...]:
-    """Pool the training seeds of each group and task, where there are several."""
-    groups: dict[tuple[str | None, ...], list[Evaluation]] = {}
+    """Pool the training seeds of each group and problem, where there are several."""
+    groups: dict[tuple[object, ...], list[Evaluation]] = {}
     for evaluation in evaluations:
         made = evaluation.entrant
-        key = (made.group, made.algorithm, made.recipe, made.trained_on, evaluation.task)
+        trained_for = made.problem.digest if made.problem else None
+        key = (made.group, made.algorithm, made.recipe, trained_for, evaluation.problem.digest)
         groups.setdefault(key, []).append(evaluation)
     return tuple(
         PooledEvaluation(members[0].entrant.group, tuple(members))

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm._files import write_atomically
 from kinarm.evaluation.evaluation import Evaluation
-from kinarm.files import write_atomically
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,31 +24,31 @@ BIN_WIDTH = 0.05
 
 
 def distance_histograms(evaluations: Sequence[Evaluation]) -> "Figure":
-    """Histograms of the final distance, a panel per task (paper, Figure 2, right).
+    """Histograms of the final distance, a panel per problem (paper, Figure 2, right).
 
     Training seeds of one recipe share a colour: the line is their mean, thin lines are the seeds.
 
     Parameters
     ----------
     evaluations : sequence of Evaluation
-        Any policies on any tasks.
+        Any policies on any problems.
     """
     from matplotlib.figure import Figure
 
-    tasks = list(dict.fromkeys(evaluation.task for evaluation in evaluations))
+    problems = {evaluation.problem.digest: evaluation.problem for evaluation in evaluations}
     labels = list(dict.fromkeys(series_label(evaluation) for evaluation in evaluations))
     furthest = max(float(evaluation.rollouts.distance.max()) for evaluation in evaluations)
     edges = np.arange(0.0, furthest + BIN_WIDTH, BIN_WIDTH)
-    figure = Figure(figsize=(4.2 * len(tasks), 3.6), layout="constrained")
-    for axes, task in zip(figure.subplots(1, len(tasks), squeeze=False)[0], tasks, strict=True):
-        on_task = [evaluation for evaluation in evaluations if evaluation.task == task]
+    figure = Figure(figsize=(4.2 * len(problems), 3.6), layout="constrained")
+    panels = figure.subplots(1, len(problems), squeeze=False)[0]
+    for axes, (digest, problem) in zip(panels, problems.items(), strict=True):
+        facing = [evaluation for evaluation in evaluations if evaluation.problem.digest == digest]
         for number, label in enumerate(labels):
-            distances = [e.rollouts.distance for e in on_task if series_label(e) == label]
+            distances = [e.rollouts.distance for e in facing if series_label(e) == label]
             if distances:
                 _stairs(axes, distances, edges, label, number)
-        tolerance = on_task[0].trials.simulator.task.tolerance
-        axes.axvline(tolerance, color="#444444", linestyle=":", linewidth=1)
-        axes.set(title=f"task {task}", xlabel="final distance to the goal [m]", xlim=(0, None))
+        axes.axvline(problem.task.tolerance, color="#444444", linestyle=":", linewidth=1)
+        axes.set(title=problem.name, xlabel="final distance to the goal [m]", xlim=(0, None))
         axes.set_ylim(0, None)
         axes.spines[["top", "right"]].set_visible(False)
         axes.legend(frameon=False, fontsize=8)
@@ -72,18 +72,19 @@ def _stairs(
 
 
 def series_label(evaluation: Evaluation) -> str:
-    """Name of what the training seeds of one recipe share, and the task if it is another one.
+    """Name of what the training seeds of a recipe share, and its problem if it is another one.
 
     Parameters
     ----------
     evaluation : Evaluation
         Of one training seed.
     """
-    entrant = evaluation.entrant
-    if entrant.policy is None:
+    entrant, trained_for = evaluation.entrant, evaluation.entrant.problem
+    if trained_for is None:
         return entrant.name
-    origin = "" if entrant.trained_on == evaluation.task else f" (trained on {entrant.trained_on})"
-    return entrant.group.removesuffix(f"-{entrant.trained_on}") + origin
+    same = trained_for.name == evaluation.problem.name
+    origin = "" if same else f" (trained on {trained_for.name})"
+    return entrant.group.removesuffix(f"-{trained_for.name}") + origin
 
 
 def save_figure(figure: "Figure", folder: Path, name: str) -> tuple[Path, ...]:

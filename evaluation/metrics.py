@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.statistics import Estimate, bootstrap_intervals, wilson_interval
-from kinarm.policies.oracle_solution import OracleSolutions
+from kinarm.policies.oracle import OracleSolutions
 from kinarm.rollouts import Rollouts
 
 LIMITS = (0.1, 0.2)

@@ -109,7 +109,7 @@ def print_table(document: dict[str, Any], console: "Console", *, markdown: bool 
     markdown : bool
         Whether to print Markdown, always with all columns.
     """
-    columns = [text_column("task"), text_column("policy"), *metric_columns()]
+    columns = [text_column("problem"), text_column("policy"), *metric_columns()]
     if markdown:
         from rich.console import Console
 
@@ -151,26 +151,26 @@ def evaluation_table(
     for column in columns:
         side: Literal["left", "right"] = "right" if column.meaning else "left"
         table.add_column(column.heading, justify=side, no_wrap=True)
-    for task in document["protocol"]["tasks"]:
+    for problem in document["protocol"]["problems"]:
         if not markdown:
             table.add_section()
-        for row in table_rows(document, task):
+        for row in table_rows(document, problem):
             table.add_row(*(str(column.cell(row)) for column in columns))
     return table
 
 
-def table_rows(document: dict[str, Any], task: str) -> list[dict[str, Any]]:
-    """Pooled results of a task and the results that are not part of them, best first.
+def table_rows(document: dict[str, Any], problem: str) -> list[dict[str, Any]]:
+    """Pooled results of a problem and the results that are not part of them, best first.
 
     Parameters
     ----------
     document : dict
         What `evaluation_document` returned.
-    task : str
-        Name of one of its tasks.
+    problem : str
+        Name of one of its problems.
     """
-    pooled = [row for row in document["pooled"] if row["task"] == task]
+    pooled = [row for row in document["pooled"] if row["problem"] == problem]
     members = {name for row in pooled for name in row["members"]}
-    single = [row for row in document["results"] if row["task"] == task]
+    single = [row for row in document["results"] if row["problem"] == problem]
     rows = pooled + [row for row in single if row["policy"] not in members]
     return sorted(rows, key=lambda row: -row["metrics"]["success"]["value"])

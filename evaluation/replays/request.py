@@ -102,6 +102,8 @@ class ReplayRequest(ProblemOptions):
             raise InvalidInputError("--port goes with --live")
         self._refuse("--live", NOT_LIVE if self.live else ())
         self._refuse("trials from a file", NOT_FROM_FILE if self.source else ())
+        if self.source is not None and self.source.suffix == ".json":
+            self._refuse("trials of an evaluation", ("arm",))
 
     def _refuse(self, mode: str, names: Sequence[str]) -> None:
         """Refuse fields that mean nothing in a mode."""

@@ -1,4 +1,4 @@
-"""Charts of a task: performance profiles, and histograms of the final distance."""
+"""Charts of a problem: performance profiles, and histograms of the final distance."""
 
 from typing import TYPE_CHECKING
 
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from kinarm.evaluation.figures import BIN_WIDTH
 from kinarm.evaluation.metrics import LIMITS
-from kinarm.evaluation.report.groups import Group, TaskResults
+from kinarm.evaluation.report.groups import Group, ProblemResults
 from kinarm.evaluation.report.svg import Drawing, draw, style
 from kinarm.evaluation.statistics import performance_profile
 
@@ -51,15 +51,15 @@ def _finish(axes: "Axes", tolerance: float, title: str) -> None:
             style(label, f"tick {side}")
 
 
-def profile_chart(task: TaskResults) -> Drawing:
-    """Draw the profiles of a task with their 95 % bands.
+def profile_chart(results: ProblemResults) -> Drawing:
+    """Draw the profiles of a problem with their 95 % bands.
 
     Parameters
     ----------
-    task : TaskResults
-        The task; its oracle is drawn, too, if it took part.
+    results : ProblemResults
+        The problem; its oracle is drawn, too, if it took part.
     """
-    limits = profile_limits(task)
+    limits = profile_limits(results)
     figure, axes = _chart(PROFILE_HEIGHT, above=14)
     axes.set(xscale="log", xlim=limits[[0, -1]], ylim=(0, 1))
     axes.set_xticks(log_ticks(limits[0], limits[-1]), minor=False)
@@ -67,8 +67,8 @@ def profile_chart(task: TaskResults) -> Drawing:
     axes.set_yticks([0, 0.25, 0.5, 0.75, 1])
     axes.yaxis.set_major_formatter(lambda share, _: f"{100 * share:g} %")
     axes.xaxis.set_major_formatter("{x:g}")
-    _finish(axes, task.tolerance, "distance d to the goal [m], logarithmic")
-    for place, group in enumerate(reversed(task.groups)):  # the best comes last, on top
+    _finish(axes, results.tolerance, "distance d to the goal [m], logarithmic")
+    for place, group in enumerate(reversed(results.groups)):  # the best comes last, on top
         rates, low, high = profile_with_band(group, limits)
         (band,) = axes.fill([*limits, *limits[::-1]], [*high, *low[::-1]], clip_on=False)
         (line,) = axes.plot(limits, rates, clip_on=False)
@@ -76,21 +76,21 @@ def profile_chart(task: TaskResults) -> Drawing:
             artist.set_zorder(3 + place)
             style(artist, part, group, title=group.name)
     shares = (
-        f"{group.name}: {100 * float((group.distances <= task.tolerance).mean()):.1f} %"
-        for group in task.groups
+        f"{group.name}: {100 * float((group.distances <= results.tolerance).mean()):.1f} %"
+        for group in results.groups
     )
     return draw(
         figure,
-        f"Performance profiles on {task.name}. Share of trials within {task.tolerance:g} m: "
+        f"Performance profiles on {results.name}. Share of trials within {results.tolerance:g} m: "
         + "; ".join(shares),
     )
 
 
-def profile_limits(task: TaskResults) -> NDArray[np.float64]:
-    """Distances at which the profiles of a task are drawn [m], ascending."""
-    furthest = max(float(group.distances.max()) for group in task.groups)
-    low, high = task.tolerance / 5, max(furthest, 2 * task.tolerance)
-    named = [limit for limit in (task.tolerance, *LIMITS) if low <= limit <= high]
+def profile_limits(results: ProblemResults) -> NDArray[np.float64]:
+    """Distances at which the profiles of a problem are drawn [m], ascending."""
+    furthest = max(float(group.distances.max()) for group in results.groups)
+    low, high = results.tolerance / 5, max(furthest, 2 * results.tolerance)
+    named = [limit for limit in (results.tolerance, *LIMITS) if low <= limit <= high]
     return np.unique(np.concatenate([np.geomspace(low, high, POINTS), named]))
 
 
@@ -110,18 +110,18 @@ def profile_with_band(
     return rates, low, high
 
 
-def histogram_chart(task: TaskResults) -> Drawing:
-    """Draw the histograms of a task below each other, all on the same scales.
+def histogram_chart(results: ProblemResults) -> Drawing:
+    """Draw the histograms of a problem below each other, all on the same scales.
 
     The height of a bar is the square root of its share, so that rare failures can be seen.
 
     Parameters
     ----------
-    task : TaskResults
-        The task.
+    results : ProblemResults
+        The problem.
     """
-    rows = len(task.groups)
-    furthest = max(float(group.distances.max()) for group in task.groups)
+    rows = len(results.groups)
+    furthest = max(float(group.distances.max()) for group in results.groups)
     edges = np.arange(0.0, furthest + 2 * BIN_WIDTH, BIN_WIDTH)
     # Rows share the height of a profile, as long as that is enough.
     figure, axes = _chart(rows * max(48, 270 // rows) + BELOW, above=0)
@@ -129,10 +129,10 @@ def histogram_chart(task: TaskResults) -> Drawing:
     spacing = 0.2 if edges[-1] < 2 else 0.5 * np.ceil(edges[-1] / 5)
     axes.set_xticks(np.arange(0, edges[-1], spacing))
     axes.xaxis.set_major_formatter("{x:g}")
-    firsts = [f"{100 * bin_shares(group, edges)[0]:.1f} %" for group in task.groups]
+    firsts = [f"{100 * bin_shares(group, edges)[0]:.1f} %" for group in results.groups]
     axes.set_yticks(range(rows), firsts[::-1], va="bottom")
-    _finish(axes, task.tolerance, "final distance to the goal [m]")
-    for row, group in enumerate(reversed(task.groups)):
+    _finish(axes, results.tolerance, "final distance to the goal [m]")
+    for row, group in enumerate(reversed(results.groups)):
         shares = bin_shares(group, edges)
         bars = axes.bar(
             edges[:-1], ROW_HEIGHT * np.sqrt(shares), 0.95 * BIN_WIDTH, row, align="edge"
@@ -143,10 +143,10 @@ def histogram_chart(task: TaskResults) -> Drawing:
                 style(bar, "bars", group, title)
         name = axes.text(edges[-1], row + 0.5, group.name, fontsize=12, ha="right")
         style(name, "name end", group)
-    named = (f"{group.name} {first}" for group, first in zip(task.groups, firsts, strict=True))
+    named = (f"{group.name} {first}" for group, first in zip(results.groups, firsts, strict=True))
     return draw(
         figure,
-        f"Histograms of the final distance on {task.name}. Share of trials in the first bin, "
+        f"Histograms of the final distance on {results.name}. Share of trials in the first bin, "
         f"below {BIN_WIDTH:g} m: " + "; ".join(named),
     )
 

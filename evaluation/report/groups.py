@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.evaluation import Evaluation
 from kinarm.evaluation.figures import series_label
 from kinarm.evaluation.table import table_rows
-from kinarm.scene import Bench
+from kinarm.scene import GoalRegion, Scene
+from kinarm.task import ReachTask
 
 COLOURS = 6
 """Colours of the style sheet for policies; beyond them, lines are dashed."""
@@ -58,13 +60,13 @@ class Group:
 
 
 @dataclass(frozen=True, eq=False)
-class TaskResults:
-    """Everything about one task.
+class ProblemResults:
+    """Everything about one problem.
 
     Attributes
     ----------
     name : str
-        Name of the task.
+        Name of the problem.
     entry : dict
         What the document's protocol says about it.
     groups : tuple of Group
@@ -81,9 +83,19 @@ class TaskResults:
         return len(self.entry["goals"])
 
     @property
+    def task(self) -> ReachTask:
+        """Its goals and endings."""
+        return self.groups[0].members[0].problem.task
+
+    @property
+    def arm(self) -> Arm:
+        """What reaches."""
+        return self.groups[0].members[0].trials.simulator.arm
+
+    @property
     def tolerance(self) -> float:
         """Distance within which a goal is reached [m]."""
-        return float(self.entry["tolerance"])
+        return self.task.tolerance
 
     @property
     def oracle_rate(self) -> float | None:
@@ -92,10 +104,14 @@ class TaskResults:
         return float(oracle["success"]["value"]) if oracle else None
 
     @property
-    def benches(self) -> tuple[Bench, ...]:
-        """The benches that goals lie on."""
-        simulator = self.groups[0].members[0].trials.simulator
-        return tuple(simulator.scene.bench(name) for name in simulator.task.benches)
+    def goal_regions(self) -> tuple[GoalRegion, ...]:
+        """Where goals lie."""
+        return tuple(self.scene.goal_region(name) for name in self.task.goal_regions)
+
+    @property
+    def scene(self) -> Scene:
+        """What stands around."""
+        return self.groups[0].members[0].problem.scene
 
     @property
     def pooled(self) -> bool:
@@ -112,7 +128,7 @@ class TaskResults:
 
 def group_results(
     document: dict[str, Any], evaluations: Sequence[Evaluation]
-) -> tuple[TaskResults, ...]:
+) -> tuple[ProblemResults, ...]:
     """Bring the rows of the table together with the evaluations behind them.
 
     Parameters
@@ -125,22 +141,19 @@ def group_results(
     Raises
     ------
     InvalidInputError
-        If the document was made of others, or two of them cannot be told apart.
+        If the document was made of others.
     """
-    known = {(each.entrant.name, each.task): each for each in evaluations}
-    if list(known) != [(row["policy"], row["task"]) for row in document["results"]]:
-        raise InvalidInputError(
-            "a report needs the document of the very evaluations that it shows, and a name of its "
-            "own for each policy on a task"
-        )
+    known = {(each.entrant.name, each.problem.name): each for each in evaluations}
+    if list(known) != [(row["policy"], row["problem"]) for row in document["results"]]:
+        raise InvalidInputError("a report needs the document of the very evaluations that it shows")
     styles = _styles(evaluations)
     return tuple(
-        TaskResults(
-            task,
+        ProblemResults(
+            problem,
             entry,
-            tuple(_group(row, known, styles) for row in table_rows(document, task)),
+            tuple(_group(row, known, styles) for row in table_rows(document, problem)),
         )
-        for task, entry in document["protocol"]["tasks"].items()
+        for problem, entry in document["protocol"]["problems"].items()
     )
 
 
@@ -148,12 +161,12 @@ def _group(
     row: dict[str, Any], known: dict[tuple[str, str], Evaluation], styles: dict[str, str]
 ) -> Group:
     names = row.get("members", [row["policy"]])
-    members = tuple(known[name, row["task"]] for name in names)
+    members = tuple(known[name, row["problem"]] for name in names)
     return Group(row, members, styles[series_label(members[0])])
 
 
 def _styles(evaluations: Sequence[Evaluation]) -> dict[str, str]:
-    """Classes by what the seeds and tasks of a recipe share, in the order of appearance."""
+    """Classes by what the seeds and problems of a recipe share, in the order of appearance."""
     styles: dict[str, str] = {}
     policies = 0
     for evaluation in evaluations:

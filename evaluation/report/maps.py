@@ -1,23 +1,24 @@
-"""Maps of the benches from above, which tell where policies fail.
+"""Maps of the goal regions from above, which tell where policies fail.
 
 They are a template of the page: every marker carries its own words, colour and shape, and they
 are to scale, which leaves nothing for a plotting library to work out.
 """
 
+from collections.abc import Iterable
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.evaluation.report.groups import Group, TaskResults
-from kinarm.scene import Bench
+from kinarm.evaluation.report.groups import Group, ProblemResults
+from kinarm.scene import GoalRegion, Obstacle
 
 SCALE = 200
 """Units of the SVG to a metre."""
 
 MARGIN = 0.07
-"""Beside the outermost bench and the arm's base [m]."""
+"""Beside the outermost region and the arm's base [m]."""
 
 BASE_RADIUS = 0.1
 """Of the circle that stands for the arm [m]."""
@@ -26,10 +27,10 @@ MARKERS = 1000
 """Trials of which a map shows markers, the first ones; the figures beside them count all."""
 
 SLICES = 10
-"""Of a bench, along x, whose failures are counted."""
+"""Of a region, along x, whose failures are counted."""
 
 BAR_OFFSET, BAR_LENGTH = 0.02, 0.25
-"""Where the bars of failures begin beside the bench, and the length of 100 % [m]."""
+"""Where the bars of failures begin beside the region, and the length of 100 % [m]."""
 
 AXIS_LENGTH = 0.2
 """Of the world axes [m]."""
@@ -37,12 +38,12 @@ AXIS_LENGTH = 0.2
 LEVELS = 6
 """Colours of distances: within the tolerance, and twice the distance from one to the next."""
 
-OUTCOMES = {"success": "reached", "horizon": "out of steps", "collision": "contact"}
+OUTCOMES = {"success": "reached", "truncated": "out of steps", "collision": "contact"}
 """How outcomes are called on the page."""
 
 SYMBOLS = {
     "success": "m-3,0a3,3 0 1,0 6,0a3,3 0 1,0 -6,0z",
-    "horizon": "m-2.8,-2.8h5.6v5.6h-5.6z",
+    "truncated": "m-2.8,-2.8h5.6v5.6h-5.6z",
     "collision": "m0,-4.2l1.3,2.9l2.9,1.3l-2.9,1.3l-1.3,2.9l-1.3,-2.9l-2.9,-1.3l2.9,-1.3z",
 }
 """Paths of the markers about their centre, by outcome."""
@@ -61,15 +62,16 @@ class View(NamedTuple):
     y: tuple[float, float]
 
     @classmethod
-    def of(cls, benches: tuple[Bench, ...]) -> "View":
-        """Show some benches, the arm's base and the axes with their names."""
-        low, high = -BASE_RADIUS, AXIS_LENGTH + MARGIN
-        bounds = [
-            (min(low, *(side[0] for side in sides)), max(high, *(side[1] for side in sides)))
-            for sides in ([bench.x for bench in benches], [bench.y for bench in benches])
-        ]
-        x, y = ((low - MARGIN, high + MARGIN) for low, high in bounds)
-        return cls(x, y)
+    def of(cls, regions: Iterable[GoalRegion]) -> "View":
+        """Show some regions, the arm's base and the axes with their names."""
+        corners = [(-BASE_RADIUS,) * 2, (AXIS_LENGTH + MARGIN,) * 2]
+        corners += [corner[:2] for region in regions for corner in (region.lower, region.upper)]
+        low, high = np.min(corners, axis=0) - MARGIN, np.max(corners, axis=0) + MARGIN
+        return cls((float(low[0]), float(high[0])), (float(low[1]), float(high[1])))
+
+    def shows(self, box: Obstacle | GoalRegion) -> bool:
+        """Whether some of a box is in view."""
+        return all(box.lower[k] < high and low < box.upper[k] for k, (low, high) in enumerate(self))
 
     def across(self, y: float) -> float:
         """Where a y [m] lies in the SVG, from the left."""
@@ -79,9 +81,10 @@ class View(NamedTuple):
         """Where an x [m] lies in the SVG, from the top."""
         return (self.x[1] - x) * SCALE
 
-    def failure_bars(self, bench: Bench) -> tuple[float, float]:
-        """Where bars beside a bench begin, and how far 100 % reaches, towards the arm."""
-        inner, inward = (bench.y[0], 1) if sum(bench.y) > 0 else (bench.y[1], -1)
+    def failure_bars(self, region: GoalRegion) -> tuple[float, float]:
+        """Where bars beside a region begin, and how far 100 % reaches, towards the arm."""
+        right, left = region.lower[1], region.upper[1]
+        inner, inward = (right, 1) if right + left > 0 else (left, -1)
         return self.across(inner - inward * BAR_OFFSET), inward * BAR_LENGTH * SCALE
 
 
@@ -95,7 +98,7 @@ class Fate(NamedTuple):
     distance : float
         Mean of the final distances [m].
     outcome : str
-        ``"collision"`` if any seed touched something, else ``"horizon"`` if any ran out of
+        ``"collision"`` if any seed touched something, else ``"truncated"`` if any ran out of
         steps, else ``"success"``.
     """
 
@@ -109,7 +112,7 @@ def fates(group: Group) -> tuple[Fate, ...]:
     success = np.array([member.rollouts.success for member in group.members])
     collision = np.array([member.rollouts.collision for member in group.members])
     outcomes = np.where(
-        collision.any(axis=0), "collision", np.where(success.all(axis=0), "success", "horizon")
+        collision.any(axis=0), "collision", np.where(success.all(axis=0), "success", "truncated")
     )
     columns = (success.sum(axis=0), group.distances.mean(axis=0), outcomes)
     return tuple(
@@ -143,17 +146,17 @@ class Marker(NamedTuple):
     title: str
 
 
-def markers(task: TaskResults, group: Group) -> list[Marker]:
-    """Goals of a task by how a group did, the worst last, on top."""
-    view, results = View.of(task.benches), fates(group)[:MARKERS]
-    goals = group.members[0].trials.goals
-    order = np.argsort([fate.distance for fate in results], kind="stable").tolist()
+def markers(results: ProblemResults, group: Group) -> list[Marker]:
+    """Goals of a problem by how a group did, the worst last, on top."""
+    view, shown = View.of(results.goal_regions), fates(group)[:MARKERS]
+    goals, seeds = group.members[0].trials.goals, len(group.members)
+    order = np.argsort([fate.distance for fate in shown], kind="stable").tolist()
     return [
         Marker(
             f"M{view.across(goals[trial, 1]):.1f},{view.down(goals[trial, 0]):.1f}"
-            + SYMBOLS[results[trial].outcome],
-            level(results[trial].distance, task.tolerance),
-            _marker_title(trial, goals[trial], results[trial], len(group.members)),
+            + SYMBOLS[shown[trial].outcome],
+            level(shown[trial].distance, results.tolerance),
+            _marker_title(trial, goals[trial], shown[trial], seeds),
         )
         for trial in order
     ]
@@ -166,15 +169,17 @@ def _marker_title(trial: int, goal: NDArray[np.float64], fate: Fate, seeds: int)
     return f"{place}: {fate.reached} of {seeds} seeds reached it, mean {fate.distance:.3f} m"
 
 
-def failure_shares(group: Group, bench: Bench) -> list[tuple[tuple[float, float], float | None]]:
-    """Share of trials that did not succeed, in slices of a bench along x, all seeds alike.
+def failure_shares(
+    group: Group, region: GoalRegion
+) -> list[tuple[tuple[float, float], float | None]]:
+    """Share of trials that did not succeed, in slices of a region along x, all seeds alike.
 
     Parameters
     ----------
     group : Group
         Whose trials.
-    bench : Bench
-        The bench.
+    region : GoalRegion
+        The region.
 
     Returns
     -------
@@ -183,27 +188,26 @@ def failure_shares(group: Group, bench: Bench) -> list[tuple[tuple[float, float]
     """
     goals = group.members[0].trials.goals
     failed = 1 - np.mean([member.rollouts.success for member in group.members], axis=0)
-    across = (bench.y[0] <= goals[:, 1]) & (goals[:, 1] <= bench.y[1])
-    slices = np.linspace(*bench.x, SLICES + 1)
+    inside = ((region.lower <= goals) & (goals <= region.upper)).all(axis=1)
+    slices = np.linspace(region.lower[0], region.upper[0], SLICES + 1)
     places = np.clip(np.searchsorted(slices, goals[:, 0], side="right") - 1, 0, SLICES - 1)
-    inside = across & (bench.x[0] <= goals[:, 0]) & (goals[:, 0] <= bench.x[1])
     rows = [inside & (places == place) for place in range(SLICES)]
     shares = [float(failed[row].mean()) if row.any() else None for row in rows]
     return list(zip(pairwise(slices.tolist()), shares, strict=True))
 
 
-def description(task: TaskResults, group: Group) -> str:
+def description(results: ProblemResults, group: Group) -> str:
     """What a map shows, for those who cannot see it."""
     outcomes = [fate.outcome for fate in fates(group)]
     every = " by every training seed" if len(group.members) > 1 else ""
+    reached = outcomes.count("success")
     return (
-        f"{group.name} on {task.name}: of {len(outcomes)} goals, {outcomes.count('success')} were "
-        f"reached{every}"
+        f"{group.name} on {results.name}: of {len(outcomes)} goals, {reached} were reached{every}"
     )
 
 
-def level_ranges(task: TaskResults) -> list[str]:
+def level_ranges(results: ProblemResults) -> list[str]:
     """Ranges of distances [m] that the colours stand for."""
-    bounds = [f"{task.tolerance * 2**step:g}" for step in range(LEVELS - 1)]
+    bounds = [f"{results.tolerance * 2**step:g}" for step in range(LEVELS - 1)]
     between = [f"{low}\N{EN DASH}{high}" for low, high in pairwise(bounds)]
     return [f"≤ {bounds[0]}", *between, f"> {bounds[-1]}"]

@@ -4,14 +4,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from kinarm._files import check_folder, write_text
 from kinarm.evaluation.evaluation import Evaluation
 from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.report import maps
 from kinarm.evaluation.report.charts import histogram_chart, profile_chart
-from kinarm.evaluation.report.groups import TaskResults, group_results
+from kinarm.evaluation.report.groups import ProblemResults, group_results
 from kinarm.evaluation.report.worst import record_worst, worst_row, worst_trials
 from kinarm.evaluation.table import SPREAD_PRIORITY, Column, metric_cell, metric_columns
-from kinarm.files import check_folder, write_text
 from kinarm.viewer import replay_page
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def write_report(
     OutputError
         If it cannot be written.
     """
-    check_folder(folder, create=True)
+    check_folder(folder)
     path = Path(folder) / "index.html"
     write_text(path, report_page(document, evaluations))
     return path
@@ -61,25 +61,25 @@ def report_page(document: dict[str, Any], evaluations: Sequence[Evaluation]) -> 
     document : dict
         What `evaluation_document` made of the evaluations.
     evaluations : sequence of Evaluation
-        Made with one trial set per task.
+        Made with one trial set per problem.
 
     Raises
     ------
     InvalidInputError
         If the document was made of others, or two of them cannot be told apart.
     """
-    tasks = group_results(document, evaluations)
-    chosen = [worst_trials(task) for task in tasks]
+    problems = group_results(document, evaluations)
+    chosen = [worst_trials(results) for results in problems]
     recordings = record_worst([worst for each in chosen for worst in each])
     return page_template().render(
-        title=_title(tasks),
-        subtitle=_subtitle(document["protocol"]),
+        title=_title(problems),
+        subtitle=_subtitle(document["protocol"], problems),
         protocol=document["protocol"],
-        tasks=tasks,
+        problems=problems,
         columns=metric_columns(),
         worst=[
-            (task, [worst_row(task, worst) for worst in each])
-            for task, each in zip(tasks, chosen, strict=True)
+            (results, [worst_row(results, worst) for worst in each])
+            for results, each in zip(problems, chosen, strict=True)
         ],
         replay=replay_page(recordings).html,
     )
@@ -112,19 +112,19 @@ def page_template() -> "Template":
     return environment.get_template("page.html")
 
 
-def shown_columns(task: TaskResults) -> list[Column]:
-    """Columns that the page shows of a task: the important ones that have something to say."""
+def shown_columns(results: ProblemResults) -> list[Column]:
+    """Columns that the page shows of a problem: the important ones that have something to say."""
     return [
         column
         for column in metric_columns()
         if column.priority >= REPORT_PRIORITY
-        and any(column.cell(group.row).value for group in task.groups)
+        and any(column.cell(group.row).value for group in results.groups)
     ]
 
 
-def _title(tasks: Sequence[TaskResults]) -> str:
+def _title(problems: Sequence[ProblemResults]) -> str:
     """The policy that was evaluated, or how many there were."""
-    groups = [group for task in tasks for group in task.contenders]
+    groups = [group for results in problems for group in results.contenders]
     names = {group.name for group in groups}
     if len(names) == 1:
         return names.pop()
@@ -132,10 +132,8 @@ def _title(tasks: Sequence[TaskResults]) -> str:
     return f"{len(members)} policies" if groups[0].is_policy else " and ".join(sorted(names))
 
 
-def _subtitle(protocol: dict[str, Any]) -> str:
-    tasks = list(protocol["tasks"])
-    kinds = f"task {tasks[0]}" if len(tasks) == 1 else f"{len(tasks)} tasks"
-    return (
-        f"{kinds} · {protocol['trials']} trials each · arm {protocol['arm']} · "
-        f"seed {protocol['seed']}"
-    )
+def _subtitle(protocol: dict[str, Any], problems: Sequence[ProblemResults]) -> str:
+    """What was faced, in a line."""
+    faced = f"problem {problems[0].name}" if len(problems) == 1 else f"{len(problems)} problems"
+    arms = " and ".join(dict.fromkeys(results.arm.name for results in problems))
+    return f"{faced} · {protocol['trials']} trials each · arm {arms} · seed {protocol['seed']}"

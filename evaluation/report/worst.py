@@ -5,15 +5,15 @@ from typing import Any, NamedTuple
 
 from kinarm.evaluation.evaluation import Evaluation
 from kinarm.evaluation.replays.recorder import record
-from kinarm.evaluation.report.groups import Group, TaskResults
+from kinarm.evaluation.report.groups import Group, ProblemResults
 from kinarm.evaluation.report.maps import OUTCOMES
 from kinarm.recording import Recording
 
 BEST_GROUPS = 4
-"""Groups of a task whose worst trials are shown."""
+"""Groups of a problem whose worst trials are shown."""
 
 TRIALS = 9
-"""Trials that the groups of a task share, but at least `AT_LEAST` each."""
+"""Trials that the groups of a problem share, but at least `AT_LEAST` each."""
 
 AT_LEAST = 3
 
@@ -36,15 +36,15 @@ class WorstTrial(NamedTuple):
     trial: int
 
 
-def worst_trials(task: TaskResults) -> tuple[WorstTrial, ...]:
-    """Choose the worst trials of the best groups of a task: failures first, the farthest first.
+def worst_trials(results: ProblemResults) -> tuple[WorstTrial, ...]:
+    """Choose the worst trials of the best groups of a problem: failures first, the farthest first.
 
     Parameters
     ----------
-    task : TaskResults
-        The task.
+    results : ProblemResults
+        The problem.
     """
-    groups = task.contenders[:BEST_GROUPS]
+    groups = results.contenders[:BEST_GROUPS]
     share = max(AT_LEAST, TRIALS // len(groups))
     return tuple(found for group in groups for found in _worst_of(group, share))
 
@@ -60,7 +60,7 @@ def _worst_of(group: Group, count: int) -> list[WorstTrial]:
     return [WorstTrial(group, group.members[seed], trial) for *_, seed, trial in ranked[:count]]
 
 
-def worst_row(task: TaskResults, worst: WorstTrial) -> dict[str, Any]:
+def worst_row(results: ProblemResults, worst: WorstTrial) -> dict[str, Any]:
     """What the page says of a trial: its policy, and figures by their headings."""
     rollouts, trial = worst.evaluation.rollouts, worst.trial
     figures = {
@@ -69,8 +69,8 @@ def worst_row(task: TaskResults, worst: WorstTrial) -> dict[str, Any]:
         "outcome": describe_outcome(worst),
         "steps": f"{rollouts.steps[trial]}",
     }
-    if task.entry["oracle"]:
-        figures["oracle"] = oracle_steps(task, trial)
+    if results.entry["oracle"]:
+        figures["oracle"] = oracle_steps(results, trial)
     return {
         "policy": worst.evaluation.entrant.name,
         "style": worst.group.style,
@@ -86,9 +86,9 @@ def describe_outcome(worst: WorstTrial) -> str:
     return f"{OUTCOMES[outcome]}: {pair[0]} \N{EN DASH} {pair[1]}" if pair else OUTCOMES[outcome]
 
 
-def oracle_steps(task: TaskResults, trial: int) -> str:
+def oracle_steps(results: ProblemResults, trial: int) -> str:
     """Steps of the oracle's motion, and how many are proven to be necessary if they are fewer."""
-    bounds = task.entry["oracle"]["trials"]
+    bounds = results.entry["oracle"]["trials"]
     if not bounds["reachable"][trial]:
         return "not reached"
     steps, proven = bounds["steps"][trial], bounds["steps_lower_bound"][trial]

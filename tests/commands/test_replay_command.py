@@ -167,6 +167,7 @@ def test_another_arm(replay):
         (("missing.json",), ["missing.json", "No such file"]),
         (("missing.npz", "--seed", "0"), ["--seed"]),
         (("missing.npz", "--tolerance", "0.1"), ["--tolerance"]),
+        (("missing.json", "--arm", "paper"), ["--arm"]),
     ],
 )
 def test_bad_input(replay, tmp_path, arguments, words):
@@ -249,8 +250,13 @@ def test_an_evaluation_that_no_longer_holds(replay, evaluation, tmp_path):
 
     assert document["protocol"]["format_version"] == 2
     refused(changed(lambda d: d["protocol"].update(format_version=9)), "format version 9")
-    refused(changed(lambda d: d["protocol"].update(arm_digest="0")), "of arm 'paper' (0)")
-    refused(changed(lambda d: d["protocol"]["tasks"]["right"]["goals"].reverse()), "hash")
+
+    def right(document):
+        return document["protocol"]["problems"]["right"]
+
+    refused(changed(lambda d: right(d)["problem"]["arm"].update(digest="0")), "another version")
+    refused(changed(lambda d: right(d)["problem"]["task"].update(tolerance=0.1)), "hash")
+    refused(changed(lambda d: right(d)["goals"].reverse()), "hash")
     row = document["results"].index(next(r for r in document["results"] if r["policy"] == "random"))
     refused(changed(lambda d: d["results"][row]["outcomes"]["steps"].reverse()), "ends otherwise")
 
@@ -258,13 +264,14 @@ def test_an_evaluation_that_no_longer_holds(replay, evaluation, tmp_path):
 @pytest.mark.parametrize(
     "path",
     [
-        ("results", 0, "task"),
+        ("results", 0, "problem"),
         ("results", 0, "policy"),
         ("results", 0, "outcomes", "steps"),
         ("protocol", "seed"),
-        ("protocol", "tasks", "right", "starts"),
-        ("protocol", "tasks", "right", "oracle"),
-        ("protocol", "tasks", "right"),
+        ("protocol", "problems", "right", "starts"),
+        ("protocol", "problems", "right", "oracle"),
+        ("protocol", "problems", "right", "problem"),
+        ("protocol", "problems", "right"),
     ],
 )
 def test_an_evaluation_with_something_missing(replay, evaluation, tmp_path, path):
