@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from kinarm._validation import whole_number
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.simulator import Simulator
+from kinarm.task import RewardWeights
 
 
 def trial_generator(seed: int, trial: int, stream: int = 0) -> np.random.Generator:
@@ -90,7 +91,8 @@ class TrialSet:
 
     @cached_property
     def digest(self) -> str:
-        """Hash of the problem, starts and goals."""
+        """Hash of starts, goals and problem, but for what is rewarded."""
         numbers = np.round(np.concatenate([self.starts, self.goals], axis=1), 12) + 0.0
-        content = self.problem.digest.encode() + numbers.tobytes()
+        rules = self.problem.replace(reward=RewardWeights())
+        content = rules.digest.encode() + numbers.tobytes()
         return hashlib.sha256(content).hexdigest()[:16]

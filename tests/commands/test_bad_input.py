@@ -67,11 +67,11 @@ UNUSABLE_ROBOTS = {
         (["--policy", "nobody"], ["'nobody'", "random, zero"]),
         (["--policy", "nobody.npz"], ["nobody.npz", "No such file"]),
         (["--policy", ""], []),
-        (["--trials", "0"], ["--trials", "'0'", "at least 1"]),
-        (["--trials", "-3"], ["--trials"]),
+        (["--trials", "0"], ["trials", "at least 1, got 0"]),
+        (["--trials", "-3"], ["trials", "-3"]),
         (["--trials", "many"], ["--trials", "'many'"]),
         (["--trials", "2.5"], ["--trials"]),
-        (["--seed", "-1"], ["--seed", "'-1'", "at least 0"]),
+        (["--seed", "-1"], ["seed", "at least 0, got -1"]),
         (["--upwards"], ["--upwards"]),
         (["stray"], ["stray"]),
     ],
@@ -184,7 +184,7 @@ def test_a_robot_that_always_touches_the_ground_is_refused(run, tmp_path):
 
 def archive(**changes) -> bytes:
     """A file as Policy.save writes it, with some arrays replaced; None leaves one out."""
-    arrays = {"format": np.array("kinarm-policy"), "version": np.array(1), **changes}
+    arrays = {"format": np.array("kinarm-policy"), "version": np.array(2), **changes}
     file = io.BytesIO()
     np.savez(file, **{key: value for key, value in arrays.items() if value is not None})
     return file.getvalue()
@@ -207,21 +207,22 @@ def valid(policy_folder) -> dict[str, np.ndarray]:
     "case", ["empty", "text", "array", "foreign", "future", "bare", "nan", "provenance", "pickle"]
 )
 def test_unusable_policy_files_are_refused(run, tmp_path, valid, program, case):
-    entries = json.loads(str(valid["provenance"]))
+    header = json.loads(str(valid["header"]))
+    incomplete = json.dumps({**header, "provenance": {"algorithm": "ars"}})
     contents = {
         "empty": b"",
         "text": b"hello",
         "array": single_array(),
         "foreign": archive(format=np.array("other-policy")),
-        "future": archive(**{**valid, "version": np.array(2)}),
+        "future": archive(**{**valid, "version": np.array(9)}),
         "bare": archive(),
         "nan": archive(**{**valid, "mean": np.full(48, np.nan)}),
-        "provenance": archive(**{**valid, "provenance": np.array(json.dumps({"task": "left"}))}),
-        "pickle": archive(**{**valid, "mean": np.array([entries], dtype=object)}),
+        "provenance": archive(**{**valid, "header": np.array(incomplete)}),
+        "pickle": archive(**{**valid, "mean": np.array([header], dtype=object)}),
     }
     path = tmp_path / "bad.npz"
     path.write_bytes(contents[case])
-    words = {"future": ["version 2"], "foreign": ["other-policy"]}.get(case, [])
+    words = {"future": ["version 9"], "foreign": ["other-policy"]}.get(case, [])
     check_refused(run(program, "--policy", path), "bad.npz", *words)
 
 
@@ -278,7 +279,8 @@ def test_a_policy_of_the_wrong_size_is_refused(run, tmp_path, policy):
 
 
 def test_a_policy_of_another_arm_is_refused(run, policy_folder):
-    answer = run("kinarm-eval", "--policy", policy_folder / "flange.npz", "--trials", 2)
+    path = policy_folder / "flange.npz"
+    answer = run("kinarm-eval", "--policy", path, "--problem", "right", "--trials", 2)
     check_refused(answer, "'paper_flange'", "'paper'")
 
 

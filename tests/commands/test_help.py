@@ -13,8 +13,8 @@ PROGRAMS = {
     "kinarm-eval": "kinarm.evaluation.commands.evaluate",
     "kinarm-replay": "kinarm.evaluation.commands.replay",
     "kinarm-train": "kinarm.policies.train",
-    "kinarm-bench": "kinarm.evaluation.bench",
-    "kinarm-reproduce": "kinarm.evaluation.reproduce",
+    "kinarm-bench": "kinarm.evaluation.commands.bench",
+    "kinarm-reproduce": "kinarm.evaluation.commands.reproduce",
 }
 HEAVY = ("torch", "numba", "matplotlib", "pinocchio", "coal", "scipy", "stable_baselines3")
 
@@ -52,8 +52,9 @@ def test_learners_have_help_of_their_own(run, learner):
     [
         (
             "kinarm-eval",
-            "--task --policy --trials --seed --arm --out --report --json --matrix "
-            "--allow-other-arm --no-oracle --markdown",
+            "--problem --task --policy --trials --seed --arm --scene --tolerance --horizon "
+            "--start-spread --out --report --overwrite --json --matrix --allow-other-arm "
+            "--no-oracle --markdown",
         ),
         (
             "kinarm-replay",

@@ -106,7 +106,7 @@ def test_a_metric_is_one_entry(
     outcomes = result["outcomes"]
     ends = zip(outcomes["outcome"], outcomes["steps"], strict=True)
     quick = np.mean([outcome == "success" and steps <= 16 for outcome, steps in ends])
-    assert result["quick"]["value"] == pytest.approx(quick)
+    assert result["metrics"]["quick"]["value"] == pytest.approx(quick)
     run(f"{command} --markdown")
     assert "quick %" in capsys.readouterr().out
 
