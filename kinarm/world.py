@@ -115,8 +115,8 @@ class World:
         configuration, target : array_like, shape (n_axes,)
             Ends of the step [rad or m].
         """
-        ends = [configuration, target]
-        q, aim = finite_array("ends of the step", ends, (2, self.arm.n_axes))
+        q = finite_array("configuration", configuration, (self.arm.n_axes,))
+        aim = finite_array("target", target, (self.arm.n_axes,))
         tested = self.substeps(q[None], aim[None])[0]
         touching = np.flatnonzero(self.contact_model.in_contact(tested))
         return self.contact_model.contact(tested[touching[0]]) if touching.size else None

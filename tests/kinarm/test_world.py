@@ -73,8 +73,10 @@ class TestContact:
     @pytest.mark.parametrize("end", [np.zeros(5), np.full(6, np.nan), 0.0])
     def test_bad_ends(self, simulator, end):
         for ask in (simulator.world.contact, simulator.world.contact_pair):
-            with pytest.raises(InvalidInputError, match="ends of the step must"):
+            with pytest.raises(InvalidInputError, match="target must"):
                 ask(np.zeros(6), end)
+            with pytest.raises(InvalidInputError, match="configuration must"):
+                ask(end, np.zeros(6))
 
     def test_none_where_nothing_touches(self, simulator):
         assert simulator.world.contact(np.zeros(6), np.full(6, 0.01)) is None
