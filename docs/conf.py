@@ -4,14 +4,16 @@ import re
 import sys
 import warnings
 from pathlib import Path
+from typing import get_args
 
 import matplotlib as mpl
 from docutils import nodes
+from numpy.typing import ArrayLike
 from sphinx import addnodes
 from sphinx.application import Sphinx
 
 mpl.use("Agg")  # examples run without a display
-sys.path.insert(0, str(Path(__file__).parent))  # extensions, and drawing.py for the examples
+sys.path.insert(0, str(Path(__file__).parent))  # extensions
 
 import kinarm
 
@@ -49,6 +51,15 @@ autodoc_class_signature = "mixed"
 typehints_use_signature_return = True
 typehints_document_rtype = False
 always_use_bars_union = True
+
+
+def typehints_formatter(annotation: object, _config: object) -> str | None:
+    """Write `ArrayLike`, alone or with None, instead of the many types that it stands for."""
+    members, given = set(get_args(ArrayLike)), set(get_args(annotation))
+    if not members <= given:
+        return None
+    return " | ".join(["ArrayLike", *("None" for _ in given - members)])
+
 
 # Types of other projects: their inventories would have to be fetched.
 nitpick_ignore_regex = [

@@ -1,52 +1,56 @@
-"""Draw ``docs/_static/reach.gif``: a shipped policy reaches one goal after the other.
+"""Make ``docs/_static/reach.gif``: a shipped policy reaches one goal after the other.
 
-Run ``python docs/make_animation.py`` from the root of a clone. Each motion starts where the last
-one ended. Goals are drawn at random; those that the policy misses, or reaches late, are skipped:
-the animation shows what a success looks like and not how often there is one.
+Run ``python docs/make_animation.py`` from the root of a clone, with Chromium and the extra
+``test`` installed. Each motion starts where the last one ended. Goals are drawn at random; those
+that the policy misses, or reaches late, are skipped: the animation shows what a success looks like
+and not how often there is one.
 """
 
+import io
+import tempfile
 from pathlib import Path
 
 import numpy as np
-from drawing import Camera, arm_solids, render, scene_solids
+from browser import open_stage
 from numpy.typing import NDArray
 from PIL import Image
 
-from kinarm import CompiledPolicy, Simulator
+from kinarm import CompiledPolicy, Recording, Simulator
 from kinarm.policies import load_policy
+from kinarm.recording import record_rollouts
+from kinarm.viewer import replay_page
 
-POLICY = "ars-tuned-both"
+POLICY = "ppo-tuned-both"
 OUT = Path(__file__).parent / "_static" / "reach.gif"
-CAMERA = Camera(target=(0.03, -0.04, 0.32), view=37.0, width=600, height=420)
-SEED = 0
-SIDES = ("right", "left", "left")
+WIDTH, HEIGHT = 600, 420
+EYE, TARGET = (-2.35, -1.5, 1.65), (0.04, -0.03, 0.3)
+"""Where the camera stands and what it looks at [m]."""
+SEED = 2
+SIDES = ("left", "right", "right", "left")
 """Benches of the goals."""
-SHORTEST, LONGEST = 8, 60
+SHORTEST, LONGEST = 12, 40
 """Steps that a motion may take: enough to see, and few enough to keep the file small."""
 ATTEMPTS = 200
-STRIDE = 2
-"""Steps of 20 ms a frame: at 25 frames a second, the arm is shown at its own speed."""
-HOLD = 6
+FRAME = 40
+"""Duration of a frame [ms]: with a step of 20 ms each, the arm is shown at half its own speed."""
+HOLD = 14
 """Frames for which the arm rests at a goal."""
 
-Frame = tuple[NDArray[np.float64], NDArray[np.float64], bool]
-"""Configuration, goal, and whether the goal is reached."""
 
-
-def record_motions(simulator: Simulator, policy: CompiledPolicy) -> list[Frame]:
+def record_motions(simulator: Simulator, policy: CompiledPolicy) -> list[Recording]:
     """Chain successful episodes, each from where the last one ended."""
     rng = np.random.default_rng(SEED)
     for _ in range(ATTEMPTS):
         (start,), _ = simulator.sample(rng, 1)
-        frames: list[Frame] = []
+        motions: list[Recording] = []
         for side in SIDES:
             motion = record_motion(simulator, policy, start, side, rng)
             if motion is None:
                 break
-            frames += motion
-            start = motion[-1][0]
+            motions.append(motion)
+            start = motion.states[-1]
         else:
-            return frames
+            return motions
     raise SystemExit(f"no chain of {len(SIDES)} motions found in {ATTEMPTS} attempts")
 
 
@@ -56,59 +60,58 @@ def record_motion(
     start: NDArray[np.float64],
     side: str,
     rng: np.random.Generator,
-) -> list[Frame] | None:
+) -> Recording | None:
     """Reach the first of some random goals that works out, or None."""
     _, goals = simulator.sample(rng, 100)
     goals = goals[(goals[:, 1] > 0) == (side == "left")]
     rollouts = simulator.rollout(policy, np.tile(start, (len(goals), 1)), goals, record=True)
-    lengths = rollouts.steps
-    fitting = np.flatnonzero(rollouts.success & (lengths > SHORTEST) & (lengths <= LONGEST))
-    if fitting.size == 0:
-        return None
-    path, goal = rollouts.paths[fitting[0], : lengths[fitting[0]] + 1], goals[fitting[0]]
-    moving: list[Frame] = [(q, goal, False) for q in path[:-1:STRIDE]]
-    return moving + [(path[-1], goal, True)] * HOLD
+    in_time = (rollouts.steps > SHORTEST) & (rollouts.steps <= LONGEST)
+    fitting = np.flatnonzero(rollouts.success & in_time)[:1]
+    return next(iter(record_rollouts(simulator, rollouts, POLICY, fitting)), None)
 
 
-def draw(simulator: Simulator, frame: Frame) -> Image.Image:
-    """One picture."""
-    configuration, goal, reached = frame
-    solids = arm_solids(simulator.arm, configuration)
-    solids += scene_solids(simulator.scene, goal, reached)
-    return Image.fromarray(render(solids, CAMERA))
+def photograph(motions: list[Recording]) -> list[Image.Image]:
+    """Pictures of motions, one after the other."""
+    pictures = []
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "replay.html"
+        replay_page(motions, path)
+        with open_stage(path, WIDTH, HEIGHT, scale=2) as page:
+            page.evaluate(f"kinarm.lookFrom({list(EYE)}, {list(TARGET)})")
+            for index, motion in enumerate(motions):
+                page.evaluate(f"kinarm.select({index})")
+                for step in range(motion.steps + 1):
+                    page.evaluate(f"kinarm.seek({step})")
+                    picture = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+                    pictures.append(picture.resize((WIDTH, HEIGHT), Image.Resampling.LANCZOS))
+                pictures += [pictures[-1]] * (HOLD - 1)
+    return pictures
 
 
-def save_animation(pictures: list[Image.Image], frames: list[Frame], path: Path) -> None:
+def save_animation(pictures: list[Image.Image], path: Path) -> None:
     """Write pictures as a GIF with one palette for all, so that what rests costs nothing."""
-    palette = common_palette(pictures, frames)
-    reduced = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
-    path.parent.mkdir(exist_ok=True)
-    reduced[0].save(
-        path, save_all=True, append_images=reduced[1:], duration=40, loop=0, optimize=True
+    palette = common_palette(pictures[:: len(pictures) // 6])
+    first, *others = (
+        picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures
     )
+    first.save(path, save_all=True, append_images=others, duration=FRAME, loop=0, optimize=True)
 
 
-def common_palette(pictures: list[Image.Image], frames: list[Frame]) -> Image.Image:
-    """Choose 255 colours from some of the pictures, and from the small cube enlarged."""
-    width, height = CAMERA.width, CAMERA.height
-    chosen = np.linspace(0, len(pictures) - 1, 6).astype(int)
-    sample = Image.new("RGB", (2 * width, height * len(chosen)), "white")
-    for row, index in enumerate(chosen):
-        column, line = CAMERA.project(frames[index][1])
-        cube = pictures[index].crop((column - 9, line - 8, column + 9, line + 8))
-        sample.paste(pictures[index], (0, row * height))
-        sample.paste(cube.resize((width // 6, height // 6)), (width, row * height))
-    palette = sample.quantize(255, method=Image.Quantize.MEDIANCUT)
-    palette.putpalette([*palette.getpalette()[: 255 * 3], 255, 255, 255])
-    return palette
+def common_palette(pictures: list[Image.Image]) -> Image.Image:
+    """Choose 255 colours: half by how often they are seen, half by how many there are."""
+    pixels = np.concatenate([np.asarray(picture).reshape(-1, 3) for picture in pictures])
+    kinds = np.unique(pixels // 8 * 8 + 4, axis=0)
+    rare = np.tile(kinds, (len(pixels) // len(kinds), 1))
+    sample = np.concatenate([pixels, rare])[None]
+    return Image.fromarray(sample).quantize(255, method=Image.Quantize.MEDIANCUT)
 
 
 def main() -> None:
-    """Record, draw and write the animation."""
-    simulator = Simulator("paper", "both")
-    frames = record_motions(simulator, load_policy(POLICY))
-    save_animation([draw(simulator, frame) for frame in frames], frames, OUT)
-    print(f"{OUT}: {len(frames)} frames, {OUT.stat().st_size / 1e6:.2f} MB")
+    """Record, photograph and write the animation."""
+    motions = record_motions(Simulator("both"), load_policy(POLICY))
+    pictures = photograph(motions)
+    save_animation(pictures, OUT)
+    print(f"{OUT}: {len(pictures)} frames, {OUT.stat().st_size / 1e6:.2f} MB")
 
 
 if __name__ == "__main__":

@@ -4,11 +4,10 @@ Run ``kinarm-eval --trials 200 --report results`` and then ``python docs/make_re
 both from the root of a clone. It needs Chromium and the extra ``test``.
 """
 
-import shutil
 from pathlib import Path
 
+from browser import open_page
 from PIL import Image
-from playwright.sync_api import sync_playwright
 
 REPORT = Path("results", "index.html")
 OUT = Path(__file__).parent / "_static" / "report.png"
@@ -17,19 +16,11 @@ WIDTH, MARGIN = 1180, 24
 
 def main() -> None:
     """Show the report down to the charts of the first task."""
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=shutil.which("chromium"), args=["--headless=new", "--no-sandbox"]
-        )
-        page = browser.new_page(
-            viewport={"width": WIDTH, "height": 900}, color_scheme="light", reduced_motion="reduce"
-        )
-        page.goto(REPORT.resolve().as_uri())
+    with open_page(REPORT, WIDTH, 900) as page:
         charts = page.locator(".pair").first.bounding_box()
         height = round(charts["y"] + charts["height"] + MARGIN)
         page.set_viewport_size({"width": WIDTH, "height": height})
         page.screenshot(path=OUT)
-        browser.close()
     Image.open(OUT).convert("RGB").quantize(256).save(OUT, optimize=True)
     print(f"{OUT}: {OUT.stat().st_size / 1000:.0f} kB")
 

@@ -5,9 +5,8 @@ from docutils.parsers.rst import directives
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from kinarm import Simulator
-from kinarm.evaluation import TrialSet, find_entrants, oracle_bounds, record
-from kinarm.replay import Replay, replay
+from kinarm.evaluation import ReplayRequest
+from kinarm.viewer import ReplayPage, replay_page
 
 
 def numbers(text: str) -> list[int]:
@@ -15,27 +14,22 @@ def numbers(text: str) -> list[int]:
     return [int(word) for word in text.split()]
 
 
-def make_replay(policy: str, task: str, trials: list[int], ghost: str | None) -> Replay:
+def make_replay(policy: str, problem: str, trials: list[int], ghost: str | None) -> ReplayPage:
     """Let one or two policies face some trials."""
-    faced = TrialSet.draw(Simulator("paper", task), max(trials) + 1, seed=0)
-    bounds = oracle_bounds(faced)
-    runs = [
-        record(find_entrants(name)[0], faced, trials, bounds=bounds)
-        for name in (policy, ghost)
-        if name is not None
-    ]
-    return replay(runs[0], ghosts=runs[1] if len(runs) > 1 else ())
+    who = {"compare": (policy, ghost)} if ghost else {"policy": policy}
+    first, *others = ReplayRequest(problem=problem, trial=tuple(trials), **who).recordings()
+    return replay_page(first, ghosts=others[0] if others else ())
 
 
 class KinarmReplay(SphinxDirective):
-    """Show trials of a policy, such as ``ars-tuned-right``, on a task."""
+    """Show trials of a policy, such as ``ars-tuned-right``, on a problem."""
 
     required_arguments = 2
     option_spec = {"trials": numbers, "ghost": directives.unchanged}  # noqa: RUF012
 
     def run(self) -> list[nodes.Node]:
-        policy, task = self.arguments
-        page = make_replay(policy, task, self.options["trials"], self.options.get("ghost"))
+        policy, problem = self.arguments
+        page = make_replay(policy, problem, self.options["trials"], self.options.get("ghost"))
         return [nodes.raw("", page._repr_html_(), format="html")]
 
 

@@ -1,5 +1,7 @@
 """Sphinx directive ``kinarm-table``: tables that are read from the code, so that they stay true."""
 
+import re
+from collections.abc import Mapping
 from dataclasses import fields
 
 import numpy as np
@@ -7,10 +9,20 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from kinarm import Arm, Simulator, arm_names
+from kinarm import PROBLEMS, REWARD_TERMS, Arm, RewardWeights, Scene, Simulator, arm_names
+from kinarm._fields import init_fields, summary_of
 from kinarm.collision import enclosing_capsule
+from kinarm.envs.registration import ENVIRONMENTS
+from kinarm.evaluation import METRICS
+from kinarm.evaluation.commands.bench import BenchmarkRequest
+from kinarm.evaluation.commands.evaluate import EvaluationRequest
+from kinarm.evaluation.commands.replay import ReplayRequest
+from kinarm.evaluation.commands.reproduce import ReproductionRequest
 from kinarm.evaluation.reproduction.tables import markdown
-from kinarm.policies import ARS_RECIPES, PPO_RECIPES
+from kinarm.observation import OBSERVATION, part_slices
+from kinarm.policies import find_learner
+from kinarm.policies.train import TrainRequest
+from kinarm.problem_options import ProblemOptions
 
 
 def numbers(values: np.ndarray) -> str:
@@ -19,23 +31,23 @@ def numbers(values: np.ndarray) -> str:
 
 
 def arm_table(name: str) -> str:
-    """Axes of an arm."""
-    arm = Arm.load(name)
-    chain, time_step = arm.chain, Simulator(arm).time_step
+    """Joints of an arm."""
+    arm, moves = Arm.load(name), np.rad2deg(Simulator("right").step_limit)
+    chain, velocity = arm.chain, np.rad2deg(arm.model.velocityLimit)
     rows = [
         [
             str(k + 1),
-            numbers(chain.translation[k]),
+            numbers(translation),
             numbers(chain.axis[k]),
             f"{np.rad2deg(chain.lower[k]):.0f} to {np.rad2deg(chain.upper[k]):.0f}",
-            f"{np.rad2deg(chain.speed[k]):.0f}",
-            f"{np.rad2deg(chain.speed[k]) * time_step:.0f}" if k < arm.n_actuated else "held",
+            f"{velocity[k]:.0f}",
+            f"{moves[k]:.0f}" if k < len(moves) else "held",
         ]
-        for k in range(arm.n_axes)
+        for k, translation in enumerate(chain.translation)
     ]
     rows.append(["tool point", numbers(chain.tool), "", "", "", ""])
-    header = ["axis", "origin in its parent [m]", "direction", "limits [deg]", "speed [deg/s]"]
-    return markdown([*header, "per step [deg]"], rows)
+    header = ["joint", "origin in its parent [m]", "axis", "limits [deg]"]
+    return markdown([*header, "velocity limit [deg/s]", "per step [deg]"], rows)
 
 
 def capsule_table(name: str) -> str:
@@ -43,7 +55,7 @@ def capsule_table(name: str) -> str:
     rows = []
     for shape in Arm.load(name).geometry.geometryObjects:
         start, end, radius = enclosing_capsule(shape)
-        frame = f"axis {shape.parentJoint}" if shape.parentJoint else "world"
+        frame = f"joint {shape.parentJoint}" if shape.parentJoint else "world"
         link = shape.name.rsplit("_", 1)[0].replace("_", " ")
         rows.append([link, frame, numbers(start), numbers(end), f"{radius:.3f}"])
     return markdown(["body", "frame", "from [m]", "to [m]", "radius [m]"], rows)
@@ -62,30 +74,133 @@ def arms_table() -> str:
                 numbers(links[3:4]),
                 numbers(arm.chain.tool[:1]),
                 numbers(arm.tool_position(arm.home)),
-                numbers(np.rad2deg(arm.speed)),
+                numbers(np.rad2deg(arm.model.velocityLimit)),
             ]
         )
-    header = ["arm", "axis 2 to 3 [m]", "axis 3 to 4 [m]", "tool [m]", "tool point at zero [m]"]
-    return markdown([*header, "speeds [deg/s]"], rows)
+    header = ["arm", "joint 2 to 3 [m]", "joint 3 to 4 [m]", "tool [m]", "tool point at zero [m]"]
+    return markdown([*header, "velocity limits [deg/s]"], rows)
 
 
-def recipe_table(recipes: dict[str, object]) -> str:
-    """Settings of a learner's recipes."""
-    skipped = ("task", "arm", "seed", "recipe")
+def scene_table() -> str:
+    """Boxes of the paper's scene."""
+    scene = Scene()
     rows = [
-        [f"`{item.name}`", *(f"{getattr(c, item.name)}" for c in recipes.values())]
+        [
+            f"{kind} `{box.name}`",
+            *(
+                f"{low:g}" if low == high else f"{low:g} to {high:g}"
+                for low, high in zip(box.lower, box.upper, strict=True)
+            ),
+        ]
+        for kind, boxes in (("obstacle", scene.obstacles), ("goal region", scene.goal_regions))
+        for box in boxes
+    ]
+    return markdown(["box", "x [m]", "y [m]", "z [m]"], rows)
+
+
+def problems_table() -> str:
+    """The paper's problems, and their environments."""
+    environments = {problem: name for name, problem in ENVIRONMENTS.items()}
+    rows = [
+        [f"`{name}`", f"task {number}", " and ".join(problem.task.goal_regions)]
+        + [f"`{environments[name]}`"]
+        for number, (name, problem) in enumerate(PROBLEMS.items(), start=1)
+    ]
+    return markdown(["problem", "in the paper", "goal regions", "environment"], rows)
+
+
+def reward_table() -> str:
+    """Terms of the reward."""
+    weights = RewardWeights()
+    rows = [
+        [f"`{name}`", f"{getattr(weights, name):g}", summary_of(RewardWeights, name)]
+        for name in REWARD_TERMS
+    ]
+    return markdown(["term", "weight by default", "what the weight is"], rows)
+
+
+def observation_table(n_joints: int) -> str:
+    """Parts of the observation."""
+    places = part_slices(n_joints)
+    rows = [
+        [
+            f"{places[part.name].start} to {places[part.name].stop - 1}",
+            f"`{part.name}`",
+            part.meaning,
+            part.unit,
+            " ".join("+" if sign > 0 else "−" for sign in part.signs),
+        ]
+        for part in OBSERVATION
+    ]
+    return markdown(["index", "part", "meaning", "unit", "signs under y → −y"], rows)
+
+
+def recipe_table(recipes: Mapping[str, object]) -> str:
+    """Settings of a learner's recipes."""
+    skipped = ("problem", "seed", "recipe")
+    rows = [
+        [f"`{item.name}`", *(setting(getattr(each, item.name)) for each in recipes.values())]
         for item in fields(next(iter(recipes.values())))
         if item.name not in skipped
     ]
     return markdown(["setting", *(f"`{name}`" for name in recipes)], rows)
 
 
+def setting(value: object) -> str:
+    """Format a setting of a recipe."""
+    if value is None:
+        return "the task's"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, RewardWeights):
+        weights = ((name, getattr(value, name)) for name in REWARD_TERMS)
+        return ", ".join(f"{name} {weight:g}" for name, weight in weights if weight)
+    return ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)
+
+
+def metrics_table() -> str:
+    """The figures of merit."""
+    rows = [
+        [f"`{name}`", metric.meaning, metric.unit, metric.interval or "", metric.heading]
+        for name, metric in METRICS.items()
+    ]
+    return markdown(["name", "meaning", "unit", "interval (95 %)", "column"], rows)
+
+
+def options_table(request: type, skip: tuple[str, ...] = ()) -> str:
+    """Options of a command: the fields of its request, but for the shared ones."""
+    shared = () if request is ProblemOptions else init_fields(ProblemOptions)
+    rows = []
+    for name, item in init_fields(request).items():
+        if name in shared or name in skip:
+            continue
+        flag = item.metadata.get("flag", f"--{name.replace('_', '-')}")
+        if not flag.startswith("--"):
+            flag = item.metadata["metavar"]
+        elif item.default is True:
+            flag = f"{flag}`, `{flag.replace('--', '--no-', 1)}"
+        meaning = re.sub(r"(--[a-z-]+)", r"`\1`", summary_of(request, name))
+        rows.append([f"`{flag}`", meaning.replace("``", "`")])
+    return markdown(["option", "meaning"], rows)
+
+
 TABLES = {
     "arm": lambda: arm_table("paper"),
     "capsules": lambda: capsule_table("paper"),
     "arms": arms_table,
-    "ars-recipes": lambda: recipe_table(ARS_RECIPES),
-    "ppo-recipes": lambda: recipe_table(PPO_RECIPES),
+    "scene": scene_table,
+    "problems": problems_table,
+    "reward": reward_table,
+    "observation": lambda: observation_table(6),
+    "metrics": metrics_table,
+    "ars-recipes": lambda: recipe_table(find_learner("ars").recipes),
+    "ppo-recipes": lambda: recipe_table(find_learner("ppo").recipes),
+    "problem-options": lambda: options_table(ProblemOptions),
+    "train-options": lambda: options_table(TrainRequest, skip=("learner", "settings")),
+    "evaluation-options": lambda: options_table(EvaluationRequest),
+    "replay-options": lambda: options_table(ReplayRequest),
+    "reproduction-options": lambda: options_table(ReproductionRequest),
+    "benchmark-options": lambda: options_table(BenchmarkRequest),
 }
 
 

@@ -3,27 +3,34 @@
 import hashlib
 import os
 import tempfile
-from functools import cache, partial
+from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from kinarm.errors import OutputError
-from kinarm.evaluation.statistics import Share
+from kinarm._archive import load_archive, save_archive
+from kinarm._files import check_folder
+from kinarm.errors import InvalidInputError, OutputError
+from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.trials import TrialSet
-from kinarm.files import CORRUPT, check_folder, write_atomically
-from kinarm.policies import oracle
-from kinarm.policies.oracle import Oracle, Progress
-from kinarm.policies.oracle_solution import OracleSolutions
-from kinarm.policies.provenance import hash_sources, package_versions
+from kinarm.policies.oracle import ORACLE_SEMANTICS, Oracle, OracleSolutions, Progress
+from kinarm.policies.provenance import package_versions
+from kinarm.semantics import SEMANTICS
 
 CACHE_VARIABLE = "KINARM_CACHE"
 """Environment variable that names another cache folder."""
 
-ORACLE_MODULES = ("detour", "inverse", "motion", "motion_search", "oracle", "oracle_solution")
-"""What the oracle consists of, beside the simulator."""
+KEPT_FILES, KEPT_BYTES = 200, 256 * 2**20
+"""Trial sets whose bounds are kept, and how large their files may be together."""
+
+COMPUTING_PACKAGES = ("numpy", "numba", "pin", "coal")
+"""Packages that the numbers of a solution come from."""
+
+ARCHIVE = ("bounds", 1)
+"""Kind and version of the files."""
 
 _known: WeakKeyDictionary[TrialSet, OracleSolutions] = WeakKeyDictionary()
 
@@ -33,7 +40,8 @@ def oracle_bounds(trials: TrialSet, on_progress: Progress | None = None) -> Orac
 
     Solutions are kept in the cache folder under a name made of the hash of the trials and of the
     oracle's version, for other processes, and in memory as long as the trials are. A file that
-    cannot be read is replaced; where none can be written, nothing is kept.
+    cannot be read is replaced; where none can be written, nothing is kept. Beyond `KEPT_FILES`
+    and `KEPT_BYTES`, the files that were used least recently go.
 
     Parameters
     ----------
@@ -46,8 +54,8 @@ def oracle_bounds(trials: TrialSet, on_progress: Progress | None = None) -> Orac
         path = cache_folder() / f"oracle-{trials.digest}-{oracle_version()}.npz"
         solutions = _load(path, trials)
         if solutions is None:
-            solver = Oracle(simulator=trials.simulator)
-            solutions = solver.solve_batch(trials.starts, trials.goals, on_progress=on_progress)
+            oracle = Oracle(trials.simulator.problem)
+            solutions = oracle.solve_batch(trials.starts, trials.goals, on_progress=on_progress)
             _save(path, solutions)
         _known[trials] = solutions
     return _known[trials]
@@ -66,39 +74,55 @@ def cache_folder() -> Path:
 
 @cache
 def oracle_version() -> str:
-    """Hash of the sources and package versions that solutions depend on."""
-    policies = Path(oracle.__file__).parent
-    sources = hash_sources(*(policies / f"{name}.py" for name in ORACLE_MODULES))
-    return hashlib.sha256(f"{package_versions()} {sources}".encode()).hexdigest()[:12]
+    """Hash of the versions of oracle, simulator and packages that solutions depend on."""
+    packages = package_versions()
+    versions = (ORACLE_SEMANTICS, SEMANTICS, *(packages[name] for name in COMPUTING_PACKAGES))
+    return hashlib.sha256(" ".join(versions).encode()).hexdigest()[:12]
 
 
 def _load(path: Path, trials: TrialSet) -> OracleSolutions | None:
     """Read solutions; None if there are none or they cannot be used."""
     try:
-        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
-            solutions = OracleSolutions(**dict(file))
-    except (OSError, *CORRUPT):
+        solutions = OracleSolutions(**load_archive(path, *ARCHIVE, InvalidInputError).arrays)
+    except (InvalidInputError, TypeError):
         return None
-    task, n = trials.simulator.task, len(trials)
+    simulator, n = trials.simulator, len(trials)
     expected = {
-        "actions": (n, task.horizon, trials.simulator.n_actions),
-        "paths": (n, task.horizon + 1, trials.simulator.arm.n_axes),
+        "actions": (n, simulator.task.horizon, simulator.n_actions),
+        "paths": (n, simulator.task.horizon + 1, simulator.arm.n_axes),
     }
     fits = (array.shape == expected.get(name, (n,)) for name, array in solutions.arrays().items())
-    return solutions if all(fits) else None
+    if not all(fits):
+        return None
+    with suppress(OSError):
+        os.utime(path)
+    return solutions
 
 
 def _save(path: Path, solutions: OracleSolutions) -> None:
-    """Write solutions, if possible, in place of those of another version."""
-    arrays: dict[str, Any] = solutions.arrays()
-    try:
-        check_folder(path.parent, create=True)
-        write_atomically(path, partial(np.savez_compressed, **arrays))
-    except OutputError:
-        return
-    trial_set = path.name.rpartition("-")[0]
-    for other in set(path.parent.glob(f"{trial_set}-*.npz")) - {path}:
-        other.unlink(missing_ok=True)
+    """Write solutions, if possible, and make room for them."""
+    with suppress(OutputError):
+        check_folder(path.parent)
+        save_archive(path, *ARCHIVE, solutions.arrays(), {}, compress=True)
+        _delete_least_recently_used(path.parent)
+
+
+def _delete_least_recently_used(folder: Path) -> None:
+    """Delete the files that are too many, whatever other processes do to them meanwhile.
+
+    What a process that was killed left half written counts, too.
+    """
+    used = []
+    for path in (*folder.glob("oracle-*.npz"), *folder.glob(".oracle-*.npz.*")):
+        with suppress(OSError):
+            status = path.stat()
+            used.append((status.st_mtime_ns, status.st_size, path))
+    total = 0
+    for rank, (_, size, path) in enumerate(sorted(used, reverse=True)):
+        total += size
+        if rank > 0 and (rank >= KEPT_FILES or total > KEPT_BYTES):
+            with suppress(OSError):
+                path.unlink()
 
 
 def bounds_document(solutions: OracleSolutions) -> dict[str, Any]:
@@ -115,7 +139,7 @@ def bounds_document(solutions: OracleSolutions) -> dict[str, Any]:
     missed = np.flatnonzero(~solutions.reachable)
     gap = (solutions.steps - solutions.steps_lower_bound)[solutions.reachable]
     return {
-        "success": Share.of(solutions.reachable).to_json(),
+        "success": Estimate.share(solutions.reachable).to_json(),
         "unsolved": [
             {"trial": int(trial), "reason": str(solutions.reasons[trial])} for trial in missed
         ],

@@ -1,5 +1,6 @@
 """Who takes part in an evaluation: trained policies and baselines."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -7,12 +8,14 @@ from typing import Protocol
 import numpy as np
 
 from kinarm.arm import Arm
-from kinarm.errors import UnknownNameError
+from kinarm.errors import InvalidInputError, PolicyFileError, UnknownNameError
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.trials import TrialSet, trial_generator
 from kinarm.networks import Networks
+from kinarm.observation import observation_size
 from kinarm.policies.library import group_of, policy_files, policy_names
 from kinarm.policies.policy import Policy
+from kinarm.problem import ReachProblem
 from kinarm.rollouts import Rollouts
 from kinarm.simulator import PolicyFunction
 
@@ -37,11 +40,9 @@ class Entrant:
     algorithm, recipe : str
         How it was made.
     group : str
-        What it shares with other training seeds of the same recipe and task.
+        What it shares with other training seeds of the same recipe and problem.
     seed : int or None
         Training seed.
-    trained_on : str or None
-        Task that it was trained on; None for baselines.
     policy : Policy or None
         The trained policy, if it is one.
     source : Path or None
@@ -54,20 +55,46 @@ class Entrant:
     recipe: str
     group: str
     seed: int | None = None
-    trained_on: str | None = None
     policy: Policy | None = None
     source: Path | None = None
 
-    def check_arm(self, arm: Arm) -> None:
-        """See that the policy, if there is one, was trained for an arm.
+    @property
+    def problem(self) -> ReachProblem | None:
+        """The problem that it was trained for, if it was."""
+        return self.policy.problem if self.policy else None
+
+    def check(self, arm: Arm, *, allow_other_arm: bool = False) -> None:
+        """See that the policy, if there is one, can drive an arm.
+
+        Parameters
+        ----------
+        arm : Arm
+            The arm.
+        allow_other_arm : bool
+            Whether it may face an arm that it was not trained for.
 
         Raises
         ------
         PolicyFileError
-            If it was trained for another one.
+            If it was trained for another one, or does not fit it.
         """
-        if self.policy is not None:
+        if self.policy is None:
+            return
+        if not allow_other_arm:
             self.policy.check_arm(arm)
+        widths = (self.policy.n_observations, self.policy.n_actions)
+        expected = (observation_size(arm.n_axes), arm.n_actuated)
+        if widths != expected:
+            raise PolicyFileError(
+                "policy {!r} maps {} observations to {} actions; arm {!r} has {} and {}".format(
+                    self.name, *widths, arm.name, *expected
+                )
+            )
+
+    def __repr__(self) -> str:
+        trained = f" for {self.problem.name}" if self.problem else ""
+        source = f", {str(self.source)!r}" if self.source else ""
+        return f"Entrant({self.name!r}: {self.algorithm} {self.recipe}{trained}{source})"
 
     @classmethod
     def from_policy(cls, name: str, policy: Policy, source: Path | None = None) -> "Entrant":
@@ -80,7 +107,6 @@ class Entrant:
             recipe=made.recipe,
             group=group_of(name),
             seed=made.seed,
-            trained_on=made.task,
             policy=policy,
             source=source,
         )
@@ -171,8 +197,34 @@ def find_entrants(name_or_file: str | Path) -> tuple[Entrant, ...]:
     )
 
 
-def shipped_entrants(arm: Arm) -> tuple[Entrant, ...]:
-    """All shipped policies that were trained for an arm, then the baselines."""
-    shipped = [entrant for name in policy_names() for entrant in find_entrants(name)]
-    fitting = [e for e in shipped if e.policy and e.policy.provenance.arm_digest == arm.digest]
-    return (*fitting, *BASELINES.values())
+def shipped_entrants() -> tuple[Entrant, ...]:
+    """All shipped policies, then the baselines."""
+    shipped = (entrant for name in policy_names() for entrant in find_entrants(name))
+    return (*shipped, *BASELINES.values())
+
+
+def check_names(pairs: Iterable[tuple[Entrant, ReachProblem]]) -> None:
+    """See that entrants and the problems that they face can be told apart by their names.
+
+    Raises
+    ------
+    InvalidInputError
+        If two of them cannot.
+    """
+    entrants: dict[str, Entrant] = {}
+    problems: dict[str, ReachProblem] = {}
+    faced = set()
+    for entrant, problem in pairs:
+        difference = problems.setdefault(problem.name, problem).first_difference(problem)
+        if difference is not None:
+            raise InvalidInputError(
+                f"two problems are called {problem.name!r}: in the second, {difference}"
+            )
+        first = entrants.setdefault(entrant.name, entrant)
+        if first.source != entrant.source or (entrant.name, problem.name) in faced:
+            sources = (each.source or "the one that needs no file" for each in (first, entrant))
+            raise InvalidInputError(
+                f"two policies are called {entrant.name!r}: {' and '.join(map(str, sources))}; "
+                "rename a file"
+            )
+        faced.add((entrant.name, problem.name))

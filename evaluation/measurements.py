@@ -10,17 +10,33 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
-from kinarm.parallel import available_threads
+import numpy as np
 
-if TYPE_CHECKING:
-    from kinarm.policies.policy import Policy
-    from kinarm.simulator import Simulator
+from kinarm._parallel import available_threads
+from kinarm.envs import ReachEnv, ReachVectorEnv
+from kinarm.errors import MissingExtraError
+from kinarm.evaluation.bounds import CACHE_VARIABLE
+from kinarm.policies.learners import train_policy
+from kinarm.policies.library import load_policy
+from kinarm.policies.oracle import Oracle
+from kinarm.policies.policy import Policy
+from kinarm.policies.provenance import package_versions, source_commit
+from kinarm.policies.recipes import recipe
+from kinarm.problem import ReachProblem
+from kinarm.reference import ReferenceSimulator
+from kinarm.simulator import Simulator
 
 BATCHES = (48, 512, 4096)
+HEADLINE_BATCH = 512
+"""Batch whose trained rollouts on all threads are compared with the reference path."""
 VECTOR_ENVS = 64
+VECTOR_STEPS, SINGLE_STEPS = 200, 2000
 ORACLE_TRIALS = 200
+REFERENCE_TRIALS = 24
+SLOW_REPETITIONS = 3
+"""How often, at most, is measured what takes seconds."""
 
 
 class Timing(NamedTuple):
@@ -29,10 +45,6 @@ class Timing(NamedTuple):
     median: float
     best: float
 
-    def to_json(self) -> dict[str, float]:
-        """As a dictionary that JSON can hold."""
-        return {"median": self.median, "best": self.best}
-
 
 def measure(policy_name: str, repetitions: int, *, ppo: bool = False) -> dict[str, Any]:
     """Measure everything.
@@ -40,7 +52,7 @@ def measure(policy_name: str, repetitions: int, *, ppo: bool = False) -> dict[st
     Parameters
     ----------
     policy_name : str
-        Trained policy to run.
+        Trained policy to run, on the problem that it is for.
     repetitions : int
         How often each figure is measured.
     ppo : bool
@@ -51,41 +63,31 @@ def measure(policy_name: str, repetitions: int, *, ppo: bool = False) -> dict[st
     dict
         Figures that JSON can hold: rates [steps/s], shares, and times [s].
     """
-    from kinarm.policies.library import load_policy
-    from kinarm.policies.provenance import package_versions, source_commit
-    from kinarm.simulator import Simulator
-
     policy = load_policy(policy_name)
-    simulator = Simulator(task=policy.provenance.task)
-    policy.check_arm(simulator.arm)
-    rollouts = measure_rollouts(simulator, policy, repetitions)
+    problem = policy.problem
+    simulator = Simulator(problem)
+    rollouts = [
+        row for size in BATCHES for row in measure_rollouts(simulator, policy, size, repetitions)
+    ]
     reference = measure_reference(simulator, policy, repetitions)
-    fast = next(row for row in rollouts if _is_headline(row))
+    fast = [row for row in rollouts if row["batch"] == HEADLINE_BATCH][-1]
+    few = min(repetitions, SLOW_REPETITIONS)
     return {
-        "machine": {"architecture": platform.machine(), "threads": simulator.threads},
+        "machine": {"architecture": platform.machine(), "threads": available_threads()},
         "versions": package_versions(),
         "commit": source_commit(),
         "policy": policy_name,
         "repetitions": repetitions,
         "rollouts": rollouts,
-        "reference": reference.to_json(),
+        "reference": reference._asdict(),
         "speed_up_over_reference": fast["steps_per_second"]["median"] / reference.median,
-        "vector_environment": measure_vector_env(policy, repetitions).to_json(),
-        "single_environment": measure_single_env(policy, repetitions).to_json(),
-        "table_1_training": measure_training(policy.provenance.task, min(repetitions, 3)),
-        "oracle": measure_oracle(policy.provenance.task, min(repetitions, 3)),
+        "vector_environment": measure_vector_env(problem, repetitions)._asdict(),
+        "single_environment": measure_single_env(problem, repetitions)._asdict(),
+        "table_1_training": measure_training(problem, few),
+        "oracle": measure_oracle(problem, few),
         "evaluation": measure_evaluation(),
-        **({"ppo_training": measure_ppo(policy.provenance.task)} if ppo else {}),
+        **({"ppo_training": measure_ppo(problem)} if ppo else {}),
     }
-
-
-def _is_headline(row: dict[str, Any]) -> bool:
-    """The figure that others are compared with: 512 trained episodes on all threads."""
-    return bool(
-        row["batch"] == 512
-        and row["actions"] == "trained"
-        and row["threads"] == available_threads()
-    )
 
 
 def timed(run: Callable[[], int], repetitions: int) -> Timing:
@@ -100,25 +102,13 @@ def timed(run: Callable[[], int], repetitions: int) -> Timing:
 
 
 def measure_rollouts(
-    simulator: "Simulator", policy: "Policy", repetitions: int
+    simulator: Simulator, policy: Policy, batch: int, repetitions: int
 ) -> list[dict[str, Any]]:
-    """Steps per second of whole episodes: batch sizes, random and trained, 1 and all threads."""
-    return [
-        row for batch in BATCHES for row in measure_batch(simulator, policy, batch, repetitions)
-    ]
-
-
-def measure_batch(
-    simulator: "Simulator", policy: "Policy", batch: int, repetitions: int
-) -> list[dict[str, Any]]:
-    """Steps per second of one batch size."""
-    import numpy as np
-
-    from kinarm.kernels import SUBSTEPS
-
+    """Steps per second of whole episodes: random and trained, on one and on all threads."""
     rng = np.random.default_rng(batch)
     starts, goals = simulator.sample(rng, batch)
     actions = rng.uniform(-1, 1, (batch, simulator.task.horizon, simulator.n_actions))
+    tested = simulator.problem.stepping.tested_configurations
 
     def run_random() -> int:
         return int(simulator.rollout_actions(actions, starts, goals).steps.sum())
@@ -130,7 +120,7 @@ def measure_batch(
     for name, run in (("random", run_random), ("trained", run_trained)):
         judged_before = simulator.judged
         steps = run()
-        judged_share = (simulator.judged - judged_before) / (SUBSTEPS * steps)
+        judged_share = (simulator.judged - judged_before) / (tested * steps)
         for threads in sorted({1, available_threads()}):
             simulator.threads = threads
             rows.append(
@@ -138,21 +128,17 @@ def measure_batch(
                     "batch": batch,
                     "actions": name,
                     "threads": threads,
-                    "steps_per_second": timed(run, repetitions).to_json(),
+                    "steps_per_second": timed(run, repetitions)._asdict(),
                     "judged_share": judged_share,
                 }
             )
     return rows
 
 
-def measure_reference(simulator: "Simulator", policy: "Policy", repetitions: int) -> Timing:
+def measure_reference(simulator: Simulator, policy: Policy, repetitions: int) -> Timing:
     """Steps per second of the slow reference path, on the trained policy."""
-    import numpy as np
-
-    from kinarm.reference import ReferenceSimulator
-
     reference = ReferenceSimulator(simulator)
-    starts, goals = simulator.sample(np.random.default_rng(0), 24)
+    starts, goals = simulator.sample(np.random.default_rng(0), REFERENCE_TRIALS)
 
     def run() -> int:
         episodes = [reference.rollout(policy, *pair) for pair in zip(starts, goals, strict=True)]
@@ -161,78 +147,61 @@ def measure_reference(simulator: "Simulator", policy: "Policy", repetitions: int
     return timed(run, repetitions)
 
 
-def measure_vector_env(policy: "Policy", repetitions: int) -> Timing:
+def measure_vector_env(problem: ReachProblem, repetitions: int) -> Timing:
     """Steps per second of the native batch environment, on random actions."""
-    import gymnasium
-    import numpy as np
-
-    name = f"kinarm/Reach{policy.provenance.task.title()}-v0"
-    env = gymnasium.make_vec(name, num_envs=VECTOR_ENVS)
+    env = ReachVectorEnv(VECTOR_ENVS, problem)
     env.reset(seed=0)
-    shape = (200, *(env.action_space.shape or ()))
+    shape = (VECTOR_STEPS, VECTOR_ENVS, env.simulator.n_actions)
     actions = np.random.default_rng(0).uniform(-1, 1, shape)
 
     def run() -> int:
         for action in actions:
             env.step(action)
-        return len(actions) * VECTOR_ENVS
+        return VECTOR_STEPS * VECTOR_ENVS
 
     return timed(run, repetitions)
 
 
-def measure_single_env(policy: "Policy", repetitions: int) -> Timing:
+def measure_single_env(problem: ReachProblem, repetitions: int) -> Timing:
     """Steps per second of the single environment without wrappers, on random actions."""
-    import numpy as np
-
-    from kinarm.env import ReachEnv
-
-    env = ReachEnv(policy.provenance.task)
+    env = ReachEnv(problem)
     env.reset(seed=0)
-    actions = np.random.default_rng(0).uniform(-1, 1, (2000, env.simulator.n_actions))
+    actions = np.random.default_rng(0).uniform(-1, 1, (SINGLE_STEPS, env.simulator.n_actions))
 
     def run() -> int:
         for action in actions:
             _, _, terminated, truncated, _ = env.step(action)
             if terminated or truncated:
                 env.reset()
-        return len(actions)
+        return SINGLE_STEPS
 
     return timed(run, repetitions)
 
 
-def measure_training(task: str, repetitions: int) -> dict[str, Any]:
+def measure_training(problem: ReachProblem, repetitions: int) -> dict[str, Any]:
     """Time and steps of a training with Table 1's settings."""
-    from kinarm.policies.ars import train_ars
-    from kinarm.policies.recipes import ars_recipe
-
-    seconds, steps = [], 0
-    for _ in range(repetitions):
-        result = train_ars(ars_recipe("paper", task=task))
-        seconds.append(result.curve[-1].wall_time)
-        steps = result.curve[-1].environment_steps
+    config = recipe("ars", "paper", problem=problem)
+    ends = [train_policy(config).curve[-1] for _ in range(repetitions)]
+    seconds = [end.wall_time for end in ends]
     return {
         "seconds": {"median": statistics.median(seconds), "best": min(seconds)},
-        "environment_steps": steps,
+        "environment_steps": ends[-1].environment_steps,
     }
 
 
-def measure_oracle(task: str, repetitions: int) -> dict[str, Any]:
+def measure_oracle(problem: ReachProblem, repetitions: int) -> dict[str, Any]:
     """Trials that the oracle solves per second."""
-    import numpy as np
-
-    from kinarm.policies.oracle import Oracle
-
-    oracle = Oracle(task=task)
+    oracle = Oracle(problem)
     starts, goals = oracle.simulator.sample(np.random.default_rng(0), ORACLE_TRIALS)
 
     def run() -> int:
         oracle.solve_batch(starts, goals)
         return ORACLE_TRIALS
 
-    return {"trials": ORACLE_TRIALS, "trials_per_second": timed(run, repetitions).to_json()}
+    return {"trials": ORACLE_TRIALS, "trials_per_second": timed(run, repetitions)._asdict()}
 
 
-def measure_ppo(task: str) -> dict[str, Any]:
+def measure_ppo(problem: ReachProblem) -> dict[str, Any]:
     """Time, steps and the simulator's share of a training with PPO's tuned recipe.
 
     Returns
@@ -240,21 +209,16 @@ def measure_ppo(task: str) -> dict[str, Any]:
     dict
         Figures that JSON can hold, or under ``skipped`` why there are none.
     """
-    from kinarm.errors import MissingExtraError
-    from kinarm.policies.ppo import train_ppo
-    from kinarm.policies.recipes import ppo_recipe
-
-    config = ppo_recipe("tuned", task=task)
+    config = recipe("ppo", "tuned", problem=problem)
     try:
-        train_ppo(replace(config, iterations=1))  # imports torch and compiles
+        train_policy(replace(config, iterations=1))  # imports torch and compiles
     except MissingExtraError as error:
         return {"skipped": str(error)}
-    result = train_ppo(config)
-    seconds = result.curve[-1].wall_time
+    state = train_policy(config).state
     return {
-        "seconds": seconds,
-        "environment_steps": result.curve[-1].environment_steps,
-        "simulator_share": result.simulator_time / seconds,
+        "seconds": state.wall_time,
+        "environment_steps": state.environment_steps,
+        "simulator_share": state.simulator_time / state.wall_time,
     }
 
 
@@ -263,19 +227,14 @@ def measure_evaluation() -> dict[str, float]:
 
     The first time, the bounds of the trials are not known; then they are.
     """
-    from kinarm.evaluation.bounds import CACHE_VARIABLE
-
-    code = "from kinarm.evaluation.eval import main; main(['--trials', '200', '--json'])"
+    module = "kinarm.evaluation.commands.evaluate"
+    command = [sys.executable, "-P", "-m", module, "--trials", "200", "--json"]
     seconds = []
     with tempfile.TemporaryDirectory() as folder:
+        env = {**os.environ, CACHE_VARIABLE: folder}
         for _ in range(2):
             began = time.perf_counter()
-            subprocess.run(
-                [sys.executable, "-P", "-c", code],
-                stdout=subprocess.DEVNULL,
-                check=True,
-                env={**os.environ, CACHE_VARIABLE: folder},
-            )
+            subprocess.run(command, stdout=subprocess.DEVNULL, check=True, env=env)
             seconds.append(time.perf_counter() - began)
     peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
     return {

@@ -1,37 +1,39 @@
-"""Figures of merit with 95 % intervals."""
+"""Estimates with 95 % intervals."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+LEVEL = 0.95
 RESAMPLES = 1000
 BOOTSTRAP_SEED = 0
+
+NUMBERS_AT_ONCE = 400_000
+"""How many trial numbers are resampled at once, so that many trials do not fill the memory."""
 
 Interval = tuple[float, float]
 
 
-@dataclass(frozen=True)
-class Share:
-    """A share of trials.
+class Estimate(NamedTuple):
+    """A figure of merit.
 
     Attributes
     ----------
-    rate : float
-        The share.
-    ci95 : tuple of float
-        Wilson interval.
+    value : float or None
+        The figure; None where there is nothing to tell.
+    ci95 : tuple of float, or None
+        Its 95 % interval, where it has one.
     """
 
-    rate: float
-    ci95: Interval
+    value: float | None
+    ci95: Interval | None = None
 
     @classmethod
-    def of(cls, hits: NDArray[np.bool_]) -> "Share":
-        """Share of hits.
+    def share(cls, hits: NDArray[np.bool_]) -> "Estimate":
+        """Share of hits, with its Wilson interval.
 
         Parameters
         ----------
@@ -39,108 +41,84 @@ class Share:
             Whether a trial hit. Several seeds face the same trials, so they are no independent
             evidence about them: their interval is that of n_trials trials, widened to whole hits.
         """
-        rate, trials = float(hits.mean()), hits.shape[-1]
-        expected = hits.sum() / (hits.size // trials)
-        few, many = int(np.floor(expected)), int(np.ceil(expected))
-        return cls(rate, (_wilson(few, trials)[0], _wilson(many, trials)[1]))
+        seeds = hits.size // hits.shape[-1]
+        return cls(float(hits.mean()), wilson_interval(int(hits.sum()), hits.shape[-1], seeds))
+
+    def __str__(self) -> str:
+        interval = " ({:.3g}..{:.3g})".format(*self.ci95) if self.ci95 else ""
+        return "unknown" if self.value is None else f"{self.value:.3g}{interval}"
 
     def to_json(self) -> dict[str, Any]:
         """As a dictionary that JSON can hold."""
-        return {"rate": self.rate, "ci95": list(self.ci95)}
+        return {"value": self.value, "ci95": self.ci95 and list(self.ci95)}
+
+
+def wilson_interval(hits: int, trials: int, seeds: int = 1) -> Interval:
+    """95 % interval of a share of trials; see `Estimate.share` for several seeds.
+
+    Parameters
+    ----------
+    hits : int
+        Hits of all seeds together.
+    trials : int
+        Trials that every seed faced.
+    seeds : int
+        Number of seeds.
+    """
+    few, many = hits // seeds, -(-hits // seeds)
+    return _wilson_interval(few, trials)[0], _wilson_interval(many, trials)[1]
 
 
 @cache
-def _wilson(hits: int, trials: int) -> Interval:
-    """95 % interval of a share; profiles ask for the same ones over and over."""
+def _wilson_interval(hits: int, trials: int) -> Interval:
+    """Interval of whole hits; profiles ask for the same ones over and over."""
     from scipy.stats import binomtest
 
-    interval = binomtest(hits, trials).proportion_ci(method="wilson")
+    interval = binomtest(hits, trials).proportion_ci(confidence_level=LEVEL, method="wilson")
     return float(interval.low), float(interval.high)
 
 
 def performance_profile(
     distances: NDArray[np.float64], limits: Iterable[float]
-) -> tuple[Share, ...]:
+) -> tuple[Estimate, ...]:
     """Shares of trials whose final distance is at most each of some limits.
 
     Parameters
     ----------
     distances : ndarray, shape (n_trials,) or (n_seeds, n_trials)
-        Final distances [m]; several seeds face the same trials, see `Share.of`.
+        Final distances [m]; several seeds face the same trials, see `Estimate.share`.
     limits : iterable of float
         The limits [m].
     """
-    return tuple(Share.of(distances <= limit) for limit in limits)
+    return tuple(Estimate.share(distances <= limit) for limit in limits)
 
 
-@dataclass(frozen=True)
-class DistanceStatistics:
-    """Statistics of final distances [m].
+def bootstrap_intervals(
+    trials: int, figures: Callable[[NDArray[np.int64]], NDArray[np.float64]]
+) -> list[Interval | None]:
+    """Seeded percentile intervals of some figures over resamples of the trials.
 
-    Attributes
+    Parameters
     ----------
-    mean, median, iqm, p95, max : float
-        Mean, median, interquartile mean, 95th percentile and maximum.
-    ci95 : dict
-        Seeded bootstrap intervals of all but the maximum; None for a single trial, which tells
-        nothing about the spread.
+    trials : int
+        Number of trials. A single one tells nothing about the spread: None for every figure.
+    figures : callable
+        From numbers of trials, shape (n_resamples, trials) or (trials,), to the figures of each
+        resample, shape (n_figures, n_resamples) or (n_figures,).
     """
+    from scipy.stats import bootstrap
 
-    mean: float
-    median: float
-    iqm: float
-    p95: float
-    max: float
-    ci95: dict[str, Interval | None]
-
-    @classmethod
-    def of(cls, distances: NDArray[np.float64]) -> "DistanceStatistics":
-        """Summarise final distances.
-
-        Parameters
-        ----------
-        distances : ndarray, shape (n_trials,) or (n_seeds, n_trials)
-            Final distances [m]. Trials are resampled for all seeds alike.
-        """
-        from scipy.stats import bootstrap
-
-        samples = tuple(np.atleast_2d(distances))
-        ci95: dict[str, Interval | None] = dict.fromkeys(ESTIMATES)
-        if len(samples[0]) > 1:
-            interval = bootstrap(
-                samples,
-                _estimates,
-                n_resamples=RESAMPLES,
-                method="percentile",
-                paired=len(samples) > 1,
-                vectorized=True,
-                rng=np.random.default_rng(BOOTSTRAP_SEED),
-            ).confidence_interval
-            for name, low, high in zip(ESTIMATES, *np.array(interval), strict=True):
-                ci95[name] = (float(low), float(high))
-        estimates = dict(zip(ESTIMATES, _estimates(*samples).tolist(), strict=True))
-        return cls(**estimates, max=float(np.max(distances)), ci95=ci95)
-
-    def to_json(self) -> dict[str, Any]:
-        """As a dictionary that JSON can hold."""
-        figures = {name: getattr(self, name) for name in (*ESTIMATES, "max")}
-        return {**figures, "ci95": {name: ci and list(ci) for name, ci in self.ci95.items()}}
-
-
-ESTIMATES = ("mean", "median", "iqm", "p95")
-"""Statistics that get an interval."""
-
-
-def _estimates(*samples: NDArray[np.float64], axis: int = -1) -> NDArray[np.float64]:
-    """Pool samples along an axis and estimate `ESTIMATES`, stacked along the first axis."""
-    from scipy.stats import trim_mean
-
-    pooled = np.concatenate(samples, axis=axis)
-    return np.stack(
-        [
-            pooled.mean(axis=axis),
-            np.median(pooled, axis=axis),
-            trim_mean(pooled, 0.25, axis=axis),
-            np.quantile(pooled, 0.95, axis=axis),
-        ]
-    )
+    numbers = np.arange(trials)
+    if trials == 1:
+        return [None] * len(figures(numbers))
+    interval = bootstrap(
+        (numbers,),
+        lambda resampled, axis: figures(resampled),  # noqa: ARG005 - along the last axis, always
+        n_resamples=RESAMPLES,
+        batch=max(1, NUMBERS_AT_ONCE // trials),
+        confidence_level=LEVEL,
+        method="percentile",
+        vectorized=True,
+        rng=np.random.default_rng(BOOTSTRAP_SEED),
+    ).confidence_interval
+    return [(float(low), float(high)) for low, high in np.transpose(interval)]

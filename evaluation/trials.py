@@ -2,12 +2,14 @@
 
 import hashlib
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm._validation import whole_number
+from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.simulator import Simulator
-from kinarm.validation import whole_number
 
 
 def trial_generator(seed: int, trial: int, stream: int = 0) -> np.random.Generator:
@@ -27,14 +29,14 @@ def trial_generator(seed: int, trial: int, stream: int = 0) -> np.random.Generat
 
 @dataclass(frozen=True, eq=False)
 class TrialSet:
-    """Starts and goals, a function of task, arm, scene and seed alone.
+    """Starts and goals, a function of the problem and a seed alone.
 
     The first n trials of a set are the same for every size of the set.
 
     Attributes
     ----------
     simulator : Simulator
-        Arm, scene and task.
+        What they are faced in.
     seed : int
         Seed of the set.
     starts : ndarray, shape (n, n_axes)
@@ -49,17 +51,27 @@ class TrialSet:
     goals: NDArray[np.float64]
 
     @classmethod
-    def draw(cls, simulator: Simulator, trials: int, seed: int) -> "TrialSet":
+    def draw(cls, problem: ProblemLike, trials: int, seed: int) -> "TrialSet":
         """Draw a set of trials.
+
+        Parameters
+        ----------
+        problem : ReachProblem, str or Path
+            The problem, its name or its file.
+        trials : int
+            How many.
+        seed : int
+            Seed of the set.
 
         Raises
         ------
         InvalidInputError
             If there is no trial or the seed is negative.
-        SceneError
+        ProblemError
             If no contact-free start exists.
         """
         trials, seed = whole_number("trials", trials, 1), whole_number("seed", seed, 0)
+        simulator = Simulator(problem)
         drawn = [simulator.sample(trial_generator(seed, trial), 1) for trial in range(trials)]
         starts, goals = (np.concatenate(part) for part in zip(*drawn, strict=True))
         starts.flags.writeable = goals.flags.writeable = False
@@ -68,11 +80,17 @@ class TrialSet:
     def __len__(self) -> int:
         return len(self.starts)
 
+    def __repr__(self) -> str:
+        return f"TrialSet({len(self)} trials of {self.problem.name}, seed {self.seed})"
+
     @property
+    def problem(self) -> ReachProblem:
+        """What is faced."""
+        return self.simulator.problem
+
+    @cached_property
     def digest(self) -> str:
-        """Hash of the starts and goals and of the rules under which they are faced."""
-        simulator, task = self.simulator, self.simulator.task
-        rules = (simulator.arm.digest, repr(simulator.scene), simulator.time_step)
-        text = repr((*rules, task.tolerance, task.horizon))
+        """Hash of the problem, starts and goals."""
         numbers = np.round(np.concatenate([self.starts, self.goals], axis=1), 12) + 0.0
-        return hashlib.sha256(text.encode() + numbers.tobytes()).hexdigest()[:16]
+        content = self.problem.digest.encode() + numbers.tobytes()
+        return hashlib.sha256(content).hexdigest()[:16]

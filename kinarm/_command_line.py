@@ -66,7 +66,11 @@ def _report(prog: str, message: str, status: int) -> int:
 
 
 def add_options(
-    parser: argparse._ActionsContainer, kind: type, *, skip: Collection[str] = ()
+    parser: argparse._ActionsContainer,
+    kind: type,
+    *,
+    skip: Collection[str] = (),
+    negatable: bool = False,
 ) -> None:
     """Add an option for every field of a dataclass; only those that are given are parsed.
 
@@ -83,36 +87,44 @@ def add_options(
         The dataclass.
     skip : collection of str
         Fields to leave out.
+    negatable : bool
+        Whether there is an option ``--no-x`` also for what is false by default.
     """
     for name, item in init_fields(kind).items():
         if name not in skip:
-            _add_option(parser, kind, item)
+            _add_option(parser, kind, item, negatable=negatable)
 
 
 def _add_option(
-    parser: argparse._ActionsContainer, kind: type, item: Field[Any], prefix: str = ""
+    parser: argparse._ActionsContainer,
+    kind: type,
+    item: Field[Any],
+    prefix: str = "",
+    negatable: bool = False,
 ) -> None:
     """Add the option of one field, or those of a nested dataclass."""
     hint = alternatives(type_hints(kind)[item.name])[0]
     if isinstance(hint, type) and is_dataclass(hint):
         for inner in init_fields(hint).values():
-            _add_option(parser, hint, inner, f"{prefix}{item.name}.")
+            _add_option(parser, hint, inner, f"{prefix}{item.name}.", negatable=True)
         return
     name = f"{prefix}{item.name}"
     flag = item.metadata.get("flag", "--" + re.sub(r"[._]", "-", name))
     options: dict[str, Any] = {"default": argparse.SUPPRESS, "help": _help(kind, item)}
     if flag.startswith("--"):
         options["dest"] = name
+        options["required"] = item.default is MISSING and item.default_factory is MISSING
     elif item.default is not MISSING:
-        options["nargs"] = "?"
+        options |= {"nargs": "?", "default": item.default}  # argparse would parse SUPPRESS
     if hint is bool:
         negative = item.default is True and "flag" not in item.metadata
-        action = argparse.BooleanOptionalAction if prefix or negative else "store_true"
+        action = argparse.BooleanOptionalAction if negatable or negative else "store_true"
         parser.add_argument(flag, action=action, **options)
         return
     if get_origin(hint) is tuple:
-        hint = get_args(hint)[0]
-        options |= {"action": "append"} if item.metadata.get("repeat") else {"nargs": "+"}
+        hint, *others = get_args(hint)
+        count = "+" if Ellipsis in others else 1 + len(others)
+        options |= {"action": "append"} if item.metadata.get("repeat") else {"nargs": count}
     usual = METAVARS.get(hint, "NAME") if flag.startswith("--") else flag
     options["metavar"] = item.metadata.get("metavar", usual)
     if get_origin(hint) is Literal:

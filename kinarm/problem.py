@@ -12,15 +12,18 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from kinarm._fields import check_fields, from_plain, init_fields, to_plain, to_toml
 from kinarm._files import first_line, write_text
 from kinarm._validation import whole_number
-from kinarm.arm import Arm, ArmSpecification
+from kinarm.arm_specification import ArmSpecification
 from kinarm.errors import InvalidInputError, ProblemError, UnknownNameError
 from kinarm.scene import Scene
 from kinarm.task import ReachTask, RewardWeights
+
+if TYPE_CHECKING:
+    from kinarm.arm import Arm
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,6 +165,8 @@ class ReachProblem:
     @cached_property
     def arm_digest(self) -> str:
         """Hash of what the simulator uses of the arm."""
+        from kinarm.arm import Arm
+
         return self.arm.digest or Arm.load(self.arm).digest
 
     @property
@@ -256,7 +261,9 @@ PROBLEMS = {
 """The paper's tasks 1, 2 and 3 by name."""
 
 
-def _specification(arm: Arm | ArmSpecification | str | Path) -> ArmSpecification:
+def _specification(arm: "Arm | ArmSpecification | str | Path") -> ArmSpecification:
+    from kinarm.arm import Arm
+
     if isinstance(arm, Arm):
         return arm.specification
     if isinstance(arm, ArmSpecification):

@@ -1,9 +1,12 @@
 """Which problem: the options that all commands and their requests share."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from kinarm._fields import init_fields
-from kinarm.problem import ProblemLike, ReachProblem
+
+if TYPE_CHECKING:
+    from kinarm.problem import ProblemLike, ReachProblem
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +39,7 @@ class ProblemOptions:
     horizon: int | None = None
     start_spread: float | None = None
 
-    def resolve(self, default: ProblemLike = "right") -> ReachProblem:
+    def resolve(self, default: "ProblemLike" = "right") -> "ReachProblem":
         """The problem that the options make of a default one.
 
         Raises
@@ -44,6 +47,8 @@ class ProblemOptions:
         KinarmError
             If a name or file cannot be used, or a number is out of range.
         """
+        from kinarm.problem import ReachProblem  # loads Pinocchio: --help does without
+
         changed = {name: getattr(self, name) for name in init_fields(ProblemOptions)}
         named = changed.pop("problem")
         if named is None and self.task is not None:

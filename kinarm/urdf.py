@@ -8,13 +8,8 @@ import numpy as np
 import pinocchio as pin
 
 from kinarm._files import first_line
+from kinarm.arm_specification import arm_names
 from kinarm.errors import ArmError, UnknownNameError
-
-
-def arm_names() -> tuple[str, ...]:
-    """Names of the arms that ship with kinarm."""
-    folder = resources.files("kinarm.data") / "arms"
-    return tuple(sorted(Path(f.name).stem for f in folder.iterdir() if f.name.endswith(".urdf")))
 
 
 def find_urdf(source: str) -> Path:

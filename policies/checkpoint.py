@@ -1,184 +1,119 @@
 """Checkpoints of a training, from which it resumes exactly."""
 
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import asdict
+from collections.abc import Iterable
+from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.arm import Arm
-from kinarm.errors import InvalidInputError, PolicyFileError
-from kinarm.files import CORRUPT, write_atomically
-from kinarm.policies.ars import ARSState
-from kinarm.policies.ars_config import ARSConfig
-from kinarm.policies.curve import CurvePoint
-from kinarm.policies.normalizer import Normalizer
-from kinarm.policies.ppo_config import PPOConfig
-from kinarm.policies.ppo_state import EpisodeStates, PPOState
+from kinarm._archive import Arrays, load_archive, reading, save_archive
+from kinarm._fields import from_plain, to_plain
+from kinarm.errors import PolicyFileError
+from kinarm.policies.config import TrainingConfig
+from kinarm.policies.learners import TrainingState, find_learner, learner_of
 
-ARS_FORMAT = "kinarm-ars-checkpoint"
-PPO_FORMAT = "kinarm-ppo-checkpoint"
-FILE_VERSION = 1
-
-Arrays = Mapping[str, NDArray[Any]]
-ConfigT = TypeVar("ConfigT", ARSConfig, PPOConfig)
-StateT = TypeVar("StateT", ARSState, PPOState)
+FORMAT_VERSION = 1
 
 
-def save_checkpoint(path: str | Path, config: ARSConfig, state: ARSState) -> None:
+class Checkpoint(NamedTuple):
+    """A training that was stopped.
+
+    Attributes
+    ----------
+    config : ARSConfig, PPOConfig or settings of another learner
+        The settings.
+    state : TrainingState
+        Where to go on.
+    """
+
+    config: Any
+    state: Any
+
+
+def save_checkpoint(path: str | Path, config: TrainingConfig, state: TrainingState) -> None:
     """Write the state of a training, replacing an earlier checkpoint only when complete.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, ``.npz`` without pickle.
+    config : ARSConfig, PPOConfig or settings of another learner
+        The settings of the training.
+    state : TrainingState
+        Its state.
 
     Raises
     ------
     OutputError
         If the file cannot be written.
     """
-    arrays = {
-        "generator": np.array(json.dumps(state.generator, sort_keys=True)),
-        "theta": state.theta,
-        **_common_arrays(state),
+    header = {
+        "learner": learner_of(config).name,
+        "config": to_plain(config),
+        "arm_digest": config.problem.arm_digest,
     }
-    _save(path, ARS_FORMAT, config, arrays)
+    save_archive(path, "checkpoint", FORMAT_VERSION, arrays_of("state", state), header)
 
 
-def load_checkpoint(path: str | Path) -> tuple[ARSConfig, ARSState]:
+def load_checkpoint(path: str | Path) -> Checkpoint:
     """Read what `save_checkpoint` wrote.
 
     Raises
     ------
     PolicyFileError
-        If the file is missing, truncated or not a checkpoint.
+        If the file is missing, truncated or not a checkpoint, or if the arm has changed since.
     """
-    return _load(path, ARS_FORMAT, ARSConfig, _ars_state)
+    header, arrays = load_archive(path, "checkpoint", FORMAT_VERSION, PolicyFileError)
+    name = repr(str(path))
+    with reading(name, "checkpoint", PolicyFileError):
+        learner = find_learner(header["learner"])
+        config = from_plain(learner.config, header["config"], "settings")
+        state = rebuilt(learner.state, "state", arrays)
+        arm_digest = header["arm_digest"]
+    if config.problem.arm_digest != arm_digest:
+        raise PolicyFileError(
+            f"arm {config.problem.arm.name!r} has changed since {name} was written"
+        )
+    return Checkpoint(config, state)
 
 
-def save_ppo_checkpoint(path: str | Path, config: PPOConfig, state: PPOState) -> None:
-    """Write the state of a training, replacing an earlier checkpoint only when complete.
+def arrays_of(name: str, value: Any) -> dict[str, NDArray[Any]]:
+    """Flatten a value into arrays; parts of records get names such as ``state.theta``.
 
-    Raises
-    ------
-    OutputError
-        If the file cannot be written.
+    Parameters
+    ----------
+    name : str
+        Name of the value.
+    value : dataclass, named tuple, tuple of named tuples of numbers, dict, array or number
+        The value. Dictionaries are kept as JSON.
     """
-    arrays = {
-        "parameters": state.parameters,
-        "first_moment": state.first_moment,
-        "second_moment": state.second_moment,
-        "simulator_time": np.array(state.simulator_time),
-        **{f"episodes_{name}": array for name, array in state.episodes._asdict().items()},
-        **_common_arrays(state),
-    }
-    _save(path, PPO_FORMAT, config, arrays)
+    if is_dataclass(value) or hasattr(value, "_fields"):
+        parts = [(part, getattr(value, part)) for part in _field_names(type(value))]
+        return {k: v for part, item in parts for k, v in arrays_of(f"{name}.{part}", item).items()}
+    if isinstance(value, dict):
+        return {name: np.array(json.dumps(value, sort_keys=True))}
+    return {name: np.array(value)}
 
 
-def load_ppo_checkpoint(path: str | Path) -> tuple[PPOConfig, PPOState]:
-    """Read what `save_ppo_checkpoint` wrote.
-
-    Raises
-    ------
-    PolicyFileError
-        If the file is missing, truncated or not a checkpoint.
-    """
-    return _load(path, PPO_FORMAT, PPOConfig, _ppo_state)
-
-
-def _common_arrays(state: ARSState | PPOState) -> dict[str, NDArray[Any]]:
-    """What every learner keeps."""
-    return {
-        "count": np.array(state.normalizer.count),
-        "mean": state.normalizer.mean,
-        "squares": state.normalizer.squares,
-        "curve": np.array(state.curve, dtype=float).reshape(-1, len(CurvePoint._fields)),
-    }
+def rebuilt(kind: Any, name: str, arrays: Arrays) -> Any:
+    """Rebuild a value of a kind, a type or its annotation, from what `arrays_of` returned."""
+    if is_dataclass(kind) or hasattr(kind, "_fields"):
+        hints = get_type_hints(kind)
+        names = _field_names(kind)
+        return kind(**{part: rebuilt(hints[part], f"{name}.{part}", arrays) for part in names})
+    if get_origin(kind) is tuple:
+        record = get_args(kind)[0]
+        types = get_type_hints(record).values()
+        rows = arrays[name].reshape(-1, len(types)).tolist()
+        return tuple(record(*(t(x) for t, x in zip(types, row, strict=True))) for row in rows)
+    if get_origin(kind) is dict:
+        return json.loads(str(arrays[name]))
+    return kind(arrays[name]) if kind in (int, float) else arrays[name]
 
 
-def _save(path: str | Path, file_format: str, config: ARSConfig | PPOConfig, state: Arrays) -> None:
-    """Write the settings and the arrays of a state."""
-    arrays: dict[str, Any] = {
-        "format": np.array(file_format),
-        "version": np.array(FILE_VERSION),
-        "arm_digest": np.array(Arm.load(config.arm).digest),
-        "config": np.array(json.dumps(asdict(config), sort_keys=True)),
-        **state,
-    }
-    write_atomically(path, lambda file: np.savez(file, **arrays))
-
-
-def _load(
-    path: str | Path,
-    file_format: str,
-    config_type: type[ConfigT],
-    read_state: Callable[[Arrays], StateT],
-) -> tuple[ConfigT, StateT]:
-    """Read settings and state, and see that the arm is still the same."""
-    try:
-        with Path(path).open("rb") as file:
-            content = np.load(file, allow_pickle=False)
-            if str(content["format"]) != file_format:
-                raise PolicyFileError(
-                    f"{str(path)!r} is not a checkpoint of such a training ({file_format})"
-                )
-            if int(content["version"]) > FILE_VERSION:
-                raise PolicyFileError(f"{str(path)!r} was written by a later version of kinarm")
-            state = read_state(content)
-            config = config_type(**json.loads(str(content["config"])))
-            arm_digest = str(content["arm_digest"])
-    except OSError as error:
-        raise PolicyFileError(f"cannot read checkpoint {str(path)!r}: {error.strerror}") from error
-    except (IndexError, *CORRUPT) as error:
-        if isinstance(error, InvalidInputError):
-            raise
-        raise PolicyFileError(f"{str(path)!r} is not a complete checkpoint") from error
-    if Arm.load(config.arm).digest != arm_digest:
-        raise PolicyFileError(f"arm {config.arm!r} has changed since {str(path)!r} was written")
-    return config, state
-
-
-def _normalizer(content: Arrays, n_observations: int) -> Normalizer:
-    """Read the statistics; ValueError if they have the wrong length."""
-    mean, squares = content["mean"], content["squares"]
-    if not mean.shape == squares.shape == (n_observations,):
-        raise ValueError(f"statistics of {mean.shape} and {squares.shape} for {n_observations}")
-    return Normalizer(int(content["count"]), mean, squares)
-
-
-def _curve(content: Arrays) -> tuple[CurvePoint, ...]:
-    return tuple(CurvePoint.from_row(row) for row in content["curve"])
-
-
-def _ars_state(content: Arrays) -> ARSState:
-    """Read a state; ValueError or TypeError if a training could not go on from it."""
-    theta = content["theta"]
-    _, n_observations = theta.shape
-    generator = json.loads(str(content["generator"]))
-    np.random.default_rng().bit_generator.state = generator
-    return ARSState(
-        theta=theta,
-        normalizer=_normalizer(content, n_observations),
-        generator=generator,
-        curve=_curve(content),
-    )
-
-
-def _ppo_state(content: Arrays) -> PPOState:
-    """Read a state; ValueError or TypeError if a training could not go on from it."""
-    vectors = [content[name] for name in ("parameters", "first_moment", "second_moment")]
-    if len({vector.shape for vector in vectors}) > 1 or vectors[0].ndim != 1:
-        raise ValueError(f"parameters and moments of shapes {[v.shape for v in vectors]}")
-    if not all(vector.dtype == np.float32 and np.isfinite(vector).all() for vector in vectors):
-        raise ValueError("parameters and moments must be finite numbers of single precision")
-    episodes = EpisodeStates(*(content[f"episodes_{name}"] for name in EpisodeStates._fields))
-    if len({len(array) for array in episodes}) > 1:
-        raise ValueError(f"episodes of shapes {[array.shape for array in episodes]}")
-    return PPOState(
-        parameters=vectors[0],
-        first_moment=vectors[1],
-        second_moment=vectors[2],
-        normalizer=_normalizer(content, len(content["mean"])),
-        episodes=episodes,
-        curve=_curve(content),
-        simulator_time=float(content["simulator_time"]),
-    )
+def _field_names(kind: Any) -> Iterable[str]:
+    """Names of the fields of a dataclass or named tuple."""
+    return [item.name for item in fields(kind)] if is_dataclass(kind) else kind._fields

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from kinarm.files import write_text
+from kinarm._files import write_text
 
 
 class CurvePoint(NamedTuple):
@@ -22,7 +22,7 @@ class CurvePoint(NamedTuple):
     environment_steps : int
         Steps taken since the training began.
     wall_time : float
-        Time spent since the training began [s].
+        Time that iterations took since the training began [s].
     """
 
     mean_return: float
@@ -30,12 +30,6 @@ class CurvePoint(NamedTuple):
     success: float
     environment_steps: int
     wall_time: float
-
-    @classmethod
-    def from_row(cls, row: Sequence[float]) -> "CurvePoint":
-        """Rebuild a point from its numbers in order."""
-        mean_return, std_return, success, environment_steps, wall_time = map(float, row)
-        return cls(mean_return, std_return, success, int(environment_steps), wall_time)
 
 
 def write_curve(path: Path, curve: Sequence[CurvePoint]) -> None:

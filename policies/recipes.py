@@ -1,123 +1,102 @@
-"""Named settings of the learners."""
+"""Recipes: settings by name, or from a file."""
 
+import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, TypeVar
+from pathlib import Path
+from typing import Any
 
-from kinarm.errors import UnknownNameError
-from kinarm.policies.ars_config import ARSConfig
-from kinarm.policies.ppo_config import PPOConfig
+from kinarm._fields import from_plain, init_fields, to_plain
+from kinarm._files import first_line
+from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.policies.learners import Learner, find_learner
+from kinarm.problem import ReachProblem
 
-ConfigT = TypeVar("ConfigT", ARSConfig, PPOConfig)
-
-TUNED = ARSConfig(
-    recipe="tuned",
-    step_size_schedule="linear",
-    iterations=8000,
-    symmetric=True,
-    sharing="iteration",
-    episodes=8,
-    collision_penalty=-2.0,
-    success_bonus=0.5,
-)
-
-ARS_RECIPES = {
-    "paper": ARSConfig(recipe="paper"),
-    "tuned": TUNED,
-    "v1": ARSConfig(recipe="v1", normalize=False, top_directions=24),
-    "brs": ARSConfig(recipe="brs", normalize=False, scale_by_deviation=False, top_directions=24),
-}
-"""ARS settings by name.
-
-``paper`` is Table 1. ``tuned`` is the best that we found for a linear policy. ``v1`` and ``brs``
-are Table 1 without the augmentations that the names lack.
-"""
-
-PPO_RECIPES = {
-    "paper": PPOConfig(recipe="paper"),
-    "tuned": PPOConfig(
-        recipe="tuned",
-        arms=125,
-        rollout_steps=16,
-        minibatch=1000,
-        hidden=(64, 64, 64),
-        learning_rate=1e-3,
-        learning_rate_schedule="linear",
-        gae_lambda=0.9,
-        entropy_weight=0.002,
-        initial_log_std=-0.7,
-        tolerance=0.03,
-        symmetric=True,
-        success_bonus=5.0,
-        initial_start_spread=0.2,
-        widening=0.4,
-    ),
-}
-"""PPO settings by name; both take 1.2 million environment steps, as the paper did.
-
-``paper`` has the paper's reward and otherwise the defaults of Stable-Baselines3. ``tuned`` is the
-best that we found.
-"""
-
-TASK_SETTINGS: dict[tuple[str, str], dict[str, Any]] = {
-    ("tuned", "both"): {"collision_penalty": -1.0}
-}
-"""Settings of an ARS recipe that differ on a task.
-
-On two benches, policies trained with the double penalty reached fewer goals.
-"""
+PER_TRAINING = ("problem", "seed")
+"""Settings that vary from one training with a recipe to the next."""
 
 
-def ars_recipe(name: str, **settings: Any) -> ARSConfig:
-    """Look a recipe up, adapt it to the task and replace some of its settings.
+def recipe(learner: str, name_or_file: str | Path = "paper", **changes: Any) -> Any:
+    """Look settings up, adapt them to the problem and replace some of them.
 
     Parameters
     ----------
-    name : str
-        Name of the recipe.
-    **settings
-        Fields of `ARSConfig` to replace; None leaves a field as it is. If another field than
-        task, arm and seed changes, the recipe's name in the result gets a star.
+    learner : str
+        Name of the learner.
+    name_or_file : str or Path
+        Name of a recipe, or a TOML file with some of the learner's settings; the others are those
+        of the recipe that its entry ``base`` names, or of ``"paper"``.
+    **changes
+        Fields of the learner's settings to replace; None leaves a field as it is. A mapping for
+        ``reward`` replaces the weights that it names. If another field than problem and seed
+        changes, the recipe's name in the result gets a star.
+
+    Returns
+    -------
+    ARSConfig, PPOConfig or settings of another learner
 
     Raises
     ------
     UnknownNameError
-        If there is no such recipe.
+        If there is no such learner, recipe or setting.
+    InvalidInputError
+        If the file cannot be used; in one line that names file, key and what is expected.
     """
-    task = settings.get("task") or ARSConfig.task
-    return _adapted(ARS_RECIPES, name, TASK_SETTINGS.get((name, task), {}), settings)
+    found = find_learner(learner)
+    available = init_fields(found.config)
+    for change in changes:
+        if change not in available:
+            raise UnknownNameError(f"setting of {learner}", change, available)
+    given = {key: value for key, value in changes.items() if value is not None}
+    circumstances = {key: given.pop(key) for key in PER_TRAINING if key in given}
+    if str(name_or_file).endswith(".toml"):
+        standard = _read_recipe(found, Path(name_or_file), circumstances)
+    else:
+        standard = _named_recipe(found, str(name_or_file), circumstances)
+    made = standard.changed(given)
+    if made == standard:
+        return made
+    return replace(made, recipe=given.get("recipe", f"{standard.recipe}*"))
 
 
-def ppo_recipe(name: str, **settings: Any) -> PPOConfig:
-    """Look a recipe up and replace some of its settings.
-
-    Parameters
-    ----------
-    name : str
-        Name of the recipe.
-    **settings
-        Fields of `PPOConfig` to replace; None leaves a field as it is. If another field than
-        task, arm and seed changes, the recipe's name in the result gets a star.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such recipe.
-    """
-    return _adapted(PPO_RECIPES, name, {}, settings)
+def _named_recipe(learner: Learner[Any, Any], name: str, circumstances: Mapping[str, Any]) -> Any:
+    """A recipe of a learner for a problem and a seed."""
+    if name not in learner.recipes:
+        raise UnknownNameError("recipe", name, (*learner.recipes, "path/to/recipe.toml"))
+    return learner.adapt(replace(learner.recipes[name], **circumstances))
 
 
-def _adapted(
-    recipes: Mapping[str, ConfigT],
-    name: str,
-    by_task: dict[str, Any],
-    settings: dict[str, Any],
-) -> ConfigT:
-    """Settings of a recipe with replacements; a star in its name if it is no longer the recipe."""
-    if name not in recipes:
-        raise UnknownNameError("recipe", name, recipes)
-    given = {key: value for key, value in settings.items() if value is not None}
-    circumstances = {key: given[key] for key in ("task", "arm", "seed") if key in given}
-    standard = replace(recipes[name], **{**by_task, **circumstances})
-    made = replace(standard, **given)
-    return made if made == standard else replace(made, recipe=given.get("recipe", f"{name}*"))
+def _read_recipe(learner: Learner[Any, Any], path: Path, circumstances: Mapping[str, Any]) -> Any:
+    """Settings of a file for a problem and a seed, which may be in the file."""
+    name = str(path)
+    try:
+        entries = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InvalidInputError(f"cannot read recipe {name!r}: {error.strerror}") from error
+    except ValueError as error:
+        raise InvalidInputError(f"{name}: not a recipe file: {first_line(error)}") from error
+    base = entries.pop("base", "paper")
+    if base not in learner.recipes:
+        choices = ", ".join(learner.recipes)
+        raise InvalidInputError(f"{name}: base must be one of {choices}, got {base!r}")
+    known = {**circumstances}
+    problem = entries.pop("problem", None)
+    if problem is not None and "problem" not in known:
+        known["problem"] = _problem_of_file(problem, path)
+    standard = _named_recipe(learner, base, known)
+    given = {"recipe": path.stem, **{key: v for key, v in entries.items() if key not in known}}
+    if isinstance(given.get("reward"), Mapping):
+        weights = standard.reward or standard.problem.task.reward
+        given["reward"] = {**to_plain(weights), **given["reward"]}
+    made = from_plain(learner.config, {**to_plain(standard), **given}, name)
+    return replace(made, problem=standard.problem)
+
+
+def _problem_of_file(problem: object, path: Path) -> ReachProblem:
+    """The problem that a recipe file names; a file's path is relative to it."""
+    if not isinstance(problem, str):
+        raise InvalidInputError(
+            f"{path}: problem must be the name or file of a problem, got {problem!r}"
+        )
+    beside = path.parent / problem
+    return ReachProblem.load(beside if beside.is_file() else problem)

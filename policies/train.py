@@ -3,256 +3,174 @@
 import argparse
 import sys
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-from functools import partial
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from kinarm.command_line import Parser, finite_number, run_command, whole_number
+from kinarm._command_line import Parser, add_options, given_options, run_command
+from kinarm._files import check_output
 from kinarm.errors import InvalidInputError, KinarmError, PolicyFileError
-from kinarm.files import check_folder
+from kinarm.policies.learners import (
+    Learner,
+    TrainingResult,
+    TrainingState,
+    begin_training,
+    find_learner,
+    learner_names,
+    learner_of,
+    run_training,
+)
+from kinarm.policies.recipes import recipe
+from kinarm.problem_options import ProblemOptions
 
 if TYPE_CHECKING:
-    from kinarm.policies.curve import CurvePoint
+    from kinarm.policies.checkpoint import Checkpoint
+    from kinarm.policies.config import TrainingConfig
 
 PROG = "kinarm-train"
 CHECKPOINT_SECONDS = 5.0
+CIRCUMSTANCES = ("problem", "seed", "recipe")
+"""Settings that a `TrainRequest` has fields of its own for."""
 
-ARS_EPILOG = """
+EPILOG = """
 examples:
-  kinarm-train ars --task right --out right.npz                      the paper's Table 1
-  kinarm-train ars --task both --recipe tuned --seed 3 --out b.npz   our best linear policy
-  kinarm-train ars --out b.npz --resume                              go on where it stopped
-"""
-
-PPO_EPILOG = """
-needs the extra ppo: pip install 'kinarm[ppo]'
-
-examples:
-  kinarm-train ppo --task right --out right.npz                      the paper's reward
-  kinarm-train ppo --task both --recipe tuned --seed 3 --out b.npz   our best policy
-  kinarm-train ppo --out b.npz --resume                              go on where it stopped
+  kinarm-train {name} --task right --out right.npz                    the paper's settings
+  kinarm-train {name} --problem my.toml --recipe tuned --out my.npz   a problem of your own
+  kinarm-train {name} --out my.npz --resume                           go on where it stopped
 """
 
 
-class Learner(NamedTuple):
-    """What the command needs of a learner.
+@dataclass(frozen=True, kw_only=True)
+class TrainRequest(ProblemOptions):
+    """A training, from its settings to the files that it leaves.
 
-    Attributes
+    Parameters
     ----------
-    name : str
-        Its name on the command line.
-    recipe : callable
-        Looks settings up by name, with replacements.
-    train : callable
-        Trains, given settings, the state to go on from, and what to call with every state.
-    save, load : callable
-        Write and read checkpoints.
+    learner : str
+        Name of the learner.
+    recipe : str, optional
+        Named settings, or a TOML file with some (paper).
+    seed : int, optional
+        Seed of all randomness (0).
+    settings : mapping
+        Settings of the learner that replace those of the recipe.
+    out : Path
+        The policy; curve and checkpoint lie beside it.
+    resume : bool
+        Go on from the checkpoint beside --out.
+    overwrite : bool
+        Replace an earlier policy.
+    tensorboard : Path, optional
+        Folder for TensorBoard logs.
     """
 
-    name: str
-    recipe: Callable[..., Any]
-    train: Callable[..., Any]
-    save: Callable[[Path, Any, Any], None]
-    load: Callable[[Path], tuple[Any, Any]]
+    learner: str
+    recipe: str | None = field(default=None, metadata={"metavar": "NAME_OR_FILE"})
+    seed: int | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    out: Path | str = field(metadata={"metavar": "FILE.npz"})
+    resume: bool = False
+    overwrite: bool = False
+    tensorboard: Path | str | None = field(default=None, metadata={"metavar": "FOLDER"})
 
+    def run(self) -> TrainingResult:
+        """Train, and write the policy and its learning curve.
 
-def build_parser() -> Parser:
-    """The options of the command."""
-    parser = Parser(prog=PROG, description="Train a policy.")
-    learners = parser.add_subparsers(dest="learner", required=True, metavar="LEARNER")
-    _add_ars(learners)
-    _add_ppo(learners)
-    return parser
+        While the training lasts, a checkpoint beside the policy is renewed every few seconds.
 
+        Raises
+        ------
+        KinarmError
+            If settings cannot be used, or a file cannot be written.
+        KeyboardInterrupt
+            If it is interrupted; the checkpoint is then complete, and the message says so.
+        """
+        from kinarm.policies.curve import write_curve
 
-def _add_ars(learners: "argparse._SubParsersAction[Parser]") -> None:
-    """Options of ``kinarm-train ars``."""
-    ars = learners.add_parser(
-        "ars",
-        help="Augmented Random Search",
-        description="Train a linear policy with Augmented Random Search.",
-        epilog=ARS_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    settings = _add_common(ars)
-    for name in ("iterations", "directions", "top-directions", "episodes"):
-        settings.add_argument(f"--{name}", type=whole_number(1), metavar="N")
-    for name in ("step-size", "noise", "success-bonus", "collision-penalty", "start-spread"):
-        settings.add_argument(f"--{name}", type=finite_number, metavar="X")
-    settings.add_argument("--sharing", choices=("none", "pair", "iteration"))
-    settings.add_argument("--step-size-schedule", choices=("constant", "linear"))
+        config, state = self._resumed() if self.resume else (self._config(), None)
+        check_output(self.out, overwrite=self.overwrite, suffix=".npz")
+        options = {} if self.tensorboard is None else {"tensorboard": self.tensorboard}
+        training = begin_training(config, **options)
+        keeper = CheckpointKeeper(config, checkpoint_path(self.out))
+        with TrainingProgress(config) as progress:
 
+            def on_iteration(state: TrainingState) -> None:
+                progress.update(state)
+                keeper.update(state)
 
-def _add_ppo(learners: "argparse._SubParsersAction[Parser]") -> None:
-    """Options of ``kinarm-train ppo``."""
-    ppo = learners.add_parser(
-        "ppo",
-        help="Proximal Policy Optimization",
-        description="Train a neural policy with Proximal Policy Optimization.",
-        epilog=PPO_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    ppo.add_argument("--tensorboard", type=Path, metavar="FOLDER", help="write logs there")
-    settings = _add_common(ppo)
-    for name in ("iterations", "arms", "rollout-steps", "minibatch", "epochs"):
-        settings.add_argument(f"--{name}", type=whole_number(1), metavar="N")
-    settings.add_argument("--hidden", type=whole_number(1), nargs="+", metavar="WIDTH")
-    for name in ("learning-rate", "gamma", "entropy-weight", "tolerance"):
-        settings.add_argument(f"--{name}", type=finite_number, metavar="X")
-    for name in ("success-bonus", "collision-penalty", "step-reward", "start-spread"):
-        settings.add_argument(f"--{name}", type=finite_number, metavar="X")
-    settings.add_argument("--learning-rate-schedule", choices=("constant", "linear"))
-
-
-def _add_common(parser: Parser) -> "argparse._ArgumentGroup":
-    """Options of every learner; returns the group for those that replace settings."""
-    add = parser.add_argument
-    add("--task", metavar="NAME", help="left, right (default) or both")
-    add("--recipe", metavar="NAME", help="named settings (paper)")
-    add("--seed", type=whole_number(0), metavar="N", help="seed of all randomness (0)")
-    add("--arm", metavar="NAME_OR_URDF", help="arm to train (paper)")
-    add("--out", type=Path, required=True, metavar="FILE.npz", help="the policy")
-    add("--resume", action="store_true", help="go on from the checkpoint beside --out")
-    settings = parser.add_argument_group("settings that replace those of the recipe")
-    settings.add_argument(
-        "--symmetric",
-        action=argparse.BooleanOptionalAction,
-        help="treat mirror images alike where the task is its own mirror image",
-    )
-    return settings
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line."""
-    run_command(PROG, lambda: _train(build_parser().parse_args(arguments)))
-
-
-def _train(options: argparse.Namespace) -> None:
-    """From options to a policy file and its learning curve."""
-    from kinarm.policies.curve import write_curve
-
-    out: Path = options.out
-    if out.suffix != ".npz" or out.is_dir():
-        raise InvalidInputError(f"--out must be a file that ends in .npz, got {str(out)!r}")
-    check_folder(out.parent)
-    learner = _ars() if options.learner == "ars" else _ppo(options.tensorboard)
-    config, state = _beginning(options, learner)
-    if learner.name == "ppo" and options.tensorboard is not None:
-        check_folder(options.tensorboard, create=True)
-    keeper = CheckpointKeeper(learner, config, checkpoint_path(out))
-    with TrainingProgress(learner.name, config) as progress:
-
-        def on_iteration(state: Any) -> None:
-            progress.update(state)
-            keeper.update(state)
-
+            try:
+                result = run_training(config, training, state=state, on_iteration=on_iteration)
+            except KeyboardInterrupt:
+                raise KeyboardInterrupt(keeper.save_on_interrupt()) from None
         try:
-            result = learner.train(config, state=state, on_iteration=on_iteration)
-        except KeyboardInterrupt:
-            raise KeyboardInterrupt(keeper.save_on_interrupt()) from None
-    try:
-        result.policy.save(out)
-        write_curve(curve_path(out), result.curve)
-    except (KinarmError, KeyboardInterrupt):
-        keeper.save()
-        raise
-    checkpoint_path(out).unlink(missing_ok=True)
-    sys.stdout.write(f"{_summary(result.curve)}; written: {out}, {curve_path(out)}\n")
+            result.policy.save(self.out)
+            write_curve(curve_path(self.out), result.curve)
+        except (KinarmError, KeyboardInterrupt):
+            keeper.save()
+            raise
+        checkpoint_path(self.out).unlink(missing_ok=True)
+        return result
 
-
-def _ars() -> Learner:
-    """Augmented Random Search."""
-    from kinarm.policies.ars import train_ars
-    from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
-    from kinarm.policies.recipes import ars_recipe
-
-    return Learner(
-        name="ars",
-        recipe=ars_recipe,
-        train=train_ars,
-        save=save_checkpoint,
-        load=load_checkpoint,
-    )
-
-
-def _ppo(tensorboard: Path | None) -> Learner:
-    """Proximal Policy Optimization, if what it needs is installed."""
-    from kinarm.policies.checkpoint import load_ppo_checkpoint, save_ppo_checkpoint
-    from kinarm.policies.ppo import require_ppo, train_ppo
-    from kinarm.policies.recipes import ppo_recipe
-
-    require_ppo(tensorboard=tensorboard is not None)
-    return Learner(
-        name="ppo",
-        recipe=ppo_recipe,
-        train=partial(train_ppo, tensorboard=tensorboard),
-        save=save_ppo_checkpoint,
-        load=load_ppo_checkpoint,
-    )
-
-
-def _beginning(options: argparse.Namespace, learner: Learner) -> tuple[Any, Any]:
-    """Settings and state to begin with: from the command line, or from a checkpoint."""
-    from kinarm.policies.mirror import task_mirror
-
-    if options.arm is not None and Path(options.arm).is_file():
-        options.arm = str(Path(options.arm).resolve())
-    settings = given_settings(options)
-    checkpoint = checkpoint_path(options.out)
-    if not options.resume:
+    def _config(self) -> "TrainingConfig":
+        """Settings of a new training."""
+        checkpoint = checkpoint_path(self.out)
         if checkpoint.exists():
             raise InvalidInputError(
                 f"{str(checkpoint)!r} holds an unfinished training: go on with --resume, "
                 "or delete it"
             )
-        config = learner.recipe(settings.pop("recipe", "paper"), **settings)
-        # Refuses what cannot be trained before any output is made.
-        task_mirror(config.symmetric, config.simulator())
-        return config, None
-    if not checkpoint.exists():
-        raise PolicyFileError(f"nothing to resume: there is no {str(checkpoint)!r}")
-    config, state = learner.load(checkpoint)
-    if settings.get("recipe") == config.recipe.removesuffix("*"):
-        del settings["recipe"]
-    if replace(config, **settings) != config:
-        changed = [name for name, value in settings.items() if getattr(config, name) != value]
-        raise InvalidInputError(
-            f"the checkpoint was made with another {', '.join(changed)}: "
-            "leave it out, or train anew without --resume"
+        named = self.recipe or "paper"
+        problem = self.resolve(default=recipe(self.learner, named).problem)
+        config: TrainingConfig = recipe(
+            self.learner, named, problem=problem, seed=self.seed, **self.settings
         )
-    return config, state
+        return config
+
+    def _resumed(self) -> "Checkpoint":
+        """The training to go on with, which must be the one that is asked for."""
+        from kinarm.policies.checkpoint import load_checkpoint
+
+        path = checkpoint_path(self.out)
+        if not path.exists():
+            raise PolicyFileError(f"nothing to resume: there is no {str(path)!r}")
+        checkpoint = load_checkpoint(path)
+        config = checkpoint.config
+        if (other := learner_of(config).name) != self.learner:
+            raise InvalidInputError(f"{str(path)!r} is of the learner {other}")
+        given = {**self.settings, **({} if self.seed is None else {"seed": self.seed})}
+        wanted = config.changed(given)
+        changed = [name for name in given if getattr(wanted, name) != getattr(config, name)]
+        if self.recipe and Path(self.recipe).stem != config.recipe.removesuffix("*"):
+            changed.append("recipe")
+        if changed:
+            raise InvalidInputError(
+                f"the checkpoint was made with another {', '.join(changed)}: "
+                "leave it out, or train anew without --resume"
+            )
+        self.resolve(default=config.problem).check_same(config.problem, f"{str(path)!r}")
+        return checkpoint
 
 
-def given_settings(options: argparse.Namespace) -> dict[str, Any]:
-    """Settings of the learner that the command line sets."""
-    ours = ("learner", "out", "resume", "tensorboard")
-    given = {name: value for name, value in vars(options).items() if value is not None}
-    if "hidden" in given:
-        given["hidden"] = tuple(given["hidden"])
-    return {name: value for name, value in given.items() if name not in ours}
-
-
-def checkpoint_path(out: Path) -> Path:
+def checkpoint_path(out: str | Path) -> Path:
     """Where the checkpoint of a training lies until it is finished."""
-    return out.with_suffix(".checkpoint.npz")
+    return Path(out).with_suffix(".checkpoint.npz")
 
 
-def curve_path(out: Path) -> Path:
+def curve_path(out: str | Path) -> Path:
     """Where the learning curve of a policy lies."""
-    return out.with_suffix(".curve.csv")
+    return Path(out).with_suffix(".curve.csv")
 
 
 class CheckpointKeeper:
     """Saves the latest state every few seconds and on demand."""
 
-    def __init__(self, learner: Learner, config: Any, path: Path) -> None:
-        self._learner, self._config, self._path = learner, config, path
+    def __init__(self, config: "TrainingConfig", path: Path) -> None:
+        self._config, self._path = config, path
         self._saved_at = time.monotonic()
-        self._state: Any = None
+        self._state: TrainingState | None = None
 
-    def update(self, state: Any) -> None:
+    def update(self, state: TrainingState) -> None:
         """Take note of a state, and save it if the last checkpoint is old."""
         self._state = state
         if time.monotonic() - self._saved_at > CHECKPOINT_SECONDS:
@@ -268,28 +186,33 @@ class CheckpointKeeper:
 
     def save(self) -> None:
         """Save the latest state."""
+        from kinarm.policies.checkpoint import save_checkpoint
+
         if self._state is not None:
-            self._learner.save(self._path, self._config, self._state)
+            save_checkpoint(self._path, self._config, self._state)
             self._saved_at = time.monotonic()
 
 
 class TrainingProgress:
-    """A progress bar on standard error: return, success, steps per second, remaining time."""
+    """A line on standard error that fits 80 columns: iterations, return, success, time left."""
 
-    def __init__(self, learner: str, config: Any) -> None:
+    def __init__(self, config: "TrainingConfig") -> None:
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+        from rich.table import Column
 
+        learner = learner_of(config).name
+        title = f"{learner} {config.recipe} {config.problem.name} seed {config.seed}"
         self._progress = Progress(
-            TextColumn(f"{learner} {config.recipe} {config.task} seed {config.seed}"),
-            BarColumn(),
+            TextColumn(title, table_column=Column(no_wrap=True, max_width=24)),
+            BarColumn(bar_width=6),
             TextColumn("{task.completed:.0f}/{task.total:.0f}"),
-            TextColumn("{task.fields[status]}"),
-            TimeRemainingColumn(),
+            TextColumn("{task.fields[status]}", table_column=Column(no_wrap=True)),
+            TimeRemainingColumn(compact=True),
             console=Console(stderr=True),
         )
         self._task = self._progress.add_task(
-            "", total=config.iterations, status="starting; the first run compiles"
+            "", total=config.iterations, status="starting; may compile"
         )
 
     def __enter__(self) -> "TrainingProgress":
@@ -299,24 +222,57 @@ class TrainingProgress:
     def __exit__(self, *_: object) -> None:
         self._progress.stop()
 
-    def update(self, state: Any) -> None:
+    def update(self, state: TrainingState) -> None:
         """Show the latest iteration."""
-        point: CurvePoint = state.curve[-1]
-        speed = point.environment_steps / max(point.wall_time, 1e-9) / 1e6
+        point = state.curve[-1]
         self._progress.update(
             self._task,
             completed=state.iteration,
-            status=f"return {point.mean_return:+.3f} success {point.success:.0%} "
-            f"{speed:.2f} M steps/s",
+            status=f"return {point.mean_return:+.3f} success {point.success:.0%}",
         )
 
 
-def _summary(curve: "Sequence[CurvePoint]") -> str:
+def build_parser() -> Parser:
+    """The options of the command."""
+    parser = Parser(prog=PROG, description="Train a policy.")
+    learners = parser.add_subparsers(dest="learner", required=True, metavar="LEARNER")
+    for name in learner_names():
+        _add_learner(learners, find_learner(name))
+    return parser
+
+
+def _add_learner(parsers: "argparse._SubParsersAction[Parser]", learner: Learner[Any, Any]) -> None:
+    """Options of a learner: those of every training, and one for each of its settings."""
+    needs = f"\nneeds the extra {learner.extra}: pip install 'kinarm[{learner.extra}]'\n"
+    parser = parsers.add_parser(
+        learner.name,
+        help=learner.title,
+        description=f"Train a policy with {learner.title}. Recipes: {', '.join(learner.recipes)}.",
+        epilog=(needs if learner.extra else "") + EPILOG.format(name=learner.name),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    unused = () if "tensorboard" in learner.options else ("tensorboard",)
+    add_options(parser, TrainRequest, skip=("learner", "settings", *unused))
+    settings = parser.add_argument_group("settings that replace those of the recipe")
+    add_options(settings, learner.config, skip=CIRCUMSTANCES, negatable=True)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line."""
+    run_command(PROG, lambda: _train(build_parser().parse_args(arguments)))
+
+
+def _train(options: argparse.Namespace) -> None:
+    """From options to a policy file, and a line that says what it came to."""
+    given = given_options(options, find_learner(options.learner).config)
+    settings = {name: value for name, value in given.items() if name not in CIRCUMSTANCES}
+    request = TrainRequest(**given_options(options, TrainRequest), settings=settings)
+    curve = request.run().curve
     last = curve[-1]
-    return (
+    sys.stdout.write(
         f"{len(curve)} iterations, {last.environment_steps / 1e6:.2f} million steps in "
         f"{last.wall_time:.1f} s; last iteration: mean return {last.mean_return:+.3f}, "
-        f"success {last.success:.0%}"
+        f"success {last.success:.0%}; written: {request.out}, {curve_path(request.out)}\n"
     )
 
 

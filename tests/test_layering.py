@@ -76,7 +76,7 @@ def test_no_module_needs_itself():
 def test_every_source_folder_was_searched():
     assert {path.relative_to(ROOT).parts[0] for path in SOURCES} == set(PACKAGES)
     assert "kinarm.arm" in imported_modules(ROOT / "kinarm" / "simulator.py")
-    assert "kinarm.simulator" in imported_modules(ROOT / "policies" / "ars.py")
+    assert "kinarm.simulator" in imported_modules(ROOT / "policies" / "ars" / "algorithm.py")
 
 
 @pytest.mark.parametrize("package", PACKAGES.values())
@@ -138,14 +138,19 @@ def test_simulating_needs_neither_torch_nor_plots():
     assert not loaded & {"torch", "matplotlib", "meshcat"}
 
 
+def test_settings_of_every_learner_are_light():
+    loaded = loaded_by("from kinarm.policies import find_learner as f; f('ars'), f('ppo')")
+    assert not loaded & HEAVY
+
+
 def test_names_of_ppo_need_no_torch():
     """They do not say that it is missing before there is something to train."""
     loaded = loaded_by(
-        "from kinarm.policies import PPOConfig, PPOState, load_ppo_checkpoint, train_ppo"
+        "from kinarm.policies import PPOConfig, PPOState, load_checkpoint, train_policy"
     )
     assert not loaded & {"torch", "stable_baselines3", "tensorboard"}
 
 
 def test_training_needs_neither_torch_nor_plots():
-    loaded = loaded_by("from kinarm.policies import train_ars, load_policy")
+    loaded = loaded_by("import kinarm.policies.library, kinarm.policies.ars.algorithm")
     assert not loaded & {"torch", "matplotlib", "meshcat"}

@@ -35,7 +35,7 @@ def test_python_examples_run(tmp_path):
 def test_results_are_those_of_the_command(tmp_path):
     command = blocks_after("Results", "sh")[0].split()
     assert command[0] == "kinarm-eval"
-    code = f"from kinarm.evaluation.eval import main; main({command[1:]!r})"
+    code = f"from kinarm.evaluation.commands.evaluate import main; main({command[1:]!r})"
     table = run(code, tmp_path).strip()
     assert table in README
 

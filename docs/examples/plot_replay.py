@@ -13,11 +13,10 @@ to the oracle, which shows how they could have ended.
 # ------
 # A :py:class:`~kinarm.Recording` holds the states that the simulator went through.
 
-from kinarm import Simulator
 from kinarm.evaluation import TrialSet, find_entrants, oracle_bounds, record
-from kinarm.replay import replay
+from kinarm.viewer import replay_page
 
-trials = TrialSet.draw(Simulator("paper", "right"), trials=200, seed=0)
+trials = TrialSet.draw("right", trials=200, seed=0)
 bounds = oracle_bounds(trials)
 (policy,) = find_entrants("ars-tuned-right-seed0")
 (oracle,) = find_entrants("oracle")
@@ -29,9 +28,9 @@ for each in collided:
 # %%
 # Replay
 # ------
-# The page shows itself here as in a notebook; ``replay(..., "contacts.html")`` writes it to a file.
-# The blue ghost is the oracle in the same trial.
+# The page shows itself here as in a notebook; ``replay_page(..., "contacts.html")`` writes it to
+# a file. The blue ghost is the oracle in the same trial.
 
 chosen = sorted(collided, key=lambda each: -each.steps)[:4]
 ghosts = record(oracle, trials, [each.trial for each in chosen], bounds=bounds)
-replay(chosen, ghosts=ghosts)
+replay_page(chosen, ghosts=ghosts)

@@ -9,21 +9,21 @@ seen, beside random actions.
 # %%
 # Train
 # -----
-# :py:func:`~kinarm.policies.ars_recipe` returns settings by name, with replacements. All perturbed
+# :py:func:`~kinarm.policies.recipe` returns settings by name, with replacements. All perturbed
 # policies of an iteration face the same four starts and goals, success earns a bonus, and the step
-# size falls linearly to zero. :py:func:`~kinarm.policies.train_ars` returns the policy and one
+# size falls linearly to zero. :py:func:`~kinarm.policies.train_policy` returns the policy and one
 # point of the learning curve per iteration.
 
 import matplotlib.pyplot as plt
 import numpy as np
 
 from kinarm.evaluation import evaluate
-from kinarm.policies import ars_recipe, train_ars
+from kinarm.policies import recipe, train_policy
 
-config = ars_recipe(
-    "tuned", task="right", iterations=800, episodes=4, collision_penalty=-1.0, seed=0
+config = recipe(
+    "ars", "tuned", problem="right", iterations=800, episodes=4, reward={"collision": -1.0}
 )
-result = train_ars(config)
+result = train_policy(config)
 
 steps = np.array([point.environment_steps for point in result.curve]) / 1e6
 returns = np.array([point.mean_return for point in result.curve])
@@ -61,9 +61,9 @@ evaluations = {
 for name, evaluation in evaluations.items():
     low, high = evaluation.success.ci95
     print(
-        f"{name:8} success {evaluation.success.rate:.0%} ({low:.0%} to {high:.0%}), "
-        f"median final distance {evaluation.distance.median:.3f} m, "
-        f"collisions {evaluation.collision.rate:.0%}"
+        f"{name:8} success {evaluation.success.value:.0%} ({low:.0%} to {high:.0%}), "
+        f"median final distance {evaluation.metrics['median_distance'].value:.3f} m, "
+        f"collisions {evaluation.collision.value:.0%}"
     )
 
 figure, axes = plt.subplots(figsize=(6.4, 3.8), layout="constrained")

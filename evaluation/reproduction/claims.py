@@ -1,20 +1,27 @@
 """The paper's claims, and whether they hold here."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.evaluation.reproduction.intervals import Estimate, Term, contrast, share, superiority
-from kinarm.evaluation.reproduction.outcome import Outcome
-from kinarm.evaluation.reproduction.results import Results, distances_after, steps_to_level
+from kinarm.evaluation.reproduction.intervals import (
+    Estimate,
+    Term,
+    contrast,
+    mean_share,
+    superiority,
+)
+from kinarm.evaluation.reproduction.results import Results
+from kinarm.evaluation.reproduction.runs import TrainedRun
 from kinarm.evaluation.reproduction.study import (
     LITERAL,
+    NEAR,
     SWEEP_PERTURBATIONS,
     SWEEP_RATES,
-    WITHIN,
     Purpose,
     Reading,
 )
@@ -111,13 +118,13 @@ def assess(results: Results, reading: Reading = LITERAL) -> tuple[Claim, ...]:
     Parameters
     ----------
     results : Results
-        All outcomes.
+        All finished trainings.
     reading : Reading
         Trainings of this reading are compared; the sweep follows the literal one.
     """
     claims = [
-        mostly_within(results, reading, "left"),
-        mostly_within(results, reading, "right"),
+        mostly_near(results, reading, "left"),
+        mostly_near(results, reading, "right"),
         both_is_worse(results, reading),
         one_bench_is_poor(results, reading),
     ]
@@ -128,29 +135,25 @@ def assess(results: Results, reading: Reading = LITERAL) -> tuple[Claim, ...]:
             ars_needs_fewer_steps(results, reading),
         ]
     if reading == LITERAL:
-        claims += [
-            low_rate_is_worse(results),
-            many_perturbations_are_worse(results),
-            many_perturbations_are_worse_for_their_steps(results),
-        ]
+        claims += [low_rate_is_worse(results), *many_perturbations_are_worse(results)]
     return tuple(claims)
 
 
-def mostly_within(results: Results, reading: Reading, task: str) -> Claim:
+def mostly_near(results: Results, reading: Reading, task: str) -> Claim:
     """Section 4: on tasks 1 and 2, most trials end within 0.2."""
-    within = results.distances("ars", task, reading) <= WITHIN
-    estimate = share(within.mean(axis=1), within.shape[1])
+    near = results.distances("ars", task, reading) <= NEAR
+    estimate = mean_share(near.mean(axis=1), near.shape[1])
     return Claim(
         f"ars-{task}",
-        f"ARS mostly ends within {WITHIN} m on {task}",
-        (Part(f"share of trials within {WITHIN} m", estimate, "above", 0.5),),
+        f"ARS mostly ends within {NEAR} m on {task}",
+        (Part(f"share of trials within {NEAR} m", estimate, "above", 0.5),),
     )
 
 
 def both_is_worse(results: Results, reading: Reading) -> Claim:
     """Section 4: task 3 is learnt less well than tasks 1 and 2."""
     terms = [
-        Term(weight, results.distances("ars", task, reading), task)
+        Term(weight, results.distances("ars", task, reading))
         for task, weight in (("both", 1.0), ("left", -0.5), ("right", -0.5))
     ]
     return Claim(
@@ -162,9 +165,9 @@ def both_is_worse(results: Results, reading: Reading) -> Claim:
 
 def one_bench_is_poor(results: Results, reading: Reading) -> Claim:
     """Section 4: on task 3, a policy does well on one bench and poorly on the other."""
-    within = results.distances("ars", "both", reading) <= WITHIN
-    better, worse = bench_shares(within, results.left_bench("both", reading))
-    label = f"share of trials within {WITHIN} m on a policy's {{}} bench"
+    near = results.distances("ars", "both", reading) <= NEAR
+    better, worse = bench_shares(near, results.trial_set("both", reading).goals[:, 1] > 0)
+    label = f"share of trials within {NEAR} m on a policy's {{}} bench"
     return Claim(
         "ars-one-bench",
         "On both, ARS does well on one bench and poorly on the other",
@@ -175,7 +178,7 @@ def one_bench_is_poor(results: Results, reading: Reading) -> Claim:
     )
 
 
-def bench_shares(within: NDArray[np.bool_], left: NDArray[np.bool_]) -> tuple[Estimate, Estimate]:
+def bench_shares(near: NDArray[np.bool_], left: NDArray[np.bool_]) -> tuple[Estimate, Estimate]:
     """Share of hits on the better and on the worse bench of every seed's policy.
 
     Which bench is the better one is told by one half of the trials and measured on the other, and
@@ -183,60 +186,53 @@ def bench_shares(within: NDArray[np.bool_], left: NDArray[np.bool_]) -> tuple[Es
 
     Parameters
     ----------
-    within : ndarray of bool, shape (n_seeds, n_trials)
+    near : ndarray of bool, shape (n_seeds, n_trials)
         Whether a trial hit.
     left : ndarray of bool, shape (n_trials,)
         Whether its goal lies on the left bench.
     """
-    half = np.arange(within.shape[1]) % 2 == 0
+    half = np.arange(near.shape[1]) % 2 == 0
     shares = np.array(
         [
             [[seed[part & bench].mean() for bench in (left, ~left)] for part in (half, ~half)]
-            for seed in within
+            for seed in near
         ]
     )
     order = np.argsort(-shares, axis=2, kind="stable")[:, ::-1]
     better, worse = np.moveaxis(np.take_along_axis(shares, order, axis=2).mean(axis=1), 1, 0)
     per_bench = int(min(left.sum(), (~left).sum()))
-    return share(better, per_bench), share(worse, per_bench)
+    return mean_share(better, per_bench), mean_share(worse, per_bench)
 
 
 def ppo_ends_nearer(results: Results, reading: Reading) -> Claim:
     """Section 4: densities of PPO's final distances are shifted to the left of ARS's."""
-    terms = _ars_less_ppo(results, reading, "left", "right")
-    return Claim(
-        "ppo-nearer",
-        "PPO ends nearer than ARS on left and right",
-        (_difference("mean final distance of ARS, less that of PPO [m]", terms),),
-    )
-
-
-def _ars_less_ppo(results: Results, reading: Reading, *tasks: str) -> list[Term]:
-    """Mean final distance of ARS, less that of PPO on the same trials."""
-    weights: dict[Purpose, float] = {"ars": 1.0 / len(tasks), "ppo": -1.0 / len(tasks)}
-    return [
-        Term(weight, results.distances(learner, task, reading), task)
-        for task in tasks
-        for learner, weight in weights.items()
-    ]
+    statement = "PPO ends nearer than ARS on left and right"
+    return Claim("ppo-nearer", statement, (_ars_less_ppo(results, reading, "left", "right"),))
 
 
 def ppo_is_better_on_both(results: Results, reading: Reading) -> Claim:
     """Section 4: PPO delivers more on task 3."""
-    terms = _ars_less_ppo(results, reading, "both")
-    return Claim(
-        "ppo-both",
-        "PPO does better than ARS on both",
-        (_difference("mean final distance of ARS, less that of PPO [m]", terms),),
-    )
+    statement = "PPO does better than ARS on both"
+    return Claim("ppo-both", statement, (_ars_less_ppo(results, reading, "both"),))
+
+
+def _ars_less_ppo(results: Results, reading: Reading, *tasks: str) -> Part:
+    """Mean final distance of ARS, less that of PPO on the same trials."""
+    weights: dict[Purpose, float] = {"ars": 1.0 / len(tasks), "ppo": -1.0 / len(tasks)}
+    terms = [
+        Term(weight, results.distances(learner, task, reading))
+        for task in tasks
+        for learner, weight in weights.items()
+    ]
+    return _difference("mean final distance of ARS, less that of PPO [m]", terms)
 
 
 def ars_needs_fewer_steps(results: Results, reading: Reading) -> Claim:
     """Section 4: ARS is much more sample-efficient."""
     pairs = []
     for task in ("left", "right", "both"):
-        ars = steps_to_levels(results, "ars", task, reading)
-        ppo = steps_to_levels(results, "ppo", task, reading)
+        ars = steps_to_levels(results.select("ars", task, reading))
+        ppo = steps_to_levels(results.select("ppo", task, reading))
         reached = np.isfinite(ars).any(axis=1) | np.isfinite(ppo).any(axis=1)
         if reached.any():
             pairs.append((ars[reached], ppo[reached]))
@@ -249,65 +245,64 @@ def ars_needs_fewer_steps(results: Results, reading: Reading) -> Claim:
     )
 
 
-def steps_to_levels(
-    results: Results, purpose: Purpose, task: str, reading: Reading
-) -> NDArray[np.float64]:
-    """Environment steps to `LEVELS`, shape (n_levels, n_seeds); infinity for never."""
-    outcomes = results.select(purpose, task, reading).values()
-    return np.array([[steps_to_level(outcome, *level) for outcome in outcomes] for level in LEVELS])
+def steps_to_levels(runs: Iterable[TrainedRun]) -> NDArray[np.float64]:
+    """Environment steps to `LEVELS`, shape (n_levels, n_runs); infinity for never."""
+    return np.array([[run.steps_to_level(*level) for level in LEVELS] for run in runs]).T
 
 
 def low_rate_is_worse(results: Results) -> Claim:
     """Section 3.3: too low a learning rate may not be desirable."""
     lowest, *higher = sorted(SWEEP_RATES)
-    parts = []
-    for other in higher:
-        pair = {s: runs for s, runs in results.sweep().items() if s[0] in (lowest, other)}
-        terms = _sweep_terms(pair, lambda rate, _: rate == lowest, lambda run: run.distance)
-        measure = f"mean final distance with rate {lowest}, less that with rate {other} [m]"
-        parts.append(_difference(measure, terms))
+    parts = [
+        _sweep_difference(
+            f"mean final distance with rate {lowest}, less that with rate {other} [m]",
+            {key: runs for key, runs in results.sweep().items() if key[0] in (lowest, other)},
+            lambda rate, _: rate == lowest,
+        )
+        for other in higher
+    ]
     return Claim("sweep-rate", "Too low a learning rate is undesirable", tuple(parts))
 
 
-def many_perturbations_are_worse(results: Results) -> Claim:
-    """Section 3.3: too many perturbations may not be desirable."""
+def many_perturbations_are_worse(results: Results) -> tuple[Claim, Claim]:
+    """Section 3.3: too many perturbations may not be desirable.
+
+    Judged twice: after as many iterations, and after as many environment steps, of which more
+    perturbations take more.
+    """
     most = max(SWEEP_PERTURBATIONS)
-    terms = _sweep_terms(results.sweep(), lambda _, n: n == most, lambda run: run.distance)
-    measure = f"mean final distance with {most} perturbations, less that with fewer [m]"
-    statement = "Too many perturbations are undesirable, after as many iterations"
-    return Claim("sweep-perturbations", statement, (_difference(measure, terms),))
-
-
-def many_perturbations_are_worse_for_their_steps(results: Results) -> Claim:
-    """The same, where all have taken as many environment steps."""
-    most = max(SWEEP_PERTURBATIONS)
-    budget = min(run.environment_steps[-1] for run in results.select("sweep").values())
-    terms = _sweep_terms(
-        results.sweep(), lambda _, n: n == most, lambda run: distances_after(run, budget)
+    budget = min(run.environment_steps[-1] for run in results.select("sweep"))
+    measure = f"mean final distance with {most} perturbations, less that with fewer"
+    after_iterations = _sweep_difference(f"{measure} [m]", results.sweep(), lambda _, n: n == most)
+    after_steps = _sweep_difference(
+        f"{measure}, after {budget / 1e3:.0f} thousand environment steps [m]",
+        results.sweep(),
+        lambda _, n: n == most,
+        lambda run: run.distance_after(budget),
     )
-    measure = (
-        f"mean final distance with {most} perturbations, less that with fewer, "
-        f"after {budget / 1e3:.0f} thousand environment steps [m]"
+    statement = "Too many perturbations are undesirable, after as many"
+    return (
+        Claim("sweep-perturbations", f"{statement} iterations", (after_iterations,)),
+        Claim("sweep-perturbations-steps", f"{statement} environment steps", (after_steps,)),
     )
-    statement = "Too many perturbations are undesirable, after as many environment steps"
-    return Claim("sweep-perturbations-steps", statement, (_difference(measure, terms),))
 
 
-def _sweep_terms(
-    settings: Mapping[tuple[float, int], Sequence[Outcome]],
+def _sweep_difference(
+    measure: str,
+    settings: Mapping[tuple[float, int], Sequence[TrainedRun]],
     chosen: Callable[[float, int], bool],
-    distances: Callable[[Outcome], NDArray[Any]],
-) -> list[Term]:
+    distance: Callable[[TrainedRun], NDArray[Any]] = attrgetter("distance"),
+) -> Part:
     """Mean of the settings that are chosen, less that of all others."""
     n = sum(chosen(*setting) for setting in settings)
-    return [
+    terms = [
         Term(
             1.0 / n if chosen(*setting) else -1.0 / (len(settings) - n),
-            np.array([distances(run) for run in runs]),
-            "left",
+            np.array([distance(run) for run in runs]),
         )
         for setting, runs in settings.items()
     ]
+    return _difference(measure, terms)
 
 
 def _difference(measure: str, terms: Sequence[Term]) -> Part:

@@ -3,19 +3,22 @@
 import csv
 import io
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
+from importlib.resources import files
+from string import Template
 from typing import Any
 
 import numpy as np
 
+from kinarm._files import write_text
 from kinarm.errors import InvalidInputError
-from kinarm.evaluation.plots import save_figure
+from kinarm.evaluation.figures import save_figure
 from kinarm.evaluation.reproduction.claims import Claim, assess
 from kinarm.evaluation.reproduction.figures import figure_2, figure_3, learning_curves
-from kinarm.evaluation.reproduction.outcome import OutcomeStore
 from kinarm.evaluation.reproduction.results import Results
+from kinarm.evaluation.reproduction.runs import RunStore
 from kinarm.evaluation.reproduction.study import LITERAL, Reading
 from kinarm.evaluation.reproduction.tables import (
     best_readings,
@@ -25,7 +28,6 @@ from kinarm.evaluation.reproduction.tables import (
     speed_table,
     sweep_table,
 )
-from kinarm.files import write_text
 from kinarm.policies.provenance import package_versions
 
 FIGURES: dict[str, Callable[[Results], Any]] = {
@@ -37,14 +39,14 @@ FIGURES: dict[str, Callable[[Results], Any]] = {
 """Figures by file name; what depends on the clock starts with ``timing``."""
 
 
-def write_all(results: Results, store: OutcomeStore, command: str) -> tuple[Claim, ...]:
+def write_all(results: Results, store: RunStore, command: str) -> tuple[Claim, ...]:
     """Write all files of a finished reproduction.
 
     Parameters
     ----------
     results : Results
-        All outcomes.
-    store : OutcomeStore
+        All finished trainings.
+    store : RunStore
         Where they lie.
     command : str
         The command that made them, for the record.
@@ -77,7 +79,7 @@ def write_all(results: Results, store: OutcomeStore, command: str) -> tuple[Clai
 
 
 def claims_document(
-    results: Results, claims: dict[Reading, tuple[Claim, ...]], store: OutcomeStore, command: str
+    results: Results, claims: dict[Reading, tuple[Claim, ...]], store: RunStore, command: str
 ) -> dict[str, Any]:
     """All verdicts and what they stand on, as a dictionary that JSON can hold."""
     study = results.study
@@ -86,7 +88,7 @@ def claims_document(
         "command": command,
         "protocol": asdict(study.protocol),
         "trainings": len(study.trainings),
-        "environment_steps": sum(int(o.environment_steps[-1]) for o in results.outcomes.values()),
+        "environment_steps": sum(int(run.environment_steps[-1]) for run in results.runs.values()),
         "commits": list(store.commits(study.trainings)),
         "versions": package_versions(),
         "readings": [
@@ -101,21 +103,16 @@ def runs_csv(results: Results) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(RUN_COLUMNS)
-    for training, outcome in results.outcomes.items():
-        shares = [float(np.mean(outcome.distance <= limit)) for limit in (0.05, 0.1, 0.2)]
-        distance = [
-            f"{value:.4f}" for value in (outcome.distance.mean(), np.median(outcome.distance))
-        ]
-        contact = float(outcome.collision.mean())
-        config = training.config
+    for training, run in results.runs.items():
+        config, distance = training.config, run.distance
         writer.writerow(
             [
                 training.name,
-                *(training.purpose, config.task, config.seed, training.reading.name),
-                int(outcome.environment_steps[-1]),
-                *shares,
-                *distance,
-                contact,
+                *(training.purpose, config.problem.name, config.seed, training.reading.name),
+                int(run.environment_steps[-1]),
+                *(float(np.mean(distance <= limit)) for limit in (0.05, 0.1, 0.2)),
+                *(f"{value:.4f}" for value in (distance.mean(), np.median(distance))),
+                float(run.collision.mean()),
             ]
         )
     return text.getvalue()
@@ -130,8 +127,8 @@ RUN_COLUMNS = (
 def timing(results: Results) -> dict[str, Any]:
     """Time that the trainings took [s], by purpose."""
     seconds: dict[str, float] = {}
-    for training, outcome in results.outcomes.items():
-        spent = seconds.get(training.purpose, 0.0) + float(outcome.wall_time[-1])
+    for training, run in results.runs.items():
+        spent = seconds.get(training.purpose, 0.0) + float(run.wall_time[-1])
         seconds[training.purpose] = round(spent, 1)
     return {"training_seconds": seconds}
 
@@ -140,66 +137,20 @@ def reproduction_page(
     results: Results, claims: dict[Reading, tuple[Claim, ...]], document: dict[str, Any]
 ) -> str:
     """``REPRODUCTION.md``."""
-    protocol, versions = results.study.protocol, document["versions"]
-    made = ", ".join(f"{name} {version}" for name, version in versions.items())
-    quick = [
-        "**A smoke version: nothing was trained to the end, and no verdict means anything.**",
-        "",
-    ]
-    sections: Sequence[str] = [
-        "# What holds of the paper's claims",
-        "",
-        *(quick if results.study.name == "quick" else []),
-        f"Made by `{document['command']}` at commit {', '.join(document['commits']) or 'unknown'}: "
-        f"{document['trainings']} trainings, {document['environment_steps'] / 1e6:.0f} million "
-        f"environment steps. Final policies faced the same {protocol.trials} trials of their task "
-        f"(seed {protocol.seed}). Intervals are 95 %, over training seeds and trials.",
-        "",
-        "## Verdicts under the literal reading",
-        "",
-        claims_table(claims[LITERAL]),
-        "A claim holds where the whole interval lies on the claimed side, does not hold where it "
-        "lies on the other, and is undecided between.",
-        "",
-        "## Twelve models of ARS, and PPO",
-        "",
-        learners_table(results),
-        "![Training rewards and final distances of ARS](figure2.png)",
-        "",
-        "*The paper's Figure 2: mean returns of four trainings a task and their mean (left), and "
-        "final distances in the trials (right).*",
-        "",
-        "![Densities of the final distances of ARS and PPO](figure3.png)",
-        "",
-        "*The paper's Figure 3: densities of the final distances, thin for each seed, on a "
-        "square-root scale, where single trials show as small bumps; grey, what the oracle "
-        "reaches.*",
-        "",
-        "## Learning rate and number of perturbations",
-        "",
-        sweep_table(results),
-        "## Environment steps to a level",
-        "",
-        speed_table(results),
-        "![Learning curves](learning_curves.png)",
-        "",
-        f"*What {protocol.snapshot_trials} other trials say of the policies in the course of their "
-        "training.*",
-        "",
-        "![Learning curves against time](timing_learning_curves.png)",
-        "",
-        "*The same against the time that a training took.*",
-        "",
-        "## Other readings of the paper",
-        "",
-        "The paper leaves open how starts are drawn (here: from which share of the joint ranges "
-        "about the home pose), how the reward is scaled (metres of progress, or their sign) and "
-        "which rollouts of an ARS iteration share a start and goal.",
-        "",
-        readings_table(results, claims),
-        best_readings(claims),
-        "",
-        f"Versions: {made}.",
-        "",
-    ]
-    return "\n".join(sections)
+    study, protocol = results.study, results.study.protocol
+    page = files(__package__).joinpath("page.md").read_text(encoding="utf-8")
+    return Template(page).substitute(
+        warning=f"**{study.warning}**\n\n" if study.warning else "",
+        command=document["command"],
+        commits=", ".join(document["commits"]) or "unknown",
+        trainings=document["trainings"],
+        million_steps=f"{document['environment_steps'] / 1e6:.0f}",
+        **asdict(protocol),
+        claims=claims_table(claims[LITERAL]),
+        learners=learners_table(results),
+        sweep=sweep_table(results),
+        speed=speed_table(results),
+        readings=readings_table(results, claims),
+        best_readings=best_readings(claims),
+        versions=", ".join(f"{name} {version}" for name, version in document["versions"].items()),
+    )

@@ -1,17 +1,17 @@
 """The paper's figures 2 and 3, and learning curves."""
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.evaluation.bounds import oracle_bounds
-from kinarm.evaluation.plots import BIN_WIDTH, COLOURS
-from kinarm.evaluation.reproduction.outcome import Outcome
+from kinarm.evaluation.figures import BIN_WIDTH, COLOURS
 from kinarm.evaluation.reproduction.results import Results
-from kinarm.evaluation.reproduction.study import LEARNERS, WITHIN, Purpose
-from kinarm.task import TASKS
+from kinarm.evaluation.reproduction.runs import TrainedRun
+from kinarm.evaluation.reproduction.study import LEARNERS, NEAR, Purpose
+from kinarm.problem import PROBLEMS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,11 +32,11 @@ NARROWEST = 0.005
 
 def figure_2(results: Results) -> "Figure":
     """Training rewards and final distances of ARS, a row per task (paper, Figure 2)."""
-    figure, panels = _panels((9.0, 8.4), len(TASKS), 2, sharex="col", sharey="col")
-    for number, (task, row) in enumerate(zip(TASKS, panels, strict=True), start=1):
-        outcomes = tuple(results.select("ars", task).values())
-        _rewards(row[0], outcomes)
-        _histograms(row[1], outcomes)
+    figure, panels = _panels((9.0, 8.4), len(PROBLEMS), 2, sharex="col", sharey="col")
+    for number, (task, row) in enumerate(zip(PROBLEMS, panels, strict=True), start=1):
+        runs = results.select("ars", task)
+        _rewards(row[0], runs)
+        _histograms(row[1], runs)
         row[0].set_ylabel(f"task {number}: {task}\nmean return of an iteration")
         row[1].set_ylabel(f"share of trials per {BIN_WIDTH} m")
     panels[0, 0].legend(frameon=False, loc="lower right")
@@ -45,28 +45,23 @@ def figure_2(results: Results) -> "Figure":
     return figure
 
 
-def _rewards(axes: "Axes", outcomes: Sequence[Outcome]) -> None:
+def _rewards(axes: "Axes", runs: Sequence[TrainedRun]) -> None:
     """Mean returns of the seeds in colour, and their mean in black."""
-    for number, outcome in enumerate(outcomes):
-        label = f"seed {number}"
-        axes.plot(_iterations(outcome), outcome.returns, color=COLOURS[number], lw=0.6, label=label)
-    mean = np.mean([outcome.returns for outcome in outcomes], axis=0)
-    axes.plot(_iterations(outcomes[0]), mean, color="black", lw=1.6, label="mean")
+    returns = np.array([run.returns for run in runs])
+    iterations = np.arange(1, returns.shape[1] + 1)
+    for number, seed in enumerate(returns):
+        axes.plot(iterations, seed, color=COLOURS[number], lw=0.6, label=f"seed {number}")
+    axes.plot(iterations, returns.mean(axis=0), color="black", lw=1.6, label="mean")
 
 
-def _iterations(outcome: Outcome) -> NDArray[np.int64]:
-    return np.arange(1, len(outcome.returns) + 1)
-
-
-def _histograms(axes: "Axes", outcomes: Sequence[Outcome]) -> None:
-    """Histograms of the seeds' final distances, with the share within 0.2 m."""
+def _histograms(axes: "Axes", runs: Sequence[TrainedRun]) -> None:
+    """Histograms of the seeds' final distances, with the share near the goal."""
     edges = np.arange(0.0, SHOWN_DISTANCE + BIN_WIDTH, BIN_WIDTH)
-    for number, outcome in enumerate(outcomes):
-        shares = np.histogram(outcome.distance, edges)[0] / len(outcome.distance)
-        within = np.mean(outcome.distance <= WITHIN)
-        label = f"seed {number}: {within:.0%} within {WITHIN} m"
+    for number, run in enumerate(runs):
+        shares = np.histogram(run.distance, edges)[0] / len(run.distance)
+        label = f"seed {number}: {np.mean(run.distance <= NEAR):.0%} within {NEAR} m"
         axes.stairs(shares, edges, color=COLOURS[number], lw=1.3, label=label)
-    axes.axvline(WITHIN, color="#444444", linestyle=":", lw=1)
+    axes.axvline(NEAR, color="#444444", linestyle=":", lw=1)
     axes.legend(frameon=False, fontsize=8)
 
 
@@ -76,18 +71,18 @@ def figure_3(results: Results) -> "Figure":
     The oracle's is drawn behind them: what could be reached. Heights are square roots, so that
     broad and narrow densities can be told apart beside each other.
     """
-    figure, panels = _panels((7.5, 8.4), len(TASKS), 1, sharex=True)
-    for number, (task, axes) in enumerate(zip(TASKS, panels[:, 0], strict=True), start=1):
+    figure, panels = _panels((7.5, 8.4), len(PROBLEMS), 1, sharex=True)
+    for number, (task, axes) in enumerate(zip(PROBLEMS, panels[:, 0], strict=True), start=1):
         distance = np.linspace(0.0, SHOWN_DISTANCE, 481)
         highest = 0.0
         for learner, style in STYLES.items():
-            seeds = [density(o.distance, distance) for o in results.select(learner, task).values()]
+            seeds = [density(run.distance, distance) for run in results.select(learner, task)]
             if not seeds:
                 continue
             axes.plot(distance, np.transpose(seeds), color=style["color"], lw=0.6, alpha=0.5)
             axes.plot(distance, np.mean(seeds, axis=0), lw=2.2, **style)
             highest = max(highest, float(np.max(seeds)))
-        trials = results.trials(task)
+        trials = results.trial_set(task)
         reached = oracle_bounds(trials).final_distance
         axes.fill_between(
             distance, density(reached, distance), color="#bbbbbb", lw=0, label="oracle (cut off)"
@@ -128,64 +123,46 @@ def density(samples: NDArray[np.float64], positions: NDArray[np.float64]) -> NDA
     return values
 
 
-def learning_curves(results: Results, against: str) -> "Figure":
+def learning_curves(results: Results, against: Literal["steps", "time"]) -> "Figure":
     """How well policies do in the course of their training, a column per task.
 
     Parameters
     ----------
     results : Results
-        All outcomes.
+        All finished trainings.
     against : {"steps", "time"}
         Whether progress is shown against environment steps or against wall time.
     """
-    figure, panels = _panels((10.5, 6.4), 2, len(TASKS), sharex=True, sharey="row")
-    across = _steps if against == "steps" else _seconds
-    for task, (above, below) in zip(TASKS, panels.T, strict=True):
+    figure, panels = _panels((10.5, 6.4), 2, len(PROBLEMS), sharex=True, sharey="row")
+    label, across = ACROSS[against]
+    for task, (above, below) in zip(PROBLEMS, panels.T, strict=True):
         for learner, style in STYLES.items():
-            outcomes = tuple(results.select(learner, task).values())
-            _curves(above, outcomes, across, _share_within, style)
-            _curves(below, outcomes, across, _median, style)
+            if runs := results.select(learner, task):
+                x = np.array([across(run) for run in runs])
+                distance = np.array([run.snapshot_distance for run in runs])
+                _curves(above, x, (distance <= NEAR).mean(axis=2), style)
+                _curves(below, x, np.median(distance, axis=2), style)
         above.set_title(f"task {task}")
-        below.set(xlabel="million environment steps" if against == "steps" else "training time [s]")
-        if against == "time":
-            below.set_xscale("log")
-    panels[0, 0].set(ylabel=f"share of trials within {WITHIN} m", ylim=(0, 1))
+        below.set(xlabel=label, xscale="linear" if against == "steps" else "log")
+    panels[0, 0].set(ylabel=f"share of trials within {NEAR} m", ylim=(0, 1))
     panels[1, 0].set(ylabel="median final distance [m]", ylim=(0, None))
     panels[0, 0].legend(frameon=False)
     return figure
 
 
+ACROSS: dict[str, tuple[str, Callable[[TrainedRun], NDArray[np.float64]]]] = {
+    "steps": ("million environment steps", lambda run: run.snapshot_steps / 1e6),
+    "time": ("training time [s]", lambda run: run.wall_time[run.snapshots]),
+}
+"""What learning curves can be drawn against: label, and values at the snapshots."""
+
+
 def _curves(
-    axes: "Axes",
-    outcomes: Sequence[Outcome],
-    across: Callable[[Outcome], NDArray[np.float64]],
-    up: Callable[[Outcome], NDArray[np.float64]],
-    style: dict[str, Any],
+    axes: "Axes", x: NDArray[np.float64], y: NDArray[np.float64], style: dict[str, Any]
 ) -> None:
     """Curves of the seeds faintly, and the mean of what they do at the same iteration boldly."""
-    for outcome in outcomes:
-        axes.plot(across(outcome), up(outcome), color=style["color"], lw=0.6, alpha=0.5)
-    if outcomes:
-        mean = (np.mean([part(o) for o in outcomes], axis=0) for part in (across, up))
-        axes.plot(*mean, lw=2, **style)
-
-
-def _steps(outcome: Outcome) -> NDArray[np.float64]:
-    return outcome.snapshot_steps / 1e6
-
-
-def _seconds(outcome: Outcome) -> NDArray[np.float64]:
-    return outcome.wall_time[outcome.snapshots]
-
-
-def _share_within(outcome: Outcome) -> NDArray[np.float64]:
-    share: NDArray[np.float64] = (outcome.snapshot_distance <= WITHIN).mean(axis=1)
-    return share
-
-
-def _median(outcome: Outcome) -> NDArray[np.float64]:
-    median: NDArray[np.float64] = np.median(outcome.snapshot_distance, axis=1)
-    return median
+    axes.plot(x.T, y.T, color=style["color"], lw=0.6, alpha=0.5)
+    axes.plot(x.mean(axis=0), y.mean(axis=0), lw=2, **style)
 
 
 def _panels(

@@ -40,21 +40,23 @@ class Term(NamedTuple):
     values : ndarray, shape (n_seeds, n_trials)
         What every training seed got in every trial.
     trials : hashable
-        Names the trials; terms with the same name were measured on the same trials.
+        Names the trials. Crossed ones have one name: terms were measured on the same trials, or
+        trial by trial on variants of them, such as the same places of another bench.
     """
 
     weight: float
     values: NDArray[np.float64]
-    trials: Hashable
+    trials: Hashable = "crossed"
 
 
 def contrast(terms: Sequence[Term]) -> Estimate:
     """Weighted sum of means over seeds and trials.
 
     Seeds and trials are crossed random effects: all seeds of a recipe face the same trials, and so
-    may several recipes. The variance is the sum of that of the seeds' means, in each term, and
-    that of the trials' means, in each set of trials; what is particular to a seed on a trial is
-    in both, which errs on the wide side. The interval is Student's, with the degrees of freedom of
+    may several recipes, also on tasks whose trials differ in nothing but the bench. The variance is
+    the sum of that of the seeds' means, in each term, and that of the trials' weighted means, in
+    each set of crossed trials; what is particular to a seed on a trial is in both, which errs on
+    the wide side. The interval is Student's, with the degrees of freedom of
     Welch and Satterthwaite.
 
     Parameters
@@ -97,7 +99,7 @@ def student(value: float, components: Iterable[tuple[float, int]]) -> Estimate:
     return Estimate(value, (value - reach, value + reach))
 
 
-def share(shares: NDArray[np.float64], trials: int) -> Estimate:
+def mean_share(shares: NDArray[np.float64], n_trials: int) -> Estimate:
     """Mean of the seeds' shares of trials.
 
     The trials' part of the variance is that of a binomial share, with two hits and two misses
@@ -107,13 +109,13 @@ def share(shares: NDArray[np.float64], trials: int) -> Estimate:
     ----------
     shares : ndarray, shape (n_seeds,)
         Share of every seed.
-    trials : int
+    n_trials : int
         Trials of a seed; they count as if all seeds had met the same ones.
     """
     value = float(shares.mean())
-    moderate = (value * trials + 2) / (trials + 4)
-    binomial = moderate * (1 - moderate) / (trials + 4)
-    components = [(_mean_variance(shares), len(shares) - 1), (binomial, trials - 1)]
+    moderate = (value * n_trials + 2) / (n_trials + 4)
+    binomial = moderate * (1 - moderate) / (n_trials + 4)
+    components = [(_mean_variance(shares), len(shares) - 1), (binomial, n_trials - 1)]
     estimate = student(value, components)
     if estimate.ci95 is None:
         return estimate

@@ -5,12 +5,14 @@ from dataclasses import asdict, dataclass, replace
 from itertools import product
 from typing import Any, Literal, get_args
 
-from kinarm.policies.ars_config import ARSConfig, Sharing
-from kinarm.policies.ppo_config import PPOConfig
-from kinarm.policies.recipes import ars_recipe, ppo_recipe
-from kinarm.task import TASKS
+from kinarm._fields import to_plain
+from kinarm.policies.ars.config import ARSConfig, Sharing
+from kinarm.policies.ppo.config import PPOConfig
+from kinarm.policies.recipes import recipe
+from kinarm.problem import PROBLEMS, ReachProblem
+from kinarm.task import RewardWeights
 
-Reward = Literal["progress", "sign"]
+Scaling = Literal["progress", "sign"]
 Purpose = Literal["sweep", "ars", "ppo"]
 
 LEARNERS: Mapping[Purpose, str] = {"ars": "ARS", "ppo": "PPO"}
@@ -21,8 +23,8 @@ SWEEP_PERTURBATIONS = (16, 24, 32)
 SWEEP_ITERATIONS = 300
 """Nine settings that the paper tried on task 1 before it chose those of Table 1 (section 3.3)."""
 
-WITHIN = 0.2
-"""Distance by which the paper judges its policies (section 4) [m]."""
+NEAR = 0.2
+"""Distance within which the paper calls a trial near its goal (section 4) [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +44,7 @@ class Reading:
     """
 
     start_spread: float = 1.0
-    reward: Reward = "progress"
+    reward: Scaling = "progress"
     sharing: Sharing = "none"
 
     @property
@@ -50,14 +52,15 @@ class Reading:
         """Such as ``"spread1-progress-none"``."""
         return f"spread{self.start_spread:g}-{self.reward}-{self.sharing}"
 
-    def settings(self) -> dict[str, float]:
-        """Settings of either learner that follow from the reading."""
-        signs = self.reward == "sign"
-        return {
-            "start_spread": self.start_spread,
-            "progress_reward": 0.0 if signs else 1.0,
-            "closer_reward": 1.0 / ARSConfig.horizon if signs else 0.0,
-        }
+    def problem(self, task: str) -> ReachProblem:
+        """One of the paper's tasks, with the starts of the reading."""
+        return PROBLEMS[task].replace(start_spread=self.start_spread)
+
+    def weights(self, problem: ReachProblem) -> RewardWeights | None:
+        """What learners are rewarded for; None for what the task rewards."""
+        if self.reward == "progress":
+            return None
+        return replace(problem.task.reward, progress=0.0, closer=1.0 / problem.task.horizon)
 
     @property
     def for_ppo(self) -> "Reading":
@@ -114,21 +117,22 @@ class Training:
         parts: list[str] = [self.purpose]
         if self.purpose == "sweep" and isinstance(config, ARSConfig):
             parts += [f"rate{config.step_size:g}", f"perturb{config.directions}"]
-        parts += [config.task, f"seed{config.seed}"]
+        parts += [config.problem.name, f"seed{config.seed}"]
         return "-".join(parts if self.reading == LITERAL else [*parts, self.reading.name])
 
     @property
     def cost(self) -> float:
         """Rough duration relative to other trainings, for scheduling and progress."""
-        if isinstance(self.config, PPOConfig):
-            return 30.0 * self.config.environment_steps
-        return float(2 * self.config.iterations * self.config.directions * self.config.horizon)
+        config = self.config
+        if isinstance(config, PPOConfig):
+            return 30.0 * config.environment_steps
+        return 2.0 * config.iterations * config.directions * config.problem.task.horizon
 
     def to_json(self) -> dict[str, Any]:
-        """Everything that the outcome depends on, save the code."""
+        """Everything that the run depends on, save the code."""
         return {
             "purpose": self.purpose,
-            "config": asdict(self.config),
+            "config": to_plain(replace(self.config, problem=self.config.problem.pinned)),
             "reading": asdict(self.reading),
         }
 
@@ -151,6 +155,13 @@ class Study:
     trainings: tuple[Training, ...]
     protocol: Protocol
 
+    @property
+    def warning(self) -> str:
+        """What to say beside its verdicts; empty if they can be trusted."""
+        if self.name == "full":
+            return ""
+        return "A smoke version: nothing was trained to the end, and no verdict means anything."
+
     def readings(self, purpose: Purpose = "ars") -> tuple[Reading, ...]:
         """Readings under which there are trainings for a purpose."""
         return tuple(dict.fromkeys(t.reading for t in self.trainings if t.purpose == purpose))
@@ -166,7 +177,7 @@ def full_study(*, ppo: bool = True) -> Study:
     """
     readings = [
         Reading(start_spread=spread, reward=reward, sharing=sharing)
-        for spread, reward, sharing in product((1.0, 0.1), get_args(Reward), get_args(Sharing))
+        for spread, reward, sharing in product((1.0, 0.1), get_args(Scaling), get_args(Sharing))
     ]
     trainings = (*_sweep(range(4)), *_ars(readings, range(4)))
     if ppo:
@@ -186,7 +197,7 @@ def quick_study(*, ppo: bool = True) -> Study:
     trainings = (
         *_sweep(range(2), iterations=6),
         *_ars(readings, range(2), iterations=10),
-        *(_ppo((LITERAL,), range(2), iterations=2, epochs=2) if ppo else ()),
+        *(_ppo((LITERAL,), range(2), iterations=2, n_epochs=2) if ppo else ()),
     )
     protocol = Protocol(trials=20, snapshots=3, snapshot_trials=10)
     return Study(name="quick", trainings=trainings, protocol=protocol)
@@ -195,9 +206,10 @@ def quick_study(*, ppo: bool = True) -> Study:
 def _sweep(seeds: Iterable[int], iterations: int = SWEEP_ITERATIONS) -> Iterator[Training]:
     """The sweep on the paper's task 1, with half of the perturbations on top as in Table 1."""
     for rate, perturbations, seed in product(SWEEP_RATES, SWEEP_PERTURBATIONS, seeds):
-        config = ars_recipe(
+        config = recipe(
+            "ars",
             "paper",
-            task="left",
+            problem=LITERAL.problem("left"),
             seed=seed,
             step_size=rate,
             directions=perturbations,
@@ -209,15 +221,22 @@ def _sweep(seeds: Iterable[int], iterations: int = SWEEP_ITERATIONS) -> Iterator
 
 def _ars(readings: Iterable[Reading], seeds: Iterable[int], **settings: Any) -> Iterator[Training]:
     """Table 1."""
-    for reading, task, seed in product(readings, TASKS, seeds):
-        given = {**reading.settings(), **settings}
-        config = ars_recipe("paper", task=task, seed=seed, sharing=reading.sharing, **given)
-        yield Training(purpose="ars", config=config, reading=reading)
+    for reading in readings:
+        yield from _comparison("ars", reading, seeds, sharing=reading.sharing, **settings)
 
 
 def _ppo(readings: Iterable[Reading], seeds: Iterable[int], **settings: Any) -> Iterator[Training]:
     """The comparison with PPO (section 4)."""
-    distinct = dict.fromkeys(reading.for_ppo for reading in readings)
-    for reading, task, seed in product(distinct, TASKS, seeds):
-        config = ppo_recipe("paper", task=task, seed=seed, **reading.settings(), **settings)
-        yield Training(purpose="ppo", config=config, reading=reading)
+    for reading in dict.fromkeys(reading.for_ppo for reading in readings):
+        yield from _comparison("ppo", reading, seeds, **settings)
+
+
+def _comparison(
+    learner: Literal["ars", "ppo"], reading: Reading, seeds: Iterable[int], **settings: Any
+) -> Iterator[Training]:
+    """Trainings of a learner on all tasks under a reading."""
+    for task, seed in product(PROBLEMS, seeds):
+        problem = reading.problem(task)
+        weights = reading.weights(problem)
+        config = recipe(learner, "paper", problem=problem, seed=seed, reward=weights, **settings)
+        yield Training(purpose=learner, config=config, reading=reading)

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.reproduction.claims import LEVELS, Claim, steps_to_levels
 from kinarm.evaluation.reproduction.results import Results
-from kinarm.evaluation.reproduction.study import LEARNERS, LITERAL, WITHIN, Reading
-from kinarm.task import TASKS
+from kinarm.evaluation.reproduction.runs import TrainedRun
+from kinarm.evaluation.reproduction.study import LEARNERS, LITERAL, NEAR, Reading
+from kinarm.problem import PROBLEMS
 
 MARKS = {"holds": "holds", "does not hold": "no", "undecided": "?"}
 
@@ -46,55 +47,50 @@ def claims_table(claims: Iterable[Claim]) -> str:
 
 def learners_table(results: Results) -> str:
     """Final policies of every learner next to what could be reached; means over seeds."""
-    rows = []
-    for number, task in enumerate(TASKS, start=1):
-        bounds = oracle_bounds(results.trials(task))
-        possible = float(bounds.reachable.mean())
+    rows: list[list[str]] = []
+    for number, task in enumerate(PROBLEMS, start=1):
+        trials, name = results.trial_set(task), f"{number}: {task}"
+        bounds = oracle_bounds(trials)
+        final, possible = bounds.final_distance, float(bounds.reachable.mean())
         for purpose, label in LEARNERS.items():
-            outcomes = tuple(results.select(purpose, task).values())
-            if not outcomes:
-                continue
-            distance = np.array([outcome.distance for outcome in outcomes])
-            within = (distance <= WITHIN).mean(axis=1)
-            success = (distance <= results.trials(task).simulator.task.tolerance).mean()
-            contact = np.mean([outcome.collision.mean() for outcome in outcomes])
-            steps = np.mean([outcome.environment_steps[-1] for outcome in outcomes])
-            rows.append(
-                (
-                    f"{number}: {task}",
-                    f"{label}, {len(outcomes)} seeds",
-                    f"{100 * success:.1f}",
-                    f"{100 * success / possible:.1f}" if possible else "",
-                    f"{100 * within.mean():.1f} ({_range(100 * within)})",
-                    f"{np.median(distance):.3f}",
-                    f"{distance.mean():.3f}",
-                    f"{100 * contact:.1f}",
-                    f"{steps / 1e6:.2f}",
-                )
-            )
-        final = bounds.final_distance
-        rows.append(
-            (
-                f"{number}: {task}",
-                "oracle",
-                f"{100 * possible:.1f}",
-                "100.0",
-                f"{100 * np.mean(final <= WITHIN):.1f}",
-                f"{np.median(final):.3f}",
-                f"{final.mean():.3f}",
-                "0.0",
-                "",
-            )
-        )
+            if runs := results.select(purpose, task):
+                cells = _learner_cells(runs, trials.simulator.task.tolerance, possible)
+                rows.append([name, f"{label}, {len(runs)} seeds", *cells])
+        oracle = (f"{100 * possible:.1f}", "100.0", f"{100 * np.mean(final <= NEAR):.1f}")
+        distances = (f"{np.median(final):.3f}", f"{final.mean():.3f}")
+        rows.append([name, "oracle", *oracle, *distances, "0.0", ""])
     header = (
-        *("task", "learner", "success %", "of oracle %", f"<= {WITHIN} m % (seeds)"),
+        *("task", "learner", "success %", "of oracle %", f"<= {NEAR} m % (seeds)"),
         *("median m", "mean m", "contact %", "million steps"),
     )
     return markdown(header, rows)
 
 
-def _range(values: NDArray[np.float64]) -> str:
-    return f"{values.min():.1f}..{values.max():.1f}"
+def _learner_cells(runs: Sequence[TrainedRun], tolerance: float, possible: float) -> list[str]:
+    """How well the policies of a learner do."""
+    distance = np.array([run.distance for run in runs])
+    success = float((distance <= tolerance).mean())
+    contact = np.mean([run.collision.mean() for run in runs])
+    return [
+        f"{100 * success:.1f}",
+        f"{100 * success / possible:.1f}" if possible else "",
+        _near_cell(distance),
+        f"{np.median(distance):.3f}",
+        f"{distance.mean():.3f}",
+        f"{100 * contact:.1f}",
+        _steps_cell(runs),
+    ]
+
+
+def _near_cell(distance: NDArray[np.float64]) -> str:
+    """Share of trials that ended near the goal, and its range over seeds [%]."""
+    near = 100 * (distance <= NEAR).mean(axis=1)
+    return f"{near.mean():.1f} ({near.min():.1f}..{near.max():.1f})"
+
+
+def _steps_cell(runs: Sequence[TrainedRun]) -> str:
+    """Mean number of environment steps of a training [millions]."""
+    return f"{np.mean([run.environment_steps[-1] for run in runs]) / 1e6:.2f}"
 
 
 def sweep_table(results: Results) -> str:
@@ -102,38 +98,28 @@ def sweep_table(results: Results) -> str:
     rows = []
     for (rate, perturbations), runs in results.sweep().items():
         distance = np.array([run.distance for run in runs])
-        means, within = distance.mean(axis=1), (distance <= WITHIN).mean(axis=1)
-        steps = np.mean([run.environment_steps[-1] for run in runs])
-        rows.append(
-            (
-                f"{rate:g}",
-                str(perturbations),
-                f"{means.mean():.3f} ({means.min():.3f}..{means.max():.3f})",
-                f"{100 * within.mean():.1f} ({_range(100 * within)})",
-                f"{steps / 1e6:.2f}",
-            )
-        )
+        means = distance.mean(axis=1)
+        mean = f"{means.mean():.3f} ({means.min():.3f}..{means.max():.3f})"
+        near, steps = _near_cell(distance), _steps_cell(runs)
+        rows.append((f"{rate:g}", str(perturbations), mean, near, steps))
     header = ("learning rate", "perturbations", "mean final distance m (seeds)")
-    return markdown((*header, f"<= {WITHIN} m % (seeds)", "million steps"), rows)
+    return markdown((*header, f"<= {NEAR} m % (seeds)", "million steps"), rows)
 
 
 def speed_table(results: Results) -> str:
     """Environment steps after which levels of success were first seen; medians over seeds."""
+    shown = [purpose for purpose in LEARNERS if results.select(purpose)]
     rows = []
-    for task in TASKS:
-        steps = {
-            label: steps_to_levels(results, purpose, task, LITERAL)
-            for purpose, label in LEARNERS.items()
-            if results.select(purpose, task)
-        }
+    for task in PROBLEMS:
+        steps = [steps_to_levels(results.select(purpose, task)) for purpose in shown]
         for number, (distance, share) in enumerate(LEVELS):
-            cells = (_steps(steps[label][number]) if label in steps else "" for label in steps)
+            cells = (_median_cell(learner[number]) for learner in steps)
             rows.append((task, f"{share:.0%} within {distance:g} m", *cells))
-    shown = [label for purpose, label in LEARNERS.items() if results.select(purpose)]
-    return markdown(("task", "level", *(f"{label}, steps" for label in shown)), rows)
+    header = ("task", "level", *(f"{LEARNERS[purpose]}, steps" for purpose in shown))
+    return markdown(header, rows)
 
 
-def _steps(steps: NDArray[np.float64]) -> str:
+def _median_cell(steps: NDArray[np.float64]) -> str:
     """Median over seeds, and how many got there at all."""
     reached = int(np.isfinite(steps).sum())
     if not reached:
@@ -148,17 +134,17 @@ def readings_table(results: Results, claims: Mapping[Reading, Sequence[Claim]]) 
     names = [claim.name for claim in claims[LITERAL] if not claim.name.startswith("sweep")]
     rows = []
     for reading, judged in claims.items():
-        verdicts = {claim.name: MARKS[claim.verdict] for claim in judged}
-        within = (np.mean(results.distances("ars", task, reading) <= WITHIN) for task in TASKS)
+        marks = {claim.name: MARKS[claim.verdict] for claim in judged}
+        near = (np.mean(results.distances("ars", task, reading) <= NEAR) for task in PROBLEMS)
         rows.append(
             (
                 *(f"{reading.start_spread:g}", reading.reward, reading.sharing),
-                " / ".join(f"{100 * share:.0f}" for share in within),
-                *(verdicts.get(name, "") for name in names),
-                str(sum(verdict == "holds" for verdict in verdicts.values())),
+                " / ".join(f"{100 * share:.0f}" for share in near),
+                *(marks.get(name, "") for name in names),
+                str(list(marks.values()).count("holds")),
             )
         )
-    header = ("starts", "reward", "shared by", f"ARS <= {WITHIN} m %, left / right / both")
+    header = ("starts", "reward", "shared by", f"ARS <= {NEAR} m %, left / right / both")
     return markdown((*header, *(f"`{name}`" for name in names), "hold"), rows)
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinarm.replay import replay
+from kinarm.recording import Recording, record_rollouts
 from kinarm.simulator import Simulator
-from kinarm.trajectory import Recording, record_rollouts
+from kinarm.viewer import replay_page
 
 REQUIRED = "KINARM_REQUIRE_BROWSER"
 PATIENCE = 120_000
@@ -96,7 +96,7 @@ def open_page(browser: object) -> Iterator[Callable[..., Watched]]:
 @pytest.fixture(scope="session")
 def recorded() -> list[Recording]:
     """Three random motions in ``both``, one of which collides."""
-    simulator = Simulator(task="both", threads=1)
+    simulator = Simulator("both", threads=1)
     count = 24
     starts, goals = simulator.sample(np.random.default_rng(0), count)
     shape = (count, simulator.task.horizon, simulator.n_actions)
@@ -110,7 +110,7 @@ def recorded() -> list[Recording]:
 @pytest.fixture(scope="session")
 def page_file(recorded: list[Recording], tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("page") / "replay.html"
-    replay(recorded, path)
+    replay_page(recorded, path)
     return path
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 
 from kinarm.arm import Arm
-from kinarm.replay.drawing import aim_camera, draw_arm, draw_surroundings
-from kinarm.replay.live import LiveServer
 from kinarm.scene import Scene
+from kinarm.viewer.drawing import aim_camera, draw_arm, draw_surroundings
+from kinarm.viewer.live_server import LiveServer
 
 COUNT = """() => {
   let meshes = 0;

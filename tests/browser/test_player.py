@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from kinarm.arm import Arm
-from kinarm.replay import replay
+from kinarm.viewer import replay_page
 
 
 def placement(arm, configuration, name):
@@ -74,7 +74,7 @@ def test_pixels_are_drawn(watched):
 def test_the_card_says_what_happens(watched, recorded):
     collided = recorded[2]
     show(watched, 2, 3)
-    assert text(watched, "#eyebrow") == f"Task both · trial {collided.trial}"
+    assert text(watched, "#eyebrow") == f"Problem both · trial {collided.trial}"
     assert text(watched, "#runs .name") == "wave"
     assert text(watched, "#runs .badge") == "Contact"
     assert " touches ".join(collided.contact) in text(watched, "#runs .note")
@@ -208,7 +208,7 @@ def test_it_plays_by_itself_and_a_ghost_comes_along(open_page, recorded, tmp_pat
         policy="other",
         states=np.concatenate([first.states[:1], first.states[:-1]]),
     )
-    replay([first], tmp_path / "made.html", ghosts=[other])
+    replay_page([first], tmp_path / "made.html", ghosts=[other])
     watched = open_page(tmp_path / "made.html", calm=False)
     assert watched.state["playing"]
     show(watched, 0, 20)

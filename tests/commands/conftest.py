@@ -9,19 +9,20 @@ from typing import NamedTuple
 
 import pytest
 
-from kinarm.evaluation import bench, eval, replay, reproduce  # noqa: A004
-from kinarm.policies import Policy, ars_recipe, train, train_ars
+from kinarm.evaluation.commands import bench, evaluate, replay, reproduce
+from kinarm.policies import Policy, recipe, train, train_policy
+from kinarm.problem import PROBLEMS
 
 ROOT = Path(__file__).resolve().parents[2]
 MODULES = {
-    "kinarm-eval": "kinarm.evaluation.eval",
-    "kinarm-replay": "kinarm.evaluation.replay",
+    "kinarm-eval": "kinarm.evaluation.commands.evaluate",
+    "kinarm-replay": "kinarm.evaluation.commands.replay",
     "kinarm-train": "kinarm.policies.train",
-    "kinarm-bench": "kinarm.evaluation.bench",
-    "kinarm-reproduce": "kinarm.evaluation.reproduce",
+    "kinarm-bench": "kinarm.evaluation.commands.bench",
+    "kinarm-reproduce": "kinarm.evaluation.commands.reproduce",
 }
 MAINS = {
-    "kinarm-eval": eval.main,
+    "kinarm-eval": evaluate.main,
     "kinarm-train": train.main,
     "kinarm-bench": bench.main,
     "kinarm-replay": replay.main,
@@ -64,14 +65,19 @@ def command() -> Callable[..., list[str]]:
 def run_outside(command: Callable[..., list[str]]) -> Callable[..., Answer]:
     """Run a command line in a process of its own."""
 
-    def call(program: str, *arguments: object, **settings: object) -> Answer:
+    def call(
+        program: str,
+        *arguments: object,
+        environment: dict[str, str] | None = None,
+        **settings: object,
+    ) -> Answer:
         done = subprocess.run(
             command(program, *arguments),
             **{"cwd": ROOT, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **settings},
             text=True,
             timeout=120,
             check=False,
-            env={**os.environ, "COLUMNS": "100"},
+            env={**os.environ, "COLUMNS": "100", **(environment or {})},
         )
         return Answer(done.returncode, done.stdout or "", done.stderr or "")
 
@@ -81,7 +87,7 @@ def run_outside(command: Callable[..., list[str]]) -> Callable[..., Answer]:
 @pytest.fixture(scope="session")
 def policy() -> Policy:
     """A policy for ``right``, hardly trained."""
-    return train_ars(ars_recipe("paper", task="right", iterations=5)).policy
+    return train_policy(recipe("ars", "paper", problem="right", iterations=5)).policy
 
 
 @pytest.fixture(scope="session")
@@ -90,11 +96,11 @@ def policy_folder(policy: Policy, tmp_path_factory: pytest.TempPathFactory) -> P
     folder = tmp_path_factory.mktemp("policies")
     policy.save(folder / "mine-seed0.npz")
     others = {
-        "mine-seed1": {"task": "right", "seed": 1},
-        "lefty": {"task": "left"},
-        "flange": {"task": "right", "arm": "paper_flange"},
+        "mine-seed1": {"problem": "right", "seed": 1},
+        "lefty": {"problem": "left"},
+        "flange": {"problem": PROBLEMS["right"].replace(arm="paper_flange")},
     }
     for name, settings in others.items():
-        config = ars_recipe("paper", iterations=2, **settings)
-        train_ars(config).policy.save(folder / f"{name}.npz")
+        config = recipe("ars", "paper", iterations=2, **settings)
+        train_policy(config).policy.save(folder / f"{name}.npz")
     return folder

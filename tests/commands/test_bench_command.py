@@ -1,22 +1,23 @@
 """``kinarm-bench``: JSON alone, or a table, from the same figures."""
 
 import json
+from functools import partial
 
 import pytest
 
-from kinarm.evaluation import bench, measurements
-from kinarm.policies import recipes
+from kinarm.evaluation import measurements
+from kinarm.evaluation.commands import bench
+from kinarm.policies import recipe
 
 
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
     """Sizes for a test."""
-    whole = recipes.ars_recipe
     evaluation = {"seconds_without_bounds": 9.87, "seconds": 4.32, "peak_memory_mb": 321.0}
     monkeypatch.setattr(measurements, "BATCHES", (512,))
     monkeypatch.setattr(measurements, "ORACLE_TRIALS", 4)
     monkeypatch.setattr(measurements, "measure_evaluation", lambda: evaluation)
-    monkeypatch.setattr(recipes, "ars_recipe", lambda name, **kw: whole(name, iterations=2, **kw))
+    monkeypatch.setattr(measurements, "recipe", partial(recipe, iterations=2))
 
 
 def test_json_alone_is_printed(run, policy_folder):
@@ -35,6 +36,8 @@ def test_json_alone_is_printed(run, policy_folder):
         "evaluation",
     } <= set(document)
     assert document["policy"] == str(path)
+    request = bench.BenchmarkRequest(policy=str(path), repetitions=1)
+    assert set(request.run()) == set(document)
 
 
 def test_table_shows_every_figure(run, monkeypatch, policy_folder):
@@ -60,7 +63,7 @@ def test_table_shows_every_figure(run, monkeypatch, policy_folder):
         },
     }
     asked = []
-    monkeypatch.setattr(bench, "measure", lambda *_, ppo: asked.append(ppo) or document)
+    monkeypatch.setattr(measurements, "measure", lambda *_, ppo: asked.append(ppo) or document)
     answer = run("kinarm-bench", "--ppo")
     assert asked == [True]
     for figure in (

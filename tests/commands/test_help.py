@@ -10,8 +10,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = {
-    "kinarm-eval": "kinarm.evaluation.eval",
-    "kinarm-replay": "kinarm.evaluation.replay",
+    "kinarm-eval": "kinarm.evaluation.commands.evaluate",
+    "kinarm-replay": "kinarm.evaluation.commands.replay",
     "kinarm-train": "kinarm.policies.train",
     "kinarm-bench": "kinarm.evaluation.bench",
     "kinarm-reproduce": "kinarm.evaluation.reproduce",
@@ -57,8 +57,9 @@ def test_learners_have_help_of_their_own(run, learner):
         ),
         (
             "kinarm-replay",
-            "--policy --compare --task --trial --worst --collisions --trials --seed --arm "
-            "--allow-other-arm --no-oracle --out --record --live --port --no-browser",
+            "--policy --compare --problem --task --arm --trial --worst --collisions --trials "
+            "--seed --allow-other-arm --no-oracle --out --record --overwrite --live --port "
+            "--no-browser",
         ),
         ("kinarm-bench", "--repetitions --policy --ppo --json"),
     ],
@@ -71,13 +72,14 @@ def test_help_names_every_option(run, program, options):
 @pytest.mark.parametrize(
     ("learner", "options"),
     [
-        ("ars", "--iterations --sharing --step-size"),
-        ("ppo", "--iterations --arms --hidden --learning-rate --tolerance --tensorboard"),
+        ("ars", "--sharing --step-size --no-normalize"),
+        ("ppo", "--n-envs --net-arch --learning-rate --training-tolerance --tensorboard"),
     ],
 )
 def test_training_help_names_every_option(run, learner, options):
     text = run("kinarm-train", learner, "--help").out
-    common = "--task --recipe --seed --arm --out --resume --symmetric"
+    common = "--problem --arm --task --scene --tolerance --horizon --start-spread --seed --out "
+    common += "--recipe --resume --overwrite --iterations --reward-success --no-symmetric"
     assert [option for option in f"{common} {options}".split() if option not in text] == []
 
 

@@ -13,7 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinarm.trajectory import load_recordings, save_recordings
+from kinarm.arm import Arm
+from kinarm.evaluation import ReplayRequest
+from kinarm.recording import load_recordings, save_recordings
 
 QUICK = ("--no-oracle",)
 
@@ -76,7 +78,7 @@ def test_trials_of_a_policy(replay, policy_folder, tmp_path):
 
 
 def test_recordings_end_as_the_evaluation_says(run, tmp_path, evaluation, policy_folder):
-    options = ("--policy", policy_folder / "mine-seed0.npz", "--task", "right")
+    options = ("--policy", policy_folder / "mine-seed0.npz", "--problem", "right")
     settings = ("--trials", 12, "--seed", 4, *QUICK)
     files = ("--out", tmp_path / "made.html", "--record", tmp_path / "made.npz")
     assert run("kinarm-replay", *options, *settings, *files).status == 0
@@ -115,8 +117,19 @@ def test_one_trial_of_an_evaluation(replay, evaluation, policy_folder):
     assert played(replay(evaluation, "--policy", policy, "--trial", 7, "--trial", 2)) == [7, 2]
 
 
+def test_a_request_does_the_same(run, tmp_path, policy_folder):
+    policy, lines = policy_folder / "mine-seed0.npz", []
+    command = ("--policy", policy, "--tolerance", 0.2, "--trials", 2)
+    answer = run("kinarm-replay", *command, "--out", tmp_path / "a.html")
+    request = ReplayRequest(policy=str(policy), tolerance=0.2, trials=2, out=tmp_path / "b.html")
+    page = request.run(lines.append)
+    assert page.html == (tmp_path / "a.html").read_text() == (tmp_path / "b.html").read_text()
+    assert lines[:2] == answer.out.splitlines()[:2]
+    assert request.recordings()[0][0].problem.task.tolerance == 0.2
+
+
 def test_two_policies_on_the_same_trials(replay, tmp_path):
-    answer = replay("--compare", "random", "zero", "--task", "left", "--trials", 2, *QUICK)
+    answer = replay("--compare", "random", "zero", "--problem", "left", "--trials", 2, *QUICK)
     assert played(answer) == [0, 0, 1, 1]
     assert "random and zero" in (tmp_path / "made.html").read_text()
 
@@ -128,7 +141,7 @@ def test_the_oracle_and_a_policy(replay):
 
 
 def test_another_arm(replay):
-    options = ("--policy", "oracle", "--task", "right", "--arm", "lrmate200ic_5l")
+    options = ("--policy", "oracle", "--problem", "right", "--arm", "lrmate200ic_5l")
     assert played(replay(*options, "--trials", 1)) == [0]
 
 
@@ -136,20 +149,25 @@ def test_another_arm(replay):
     ("arguments", "words"),
     [
         ((), ["name a --policy"]),
-        (("--policy", "zero"), ["'zero'", "name a --task"]),
+        (("--policy", "zero"), ["'zero'", "name a --problem"]),
         (("--policy", "nobody"), ["'nobody'", "ars-tuned-right"]),
-        (("--policy", "zero", "--task", "up"), ["'up'", "left, right, both"]),
+        (("--policy", "zero", "--problem", "up"), ["'up'", "left, right, both"]),
         (("--policy", "ars-tuned-right", "--arm", "paper_flange"), ["trained for arm 'paper'"]),
-        (("--policy", "zero", "--compare", "zero", "random"), ["--compare"]),
-        (("--policy", "zero", "--task", "left", "--trial", "200"), ["no trial 200", "0 to 199"]),
-        (("--policy", "zero", "--task", "left", "--trial", "x"), ["--trial", "'x'"]),
-        (("--policy", "zero", "--task", "left", "--trials", "3", "--worst", "4"), ["--worst 4"]),
-        (("--policy", "zero", "--task", "left", "--collisions"), ["none of the 200 trials"]),
-        (("--policy", "zero", "--task", "left", "--port", "7001"), ["--live"]),
-        (("--policy", "zero", "--task", "left", "--live"), ["--out", "--live"]),
+        (("--policy", "zero", "--compare", "zero", "random"), ["--policy", "--compare"]),
+        (("--policy", "zero", "--worst", "3", "--collisions"), ["--worst", "--collisions"]),
+        (("--compare", "zero"), ["--compare", "2 arguments"]),
+        (("--policy", "zero", "--problem", "left", "--trial", "200"), ["no trial 200", "0 to 199"]),
+        (("--policy", "zero", "--problem", "left", "--trial", "x"), ["--trial", "'x'"]),
+        (("--policy", "zero", "--problem", "left", "--trials", "3", "--worst", "4"), ["--worst 4"]),
+        (("--policy", "zero", "--problem", "left", "--collisions"), ["none of the 200 trials"]),
+        (("--policy", "zero", "--problem", "left", "--port", "7001"), ["--live"]),
+        (("--policy", "zero", "--problem", "left", "--live"), ["--out", "--live"]),
+        (("--policy", "zero", "--worst", "0"), ["worst", "at least 1"]),
         (("missing.npz",), ["missing.npz", "No such file"]),
         (("missing.json",), ["missing.json", "No such file"]),
-        (("missing.npz", "--seed", "3"), ["--seed"]),
+        (("missing.npz", "--seed", "0"), ["--seed"]),
+        (("missing.npz", "--tolerance", "0.1"), ["--tolerance"]),
+        (("missing.json", "--arm", "paper"), ["--arm"]),
     ],
 )
 def test_bad_input(replay, tmp_path, arguments, words):
@@ -158,22 +176,37 @@ def test_bad_input(replay, tmp_path, arguments, words):
 
 
 def test_the_page_cannot_be_written(run, tmp_path):
-    options = ("--policy", "zero", "--task", "left", "--trials", 1, *QUICK)
-    missing = tmp_path / "none" / "made.html"
-    refused(run("kinarm-replay", *options, "--out", missing), "none")
+    options = ("--policy", "zero", "--problem", "left", "--trials", 1, *QUICK)
     refused(run("kinarm-replay", *options, "--out", tmp_path), str(tmp_path))
-    bad = ("--out", tmp_path / "made.html", "--record", tmp_path / "none" / "made.npz")
-    refused(run("kinarm-replay", *options, *bad), "none")
+    bad = ("--out", tmp_path / "made.html", "--record", tmp_path / "made.txt")
+    refused(run("kinarm-replay", *options, *bad), ".npz")
     assert list(tmp_path.iterdir()) == []
 
 
+def test_folders_are_made_and_files_kept(run, tmp_path):
+    page, kept = tmp_path / "new" / "made.html", tmp_path / "other" / "made.npz"
+    options = ("--policy", "zero", "--problem", "left", "--trials", 1, *QUICK)
+    files = ("--out", page, "--record", kept)
+    assert run("kinarm-replay", *options, *files).status == 0
+    refused(run("kinarm-replay", *options, "--out", page), "--overwrite")
+    fresh = ("--out", tmp_path / "fresh.html")
+    refused(run("kinarm-replay", *options, *fresh, "--record", kept), "--overwrite")
+    assert run("kinarm-replay", *options, *files, "--overwrite").status == 0
+
+
 def test_recordings_of_another_arm(replay, recordings):
-    refused(replay(recordings, "--arm", "paper_flange"), "'paper'", "'paper_flange'")
+    refused(replay(recordings, "--arm", "paper_flange"), "'paper_flange' is another version")
+
+
+def test_an_arm_that_was_moved(replay, recordings, tmp_path):
+    urdf = tmp_path / "moved.urdf"
+    urdf.write_text(Arm.load("paper").urdf_path.read_text())
+    assert played(replay(recordings, "--arm", urdf)) == [0, 1, 2, 3]
 
 
 def test_recordings_do_not_hold_it(replay, recordings):
     refused(replay(recordings, "--policy", "nobody"), "'nobody'", "mine-seed0")
-    refused(replay(recordings, "--task", "left"), "holds no recording")
+    refused(replay(recordings, "--problem", "left"), "holds no recording")
     refused(replay(recordings, "--trial", 9), "no trial 9", "0 to 3")
 
 
@@ -191,11 +224,11 @@ def test_truncated_recordings(replay, recordings, tmp_path, share):
     content = recordings.read_bytes()
     path = tmp_path / "cut.npz"
     path.write_bytes(content[: int(share * len(content))])
-    refused(replay(path), "cut.npz", "not a complete recording")
+    refused(replay(path), "cut.npz", "not a complete kinarm recording")
 
 
 def test_policies_are_no_recordings(replay, policy_folder):
-    refused(replay(policy_folder / "lefty.npz"), "'kinarm-policy'", "'kinarm-recordings'")
+    refused(replay(policy_folder / "lefty.npz"), "'kinarm-policy'", "'kinarm-recording'")
 
 
 @pytest.mark.parametrize("content", ["", "{}", "[1]", '{"protocol": {}}', "\x00"])
@@ -215,10 +248,15 @@ def test_an_evaluation_that_no_longer_holds(replay, evaluation, tmp_path):
         path.write_text(json.dumps(copy))
         return replay(path, "--policy", "random", *QUICK)
 
-    assert document["protocol"]["format_version"] == 1
-    refused(changed(lambda d: d["protocol"].update(format_version=2)), "format version 2")
-    refused(changed(lambda d: d["protocol"].update(arm_digest="0")), "of arm 'paper' (0)")
-    refused(changed(lambda d: d["protocol"]["tasks"]["right"]["goals"].reverse()), "hash")
+    assert document["protocol"]["format_version"] == 2
+    refused(changed(lambda d: d["protocol"].update(format_version=9)), "format version 9")
+
+    def right(document):
+        return document["protocol"]["problems"]["right"]
+
+    refused(changed(lambda d: right(d)["problem"]["arm"].update(digest="0")), "another version")
+    refused(changed(lambda d: right(d)["problem"]["task"].update(tolerance=0.1)), "hash")
+    refused(changed(lambda d: right(d)["goals"].reverse()), "hash")
     row = document["results"].index(next(r for r in document["results"] if r["policy"] == "random"))
     refused(changed(lambda d: d["results"][row]["outcomes"]["steps"].reverse()), "ends otherwise")
 
@@ -226,13 +264,14 @@ def test_an_evaluation_that_no_longer_holds(replay, evaluation, tmp_path):
 @pytest.mark.parametrize(
     "path",
     [
-        ("results", 0, "task"),
+        ("results", 0, "problem"),
         ("results", 0, "policy"),
         ("results", 0, "outcomes", "steps"),
         ("protocol", "seed"),
-        ("protocol", "tasks", "right", "starts"),
-        ("protocol", "tasks", "right", "oracle"),
-        ("protocol", "tasks", "right"),
+        ("protocol", "problems", "right", "starts"),
+        ("protocol", "problems", "right", "oracle"),
+        ("protocol", "problems", "right", "problem"),
+        ("protocol", "problems", "right"),
     ],
 )
 def test_an_evaluation_with_something_missing(replay, evaluation, tmp_path, path):
@@ -248,7 +287,7 @@ def test_an_evaluation_with_something_missing(replay, evaluation, tmp_path, path
 
 def test_an_evaluation_of_several_policies(replay, evaluation):
     refused(replay(evaluation, "--policy", "nobody"), "'nobody'", "random")
-    refused(replay(evaluation, "--policy", "random", "--task", "left"), "'random'")
+    refused(replay(evaluation, "--policy", "random", "--problem", "left"), "'random'")
 
 
 # The live page
@@ -266,9 +305,18 @@ def live(command):
     started = []
 
     def start(port):
-        options = ("--policy", "zero", "--task", "left", "--live", "--no-browser", "--port", port)
+        options = (
+            "--policy",
+            "zero",
+            "--problem",
+            "left",
+            "--live",
+            "--no-browser",
+            "--port",
+            port,
+        )
         process = subprocess.Popen(
-            command("kinarm-replay", *options),
+            command("kinarm-replay", *options, "--no-browser", "--port", port),
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,

@@ -1,21 +1,22 @@
 """``kinarm-reproduce``: a quick study from end to end, killed and resumed, and bad input."""
 
 import json
-import multiprocessing
 import os
+import shutil
 import signal
 import subprocess
 import time
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from kinarm.errors import WorkerError
-from kinarm.evaluation.reproduction import workers
+from kinarm.errors import InvalidInputError, WorkerError
+from kinarm.evaluation.commands.reproduce import ReproductionRequest
+from kinarm.evaluation.reproduction.executor import LocalExecutor
 from kinarm.evaluation.reproduction.study import quick_study
-from kinarm.evaluation.reproduction.workers import carry_out_all
 
 QUICK = ("--quick", "--no-ppo", "--jobs", 2)
 needs_ppo = pytest.mark.skipif(find_spec("stable_baselines3") is None, reason="needs the extra ppo")
@@ -45,6 +46,7 @@ class TestQuick:
         assert "ARS mostly ends within 0.2 m on left" in answer.out
         assert "does not hold" in answer.out
         assert "reproduction-quick/REPRODUCTION.md" in answer.out
+        assert "no verdict means anything" in answer.out
         assert "Traceback" not in answer.err
 
     def test_writes_everything(self, reference):
@@ -87,6 +89,33 @@ class TestQuick:
         answer = run_outside("kinarm-reproduce", *QUICK, cwd=folder.parent)
         assert "29 of 30 trainings are finished" in answer.err
         assert contents(folder) == before
+
+
+class InThisProcess:
+    """An executor as simple as can be."""
+
+    def __init__(self):
+        self.names = []
+
+    def carry_out(self, work, tasks):
+        for task in tasks:
+            work(task)
+            self.names.append(task.name)
+            yield task
+
+
+def test_python_gets_the_same_from_a_request_and_another_executor(reference, tmp_path):
+    """Nothing is left to do in a copy without two of the runs but these two."""
+    folder = tmp_path / "copy"
+    shutil.copytree(reference[0], folder)
+    for name in ("ars-left-seed0", "ars-both-seed1"):
+        (folder / "runs" / f"{name}.npz").unlink()
+    executor = InThisProcess()
+    request = ReproductionRequest(quick=True, ppo=False, out=folder)
+    claims = request.run(executor, command="kinarm-reproduce --quick --no-ppo --jobs 2")
+    assert sorted(executor.names) == ["ars-both-seed1", "ars-left-seed0"]
+    assert contents(folder) == contents(reference[0])
+    assert claims[0].name == "ars-left"
 
 
 @pytest.mark.slow
@@ -157,29 +186,42 @@ def test_quick_with_ppo(run_outside, tmp_path):
 
 
 class TestWorkers:
-    def test_a_worker_that_is_killed(self, tmp_path):
-        class KillsWorkers:
-            def began(self, training):
-                pass
-
-            finished = began
-
-            def refresh(self):
-                for worker in multiprocessing.active_children():
-                    worker.kill()
-
-        study = quick_study(ppo=False)
+    def test_a_worker_that_is_killed(self):
+        tasks = LocalExecutor(2).carry_out(kill_own_process_at_seven, range(9))
         with pytest.raises(WorkerError, match="a worker ended unexpectedly"):
-            carry_out_all(study.trainings, study.protocol, tmp_path, 1, KillsWorkers())
+            list(tasks)
 
     def test_its_exit_status_is_that_of_a_failed_run(self, run, monkeypatch, tmp_path):
         def fail(*_):
             raise WorkerError("a worker ended unexpectedly")
 
-        monkeypatch.setattr(workers, "carry_out_all", fail)
+        monkeypatch.setattr(LocalExecutor, "carry_out", fail)
         answer = run("kinarm-reproduce", *QUICK, "--out", tmp_path)
         assert answer.status == 1
         assert answer.err.splitlines()[-1] == "kinarm-reproduce: a worker ended unexpectedly"
+
+    @pytest.mark.parametrize("jobs", [1, 2])
+    def test_every_task_is_done_once(self, jobs, tmp_path):
+        done = LocalExecutor(jobs).carry_out(partial(touch, tmp_path), range(6))
+        assert sorted(done) == list(range(6))
+        assert sorted(path.name for path in tmp_path.iterdir()) == [*"012345"]
+
+    def test_one_at_a_time_they_are_done_in_the_given_order(self, tmp_path):
+        assert list(LocalExecutor(1).carry_out(partial(touch, tmp_path), (3, 1, 2))) == [3, 1, 2]
+
+    def test_errors_of_a_task_are_told_as_they_are(self, tmp_path):
+        work = partial(touch, tmp_path / "missing")
+        with pytest.raises(FileNotFoundError):
+            list(LocalExecutor(2).carry_out(work, range(3)))
+
+
+def touch(folder, number):
+    (folder / str(number)).touch(exist_ok=False)
+
+
+def kill_own_process_at_seven(number):
+    if number == 7:
+        os.kill(os.getpid(), signal.SIGKILL)
 
 
 class TestBadInput:
@@ -190,6 +232,8 @@ class TestBadInput:
         assert answer.out == ""
 
     def test_jobs(self, run):
+        with pytest.raises(InvalidInputError, match="jobs"):
+            ReproductionRequest(jobs=0)
         self.check(run("kinarm-reproduce", "--jobs", 0), "must be a whole number of at least 1")
 
     def test_folder_of_another_study(self, run, tmp_path):
@@ -209,7 +253,7 @@ class TestBadInput:
         self.check(answer, "cannot write")
 
     def test_without_the_extra(self, run, tmp_path, monkeypatch):
-        monkeypatch.setattr("kinarm.policies.ppo.find_spec", lambda _: None)
+        monkeypatch.setattr("kinarm.policies.learners.find_spec", lambda _: None)
         answer = run("kinarm-reproduce", "--quick", "--out", tmp_path)
         self.check(answer, "pip install 'kinarm[ppo]'")
         assert list(tmp_path.iterdir()) == []

@@ -2,18 +2,23 @@
 
 import csv
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from kinarm.evaluation.evaluations import evaluate
-from kinarm.policies import Policy, ars_recipe, train_ars
+from kinarm.evaluation.evaluation import evaluate
+from kinarm.policies import Policy, recipe, train_policy
 from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
+from kinarm.policies.train import TrainRequest
+from kinarm.problem import PROBLEMS
+from kinarm.task import RewardWeights
 
 ROOT = Path(__file__).resolve().parents[2]
 LONG = {"iterations": 2000, "directions": 2, "top_directions": 2}
@@ -57,7 +62,7 @@ def stop_after(iteration: int, config, path: Path) -> None:
             raise StoppedError
 
     with pytest.raises(StoppedError):
-        train_ars(config, on_iteration=stop)
+        train_policy(config, on_iteration=stop)
 
 
 def test_policy_and_curve_are_those_of_the_library(run, tmp_path):
@@ -67,7 +72,7 @@ def test_policy_and_curve_are_those_of_the_library(run, tmp_path):
     )
     assert answer.status == 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["p.curve.csv", "p.npz"]
-    expected = train_ars(ars_recipe("paper", task="left", seed=3, iterations=6))
+    expected = train_policy(recipe("ars", "paper", problem="left", seed=3, iterations=6))
     check_equal(Policy.load(out), expected.policy)
     rows = read_curve(tmp_path / "p.curve.csv")
     assert [int(row["iteration"]) for row in rows] == [1, 2, 3, 4, 5, 6]
@@ -88,8 +93,6 @@ def test_summary_says_where_the_policy_is(run, tmp_path):
 
 def test_every_setting_reaches_the_training(run, tmp_path):
     settings = {
-        "task": "both",
-        "arm": "paper_flange",
         "seed": 7,
         "iterations": 2,
         "directions": 5,
@@ -97,43 +100,100 @@ def test_every_setting_reaches_the_training(run, tmp_path):
         "episodes": 2,
         "step_size": 0.03,
         "noise": 0.02,
-        "success_bonus": 0.25,
-        "collision_penalty": -2.0,
-        "start_spread": 0.5,
         "sharing": "pair",
         "step_size_schedule": "linear",
     }
     options = [word for k, v in settings.items() for word in (f"--{k.replace('_', '-')}", v)]
+    options += ["--task", "both", "--arm", "paper_flange", "--start-spread", 0.5]
+    options += ["--reward-success", 0.25, "--reward-collision", -2, "--symmetric", "--normalize"]
     out = tmp_path / "p.npz"
     assert run("kinarm-train", "ars", "--recipe", "brs", *options, "--out", out).status == 0
     made = Policy.load(out).provenance
     assert {name: made.config[name] for name in settings} == settings
-    assert (made.recipe, made.task, made.arm, made.seed) == ("brs*", "both", "paper_flange", 7)
-    assert (made.config["normalize"], made.config["scale_by_deviation"]) == (False, False)
+    assert (made.recipe, made.seed) == ("brs*", 7)
+    assert made.problem == PROBLEMS["both"].replace(arm="paper_flange", start_spread=0.5).pinned
+    assert made.config["reward"] == asdict(RewardWeights(success=0.25, collision=-2.0))
+    assert (made.config["normalize"], made.config["scale_by_deviation"]) == (True, False)
+    assert made.config["symmetric"]
+
+
+def test_a_recipe_and_a_problem_from_files(run, tmp_path):
+    PROBLEMS["left"].replace(tolerance=0.1, name="near").save(tmp_path / "near.toml")
+    (tmp_path / "mine.toml").write_text('problem = "near.toml"\niterations = 3\nseed = 5\n')
+    out = tmp_path / "p.npz"
+    arguments = ("ars", "--recipe", tmp_path / "mine.toml", "--horizon", 9, "--out", out)
+    assert run("kinarm-train", *arguments).status == 0
+    made = Policy.load(out).provenance
+    assert (made.recipe, made.seed, made.config["iterations"]) == ("mine", 5, 3)
+    assert made.problem == PROBLEMS["left"].replace(name="near", tolerance=0.1, horizon=9).pinned
+
+
+def test_python_trains_with_the_same_effect(run, tmp_path):
+    arguments = ("--task", "left", "--noise", 0.1, "--reward-success", 1, "--iterations", 3)
+    run("kinarm-train", "ars", *arguments, "--out", tmp_path / "command.npz")
+    result = TrainRequest(
+        learner="ars",
+        task="left",
+        settings={"noise": 0.1, "reward": {"success": 1.0}, "iterations": 3},
+        out=tmp_path / "python.npz",
+    ).run()
+    made = Policy.load(tmp_path / "command.npz")
+    check_equal(made, Policy.load(tmp_path / "python.npz"))
+    check_equal(made, result.policy)
+    assert (tmp_path / "python.curve.csv").exists()
 
 
 def test_a_trained_policy_can_be_evaluated(run, tmp_path):
     out = tmp_path / "p.npz"
     run("kinarm-train", "ars", "--task", "left", "--iterations", 2, "--out", out)
     evaluation = evaluate(out, trials=3)
-    assert (evaluation.task, len(evaluation.rollouts)) == ("left", 3)
+    assert (evaluation.problem.name, len(evaluation.rollouts)) == ("left", 3)
 
 
-def test_an_earlier_policy_is_replaced(run, tmp_path):
+def test_an_earlier_policy_is_replaced_on_demand_alone(run, tmp_path):
     out = tmp_path / "p.npz"
-    for seed in (0, 1):
-        run("kinarm-train", "ars", "--seed", seed, "--iterations", 2, "--out", out)
+    arguments = ("kinarm-train", "ars", "--iterations", 2, "--out", out)
+    run(*arguments)
+    before = out.read_bytes()
+    answer = run(*arguments, "--seed", 1)
+    assert (answer.status, answer.out, len(answer.err.splitlines())) == (2, "", 1)
+    assert "--overwrite" in answer.err
+    assert out.read_bytes() == before
+    assert run(*arguments, "--seed", 1, "--overwrite").status == 0
     assert Policy.load(out).provenance.seed == 1
 
 
-@pytest.mark.parametrize("recipe", ["paper", "tuned", "v1"])
+def test_missing_folders_are_made(run, tmp_path):
+    out = tmp_path / "a" / "b" / "p.npz"
+    assert run("kinarm-train", "ars", "--iterations", 2, "--out", out).status == 0
+    assert out.exists()
+
+
+def test_progress_fits_80_columns(run_outside, tmp_path, monkeypatch):
+    arguments = ("--recipe", "tuned", "--task", "both", "--seed", 10, "--iterations", 3000)
+    settings = ("--directions", 2, "--top-directions", 2, "--episodes", 1)
+    answer = run_outside(
+        *("kinarm-train", "ars", *arguments, *settings, "--out", tmp_path / "p.npz"),
+        environment={"COLUMNS": "80", "FORCE_COLOR": "1", "TERM": "xterm"},
+    )
+    lines = [
+        re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", line) for line in re.split(r"[\r\n]", answer.err)
+    ]
+    shown = [line for line in lines if line.strip()]
+    assert all(line.startswith("ars tuned* both seed 10") for line in shown)
+    assert all(len(line.rstrip()) <= 80 for line in shown)
+    assert "3000/3000 return " in shown[-1]
+    assert " success " in shown[-1]
+
+
+@pytest.mark.parametrize("name", ["paper", "tuned", "v1"])
 @pytest.mark.parametrize("stopped_after", [1, 7])
-def test_resumed_is_uninterrupted(run, tmp_path, recipe, stopped_after):
-    config = ars_recipe(recipe, iterations=9, directions=4, top_directions=4, episodes=2)
+def test_resumed_is_uninterrupted(run, tmp_path, name, stopped_after):
+    config = recipe("ars", name, iterations=9, directions=4, top_directions=4, episodes=2)
     out = tmp_path / "p.npz"
     stop_after(stopped_after, config, tmp_path / "p.checkpoint.npz")
     assert run("kinarm-train", "ars", "--out", out, "--resume").status == 0
-    expected = train_ars(config)
+    expected = train_policy(config)
     check_equal(Policy.load(out), expected.policy)
     rows = read_curve(tmp_path / "p.curve.csv")
     assert [float(row["mean_return"]) for row in rows] == [p.mean_return for p in expected.curve]
@@ -141,7 +201,7 @@ def test_resumed_is_uninterrupted(run, tmp_path, recipe, stopped_after):
 
 
 def test_the_clock_goes_on_when_resumed(run, tmp_path):
-    config = ars_recipe("paper", iterations=5)
+    config = recipe("ars", "paper", iterations=5)
     stop_after(3, config, tmp_path / "p.checkpoint.npz")
     run("kinarm-train", "ars", "--out", tmp_path / "p.npz", "--resume")
     times = [float(row["wall_time"]) for row in read_curve(tmp_path / "p.curve.csv")]
@@ -149,7 +209,7 @@ def test_the_clock_goes_on_when_resumed(run, tmp_path):
 
 
 def test_naming_the_same_settings_again_is_fine(run, tmp_path):
-    stop_after(2, ars_recipe("tuned", iterations=3, seed=5), tmp_path / "p.checkpoint.npz")
+    stop_after(2, recipe("ars", "tuned", iterations=3, seed=5), tmp_path / "p.checkpoint.npz")
     arguments = ("--recipe", "tuned", "--seed", 5, "--iterations", 3, "--resume")
     assert run("kinarm-train", "ars", "--out", tmp_path / "p.npz", *arguments).status == 0
     assert Policy.load(tmp_path / "p.npz").provenance.recipe == "tuned*"
@@ -165,17 +225,20 @@ def test_naming_the_same_settings_again_is_fine(run, tmp_path):
         ("--arm", "paper_flange"),
         ("--sharing", "pair"),
         ("--recipe", "tuned"),
+        ("--reward-success", 3),
+        ("--tolerance", 0.1),
     ],
 )
 def test_other_settings_are_refused_when_resuming(run, tmp_path, option, value):
     """A setting that would be ignored is an error, and the checkpoint stays as it is."""
     checkpoint = tmp_path / "p.checkpoint.npz"
-    stop_after(2, ars_recipe("paper", iterations=4), checkpoint)
+    stop_after(2, recipe("ars", "paper", iterations=4), checkpoint)
     before = checkpoint.read_bytes()
     answer = run("kinarm-train", "ars", "--out", tmp_path / "p.npz", "--resume", option, value)
     assert (answer.status, answer.out) == (2, "")
     assert len(answer.err.splitlines()) == 1
-    assert option.strip("-") in answer.err
+    word = {"--task": "goal_regions", "--reward-success": "reward"}.get(option, option[2:])
+    assert word in answer.err
     assert checkpoint.read_bytes() == before
     assert not (tmp_path / "p.npz").exists()
 
@@ -183,7 +246,7 @@ def test_other_settings_are_refused_when_resuming(run, tmp_path, option, value):
 @pytest.mark.parametrize("damage", ["truncated", "policy", "text"])
 def test_an_unusable_checkpoint_is_refused(run, tmp_path, policy, damage):
     checkpoint = tmp_path / "p.checkpoint.npz"
-    stop_after(2, ars_recipe("paper", iterations=4), checkpoint)
+    stop_after(2, recipe("ars", "paper", iterations=4), checkpoint)
     whole = checkpoint.read_bytes()
     if damage == "policy":
         policy.save(checkpoint)
@@ -246,12 +309,12 @@ def test_ctrl_c_and_resume_give_the_uninterrupted_policy(run, tmp_path):
 
     assert run("kinarm-train", "ars", "--out", out, "--resume").status == 0
     assert not checkpoint.exists()
-    check_equal(Policy.load(out), train_ars(ars_recipe("paper", **LONG)).policy)
+    check_equal(Policy.load(out), train_policy(recipe("ars", "paper", **LONG)).policy)
 
 
 def test_an_unfinished_training_is_not_overwritten(run, tmp_path):
     checkpoint = tmp_path / "p.checkpoint.npz"
-    stop_after(2, ars_recipe("paper", iterations=4), checkpoint)
+    stop_after(2, recipe("ars", "paper", iterations=4), checkpoint)
     before = checkpoint.read_bytes()
     answer = run("kinarm-train", "ars", "--iterations", 2, "--out", tmp_path / "p.npz")
     assert (answer.status, answer.out, len(answer.err.splitlines())) == (2, "", 1)

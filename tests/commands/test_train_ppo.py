@@ -12,20 +12,21 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 
-from kinarm.evaluation.evaluations import evaluate
+from kinarm.evaluation.evaluation import evaluate
 from kinarm.policies import (
     Policy,
-    load_ppo_checkpoint,
-    ppo_recipe,
-    save_ppo_checkpoint,
-    train_ppo,
+    load_checkpoint,
+    recipe,
+    save_checkpoint,
+    train_policy,
 )
+from kinarm.problem import PROBLEMS
 
 ROOT = Path(__file__).resolve().parents[2]
-TINY = {"arms": 4, "rollout_steps": 16, "minibatch": 32, "epochs": 2, "hidden": (8, 8)}
+TINY = {"n_envs": 4, "n_steps": 16, "batch_size": 32, "n_epochs": 2, "net_arch": (8, 8)}
 TINY_OPTIONS = (
-    *("--arms", 4, "--rollout-steps", 16, "--minibatch", 32, "--epochs", 2),
-    *("--hidden", 8, 8),
+    *("--n-envs", 4, "--n-steps", 16, "--batch-size", 32, "--n-epochs", 2),
+    *("--net-arch", 8, 8),
 )
 TRAIN_WITH_FREQUENT_CHECKPOINTS = """
 import signal, sys
@@ -47,8 +48,8 @@ def check_equal(one: Policy, other: Policy) -> None:
 def leave_checkpoint(path: Path, config) -> None:
     """Leave the checkpoint of a training that was stopped after two iterations."""
     states = []
-    train_ppo(config, on_iteration=states.append)
-    save_ppo_checkpoint(path, config, states[1])
+    train_policy(config, on_iteration=states.append)
+    save_checkpoint(path, config, states[1])
 
 
 def test_policy_and_curve_are_those_of_the_library(run, tmp_path):
@@ -59,7 +60,7 @@ def test_policy_and_curve_are_those_of_the_library(run, tmp_path):
     assert len(answer.out.splitlines()) == 1
     assert str(out) in answer.out
     assert sorted(path.name for path in tmp_path.iterdir()) == ["p.curve.csv", "p.npz"]
-    expected = train_ppo(ppo_recipe("paper", task="both", seed=3, iterations=4, **TINY))
+    expected = train_policy(recipe("ppo", "paper", problem="both", seed=3, iterations=4, **TINY))
     check_equal(Policy.load(out), expected.policy)
     with (tmp_path / "p.curve.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
@@ -69,32 +70,29 @@ def test_policy_and_curve_are_those_of_the_library(run, tmp_path):
 
 def test_every_setting_reaches_the_training(run, tmp_path):
     settings = {
-        "task": "both",
-        "arm": "paper_flange",
         "seed": 7,
         "iterations": 2,
-        "arms": 6,
-        "rollout_steps": 10,
-        "minibatch": 30,
-        "epochs": 3,
+        "n_envs": 6,
+        "n_steps": 10,
+        "batch_size": 30,
+        "n_epochs": 3,
         "learning_rate": 0.002,
         "gamma": 0.9,
-        "entropy_weight": 0.01,
-        "tolerance": 0.04,
-        "success_bonus": 0.25,
-        "collision_penalty": -2.0,
-        "step_reward": -0.01,
-        "start_spread": 0.5,
+        "ent_coef": 0.01,
+        "training_tolerance": 0.04,
         "learning_rate_schedule": "constant",
     }
     options = [word for k, v in settings.items() for word in (f"--{k.replace('_', '-')}", v)]
     out = tmp_path / "p.npz"
-    arguments = ("--recipe", "tuned", "--hidden", 7, 6, "--no-symmetric", *options)
+    arguments = ("--recipe", "tuned", "--net-arch", 7, 6, "--no-symmetric", *options)
+    arguments += ("--task", "both", "--arm", "paper_flange", "--reward-step", -0.01)
     assert run("kinarm-train", "ppo", *arguments, "--out", out).status == 0
     made = Policy.load(out).provenance
     assert {name: made.config[name] for name in settings} == settings
-    assert (made.config["hidden"], made.config["symmetric"]) == ([7, 6], False)
-    assert (made.algorithm, made.recipe, made.task) == ("ppo", "tuned*", "both")
+    assert (made.config["net_arch"], made.config["symmetric"]) == ([7, 6], False)
+    assert (made.algorithm, made.recipe) == ("ppo", "tuned*")
+    assert made.problem == PROBLEMS["both"].replace(arm="paper_flange").pinned
+    assert (made.config["reward"]["step"], made.config["reward"]["success"]) == (-0.01, 5.0)
     assert (made.seed, made.environment_steps) == (7, 120)
 
 
@@ -103,39 +101,39 @@ def test_a_trained_policy_can_be_evaluated(run, tmp_path):
     arguments = ("--recipe", "tuned", "--task", "both", "--iterations", 2, *TINY_OPTIONS)
     assert run("kinarm-train", "ppo", *arguments, "--out", out).status == 0
     evaluation = evaluate(out, trials=3)
-    assert (evaluation.task, len(evaluation.rollouts)) == ("both", 3)
+    assert (evaluation.problem.name, len(evaluation.rollouts)) == ("both", 3)
     assert evaluation.entrant.algorithm == "ppo"
 
 
-@pytest.mark.parametrize("recipe", ["paper", "tuned"])
-def test_resumed_is_uninterrupted(run, tmp_path, recipe):
-    config = ppo_recipe(recipe, iterations=5, **TINY)
+@pytest.mark.parametrize("name", ["paper", "tuned"])
+def test_resumed_is_uninterrupted(run, tmp_path, name):
+    config = recipe("ppo", name, iterations=5, **TINY)
     out = tmp_path / "p.npz"
     leave_checkpoint(tmp_path / "p.checkpoint.npz", config)
-    answer = run("kinarm-train", "ppo", "--out", out, "--resume", "--recipe", recipe, "--seed", 0)
+    answer = run("kinarm-train", "ppo", "--out", out, "--resume", "--recipe", name, "--seed", 0)
     assert answer.status == 0, answer.err
-    check_equal(Policy.load(out), train_ppo(config).policy)
+    check_equal(Policy.load(out), train_policy(config).policy)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["p.curve.csv", "p.npz"]
 
 
 @pytest.mark.parametrize(
-    "change", [("--task", "left"), ("--gamma", 0.5), ("--hidden", 9, 9), ("--recipe", "tuned")]
+    "change", [("--task", "left"), ("--gamma", 0.5), ("--net-arch", 9, 9), ("--recipe", "tuned")]
 )
 def test_other_settings_are_refused_when_resuming(run, tmp_path, change):
     checkpoint = tmp_path / "p.checkpoint.npz"
-    leave_checkpoint(checkpoint, ppo_recipe("paper", iterations=3, **TINY))
+    leave_checkpoint(checkpoint, recipe("ppo", "paper", iterations=3, **TINY))
     before = checkpoint.read_bytes()
     answer = run("kinarm-train", "ppo", "--out", tmp_path / "p.npz", "--resume", *change)
     assert (answer.status, answer.out, len(answer.err.splitlines())) == (2, "", 1)
-    assert change[0].strip("-") in answer.err
+    assert {"--task": "goal_regions"}.get(change[0], change[0][2:].replace("-", "_")) in answer.err
     assert checkpoint.read_bytes() == before
 
 
 def test_learners_do_not_resume_each_other(run, tmp_path):
-    leave_checkpoint(tmp_path / "p.checkpoint.npz", ppo_recipe("paper", iterations=3, **TINY))
+    leave_checkpoint(tmp_path / "p.checkpoint.npz", recipe("ppo", "paper", iterations=3, **TINY))
     answer = run("kinarm-train", "ars", "--out", tmp_path / "p.npz", "--resume")
     assert (answer.status, answer.out, len(answer.err.splitlines())) == (2, "", 1)
-    assert "not a checkpoint" in answer.err
+    assert "is of the learner ppo" in answer.err
 
 
 def test_ctrl_c_and_resume_give_the_uninterrupted_policy(run, tmp_path):
@@ -149,7 +147,7 @@ def test_ctrl_c_and_resume_give_the_uninterrupted_policy(run, tmp_path):
         stderr=subprocess.PIPE,
         text=True,
     )
-    while not (checkpoint.exists() and load_ppo_checkpoint(checkpoint)[1].iteration >= 10):
+    while not (checkpoint.exists() and load_checkpoint(checkpoint)[1].iteration >= 10):
         assert process.poll() is None, process.stderr.read()
         time.sleep(0.02)
     process.send_signal(signal.SIGINT)
@@ -159,7 +157,9 @@ def test_ctrl_c_and_resume_give_the_uninterrupted_policy(run, tmp_path):
     assert errors.splitlines()[-1].startswith("kinarm-train: interrupted after")
     assert not out.exists()
     assert run("kinarm-train", "ppo", "--out", out, "--resume").status == 0
-    check_equal(Policy.load(out), train_ppo(ppo_recipe("paper", iterations=150, **TINY)).policy)
+    check_equal(
+        Policy.load(out), train_policy(recipe("ppo", "paper", iterations=150, **TINY)).policy
+    )
 
 
 def test_tensorboard(run, tmp_path):

@@ -9,7 +9,7 @@ import pytest
 
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.entrants import BASELINES, Entrant
-from kinarm.evaluation.evaluations import Evaluation, run_trials
+from kinarm.evaluation.evaluation import Evaluation, run_trials
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies import Policy, ars_recipe, train_ars
 from kinarm.simulator import Simulator

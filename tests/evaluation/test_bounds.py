@@ -1,13 +1,14 @@
 """Bounds of trials: those of the oracle, found once, kept on disk, whatever happens there."""
 
-import ast
 import gc
 import io
 import json
 import os
 import subprocess
 import sys
+import time
 import weakref
+from copy import copy
 from pathlib import Path
 
 import numpy as np
@@ -19,20 +20,16 @@ from kinarm.arm import Arm
 from kinarm.evaluation import bounds
 from kinarm.evaluation.bounds import bounds_document, cache_folder, oracle_bounds
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies import oracle
-from kinarm.policies.oracle import Oracle
-from kinarm.policies.oracle_solution import OracleSolutions
-from kinarm.scene import Bench, Scene
-from kinarm.simulator import Simulator
-from kinarm.task import RewardWeights, load_task
+from kinarm.policies.oracle import Oracle, OracleSolutions
+from kinarm.policies.provenance import package_versions
+from kinarm.problem import PROBLEMS
+from kinarm.scene import PAPER_BENCHES, Obstacle, Scene
+from kinarm.task import RewardWeights
 
-FAR = Bench(name="far", x=(5, 6), y=(5, 6), height=1)
+FAR = Obstacle(name="far", lower=(5.0, 5.0, 0.0), upper=(6.0, 6.0, 1.0))
 
-ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(kinarm.__file__).parent.parent
 """What the package is imported from."""
-
-PRINT_VERSION = "from kinarm.evaluation.bounds import oracle_version; print(oracle_version())"
 
 PROCESSES = 3
 
@@ -42,11 +39,9 @@ from multiprocessing import get_context
 from kinarm.evaluation import TrialSet, oracle_bounds
 from kinarm.evaluation.bounds import bounds_document
 from kinarm.policies.oracle import Oracle
-from kinarm.simulator import Simulator
 
-simulator = Simulator(task="right", threads=1)
-trials = TrialSet.draw(simulator, 3, seed=5)
-Oracle(simulator=simulator).solve(trials.starts[0], trials.goals[0])
+trials = TrialSet.draw("right", 3, seed=5)
+Oracle("right", threads=1).solve(trials.starts[0], trials.goals[0])
 
 def solve(_):
     all_ready.wait()
@@ -70,7 +65,7 @@ def folder(tmp_path, monkeypatch) -> Path:
 def solutions() -> OracleSolutions:
     """What the oracle says of the trials that ``draw`` draws."""
     trials = draw()
-    return Oracle(simulator=trials.simulator).solve_batch(trials.starts, trials.goals)
+    return Oracle("right").solve_batch(trials.starts, trials.goals)
 
 
 @pytest.fixture(scope="module")
@@ -79,8 +74,8 @@ def hard() -> TrialSet:
     return draw("right", 12, 2, arm="paper_flange")
 
 
-def draw(task="right", trials=3, seed=5, arm="paper", scene=None, **settings) -> TrialSet:
-    return TrialSet.draw(Simulator(arm, load_task(task, **settings), scene), trials, seed)
+def draw(problem="right", trials=3, seed=5, **overrides) -> TrialSet:
+    return TrialSet.draw(PROBLEMS[problem].replace(**overrides), trials, seed)
 
 
 def same(one: OracleSolutions, other: OracleSolutions) -> bool:
@@ -119,16 +114,16 @@ def test_bounds_are_those_of_the_oracle(folder, solutions):
     trials = draw()
     found = oracle_bounds(trials)
     assert same(found, solutions)
-    single = Oracle(task="right").solve(trials.starts[1], trials.goals[1])
+    single = Oracle("right").solve(trials.starts[1], trials.goals[1])
     assert (found[1].steps, found[1].steps_lower_bound) == (single.steps, single.steps_lower_bound)
     np.testing.assert_array_equal(found[1].path, single.path)
 
 
-def test_bounds_are_those_of_the_arm_scene_and_task_of_the_trials(folder):
-    bench = Bench(name="right", x=(0.3, 0.5), y=(-0.8, -0.6), height=0.2)
-    trials = draw(tolerance=0.1, horizon=20, arm="lrmate200ic_5l", scene=Scene(benches=(bench,)))
-    task = load_task("right", tolerance=0.1, horizon=20)
-    solver = Oracle("lrmate200ic_5l", Scene(benches=(bench,)), task)
+def test_bounds_are_those_of_the_problem_of_the_trials(folder):
+    post = Obstacle(name="post", lower=(0.3, -0.8, 0.0), upper=(0.5, -0.6, 0.2))
+    settings = {"tolerance": 0.1, "horizon": 20, "arm": "lrmate200ic_5l"}
+    trials = draw(scene=Scene(obstacles=(post,)), **settings)
+    solver = Oracle(PROBLEMS["right"].replace(scene=Scene(obstacles=(post,)), **settings))
     assert same(oracle_bounds(trials), solver.solve_batch(trials.starts, trials.goals))
 
 
@@ -183,12 +178,12 @@ def test_the_reward_does_not_matter(folder, monkeypatch):
     [
         {"seed": 6},
         {"trials": 4},
-        {"task": "left"},
+        {"problem": "left"},
         {"arm": "paper_flange"},
         {"tolerance": 0.04},
         {"horizon": 65},
         {"start_spread": 0.5},
-        {"scene": Scene(benches=(*Scene().benches, FAR))},
+        {"scene": Scene(obstacles=(*PAPER_BENCHES, FAR))},
     ],
     ids=lambda other: next(iter(other)),
 )
@@ -201,14 +196,13 @@ def test_other_trials_are_solved_and_kept_apart(folder, monkeypatch, other):
     assert len(list(folder.iterdir())) == 2
 
 
-def test_another_version_of_the_oracle_solves_again_and_replaces_the_file(folder, monkeypatch):
+def test_another_version_of_the_oracle_solves_again(folder, monkeypatch):
     oracle_bounds(draw())
     calls = count_calls(monkeypatch)
     monkeypatch.setattr(bounds, "oracle_version", lambda: "later")
     oracle_bounds(draw())
     assert calls == [3]
-    (path,) = folder.iterdir()
-    assert path.stem.endswith("-later")
+    assert len(list(folder.glob("*-later.npz"))) == 1
 
 
 def archive(arrays: dict[str, np.ndarray]) -> bytes:
@@ -265,11 +259,13 @@ def test_whichever_byte_of_a_file_is_wrong_the_bounds_are_right(folder, solution
     (path,) = folder.iterdir()
     whole = path.read_bytes()
     monkeypatch.setattr(Oracle, "solve_batch", lambda *_, **__: solutions)
+    monkeypatch.setattr(bounds, "_save", lambda *_: None)
+    drawn = draw()
     for place in range(0, len(whole), 13):
         content = bytearray(whole)
         content[place] ^= 0xFF
         path.write_bytes(content)
-        assert same(oracle_bounds(TrialSet(**vars(draw()))), solutions), place
+        assert same(oracle_bounds(copy(drawn)), solutions), place
 
 
 @pytest.mark.parametrize("inside", ["", "deep"])
@@ -306,62 +302,97 @@ def test_the_folder_is_the_chosen_or_the_users(monkeypatch, variables, expected)
     assert cache_folder() == Path(expected)
 
 
-def modules_of(package: str, path: Path) -> set[str]:
-    """Modules of a package that a source file imports."""
-    nodes = ast.walk(ast.parse(path.read_text()))
-    names = {node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module}
-    return {name.removeprefix(package) for name in names if name.startswith(package)}
-
-
-def test_the_version_covers_everything_that_the_oracle_consists_of():
-    found, waiting = set(), {"oracle"}
-    while waiting:
-        found.add(name := waiting.pop())
-        source = Path(oracle.__file__).with_name(f"{name}.py")
-        waiting |= modules_of("kinarm.policies.", source) - found
-    assert found == set(bounds.ORACLE_MODULES)
-
-
-def test_the_version_is_the_same_in_every_process(tmp_path):
-    version = run_outside(PRINT_VERSION, tmp_path, PYTHONPATH=str(HERE))
-    assert version == bounds.oracle_version()
-
-
-def test_the_version_is_the_same_in_the_clone_and_elsewhere(tmp_path):
-    assert run_outside(PRINT_VERSION, ROOT) == run_outside(PRINT_VERSION, tmp_path)
-
-
-KERNELS = Path(kinarm.__file__).parent / "kernels"
-
-
-@pytest.mark.parametrize(
-    "source",
-    [
-        *(Path(oracle.__file__).with_name(f"{name}.py") for name in bounds.ORACLE_MODULES),
-        *(KERNELS / "approach.py", KERNELS.parent / "simulator.py", KERNELS.parent / "scene.py"),
-    ],
-    ids=lambda path: path.stem,
-)
-def test_the_version_changes_with_the_sources(monkeypatch, source):
+@pytest.mark.parametrize("constant", ["ORACLE_SEMANTICS", "SEMANTICS"])
+def test_the_version_changes_with_what_oracle_and_simulator_mean(monkeypatch, constant):
     before = bounds.oracle_version.__wrapped__()
     assert before == bounds.oracle_version()
-    read = Path.read_bytes
-
-    def read_bytes(path):
-        return read(path) + b"# changed" * path.samefile(source)
-
-    monkeypatch.setattr(Path, "read_bytes", read_bytes)
+    monkeypatch.setattr(bounds, constant, "another")
     assert bounds.oracle_version.__wrapped__() != before
 
 
-def test_the_version_changes_with_the_packages(monkeypatch):
-    before = bounds.oracle_version.__wrapped__()
-    monkeypatch.setattr(bounds, "package_versions", lambda: {"numpy": "99"})
+@pytest.mark.parametrize("package", bounds.COMPUTING_PACKAGES)
+def test_the_version_changes_with_the_packages_that_compute(monkeypatch, package):
+    before, installed = bounds.oracle_version.__wrapped__(), package_versions()
+    monkeypatch.setattr(bounds, "package_versions", lambda: {**installed, package: "99"})
     assert bounds.oracle_version.__wrapped__() != before
+    monkeypatch.setattr(bounds, "package_versions", lambda: {**installed, "torch": "99"})
+    assert bounds.oracle_version.__wrapped__() == before
+
+
+def fill(folder: Path, *names: str, size: int = 1000) -> None:
+    """Write files of which each was used an hour before the next, the last one an hour ago."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for age, name in enumerate(reversed(names), start=1):
+        (folder / name).write_bytes(bytes(size))
+        used = time.time() - 3600 * age
+        os.utime(folder / name, (used, used))
+
+
+def names_in(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+class TestRoom:
+    """What the cache keeps when it gets full."""
+
+    def test_the_least_recently_used_files_go_beyond_a_number(self, folder, monkeypatch):
+        monkeypatch.setattr(bounds, "KEPT_FILES", 3)
+        fill(folder, *(f"oracle-{name}-1.npz" for name in "abcd"))
+        oracle_bounds(draw())
+        assert {f"oracle-{name}-1.npz" for name in "cd"} < names_in(folder)
+        assert len(names_in(folder)) == 3
+
+    def test_the_least_recently_used_files_go_beyond_a_size(self, folder, monkeypatch):
+        fill(folder, *(f"oracle-{name}-1.npz" for name in "abcd"), size=100_000)
+        monkeypatch.setattr(bounds, "KEPT_BYTES", 250_000)
+        oracle_bounds(draw())
+        assert {f"oracle-{name}-1.npz" for name in "cd"} < names_in(folder)
+        assert len(names_in(folder)) == 3
+
+    def test_looking_up_is_use(self, folder, monkeypatch):
+        monkeypatch.setattr(bounds, "KEPT_FILES", 2)
+        oracle_bounds(draw())
+        (first,) = names_in(folder)
+        os.utime(folder / first, (0, 0))
+        fill(folder, "oracle-old-1.npz")
+        oracle_bounds(draw())
+        oracle_bounds(draw(seed=6))
+        assert first in names_in(folder)
+        assert "oracle-old-1.npz" not in names_in(folder)
+
+    def test_bounds_larger_than_the_cache_are_kept_alone(self, folder, monkeypatch):
+        monkeypatch.setattr(bounds, "KEPT_BYTES", 1)
+        fill(folder, "oracle-old-1.npz")
+        oracle_bounds(draw())
+        (kept,) = names_in(folder)
+        assert kept != "oracle-old-1.npz"
+
+    def test_only_what_belongs_to_the_cache_goes(self, folder, monkeypatch):
+        monkeypatch.setattr(bounds, "KEPT_FILES", 1)
+        abandoned = ".oracle-a-1.npz.x2f9k"
+        fill(folder, abandoned, "notes.txt", "oracle.npz", "policy.npz", "oracle-mine.txt")
+        oracle_bounds(draw())
+        assert {"notes.txt", "oracle.npz", "policy.npz", "oracle-mine.txt"} < names_in(folder)
+        assert abandoned not in names_in(folder)
+
+    def test_files_that_vanish_or_cannot_be_deleted_do_no_harm(self, folder, monkeypatch):
+        fill(folder, *(f"oracle-{name}-1.npz" for name in "abc"))
+        (folder / "oracle-folder-1.npz" / "inside").mkdir(parents=True)
+        (folder / "oracle-link-1.npz").symlink_to(folder / "nothing")
+        monkeypatch.setattr(bounds, "KEPT_FILES", 0)
+        unlink = Path.unlink
+
+        def race(path, **settings):
+            unlink(path)
+            unlink(path)
+
+        monkeypatch.setattr(Path, "unlink", race)
+        oracle_bounds(draw())
+        assert not {f"oracle-{name}-1.npz" for name in "abc"} & names_in(folder)
 
 
 def test_progress_is_told_while_trials_are_solved(folder, monkeypatch):
-    monkeypatch.setattr(oracle, "LOT", 2)
+    monkeypatch.setattr("kinarm.policies.oracle.oracle.LOT", 2)
     told = []
     trials = draw(trials=5)
     oracle_bounds(trials, lambda *counts: told.append(counts))
@@ -397,7 +428,7 @@ def test_document_tells_the_bounds_of_every_trial(hard):
 def test_document_sums_up_the_bounds(hard):
     solutions = list(oracle_bounds(hard))
     document = bounds_document(oracle_bounds(hard))
-    assert document["success"]["rate"] == sum(s.reachable for s in solutions) / 12
+    assert document["success"]["value"] == sum(s.reachable for s in solutions) / 12
     assert document["tight_share"] == sum(s.tight for s in solutions) / 12
     columns = {
         "steps": [s.steps for s in solutions],
@@ -429,13 +460,13 @@ def test_document_says_why_trials_are_not_solved(hard):
 
 def test_document_of_solved_trials_lists_none(solutions):
     assert bounds_document(solutions)["unsolved"] == []
-    assert bounds_document(solutions)["success"]["rate"] == 1
+    assert bounds_document(solutions)["success"]["value"] == 1
 
 
 def test_document_of_hopeless_trials_has_no_gap(folder):
     document = bounds_document(oracle_bounds(draw(horizon=1)))
     assert json.loads(json.dumps(document, allow_nan=False)) == document
-    assert (document["success"]["rate"], document["gap"]) == (0, None)
+    assert (document["success"]["value"], document["gap"]) == (0, None)
     assert [entry["trial"] for entry in document["unsolved"]] == [0, 1, 2]
     assert document["steps"]["max"] == 1
     assert document["steps_lower_bound"]["mean"] == 2

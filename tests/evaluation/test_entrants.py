@@ -102,12 +102,12 @@ def test_the_oracle_does_not_change_other_entrants(skilled, trials):
 
 def test_a_policy_for_another_arm_is_told(skilled):
     entrant = Entrant.from_policy("mine", skilled)
-    entrant.check_arm(Arm.load())
+    entrant.check(Arm.load())
     with pytest.raises(PolicyFileError, match=r"trained for arm 'paper', not for 'paper_flange'"):
-        entrant.check_arm(Arm.load("paper_flange"))
+        entrant.check(Arm.load("paper_flange"))
 
 
 @pytest.mark.parametrize("entrant", [*BASELINES.values(), ORACLE], ids=lambda e: e.name)
 def test_what_is_not_trained_fits_every_arm(shipped_arms, entrant):
     for arm in shipped_arms.values():
-        entrant.check_arm(arm)
+        entrant.check(arm)

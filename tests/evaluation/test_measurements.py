@@ -3,14 +3,15 @@
 import json
 import subprocess
 import time
+from functools import partial
 from pathlib import Path
 
-import gymnasium
 import numpy as np
 import pytest
 
 from kinarm.evaluation import measurements
-from kinarm.policies import recipes
+from kinarm.policies import recipe
+from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
 
 
@@ -25,15 +26,15 @@ def document(train_novice, tmp_path_factory):
 
 def shrink(patch: pytest.MonkeyPatch) -> None:
     """Fewer batch sizes and trials, and a short training."""
-    recipe, run = recipes.ars_recipe, subprocess.run
+    run = subprocess.run
 
     def run_less(command, **settings):
-        *words, last = command
-        return run([*words, last.replace("'200'", "'1', '--policy', 'zero'")], **settings)
+        fewer = ["1" if word == "200" else word for word in command]
+        return run([*fewer, "--policy", "zero"], **settings)
 
     patch.setattr(measurements, "BATCHES", (6, 512))
     patch.setattr(measurements, "ORACLE_TRIALS", 4)
-    patch.setattr(recipes, "ars_recipe", lambda name, **kw: recipe(name, iterations=3, **kw))
+    patch.setattr(measurements, "recipe", partial(recipe, iterations=3))
     patch.setattr(subprocess, "run", run_less)
 
 
@@ -130,41 +131,33 @@ def test_timing_divides_steps_by_time_and_leaves_out_the_first_run(monkeypatch):
 def test_measured_steps_are_steps_taken(monkeypatch, train_novice):
     """The rate of trained rollouts counts the steps of the episodes, not their horizon."""
     counted = []
-    monkeypatch.setattr(measurements, "BATCHES", (32,))
     monkeypatch.setattr(
         measurements, "timed", lambda run, _: counted.append(run()) or measurements.Timing(1, 1)
     )
-    simulator, policy = Simulator(task="right", threads=1), train_novice("right")
-    measurements.measure_rollouts(simulator, policy, 1)
+    simulator, policy = Simulator("right", threads=1), train_novice("right")
+    measurements.measure_rollouts(simulator, policy, 32, 1)
     starts, goals = simulator.sample(np.random.default_rng(32), 32)
     steps = int(simulator.rollout(policy, starts, goals).steps.sum())
     assert steps < 32 * 64
     assert counted[-1] == steps
 
 
-def test_environments_are_measured_with_all_their_arms(monkeypatch, train_novice):
+def test_environments_are_measured_with_all_their_arms(monkeypatch):
     counted = []
     monkeypatch.setattr(
         measurements, "timed", lambda run, _: counted.append(run()) or measurements.Timing(1, 1)
     )
-    made = []
-    whole = gymnasium.make_vec
-    monkeypatch.setattr(
-        gymnasium, "make_vec", lambda *a, **kw: made.append(whole(*a, **kw)) or made[-1]
-    )
-    measurements.measure_vector_env(train_novice("right"), 1)
-    assert made[0].num_envs == 64
-    assert counted[0] % 64 == 0
+    measurements.measure_vector_env(PROBLEMS["right"], 1)
+    assert counted[0] == 64 * 200
 
 
 class TestPPO:
     @pytest.fixture
     def training(self, monkeypatch):
         pytest.importorskip("stable_baselines3")
-        whole = recipes.ppo_recipe
-        tiny = {"iterations": 3, "arms": 4, "minibatch": 64, "hidden": (8, 8)}
-        monkeypatch.setattr(recipes, "ppo_recipe", lambda name, **kw: whole(name, **tiny, **kw))
-        return measurements.measure_ppo("left")
+        tiny = {"iterations": 3, "n_envs": 4, "batch_size": 64, "net_arch": (8, 8)}
+        monkeypatch.setattr(measurements, "recipe", partial(recipe, **tiny))
+        return measurements.measure_ppo(PROBLEMS["left"])
 
     def test_share_of_the_simulator(self, training):
         assert training["environment_steps"] == 3 * 4 * 16
@@ -173,11 +166,6 @@ class TestPPO:
         assert json.loads(json.dumps(training)) == training
 
     def test_skipped_without_its_packages(self, monkeypatch):
-        from kinarm.policies import ppo
-
-        monkeypatch.setattr(ppo, "find_spec", lambda name: None)
-        assert "pip install 'kinarm[ppo]'" in measurements.measure_ppo("left")["skipped"]
-
-
-def test_training_with_ppo_is_measured_on_demand(document):
-    assert "ppo_training" not in document
+        monkeypatch.setattr("kinarm.policies.learners.find_spec", lambda name: None)
+        skipped = measurements.measure_ppo(PROBLEMS["left"])["skipped"]
+        assert "pip install 'kinarm[ppo]'" in skipped

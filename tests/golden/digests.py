@@ -1,31 +1,38 @@
 """Digests of what must not change: trials, rollouts, training iterations and oracle solutions.
 
-``python tests/golden/digests.py`` prints them, ``--record`` keeps them in ``digests.json``.
+``python tests/golden/digests.py`` prints them, ``--record`` keeps them in ``digests.json`` with the
+semantics of simulator and oracle that they belong to; under one version they stay as they are.
 Numbers are rounded to 8 decimals, far above what processors and C libraries differ by.
 """
 
 import hashlib
 import json
+import re
 import sys
 from collections.abc import Iterable
 from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.ars import ARSState, train_ars
+from kinarm.policies.ars.state import ARSState
+from kinarm.policies.learners import train_policy
 from kinarm.policies.library import load_policy
-from kinarm.policies.oracle import Oracle
-from kinarm.policies.recipes import ars_recipe, ppo_recipe
+from kinarm.policies.oracle import ORACLE_SEMANTICS, Oracle
+from kinarm.policies.recipes import recipe
 from kinarm.problem import PROBLEMS
 from kinarm.rollouts import Rollouts
+from kinarm.semantics import SEMANTICS
 from kinarm.simulator import Simulator
 
 RECORDED = Path(__file__).with_name("digests.json")
 ARMS = ("lrmate200ic_5l", "paper", "paper_flange")
 TASKS = ("left", "right", "both")
 EPISODES = 96
+RAISE = "if that is meant, raise SEMANTICS in kinarm/semantics.py or, for bounds, ORACLE_SEMANTICS"
 
 
 def digest(arrays: Iterable[object], decimals: int = 8) -> str:
@@ -85,14 +92,14 @@ def rollout_digests() -> dict[str, str]:
 def ars_digests() -> dict[str, str]:
     """Ten iterations of Augmented Random Search."""
     found = {}
-    for recipe in ("paper", "tuned", "brs"):
+    for name in ("paper", "tuned", "brs"):
         for task in TASKS:
             states: list[ARSState] = []
-            config = replace(ars_recipe(recipe, task=task, seed=2), iterations=10)
-            result = train_ars(config, on_iteration=states.append)
+            config = replace(recipe("ars", name, problem=task, seed=2), iterations=10)
+            result = train_policy(config, on_iteration=states.append)
             state = states[-1]
             curve = [point[:4] for point in state.curve]
-            found[f"ars {recipe} {task}"] = digest(
+            found[f"ars {name} {task}"] = digest(
                 [
                     *(state.theta, state.normalizer.mean, state.normalizer.squares, curve),
                     *result.policy.networks().weights,
@@ -103,18 +110,17 @@ def ars_digests() -> dict[str, str]:
 
 def ppo_digests() -> dict[str, str]:
     """Three iterations of PPO, which follow torch's kernels: the same on one machine only."""
-    from kinarm.policies.ppo import train_ppo
-    from kinarm.policies.ppo_state import PPOState
+    from kinarm.policies.ppo.state import PPOState
 
     found = {}
-    for recipe, task in (("paper", "right"), ("tuned", "left"), ("tuned", "both")):
+    for name, task in (("paper", "right"), ("tuned", "left"), ("tuned", "both")):
         states: list[PPOState] = []
-        train_ppo(
-            replace(ppo_recipe(recipe, task=task, seed=2), iterations=3),
+        train_policy(
+            replace(recipe("ppo", name, problem=task, seed=2), iterations=3),
             on_iteration=states.append,
         )
         state = states[-1]
-        found[f"ppo {recipe} {task}"] = digest(
+        found[f"ppo {name} {task}"] = digest(
             [
                 *(state.parameters, state.first_moment, state.second_moment),
                 *(state.normalizer.mean, state.normalizer.squares, *state.episodes),
@@ -142,13 +148,51 @@ def oracle_digests() -> dict[str, str]:
     return found
 
 
-def all_digests() -> dict[str, str]:
-    """Everything that is the same on every machine."""
-    return {**trial_digests(), **rollout_digests(), **ars_digests(), **oracle_digests()}
+def machine() -> str:
+    """What PPO's numbers depend on besides the settings: processor and torch."""
+    models = re.findall(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text())
+    return f"{models[0]}, torch {version('torch')}"
+
+
+def changed(record: dict[str, Any], digests: dict[str, str]) -> list[str]:
+    """Names under which a record holds another digest, or none."""
+    return [name for name, found in digests.items() if record["digests"].get(name) != found]
+
+
+def seal(record: dict[str, Any]) -> str:
+    """Hash of a record, by which a change by hand shows."""
+    content = {name: entry for name, entry in record.items() if name != "seal"}
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def renewed(record: dict[str, Any], digests: dict[str, str], where: str) -> dict[str, Any]:
+    """A record of the digests; refused if those of the same version change."""
+    versions = {"semantics": SEMANTICS, "oracle_semantics": ORACLE_SEMANTICS}
+    kept = {name for name, version in versions.items() if record[name] == version}
+    comparable = record["machine"] == where
+    refused = [
+        name
+        for name, recorded in record["digests"].items()
+        if digests.get(name) != recorded
+        and "semantics" in kept
+        and ("oracle_semantics" in kept or not name.startswith("oracle "))
+        and (comparable or not name.startswith("ppo "))
+    ]
+    if refused:
+        raise SystemExit(f"results changed under the same versions {versions}: {refused}; {RAISE}")
+    made = {**versions, "machine": where, "digests": digests}
+    return {"seal": seal(made), **made}
 
 
 if __name__ == "__main__":
-    digests = {**all_digests(), **ppo_digests()}
+    found = {
+        **trial_digests(),
+        **rollout_digests(),
+        **ars_digests(),
+        **oracle_digests(),
+        **ppo_digests(),
+    }
     if "--record" in sys.argv:
-        RECORDED.write_text(json.dumps(digests, indent=1) + "\n")
-    sys.stdout.write(json.dumps(digests, indent=1) + "\n")
+        record = renewed(json.loads(RECORDED.read_text()), found, machine())
+        RECORDED.write_text(json.dumps(record, indent=1) + "\n")
+    sys.stdout.write(json.dumps(found, indent=1) + "\n")

@@ -1,16 +1,84 @@
-"""What is recorded holds: a change of results needs a commit that says so and records anew."""
+"""What is recorded holds: other results need another semantics version, recorded anew."""
 
 import json
 from collections.abc import Callable
+from importlib.util import find_spec
 
 import pytest
-from digests import RECORDED, ars_digests, oracle_digests, rollout_digests, trial_digests
+from digests import (
+    RAISE,
+    RECORDED,
+    ars_digests,
+    changed,
+    machine,
+    oracle_digests,
+    ppo_digests,
+    renewed,
+    rollout_digests,
+    seal,
+    trial_digests,
+)
 
-ANEW = "if that is meant: python tests/golden/digests.py --record"
+from kinarm.policies.oracle import ORACLE_SEMANTICS
+from kinarm.semantics import SEMANTICS
+
+RECORD = json.loads(RECORDED.read_text())
+ANEW = f"results changed: {RAISE}, and run python tests/golden/digests.py --record"
 
 
 @pytest.mark.parametrize("found", [trial_digests, rollout_digests, ars_digests, oracle_digests])
 def test_results_are_those_recorded(found: Callable[[], dict[str, str]]) -> None:
-    recorded = json.loads(RECORDED.read_text())
-    changed = [name for name, digest in found().items() if recorded.get(name) != digest]
-    assert not changed, ANEW
+    assert not changed(RECORD, found()), ANEW
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(find_spec("stable_baselines3") is None, reason="needs the extra ppo")
+def test_ppo_is_as_recorded_where_it_was_recorded() -> None:
+    if machine() != RECORD["machine"]:
+        pytest.skip(f"recorded on another machine: {RECORD['machine']}")
+    assert not changed(RECORD, ppo_digests()), ANEW
+
+
+def test_they_were_recorded_under_this_version() -> None:
+    versions = (RECORD["semantics"], RECORD["oracle_semantics"])
+    expected = (SEMANTICS, ORACLE_SEMANTICS)
+    assert versions == expected, "run python tests/golden/digests.py --record"
+
+
+def test_they_were_not_edited_by_hand() -> None:
+    assert RECORD["seal"] == seal(RECORD), "run python tests/golden/digests.py --record"
+
+
+OLD = {
+    "semantics": SEMANTICS,
+    "oracle_semantics": ORACLE_SEMANTICS,
+    "machine": "here",
+    "digests": {"trials": "a", "ppo x": "b"},
+}
+
+
+class TestRecordingAnew:
+    @pytest.mark.parametrize("digests", [{"trials": "z", "ppo x": "b"}, {"ppo x": "z"}, {}])
+    def test_other_results_need_another_version(self, digests: dict[str, str]) -> None:
+        with pytest.raises(SystemExit, match="raise SEMANTICS"):
+            renewed(OLD, digests, "here")
+        made = renewed({**OLD, "semantics": "0"}, digests, "here")
+        assert made["digests"] == digests
+        assert made["seal"] == seal(made)
+
+    def test_other_bounds_need_another_version_of_the_oracle_alone(self) -> None:
+        old = {**OLD, "digests": {**OLD["digests"], "oracle x": "c"}}
+        digests = {**OLD["digests"], "oracle x": "d"}
+        with pytest.raises(SystemExit, match="oracle x"):
+            renewed(old, digests, "here")
+        assert renewed({**old, "oracle_semantics": "0"}, digests, "here")["digests"] == digests
+        with pytest.raises(SystemExit, match="trials"):
+            renewed({**old, "oracle_semantics": "0"}, {**digests, "trials": "z"}, "here")
+
+    def test_further_digests_do_not(self) -> None:
+        digests = {**OLD["digests"], "oracle": "c"}
+        assert renewed(OLD, digests, "here")["digests"] == digests
+
+    def test_those_of_ppo_are_comparable_on_one_machine_only(self) -> None:
+        digests = {"trials": "a", "ppo x": "z"}
+        assert renewed(OLD, digests, "there")["machine"] == "there"

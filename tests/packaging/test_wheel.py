@@ -135,11 +135,11 @@ def test_metadata_name_the_commands_the_licence_and_no_torch(wheel):
         commands = archive.read(f"{folder}entry_points.txt").decode()
         assert f"{folder}licenses/LICENSE" in archive.namelist()
     for line in (
-        "kinarm-eval = kinarm.evaluation.eval:main",
-        "kinarm-replay = kinarm.evaluation.replay:main",
+        "kinarm-eval = kinarm.evaluation.commands.evaluate:main",
+        "kinarm-replay = kinarm.evaluation.commands.replay:main",
         "kinarm-train = kinarm.policies.train:main",
-        "kinarm-bench = kinarm.evaluation.bench:main",
-        "kinarm-reproduce = kinarm.evaluation.reproduce:main",
+        "kinarm-bench = kinarm.evaluation.commands.bench:main",
+        "kinarm-reproduce = kinarm.evaluation.commands.reproduce:main",
     ):
         assert line in commands
     assert "License-Expression: BSD-2-Clause" in metadata
@@ -176,7 +176,7 @@ def test_it_simulates_as_the_clone_does(used):
 
 def test_commands_work_from_elsewhere(target, tmp_path):
     options = ("--policy", "zero", "--task", "left", "--trials", "2", "--out", "results")
-    command = (sys.executable, "-m", "kinarm.evaluation.eval", *options)
+    command = (sys.executable, "-m", "kinarm.evaluation.commands.evaluate", *options)
     call(*command, cwd=tmp_path, env=environment(target))
     assert (tmp_path / "results" / "evaluation.json").is_file()
 

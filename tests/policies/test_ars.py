@@ -5,22 +5,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinarm.errors import InvalidInputError, KinarmError, UnknownNameError
-from kinarm.policies import ARSConfig, Policy, train_ars
-from kinarm.policies.ars import (
+from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.policies import ARSConfig, Policy, state_policy, train_policy
+from kinarm.policies.ars.algorithm import (
+    ARSTraining,
     ars_iteration,
     ars_step,
-    draw_scenarios,
-    initial_state,
     linear_networks,
-    state_policy,
+    shared_scenarios,
     top_directions,
 )
 from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
+from kinarm.policies.mirror import commuting_weights, task_mirror
 from kinarm.policies.normalizer import Normalizer
+from kinarm.problem import PROBLEMS
 from kinarm.reference import ReferenceSimulator
+from kinarm.task import RewardWeights
+from kinarm.world import World
 
-TINY = ARSConfig(directions=4, top_directions=2, iterations=6, horizon=8, seed=5)
+SHORT = PROBLEMS["right"].replace(horizon=8)
+TINY = ARSConfig(problem=SHORT, directions=4, top_directions=2, iterations=6, seed=5)
 
 
 @pytest.fixture(scope="module")
@@ -34,9 +38,9 @@ def random_round(seed, directions=6):
 
 
 def run(config, simulator, iterations, state=None):
-    states = [state or initial_state(config, simulator)]
+    states = [state or ARSTraining(config, threads=1).initial_state()]
     for _ in range(iterations):
-        states.append(ars_iteration(config, simulator, states[-1], 0.0))
+        states.append(ars_iteration(config, simulator, states[-1]))
     return states
 
 
@@ -147,12 +151,12 @@ class TestIteration:
         simulator = config.simulator(threads=1)
         reference = ReferenceSimulator(simulator)
         state = run(config, simulator, 2)[-1]
-        after = ars_iteration(config, simulator, state, 0.0)
+        after = ars_iteration(config, simulator, state)
 
         rng = np.random.default_rng()
         rng.bit_generator.state = state.generator
         delta = rng.standard_normal((4, 5, 48))
-        starts, goals = draw_scenarios(config, simulator, rng)
+        starts, goals = shared_scenarios(config, simulator, rng)
         mean, std = state.normalizer.mean, state.normalizer.std
         scale = np.where(std < 1e-6, 0, 1 / np.where(std < 1e-6, 1, std))
         if not normalize:
@@ -180,8 +184,8 @@ class TestIteration:
         variance = np.maximum(second / count - combined**2, 0)
         np.testing.assert_allclose(after.normalizer.std**2, variance, atol=1e-10)
 
-    def test_first_state_is_zero(self, tiny_simulator):
-        state = initial_state(TINY, tiny_simulator)
+    def test_first_state_is_zero(self):
+        state = ARSTraining(TINY, threads=1).initial_state()
         np.testing.assert_array_equal(state.theta, np.zeros((5, 48)))
         np.testing.assert_array_equal(state.normalizer.std, np.ones(48))
         assert (state.iteration, state.environment_steps, state.wall_time) == (0, 0, 0.0)
@@ -196,7 +200,7 @@ class TestIteration:
             return original(networks, *args, **settings)
 
         monkeypatch.setattr(tiny_simulator, "rollout", spy)
-        ars_iteration(TINY, tiny_simulator, state, 0.0)
+        ars_iteration(TINY, tiny_simulator, state)
         assert len(used) == 1
         networks, _ = used[0]
         rng = np.random.default_rng()
@@ -209,7 +213,7 @@ class TestIteration:
     def test_does_not_change_the_old_state(self, tiny_simulator):
         state = run(TINY, tiny_simulator, 2)[-1]
         theta, generator = state.theta.copy(), dict(state.generator)
-        ars_iteration(TINY, tiny_simulator, state, 0.0)
+        ars_iteration(TINY, tiny_simulator, state)
         np.testing.assert_array_equal(state.theta, theta)
         assert state.generator == generator
 
@@ -227,7 +231,7 @@ class TestIteration:
 class TestScenarios:
     def draw(self, sharing, simulator, **settings):
         config = replace(TINY, sharing=sharing, **settings)
-        starts, goals = draw_scenarios(config, simulator, np.random.default_rng(12))
+        starts, goals = shared_scenarios(config, simulator, np.random.default_rng(12))
         table = np.concatenate([starts, goals], axis=1)
         return table.reshape(2, config.directions, config.episodes, 9)
 
@@ -248,34 +252,36 @@ class TestScenarios:
     def test_iterations_draw_anew(self, tiny_simulator):
         config = replace(TINY, sharing="iteration")
         rng = np.random.default_rng(13)
-        first, second = (draw_scenarios(config, tiny_simulator, rng)[1] for _ in range(2))
+        first, second = (shared_scenarios(config, tiny_simulator, rng)[1] for _ in range(2))
         assert not np.array_equal(first, second)
 
 
 class TestTraining:
     def test_same_seed_same_policy(self):
-        assert_same_policy(train_ars(TINY).policy, train_ars(TINY).policy)
+        assert_same_policy(train_policy(TINY).policy, train_policy(TINY).policy)
 
     def test_other_seed_other_policy(self):
-        first, second = train_ars(TINY).policy, train_ars(replace(TINY, seed=6)).policy
+        first, second = train_policy(TINY).policy, train_policy(replace(TINY, seed=6)).policy
         assert not np.array_equal(first.layers[0].weights, second.layers[0].weights)
 
     def test_threads_do_not_matter(self):
-        config = replace(TINY, directions=24, horizon=64, iterations=4)
-        assert_same_policy(train_ars(config, threads=1).policy, train_ars(config, threads=2).policy)
+        config = replace(TINY, directions=24, problem=PROBLEMS["right"], iterations=4)
+        assert_same_policy(
+            train_policy(config, threads=1).policy, train_policy(config, threads=2).policy
+        )
 
     def test_equals_its_iterations(self, tiny_simulator):
         states = run(TINY, tiny_simulator, TINY.iterations)
         seen = []
-        result = train_ars(TINY, on_iteration=seen.append)
+        result = train_policy(TINY, on_iteration=seen.append)
         assert [state.iteration for state in seen] == [1, 2, 3, 4, 5, 6]
         assert_same_state(seen[-1], states[-1])
-        assert_same_policy(result.policy, state_policy(TINY, tiny_simulator.arm, states[-1]))
+        assert_same_policy(result.policy, state_policy(TINY, states[-1]))
         assert len(result.curve) == 6
 
     def test_policy_behaves_like_the_last_parameters(self, tiny_simulator):
         state = run(TINY, tiny_simulator, 3)[-1]
-        policy = state_policy(TINY, tiny_simulator.arm, state)
+        policy = state_policy(TINY, state)
         trained = linear_networks(state.theta[None], state.normalizer)
         np.testing.assert_allclose(
             policy.networks().weights, trained.weights, rtol=1e-12, atol=1e-15
@@ -283,25 +289,26 @@ class TestTraining:
 
     def test_policy_without_normaliser(self):
         config = replace(TINY, normalize=False)
-        policy = train_ars(config).policy
+        policy = train_policy(config).policy
         np.testing.assert_array_equal(policy.mean, np.zeros(48))
         np.testing.assert_array_equal(policy.std, np.ones(48))
 
     def test_constant_inputs_of_the_training_have_weight_zero(self):
         # On one bench the height of the goal never changes, nor does the place of axis 1.
-        policy = train_ars(TINY).policy
+        policy = train_policy(TINY).policy
         weights = policy.networks().weights[0, :240].reshape(48, 5)
         np.testing.assert_array_equal(weights[[2, 30, 31, 32]], 0)
         assert (weights[[0, 1, 3]] != 0).all()
 
     def test_provenance_says_how(self, shipped_arms):
-        result = train_ars(replace(TINY, recipe="mine"))
+        result = train_policy(replace(TINY, recipe="mine"))
         trained = result.policy.provenance
-        assert (trained.algorithm, trained.recipe, trained.task) == ("ars", "mine", "right")
-        assert (trained.arm, trained.seed) == ("paper", 5)
-        assert trained.arm_digest == shipped_arms["paper"].digest
+        assert (trained.algorithm, trained.recipe, trained.seed) == ("ars", "mine", 5)
+        assert trained.problem == TINY.problem.pinned
+        assert trained.problem.arm.digest == shipped_arms["paper"].digest
         assert trained.environment_steps == result.curve[-1].environment_steps
-        assert ARSConfig(**trained.config) == replace(TINY, recipe="mine")
+        settings = {**trained.config, "problem": SHORT}
+        assert ARSConfig(**settings) == replace(TINY, recipe="mine")
         assert "numpy" in trained.versions
 
     def test_linear_schedule_falls_to_zero(self):
@@ -310,22 +317,31 @@ class TestTraining:
         assert ARSConfig(step_size=0.4).step_size_at(700) == 0.4
 
     def test_weights_reach_the_simulator(self):
-        config = replace(
-            TINY, collision_penalty=-3, success_bonus=2, step_reward=-0.1, start_spread=0.5
-        )
+        weights = RewardWeights(collision=-3, success=2, step=-0.1)
+        config = replace(TINY, reward=weights, problem=SHORT.replace(start_spread=0.5))
         task = config.simulator().task
-        assert (task.reward.collision, task.reward.success, task.reward.step) == (-3, 2, -0.1)
+        assert task.reward == weights
         assert (task.horizon, task.start_spread) == (8, 0.5)
+
+    def test_without_weights_those_of_the_task_count(self):
+        weights = RewardWeights(success=3)
+        config = replace(TINY, problem=SHORT.replace(reward=weights))
+        assert config.simulator().task.reward == weights
+
+    def test_the_policy_is_for_the_problem_without_the_weights(self):
+        config = replace(TINY, reward=RewardWeights(success=3), iterations=1)
+        assert train_policy(config).policy.problem.digest == SHORT.digest
 
     @pytest.mark.slow
     @pytest.mark.parametrize(
-        "settings", [{}, {"step_size_schedule": "linear", "success_bonus": 0.5}]
+        "settings",
+        [{}, {"step_size_schedule": "linear", "reward": RewardWeights(success=0.5)}],
     )
     def test_short_training_beats_standing_still_by_far(self, settings):
         config = ARSConfig(
             sharing="iteration", episodes=2, iterations=300, step_size=0.05, **settings
         )
-        result = train_ars(config)
+        result = train_policy(config)
         simulator = ARSConfig().simulator()
         starts, goals = simulator.sample(np.random.default_rng(14), 1000)
         trained = simulator.rollout(result.policy, starts, goals)
@@ -340,35 +356,37 @@ class TestResume:
     @pytest.mark.parametrize("stop", [1, 3, 5])
     def test_equals_an_uninterrupted_training(self, tmp_path, stop):
         seen = []
-        whole = train_ars(TINY, on_iteration=seen.append)
+        whole = train_policy(TINY, on_iteration=seen.append)
         save_checkpoint(tmp_path / "run.ckpt", TINY, seen[stop - 1])
         config, state = load_checkpoint(tmp_path / "run.ckpt")
         assert config == TINY
         assert state.iteration == stop
         rest = []
-        resumed = train_ars(config, state=state, on_iteration=rest.append)
+        resumed = train_policy(config, state=state, on_iteration=rest.append)
         assert len(rest) == 6 - stop
         assert_same_state(rest[-1], seen[-1])
         assert_same_policy(resumed.policy, whole.policy)
 
     def test_equals_with_shared_scenarios_and_a_schedule(self, tmp_path):
-        config = replace(TINY, sharing="pair", step_size_schedule="linear", episodes=2, task="both")
+        config = replace(
+            TINY, sharing="pair", step_size_schedule="linear", episodes=2, problem="both"
+        )
         seen = []
-        whole = train_ars(config, on_iteration=seen.append)
+        whole = train_policy(config, on_iteration=seen.append)
         save_checkpoint(tmp_path / "run.ckpt", config, seen[2])
-        resumed = train_ars(config, state=load_checkpoint(tmp_path / "run.ckpt")[1])
+        resumed = train_policy(config, state=load_checkpoint(tmp_path / "run.ckpt")[1])
         assert_same_policy(resumed.policy, whole.policy)
 
     def test_wall_time_goes_on(self, tiny_simulator):
         state = run(TINY, tiny_simulator, 2)[-1]
         late = replace(state, curve=(*state.curve[:-1], state.curve[-1]._replace(wall_time=1000.0)))
-        result = train_ars(TINY, state=late)
+        result = train_policy(TINY, state=late)
         assert result.curve[-1].wall_time >= 1000
 
     def test_finished_training_stays_as_it_is(self):
         seen = []
-        whole = train_ars(TINY, on_iteration=seen.append)
-        again = train_ars(TINY, state=seen[-1])
+        whole = train_policy(TINY, on_iteration=seen.append)
+        again = train_policy(TINY, state=seen[-1])
         assert_same_policy(again.policy, whole.policy)
 
 
@@ -383,7 +401,6 @@ class TestConfig:
             ({"iterations": 1.5}, "iterations"),
             ({"directions": 24.5}, "directions"),
             ({"episodes": 0}, "episodes"),
-            ({"horizon": -1}, "horizon"),
             ({"step_size": 0}, "step_size must be greater than 0, got 0"),
             ({"step_size": float("nan")}, "step_size"),
             ({"noise": -0.1}, "noise"),
@@ -397,33 +414,16 @@ class TestConfig:
         with pytest.raises(InvalidInputError, match=message):
             ARSConfig(**settings)
 
-    def test_unknown_task_and_arm(self):
-        with pytest.raises(UnknownNameError, match="task 'up'.*left, right, both"):
-            train_ars(replace(TINY, task="up"))
-        with pytest.raises(UnknownNameError, match="arm 'nope'"):
-            train_ars(replace(TINY, arm="nope"))
-
-    @pytest.mark.parametrize(
-        "name",
-        [
-            "progress_reward",
-            "closer_reward",
-            "collision_penalty",
-            "success_bonus",
-            "step_reward",
-            "start_spread",
-        ],
-    )
-    def test_settings_that_are_not_finite(self, name):
-        with pytest.raises(KinarmError, match="nan"):
-            train_ars(replace(TINY, **{name: float("nan")}))
+    def test_unknown_problem(self):
+        with pytest.raises(UnknownNameError, match="problem 'up'.*left, right, both"):
+            replace(TINY, problem="up")
 
     def test_other_arm(self):
-        result = train_ars(replace(TINY, arm="paper_flange", iterations=1))
-        assert result.policy.provenance.arm == "paper_flange"
+        config = replace(TINY, problem=SHORT.replace(arm="paper_flange"), iterations=1)
+        assert train_policy(config).policy.problem.arm.name == "paper_flange"
 
     def test_trained_policy_survives_its_file(self, tmp_path):
-        policy = train_ars(TINY).policy
+        policy = train_policy(TINY).policy
         policy.save(tmp_path / "policy.npz")
         loaded = Policy.load(tmp_path / "policy.npz")
         assert_same_policy(policy, loaded)
@@ -434,6 +434,25 @@ class TestConfig:
 def test_seeds_from_numpy_can_be_written(tmp_path):
     config = ARSConfig(seed=np.int64(3), iterations=np.int32(1), directions=2, top_directions=1)
     assert type(config.seed) is int
-    policy = train_ars(config).policy
+    policy = train_policy(config).policy
     policy.save(tmp_path / "p.npz")
     assert Policy.load(tmp_path / "p.npz").provenance.seed == 3
+
+
+class TestMirror:
+    """Of a policy that treats mirror images alike, at any time of its training."""
+
+    def test_snapshots_have_it(self):
+        config = replace(TINY, problem="both", symmetric=True)
+        states = []
+        train_policy(config, on_iteration=states.append)
+        mirror = task_mirror(True, World(config.problem))
+        for state in states:
+            policy = state_policy(config, state)
+            np.testing.assert_array_equal(policy.mean[mirror.observations < 0], 0)
+            assert (policy.layers[0].weights[~commuting_weights(mirror)] == 0).all()
+
+    def test_the_last_one_is_the_result(self):
+        config = replace(TINY, problem="both", symmetric=True)
+        result = train_policy(config)
+        assert_same_policy(state_policy(config, result.state), result.policy)

@@ -9,16 +9,19 @@ import numpy as np
 import pytest
 
 from kinarm.errors import InvalidInputError, OutputError, PolicyFileError
-from kinarm.policies import ARSConfig, train_ars
+from kinarm.policies import ARSConfig, train_policy
 from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
+from kinarm.problem import PROBLEMS
 
-TINY = ARSConfig(directions=2, top_directions=1, iterations=3, horizon=4, task="left")
+TINY = ARSConfig(
+    directions=2, top_directions=1, iterations=3, problem=PROBLEMS["left"].replace(horizon=4)
+)
 
 
 @pytest.fixture(scope="module")
 def state():
     states = []
-    train_ars(TINY, on_iteration=states.append)
+    train_policy(TINY, on_iteration=states.append)
     return states[1]
 
 
@@ -121,7 +124,11 @@ def test_policy_is_no_checkpoint(saved, make_policy):
 
 
 @pytest.mark.parametrize(
-    "key", ["config", "generator", "theta", "count", "mean", "squares", "curve"]
+    "key",
+    [
+        *("header", "state.theta", "state.generator", "state.curve"),
+        *(f"state.normalizer.{name}" for name in ("count", "mean", "squares")),
+    ],
 )
 def test_missing_entry(saved, key):
     kept = contents(saved)
@@ -133,7 +140,7 @@ def test_missing_entry(saved, key):
 
 def resume(path):
     config, state = load_checkpoint(path)
-    return train_ars(config, state=state)
+    return train_policy(config, state=state)
 
 
 def spoil(path, **entries):
@@ -143,33 +150,38 @@ def spoil(path, **entries):
 
 
 @pytest.mark.parametrize(
-    "entries", [{"config": "{"}, {"generator": "["}, {"theta": np.array([{}], dtype=object)}]
+    "entries",
+    [{"header": "{"}, {"state.generator": "["}, {"state.theta": np.array([{}], dtype=object)}],
 )
 def test_bad_entry(saved, entries):
     spoil(saved, **entries)
     refused(saved)
 
 
+def spoil_settings(path, **settings):
+    header = json.loads(str(contents(path)["header"]))
+    header["config"] |= settings
+    spoil(path, header=json.dumps(header))
+
+
 def test_unknown_setting(saved):
-    config = json.loads(str(contents(saved)["config"]))
-    spoil(saved, config=json.dumps({**config, "momentum": 0.9}))
+    spoil_settings(saved, momentum=0.9)
     refused(saved)
 
 
 def test_impossible_setting_is_named(saved):
-    config = json.loads(str(contents(saved)["config"]))
-    spoil(saved, config=json.dumps({**config, "directions": 0}))
-    with pytest.raises((InvalidInputError, PolicyFileError), match="directions"):
+    spoil_settings(saved, directions=0)
+    with pytest.raises(PolicyFileError, match="directions"):
         load_checkpoint(saved)
 
 
 @pytest.mark.parametrize(
     "entries",
     [
-        {"theta": np.zeros((3, 3))},
-        {"mean": np.zeros(3)},
-        {"theta": np.full((5, 48), np.nan)},
-        {"generator": '{"bit_generator": "MT19937"}'},
+        {"state.theta": np.zeros((3, 3))},
+        {"state.normalizer.mean": np.zeros(3)},
+        {"state.theta": np.full((5, 48), np.nan)},
+        {"state.generator": '{"bit_generator": "MT19937"}'},
     ],
     ids=["theta", "mean", "nan", "generator"],
 )
@@ -181,9 +193,9 @@ def test_state_that_does_not_fit_is_refused_before_training(saved, entries):
 
 def test_an_arm_that_changed_since_is_refused(tmp_path, write_robot, make_joint):
     path = write_robot([make_joint(), make_joint(axis="0 1 0")])
-    config = replace(TINY, arm=str(path))
+    config = replace(TINY, problem=TINY.problem.replace(arm=str(path)))
     states = []
-    train_ars(replace(config, iterations=1), on_iteration=states.append)
+    train_policy(replace(config, iterations=1), on_iteration=states.append)
     save_checkpoint(tmp_path / "c.npz", config, states[0])
     assert load_checkpoint(tmp_path / "c.npz")[0] == config
     slower = path.read_text().replace('velocity="3"', 'velocity="2"')

@@ -12,32 +12,38 @@ pytest.importorskip("stable_baselines3")
 
 import torch
 
+from kinarm._fields import from_plain
 from kinarm.errors import InvalidInputError, MissingExtraError
 from kinarm.policies import (
     PPOConfig,
-    load_ppo_checkpoint,
-    ppo,
-    save_ppo_checkpoint,
-    train_ppo,
+    learners,
+    load_checkpoint,
+    save_checkpoint,
+    state_policy,
+    train_policy,
 )
-from kinarm.policies.ppo_learner import PPOLearner, alone_in_torch, seed_iteration
+from kinarm.policies.ppo.learner import PPOTraining, alone_in_torch, seed_iteration
+from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
+from kinarm.task import RewardWeights
 
 TINY = PPOConfig(
-    task="both",
-    arms=6,
-    rollout_steps=20,
-    minibatch=40,
-    epochs=3,
+    problem="both",
+    n_envs=6,
+    n_steps=20,
+    batch_size=40,
+    n_epochs=3,
     iterations=5,
-    hidden=(12, 10),
+    net_arch=(12, 10),
     learning_rate_schedule="linear",
     seed=5,
 )
 CONFIGS = {
     "plain": TINY,
     "symmetric": replace(TINY, symmetric=True),
-    "right": replace(TINY, task="right", success_bonus=1.0, tolerance=0.3),
+    "right": replace(
+        TINY, problem="right", reward=RewardWeights(success=1.0), training_tolerance=0.3
+    ),
 }
 
 
@@ -67,7 +73,7 @@ def trained(request):
     """Settings, result and the state after each iteration."""
     states = []
     config = CONFIGS[request.param]
-    return config, train_ppo(config, on_iteration=states.append), states
+    return config, train_policy(config, on_iteration=states.append), states
 
 
 class TestAdvantages:
@@ -77,28 +83,28 @@ class TestAdvantages:
 
     @pytest.fixture
     def collect(self):
-        def collect(**settings):
+        def collect(horizon, **settings):
             config = PPOConfig(
-                arms=2,
-                rollout_steps=3,
-                minibatch=6,
+                n_envs=2,
+                n_steps=3,
+                batch_size=6,
                 gamma=self.GAMMA,
                 gae_lambda=self.LAMBDA,
-                step_reward=self.REWARD,
-                initial_log_std=-30.0,
+                problem=PROBLEMS["right"].replace(horizon=horizon),
+                reward=RewardWeights(step=self.REWARD),
+                log_std_init=-30.0,
                 **settings,
             )
-            state = PPOLearner.initial_state(config)
-            learner = PPOLearner(config, state.normalizer)
-            learner.load(state)
+            training = PPOTraining(config)
+            training.load(training.initial_state())
             with torch.no_grad():
-                for net in (learner.model.policy.action_net, learner.model.policy.value_net):
+                for net in (training.model.policy.action_net, training.model.policy.value_net):
                     net.weight.zero_()
                     net.bias.zero_()
-                learner.model.policy.value_net.bias.fill_(self.VALUE)
-            model = learner.model
+                training.model.policy.value_net.bias.fill_(self.VALUE)
+            model = training.model
             _, callback = model._setup_learn(6, None, reset_num_timesteps=False)
-            model.collect_rollouts(learner.env, callback, model.rollout_buffer, 3)
+            model.collect_rollouts(training.env, callback, model.rollout_buffer, 3)
             return model.rollout_buffer
 
         return collect
@@ -127,7 +133,7 @@ class TestAdvantages:
         whole = Simulator.sample
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(Simulator, "sample", near_goals(whole))
-            advantages = collect(horizon=64, tolerance=0.3).advantages
+            advantages = collect(horizon=64, training_tolerance=0.3).advantages
         # delta = r - V at every step, each of which ends an episode.
         np.testing.assert_allclose(advantages, self.REWARD - self.VALUE, atol=1e-5)
 
@@ -135,9 +141,9 @@ class TestAdvantages:
 def near_goals(sample):
     """Draw as the simulator does, but put every goal 0.1 m above the tool."""
 
-    def draw(simulator, rng, count):
-        starts, _ = sample(simulator, rng, count)
-        tools, _ = simulator.screen(starts)
+    def draw(simulator, rng, count, **settings):
+        starts, _ = sample(simulator, rng, count, **settings)
+        tools, _ = simulator.world.screen(starts)
         return starts, tools + np.array([0, 0, 0.1])
 
     return draw
@@ -147,11 +153,11 @@ class TestResuming:
     @pytest.mark.parametrize("stopped_after", [1, 4])
     def test_equals_uninterrupted(self, trained, tmp_path, stopped_after):
         config, result, states = trained
-        save_ppo_checkpoint(tmp_path / "c.npz", config, states[stopped_after - 1])
-        loaded_config, state = load_ppo_checkpoint(tmp_path / "c.npz")
+        save_checkpoint(tmp_path / "c.npz", config, states[stopped_after - 1])
+        loaded_config, state = load_checkpoint(tmp_path / "c.npz")
         assert loaded_config == config
         later = []
-        resumed = train_ppo(loaded_config, state=state, on_iteration=later.append)
+        resumed = train_policy(loaded_config, state=state, on_iteration=later.append)
         assert len(later) == config.iterations - stopped_after
         assert_same_states(later[-1], states[-1])
         assert_same_policies(resumed.policy, result.policy)
@@ -160,25 +166,25 @@ class TestResuming:
         """The model of Stable-Baselines3 that just goes on, without our putting a state into it."""
         config, _, states = trained
         with alone_in_torch():
-            learner = PPOLearner(config, states[0].normalizer)
-            learner.iterate(states[0], 0.0)
-            learner.env.rng = seed_iteration(config.seed, 2 + 1)
-            learner._learning_rate = config.learning_rate_at(2 / config.iterations)
-            learner.model.learn(config.steps_per_iteration, reset_num_timesteps=False)
-            assert learner.parameters().tobytes() == states[2].parameters.tobytes()
-            assert learner.model.num_timesteps == states[2].environment_steps
+            training = PPOTraining(config)
+            training.iterate(states[0])
+            training.env.rng = seed_iteration(config.seed, 2 + 1)
+            training._learning_rate = config.learning_rate_at(2 / config.iterations)
+            training.model.learn(config.steps_per_iteration, reset_num_timesteps=False)
+            assert training.parameters().tobytes() == states[2].parameters.tobytes()
+            assert training.model.num_timesteps == states[2].environment_steps
 
     def test_finished_training_is_left_alone(self, trained):
         config, result, states = trained
-        again = train_ppo(config, state=states[-1], on_iteration=pytest.fail)
+        again = train_policy(config, state=states[-1], on_iteration=pytest.fail)
         assert_same_policies(again.policy, result.policy)
         assert again.curve == result.curve or np.isnan(again.curve[0].mean_return)
 
-    @pytest.mark.parametrize(("setting", "value"), [("hidden", (12, 11)), ("arms", 12)])
+    @pytest.mark.parametrize(("setting", "value"), [("net_arch", (12, 11)), ("n_envs", 12)])
     def test_state_of_another_training_is_refused(self, trained, setting, value):
         config, _, states = trained
         with pytest.raises(InvalidInputError, match="the state to resume has"):
-            train_ppo(replace(config, **{setting: value}), state=states[0])
+            train_policy(replace(config, **{setting: value}), state=states[0])
 
 
 class TestResult:
@@ -189,27 +195,32 @@ class TestResult:
         assert result.policy.provenance.environment_steps == config.environment_steps == 600
         times = [point.wall_time for point in result.curve]
         assert times == sorted(times)
-        assert 0 < result.simulator_time < times[-1]
+        assert 0 < result.state.simulator_time < times[-1]
 
     def test_curve_is_of_the_episodes_that_ended(self):
         """Without a move every episode lasts to the horizon and returns 8 step rewards."""
-        config = replace(TINY, initial_log_std=-30.0, horizon=8, step_reward=-0.5)
-        first = train_ppo(replace(config, iterations=1)).curve[0]
+        config = replace(
+            TINY,
+            problem=PROBLEMS["both"].replace(horizon=8),
+            reward=RewardWeights(step=-0.5),
+            log_std_init=-30.0,
+        )
+        first = train_policy(replace(config, iterations=1)).curve[0]
         assert first.mean_return == pytest.approx(-4, abs=0.02)
         assert first.std_return < 0.02
         assert first.success == 0
 
     def test_curve_without_ended_episodes_is_not_a_number(self):
-        config = replace(TINY, rollout_steps=2, minibatch=12, iterations=1, initial_log_std=-30.0)
-        point = train_ppo(config).curve[0]
+        config = replace(TINY, n_steps=2, batch_size=12, iterations=1, log_std_init=-30.0)
+        point = train_policy(config).curve[0]
         assert np.isnan([point.mean_return, point.std_return, point.success]).all()
 
     def test_provenance(self, trained):
         config, result, _ = trained
         made = result.policy.provenance
-        assert (made.algorithm, made.task, made.seed) == ("ppo", config.task, 5)
-        assert made.config["hidden"] == (12, 10)
-        assert PPOConfig(**made.config) == config
+        assert (made.algorithm, made.seed) == ("ppo", 5)
+        assert made.problem == config.problem.pinned
+        assert from_plain(PPOConfig, made.config, "it") == replace(config, problem="right")
         assert {"torch", "stable-baselines3"} <= set(made.versions)
 
     def test_policy_survives_its_file(self, trained, tmp_path):
@@ -217,13 +228,13 @@ class TestResult:
         result.policy.save(tmp_path / "p.npz")
         loaded = type(result.policy).load(tmp_path / "p.npz")
         assert_same_policies(loaded, result.policy)
-        assert PPOConfig(**loaded.provenance.config) == PPOConfig(**result.policy.provenance.config)
+        assert loaded.provenance == result.policy.provenance
 
 
-def predicted(learner, observations):
+def predicted(training, observations):
     """What Stable-Baselines3 itself would do, given raw observations."""
-    env = learner.env
-    actions, _ = learner.model.predict(env._seen(observations), deterministic=True)
+    env = training.env
+    actions, _ = training.model.predict(env._normalized(observations), deterministic=True)
     if env.mirror is None:
         return actions
     left = observations[:, 1] > 0
@@ -232,27 +243,27 @@ def predicted(learner, observations):
 
 def test_policy_acts_like_the_model(trained):
     config, _, states = trained
-    learner = PPOLearner(config, states[-1].normalizer)
-    learner.load(states[-1])
+    training = PPOTraining(config)
+    training.load(states[-1])
     with torch.no_grad():  # so that some actions are clipped
-        learner.model.policy.action_net.weight.mul_(100)
-    state = replace(states[-1], parameters=learner.parameters())
-    policy = learner.policy(state)
-    simulator = Simulator(task=config.task, threads=1)
-    observations = simulator.observe(*simulator.sample(np.random.default_rng(0), 500))
-    expected = predicted(learner, observations)
+        training.model.policy.action_net.weight.mul_(100)
+    state = replace(states[-1], parameters=training.parameters())
+    policy = state_policy(config, state)
+    simulator = Simulator(config.problem, threads=1)
+    observations = simulator.world.observe(*simulator.sample(np.random.default_rng(0), 500))
+    expected = predicted(training, observations)
     assert 0.01 < (np.abs(expected) == 1).mean() < 0.99
     np.testing.assert_allclose(policy(observations), expected, rtol=0, atol=1e-5)
 
 
 def test_compiled_rollouts_follow_the_model(trained):
     config, result, states = trained
-    learner = PPOLearner(config, states[-1].normalizer)
-    learner.load(states[-1])
-    simulator = Simulator(task=config.task, threads=1)
+    training = PPOTraining(config)
+    training.load(states[-1])
+    simulator = Simulator(config.problem, threads=1)
     starts, goals = simulator.sample(np.random.default_rng(1), 50)
     compiled = simulator.rollout(result.policy, starts, goals)
-    stepped = simulator.rollout(lambda seen: predicted(learner, seen), starts, goals)
+    stepped = simulator.rollout(lambda seen: predicted(training, seen), starts, goals)
     np.testing.assert_array_equal(compiled.steps, stepped.steps)
     np.testing.assert_allclose(compiled.configurations, stepped.configurations, atol=1e-3)
 
@@ -260,11 +271,16 @@ def test_compiled_rollouts_follow_the_model(trained):
 def test_starts_spread_out_as_configured():
     """From home at the beginning, over the whole range from half of the training on."""
     config = replace(
-        TINY, iterations=9, initial_start_spread=0.0, widening=0.5, horizon=2, tolerance=0.01
+        TINY,
+        iterations=9,
+        problem=PROBLEMS["both"].replace(horizon=2),
+        initial_start_spread=0.0,
+        widening=0.5,
+        training_tolerance=0.01,
     )
     assert [config.start_spread_at(done) for done in (0, 0.25, 0.5, 1)] == [0, 0.5, 1, 1]
-    states = [PPOLearner.initial_state(config)]
-    train_ppo(config, on_iteration=states.append)
+    states = [PPOTraining(config).initial_state()]
+    train_policy(config, on_iteration=states.append)
     home = config.simulator().arm.home
     limit = 2 * config.simulator().step_limit
     moved = [np.abs(state.episodes.q - home)[:, :5] for state in states]
@@ -280,7 +296,7 @@ class TestGlobalState:
         np.random.seed(1)  # noqa: NPY002
         before = random.getstate(), torch.get_rng_state(), np.random.get_state()  # noqa: NPY002
         threads = torch.get_num_threads()
-        train_ppo(replace(TINY, iterations=1))
+        train_policy(replace(TINY, iterations=1))
         assert random.getstate() == before[0]
         assert torch.equal(torch.get_rng_state(), before[1])
         np.testing.assert_array_equal(np.random.get_state()[1], before[2][1])  # noqa: NPY002
@@ -292,13 +308,13 @@ class TestGlobalState:
         torch.manual_seed(99)
         torch.set_num_threads(threads + 1)
         try:
-            assert_same_policies(train_ppo(config).policy, result.policy)
+            assert_same_policies(train_policy(config).policy, result.policy)
         finally:
             torch.set_num_threads(threads)
 
     def test_seeds_differ(self, trained):
         config, result, _ = trained
-        other = train_ppo(replace(config, seed=6)).policy
+        other = train_policy(replace(config, seed=6)).policy
         assert (other.layers[0].weights != result.policy.layers[0].weights).any()
         assert (other.mean != result.policy.mean).any()
 
@@ -306,37 +322,37 @@ class TestGlobalState:
 class TestTensorBoard:
     def test_logs_are_written(self, tmp_path):
         pytest.importorskip("tensorboard")
-        train_ppo(replace(TINY, iterations=2), tensorboard=tmp_path / "logs")
+        train_policy(replace(TINY, iterations=2), tensorboard=tmp_path / "logs")
         assert [name for name in os.listdir(tmp_path / "logs") if "tfevents" in name]  # noqa: PTH208
 
     def test_missing_package_is_named(self, monkeypatch):
-        whole = ppo.find_spec
+        whole = learners.find_spec
         monkeypatch.setattr(
-            ppo, "find_spec", lambda name: None if name == "tensorboard" else whole(name)
+            learners, "find_spec", lambda name: None if name == "tensorboard" else whole(name)
         )
         with pytest.raises(MissingExtraError, match="tensorboard is not installed"):
-            train_ppo(TINY, tensorboard="logs")
+            train_policy(TINY, tensorboard="logs")
 
 
 @pytest.mark.slow
 def test_learns():
     """A tenth of the paper's steps bring the tool within centimetres of the goals."""
     config = PPOConfig(
-        arms=125,
-        rollout_steps=16,
-        minibatch=1000,
+        n_envs=125,
+        n_steps=16,
+        batch_size=1000,
         iterations=60,
         learning_rate=2e-3,
         learning_rate_schedule="linear",
         gamma=0.9,
-        initial_log_std=-0.7,
-        tolerance=0.03,
-        success_bonus=1.0,
+        log_std_init=-0.7,
+        training_tolerance=0.03,
+        reward=RewardWeights(success=1.0),
     )
-    beginning = PPOLearner.initial_state(config)
-    untrained = PPOLearner(config, beginning.normalizer).policy(beginning)
-    trained = train_ppo(config).policy
-    simulator = Simulator(task="right", threads=1)
+    beginning = PPOTraining(config).initial_state()
+    untrained = state_policy(config, beginning)
+    trained = train_policy(config).policy
+    simulator = Simulator("right", threads=1)
     starts, goals = simulator.sample(np.random.default_rng(0), 500)
     before = simulator.rollout(untrained, starts, goals)
     after = simulator.rollout(trained, starts, goals)

@@ -8,11 +8,10 @@ import pytest
 
 TRAIN = """
 from dataclasses import replace
-from kinarm.policies.ars import train_ars
-from kinarm.policies.recipes import ars_recipe
-for recipe in ("paper", "tuned"):
-    config = replace(ars_recipe(recipe, task="both", seed=1), iterations=10)
-    networks = train_ars(config).policy.networks()
+from kinarm.policies import recipe, train_policy
+for name in ("paper", "tuned"):
+    config = replace(recipe("ars", name, problem="both", seed=1), iterations=10)
+    networks = train_policy(config).policy.networks()
     print(networks.weights.tobytes().hex())
 """
 

@@ -1,34 +1,37 @@
 """Named settings."""
 
 import inspect
+from dataclasses import fields, replace
 
 import pytest
 
-from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.errors import InvalidInputError, KinarmError, UnknownNameError
 from kinarm.policies import (
-    ARS_RECIPES,
-    PPO_RECIPES,
     ARSConfig,
     PPOConfig,
-    ars_recipe,
-    ppo_recipe,
+    find_learner,
+    recipe,
 )
+from kinarm.problem import PROBLEMS
+from kinarm.task import RewardWeights
+
+ARS_RECIPES, PPO_RECIPES = find_learner("ars").recipes, find_learner("ppo").recipes
 
 
 def test_paper_is_table_1():
-    config = ars_recipe("paper")
+    config = recipe("ars", "paper")
     assert (config.step_size, config.noise) == (0.02, 0.03)
     assert (config.directions, config.top_directions) == (24, 12)
-    assert (config.horizon, config.iterations) == (64, 800)
+    assert (config.problem.task.horizon, config.iterations) == (64, 800)
     assert config.normalize
     assert config.scale_by_deviation
     assert (config.sharing, config.episodes) == ("none", 1)
-    assert (config.collision_penalty, config.success_bonus, config.step_reward) == (-1, 0, 0)
+    assert config.training_problem == config.problem == PROBLEMS["right"]
     assert config.step_size_schedule == "constant"
 
 
 def test_paper_is_the_default():
-    assert ars_recipe("paper", recipe="custom") == ARSConfig()
+    assert recipe("ars", "paper", recipe="custom") == ARSConfig()
 
 
 def test_names():
@@ -38,7 +41,7 @@ def test_names():
 
 
 def test_v1_and_brs_lack_the_augmentations():
-    v1, brs = ars_recipe("v1"), ars_recipe("brs")
+    v1, brs = recipe("ars", "v1"), recipe("ars", "brs")
     assert (v1.normalize, v1.scale_by_deviation) == (False, True)
     assert (brs.normalize, brs.scale_by_deviation) == (False, False)
     for config in (v1, brs):
@@ -46,51 +49,75 @@ def test_v1_and_brs_lack_the_augmentations():
 
 
 def test_settings_replace_those_of_the_recipe():
-    config = ars_recipe("tuned", task="both", seed=4, iterations=None)
-    assert (config.task, config.seed) == ("both", 4)
+    config = recipe("ars", "tuned", problem="both", seed=4, iterations=None)
+    assert (config.problem, config.seed) == (PROBLEMS["both"], 4)
     assert config.iterations == ARS_RECIPES["tuned"].iterations
 
 
 def test_unknown_recipe_lists_the_recipes():
     with pytest.raises(UnknownNameError, match="unknown recipe 'best'; available: paper, tuned"):
-        ars_recipe("best")
+        recipe("ars", "best")
+
+
+def test_unknown_learner_lists_the_learners():
+    with pytest.raises(UnknownNameError, match="unknown learner 'sac'; available: ars, ppo"):
+        recipe("sac", "paper")
 
 
 def test_unknown_setting_is_refused():
-    with pytest.raises((InvalidInputError, TypeError), match="learning_rate"):
-        ars_recipe("paper", learning_rate=1)
+    words = "unknown setting of ars 'learning_rate'; available: problem, reward, seed"
+    with pytest.raises(UnknownNameError, match=words):
+        recipe("ars", "paper", learning_rate=1)
 
 
 def test_bad_setting_is_refused():
     with pytest.raises(InvalidInputError, match="directions"):
-        ars_recipe("paper", directions=0)
+        recipe("ars", "paper", directions=0)
 
 
 def test_a_changed_recipe_says_so():
-    assert ars_recipe("tuned", task="left", seed=3, arm="paper_flange").recipe == "tuned"
-    assert ars_recipe("tuned", noise=0.5).recipe == "tuned*"
-    assert ars_recipe("tuned", noise=0.5, recipe="mine").recipe == "mine"
-    assert ars_recipe("tuned", noise=ARS_RECIPES["tuned"].noise).recipe == "tuned"
+    assert recipe("ars", "tuned", problem="left", seed=3).recipe == "tuned"
+    assert recipe("ars", "tuned", noise=0.5).recipe == "tuned*"
+    assert recipe("ars", "tuned", noise=0.5, recipe="mine").recipe == "mine"
+    assert recipe("ars", "tuned", noise=ARS_RECIPES["tuned"].noise).recipe == "tuned"
 
 
 def test_tuned_adapts_to_two_benches():
-    assert ars_recipe("tuned", task="both").collision_penalty == -1
-    assert ars_recipe("tuned", task="right").collision_penalty == -2
-    assert ars_recipe("tuned", task="both", collision_penalty=-3.0).collision_penalty == -3
+    assert recipe("ars", "tuned", problem="both").reward.collision == -1
+    assert recipe("ars", "tuned", problem="right").reward.collision == -2
+    changed = recipe("ars", "tuned", problem="both", reward={"collision": -3.0})
+    assert changed.reward == RewardWeights(collision=-3, success=0.5)
+    assert changed.recipe == "tuned*"
+
+
+def test_weights_replace_those_of_the_task_if_the_recipe_has_none():
+    problem = PROBLEMS["left"].replace(reward={"step": -0.5})
+    changed = recipe("ars", "paper", problem=problem, reward={"success": 2.0})
+    assert changed.reward == RewardWeights(step=-0.5, success=2.0)
+
+
+def test_unknown_weight():
+    with pytest.raises(UnknownNameError, match="'bonus'; available: progress, closer, step"):
+        recipe("ars", reward={"bonus": 1})
+
+
+@pytest.mark.parametrize("weights", [{"collision": 2.0}, {"success": -1.0}])
+def test_rewarding_contact_or_punishing_success_is_refused(weights):
+    with pytest.raises(KinarmError, match="other sign"):
+        recipe("ars", "tuned", reward=weights)
+    assert recipe("ars", "tuned", reward={**weights, "allow_perverse": True})
 
 
 class TestPPO:
     @pytest.mark.parametrize("name", ["paper", "tuned"])
     def test_all_take_the_papers_steps(self, name):
-        config = ppo_recipe(name, task="both", seed=2)
+        config = recipe("ppo", name, problem="both", seed=2)
         assert config.environment_steps == 1_200_000
-        assert (config.recipe, config.task, config.seed) == (name, "both", 2)
-        assert config.horizon == 64
+        assert (config.recipe, config.problem, config.seed) == (name, PROBLEMS["both"], 2)
 
     def test_paper_has_the_papers_reward(self):
-        config = ppo_recipe("paper")
-        assert (config.collision_penalty, config.success_bonus, config.step_reward) == (-1, 0, 0)
-        assert (config.tolerance, config.start_spread) == (0.05, 1)
+        config = recipe("ppo", "paper")
+        assert config.training_problem == config.problem == PROBLEMS["right"]
         assert config.start_spread_at(0) == 1
         assert not config.symmetric
 
@@ -101,20 +128,14 @@ class TestPPO:
             name: parameter.default
             for name, parameter in inspect.signature(sb3.PPO.__init__).parameters.items()
         }
-        config = ppo_recipe("paper")
-        for ours, theirs in {
-            "learning_rate": "learning_rate",
-            "epochs": "n_epochs",
-            "gamma": "gamma",
-            "gae_lambda": "gae_lambda",
-            "clip_range": "clip_range",
-            "entropy_weight": "ent_coef",
-            "value_weight": "vf_coef",
-            "max_grad_norm": "max_grad_norm",
-        }.items():
-            assert getattr(config, ours) == defaults[theirs], ours
-        assert config.hidden == (64, 64)
-        assert (config.initial_log_std, config.learning_rate_schedule) == (0, "constant")
+        config = recipe("ppo", "paper")
+        other = {"n_steps", "batch_size", "seed"}
+        shared = {item.name for item in fields(config)} & set(defaults) - other
+        assert {"learning_rate", "n_epochs", "gamma", "gae_lambda", "clip_range"} <= shared
+        assert {"ent_coef", "vf_coef", "max_grad_norm"} <= shared
+        assert {name: getattr(config, name) for name in shared} == {n: defaults[n] for n in shared}
+        assert config.net_arch == (64, 64)
+        assert (config.log_std_init, config.learning_rate_schedule) == (0, "constant")
 
     def test_names(self):
         assert set(PPO_RECIPES) == {"paper", "tuned"}
@@ -123,8 +144,72 @@ class TestPPO:
 
     def test_unknown_recipe_lists_the_recipes(self):
         with pytest.raises(UnknownNameError, match="unknown recipe 'v1'; available: paper, tuned"):
-            ppo_recipe("v1")
+            recipe("ppo", "v1")
 
     def test_a_changed_recipe_says_so(self):
-        assert ppo_recipe("tuned", gamma=0.5).recipe == "tuned*"
-        assert ppo_recipe("tuned", gamma=None, iterations=600).recipe == "tuned"
+        assert recipe("ppo", "tuned", gamma=0.5).recipe == "tuned*"
+        assert recipe("ppo", "tuned", gamma=None, iterations=600).recipe == "tuned"
+
+
+class TestFile:
+    """Settings from TOML."""
+
+    @pytest.fixture
+    def write(self, tmp_path):
+        def write(text, name="mine.toml"):
+            (tmp_path / name).write_text(text)
+            return tmp_path / name
+
+        return write
+
+    def test_the_rest_is_that_of_the_base(self, write):
+        path = write('base = "tuned"\niterations = 9\nnoise = 1\n[reward]\nsuccess = 2\n')
+        config = recipe("ars", path, problem="left", seed=4)
+        expected = recipe("ars", "tuned", problem="left", seed=4, iterations=9, noise=1.0)
+        weights = RewardWeights(collision=-2, success=2)
+        assert config == replace(expected, recipe="mine", reward=weights)
+
+    def test_without_base_it_is_the_papers(self, write):
+        assert recipe("ars", write("")) == recipe("ars", "paper", recipe="mine")
+        path = write("net_arch = [8, 4]\ntraining_tolerance = 0.02\n")
+        expected = recipe("ppo", net_arch=(8, 4), training_tolerance=0.02, recipe="mine")
+        assert recipe("ppo", path) == expected
+
+    def test_it_may_name_problem_and_seed(self, write):
+        PROBLEMS["left"].replace(tolerance=0.03).save(write("", "near.toml"))
+        path = write('problem = "near.toml"\nseed = 8\n')
+        config = recipe("ars", path)
+        assert (config.problem.name, config.problem.task.tolerance) == ("left", 0.03)
+        assert (config.seed, config.recipe) == (8, "mine")
+        config = recipe("ars", path, problem="both", seed=1)
+        assert (config.problem, config.seed, config.recipe) == (PROBLEMS["both"], 1, "mine")
+
+    def test_changes_are_on_top(self, write):
+        path = write("noise = 0.5\n")
+        assert recipe("ars", path, noise=0.25).recipe == "mine*"
+        assert recipe("ars", path, noise=0.5).recipe == "mine"
+
+    @pytest.mark.parametrize(
+        ("text", "words"),
+        [
+            ("speed = 3", "mine.toml: unknown key 'speed'; available: problem, reward, seed"),
+            ('noise = "a"', "mine.toml: noise must be a number, got 'a'"),
+            ("iterations = 2.5", "mine.toml: iterations must be a whole number, got 2.5"),
+            ("iterations = 0", "mine.toml: iterations must be .* at least 1, got 0"),
+            ('sharing = "all"', "mine.toml: sharing must be one of none, pair, iteration"),
+            ("[reward]\nbonus = 1", "mine.toml: unknown key 'reward.bonus'; available: progress"),
+            ("[reward]\ncollision = 2", "mine.toml: reward: .*rewards contact"),
+            ("reward = 1", "mine.toml: reward must be a table, got 1"),
+            ('base = "best"', "mine.toml: base must be one of paper, tuned, v1, brs, got 'best'"),
+            ("problem = 3", "mine.toml: problem must be the name or file of a problem, got 3"),
+            ("noise =", "mine.toml: not a recipe file: "),
+        ],
+    )
+    def test_one_line_says_what_is_wrong(self, write, text, words):
+        with pytest.raises(InvalidInputError, match=words) as caught:
+            recipe("ars", write(text))
+        assert len(str(caught.value).splitlines()) == 1
+
+    def test_missing(self, tmp_path):
+        with pytest.raises(InvalidInputError, match=r"cannot read recipe .*gone.toml': No such"):
+            recipe("ars", tmp_path / "gone.toml")

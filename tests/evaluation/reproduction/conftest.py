@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import pytest
 
-from kinarm.evaluation.reproduction.outcome import Outcome
 from kinarm.evaluation.reproduction.results import Results
+from kinarm.evaluation.reproduction.runs import TrainedRun
 from kinarm.evaluation.reproduction.study import Study, Training, full_study
 
 
@@ -17,9 +17,9 @@ def study() -> Study:
 
 @pytest.fixture(scope="session")
 def results_of(study: Study) -> Callable[..., Results]:
-    """Make results from a function from trainings to outcomes."""
+    """Make results from a function from trainings to runs."""
 
-    def make(outcome_of: Callable[[Training], Outcome]) -> Results:
-        return Results(study, {training: outcome_of(training) for training in study.trainings})
+    def make(run_of: Callable[[Training], TrainedRun]) -> Results:
+        return Results(study, {training: run_of(training) for training in study.trainings})
 
     return make

@@ -5,12 +5,12 @@ import math
 
 import numpy as np
 import pytest
-from outcomes import made_up
+from made_up_runs import made_up
 
 from kinarm.evaluation.reproduction.claims import Claim, Part, assess, bench_shares
 from kinarm.evaluation.reproduction.intervals import Estimate
 from kinarm.evaluation.reproduction.study import LITERAL, Protocol, Reading
-from kinarm.evaluation.reproduction.training_run import final_trials
+from kinarm.evaluation.reproduction.training import final_trials
 
 TRIALS = 200
 
@@ -35,8 +35,8 @@ def as_the_paper_says(training):
         return made_up(distance, np.tile(distance[:10], (4, 1)))
     base = 0.1 if training.purpose == "ars" else 0.05
     distance = base + np.abs(noise(training))
-    if training.purpose == "ars" and config.task == "both":
-        trials = final_trials("both", training.reading, Protocol())
+    if training.purpose == "ars" and config.problem.name == "both":
+        trials = final_trials(config.problem, Protocol())
         poor = (trials.goals[:, 1] > 0) == bool(config.seed % 2)
         distance = distance + 0.5 * poor
     return made_up(distance, learnt_at(0 if training.purpose == "ars" else 2))
@@ -50,7 +50,7 @@ def the_other_way_round(training):
         distance = 0.5 - better + noise(training)
         return made_up(distance, np.tile(distance[:10], (4, 1)))
     base = 0.5 if training.purpose == "ars" else 0.7
-    distance = base - 0.1 * (config.task == "both") + noise(training)
+    distance = base - 0.1 * (config.problem.name == "both") + noise(training)
     return made_up(distance, learnt_at(2 if training.purpose == "ars" else 0))
 
 
@@ -90,15 +90,31 @@ class TestWorlds:
     def test_other_readings_are_judged_by_their_own_trainings(self, results_of):
         near = Reading(start_spread=0.1, sharing="pair")
 
-        def outcome_of(training):
+        def run_of(training):
             world = as_the_paper_says if training.reading.start_spread == 1 else the_other_way_round
             return world(training)
 
-        results = results_of(outcome_of)
+        results = results_of(run_of)
         assert set(verdicts(assess(results)).values()) == {"holds"}
         found = verdicts(assess(results, near))
         assert set(found) == {name for name in ALL if not name.startswith("sweep")}
         assert set(found.values()) == {"does not hold"}
+
+
+@pytest.mark.parametrize("start_spread", [1.0, 0.1])
+def test_trials_of_all_tasks_are_crossed(start_spread):
+    """What `contrast` is told of them: one start, and one place of the goal on its bench."""
+    reading = Reading(start_spread=start_spread)
+    left, right, both = (
+        final_trials(reading.problem(task), Protocol(trials=50))
+        for task in ("left", "right", "both")
+    )
+    bench_to_bench = np.array([0.0, 1.3, 0.0])
+    np.testing.assert_allclose(left.goals, right.goals + bench_to_bench)
+    on_left = both.goals[:, 1:2] > 0
+    np.testing.assert_array_equal(both.goals, np.where(on_left, left.goals, right.goals))
+    for trials in (right, both):
+        np.testing.assert_array_equal(trials.starts, left.starts)
 
 
 class TestStatistics:
@@ -120,14 +136,14 @@ class TestStatistics:
         json.dumps(claim.to_json(), allow_nan=False)
 
     def test_equal_steps_are_those_of_the_shortest_training(self, results_of):
-        def outcome_of(training):
+        def run_of(training):
             if training.purpose != "sweep":
                 return made_up(np.ones(TRIALS))
             many = training.config.directions == 32
             snapshots = np.array([[0.4], [0.3], [0.2], [0.1]]) * np.ones((4, 10))
             return made_up(np.full(TRIALS, 0.1), snapshots, 2000 if many else 1000)
 
-        claims = {claim.name: claim for claim in assess(results_of(outcome_of))}
+        claims = {claim.name: claim for claim in assess(results_of(run_of))}
         part = claims["sweep-perturbations-steps"].parts[0]
         assert "after 4 thousand environment steps" in part.measure
         assert part.estimate.value == pytest.approx(0.2)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from outcomes import made_up
+from made_up_runs import made_up
 
 from kinarm.evaluation.reproduction.figures import density, figure_2, figure_3, learning_curves
 
@@ -29,11 +29,11 @@ class TestDensity:
 
 @pytest.fixture(scope="module")
 def results(results_of):
-    def outcome_of(training):
+    def run_of(training):
         rng = np.random.default_rng([*training.name.encode()])
         return made_up(rng.uniform(0, 1, 200), rng.uniform(0, 1, (4, 10)))
 
-    return results_of(outcome_of)
+    return results_of(run_of)
 
 
 def test_figure_2_has_seeds_and_their_mean(results):

@@ -2,10 +2,10 @@
 
 from collections import Counter
 
-import pytest
-
 from kinarm.evaluation.reproduction.study import LITERAL, Reading, full_study, quick_study
-from kinarm.policies import ARS_RECIPES, PPO_RECIPES
+from kinarm.policies import recipe
+from kinarm.problem import PROBLEMS
+from kinarm.task import RewardWeights
 
 
 class TestFullStudy:
@@ -15,25 +15,25 @@ class TestFullStudy:
         nine = {(rate, n) for rate in (0.05, 0.01, 0.005) for n in (16, 24, 32)}
         assert settings == dict.fromkeys(nine, 4)
         assert {t.config.iterations for t in sweep} == {300}
-        assert {t.config.task for t in sweep} == {"left"}
+        assert {t.config.problem.name for t in sweep} == {"left"}
         assert all(2 * t.config.top_directions == t.config.directions for t in sweep)
 
     def test_twelve_models_of_table_1(self, study):
         models = [t for t in study.trainings if t.purpose == "ars" and t.reading == LITERAL]
-        assert Counter(t.config.task for t in models) == {"left": 4, "right": 4, "both": 4}
+        assert Counter(t.config.problem.name for t in models) == {"left": 4, "right": 4, "both": 4}
         for training in models:
             config = training.config
             assert (config.step_size, config.noise) == (0.02, 0.03)
             assert (config.directions, config.top_directions) == (24, 12)
-            assert (config.horizon, config.iterations) == (64, 800)
-            assert config.recipe == ARS_RECIPES["paper"].recipe
+            assert (config.problem.task.horizon, config.iterations) == (64, 800)
+            assert config.recipe == recipe("ars", "paper").recipe
         assert study.protocol.trials == 200
 
     def test_ppo_takes_the_papers_steps(self, study):
         models = [t for t in study.trainings if t.purpose == "ppo" and t.reading == LITERAL]
-        assert Counter(t.config.task for t in models) == {"left": 4, "right": 4, "both": 4}
+        assert Counter(t.config.problem.name for t in models) == {"left": 4, "right": 4, "both": 4}
         assert {t.config.environment_steps for t in models} == {1_200_000}
-        assert {t.config.recipe for t in models} == {PPO_RECIPES["paper"].recipe}
+        assert {t.config.recipe for t in models} == {recipe("ppo", "paper").recipe}
 
     def test_every_combination_of_readings(self, study):
         assert len(study.readings()) == len(set(study.readings())) == 12
@@ -60,20 +60,21 @@ def test_quick_study_has_something_of_everything():
 
 
 class TestReading:
-    def test_settings(self):
-        assert LITERAL.settings() == {
-            "start_spread": 1.0,
-            "progress_reward": 1.0,
-            "closer_reward": 0.0,
-        }
-        signs = Reading(start_spread=0.1, reward="sign").settings()
-        assert signs["progress_reward"] == 0
-        assert 64 * signs["closer_reward"] == pytest.approx(1), "as much as a metre of progress"
+    def test_the_literal_one_is_the_papers_problems_as_they_are(self):
+        for name, problem in PROBLEMS.items():
+            assert LITERAL.problem(name) == problem
+            assert LITERAL.weights(problem) is None
+
+    def test_signs_of_all_steps_weigh_as_much_as_a_metre_of_progress(self):
+        reading = Reading(start_spread=0.1, reward="sign")
+        weights = reading.weights(reading.problem("left"))
+        assert weights == RewardWeights(progress=0.0, closer=1 / 64)
 
     def test_trainings_follow_their_reading(self, study):
         for training in study.trainings:
             config, reading = training.config, training.reading
-            assert config.start_spread == reading.start_spread
-            assert (config.progress_reward == 0) == (reading.reward == "sign")
+            assert config.problem.task.start_spread == reading.start_spread
+            assert config.training_problem.task.reward.collision == -1
+            assert (config.training_problem.task.reward.progress == 0) == (reading.reward == "sign")
             if training.purpose == "ars":
                 assert config.sharing == reading.sharing

@@ -1,0 +1,329 @@
+"""``kinarm-eval``: put policies to the trials and report how they did."""
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from kinarm._command_line import Parser, add_options, command_text, request_of, run_command
+from kinarm._files import check_output, write_text
+from kinarm._validation import whole_number
+from kinarm.errors import InvalidInputError
+from kinarm.problem_options import ProblemOptions
+
+if TYPE_CHECKING:
+    from kinarm.evaluation.entrants import Entrant
+    from kinarm.evaluation.evaluation import Evaluation
+    from kinarm.problem import ReachProblem
+
+PROG = "kinarm-eval"
+
+EPILOG = """
+examples:
+  kinarm-eval --trials 200                               all shipped policies and baselines
+  kinarm-eval --policy ars-tuned-right --problem right   one recipe, all its training seeds
+  kinarm-eval --policy my_policy.npz --out results       your own, with figures and every trial
+  kinarm-eval --trials 200 --report results              a page to look at: results/index.html
+"""
+
+DOCUMENT, HISTOGRAMS, REPORT = "evaluation.json", "final_distance", "index.html"
+"""Files that are written; the histograms as PNG and as SVG."""
+
+Pair = tuple["Entrant", "ReachProblem"]
+"""Who faces what."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EvaluationRequest(ProblemOptions):
+    """Put policies to random reaching trials, and report how they did.
+
+    By default a trained policy faces the problem that it was trained for, changed as the options
+    say, and a baseline all problems in play. Problems that are named restrict the default
+    selection; together with named policies, or `matrix`, they say what those face. The oracle
+    joins on every problem that is faced.
+
+    Parameters
+    ----------
+    policies : tuple of str
+        Shipped policy, recipe (all its seeds), random, zero, oracle, or .npz file; repeatable;
+        by default all shipped ones, random and zero.
+    problems : tuple of str
+        Left, right, both, or a problem file; repeatable. `problem` is for a single one.
+    trials : int
+        Trials a problem.
+    seed : int
+        Seed of the trials.
+    allow_other_arm : bool
+        Let policies face an arm that they were not trained for.
+    matrix : bool
+        Every policy on every problem, not only on its own.
+    oracle : bool
+        Bound what any policy could reach.
+    out : Path
+        Folder for evaluation.json and histograms.
+    report : Path
+        Folder for the report: index.html, one page.
+    overwrite : bool
+        Replace earlier results.
+    json : bool
+        Print the JSON document alone on standard output.
+    markdown : bool
+        Print the table as Markdown.
+
+    Raises
+    ------
+    InvalidInputError
+        If there is no trial or the seed is negative.
+    """
+
+    policies: tuple[str, ...] = field(
+        default=(), metadata={"flag": "--policy", "metavar": "NAME_OR_FILE", "repeat": True}
+    )
+    problems: tuple[str, ...] = field(
+        default=(), metadata={"flag": "--problem", "metavar": "NAME_OR_FILE", "repeat": True}
+    )
+    trials: int = 200
+    seed: int = 0
+    allow_other_arm: bool = False
+    matrix: bool = False
+    oracle: bool = True
+    out: Path | None = field(default=None, metadata={"metavar": "FOLDER"})
+    report: Path | None = field(default=None, metadata={"metavar": "FOLDER"})
+    overwrite: bool = False
+    json: bool = False
+    markdown: bool = False
+
+    def __post_init__(self) -> None:
+        whole_number("trials", self.trials, 1)
+        whole_number("seed", self.seed, 0)
+
+    def run(
+        self, command: str | None = None, tell: Callable[[str], object] = lambda _: None
+    ) -> dict[str, Any]:
+        """Evaluate, and write what is asked for.
+
+        Parameters
+        ----------
+        command : str, optional
+            What to record as the command that did it; this request if it is left out.
+        tell : callable
+            Called with what is being done.
+
+        Returns
+        -------
+        dict
+            The document; see `kinarm.evaluation.evaluation_document`.
+
+        Raises
+        ------
+        KinarmError
+            If a name, file or number cannot be used, or a file cannot be written.
+        """
+        from kinarm.evaluation.document import evaluation_document
+        from kinarm.evaluation.figures import distance_histograms, save_figure
+        from kinarm.evaluation.report.page import write_report
+
+        evaluations = self.evaluate(tell)
+        document = evaluation_document(evaluations, repr(self) if command is None else command)
+        if self.report is not None:
+            tell("writing the report")
+            write_report(self.report, document, evaluations)
+        if self.out is not None:
+            write_text(self.out / DOCUMENT, json.dumps(document, indent=1))
+            shown = [e for e in evaluations if e.entrant.algorithm != "oracle"] or evaluations
+            save_figure(distance_histograms(shown), self.out, HISTOGRAMS)
+        return document
+
+    def evaluate(self, tell: Callable[[str], object] = lambda _: None) -> "list[Evaluation]":
+        """Let every chosen policy face its trials; whatever is wrong is refused before that.
+
+        Parameters
+        ----------
+        tell : callable
+            Called with what is being done.
+
+        Raises
+        ------
+        KinarmError
+            As for `run`.
+        """
+        from kinarm.arm import Arm
+        from kinarm.evaluation.bounds import oracle_bounds
+        from kinarm.evaluation.evaluation import run_trials
+        from kinarm.evaluation.trials import TrialSet
+
+        pairs, evaluations = self.pairs(), []
+        problems = {problem.name: problem for _, problem in pairs}
+        arms = {name: Arm.load(problem.arm) for name, problem in problems.items()}
+        for entrant, problem in pairs:
+            entrant.check(arms[problem.name], allow_other_arm=self.allow_other_arm)
+        self._check_outputs()
+        for name, problem in problems.items():
+            trials = TrialSet.draw(problem, self.trials, self.seed)
+            if self.oracle:
+                oracle_bounds(trials, partial(_tell_bounds, tell, name))
+            tell(f"evaluating on {name}")
+            evaluations += [
+                run_trials(entrant, trials, self.allow_other_arm, oracle=self.oracle)
+                for entrant, faced in pairs
+                if faced.name == name
+            ]
+        return evaluations
+
+    def pairs(self) -> list[Pair]:
+        """Decide who faces which problem.
+
+        Raises
+        ------
+        KinarmError
+            If a name or file cannot be used, there is nothing to do, or two policies or problems
+            have one name.
+        """
+        from kinarm.evaluation.entrants import ORACLE, check_names
+
+        entrants, named = self._entrants(), self._named_problems()
+        pairs = [
+            (entrant, problem)
+            for problem in named or self._problems_of(entrants)
+            for entrant in entrants
+            if self.matrix or (self.policies and named) or self._is_own(entrant, problem)
+        ]
+        if not pairs:
+            raise InvalidInputError("no chosen policy was trained for a problem: name a --problem")
+        if self.oracle and ORACLE not in entrants:
+            faced = {problem.digest: problem for _, problem in pairs}
+            pairs += [(ORACLE, problem) for problem in faced.values()]
+        check_names(pairs)
+        return pairs
+
+    def _entrants(self) -> "list[Entrant]":
+        """Entrants that are named, without repetition; or all whose arm stays the same."""
+        from kinarm.evaluation.entrants import find_entrants, shipped_entrants
+
+        if self.policies:
+            named = (entrant for name in self.policies for entrant in find_entrants(name))
+            return list({(entrant.name, entrant.source): entrant for entrant in named}.values())
+        return [
+            entrant
+            for entrant in shipped_entrants()
+            if entrant.problem is None
+            or self._changed(entrant.problem).arm_digest == entrant.problem.arm_digest
+        ]
+
+    def _named_problems(self) -> "list[ReachProblem]":
+        names = (self.problem, *self.problems) if self.problem else self.problems
+        if not names and self.task is not None:
+            return [self.resolve()]
+        problems = (replace(self, problem=name).resolve() for name in names)
+        return list({problem.digest: problem for problem in problems}.values())
+
+    def _problems_of(self, entrants: "Sequence[Entrant]") -> "list[ReachProblem]":
+        """What some entrants were trained for, or all that there is; the paper's come first."""
+        from kinarm.problem import PROBLEMS
+
+        trained = [entrant.problem for entrant in entrants if entrant.problem is not None]
+        own = {problem.digest: problem for problem in map(self._changed, trained)}
+        shipped = {problem.digest: problem for problem in map(self._changed, PROBLEMS.values())}
+        if self.matrix or not own:
+            return list((shipped | own).values())
+        return [own.pop(digest) for digest in shipped if digest in own] + list(own.values())
+
+    def _is_own(self, entrant: "Entrant", problem: "ReachProblem") -> bool:
+        """Whether an entrant was trained for a problem, but for what the options change."""
+        trained_for = entrant.problem
+        return trained_for is None or self._changed(trained_for).digest == problem.digest
+
+    def _changed(self, problem: "ReachProblem") -> "ReachProblem":
+        """A problem with the changes that the options make of any."""
+        return replace(self, problem=None, task=None).resolve(problem)
+
+    def _check_outputs(self) -> None:
+        """See that the files can be written."""
+        if self.report is not None:
+            check_output(self.report / REPORT, overwrite=self.overwrite)
+        if self.out is not None:
+            for name in (DOCUMENT, f"{HISTOGRAMS}.png", f"{HISTOGRAMS}.svg"):
+                check_output(self.out / name, overwrite=self.overwrite)
+
+
+def _tell_bounds(tell: Callable[[str], object], problem: str, done: int, total: int) -> None:
+    """Say how far the oracle is."""
+    tell(f"what could any policy reach on {problem}? {done} of {total} trials solved")
+
+
+def build_parser() -> Parser:
+    """The options of the command."""
+    parser = Parser(
+        prog=PROG,
+        description="Put policies to random reaching trials and report how they did.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add_options(parser, EvaluationRequest, skip=("problem",))
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line."""
+    run_command(PROG, lambda: _evaluate(arguments))
+
+
+def _evaluate(arguments: Sequence[str] | None) -> None:
+    """Run a request, and print what it came to."""
+    request = request_of(build_parser().parse_args(arguments), EvaluationRequest)
+    from rich.console import Console
+
+    with Console(stderr=True).status("evaluating; the first run compiles") as status:
+        document = request.run(command_text(PROG, arguments), status.update)
+    if request.json:
+        json.dump(document, sys.stdout)
+        sys.stdout.write("\n")
+    else:
+        _print(request, document)
+
+
+def _print(request: EvaluationRequest, document: dict[str, Any]) -> None:
+    """Print the table, and what it stands on."""
+    from rich.console import Console
+
+    from kinarm.evaluation.table import print_table
+
+    console = Console(width=None if sys.stdout.isatty() else 200, highlight=False)
+    print_table(document, console, markdown=request.markdown)
+    if not request.markdown:
+        console.print(_footnote(document), style="dim")
+        if not request.policies and all(row["trained_on"] is None for row in document["results"]):
+            console.print("no shipped policy was trained for this", style="dim")
+    if request.out is not None:
+        console.print(f"written: {request.out / DOCUMENT} and histograms", style="dim")
+    if request.report is not None:
+        console.print(f"written: {request.report / REPORT}", style="dim")
+
+
+def _footnote(document: dict[str, Any]) -> str:
+    """What the figures in the table stand on."""
+    protocol = document["protocol"]
+    problems = protocol["problems"].items()
+    arms = " and ".join(dict.fromkeys(entry["arm"] for _, entry in problems))
+    lines = [
+        f"{protocol['trials']} trials a problem, seed {protocol['seed']}, arm {arms}; "
+        "95 % intervals in brackets"
+    ]
+    bounds = [(problem, entry["oracle"]) for problem, entry in problems if entry["oracle"]]
+    if bounds:
+        shares = (f"{problem} {100 * bound['tight_share']:.1f} %" for problem, bound in bounds)
+        lines.append(
+            "step ratio: steps over the number proven necessary, of trials that succeeded; "
+            f"proofs complete: {', '.join(shares)}"
+        )
+    hashes = (f"{problem} {entry['trial_set_hash']}" for problem, entry in problems)
+    lines.append(f"trial sets: {', '.join(hashes)}")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    main()

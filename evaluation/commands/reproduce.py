@@ -1,0 +1,213 @@
+"""``kinarm-reproduce``: train what the paper trained, and see which of its claims hold."""
+
+import argparse
+import json
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from kinarm._command_line import Parser, add_options, command_text, request_of, run_command
+from kinarm._files import check_folder, write_text
+from kinarm._parallel import available_threads
+from kinarm._validation import whole_number
+from kinarm.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from kinarm.evaluation.reproduction.claims import Claim
+    from kinarm.evaluation.reproduction.executor import Executor
+    from kinarm.evaluation.reproduction.results import Results
+    from kinarm.evaluation.reproduction.runs import RunStore
+    from kinarm.evaluation.reproduction.study import Study
+
+PROG = "kinarm-reproduce"
+
+EPILOG = """
+needs the extra ppo: pip install 'kinarm[ppo]' (or --no-ppo)
+
+An interrupted reproduction goes on where it stopped, by the same command.
+
+examples:
+  kinarm-reproduce                  the whole paper, into the folder reproduction
+  kinarm-reproduce --quick          see in a minute that everything works; results mean nothing
+  kinarm-reproduce --no-ppo         Augmented Random Search alone, a few minutes
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReproductionRequest:
+    """Train everything that the paper trained, and judge its claims.
+
+    Parameters
+    ----------
+    out : Path
+        Output folder: reproduction, or reproduction-quick with --quick.
+    jobs : int
+        Trainings at a time; one a processor.
+    quick : bool
+        A smoke version of everything, whose results mean nothing.
+    ppo : bool
+        Compare with PPO.
+
+    Raises
+    ------
+    InvalidInputError
+        If there are no jobs.
+    """
+
+    out: Path | None = None
+    jobs: int | None = None
+    quick: bool = False
+    ppo: bool = True
+
+    def __post_init__(self) -> None:
+        if self.jobs is not None:
+            whole_number("jobs", self.jobs, 1)
+
+    @property
+    def folder(self) -> Path:
+        """Where the files go."""
+        return self.out or Path("reproduction-quick" if self.quick else "reproduction")
+
+    @property
+    def study(self) -> "Study":
+        """What is trained."""
+        from kinarm.evaluation.reproduction.study import full_study, quick_study
+
+        return (quick_study if self.quick else full_study)(ppo=self.ppo)
+
+    def run(
+        self, executor: "Executor | None" = None, command: str | None = None
+    ) -> "tuple[Claim, ...]":
+        """Train what is missing, and write what it came to.
+
+        Parameters
+        ----------
+        executor : Executor, optional
+            Where trainings are carried out; the processors of this machine if it is left out.
+        command : str, optional
+            What to record as the command that made the files; this request if it is left out.
+
+        Returns
+        -------
+        tuple of Claim
+            The claims under the literal reading.
+
+        Raises
+        ------
+        KinarmError
+            If the extra ``ppo`` is missing, the folder holds another study or cannot be written
+            to, or a worker ends unexpectedly.
+        """
+        from rich.console import Console
+
+        from kinarm.evaluation.reproduction.document import write_all
+        from kinarm.evaluation.reproduction.results import Results
+        from kinarm.evaluation.reproduction.runs import RunStore
+        from kinarm.policies.learners import find_learner
+
+        if self.ppo:
+            find_learner("ppo").check_installed()
+        study, folder = self.study, self.folder
+        check_folder(folder)
+        _claim_folder(folder, study)
+        store = RunStore(folder, study.protocol)
+        results = Results.load(study, store)
+        try:
+            if results.missing:
+                results = _train(results, store, self.jobs or available_threads(), executor)
+            with Console(stderr=True).status("bounding what could be reached, drawing figures"):
+                return write_all(results, store, command or repr(self))
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(
+                "interrupted; what is finished is kept, and the same command goes on"
+            ) from None
+
+
+def build_parser() -> Parser:
+    """The options of the command."""
+    parser = Parser(
+        prog=PROG,
+        description="Train everything that the paper trained, and judge its claims.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add_options(parser, ReproductionRequest)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line."""
+    run_command(PROG, lambda: _reproduce(arguments))
+
+
+def _reproduce(arguments: Sequence[str] | None) -> None:
+    """Run a request, and print its verdicts."""
+    request = request_of(build_parser().parse_args(arguments), ReproductionRequest)
+    _print(request.run(command=command_text(PROG, arguments)))
+    if request.study.warning:
+        sys.stdout.write(f"{request.study.warning}\n")
+    page = request.folder / "REPRODUCTION.md"
+    sys.stdout.write(f"written: {page}, with tables and figures beside it\n")
+
+
+def _print(claims: "Iterable[Claim]") -> None:
+    """Print the verdicts."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("claim", "measured (95 %)", "claimed", "verdict", header_style="bold")
+    for claim in claims:
+        measured, claimed = zip(
+            *((str(part.estimate), f"{part.claimed} {part.threshold:g}") for part in claim.parts),
+            strict=True,
+        )
+        table.add_row(claim.statement, "\n".join(measured), "\n".join(claimed), claim.verdict)
+    Console(width=None if sys.stdout.isatty() else 120, highlight=False).print(table)
+
+
+def _claim_folder(folder: Path, study: "Study") -> None:
+    """Mark the folder as that of a study; refuse one that holds another."""
+    marker = folder / "study.json"
+    if marker.exists():
+        try:
+            held = json.loads(marker.read_bytes())["study"]
+        except (ValueError, KeyError, TypeError, OSError):
+            held = "foreign"
+        if held != study.name:
+            raise InvalidInputError(
+                f"{str(folder)!r} holds a {held} reproduction, not a {study.name} one: "
+                "name another folder with --out"
+            )
+    write_text(marker, json.dumps({"study": study.name}))
+
+
+def _train(
+    results: "Results", store: "RunStore", jobs: int, executor: "Executor | None"
+) -> "Results":
+    """Carry out what is missing, the longest first, and read all runs anew."""
+    from rich.console import Console
+
+    from kinarm.evaluation.reproduction.executor import LocalExecutor
+    from kinarm.evaluation.reproduction.progress import StudyProgress
+    from kinarm.evaluation.reproduction.results import Results
+    from kinarm.evaluation.reproduction.training import carry_out
+
+    study = results.study
+    missing = sorted(results.missing, key=lambda training: -training.cost)
+    console = Console(stderr=True, highlight=False)
+    if results.runs:
+        console.print(f"{len(results.runs)} of {len(study.trainings)} trainings are finished")
+    jobs = min(jobs, len(missing))
+    threads = max(1, available_threads() // jobs)
+    work = partial(carry_out, protocol=study.protocol, folder=store.folder, threads=threads)
+    with StudyProgress(study, missing, jobs, console) as progress:
+        for training in (executor or LocalExecutor(jobs, threads)).carry_out(work, missing):
+            progress.finished(training)
+    return Results.load(study, store)
+
+
+if __name__ == "__main__":
+    main()

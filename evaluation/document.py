@@ -1,0 +1,276 @@
+"""The document of an evaluation: everything about it, to keep and to face the same trials again."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kinarm._files import first_line
+from kinarm._validation import finite_array
+from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.evaluation.bounds import bounds_document
+from kinarm.evaluation.entrants import check_names
+from kinarm.evaluation.evaluation import Evaluation, pool
+from kinarm.evaluation.statistics import BOOTSTRAP_SEED, LEVEL, RESAMPLES
+from kinarm.evaluation.trials import TrialSet
+from kinarm.policies.library import group_of
+from kinarm.policies.provenance import package_versions, source_commit
+from kinarm.problem import ReachProblem
+from kinarm.recording import Recording
+from kinarm.simulator import Simulator
+
+FORMAT_VERSION = 2
+
+ENDS = ("outcome", "steps", "final_distance")
+"""What has to be the same again."""
+
+
+def evaluation_document(evaluations: Sequence[Evaluation], command: str) -> dict[str, Any]:
+    """Everything about an evaluation, as a dictionary that JSON can hold.
+
+    Parameters
+    ----------
+    evaluations : sequence of Evaluation
+        Made with one trial set per problem.
+    command : str
+        The command that made them.
+
+    Returns
+    -------
+    dict
+        ``protocol`` (problems, their trials with hash and bounds, versions, commit, command),
+        ``results`` (one per policy and problem, with the outcome of every trial) and ``pooled``
+        (one per recipe and problem with several training seeds).
+
+    Raises
+    ------
+    InvalidInputError
+        If two policies on a problem, or two problems, have the same name.
+    """
+    check_names((each.entrant, each.problem) for each in evaluations)
+    any_set = evaluations[0].trials
+    facing = {each.problem.name: each for each in reversed(evaluations)}
+    return {
+        "protocol": {
+            "format_version": FORMAT_VERSION,
+            "command": command,
+            "trials": len(any_set),
+            "seed": any_set.seed,
+            "intervals": {
+                "level": LEVEL,
+                "shares": "Wilson",
+                "distances": "percentile bootstrap over trials",
+                "resamples": RESAMPLES,
+                "bootstrap_seed": BOOTSTRAP_SEED,
+            },
+            "problems": {name: _problem_entry(facing[name]) for name in reversed(facing)},
+            "versions": package_versions(),
+            "commit": source_commit(),
+        },
+        "results": [evaluation.to_json() for evaluation in evaluations],
+        "pooled": [pooled.to_json() for pooled in pool(evaluations)],
+    }
+
+
+def _problem_entry(evaluation: Evaluation) -> dict[str, Any]:
+    """What was faced, and what any policy could do there."""
+    trials, bounds = evaluation.trials, evaluation.bounds
+    return {
+        "arm": trials.simulator.arm.name,
+        "problem": trials.problem.pinned.to_json(),
+        "digest": trials.problem.digest,
+        "trial_set_hash": trials.digest,
+        "starts": trials.starts.tolist(),
+        "goals": trials.goals.tolist(),
+        "oracle": bounds_document(bounds) if bounds is not None else None,
+    }
+
+
+@dataclass(frozen=True)
+class EvaluationDocument:
+    """What a file ``evaluation.json`` holds.
+
+    Attributes
+    ----------
+    name : str
+        Name of the file.
+    protocol : dict
+        Problems and trials.
+    results : list of dict
+        One for each policy and problem.
+    """
+
+    name: str
+    protocol: dict[str, Any]
+    results: list[dict[str, Any]]
+
+    @classmethod
+    def load(cls, path: str | Path) -> "EvaluationDocument":
+        """Read a document.
+
+        Raises
+        ------
+        InvalidInputError
+            If the file is missing, damaged, something else, or of another version.
+        """
+        name = str(path)
+        try:
+            content = json.loads(Path(path).read_text(encoding="utf-8"))
+            check_fields("it", content, {"protocol": dict, "results": list})
+            check_fields("protocol", content["protocol"], {"format_version": int})
+            version = content["protocol"]["format_version"]
+            if version == FORMAT_VERSION:
+                check_document(content)
+        except OSError as error:
+            raise InvalidInputError(f"cannot read {name!r}: {error.strerror}") from error
+        except (ValueError, RecursionError) as error:
+            raise InvalidInputError(
+                f"{name!r} is not an evaluation of kinarm-eval: {first_line(error)}"
+            ) from error
+        if version != FORMAT_VERSION:
+            raise InvalidInputError(
+                f"{name!r} has format version {version}; this kinarm reads {FORMAT_VERSION}"
+            )
+        return cls(name, content["protocol"], content["results"])
+
+    def result(self, policy: str | None, problem: str | None) -> dict[str, Any]:
+        """Find the result of a policy, or of a group's first seed, on a problem.
+
+        Raises
+        ------
+        InvalidInputError
+            If there is none, or several that fit.
+        """
+        fitting = [row for row in self.results if problem in (None, row["problem"])]
+        if policy is None:
+            named = [row for row in fitting if row["trained_on"] is not None] or fitting
+            if len(named) != 1:
+                choices = ", ".join(f"{row['policy']} on {row['problem']}" for row in named)
+                raise InvalidInputError(
+                    f"{self.name!r} holds several results, choose with --policy and --problem: "
+                    f"{choices or 'none on this problem'}"
+                )
+            return named[0]
+        for known_as in (str, group_of):
+            for row in fitting:
+                if known_as(row["policy"]) == policy:
+                    return row
+        raise UnknownNameError("policy", policy, dict.fromkeys(row["policy"] for row in fitting))
+
+    def problem(self, name: str) -> ReachProblem:
+        """One of the problems that were faced.
+
+        Raises
+        ------
+        InvalidInputError
+            If it cannot be read.
+        """
+        entry = self.protocol["problems"][name]
+        return ReachProblem.from_json(entry["problem"], f"{self.name}: problem {name}")
+
+    def trials(self, problem: str) -> TrialSet:
+        """The trials of a problem, as they were faced.
+
+        Raises
+        ------
+        InvalidInputError
+            If problem, starts and goals do not match their hash.
+        KinarmError
+            If the arm is missing or another one by now.
+        """
+        entry = self.protocol["problems"][problem]
+        simulator = Simulator(self.problem(problem))
+        starts, goals = np.array(entry["starts"]), np.array(entry["goals"])
+        trials = TrialSet(simulator, self.protocol["seed"], starts, goals)
+        if trials.digest != entry["trial_set_hash"]:
+            raise InvalidInputError(
+                f"the trials of {problem} in {self.name!r} do not match their hash"
+            )
+        return trials
+
+    def floors(self, problem: str) -> list[int] | None:
+        """Proven numbers of steps of a problem's trials, if the evaluation had them."""
+        oracle = self.protocol["problems"][problem]["oracle"]
+        return oracle["trials"]["steps_lower_bound"] if oracle else None
+
+    def check_same(self, row: dict[str, Any], recordings: list[Recording]) -> None:
+        """See that recordings end as the evaluation says.
+
+        Raises
+        ------
+        InvalidInputError
+            If one does not: policy or simulator have changed since.
+        """
+        ends = list(zip(*(row["outcomes"][part] for part in ENDS), strict=True))
+        for recording in recordings:
+            end = (recording.outcome, recording.steps, recording.final_distance)
+            if len(ends) != len(recordings) or end != ends[recording.trial]:
+                raise InvalidInputError(
+                    f"trial {recording.trial} of {recording.policy!r} ends otherwise than in "
+                    f"{self.name!r}: the policy or kinarm has changed, evaluate again"
+                )
+
+
+NULL = type(None)
+
+PROBLEM_FIELDS = {
+    "problem": dict,
+    "trial_set_hash": str,
+    "starts": list,
+    "goals": list,
+    "oracle": (dict, NULL),
+}
+
+RESULT_FIELDS = {"policy": str, "problem": str, "trained_on": (str, NULL), "outcomes": dict}
+
+
+def check_document(content: dict[str, Any]) -> None:
+    """See that a document holds what is needed to face its trials again.
+
+    Parameters
+    ----------
+    content : dict
+        ``protocol`` and ``results``, of this version.
+
+    Raises
+    ------
+    InvalidInputError
+        If something is missing or of another kind, with the place where that is.
+    """
+    problems = content["protocol"].get("problems")
+    check_fields("protocol", content["protocol"], {"seed": int, "problems": dict})
+    for name, entry in problems.items():
+        check_fields(f"problem {name!r}", entry, PROBLEM_FIELDS)
+        for part in ("starts", "goals"):
+            finite_array(f"{part} of {name!r}", entry[part], (None, None))
+        if entry["oracle"]:
+            check_fields(f"oracle of {name!r}", entry["oracle"], {"trials": dict})
+            check_fields("its trials", entry["oracle"]["trials"], {"steps_lower_bound": list})
+    for number, row in enumerate(content["results"]):
+        where = f"result {number}"
+        check_fields(where, row, RESULT_FIELDS)
+        check_fields(where, row["outcomes"], dict.fromkeys(ENDS, list))
+        if row["problem"] not in problems:
+            raise InvalidInputError(f"{where} is of the unknown problem {row['problem']!r}")
+        if len({len(row["outcomes"][part]) for part in ENDS}) > 1:
+            raise InvalidInputError(f"{where} has outcomes of different lengths")
+
+
+def check_fields(where: str, entries: Any, fields: Mapping[str, Any]) -> None:
+    """See that an object of a document has some fields, each of a type.
+
+    Raises
+    ------
+    InvalidInputError
+        If it has not, with its name.
+    """
+    if not isinstance(entries, dict):
+        raise InvalidInputError(f"{where} is no object")
+    for field, kind in fields.items():
+        if field not in entries:
+            raise InvalidInputError(f"{where} lacks {field!r}")
+        if not isinstance(entries[field], kind):
+            raise InvalidInputError(f"{where} has no such {field!r} as it should")

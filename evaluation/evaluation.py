@@ -1,0 +1,284 @@
+"""Put policies to the trials and summarise how they did."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.errors import InvalidInputError
+from kinarm.evaluation.bounds import oracle_bounds
+from kinarm.evaluation.entrants import Entrant, find_entrants
+from kinarm.evaluation.metrics import Outcomes, estimate_metrics
+from kinarm.evaluation.statistics import Estimate
+from kinarm.evaluation.trials import TrialSet
+from kinarm.policies.oracle.solution import OracleSolutions
+from kinarm.policies.policy import Policy
+from kinarm.problem import ProblemLike, ReachProblem
+from kinarm.rollouts import Rollouts
+from kinarm.simulator import PolicyFunction
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """How one policy did on one problem.
+
+    Attributes
+    ----------
+    entrant : Entrant
+        The policy.
+    trials : TrialSet
+        What it faced.
+    rollouts : Rollouts
+        What it did.
+    bounds : OracleSolutions or None
+        What any policy could do, if that was asked for.
+    """
+
+    entrant: Entrant
+    trials: TrialSet
+    rollouts: Rollouts
+    bounds: OracleSolutions | None = None
+
+    @property
+    def problem(self) -> ReachProblem:
+        """What was faced."""
+        return self.trials.problem
+
+    @cached_property
+    def metrics(self) -> dict[str, Estimate]:
+        """Every figure of merit by its name in `kinarm.evaluation.metrics.METRICS`."""
+        return estimate_metrics(Outcomes((self.rollouts,), self.bounds))
+
+    @property
+    def success(self) -> Estimate:
+        """Share of trials that ended within the tolerance, without contact."""
+        return Estimate.share(self.rollouts.success)
+
+    @property
+    def collision(self) -> Estimate:
+        """Share of trials that ended in contact."""
+        return Estimate.share(self.rollouts.collision)
+
+    def within(self, distance: float) -> Estimate:
+        """Share of trials whose final distance is at most ``distance`` [m]."""
+        return Estimate.share(self.rollouts.distance <= distance)
+
+    @cached_property
+    def contacts(self) -> tuple[tuple[str, str] | None, ...]:
+        """Bodies that touched, per trial."""
+        return self.trials.simulator.contact_pairs(self.rollouts)
+
+    @property
+    def step_ratio(self) -> NDArray[np.float64]:
+        """Steps taken over those proven to be necessary, of the trials that succeeded.
+
+        Raises
+        ------
+        InvalidInputError
+            If the evaluation was made without bounds.
+        """
+        return Outcomes((self.rollouts,), self.bounds).step_ratio
+
+    @property
+    def outcomes(self) -> tuple[str, ...]:
+        """``"success"``, ``"collision"`` or ``"truncated"``, per trial."""
+        codes = self.rollouts.success + 2 * self.rollouts.collision
+        return tuple(("truncated", "success", "collision")[code] for code in codes)
+
+    def to_json(self) -> dict[str, Any]:
+        """Figures of merit and every trial, as a dictionary that JSON can hold."""
+        return {
+            **_rows_head(self.entrant.name, self.entrant, self.problem),
+            "training_seed": self.entrant.seed,
+            "trials": len(self.trials),
+            "metrics": _metrics_json(self.metrics),
+            "outcomes": {
+                "final_distance": self.rollouts.distance.tolist(),
+                "steps": self.rollouts.steps.tolist(),
+                "outcome": list(self.outcomes),
+                "contact": [list(pair) if pair else None for pair in self.contacts],
+            },
+        }
+
+    def __repr__(self) -> str:
+        return f"Evaluation({_summary(self.entrant.name, self.trials, self.success)})"
+
+
+@dataclass(frozen=True, eq=False)
+class PooledEvaluation:
+    """How several training seeds of one recipe did on the same trials.
+
+    Attributes
+    ----------
+    name : str
+        Name of the group.
+    members : tuple of Evaluation
+        One per training seed.
+    """
+
+    name: str
+    members: tuple[Evaluation, ...]
+
+    @property
+    def problem(self) -> ReachProblem:
+        """What was faced."""
+        return self.members[0].problem
+
+    @property
+    def success_rates(self) -> tuple[float, ...]:
+        """Success of each seed."""
+        return tuple(float(member.rollouts.success.mean()) for member in self.members)
+
+    @cached_property
+    def metrics(self) -> dict[str, Estimate]:
+        """Every figure of merit over all seeds; intervals are those of the trials they share."""
+        rollouts = tuple(member.rollouts for member in self.members)
+        return estimate_metrics(Outcomes(rollouts, self.members[0].bounds))
+
+    @property
+    def spread(self) -> dict[str, dict[str, Any]]:
+        """Extremes, standard deviation and values over the seeds, of the metrics that all have."""
+        spread = {}
+        for name in self.metrics:
+            known = [member.metrics[name].value for member in self.members]
+            each = [value for value in known if value is not None]
+            if len(each) == len(known):
+                deviation = float(np.std(each, ddof=1))
+                spread[name] = {"min": min(each), "max": max(each), "std": deviation, "each": each}
+        return spread
+
+    def to_json(self) -> dict[str, Any]:
+        """Figures of merit as a dictionary that JSON can hold."""
+        return {
+            **_rows_head(self.name, self.members[0].entrant, self.problem),
+            "members": [member.entrant.name for member in self.members],
+            "training_seeds": [member.entrant.seed for member in self.members],
+            "trials": len(self.members[0].trials),
+            "metrics": _metrics_json(self.metrics),
+            "spread": self.spread,
+        }
+
+    def __repr__(self) -> str:
+        success = Estimate.share(np.array([member.rollouts.success for member in self.members]))
+        summary = _summary(self.name, self.members[0].trials, success)
+        return f"PooledEvaluation({len(self.members)} seeds of {summary})"
+
+
+def _rows_head(name: str, entrant: Entrant, problem: ReachProblem) -> dict[str, Any]:
+    """What a row of a document is about."""
+    return {
+        "policy": name,
+        "algorithm": entrant.algorithm,
+        "recipe": entrant.recipe,
+        "problem": problem.name,
+        "trained_on": entrant.problem.name if entrant.problem else None,
+    }
+
+
+def _metrics_json(metrics: dict[str, Estimate]) -> dict[str, Any]:
+    return {name: estimate.to_json() for name, estimate in metrics.items()}
+
+
+def _summary(name: str, trials: TrialSet, success: Estimate) -> str:
+    """What faced which trials, and with what success."""
+    return f"{name} on {len(trials)} trials of {trials.problem.name}, success {success}"
+
+
+def evaluate(
+    policy: str | Path | Policy | Entrant | PolicyFunction,
+    problem: ProblemLike | None = None,
+    trials: int = 200,
+    seed: int = 0,
+    *,
+    allow_other_arm: bool = False,
+    oracle: bool = False,
+    **overrides: Any,
+) -> Evaluation:
+    """Put one policy to the trials (paper, section 3.3: 200 random goals, 64 steps each).
+
+    Parameters
+    ----------
+    policy : str, Path, Policy, Entrant or function
+        A shipped policy, a baseline or the oracle by name (a group's first seed), a file, a
+        policy, or a function from observations (n, n_observations) to actions (n, n_actions).
+    problem : ReachProblem, str or Path, optional
+        What it faces; by default the problem that the policy was trained for.
+    trials : int
+        Number of trials.
+    seed : int
+        Seed of the trials.
+    allow_other_arm : bool
+        Whether a policy may face an arm that it was not trained for.
+    oracle : bool
+        Whether to bound what any policy could do in the trials; see `Evaluation.bounds`.
+    **overrides
+        Changes of the problem, such as ``tolerance``; see `ReachProblem.replace`.
+
+    Raises
+    ------
+    InvalidInputError
+        If a number is out of range, or no problem is given for something untrained.
+    PolicyFileError
+        If the policy cannot be read, was trained for another arm, or does not fit this one.
+    """
+    entrant = _entrant_of(policy)
+    faced = problem if problem is not None else entrant.problem
+    if faced is None:
+        raise InvalidInputError(f"{entrant.name!r} was not trained for a problem: name one")
+    trial_set = TrialSet.draw(ReachProblem.load(faced).replace(**overrides), trials, seed)
+    return run_trials(entrant, trial_set, allow_other_arm, oracle=oracle)
+
+
+def _entrant_of(policy: str | Path | Policy | Entrant | PolicyFunction) -> Entrant:
+    if isinstance(policy, Entrant):
+        return policy
+    if isinstance(policy, Policy):
+        made = policy.provenance
+        return Entrant.from_policy(f"{made.algorithm}-{made.recipe}-{policy.problem.name}", policy)
+    if isinstance(policy, str | Path):
+        return find_entrants(policy)[0]
+    return Entrant.from_function(getattr(policy, "__name__", "function"), policy)
+
+
+def run_trials(
+    entrant: Entrant, trials: TrialSet, allow_other_arm: bool = False, *, oracle: bool = False
+) -> Evaluation:
+    """Let an entrant face a set of trials.
+
+    Parameters
+    ----------
+    entrant : Entrant
+        The policy.
+    trials : TrialSet
+        What it faces.
+    allow_other_arm, oracle
+        As for `evaluate`.
+
+    Raises
+    ------
+    PolicyFileError
+        If it was trained for another arm and that is not allowed, or its inputs or actions are
+        not those of this arm.
+    """
+    entrant.check(trials.simulator.arm, allow_other_arm=allow_other_arm)
+    bounds = oracle_bounds(trials) if oracle else None
+    return Evaluation(entrant, trials, entrant.run(trials), bounds)
+
+
+def pool(evaluations: Sequence[Evaluation]) -> tuple[PooledEvaluation, ...]:
+    """Pool the training seeds of each group and problem, where there are several."""
+    groups: dict[tuple[object, ...], list[Evaluation]] = {}
+    for evaluation in evaluations:
+        made = evaluation.entrant
+        trained_for = made.problem.digest if made.problem else None
+        key = (made.group, made.algorithm, made.recipe, trained_for, evaluation.problem.digest)
+        groups.setdefault(key, []).append(evaluation)
+    return tuple(
+        PooledEvaluation(members[0].entrant.group, tuple(members))
+        for members in groups.values()
+        if len(members) > 1
+    )

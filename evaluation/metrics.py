@@ -1,0 +1,287 @@
+"""The figures of merit in one table, which documents, tables, reports and the docs read."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.errors import InvalidInputError
+from kinarm.evaluation.statistics import Estimate, bootstrap_intervals, wilson_interval
+from kinarm.policies.oracle import OracleSolutions
+from kinarm.rollouts import Rollouts
+
+LIMITS = (0.1, 0.2)
+"""Distances whose shares are reported beside success [m]."""
+
+ALWAYS = float("inf")
+"""Priority of columns that are never left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outcomes:
+    """What one or several training seeds did in the same trials.
+
+    Their arrays are joined along the last axis, shape (..., n_seeds * n_trials).
+
+    Attributes
+    ----------
+    rollouts : tuple of Rollouts
+        One per training seed.
+    bounds : OracleSolutions or None
+        What any policy could do in the trials, if that is known.
+    numbers : ndarray of int, shape (..., n_trials), optional
+        Resampled trials; by default each of them once.
+    """
+
+    rollouts: tuple[Rollouts, ...]
+    bounds: OracleSolutions | None = None
+    numbers: NDArray[np.int64] | None = None
+
+    def _joined(self, columns: Iterable[NDArray[Any]]) -> NDArray[Any]:
+        chosen = [column if self.numbers is None else column[self.numbers] for column in columns]
+        return np.concatenate(chosen, axis=-1)
+
+    @cached_property
+    def distance(self) -> NDArray[np.float64]:
+        """Final distances [m]."""
+        return self._joined(rollouts.distance for rollouts in self.rollouts)
+
+    @cached_property
+    def steps(self) -> NDArray[np.int64]:
+        """Steps taken."""
+        return self._joined(rollouts.steps for rollouts in self.rollouts)
+
+    @cached_property
+    def returns(self) -> NDArray[np.float64]:
+        """Sums of rewards."""
+        return self._joined(rollouts.returns for rollouts in self.rollouts)
+
+    @cached_property
+    def success(self) -> NDArray[np.bool_]:
+        """Whether a trial ended within the tolerance, without contact."""
+        return self._joined(rollouts.success for rollouts in self.rollouts)
+
+    @cached_property
+    def collision(self) -> NDArray[np.bool_]:
+        """Whether a trial ended in contact."""
+        return self._joined(rollouts.collision for rollouts in self.rollouts)
+
+    @cached_property
+    def reachable(self) -> NDArray[np.bool_]:
+        """Whether the oracle found a motion to the goal."""
+        return self._joined(self._known_bounds.reachable for _ in self.rollouts)
+
+    @cached_property
+    def step_ratio(self) -> NDArray[np.float64]:
+        """Steps taken over those proven necessary, of the trials that succeeded, one axis."""
+        necessary = self._joined(self._known_bounds.steps_lower_bound for _ in self.rollouts)
+        ratio: NDArray[np.float64] = self.steps / necessary
+        return ratio[self.success]
+
+    @property
+    def _known_bounds(self) -> OracleSolutions:
+        if self.bounds is None:
+            raise InvalidInputError("there are no bounds: the evaluation was made without them")
+        return self.bounds
+
+
+@dataclass(frozen=True, kw_only=True)
+class Metric:
+    """A figure of merit: what it means, how it is computed and how it is shown.
+
+    Attributes
+    ----------
+    meaning : str
+        What it is, for documentation and reports.
+    formula : callable
+        From `Outcomes` to the figure; None or NaN where there is nothing to tell. For an interval
+        it is asked about many resamples at once and works along the last axis.
+    unit : str
+        ``"%"`` for shares, which are kept as fractions and shown in per cent.
+    interval : ``"Wilson"``, ``"bootstrap"`` or None
+        How its 95 % interval is made. Wilson's is for shares of trials.
+    needs_bounds : bool
+        Whether it compares with the oracle.
+    heading : str
+        Heading of its column in tables; without one it is in documents alone.
+    digits : int
+        Decimals that are shown.
+    shows_interval : bool
+        Whether the interval is shown, too.
+    beside : tuple of str, optional
+        Label and name of another metric that is shown in the same column.
+    spread_heading : str
+        Heading of a column for its range over training seeds, if there is to be one.
+    priority : float
+        Where space is scarce, columns of low priority are left out first; those of `ALWAYS` never.
+    """
+
+    meaning: str
+    formula: Callable[[Outcomes], Any]
+    unit: str = ""
+    interval: Literal["Wilson", "bootstrap"] | None = None
+    needs_bounds: bool = False
+    heading: str = ""
+    digits: int = 3
+    shows_interval: bool = False
+    beside: tuple[str, str] | None = None
+    spread_heading: str = ""
+    priority: float = 0
+
+    def write(self, value: float) -> str:
+        """A value of the metric as text."""
+        return f"{100 * value if self.unit == '%' else value:.{self.digits}f}"
+
+    def write_range(self, low: float, high: float) -> str:
+        """A range of values as text."""
+        return f"{self.write(low)}..{self.write(high)}"
+
+
+def share_within(limit: float) -> Metric:
+    """Share of trials that end within a distance [m]."""
+    return Metric(
+        meaning=f"share of trials with a final distance of at most {limit:g} m; contact allowed",
+        formula=lambda trials: (trials.distance <= limit).mean(axis=-1),
+        unit="%",
+        interval="Wilson",
+        heading=f"<= {limit:g} m",
+        digits=1,
+        priority=1,
+    )
+
+
+def distance_metric(
+    meaning: str, statistic: Callable[..., Any], heading: str = "", **shown: Any
+) -> Metric:
+    """A statistic of the final distance, such as ``np.mean``."""
+    return Metric(
+        meaning=f"{meaning} of the final distance",
+        formula=lambda trials: statistic(trials.distance, axis=-1),
+        unit="m",
+        interval="bootstrap",
+        heading=heading,
+        **shown,
+    )
+
+
+def interquartile_mean(values: NDArray[np.float64], axis: int) -> Any:
+    """Mean of the middle half of some values."""
+    from scipy.stats import trim_mean
+
+    return trim_mean(values, 0.25, axis=axis)
+
+
+def percentile_95(values: NDArray[np.float64], axis: int) -> Any:
+    """95th percentile of some values."""
+    return np.quantile(values, 0.95, axis=axis)
+
+
+METRICS: dict[str, Metric] = {
+    "success": Metric(
+        meaning="share of trials that ended within the tolerance, without contact",
+        formula=lambda trials: trials.success.mean(axis=-1),
+        unit="%",
+        interval="Wilson",
+        heading="success %",
+        digits=1,
+        shows_interval=True,
+        spread_heading="over seeds %",
+        priority=ALWAYS,
+    ),
+    "relative_success": Metric(
+        meaning="success over that of the oracle",
+        formula=lambda trials: (
+            trials.success.mean() / trials.reachable.mean() if trials.reachable.any() else None
+        ),
+        unit="%",
+        needs_bounds=True,
+        heading="of oracle %",
+        digits=1,
+        priority=7,
+    ),
+    **{f"within_{limit:g}": share_within(limit) for limit in LIMITS},
+    "median_distance": distance_metric(
+        "median", np.median, "median m", shows_interval=True, priority=ALWAYS
+    ),
+    "mean_distance": distance_metric("mean", np.mean, "mean m", priority=2),
+    "iqm_distance": distance_metric("interquartile mean (of the middle half)", interquartile_mean),
+    "p95_distance": distance_metric("95th percentile", percentile_95, "p95 m", priority=2),
+    "max_distance": Metric(
+        meaning="largest final distance",
+        formula=lambda trials: trials.distance.max(),
+        unit="m",
+    ),
+    "collision": Metric(
+        meaning="share of trials that ended in contact with a bench, the ground or the arm",
+        formula=lambda trials: trials.collision.mean(axis=-1),
+        unit="%",
+        interval="Wilson",
+        heading="contact %",
+        digits=1,
+        priority=6,
+    ),
+    "mean_steps": Metric(
+        meaning="mean length of the episodes", formula=lambda trials: trials.steps.mean()
+    ),
+    "median_steps": Metric(
+        meaning="median length of the episodes",
+        formula=lambda trials: np.median(trials.steps),
+        heading="steps",
+        digits=0,
+        priority=3,
+    ),
+    "step_ratio": Metric(
+        meaning="steps over the number proven necessary, of the trials that succeeded: median",
+        formula=lambda trials: np.median(trials.step_ratio) if trials.step_ratio.size else None,
+        needs_bounds=True,
+        heading="step ratio",
+        digits=2,
+        beside=("p95", "step_ratio_p95"),
+        priority=8,
+    ),
+    "step_ratio_p95": Metric(
+        meaning="the same: 95th percentile",
+        formula=lambda trials: (
+            np.percentile(trials.step_ratio, 95) if trials.step_ratio.size else None
+        ),
+        needs_bounds=True,
+        digits=2,
+    ),
+}
+"""All figures of merit by their name in documents. A new one is one entry here."""
+
+
+def estimate_metrics(outcomes: Outcomes) -> dict[str, Estimate]:
+    """Work out all `METRICS`, with their intervals.
+
+    Parameters
+    ----------
+    outcomes : Outcomes
+        What happened. Metrics that need bounds stay empty where there are none.
+    """
+    known = {
+        name: metric
+        for name, metric in METRICS.items()
+        if outcomes.bounds is not None or not metric.needs_bounds
+    }
+    bootstrapped = [name for name, metric in known.items() if metric.interval == "bootstrap"]
+
+    def resampled_figures(numbers: NDArray[np.int64]) -> NDArray[np.float64]:
+        resampled = replace(outcomes, numbers=numbers)
+        return np.stack([known[name].formula(resampled) for name in bootstrapped])
+
+    trials, seeds = len(outcomes.rollouts[0]), len(outcomes.rollouts)
+    intervals = dict(zip(bootstrapped, bootstrap_intervals(trials, resampled_figures), strict=True))
+    estimates = dict.fromkeys(METRICS, Estimate(None))
+    for name, metric in known.items():
+        value = metric.formula(outcomes)
+        if value is None or np.isnan(value):
+            continue
+        interval = intervals.get(name)
+        if metric.interval == "Wilson":
+            interval = wilson_interval(round(value * trials * seeds), trials, seeds)
+        estimates[name] = Estimate(float(value), interval)
+    return estimates

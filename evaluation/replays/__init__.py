@@ -1,0 +1,1 @@
+"""What is replayed: finding and choosing trials, recording entrants, following them live."""

@@ -1,0 +1,56 @@
+"""Record what entrants do in trials."""
+
+from collections.abc import Sequence
+
+from kinarm.evaluation.entrants import Entrant
+from kinarm.evaluation.trials import TrialSet
+from kinarm.policies.oracle.solution import OracleSolutions
+from kinarm.policies.provenance import package_versions, source_commit
+from kinarm.recording import Recording, record_rollouts
+
+
+def record(
+    entrant: Entrant,
+    trials: TrialSet,
+    numbers: Sequence[int] | None = None,
+    *,
+    bounds: OracleSolutions | None = None,
+    allow_other_arm: bool = False,
+) -> list[Recording]:
+    """Let an entrant face trials and keep what it does, state by state.
+
+    Parameters
+    ----------
+    entrant : Entrant
+        The policy, baseline or oracle.
+    trials : TrialSet
+        What it faces.
+    numbers : sequence of int, optional
+        Trials to keep, in this order; all by default.
+    bounds : OracleSolutions, optional
+        What `oracle_bounds` knows about the trials, to show beside what was done.
+    allow_other_arm : bool
+        Whether a policy may face an arm that it was not trained for.
+
+    Raises
+    ------
+    InvalidInputError
+        If there is no trial of such a number.
+    PolicyFileError
+        If the policy was trained for another arm and that is not allowed.
+    """
+    entrant.check(trials.simulator.arm, allow_other_arm=allow_other_arm)
+    made = entrant.policy.provenance.to_json() if entrant.policy else None
+    return record_rollouts(
+        trials.simulator,
+        entrant.run(trials, record=True),
+        entrant.name,
+        numbers,
+        steps_lower_bound=None if bounds is None else lambda n: int(bounds.steps_lower_bound[n]),
+        provenance={
+            "trial_seed": trials.seed,
+            "policy": made,
+            "versions": package_versions(),
+            "commit": source_commit(),
+        },
+    )

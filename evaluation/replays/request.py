@@ -1,0 +1,210 @@
+"""What a replay is asked for."""
+
+import webbrowser
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from kinarm._files import check_output
+from kinarm._validation import whole_number
+from kinarm.errors import InvalidInputError
+from kinarm.problem_options import ProblemOptions
+
+if TYPE_CHECKING:
+    from kinarm.evaluation.replays.candidates import Runs
+    from kinarm.recording import Recording
+    from kinarm.viewer import ReplayPage
+
+PAGE = Path("replay.html")
+SMALLEST = {"trials": 1, "worst": 1, "seed": 0, "port": 1}
+ALTERNATIVES = (("policy", "compare"), ("trial", "worst", "collisions"))
+"""Fields of which one at most can be given."""
+
+NOT_LIVE = ("source", "compare", "trial", "worst", "collisions", "trials", "out", "record")
+NOT_FROM_FILE = ("task", "scene", "tolerance", "horizon", "start_spread", "seed", "trials")
+"""Fields that mean nothing for the live page, and for trials from a file."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReplayRequest(ProblemOptions):
+    """Trials to watch: on a page that plays offline, or live.
+
+    Parameters
+    ----------
+    source : Path
+        File to take trials from: evaluation.json of kinarm-eval, or recordings (.npz).
+    policy : str
+        Shipped policy or recipe (its first seed), random, zero, oracle, or .npz file.
+    compare : tuple of str
+        Two policies on the same trials, the second as a ghost.
+    trial : tuple of int
+        Play this trial; repeatable.
+    worst : int
+        Play so many that ended farthest away.
+    collisions : bool
+        Play the trials that ended in contact.
+    trials : int
+        Trials in all (5; or 200 to choose from).
+    seed : int
+        Seed of the trials (0).
+    allow_other_arm : bool
+        Let policies face an arm that they were not trained for.
+    oracle : bool
+        Show the number of steps proven necessary.
+    out : Path
+        The page to write (replay.html).
+    record : Path
+        Write the recordings as well (.npz).
+    overwrite : bool
+        Replace files that exist.
+    live : bool
+        Serve endless fresh trials to the browser of this machine instead.
+    port : int
+        Port of --live (7000, or the next free one).
+    browser : bool
+        Open the live page in a browser.
+
+    Raises
+    ------
+    InvalidInputError
+        If a number is out of range, or two fields do not go together.
+    """
+
+    source: Path | None = field(default=None, metadata={"flag": "source", "metavar": "FILE"})
+    policy: str | None = field(default=None, metadata={"metavar": "NAME_OR_FILE"})
+    compare: tuple[str, str] | None = field(default=None, metadata={"metavar": ("A", "B")})
+    trial: tuple[int, ...] = field(default=(), metadata={"repeat": True})
+    worst: int | None = None
+    collisions: bool = False
+    trials: int | None = None
+    seed: int | None = None
+    allow_other_arm: bool = False
+    oracle: bool = True
+    out: Path | None = None
+    record: Path | None = None
+    overwrite: bool = False
+    live: bool = False
+    port: int | None = None
+    browser: bool = True
+
+    def __post_init__(self) -> None:
+        for name, smallest in SMALLEST.items():
+            if getattr(self, name) is not None:
+                whole_number(name, getattr(self, name), smallest)
+        for trial in self.trial:
+            whole_number("trial", trial, 0)
+        for names in ALTERNATIVES:
+            given = self._given(names)
+            if len(given) > 1:
+                raise InvalidInputError(f"{given[0]} and {given[1]} exclude each other")
+        if self.port is not None and not self.live:
+            raise InvalidInputError("--port goes with --live")
+        self._refuse("--live", NOT_LIVE if self.live else ())
+        self._refuse("trials from a file", NOT_FROM_FILE if self.source else ())
+        if self.source is not None and self.source.suffix == ".json":
+            self._refuse("trials of an evaluation", ("arm",))
+
+    def _refuse(self, mode: str, names: Sequence[str]) -> None:
+        """Refuse fields that mean nothing in a mode."""
+        for option in self._given(names):
+            raise InvalidInputError(f"{option} does not go with {mode}")
+
+    def _given(self, names: Sequence[str]) -> list[str]:
+        """Options of the fields that are given."""
+        defaults = {item.name: item.default for item in fields(self)}
+        given = (name for name in names if getattr(self, name) != defaults[name])
+        return ["a file" if name == "source" else f"--{name.replace('_', '-')}" for name in given]
+
+    def run(self, report: Callable[[str], object] = lambda _: None) -> "ReplayPage | None":
+        """Write the page, and the recordings if that is asked for; or serve the live page.
+
+        Parameters
+        ----------
+        report : callable
+            Called with lines about what is shown.
+
+        Returns
+        -------
+        ReplayPage or None
+            The page; the live one is served until this is interrupted.
+
+        Raises
+        ------
+        KinarmError
+            If a file, name or number cannot be used, or a file cannot be written.
+        """
+        if self.live:
+            self._serve(report)
+            return None
+        return self._write(report)
+
+    def recordings(self) -> "Runs":
+        """Make or read what is to be played: a list for the policy, or one for each of two.
+
+        Raises
+        ------
+        KinarmError
+            If a file, name or number cannot be used.
+        """
+        from kinarm.evaluation.replays.candidates import find_candidates
+        from kinarm.evaluation.replays.choosing import choose
+
+        return choose(find_candidates(self), self)
+
+    def _write(self, report: Callable[[str], object]) -> "ReplayPage":
+        from rich.console import Console
+
+        from kinarm.recording import save_recordings
+        from kinarm.viewer import replay_page
+
+        out = self.out or PAGE
+        check_output(out, overwrite=self.overwrite)
+        if self.record is not None:
+            check_output(self.record, overwrite=self.overwrite, suffix=".npz")
+        with Console(stderr=True).status("recording; the first run compiles"):
+            runs = self.recordings()
+            page = replay_page(runs[0], ghosts=runs[1] if len(runs) > 1 else ())
+        if self.record is not None:
+            save_recordings(self.record, [recording for run in runs for recording in run])
+        page.save(out)
+        for trial in zip(*runs, strict=True):
+            for recording in trial:
+                report(described(recording))
+        report(f"written: {out}, {len(page.html) / 1e6:.1f} MB, plays offline in any browser")
+        return page
+
+    def _serve(self, report: Callable[[str], object]) -> None:
+        """Serve fresh trials until this is interrupted."""
+        from kinarm.evaluation.replays.candidates import faced_problem, first_entrant
+        from kinarm.evaluation.replays.following import follow
+        from kinarm.simulator import Simulator
+        from kinarm.viewer.live_server import PORT, LiveServer
+
+        entrant = first_entrant(self.policy)
+        simulator = Simulator(faced_problem([entrant], self))
+        entrant.check(simulator.arm, allow_other_arm=self.allow_other_arm)
+        wanted = self.port or PORT
+        with LiveServer(wanted) as server:
+            if server.port != wanted:
+                report(f"port {wanted} is in use: taking {server.port}")
+            report(f"{entrant.name} at {server.address} (stop with Ctrl-C)")
+            if self.browser:
+                webbrowser.open(server.address)
+            for recording in follow(server, entrant, simulator, self.seed or 0):
+                report(described(recording))
+
+
+def described(recording: "Recording") -> str:
+    """One line about a recording."""
+    ending = {
+        "success": "reached the goal",
+        "collision": " touches ".join(recording.contact or ("something",)),
+        "truncated": "out of time",
+    }[recording.outcome]
+    floor = recording.steps_lower_bound
+    necessary = f" ({floor} proven necessary)" if floor is not None else ""
+    return (
+        f"{recording.problem.name} {recording.trial}, {recording.policy}: {ending} after "
+        f"{recording.steps} steps{necessary}, {recording.final_distance:.3f} m from the goal"
+    )

@@ -1,0 +1,213 @@
+"""Maps of the goal regions from above, which tell where policies fail.
+
+They are a template of the page: every marker carries its own words, colour and shape, and they
+are to scale, which leaves nothing for a plotting library to work out.
+"""
+
+from collections.abc import Iterable
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.evaluation.report.groups import Group, ProblemResults
+from kinarm.scene import GoalRegion, Obstacle
+
+SCALE = 200
+"""Units of the SVG to a metre."""
+
+MARGIN = 0.07
+"""Beside the outermost region and the arm's base [m]."""
+
+BASE_RADIUS = 0.1
+"""Of the circle that stands for the arm [m]."""
+
+MARKERS = 1000
+"""Trials of which a map shows markers, the first ones; the figures beside them count all."""
+
+SLICES = 10
+"""Of a region, along x, whose failures are counted."""
+
+BAR_OFFSET, BAR_LENGTH = 0.02, 0.25
+"""Where the bars of failures begin beside the region, and the length of 100 % [m]."""
+
+AXIS_LENGTH = 0.2
+"""Of the world axes [m]."""
+
+LEVELS = 6
+"""Colours of distances: within the tolerance, and twice the distance from one to the next."""
+
+OUTCOMES = {"success": "reached", "truncated": "out of steps", "collision": "contact"}
+"""How outcomes are called on the page."""
+
+SYMBOLS = {
+    "success": "m-3,0a3,3 0 1,0 6,0a3,3 0 1,0 -6,0z",
+    "truncated": "m-2.8,-2.8h5.6v5.6h-5.6z",
+    "collision": "m0,-4.2l1.3,2.9l2.9,1.3l-2.9,1.3l-1.3,2.9l-1.3,-2.9l-2.9,-1.3l2.9,-1.3z",
+}
+"""Paths of the markers about their centre, by outcome."""
+
+
+class View(NamedTuple):
+    """What a map shows of the world, seen from above: x points up and y to the left.
+
+    Attributes
+    ----------
+    x, y : tuple of float
+        Lower and upper bound [m].
+    """
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+
+    @classmethod
+    def of(cls, regions: Iterable[GoalRegion]) -> "View":
+        """Show some regions, the arm's base and the axes with their names."""
+        corners = [(-BASE_RADIUS,) * 2, (AXIS_LENGTH + MARGIN,) * 2]
+        corners += [corner[:2] for region in regions for corner in (region.lower, region.upper)]
+        low, high = np.min(corners, axis=0) - MARGIN, np.max(corners, axis=0) + MARGIN
+        return cls((float(low[0]), float(high[0])), (float(low[1]), float(high[1])))
+
+    def shows(self, box: Obstacle | GoalRegion) -> bool:
+        """Whether some of a box is in view."""
+        return all(box.lower[k] < high and low < box.upper[k] for k, (low, high) in enumerate(self))
+
+    def across(self, y: float) -> float:
+        """Where a y [m] lies in the SVG, from the left."""
+        return (self.y[1] - y) * SCALE
+
+    def down(self, x: float) -> float:
+        """Where an x [m] lies in the SVG, from the top."""
+        return (self.x[1] - x) * SCALE
+
+    def failure_bars(self, region: GoalRegion) -> tuple[float, float]:
+        """Where bars beside a region begin, and how far 100 % reaches, towards the arm."""
+        right, left = region.lower[1], region.upper[1]
+        inner, inward = (right, 1) if right + left > 0 else (left, -1)
+        return self.across(inner - inward * BAR_OFFSET), inward * BAR_LENGTH * SCALE
+
+
+class Fate(NamedTuple):
+    """What became of one trial in the hands of one or several training seeds.
+
+    Attributes
+    ----------
+    reached : int
+        How many seeds reached the goal.
+    distance : float
+        Mean of the final distances [m].
+    outcome : str
+        ``"collision"`` if any seed touched something, else ``"truncated"`` if any ran out of
+        steps, else ``"success"``.
+    """
+
+    reached: int
+    distance: float
+    outcome: str
+
+
+def fates(group: Group) -> tuple[Fate, ...]:
+    """What became of each trial in the hands of a group."""
+    success = np.array([member.rollouts.success for member in group.members])
+    collision = np.array([member.rollouts.collision for member in group.members])
+    outcomes = np.where(
+        collision.any(axis=0), "collision", np.where(success.all(axis=0), "success", "truncated")
+    )
+    columns = (success.sum(axis=0), group.distances.mean(axis=0), outcomes)
+    return tuple(
+        Fate(int(reached), float(distance), str(outcome))
+        for reached, distance, outcome in zip(*columns, strict=True)
+    )
+
+
+def level(distance: float, tolerance: float) -> int:
+    """Which of the `LEVELS` colours a distance [m] gets."""
+    if distance <= tolerance:
+        return 0
+    return min(int(np.ceil(np.log2(distance / tolerance) - 1e-12)), LEVELS - 1)
+
+
+class Marker(NamedTuple):
+    """A goal on a map.
+
+    Attributes
+    ----------
+    path : str
+        Where it lies, and its shape.
+    level : int
+        Its colour.
+    title : str
+        What is said where the pointer is.
+    """
+
+    path: str
+    level: int
+    title: str
+
+
+def markers(results: ProblemResults, group: Group) -> list[Marker]:
+    """Goals of a problem by how a group did, the worst last, on top."""
+    view, shown = View.of(results.goal_regions), fates(group)[:MARKERS]
+    goals, seeds = group.members[0].trials.goals, len(group.members)
+    order = np.argsort([fate.distance for fate in shown], kind="stable").tolist()
+    return [
+        Marker(
+            f"M{view.across(goals[trial, 1]):.1f},{view.down(goals[trial, 0]):.1f}"
+            + SYMBOLS[shown[trial].outcome],
+            level(shown[trial].distance, results.tolerance),
+            _marker_title(trial, goals[trial], shown[trial], seeds),
+        )
+        for trial in order
+    ]
+
+
+def _marker_title(trial: int, goal: NDArray[np.float64], fate: Fate, seeds: int) -> str:
+    place = f"trial {trial}, goal ({goal[0]:.2f}, {goal[1]:.2f})"
+    if seeds == 1:
+        return f"{place}: {fate.distance:.3f} m, {OUTCOMES[fate.outcome]}"
+    return f"{place}: {fate.reached} of {seeds} seeds reached it, mean {fate.distance:.3f} m"
+
+
+def failure_shares(
+    group: Group, region: GoalRegion
+) -> list[tuple[tuple[float, float], float | None]]:
+    """Share of trials that did not succeed, in slices of a region along x, all seeds alike.
+
+    Parameters
+    ----------
+    group : Group
+        Whose trials.
+    region : GoalRegion
+        The region.
+
+    Returns
+    -------
+    list of tuple
+        Ends of each slice [m], ascending, and its share; None where no goal lies.
+    """
+    goals = group.members[0].trials.goals
+    failed = 1 - np.mean([member.rollouts.success for member in group.members], axis=0)
+    inside = ((region.lower <= goals) & (goals <= region.upper)).all(axis=1)
+    slices = np.linspace(region.lower[0], region.upper[0], SLICES + 1)
+    places = np.clip(np.searchsorted(slices, goals[:, 0], side="right") - 1, 0, SLICES - 1)
+    rows = [inside & (places == place) for place in range(SLICES)]
+    shares = [float(failed[row].mean()) if row.any() else None for row in rows]
+    return list(zip(pairwise(slices.tolist()), shares, strict=True))
+
+
+def description(results: ProblemResults, group: Group) -> str:
+    """What a map shows, for those who cannot see it."""
+    outcomes = [fate.outcome for fate in fates(group)]
+    every = " by every training seed" if len(group.members) > 1 else ""
+    reached = outcomes.count("success")
+    return (
+        f"{group.name} on {results.name}: of {len(outcomes)} goals, {reached} were reached{every}"
+    )
+
+
+def level_ranges(results: ProblemResults) -> list[str]:
+    """Ranges of distances [m] that the colours stand for."""
+    bounds = [f"{results.tolerance * 2**step:g}" for step in range(LEVELS - 1)]
+    between = [f"{low}\N{EN DASH}{high}" for low, high in pairwise(bounds)]
+    return [f"≤ {bounds[0]}", *between, f"> {bounds[-1]}"]

@@ -1,0 +1,139 @@
+"""The page as a whole."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from kinarm._files import check_folder, write_text
+from kinarm.evaluation.evaluation import Evaluation
+from kinarm.evaluation.metrics import METRICS
+from kinarm.evaluation.report import maps
+from kinarm.evaluation.report.charts import histogram_chart, profile_chart
+from kinarm.evaluation.report.groups import ProblemResults, group_results
+from kinarm.evaluation.report.worst import record_worst, worst_row, worst_trials
+from kinarm.evaluation.table import SPREAD_PRIORITY, Column, metric_cell, metric_columns
+from kinarm.viewer import replay_page
+
+if TYPE_CHECKING:
+    from jinja2 import Template
+
+
+REPORT_PRIORITY = SPREAD_PRIORITY
+"""Priority of the least important columns that the page shows; see `Metric.priority`."""
+
+
+def write_report(
+    folder: str | Path, document: dict[str, Any], evaluations: Sequence[Evaluation]
+) -> Path:
+    """Write the report of an evaluation as ``index.html``.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Where to; it is created if it is missing.
+    document, evaluations
+        As for `report_page`.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
+    """
+    check_folder(folder)
+    path = Path(folder) / "index.html"
+    write_text(path, report_page(document, evaluations))
+    return path
+
+
+def report_page(document: dict[str, Any], evaluations: Sequence[Evaluation]) -> str:
+    """The report of an evaluation: one HTML page that fetches nothing.
+
+    It holds the table with its intervals drawn, performance profiles, histograms, maps of the
+    benches, the worst trials and how everything was made. Equal input gives equal text.
+
+    Parameters
+    ----------
+    document : dict
+        What `evaluation_document` made of the evaluations.
+    evaluations : sequence of Evaluation
+        Made with one trial set per problem.
+
+    Raises
+    ------
+    InvalidInputError
+        If the document was made of others, or two of them cannot be told apart.
+    """
+    problems = group_results(document, evaluations)
+    chosen = [worst_trials(results) for results in problems]
+    recordings = record_worst([worst for each in chosen for worst in each])
+    return page_template().render(
+        title=_title(problems),
+        subtitle=_subtitle(document["protocol"], problems),
+        protocol=document["protocol"],
+        problems=problems,
+        columns=metric_columns(),
+        worst=[
+            (results, [worst_row(results, worst) for worst in each])
+            for results, each in zip(problems, chosen, strict=True)
+        ],
+        replay=replay_page(recordings).html,
+    )
+
+
+def page_template() -> "Template":
+    """The template of the page, with what it calls."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader(__package__),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
+    environment.filters.update(
+        tenth=lambda length: f"{length:.1f}".removesuffix(".0"),
+        percent=lambda share: f"{100 * share:.1f} %",
+        dashes=lambda text: text.replace("..", "\N{EN DASH}"),
+        zip=zip,
+    )
+    environment.globals.update(
+        maps=maps,
+        success_cell=lambda row: metric_cell("success", METRICS["success"], row),
+        profile_chart=profile_chart,
+        histogram_chart=histogram_chart,
+        shown_columns=shown_columns,
+    )
+    return environment.get_template("page.html")
+
+
+def shown_columns(results: ProblemResults) -> list[Column]:
+    """Columns that the page shows of a problem: the important ones that have something to say."""
+    return [
+        column
+        for column in metric_columns()
+        if column.priority >= REPORT_PRIORITY
+        and any(column.cell(group.row).value for group in results.groups)
+    ]
+
+
+def _title(problems: Sequence[ProblemResults]) -> str:
+    """The policy that was evaluated, or how many there were."""
+    groups = [group for results in problems for group in results.contenders]
+    names = {group.name for group in groups}
+    if len(names) == 1:
+        return names.pop()
+    members = {member.entrant.name for group in groups for member in group.members}
+    return f"{len(members)} policies" if groups[0].is_policy else " and ".join(sorted(names))
+
+
+def _subtitle(protocol: dict[str, Any], problems: Sequence[ProblemResults]) -> str:
+    """What was faced, in a line."""
+    faced = f"problem {problems[0].name}" if len(problems) == 1 else f"{len(problems)} problems"
+    arms = " and ".join(dict.fromkeys(results.arm.name for results in problems))
+    return f"{faced} · {protocol['trials']} trials each · arm {arms} · seed {protocol['seed']}"

@@ -1,0 +1,125 @@
+"""The worst trials of each policy, which the page lists and replays."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from kinarm.evaluation.evaluation import Evaluation
+from kinarm.evaluation.replays.recorder import record
+from kinarm.evaluation.report.groups import Group, ProblemResults
+from kinarm.evaluation.report.maps import OUTCOMES
+from kinarm.recording import Recording
+
+BEST_GROUPS = 4
+"""Groups of a problem whose worst trials are shown."""
+
+TRIALS = 9
+"""Trials that the groups of a problem share, but at least `AT_LEAST` each."""
+
+AT_LEAST = 3
+
+
+class WorstTrial(NamedTuple):
+    """A trial that went badly.
+
+    Attributes
+    ----------
+    group : Group
+        Whose it was.
+    evaluation : Evaluation
+        Which training seed's.
+    trial : int
+        Its number.
+    """
+
+    group: Group
+    evaluation: Evaluation
+    trial: int
+
+
+def worst_trials(results: ProblemResults) -> tuple[WorstTrial, ...]:
+    """Choose the worst trials of the best groups of a problem: failures first, the farthest first.
+
+    Parameters
+    ----------
+    results : ProblemResults
+        The problem.
+    """
+    groups = results.contenders[:BEST_GROUPS]
+    share = max(AT_LEAST, TRIALS // len(groups))
+    return tuple(found for group in groups for found in _worst_of(group, share))
+
+
+def _worst_of(group: Group, count: int) -> list[WorstTrial]:
+    ranked = sorted(
+        (bool(success), -float(distance), seed, trial)
+        for seed, member in enumerate(group.members)
+        for trial, (success, distance) in enumerate(
+            zip(member.rollouts.success, member.rollouts.distance, strict=True)
+        )
+    )
+    return [WorstTrial(group, group.members[seed], trial) for *_, seed, trial in ranked[:count]]
+
+
+def worst_row(results: ProblemResults, worst: WorstTrial) -> dict[str, Any]:
+    """What the page says of a trial: its policy, and figures by their headings."""
+    rollouts, trial = worst.evaluation.rollouts, worst.trial
+    figures = {
+        "trial": f"{trial}",
+        "distance m": f"{rollouts.distance[trial]:.3f}",
+        "outcome": describe_outcome(worst),
+        "steps": f"{rollouts.steps[trial]}",
+    }
+    if results.entry["oracle"]:
+        figures["oracle"] = oracle_steps(results, trial)
+    return {
+        "policy": worst.evaluation.entrant.name,
+        "style": worst.group.style,
+        "trial": trial,
+        "figures": figures,
+    }
+
+
+def describe_outcome(worst: WorstTrial) -> str:
+    """How a trial ended, and what touched what."""
+    outcome = worst.evaluation.outcomes[worst.trial]
+    pair = worst.evaluation.contacts[worst.trial]
+    return f"{OUTCOMES[outcome]}: {pair[0]} \N{EN DASH} {pair[1]}" if pair else OUTCOMES[outcome]
+
+
+def oracle_steps(results: ProblemResults, trial: int) -> str:
+    """Steps of the oracle's motion, and how many are proven to be necessary if they are fewer."""
+    bounds = results.entry["oracle"]["trials"]
+    if not bounds["reachable"][trial]:
+        return "not reached"
+    steps, proven = bounds["steps"][trial], bounds["steps_lower_bound"][trial]
+    return f"{steps}" if steps == proven else f"{steps}, proven ≥ {proven}"
+
+
+def record_worst(chosen: Sequence[WorstTrial]) -> list[Recording]:
+    """Let policies face the trials again and keep what they do, state by state.
+
+    Parameters
+    ----------
+    chosen : sequence of WorstTrial
+        The trials.
+
+    Returns
+    -------
+    list of Recording
+        One for each, in the same order.
+    """
+    numbers: dict[Evaluation, list[int]] = {}
+    for worst in chosen:
+        numbers.setdefault(worst.evaluation, []).append(worst.trial)
+    recordings = {
+        (evaluation, recording.trial): recording
+        for evaluation, trials in numbers.items()
+        for recording in record(
+            evaluation.entrant,
+            evaluation.trials,
+            trials,
+            bounds=evaluation.bounds,
+            allow_other_arm=True,  # it was checked when the evaluation was made
+        )
+    }
+    return [recordings[worst.evaluation, worst.trial] for worst in chosen]

@@ -1,0 +1,176 @@
+"""The table of an evaluation, for terminals, Markdown and reports."""
+
+import io
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+from kinarm.evaluation.metrics import ALWAYS, METRICS, Metric
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+SPREAD_PRIORITY = 5
+"""Priority of the columns with ranges over training seeds; see `Metric.priority`."""
+
+
+class Cell(NamedTuple):
+    """A figure as text.
+
+    Attributes
+    ----------
+    value : str
+        The figure; empty if there is none.
+    beside : str
+        Its interval, or whatever else is shown with it.
+    """
+
+    value: str = ""
+    beside: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.value} ({self.beside})" if self.beside else self.value
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the table.
+
+    Attributes
+    ----------
+    heading : str
+        What stands above it.
+    meaning : str
+        What its figures mean.
+    priority : float
+        Columns of low priority are left out first.
+    cell : callable
+        From a row of the document to what the column says of it.
+    """
+
+    heading: str
+    meaning: str
+    priority: float
+    cell: Callable[[dict[str, Any]], Cell]
+
+
+def metric_columns() -> list[Column]:
+    """Columns of the `METRICS` that have a heading."""
+    columns = []
+    for name, metric in METRICS.items():
+        if metric.heading:
+            cell = partial(metric_cell, name, metric)
+            columns.append(Column(metric.heading, metric.meaning, metric.priority, cell))
+        if metric.spread_heading:
+            meaning = f"range over training seeds, and their number: {metric.meaning}"
+            cell = partial(spread_cell, name, metric)
+            columns.append(Column(metric.spread_heading, meaning, SPREAD_PRIORITY, cell))
+    return columns
+
+
+def metric_cell(name: str, metric: Metric, row: dict[str, Any]) -> Cell:
+    """What a row of the document says of a metric."""
+    estimate = row["metrics"][name]
+    if estimate["value"] is None:
+        return Cell()
+    beside = ""
+    if metric.shows_interval and estimate["ci95"]:
+        beside = metric.write_range(*estimate["ci95"])
+    if metric.beside:
+        label, other = metric.beside
+        beside = f"{label} {METRICS[other].write(row['metrics'][other]['value'])}"
+    return Cell(metric.write(estimate["value"]), beside)
+
+
+def spread_cell(name: str, metric: Metric, row: dict[str, Any]) -> Cell:
+    """What a row of the document says of a metric's range over training seeds, if there are."""
+    spread = row.get("spread", {}).get(name)
+    if spread is None:
+        return Cell()
+    return Cell(metric.write_range(spread["min"], spread["max"]), f"{len(spread['each'])} seeds")
+
+
+def text_column(key: str) -> Column:
+    """Column of something that a row of the document says in words."""
+    return Column(key, "", ALWAYS, lambda row: Cell(row[key]))
+
+
+def print_table(document: dict[str, Any], console: "Console", *, markdown: bool = False) -> None:
+    """Print the figures of a document, without the less important columns if space is scarce.
+
+    Parameters
+    ----------
+    document : dict
+        What `evaluation_document` returned.
+    console : rich.console.Console
+        Where to print.
+    markdown : bool
+        Whether to print Markdown, always with all columns.
+    """
+    columns = [text_column("problem"), text_column("policy"), *metric_columns()]
+    if markdown:
+        from rich.console import Console
+
+        text = io.StringIO()
+        Console(file=text, width=1000).print(evaluation_table(document, columns, markdown=True))
+        console.out(text.getvalue().strip(), highlight=False)
+        return
+    expendable = sorted((c for c in columns if c.priority < ALWAYS), key=lambda c: c.priority)
+    unbounded = console.options.update(width=1000)
+    for count in range(len(expendable) + 1):
+        left_out = expendable[:count]
+        table = evaluation_table(document, [c for c in columns if c not in left_out])
+        if console.measure(table, options=unbounded).maximum <= console.width:
+            break
+    console.print(table)
+    if left_out:
+        headings = ", ".join(column.heading for column in left_out)
+        console.print(f"left out for want of width: {headings}; --markdown prints all", style="dim")
+
+
+def evaluation_table(
+    document: dict[str, Any], columns: Sequence[Column], *, markdown: bool = False
+) -> "Table":
+    """The figures of a document as a table; several training seeds share a row.
+
+    Parameters
+    ----------
+    document : dict
+        What `evaluation_document` returned.
+    columns : sequence of Column
+        What it shows.
+    markdown : bool
+        Whether the table is to be printed as Markdown.
+    """
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.MARKDOWN if markdown else box.HEAVY_HEAD, header_style="bold")
+    for column in columns:
+        side: Literal["left", "right"] = "right" if column.meaning else "left"
+        table.add_column(column.heading, justify=side, no_wrap=True)
+    for problem in document["protocol"]["problems"]:
+        if not markdown:
+            table.add_section()
+        for row in table_rows(document, problem):
+            table.add_row(*(str(column.cell(row)) for column in columns))
+    return table
+
+
+def table_rows(document: dict[str, Any], problem: str) -> list[dict[str, Any]]:
+    """Pooled results of a problem and the results that are not part of them, best first.
+
+    Parameters
+    ----------
+    document : dict
+        What `evaluation_document` returned.
+    problem : str
+        Name of one of its problems.
+    """
+    pooled = [row for row in document["pooled"] if row["problem"] == problem]
+    members = {name for row in pooled for name in row["members"]}
+    single = [row for row in document["results"] if row["problem"] == problem]
+    rows = pooled + [row for row in single if row["policy"] not in members]
+    return sorted(rows, key=lambda row: -row["metrics"]["success"]["value"])

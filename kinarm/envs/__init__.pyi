@@ -1,0 +1,2 @@
+from .reach import ReachEnv as ReachEnv
+from .vector import ReachVectorEnv as ReachVectorEnv

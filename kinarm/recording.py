@@ -1,0 +1,265 @@
+"""Recordings: what an arm did in one trial, state by state, in files without pickle."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm._archive import Archive, load_archive, reading, save_archive
+from kinarm._validation import finite_array, whole_number
+from kinarm.errors import InvalidInputError, RecordingFileError
+from kinarm.problem import ReachProblem
+from kinarm.rollouts import Rollouts
+from kinarm.simulator import Simulator
+
+KIND, FORMAT_VERSION = "recording", 2
+OUTCOMES = ("success", "collision", "truncated")
+ARRAYS = ("states", "distances", "goal", "refused", "contact_point")
+"""Fields of a `Recording` that are stored as arrays."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Recording:
+    """What an arm did in one trial. Arrays are copied and read-only.
+
+    Parameters
+    ----------
+    policy : str
+        Name of what drove the arm.
+    problem : ReachProblem
+        What was faced, with the hash of its arm.
+    trial : int
+        Number of the trial in its set.
+    states : ndarray, shape (steps + 1, n_axes)
+        Configurations, from the start to the end [rad or m].
+    distances : ndarray, shape (steps + 1,)
+        Distance from the tool to the goal at each of them [m].
+    goal : ndarray, shape (3,)
+        Goal position [m].
+    outcome : str
+        ``"success"``, ``"collision"`` or ``"truncated"``.
+    contact : tuple of str, optional
+        The two bodies that would have touched, if the last move was refused.
+    contact_point : ndarray, shape (3,), optional
+        Where they would have touched [m].
+    refused : ndarray, shape (n_axes,), optional
+        The first configuration of the refused move at which they touch [rad or m].
+    steps_lower_bound : int, optional
+        Proven: no motion reaches the goal in fewer steps.
+    provenance : dict
+        Where it comes from, in terms that JSON can hold.
+
+    Raises
+    ------
+    InvalidInputError
+        If shapes do not fit together, an entry is not finite or the outcome is unknown.
+    """
+
+    policy: str
+    problem: ReachProblem
+    trial: int
+    states: NDArray[np.float64]
+    distances: NDArray[np.float64]
+    goal: NDArray[np.float64]
+    outcome: str
+    contact: tuple[str, str] | None = None
+    contact_point: NDArray[np.float64] | None = None
+    refused: NDArray[np.float64] | None = None
+    steps_lower_bound: int | None = None
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.outcome not in OUTCOMES:
+            raise InvalidInputError(f"outcome must be one of {OUTCOMES}, got {self.outcome!r}")
+        whole_number("trial", self.trial, 0)
+        states = finite_array("states", self.states, (None, None))
+        horizon = self.problem.task.horizon
+        if not 1 <= len(states) <= horizon + 1:
+            raise InvalidInputError(
+                f"states must be 1 to {horizon + 1} for a horizon of {horizon}, got {len(states)}"
+            )
+        shapes = {
+            "states": states.shape,
+            "distances": (len(states),),
+            "goal": (3,),
+            "refused": states.shape[1:],
+            "contact_point": (3,),
+        }
+        for name, shape in shapes.items():
+            value = getattr(self, name)
+            if value is not None:
+                value = finite_array(name, value, shape)
+                value.flags.writeable = False
+                object.__setattr__(self, name, value)
+
+    def __repr__(self) -> str:
+        return (
+            f"Recording({self.policy} in trial {self.trial} of {self.problem.name}: "
+            f"{self.outcome} after {self.steps} steps)"
+        )
+
+    @property
+    def steps(self) -> int:
+        """Steps taken, a refused one included."""
+        return len(self.states) - 1
+
+    @property
+    def final_distance(self) -> float:
+        """Distance from the tool to the goal at the end [m]."""
+        return float(self.distances[-1])
+
+    def same_trial(self, other: "Recording") -> bool:
+        """Whether another recording has the same start and goal."""
+        return np.array_equal(self.goal, other.goal) and np.array_equal(
+            self.states[0], other.states[0]
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write this recording alone to an ``.npz`` file; see `save_recordings`.
+
+        Raises
+        ------
+        OutputError
+            If the file cannot be written.
+        """
+        save_recordings(path, [self])
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Recording":
+        """Read the recording of a file that holds one.
+
+        Raises
+        ------
+        RecordingFileError
+            If the file cannot be used, or holds several.
+        """
+        recordings = load_recordings(path)
+        if len(recordings) != 1:
+            raise RecordingFileError(
+                f"{str(path)!r} holds {len(recordings)} recordings: load_recordings reads them all"
+            )
+        return recordings[0]
+
+
+def save_recordings(path: str | Path, recordings: Sequence[Recording]) -> None:
+    """Write recordings to an ``.npz`` file, without pickle.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written; an existing file is then left as it was.
+    """
+    problems = list(dict.fromkeys(each.problem for each in recordings))
+    names = [item.name for item in fields(Recording) if item.name not in (*ARRAYS, "problem")]
+    header = {
+        "problems": [problem.to_json() for problem in problems],
+        "recordings": [
+            {name: getattr(each, name) for name in names}
+            | {"problem": problems.index(each.problem)}
+            for each in recordings
+        ],
+    }
+    values = {
+        f"{name}_{number}": getattr(each, name)
+        for number, each in enumerate(recordings)
+        for name in ARRAYS
+    }
+    arrays = {name: value for name, value in values.items() if value is not None}
+    save_archive(path, KIND, FORMAT_VERSION, arrays, header, compress=True)
+
+
+def load_recordings(path: str | Path) -> list[Recording]:
+    """Read what `save_recordings` wrote.
+
+    Raises
+    ------
+    RecordingFileError
+        If the file is missing, truncated, something else, or written by another version.
+    """
+    archive = load_archive(path, KIND, FORMAT_VERSION, RecordingFileError)
+    with reading(repr(str(path)), KIND, RecordingFileError):
+        return _recordings(archive)
+
+
+def _recordings(archive: Archive) -> list[Recording]:
+    """Rebuild recordings from what a file holds."""
+    header, recordings = archive.header, []
+    problems = [ReachProblem.from_json(entries) for entries in header["problems"]]
+    for number, entries in enumerate(header["recordings"]):
+        given = {**entries, "problem": problems[entries["problem"]]}
+        given |= {name: archive.arrays.get(f"{name}_{number}") for name in ARRAYS}
+        if given["contact"] is not None:
+            given["contact"] = tuple(given["contact"])
+        recordings.append(Recording(**given))
+    return recordings
+
+
+def record_rollouts(
+    simulator: Simulator,
+    rollouts: Rollouts,
+    policy: str,
+    numbers: Sequence[int] | None = None,
+    *,
+    steps_lower_bound: Callable[[int], int] | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> list[Recording]:
+    """Turn rollouts into recordings.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        Where the rollouts took place.
+    rollouts : Rollouts
+        Made with ``record=True``.
+    policy : str
+        Name of what drove the arm.
+    numbers : sequence of int, optional
+        Which rollouts; all by default. A rollout's number becomes that of the trial.
+    steps_lower_bound : callable, optional
+        Gives the proven number of steps of a trial.
+    provenance : dict, optional
+        Where they come from, in terms that JSON can hold.
+
+    Raises
+    ------
+    InvalidInputError
+        If the rollouts were made without ``record=True``, or have no such number.
+    """
+    if rollouts.paths.size == 0:
+        raise InvalidInputError("these rollouts kept no configurations: make them with record=True")
+    world, problem = simulator.world, simulator.problem.pinned
+    recordings = []
+    for number in range(len(rollouts)) if numbers is None else numbers:
+        if number not in range(len(rollouts)):
+            raise InvalidInputError(f"no trial {number}: there are 0 to {len(rollouts) - 1}")
+        states = rollouts.paths[number, : rollouts.steps[number] + 1]
+        goal = rollouts.goals[number]
+        touch = None
+        if rollouts.collision[number]:
+            touch = world.contact(rollouts.configurations[number], rollouts.targets[number])
+        recordings.append(
+            Recording(
+                policy=policy,
+                problem=problem,
+                trial=int(number),
+                states=states,
+                distances=world.distances(states, np.tile(goal, (len(states), 1))),
+                goal=goal,
+                outcome=_outcome(rollouts, number),
+                contact=touch.pair if touch else None,
+                contact_point=touch.point if touch else None,
+                refused=touch.configuration if touch else None,
+                steps_lower_bound=steps_lower_bound(number) if steps_lower_bound else None,
+                provenance=dict(provenance or {}),
+            )
+        )
+    return recordings
+
+
+def _outcome(rollouts: Rollouts, number: int) -> str:
+    if rollouts.success[number]:
+        return "success"
+    return "collision" if rollouts.collision[number] else "truncated"

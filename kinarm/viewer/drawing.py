@@ -1,0 +1,213 @@
+"""Draw an arm and its scene into a Meshcat window: a page in the making, or a live one."""
+
+from collections import defaultdict
+
+import numpy as np
+import umsgpack
+from meshcat import Visualizer
+from meshcat.geometry import Geometry, LineBasicMaterial, LineSegments, Material, Object
+from meshcat.geometry import Mesh as DrawnMesh
+from numpy.typing import NDArray
+
+from kinarm.arm import Arm
+from kinarm.problem import ReachProblem
+from kinarm.recording import Recording
+from kinarm.scene import GoalRegion, Obstacle, Scene
+from kinarm.viewer.arm_shapes import arm_parts
+from kinarm.viewer.meshes import Mesh, box, capsule, cylinder, tube
+from kinarm.viewer.parts import Finish
+
+OUTCOME_COLOURS = {"success": 0x0072B2, "collision": 0xD55E00, "truncated": 0xE69F00}
+"""Distinguishable with any colour vision (Okabe and Ito)."""
+
+FLOOR = Finish(0xE9ECEF, roughness=0.95)
+OBSTACLE = Finish(0xB4BCC6, roughness=0.8)
+GOAL_SLAB = Finish(0xCBD2DA, roughness=0.7)
+CUBE = Finish(0x009E73, roughness=0.5)
+HALO = Finish(0x009E73, opacity=0.16, glow=True)
+FLASH = Finish(OUTCOME_COLOURS["collision"], opacity=0.5, glow=True)
+GRID_COLOUR = 0xC6CCD3
+BACKGROUND = [0.93, 0.945, 0.96]
+
+FLOOR_RADIUS, GRID_RADIUS, GRID_STEP = 12.0, 2.0, 0.25
+SLAB_THICKNESS = 0.02
+"""Thickness of the slab that covers an obstacle on which goals lie [m]."""
+
+TRACE_RADIUS = 0.0042
+TRACE_SIDES = 6
+
+SUN_PLACE = [-2.0, -1.0, 3.4]
+CLUTTER = ("/Axes", "/Grid", "/Lights/PointLightPositiveX", "/Lights/PointLightNegativeX")
+"""What Meshcat shows by default and a replay does not."""
+DIMMED = {"/Lights/AmbientLight/<object>": 0.42, "/Lights/FillLight/<object>": 0.2}
+CAMERA = {"fov": 32, "position": [-2.4, 1.6, 1.9]}
+"""In the frame of three.js, whose y axis points up."""
+
+
+class _BufferGeometry(Geometry):
+    """Points with attributes, in as few bytes as three.js reads; triangles if there are faces."""
+
+    def __init__(
+        self, faces: NDArray[np.int64] | None = None, **attributes: NDArray[np.generic]
+    ) -> None:
+        super().__init__()
+        self.data: dict[str, object] = {
+            "attributes": {name: _typed_array(array, 3) for name, array in attributes.items()}
+        }
+        if faces is not None:
+            self.data["index"] = _typed_array(faces.astype(np.uint32), 1)
+
+    def lower(self, _: dict[str, object]) -> dict[str, object]:
+        """Describe it to three.js."""
+        return {"uuid": self.uuid, "type": "BufferGeometry", "data": self.data}
+
+
+class _FinishMaterial(Material):
+    """A finish as a material."""
+
+    def __init__(self, finish: Finish) -> None:
+        super().__init__()
+        self.finish = finish
+
+    def lower(self, _: dict[str, object]) -> dict[str, object]:
+        """Describe it to three.js."""
+        look = self.finish
+        described = {"uuid": self.uuid, "color": look.colour, "opacity": look.opacity}
+        if look.opacity < 1:
+            described |= {"transparent": True, "depthWrite": False}
+        if look.glow:
+            return described | {"type": "MeshBasicMaterial"}
+        shine = {"roughness": look.roughness, "metalness": look.metalness}
+        return described | shine | {"type": "MeshStandardMaterial"}
+
+
+class _Sun(Object):
+    """A light from afar that casts shadows."""
+
+    def __init__(self) -> None:
+        super().__init__(None, None)
+
+    def lower(self) -> dict[str, object]:
+        """Describe it to three.js."""
+        sides = {"left": -1.7, "right": 1.7, "top": 1.7, "bottom": -1.7, "near": 0.5, "far": 8.0}
+        shadow = {"mapSize": [2048, 2048], "bias": -0.0004, "normalBias": 0.004, "radius": 3}
+        camera = {"uuid": f"{self.uuid}-camera", "type": "OrthographicCamera", "zoom": 1, **sides}
+        light = {
+            "uuid": self.uuid,
+            "type": "DirectionalLight",
+            "color": 0xFFF6E8,
+            "intensity": 0.5,
+        }
+        return {"object": {**light, "shadow": {**shadow, "camera": camera}}}
+
+
+CODES = {
+    "float32": ("Float32Array", 0x17),
+    "int8": ("Int8Array", 0x11),
+    "uint32": ("Uint32Array", 0x16),
+}
+
+
+def _typed_array(array: NDArray[np.generic], size: int) -> dict[str, object]:
+    name, code = CODES[array.dtype.name]
+    data = umsgpack.Ext(code, np.ascontiguousarray(array).tobytes())
+    return {"itemSize": size, "type": name, "array": data, "normalized": name == "Int8Array"}
+
+
+def put(window: Visualizer, finish: Finish, *meshes: Mesh) -> None:
+    """Show meshes with one finish."""
+    vertices, normals, faces = Mesh.joined(meshes).with_normals()
+    position, normal = vertices.astype(np.float32), np.round(127 * normals).astype(np.int8)
+    geometry = _BufferGeometry(faces, position=position, normal=normal)
+    window.set_object(DrawnMesh(geometry, _FinishMaterial(finish)))
+
+
+def draw_surroundings(window: Visualizer, scene: Scene) -> None:
+    """Lights, floor with a grid, and obstacles."""
+    for path in CLUTTER:
+        window[path].set_property("visible", False)
+    for path, intensity in DIMMED.items():
+        window[path].set_property("intensity", intensity)
+    for end in ("top_color", "bottom_color"):
+        window["/Background"].set_property(end, BACKGROUND)
+    window["sun"].set_object(_Sun())
+    window["sun"]["<object>"].set_property("position", SUN_PLACE)
+    if scene.ground:
+        put(window["floor"], FLOOR, cylinder(0.002, FLOOR_RADIUS, 0.0).moved((0, 0, -0.002)))
+        grid = _BufferGeometry(position=_grid_lines().astype(np.float32))
+        window["grid"].set_object(LineSegments(grid, LineBasicMaterial(color=GRID_COLOUR)))
+    for number, obstacle in enumerate(scene.obstacles):
+        _draw_obstacle(window[f"obstacles/{number}"], obstacle, scene)
+
+
+def _draw_obstacle(window: Visualizer, obstacle: Obstacle, scene: Scene) -> None:
+    """A box; where goals lie on it, with a slab like that of a bench."""
+    size, centre = obstacle.size, obstacle.centre
+    if not any(_lies_on(region, obstacle, scene.cube_edge) for region in scene.goal_regions):
+        put(window["body"], OBSTACLE, box(size, 0.04 * size.min()).moved(centre))
+        return
+    top = min(SLAB_THICKNESS, size[2] / 2)
+    inset = np.minimum(0.03, 0.2 * size[:2])
+    slab = box((*size[:2], top), 0.2 * top).moved((0, 0, (size[2] - top) / 2))
+    body = box((*size[:2] - inset, size[2] - top)).moved((0, 0, -top / 2))
+    put(window["top"], GOAL_SLAB, slab.moved(centre))
+    put(window["body"], OBSTACLE, body.moved(centre))
+
+
+def _lies_on(region: GoalRegion, obstacle: Obstacle, edge: float) -> bool:
+    """Whether cubes with a given edge [m], centred in a region, lie on an obstacle."""
+    gap = region.lower[2] - obstacle.upper[2]
+    above = all(
+        region.lower[k] < obstacle.upper[k] and obstacle.lower[k] < region.upper[k] for k in (0, 1)
+    )
+    return above and 0 <= gap <= edge
+
+
+def _grid_lines() -> NDArray[np.float64]:
+    """Ends of lines within a circle."""
+    lines = []
+    for across in np.arange(-GRID_RADIUS, GRID_RADIUS + 1e-9, GRID_STEP):
+        half = np.sqrt(max(GRID_RADIUS**2 - across**2, 0))
+        lines += [(across, -half), (across, half), (-half, across), (half, across)]
+    return np.column_stack([np.array(lines), np.full(len(lines), 0.0005)])
+
+
+def aim_camera(window: Visualizer) -> None:
+    """Look at the arm from behind its right side."""
+    for name, value in CAMERA.items():
+        window["/Cameras/default/rotated/<object>"].set_property(name, value)
+
+
+def draw_goal(window: Visualizer, problem: ReachProblem) -> None:
+    """The cube, and a halo within which the goal counts as reached, about the origin."""
+    edge = problem.scene.cube_edge or 0.01
+    put(window["cube"], CUBE, box((edge, edge, edge), 0.08 * edge))
+    put(window["halo"], HALO, capsule(0.0, problem.task.tolerance))
+
+
+def draw_arm(window: Visualizer, arm: Arm) -> list[Visualizer]:
+    """Draw an arm as nested groups, one for each joint.
+
+    Returns
+    -------
+    list of meshcat.Visualizer
+        The base and the joints; a joint's transform is that in its parent.
+    """
+    frames = [window]
+    for number in range(1, arm.n_axes + 1):
+        frames.append(frames[-1][f"axis_{number}"])
+    surfaces: dict[tuple[int, Finish], list[Mesh]] = defaultdict(list)
+    for part in arm_parts(arm):
+        surfaces[part.joint, part.finish].append(part.mesh)
+    for index, ((joint, finish), meshes) in enumerate(surfaces.items()):
+        put(frames[joint][f"part_{index}"], finish, *meshes)
+    return frames
+
+
+def draw_trace(window: Visualizer, arm: Arm, recording: Recording) -> None:
+    """The way of the tool, in the colour of the outcome; nothing if there is no way."""
+    if recording.steps == 0:
+        return
+    points = [arm.tool_position(state) for state in recording.states]
+    finish = Finish(OUTCOME_COLOURS[recording.outcome], roughness=0.5)
+    put(window, finish, tube(points, TRACE_RADIUS, TRACE_SIDES))

@@ -1,0 +1,251 @@
+"""Triangle meshes from profiles and primitives, with normals that keep sharp edges sharp."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import coal
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+SEGMENTS = 40
+"""Straight pieces that a full circle is made of."""
+
+CREASE = np.cos(np.deg2rad(38.0))
+"""Faces that meet at a larger angle than this keep their edge."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles.
+
+    Attributes
+    ----------
+    vertices : ndarray, shape (n, 3)
+        Corners [m].
+    faces : ndarray of int, shape (m, 3)
+        Indices of corners, anticlockwise seen from outside.
+    """
+
+    vertices: Array
+    faces: NDArray[np.int64]
+
+    def moved(
+        self, translation: ArrayLike = (0, 0, 0), rotation: ArrayLike | None = None
+    ) -> "Mesh":
+        """Rotate by a matrix, then translate [m]."""
+        turned = self.vertices if rotation is None else self.vertices @ np.asarray(rotation).T
+        return Mesh(turned + np.asarray(translation, dtype=float), self.faces)
+
+    @classmethod
+    def joined(cls, meshes: Sequence["Mesh"]) -> "Mesh":
+        """Put meshes into one."""
+        offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
+        faces = [mesh.faces + offset for mesh, offset in zip(meshes, offsets, strict=True)]
+        return cls(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+
+    def with_normals(self) -> tuple[Array, Array, NDArray[np.int64]]:
+        """Split corners where faces meet at an edge, and give every corner its normal.
+
+        Returns
+        -------
+        vertices, normals : ndarray, shape (k, 3)
+            Corners [m] and unit vectors.
+        faces : ndarray of int, shape (m, 3)
+            Indices of corners.
+        """
+        places, welded = np.unique(np.round(self.vertices, 6), axis=0, return_inverse=True)
+        corners = welded.reshape(-1)[self.faces]
+        a, b, c = (places[corners[:, k]] for k in range(3))
+        weighted = np.cross(b - a, c - a)
+        flat = weighted / np.maximum(np.linalg.norm(weighted, axis=1, keepdims=True), 1e-30)
+        normals = _corner_normals(corners.reshape(-1), weighted, flat)
+        keys = np.column_stack([places[corners.reshape(-1)], np.round(normals, 4)])
+        unique, inverse = np.unique(keys, axis=0, return_inverse=True)
+        return unique[:, :3], unique[:, 3:], inverse.reshape(-1, 3)
+
+
+def _corner_normals(corners: NDArray[np.int64], weighted: Array, flat: Array) -> Array:
+    """Mean normal, at each corner of each face, of the faces that meet there without an edge."""
+    order = np.argsort(corners, kind="stable")
+    counts = np.bincount(corners)
+    starts = np.cumsum(counts) - counts
+    mine = np.repeat(order, counts[corners[order]])
+    group = np.repeat(corners[order], counts[corners[order]])
+    within = np.arange(len(group)) - np.repeat(
+        np.cumsum(counts[corners[order]]) - counts[corners[order]], counts[corners[order]]
+    )
+    theirs = order[starts[group] + within]
+    joins = (flat[mine // 3] * flat[theirs // 3]).sum(axis=1) >= CREASE
+    empty = np.linalg.norm(weighted, axis=1) == 0
+    joins |= empty[mine // 3]  # a face without area takes any side
+    total = np.zeros((len(corners), 3))
+    np.add.at(total, mine[joins], weighted[theirs[joins] // 3])
+    unit: Array = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-30)
+    return unit
+
+
+def loft(rings: Array) -> Mesh:
+    """Skin a stack of closed rings, stretch by stretch, and close it at both ends.
+
+    Parameters
+    ----------
+    rings : ndarray, shape (n_rings, n_points, 3)
+        Anticlockwise when seen against the direction of the stack [m].
+    """
+    levels, around = rings.shape[:2]
+    here = np.arange(around)
+    after = (here + 1) % around
+    below, above = np.full(around, levels * around), np.full(around, levels * around + 1)
+    stretch = np.concatenate(
+        [
+            np.stack([here, after, after + around], 1),
+            np.stack([here, after + around, here + around], 1),
+        ]
+    )
+    last = (levels - 1) * around
+    walls = (stretch + around * np.arange(levels - 1)[:, None, None]).reshape(-1, 3)
+    ends = [np.stack([below, after, here], 1), np.stack([above, last + here, last + after], 1)]
+    middles = [rings[0].mean(axis=0), rings[-1].mean(axis=0)]
+    return Mesh(np.concatenate([rings.reshape(-1, 3), middles]), np.concatenate([walls, *ends]))
+
+
+def lathe(profile: Sequence[tuple[float, float]], axis: str = "z") -> Mesh:
+    """Turn a profile about an axis through the origin.
+
+    Parameters
+    ----------
+    profile : sequence of (position, radius)
+        From one end of the axis to the other [m].
+    axis : str
+        ``"x"``, ``"y"`` or ``"z"``.
+    """
+    angle = np.linspace(0, 2 * np.pi, SEGMENTS, endpoint=False)
+    position, radius = np.array(profile, dtype=float).T
+    across = radius[:, None] * np.cos(angle), radius[:, None] * np.sin(angle)
+    along = np.repeat(position[:, None], SEGMENTS, axis=1)
+    order = {"z": (*across, along), "x": (along, *across), "y": (across[1], along, across[0])}
+    return loft(np.stack(order[axis], axis=2))
+
+
+def cylinder(length: float, radius: float, chamfer: float, axis: str = "z") -> Mesh:
+    """A cylinder about the origin with chamfered rims [m]."""
+    half = length / 2
+    profile = [(-half, radius - chamfer), (-half + chamfer, radius)]
+    return lathe([*profile, (half - chamfer, radius), (half, radius - chamfer)], axis)
+
+
+def housing(sections: Sequence[tuple[float, float, float, float, float]]) -> Mesh:
+    """Blend a casting through rounded cross sections that are stacked along z.
+
+    Parameters
+    ----------
+    sections : sequence of (z, x, half_x, half_y, exponent)
+        Height, centre and half widths [m]; exponent 2 is an ellipse, larger ones are boxier.
+    """
+    angle = np.linspace(0, 2 * np.pi, SEGMENTS, endpoint=False)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    rings = [
+        np.stack(
+            [
+                x + half_x * np.sign(cosine) * np.abs(cosine) ** (2 / exponent),
+                half_y * np.sign(sine) * np.abs(sine) ** (2 / exponent),
+                np.full(SEGMENTS, z),
+            ],
+            axis=1,
+        )
+        for z, x, half_x, half_y, exponent in sections
+    ]
+    return loft(np.array(rings))
+
+
+def box(size: ArrayLike, chamfer: float = 0.0) -> Mesh:
+    """A box about the origin with chamfered edges [m]."""
+    half = np.asarray(size, dtype=float) / 2
+    if chamfer == 0:
+        return _convex_hull(half * _cube_corners())
+    inset = half - chamfer
+    return _convex_hull(
+        np.concatenate(
+            [_cube_corners() * np.where(np.arange(3) == k, half, inset) for k in range(3)]
+        )
+    )
+
+
+def _cube_corners() -> Array:
+    return np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T
+
+
+def _convex_hull(points: Array) -> Mesh:
+    """Convex hull of points, shape (n, 3)."""
+    from scipy.spatial import ConvexHull
+
+    hull = ConvexHull(points)
+    faces = hull.simplices.astype(np.int64)
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    inward = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0
+    faces[inward] = faces[inward][:, ::-1]
+    return Mesh(points, faces)
+
+
+def capsule(length: float, radius: float) -> Mesh:
+    """A cylinder along z with half spheres at its ends; a sphere if its length is zero [m]."""
+    turn = np.linspace(0, np.pi / 2, 9)
+    low = [(-length / 2 - radius * np.cos(t), radius * np.sin(t)) for t in turn]
+    return lathe([*low, *[(-position, r) for position, r in reversed(low)]])
+
+
+def tube(points: ArrayLike, radius: float, sides: int = 6) -> Mesh:
+    """A tube along at least two points, with 2 * ``sides`` faces for one stretch after the other.
+
+    Parameters
+    ----------
+    points : array_like, shape (n, 3)
+        Its middle [m].
+    radius : float
+        Its radius [m].
+    sides : int
+        Straight pieces around it.
+    """
+    middle = np.asarray(points, dtype=float)
+    forward = np.gradient(middle, axis=0)
+    lengths = np.linalg.norm(forward, axis=1)
+    moving = np.flatnonzero(lengths > 1e-9)
+    if moving.size:
+        known = moving[np.maximum(np.searchsorted(moving, np.arange(len(middle)), "right") - 1, 0)]
+        forward = forward[known] / lengths[known, None]
+    across = np.zeros_like(middle)
+    side = np.cross(forward[0], [0.31, 0.83, 0.47])
+    for k, direction in enumerate(forward):
+        side = side - (side @ direction) * direction
+        side = side / max(float(np.linalg.norm(side)), 1e-12)
+        across[k] = side
+    angle = np.linspace(0, 2 * np.pi, sides, endpoint=False)[:, None, None]
+    around = np.cos(angle) * across + np.sin(angle) * np.cross(forward, across)
+    return loft((middle + radius * around).transpose(1, 0, 2))
+
+
+def from_coal(shape: coal.CollisionGeometry) -> Mesh:
+    """Skin of a primitive, a convex hull or a mesh, in its own frame.
+
+    Raises
+    ------
+    TypeError
+        For any other shape.
+    """
+    if isinstance(shape, coal.Box):
+        return box(2 * np.array(shape.halfSide))
+    if isinstance(shape, coal.Sphere):
+        return capsule(0.0, shape.radius)
+    if isinstance(shape, coal.Capsule):
+        return capsule(2 * shape.halfLength, shape.radius)
+    if isinstance(shape, coal.Cylinder):
+        return cylinder(2 * shape.halfLength, shape.radius, 0.0)
+    if isinstance(shape, coal.ConvexBase):
+        return _convex_hull(np.array(shape.points()))
+    if isinstance(shape, coal.BVHModelBase):
+        corners = [shape.tri_indices(k) for k in range(shape.num_tris)]
+        faces = [[int(corner[k]) for k in range(3)] for corner in corners]
+        return Mesh(np.array(shape.vertices()), np.array(faces, dtype=np.int64).reshape(-1, 3))
+    raise TypeError(f"cannot draw a {type(shape).__name__}")

@@ -1,0 +1,333 @@
+"use strict";
+
+const element = (id) => document.getElementById(id);
+const SPEEDS = [0.1, 0.25, 0.5, 1, 2];
+const HOLD = 1.4; // seconds between the end of a trial and the next one
+const BADGES = {
+  success: ["Reached", "m5 12.5 4.5 4.5L19 7.5"],
+  collision: ["Contact", "M6 6l12 12M18 6 6 18"],
+  truncated: ["Out of time", "M12 6v6.5l4 2.5M12 3a9 9 0 1 0 .01 0"],
+};
+
+/* ---------- data ---------- */
+
+async function inflated(id) {
+  const packed = Uint8Array.from(atob(element(id).textContent), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+async function startViewer() {
+  const script = document.createElement("script");
+  script.textContent = new TextDecoder().decode(await inflated("data-viewer"));
+  document.head.append(script);
+  const viewer = new MeshCat.Viewer(element("stage"));
+  const bytes = await inflated("data-scene");
+  const view = new DataView(bytes.buffer);
+  for (let at = 0; at < bytes.length; ) {
+    const length = view.getUint32(at, true);
+    viewer.handle_command_bytearray(bytes.subarray(at + 4, at + 4 + length));
+    at += 4 + length;
+  }
+  return viewer;
+}
+
+/* ---------- the panels: card, plot and controls ---------- */
+
+function make(tag, attributes = {}, text = "") {
+  const svg = ["path", "line", "svg"].includes(tag);
+  const node = svg ? document.createElementNS("http://www.w3.org/2000/svg", tag) : document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    node.setAttribute(name, value);
+  }
+  node.append(text);
+  return node;
+}
+
+function badge(outcome) {
+  const [words, shape] = BADGES[outcome];
+  const node = make("span", { class: `badge ${outcome}` });
+  const icon = make("svg", { viewBox: "0 0 24 24", "aria-hidden": "true" });
+  icon.append(make("path", { d: shape }));
+  node.append(icon, words);
+  return node;
+}
+
+const metres = (value) => `${value.toFixed(3)} m`;
+const count = (number, noun) => `${number} ${noun}${number === 1 ? "" : "s"}`;
+
+/** How a run ended, in words. */
+function verdict(run, trial) {
+  const steps = run.states.length - 1;
+  const distance = metres(run.distances[steps]);
+  if (run.outcome === "collision") {
+    const pair = run.contact ? run.contact.join(" touches ") : "something touches";
+    return `${pair} after ${count(steps, "step")}, ${distance} from the goal`;
+  }
+  if (run.outcome === "truncated") {
+    return `${distance} from the goal after ${count(steps, "step")}`;
+  }
+  const ratio = steps === trial.floor ? ", as few as possible" : `, ${(steps / trial.floor).toFixed(1)} times what is necessary`;
+  return `${count(steps, "step")}${trial.floor ? ratio : ""}`;
+}
+
+function fillCard(trial) {
+  element("eyebrow").textContent = `Problem ${trial.problem} · trial ${trial.trial}`;
+  element("runs").replaceChildren(...trial.runs.map((run, k) => {
+    const row = make("li");
+    const name = make("span", { class: "name" });
+    if (trial.runs.length > 1) {
+      name.append(make("span", { class: "swatch", style: `background: ${k ? "#56b4e9" : "#f2b21b"}` }));
+    }
+    name.append(run.policy);
+    row.append(name, badge(run.outcome), make("span", { class: "note" }, verdict(run, trial)));
+    return row;
+  }));
+  element("floor-row").hidden = trial.floor === null;
+  if (trial.floor !== null) {
+    element("floor").textContent = trial.floor > trial.horizon ? "out of reach" : count(trial.floor, "step");
+  }
+}
+
+function drawPlot(trial, frames, colours) {
+  const highest = Math.max(...trial.runs.flatMap((run) => run.distances), 2 * trial.tolerance);
+  const across = (step) => (1000 * step) / Math.max(frames, 1);
+  const up = (distance) => 96 - (92 * distance) / highest;
+  const plot = element("plot");
+  plot.replaceChildren();
+  const level = up(trial.tolerance);
+  plot.append(make("line", { class: "goal", x1: 0, x2: 1000, y1: level, y2: level }));
+  element("goal-label").style.top = `${level / 100 * plot.clientHeight}px`;
+  if (trial.floor !== null && trial.floor <= frames) {
+    plot.append(make("line", { class: "floor", x1: across(trial.floor), x2: across(trial.floor), y1: 0, y2: 100 }));
+  }
+  trial.runs.forEach((run, k) => {
+    const points = run.distances.map((distance, step) => `${across(step).toFixed(1)} ${up(distance).toFixed(1)}`);
+    const colour = colours[run.outcome];
+    if (k === 0) {
+      plot.append(make("path", { class: "area", d: `M0 100L${points.join("L")}L${across(points.length - 1).toFixed(1)} 100Z`, style: `fill: ${colour}` }));
+    }
+    plot.append(make("path", { class: k ? "curve ghost" : "curve", d: `M${points.join("L")}`, style: `stroke: ${colour}` }));
+  });
+  plot.append(make("line", { class: "head", y1: -4, y2: 104 }));
+}
+
+/* ---------- the player ---------- */
+
+class Player {
+  constructor(stage, data) {
+    this.stage = stage;
+    this.data = data;
+    this.speed = 0.25;
+    this.playing = false;
+    this.calm = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+    data.trials.forEach((trial, index) => {
+      const words = BADGES[trial.runs[0].outcome][0].toLowerCase();
+      element("trial").append(make("option", { value: index }, `${trial.problem} ${trial.trial}: ${words}`));
+    });
+    element("trial-choice").hidden = data.trials.length < 2;
+    this.connect();
+    this.setTheme(window.matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+    this.select(0);
+    requestAnimationFrame((now) => this.tick(now));
+  }
+
+  get trial() {
+    return this.data.trials[this.index];
+  }
+
+  select(index) {
+    this.index = (index + this.data.trials.length) % this.data.trials.length;
+    this.frames = Math.max(...this.trial.runs.map((run) => run.states.length - 1));
+    fillCard(this.trial);
+    this.stage.select(this.index);
+    element("trial").value = this.index;
+    element("frame").max = this.frames;
+    drawPlot(this.trial, this.frames, this.data.colours);
+    this.show(0);
+    const run = this.trial.runs[0];
+    element("spoken").textContent = `Trial ${this.trial.trial}: ${run.policy}, ${BADGES[run.outcome][0]}`;
+  }
+
+  /** Show a moment, in steps from the start. */
+  show(time) {
+    this.time = Math.min(Math.max(time, 0), this.frames);
+    this.stage.show(this.time);
+    const step = Math.floor(this.time);
+    const run = this.trial.runs[0];
+    const last = run.states.length - 1;
+    element("frame").value = step;
+    element("frame").setAttribute("aria-valuetext", `step ${step} of ${this.frames}`);
+    element("step").replaceChildren(String(Math.min(step, last)), make("small", {}, ` / ${last}`));
+    element("distance").textContent = metres(run.distances[Math.min(step, last)]);
+    const head = element("plot").querySelector(".head");
+    const x = (1000 * this.time) / Math.max(this.frames, 1);
+    head.setAttribute("x1", x);
+    head.setAttribute("x2", x);
+  }
+
+  seek(frame) {
+    this.pause();
+    this.show(Math.round(frame));
+  }
+
+  play() {
+    if (this.time >= this.frames) {
+      this.show(0);
+    }
+    this.setPlaying(true);
+  }
+
+  pause() {
+    this.setPlaying(false);
+  }
+
+  setPlaying(playing) {
+    this.playing = playing;
+    this.held = 0;
+    document.body.classList.toggle("playing", playing);
+    element("play").setAttribute("aria-label", playing ? "Pause" : "Play");
+  }
+
+  setSpeed(speed) {
+    this.speed = speed;
+    element("speed").value = speed;
+  }
+
+  setTheme(name) {
+    this.theme = name;
+    document.documentElement.dataset.theme = name;
+    this.stage.theme(name);
+  }
+
+  tick(now) {
+    const passed = Math.min((now - (this.before ?? now)) / 1000, 0.1);
+    this.before = now;
+    if (this.playing) {
+      this.advance(passed);
+    }
+    if (this.stage.flash.visible && !this.calm) {
+      this.stage.pulse(now / 1000);
+    }
+    requestAnimationFrame((next) => this.tick(next));
+  }
+
+  /** Play on; at the end hold for a moment, then go to the next trial. */
+  advance(passed) {
+    if (this.time < this.frames) {
+      this.show(this.time + (passed * this.speed) / this.trial.timeStep);
+      return;
+    }
+    this.held += passed;
+    if (this.held > HOLD) {
+      this.held = 0;
+      this.select(this.index + 1);
+    }
+  }
+
+  connect() {
+    const click = (id, action) => element(id).addEventListener("click", action);
+    click("play", () => this.toggle());
+    click("first", () => this.seek(0));
+    click("back", () => this.seek(Math.ceil(this.time) - 1));
+    click("forward", () => this.seek(Math.floor(this.time) + 1));
+    click("previous", () => this.select(this.index - 1));
+    click("next", () => this.select(this.index + 1));
+    click("view", () => this.stage.look(this.stage.side));
+    click("theme", () => this.setTheme(this.theme === "dark" ? "light" : "dark"));
+    click("help", () => this.toggleKeys());
+    element("frame").addEventListener("input", (event) => this.seek(Number(event.target.value)));
+    element("speed").addEventListener("change", (event) => this.setSpeed(Number(event.target.value)));
+    element("trial").addEventListener("change", (event) => this.select(Number(event.target.value)));
+    window.addEventListener("resize", () => drawPlot(this.trial, this.frames, this.data.colours) ?? this.show(this.time));
+    document.addEventListener("keydown", (event) => this.press(event));
+    const plot = element("plot");
+    const drag = (event) => {
+      const bounds = plot.getBoundingClientRect();
+      this.seek(this.frames * (event.clientX - bounds.left) / bounds.width);
+    };
+    plot.addEventListener("pointerdown", (event) => {
+      plot.setPointerCapture(event.pointerId);
+      drag(event);
+    });
+    plot.addEventListener("pointermove", (event) => plot.hasPointerCapture(event.pointerId) && drag(event));
+  }
+
+  toggle() {
+    if (this.playing) {
+      this.pause();
+    } else {
+      this.play();
+    }
+  }
+
+  toggleKeys() {
+    element("keys").hidden = !element("keys").hidden;
+    element("help").setAttribute("aria-expanded", String(!element("keys").hidden));
+  }
+
+  press(event) {
+    const tag = event.target.tagName;
+    const own = { SELECT: () => true, INPUT: (key) => key !== " " && key.length > 1, BUTTON: (key) => key === " " || key === "Enter" };
+    if (event.ctrlKey || event.metaKey || event.altKey || (own[tag] && own[tag](event.key))) {
+      return;
+    }
+    const faster = (by) => this.setSpeed(SPEEDS[Math.min(Math.max(SPEEDS.indexOf(this.speed) + by, 0), SPEEDS.length - 1)]);
+    const actions = {
+      " ": () => this.toggle(),
+      ArrowLeft: () => this.seek(Math.ceil(this.time) - 1),
+      ArrowRight: () => this.seek(Math.floor(this.time) + 1),
+      Home: () => this.seek(0),
+      End: () => this.seek(this.frames),
+      p: () => this.select(this.index - 1),
+      n: () => this.select(this.index + 1),
+      ",": () => faster(-1),
+      ".": () => faster(1),
+      r: () => this.stage.look(this.stage.side),
+      t: () => this.setTheme(this.theme === "dark" ? "light" : "dark"),
+      "?": () => this.toggleKeys(),
+    };
+    const action = actions[event.key.length > 1 ? event.key : event.key.toLowerCase()];
+    if (action) {
+      event.preventDefault();
+      action();
+    }
+  }
+
+  get state() {
+    const run = this.trial.runs[0];
+    return {
+      index: this.index, trial: this.trial.trial, problem: this.trial.problem, policy: run.policy, outcome: run.outcome,
+      frame: Math.floor(this.time), frames: this.frames, playing: this.playing, speed: this.speed, theme: this.theme,
+    };
+  }
+}
+
+async function main() {
+  const data = JSON.parse(new TextDecoder().decode(await inflated("data-trials")));
+  const viewer = await startViewer();
+  element("card").hidden = element("dock").hidden = false;
+  const stage = new Stage(viewer, data);
+  const player = new Player(stage, data);
+  viewer.set_3d_pane_size();
+  element("message").hidden = true;
+  window.kinarm = {
+    seek: (frame) => player.seek(frame),
+    select: (index) => player.select(index),
+    play: () => player.play(),
+    pause: () => player.pause(),
+    lookFrom: (eye, target) => stage.lookFrom(eye, target),
+    pose: (name, run) => stage.pose(name, run),
+    census: () => stage.census(),
+    get state() { return player.state; },
+  };
+  document.body.dataset.ready = "";
+  if (!player.calm) {
+    player.play();
+  }
+}
+
+main().catch((error) => {
+  element("message").textContent = `This browser cannot show the replay, which needs WebGL and gzip streams: ${error.message}`;
+  throw error;
+});

@@ -1,0 +1,78 @@
+"""The scene of a page as Meshcat commands, the same bytes for the same recordings."""
+
+import struct
+from collections.abc import Sequence
+from typing import Any
+
+import meshcat
+import umsgpack
+
+from kinarm.arm import Arm
+from kinarm.recording import Recording
+from kinarm.viewer.drawing import (
+    FLASH,
+    draw_arm,
+    draw_goal,
+    draw_surroundings,
+    draw_trace,
+    put,
+)
+from kinarm.viewer.meshes import capsule
+
+FLASH_RADIUS = 0.025
+"""Radius of what lights up where two bodies touch [m]."""
+
+
+def scene_commands(trials: Sequence[Sequence[Recording]], arm: Arm) -> bytes:
+    """Draw surroundings, goal, arm and the ways of the tool.
+
+    Parameters
+    ----------
+    trials : sequence of sequence of Recording
+        One or two recordings of each trial.
+    arm : Arm
+        The arm that was recorded.
+
+    Returns
+    -------
+    bytes
+        Commands as Meshcat's viewer decodes them, each led by its length.
+    """
+    capture = CapturingWindow()
+    window = meshcat.Visualizer(window=capture)
+    problem = trials[0][0].problem
+    draw_surroundings(window, problem.scene)
+    draw_goal(window["goal"], problem)
+    put(window["flash"], FLASH, capsule(0.0, FLASH_RADIUS))
+    draw_arm(window["arm"], arm)
+    for number, runs in enumerate(trials):
+        for name, run in zip(("run", "ghost"), runs, strict=False):
+            draw_trace(window[f"trials/{number}/{name}"], arm, run)
+    return b"".join(struct.pack("<I", len(each)) + each for each in capture.commands)
+
+
+class CapturingWindow:
+    """Stands in for Meshcat's window and keeps every command, in order.
+
+    Attributes
+    ----------
+    commands : list of bytes
+        As Meshcat's viewer decodes them.
+    """
+
+    def __init__(self) -> None:
+        self.commands: list[bytes] = []
+        self._numbers: dict[str, str] = {}
+
+    def send(self, command: Any) -> None:
+        """Keep a command, with its random ids replaced by numbers."""
+        self.commands.append(umsgpack.packb(self._renumbered(command.lower())))
+
+    def _renumbered(self, value: Any, key: str = "") -> Any:
+        if isinstance(value, dict):
+            return {name: self._renumbered(entry, name) for name, entry in value.items()}
+        if isinstance(value, list):
+            return [self._renumbered(entry) for entry in value]
+        if key in ("uuid", "geometry", "material"):
+            return self._numbers.setdefault(value, f"id-{len(self._numbers)}")
+        return value

@@ -1,0 +1,203 @@
+"""Augmented Random Search (paper, Algorithm 1 and Table 1; Mania, Guy and Recht 2018)."""
+
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.networks import Mirror, Networks
+from kinarm.policies.ars.config import ARSConfig
+from kinarm.policies.ars.state import ARSState
+from kinarm.policies.curve import CurvePoint
+from kinarm.policies.mirror import commuting_weights, task_mirror
+from kinarm.policies.normalizer import Normalizer, fold_normalizer
+from kinarm.policies.policy import Layer, Policy
+from kinarm.policies.provenance import Provenance
+from kinarm.simulator import Simulator
+from kinarm.world import World
+
+
+class ARSTraining:
+    """A training under way; all that changes is in the `ARSState`.
+
+    Parameters
+    ----------
+    config : ARSConfig
+        The settings.
+    threads : int, optional
+        Threads of the simulator; the result does not depend on it.
+    """
+
+    def __init__(self, config: ARSConfig, threads: int | None = None) -> None:
+        self.config, self.simulator = config, config.simulator(threads)
+        self.mirror = task_mirror(config.symmetric, self.simulator.world)
+
+    def initial_state(self) -> ARSState:
+        """State before the first iteration: theta = 0, mu = 0, Sigma = I."""
+        n_actions, n_observations = self.simulator.n_actions, self.simulator.n_observations
+        return ARSState(
+            theta=np.zeros((n_actions, n_observations)),
+            normalizer=Normalizer.empty(n_observations),
+            generator=dict(np.random.default_rng(self.config.seed).bit_generator.state),
+        )
+
+    def iterate(self, state: ARSState) -> ARSState:
+        """One pass through the loop of Algorithm 1."""
+        return ars_iteration(self.config, self.simulator, state, self.mirror)
+
+
+def ars_iteration(
+    config: ARSConfig,
+    simulator: Simulator,
+    state: ARSState,
+    mirror: Mirror | None = None,
+) -> ARSState:
+    """One pass through the loop of Algorithm 1.
+
+    Parameters
+    ----------
+    config : ARSConfig
+        The settings.
+    simulator : Simulator
+        Where episodes are run.
+    state : ARSState
+        State before the iteration.
+    mirror : Mirror, optional
+        Reflection that the policy has to commute with.
+
+    Returns
+    -------
+    ARSState
+        State after it. The statistics are frozen within an iteration: they are updated at its
+        end with all observations of its episodes.
+    """
+    began, rng = time.perf_counter(), state.random_generator()
+    N, theta, normalizer = config.directions, state.theta, state.normalizer
+    delta = rng.standard_normal((N, *theta.shape))
+    if mirror is not None:
+        delta *= commuting_weights(mirror)
+    candidates = np.concatenate([theta + config.noise * delta, theta - config.noise * delta])
+    starts, goals = shared_scenarios(config, simulator, rng)
+    rollouts = simulator.rollout(
+        linear_networks(candidates, policy_normalizer(config, normalizer, mirror)),
+        starts,
+        goals,
+        policy_index=np.repeat(np.arange(2 * N), config.episodes),
+        shift=normalizer.mean,
+    )
+    returns = rollouts.returns.reshape(2, N, config.episodes).mean(axis=2)
+    theta = theta + ars_step(config, delta, returns, config.step_size_at(state.iteration))
+    normalizer = normalizer.updated(rollouts.moments, rollouts.steps)
+    point = CurvePoint(
+        mean_return=float(rollouts.returns.mean()),
+        std_return=float(rollouts.returns.std()),
+        success=float(rollouts.success.mean()),
+        environment_steps=state.environment_steps + int(rollouts.steps.sum()),
+        wall_time=state.wall_time + time.perf_counter() - began,
+    )
+    return ARSState(
+        theta=theta,
+        normalizer=normalizer,
+        generator=dict(rng.bit_generator.state),
+        curve=(*state.curve, point),
+    )
+
+
+def shared_scenarios(
+    config: ARSConfig, simulator: Simulator, rng: np.random.Generator
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Draw the starts and goals of an iteration's episodes, shared as configured.
+
+    Returns
+    -------
+    starts, goals : ndarray, shape (2 N episodes, n_axes) and (2 N episodes, 3)
+        In the order sign, direction, episode.
+    """
+    copies = {"none": 1, "pair": 2, "iteration": 2 * config.directions}[config.sharing]
+    starts, goals = simulator.sample(rng, 2 * config.directions * config.episodes // copies)
+    return np.tile(starts, (copies, 1)), np.tile(goals, (copies, 1))
+
+
+def policy_normalizer(
+    config: ARSConfig, seen: Normalizer, mirror: Mirror | None
+) -> Normalizer | None:
+    """Statistics by which the policy normalises its inputs, if it does."""
+    if not config.normalize:
+        return None
+    return seen if mirror is None else seen.mirrored(mirror.observations)
+
+
+def linear_networks(theta: NDArray[np.float64], normalizer: Normalizer | None) -> Networks:
+    """Policies theta diag(Sigma)^(-1/2) (x - mu) with the normaliser folded in.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (n, n_actions, n_observations)
+        Parameters.
+    normalizer : Normalizer or None
+        Statistics of the observations; None leaves them as they are.
+    """
+    bias = np.zeros(theta.shape[:2])
+    if normalizer is None:
+        return Networks.linear(theta, bias)
+    return Networks.linear(*fold_normalizer(theta, bias, normalizer.mean, normalizer.std))
+
+
+def top_directions(returns: NDArray[np.float64], b: int) -> NDArray[np.int64]:
+    """Indices of exactly b directions with the largest max(r+, r-); ties keep their order.
+
+    Parameters
+    ----------
+    returns : ndarray, shape (2, N)
+        Returns of the positive and negative perturbations.
+    b : int
+        How many.
+    """
+    return np.argsort(-returns.max(axis=0), kind="stable")[:b]
+
+
+def ars_step(
+    config: ARSConfig,
+    delta: NDArray[np.float64],
+    returns: NDArray[np.float64],
+    step_size: float,
+) -> NDArray[np.float64]:
+    """Update of theta: alpha / (b sigma_R) times the sum of (r+ - r-) delta over the top b.
+
+    sigma_R is the population standard deviation of the returns of all perturbations, as the
+    paper defines it in section 2.1; the step is zero when all returns tie.
+
+    Parameters
+    ----------
+    config : ARSConfig
+        The settings.
+    delta : ndarray, shape (N, n_actions, n_observations)
+        Perturbations.
+    returns : ndarray, shape (2, N)
+        Returns of theta + nu delta and theta - nu delta.
+    step_size : float
+        Learning rate alpha.
+    """
+    b = config.top_directions
+    top = top_directions(returns, b)
+    sigma = float(returns.std()) if config.scale_by_deviation else 1.0
+    if sigma < 1e-12:
+        return np.zeros(delta.shape[1:])
+    difference = returns[0, top] - returns[1, top]
+    # Summed in order, not by BLAS: the same bits on every processor.
+    step: NDArray[np.float64] = (difference[:, None, None] * delta[top]).sum(axis=0)
+    return step_size / (b * sigma) * step
+
+
+def linear_policy(config: ARSConfig, state: ARSState) -> Policy:
+    """Freeze a state of the training into a policy."""
+    mirror = task_mirror(config.symmetric, World(config.problem, threads=1))
+    n_actions, n_observations = state.theta.shape
+    normalizer = policy_normalizer(config, state.normalizer, mirror)
+    normalizer = normalizer or Normalizer.empty(n_observations)
+    return Policy(
+        mean=normalizer.mean,
+        std=normalizer.std,
+        layers=(Layer(state.theta, np.zeros(n_actions)),),
+        provenance=Provenance.of("ars", config, state.environment_steps),
+    )

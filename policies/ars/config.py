@@ -1,0 +1,66 @@
+"""Settings of Augmented Random Search."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from kinarm.errors import InvalidInputError
+from kinarm.policies.config import POSITIVE, Schedule, TrainingConfig, scheduled
+
+Sharing = Literal["none", "pair", "iteration"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ARSConfig(TrainingConfig):
+    """Settings of a training; the defaults are the paper's Table 1, that is, ARS V2-t.
+
+    Parameters
+    ----------
+    problem, reward, seed, recipe, iterations
+        See `TrainingConfig`.
+    step_size : float
+        Learning rate alpha.
+    step_size_schedule : {"constant", "linear"}
+        Whether alpha stays or falls linearly to zero.
+    noise : float
+        Standard deviation nu of the perturbations.
+    directions : int
+        Perturbations N per iteration, each tried with both signs.
+    top_directions : int
+        Perturbations b that enter the update, those with the best returns; b = N is V1 or V2.
+    symmetric : bool
+        Whether the policy is to treat mirror images alike, where the task is its own mirror
+        image (``both``); see `kinarm.policies.mirror`. It halves the parameters.
+    normalize : bool
+        Whether observations are normalised (V2) or not (BRS, V1).
+    scale_by_deviation : bool
+        Whether the step is divided by the standard deviation of the returns (ARS) or not (BRS).
+    sharing : {"none", "pair", "iteration"}
+        Who faces the same starts and goals: nobody (every episode draws its own), the two signs
+        of a perturbation, or all perturbations of an iteration.
+    episodes : int
+        Episodes whose mean return judges a perturbed policy.
+    """
+
+    iterations: int = 800
+    step_size: float = field(default=0.02, metadata=POSITIVE)
+    step_size_schedule: Schedule = "constant"
+    noise: float = field(default=0.03, metadata=POSITIVE)
+    directions: int = 24
+    top_directions: int = 12
+    symmetric: bool = False
+    normalize: bool = True
+    scale_by_deviation: bool = True
+    sharing: Sharing = "none"
+    episodes: int = 1
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.top_directions > self.directions:
+            raise InvalidInputError(
+                f"top_directions must be at most directions ({self.directions}), "
+                f"got {self.top_directions}"
+            )
+
+    def step_size_at(self, iteration: int) -> float:
+        """Learning rate of an iteration."""
+        return scheduled(self.step_size, self.step_size_schedule, iteration / self.iterations)

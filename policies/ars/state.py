@@ -1,0 +1,52 @@
+"""State of an ARS training between two iterations."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.errors import InvalidInputError
+from kinarm.policies.learners import TrainingState
+from kinarm.policies.normalizer import Normalizer
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ARSState(TrainingState):
+    """Everything that the next iteration depends on.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (n_actions, n_observations)
+        Parameters of the policy.
+    normalizer : Normalizer
+        Statistics mu and Sigma of the observations.
+    generator : dict
+        State of the random generator.
+    curve : tuple of CurvePoint
+        One point per finished iteration.
+
+    Raises
+    ------
+    InvalidInputError
+        If a training could not go on from it.
+    """
+
+    theta: NDArray[np.float64]
+    normalizer: Normalizer
+    generator: dict[str, Any]
+
+    def __post_init__(self) -> None:
+        widths = {self.theta.shape[1:], self.normalizer.mean.shape, self.normalizer.squares.shape}
+        if len(widths) > 1 or self.theta.ndim != 2:
+            raise InvalidInputError(
+                f"theta of shape {self.theta.shape} needs as many statistics, "
+                f"got {self.normalizer.mean.shape} and {self.normalizer.squares.shape}"
+            )
+        self.random_generator()
+
+    def random_generator(self) -> np.random.Generator:
+        """A generator in the state that the next iteration begins with."""
+        rng = np.random.default_rng(0)
+        rng.bit_generator.state = self.generator
+        return rng

@@ -1,0 +1,153 @@
+"""Detours around obstacles: RRT-Connect with shortcuts (Kuffner and LaValle 2000)."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.policies.oracle.motion import steps_between
+from kinarm.simulator import Simulator
+
+EXTENSIONS = 1500
+"""Samples before the search is given up."""
+
+LONGEST_EXTENSION = 6.0
+"""How far a tree grows towards a sample [steps]."""
+
+SHORTCUTS = 120
+"""Pairs of points of a path between which the straight way is tried."""
+
+
+class Tree:
+    """Configurations that are connected by contact-free straight motions.
+
+    Parameters
+    ----------
+    roots : ndarray, shape (k, n_axes)
+        Configurations to grow from [rad or m].
+    """
+
+    def __init__(self, roots: NDArray[np.float64]) -> None:
+        self.nodes = roots.copy()
+        self.parents = [-1] * len(roots)
+
+    def add(self, node: NDArray[np.float64], parent: int) -> int:
+        """Append a node and return its index."""
+        self.nodes = np.concatenate([self.nodes, node[None]])
+        self.parents.append(parent)
+        return len(self.parents) - 1
+
+    def path_to_root(self, node: int) -> list[NDArray[np.float64]]:
+        """Nodes from a given one to its root."""
+        found = []
+        while node >= 0:
+            found.append(self.nodes[node])
+            node = self.parents[node]
+        return found
+
+
+def find_detour(
+    simulator: Simulator,
+    start: NDArray[np.float64],
+    ends: NDArray[np.float64],
+    rng: np.random.Generator,
+) -> NDArray[np.float64] | None:
+    """Find a contact-free path of straight segments to one of several configurations.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        Arm and scene.
+    start : ndarray, shape (n_axes,)
+        Contact-free start [rad or m].
+    ends : ndarray, shape (k, n_axes)
+        Contact-free ends [rad or m].
+    rng : numpy.random.Generator
+        Source of randomness.
+
+    Returns
+    -------
+    ndarray, shape (m, n_axes), or None
+        The path from the start to an end; None if none was found.
+    """
+    path = _connect(simulator, start, ends, rng)
+    return None if path is None else _shorten(simulator, path, rng)
+
+
+def _connect(
+    simulator: Simulator,
+    start: NDArray[np.float64],
+    ends: NDArray[np.float64],
+    rng: np.random.Generator,
+) -> NDArray[np.float64] | None:
+    """Grow a tree from either side, in turns, until they meet."""
+    moved, n = slice(simulator.n_actions), simulator.n_actions
+    lower, upper = simulator.arm.lower[moved], simulator.arm.upper[moved]
+    growing, other = Tree(start[None]), Tree(ends)
+    from_start = True
+    for _ in range(EXTENSIONS):
+        sample = start.copy()
+        sample[moved] = rng.uniform(lower, upper, n)
+        grown = _extend(simulator, growing, sample, LONGEST_EXTENSION)
+        if grown is not None:
+            node = growing.nodes[grown]
+            met = _extend(simulator, other, node, np.inf)
+            if met is not None and steps_between(simulator, other.nodes[met], node) < 1e-9:
+                near, far = growing.path_to_root(grown)[::-1], other.path_to_root(met)[1:]
+                path = np.array(near + far)
+                return path if from_start else path[::-1]
+        growing, other, from_start = other, growing, not from_start
+    return None
+
+
+def _extend(
+    simulator: Simulator, tree: Tree, sample: NDArray[np.float64], longest: float
+) -> int | None:
+    """Grow a tree from its node nearest to a sample towards it, as far as nothing touches."""
+    distances = steps_between(simulator, tree.nodes, sample)
+    nearest = int(distances.argmin())
+    if distances[nearest] < 1e-9:
+        return nearest
+    origin = tree.nodes[nearest]
+    towards = origin + min(1.0, longest / distances[nearest]) * (sample - origin)
+    on_the_way = _tested_configurations(simulator, origin, towards)
+    free = _count_free(simulator, on_the_way)
+    return tree.add(on_the_way[free - 1], nearest) if free else None
+
+
+def _tested_configurations(
+    simulator: Simulator, first: NDArray[np.float64], second: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Configurations as far apart as those at which a step is tested, without the first."""
+    tested_each = simulator.problem.stepping.tested_configurations
+    count = max(1, int(np.ceil(tested_each * steps_between(simulator, first, second))))
+    shares = np.arange(1, count + 1)[:, None] / count
+    tested: NDArray[np.float64] = first + shares * (second - first)
+    tested[-1] = second
+    return tested
+
+
+def _count_free(simulator: Simulator, configurations: NDArray[np.float64]) -> int:
+    """How many configurations in a row touch nothing."""
+    _, touching = simulator.world.screen(configurations)
+    return int(touching.argmax()) if touching.any() else len(configurations)
+
+
+def _shorten(
+    simulator: Simulator, path: NDArray[np.float64], rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """Replace parts of a path by the straight way where nothing touches."""
+    for _ in range(SHORTCUTS):
+        if len(path) < 3:
+            break
+        lengths = steps_between(simulator, path[:-1], path[1:])
+        arrival = np.concatenate([[0.0], np.cumsum(lengths)])
+        a, b = np.sort(rng.uniform(0.0, arrival[-1], 2))
+        first, second = (
+            np.array([np.interp(time, arrival, axis) for axis in path.T]) for time in (a, b)
+        )
+        if steps_between(simulator, first, second) > b - a - 1e-6:
+            continue
+        tested = _tested_configurations(simulator, first, second)
+        if _count_free(simulator, tested) == len(tested):
+            before, after = path[arrival < a], path[arrival > b]
+            path = np.concatenate([before, first[None], second[None], after])
+    return path

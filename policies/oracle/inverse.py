@@ -1,0 +1,217 @@
+"""Inverse kinematics: configurations that bring the tool to a goal without contact.
+
+Kinematics and Jacobian are those of the Pinocchio model, flattened for the compiled kernels.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kinarm._parallel import run_rows
+from kinarm._validation import finite_array, whole_number
+from kinarm.errors import InvalidInputError
+from kinarm.policies.oracle.kernels.projection import damped_least_squares
+from kinarm.policies.oracle.motion import steps_between
+from kinarm.simulator import Simulator
+
+RESERVE = 1e-6
+"""Share of the tolerance that is left against rounding."""
+
+
+class Solutions(NamedTuple):
+    """Configurations at which the tool is within the tolerance of a goal and nothing touches.
+
+    Attributes
+    ----------
+    configurations : ndarray, shape (m, n_axes)
+        In the order of their owners [rad or m].
+    owner : ndarray of int, shape (m,)
+        Which goal they belong to.
+    """
+
+    configurations: NDArray[np.float64]
+    owner: NDArray[np.int64]
+
+
+def inverse_kinematics(
+    simulator: Simulator,
+    start: ArrayLike,
+    goal: ArrayLike,
+    *,
+    samples: int = 1024,
+    separation: float = 0.2,
+) -> NDArray[np.float64]:
+    """Find the distinct contact-free configurations that reach a goal within the horizon.
+
+    Evenly spread configurations and the current one are moved into the ball about the goal by
+    damped least squares within the limits. An arm with more axes than a position has coordinates
+    has a continuum of solutions: those returned differ from each other.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        Arm, scene and tolerance.
+    start : array_like, shape (n_axes,)
+        Current configuration; axes that are not actuated stay there [rad or m].
+    goal : array_like, shape (3,)
+        Goal position [m].
+    samples : int
+        Configurations to begin with.
+    separation : float
+        Least difference of two solutions in some axis [rad or m].
+
+    Returns
+    -------
+    ndarray, shape (k, n_axes)
+        The solution that takes the fewest steps first [rad or m]; k may be 0.
+
+    Raises
+    ------
+    InvalidInputError
+        If a shape is wrong, an entry is not finite, the start is beyond the limits or a number
+        is not positive.
+    """
+    q = finite_array("start", start, (simulator.arm.n_axes,))
+    g = finite_array("goal", goal, (3,))
+    starts, goals = simulator.check_scenarios(q[None], g[None])
+    horizon, tolerance = np.array([simulator.task.horizon]), np.array([simulator.task.tolerance])
+    samples = whole_number("samples", samples, 1)
+    if not separation > 0:
+        raise InvalidInputError(f"separation must be greater than 0, got {separation}")
+    found, _ = solve_within(simulator, starts, goals, horizon, tolerance, starts, samples)
+    remaining = found[np.argsort(steps_between(simulator, starts, found), kind="stable")]
+    distinct = []
+    while len(remaining):
+        distinct.append(remaining[0])
+        remaining = remaining[np.abs(remaining - remaining[0]).max(axis=1) > separation]
+    return np.array(distinct).reshape(-1, simulator.arm.n_axes)
+
+
+def solve_within(
+    simulator: Simulator,
+    starts: NDArray[np.float64],
+    goals: NDArray[np.float64],
+    steps: NDArray[np.int64],
+    tolerances: NDArray[np.float64],
+    guesses: NDArray[np.float64],
+    samples: int,
+) -> Solutions:
+    """Find contact-free configurations close to goals that are at most some steps away.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        Arm and scene.
+    starts : ndarray, shape (m, n_axes)
+        Configurations to be close to [rad or m].
+    goals : ndarray, shape (m, 3)
+        Goal positions [m].
+    steps : ndarray of int, shape (m,)
+        How many steps away solutions may be.
+    tolerances : ndarray, shape (m,)
+        How far the tool may be from the goals [m].
+    guesses : ndarray, shape (m, n_axes)
+        One more configuration to begin with [rad or m].
+    samples : int
+        Configurations to begin with, per goal: the start, the guess, and evenly spread ones.
+    """
+    m, n_axes = len(starts), simulator.arm.n_axes
+    box = step_box(simulator, starts, steps)
+    spread = evenly_spread(samples, simulator.n_actions + 1)
+    beginnings = _beginnings(starts, guesses, box, spread[:, :-1])
+    # Half of the solutions may rest on the rim of the ball, the others lie throughout it.
+    shares = np.where(np.arange(samples) % 2 == 0, 1.0, np.cbrt(spread[:, -1]))
+    owner = np.repeat(np.arange(m), samples)
+    allowed = (tolerances * (1.0 - RESERVE))[owner]
+    radius = allowed * np.tile(shares, m)
+    configurations, distances = project(
+        simulator, beginnings.reshape(-1, n_axes), owner, box, goals, radius
+    )
+    near = np.flatnonzero(distances <= allowed)
+    _, touching = simulator.world.screen(configurations[near])
+    free = near[~touching]
+    return Solutions(configurations[free], owner[free])
+
+
+def _beginnings(
+    starts: NDArray[np.float64],
+    guesses: NDArray[np.float64],
+    box: tuple[NDArray[np.float64], NDArray[np.float64]],
+    spread: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Start, guess and evenly spread configurations of boxes, shape (m, samples, n_axes)."""
+    lower, upper = box[0][:, None], box[1][:, None]
+    samples, moved = len(spread), slice(lower.shape[-1])
+    beginnings = np.repeat(starts[:, None], samples, axis=1)
+    beginnings[:, :, moved] = lower + spread * (upper - lower)
+    beginnings[:, 1 % samples] = guesses
+    beginnings[:, 0] = starts
+    beginnings[:, :, moved] = np.clip(beginnings[:, :, moved], lower, upper)
+    return beginnings
+
+
+def project(
+    simulator: Simulator,
+    configurations: NDArray[np.float64],
+    owner: NDArray[np.int64],
+    box: tuple[NDArray[np.float64], NDArray[np.float64]],
+    goals: NDArray[np.float64],
+    radius: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Move configurations towards goals by damped least squares; contact is ignored.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        The arm.
+    configurations : ndarray, shape (m samples, n_axes)
+        Within the limits [rad or m].
+    owner : ndarray of int, shape (m samples,)
+        Which goal they belong to.
+    box : tuple of ndarray, shape (m, n_actions)
+        Limits per goal [rad or m].
+    goals : ndarray, shape (m, 3)
+        Goal positions [m].
+    radius : ndarray, shape (m samples,)
+        Distances at which they rest [m].
+
+    Returns
+    -------
+    configurations : ndarray, shape (m samples, n_axes)
+        Where they ended [rad or m].
+    distances : ndarray, shape (m samples,)
+        From the tool to the goal [m].
+    """
+    ended, distances = configurations.copy(), np.empty(len(configurations))
+    arrays = (simulator.arm.chain, owner, *box, goals, radius, ended, distances)
+    run_rows(damped_least_squares, len(ended), 4 * len(ended), simulator.threads, *arrays)
+    return ended, distances
+
+
+def step_box(
+    simulator: Simulator, starts: NDArray[np.float64], steps: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Corners of what the actuated axes can reach in some steps, shapes (m, n_actions)."""
+    moved = slice(simulator.n_actions)
+    extent = steps[:, None] * simulator.step_limit
+    lower = np.maximum(simulator.arm.lower[moved], starts[:, moved] - extent)
+    upper = np.minimum(simulator.arm.upper[moved], starts[:, moved] + extent)
+    return lower, upper
+
+
+def evenly_spread(count: int, dimensions: int) -> NDArray[np.float64]:
+    """Points of low discrepancy in the unit cube: multiples of powers of a root, modulo 1.
+
+    The root solves x^(d + 1) = x + 1, which for d = 1 is the golden ratio (Roberts 2018).
+
+    Returns
+    -------
+    ndarray, shape (count, dimensions)
+    """
+    root = 2.0
+    for _ in range(64):
+        root = (1.0 + root) ** (1.0 / (dimensions + 1))
+    strides = root ** -np.arange(1.0, dimensions + 1)
+    points: NDArray[np.float64] = (0.5 + np.arange(1, count + 1)[:, None] * strides) % 1.0
+    return points

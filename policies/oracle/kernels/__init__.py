@@ -1,0 +1,1 @@
+"""Compiled kernels of the oracle: proofs by branch and bound, and inverse kinematics."""

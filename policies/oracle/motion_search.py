@@ -1,0 +1,207 @@
+"""Search for the motions that reach goals in the fewest steps."""
+
+import hashlib
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.policies.oracle.detour import find_detour
+from kinarm.policies.oracle.inverse import (
+    Solutions,
+    evenly_spread,
+    inverse_kinematics,
+    solve_within,
+    step_box,
+)
+from kinarm.policies.oracle.motion import along_path, straight, two_segments
+from kinarm.simulator import Simulator
+
+SAMPLES = (48, 512)
+"""Configurations from which goals are sought for each number of steps: a few, then many."""
+
+VIAS = 128
+"""Motions by way of another configuration that are tried for each number of steps."""
+
+DETOURS = 4
+"""Detours that are planned for a trial; the shortest one counts."""
+
+APPROACHES = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
+"""Distances beyond the smallest possible one to which a goal is approached, in turn [m]."""
+
+MISS_COST = 1000.0
+"""Cost of a motion that misses the goal without contact, beside its final distance in metres."""
+
+
+class MotionSearch:
+    """The best motions found so far for a lot of trials.
+
+    A motion that reaches the goal costs its steps, one that misses it more, and contact is
+    out of the question. What counts is the outcome in the simulator.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        Arm, scene and task.
+    starts, goals : ndarray, shape (n, n_axes) and (n, 3)
+        The trials [rad or m], [m].
+
+    Attributes
+    ----------
+    actions : ndarray, shape (n, horizon, n_actions)
+        The motions; at rest where there is none.
+    costs : ndarray, shape (n,)
+        Their costs; infinite where there is none.
+    has_solution : ndarray of bool, shape (n,)
+        Whether some contact-free configuration at the goal was found.
+    """
+
+    def __init__(
+        self, simulator: Simulator, starts: NDArray[np.float64], goals: NDArray[np.float64]
+    ) -> None:
+        n = len(starts)
+        self.simulator, self.starts, self.goals = simulator, starts, goals
+        self.actions = np.zeros((n, simulator.task.horizon, simulator.n_actions))
+        self.costs = np.full(n, np.inf)
+        self.has_solution = np.zeros(n, dtype=bool)
+
+    @property
+    def reached(self) -> NDArray[np.bool_]:
+        """Whether the motions reach the goals, shape (n,)."""
+        reached: NDArray[np.bool_] = self.costs <= self.simulator.task.horizon
+        return reached
+
+    @property
+    def steps(self) -> NDArray[np.int64]:
+        """Steps of the motions, shape (n,); the horizon + 1 where none reaches the goal."""
+        steps: NDArray[np.int64] = np.fmin(self.costs, self.simulator.task.horizon + 1).astype(int)
+        return steps
+
+    def try_steps(
+        self, rows: NDArray[np.int64], steps: NDArray[np.int64], guesses: NDArray[np.float64]
+    ) -> None:
+        """Look for motions of a number of steps where none reaches the goal yet.
+
+        Parameters
+        ----------
+        rows : ndarray of int, shape (m,)
+            Trials.
+        steps : ndarray of int, shape (m,)
+            Steps of the motions; beyond the horizon there are none.
+        guesses : ndarray, shape (n, n_axes)
+            Configurations close to the goals, of all trials [rad or m].
+        """
+        for samples in SAMPLES:
+            due = ~self.reached[rows] & (steps <= self.simulator.task.horizon)
+            rows, steps = rows[due], steps[due]
+            if rows.size == 0:
+                return
+            tolerances = np.full(rows.size, self.simulator.task.tolerance)
+            solutions = self._solutions(rows, steps, tolerances, guesses, samples)
+            self.has_solution[rows[solutions.owner]] = True
+            self._try_straight(rows, steps, solutions)
+        self._try_vias(rows, steps, solutions, np.flatnonzero(~self.reached[rows] & (steps > 1)))
+
+    def try_detours(self, rows: NDArray[np.int64]) -> None:
+        """Plan detours where no motion reaches the goal yet, some for each trial."""
+        for row in rows[~self.reached[rows]]:
+            ends = inverse_kinematics(self.simulator, self.starts[row], self.goals[row])
+            if len(ends) == 0:
+                continue
+            self.has_solution[row] = True
+            rng = self._generator(row)
+            for _ in range(DETOURS):
+                path = find_detour(self.simulator, self.starts[row], ends, rng)
+                if path is None:
+                    break
+                for through_corners in (False, True):
+                    actions = along_path(self.simulator, path, through_corners=through_corners)
+                    if actions is not None:
+                        self._replay(np.array([row]), actions[None])
+
+    def try_approach(
+        self, rows: NDArray[np.int64], distances: NDArray[np.float64], guesses: NDArray[np.float64]
+    ) -> None:
+        """Look for motions that end close to goals which none reaches.
+
+        Parameters
+        ----------
+        rows : ndarray of int, shape (m,)
+            Trials.
+        distances : ndarray, shape (m,)
+            Smallest distances that may be possible [m].
+        guesses : ndarray, shape (n, n_axes)
+            As for `try_steps`.
+        """
+        for nearer in APPROACHES:
+            due = np.isinf(self.costs[rows])
+            rows, distances = rows[due], distances[due]
+            if rows.size == 0:
+                return
+            steps = np.full(rows.size, self.simulator.task.horizon)
+            solutions = self._solutions(rows, steps, distances + nearer, guesses, SAMPLES[-1])
+            self._try_straight(rows, steps, solutions)
+            self._try_vias(rows, steps, solutions, np.flatnonzero(np.isinf(self.costs[rows])))
+
+    def _solutions(
+        self,
+        rows: NDArray[np.int64],
+        steps: NDArray[np.int64],
+        tolerances: NDArray[np.float64],
+        guesses: NDArray[np.float64],
+        samples: int,
+    ) -> Solutions:
+        """Find configurations close to the goals; owners count within ``rows``."""
+        starts, goals = self.starts[rows], self.goals[rows]
+        return solve_within(
+            self.simulator, starts, goals, steps, tolerances, guesses[rows], samples
+        )
+
+    def _try_straight(
+        self, rows: NDArray[np.int64], steps: NDArray[np.int64], solutions: Solutions
+    ) -> None:
+        """Try the straight motions to all solutions."""
+        trials, total = rows[solutions.owner], steps[solutions.owner]
+        ends = solutions.configurations
+        self._replay(trials, straight(self.simulator, self.starts[trials], ends, total))
+
+    def _try_vias(
+        self,
+        rows: NDArray[np.int64],
+        steps: NDArray[np.int64],
+        solutions: Solutions,
+        due: NDArray[np.int64],
+    ) -> None:
+        """Try motions by way of configurations from which the solutions are reached in time."""
+        lots = [np.flatnonzero(solutions.owner == row) for row in due]
+        chosen = [np.resize(lot, VIAS) for lot in lots if lot.size]
+        if not chosen:
+            return
+        index = np.concatenate(chosen)
+        owner, ends = solutions.owner[index], solutions.configurations[index]
+        starts, total, moved = self.starts[rows[owner]], steps[owner], self.simulator.n_actions
+        spread = np.tile(evenly_spread(VIAS, moved + 1), (len(chosen), 1))
+        turn = np.rint((0.25 + 0.5 * spread[:, -1]) * total).astype(np.int64)
+        turn = np.clip(turn, 1, total - 1)
+        from_start = step_box(self.simulator, starts, turn)
+        to_end = step_box(self.simulator, ends, total - turn)
+        lower, upper = np.fmax(from_start[0], to_end[0]), np.fmin(from_start[1], to_end[1])
+        vias = starts.copy()
+        vias[:, :moved] = lower + spread[:, :-1] * (upper - lower)
+        self._replay(rows[owner], two_segments(self.simulator, starts, vias, ends, turn, total))
+
+    def _generator(self, row: int) -> np.random.Generator:
+        """Random generator of a trial, a function of its start and goal."""
+        numbers = np.concatenate([self.starts[row], self.goals[row]]) + 0.0
+        digest = hashlib.sha256(numbers.tobytes()).digest()
+        return np.random.default_rng(np.frombuffer(digest, dtype=np.uint32))
+
+    def _replay(self, trials: NDArray[np.int64], actions: NDArray[np.float64]) -> None:
+        """Run motions in the simulator, and keep the best of each trial if it is a better one."""
+        outcome = self.simulator.rollout_actions(actions, self.starts[trials], self.goals[trials])
+        missed = np.where(outcome.collision, np.inf, MISS_COST + outcome.distance)
+        costs = np.where(outcome.success, outcome.steps, missed)
+        order = np.lexsort((costs, trials))
+        best = order[np.unique(trials[order], return_index=True)[1]]
+        better = best[costs[best] < self.costs[trials[best]]]
+        self.actions[trials[better]] = actions[better]
+        self.costs[trials[better]] = costs[better]

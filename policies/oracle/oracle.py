@@ -1,0 +1,273 @@
+"""The oracle: bounds of what any policy could reach, and in how many steps.
+
+For each trial the oracle *proves* bounds and *finds* a motion; the best policy lies between them.
+
+Proven, by branch and bound over all configurations within reach:
+
+- the number of steps below which no policy can bring the tool within the tolerance of the goal;
+- where none can within the horizon, a distance that no policy can beat, to a millimetre if the
+  budget suffices.
+
+Contact is ignored in that, which makes both hold all the more for motions that avoid it. Where the
+motion found is slower than the bound, the bound is raised: a motion does not end where the arm
+touches something, as far as its shapes are capsules. Boxes of configurations and distances are
+enlarged by 1e-9 to cover rounding. When the budget of a proof runs out, what is proven so far
+stands and is marked as not tight.
+
+Found, by search, and replayed in the simulator, whose outcome is what counts: a motion that
+reaches the goal without contact. It need not be the fastest one, and that none was found proves
+nothing.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kinarm._parallel import run_rows
+from kinarm._validation import finite_array
+from kinarm.motion_bounds import MotionBounds
+from kinarm.policies.oracle.inverse import inverse_kinematics, step_box
+from kinarm.policies.oracle.kernels.approach import ArmInScene, bound_distance, bound_steps
+from kinarm.policies.oracle.motion_search import MotionSearch
+from kinarm.policies.oracle.solution import OracleSolution, OracleSolutions
+from kinarm.problem import ProblemLike
+from kinarm.rollouts import Rollouts
+from kinarm.simulator import Simulator
+
+ORACLE_SEMANTICS = "1"
+"""Version of what the oracle proves and finds: raised with every change of its results."""
+
+BUDGET = 100_000
+"""Boxes that a proof may examine, for each number of steps."""
+
+RESOLUTION = 1e-3
+"""By how much a proven distance may fall short of the smallest possible one [m]."""
+
+EXTRA_STEPS = 24
+"""How far above its lower bound the number of steps is raised before a detour is planned."""
+
+LOT = 128
+"""Trials that are solved together."""
+
+Progress = Callable[[int, int], object]
+"""Called with the number of trials solved so far and in all."""
+
+
+class Oracle:
+    """Bounds what any policy could do in given trials.
+
+    The result for a trial depends on nothing else: not on other trials, their order or the
+    number of threads.
+
+    Parameters
+    ----------
+    problem : ReachProblem, str or Path
+        The problem, its name or its file; its rewards do not matter.
+    threads : int, optional
+        Threads to use; as many as the processors that this process may use by default.
+
+    Attributes
+    ----------
+    simulator : Simulator
+        Where motions are replayed.
+    """
+
+    def __init__(self, problem: ProblemLike, *, threads: int | None = None) -> None:
+        self.simulator = Simulator(problem, threads=threads)
+        chain, n = self.simulator.arm.chain, self.simulator.n_actions
+        shapes = self.simulator.world.contact_model.shapes
+        self._arm = ArmInScene(chain, MotionBounds.of(chain, n), shapes)
+
+    def __repr__(self) -> str:
+        return f"Oracle({self.simulator.problem!r})"
+
+    def solve(self, start: ArrayLike, goal: ArrayLike) -> OracleSolution:
+        """Solve one trial.
+
+        Parameters
+        ----------
+        start : array_like, shape (n_axes,)
+            Contact-free start configuration [rad or m].
+        goal : array_like, shape (3,)
+            Goal position [m].
+
+        Raises
+        ------
+        InvalidInputError
+            If a shape is wrong, an entry is not finite or the start is beyond the limits.
+        StartInContactError
+            If the start touches something.
+        """
+        q = finite_array("start", start, (self.simulator.arm.n_axes,))
+        return self.solve_batch(q[None], finite_array("goal", goal, (3,))[None])[0]
+
+    def solve_batch(
+        self, starts: ArrayLike, goals: ArrayLike, *, on_progress: Progress | None = None
+    ) -> OracleSolutions:
+        """Solve many trials.
+
+        Parameters
+        ----------
+        starts : array_like, shape (n, n_axes)
+            Contact-free start configurations [rad or m].
+        goals : array_like, shape (n, 3)
+            Goal positions [m].
+        on_progress : callable, optional
+            Called with the number of trials solved so far and in all.
+
+        Raises
+        ------
+        InvalidInputError
+            If a shape is wrong, an entry is not finite or a start is beyond the limits.
+        StartInContactError
+            If a start touches something.
+        """
+        episodes = self.simulator.reset(starts, goals)
+        q, g = episodes.q, episodes.goal
+        parts = []
+        for first in range(0, max(len(q), 1), LOT):
+            lot = slice(first, first + LOT)
+            parts.append(self._solve_lot(q[lot], g[lot]))
+            if on_progress is not None:
+                on_progress(min(first + LOT, len(q)), len(q))
+        return OracleSolutions.concatenated(parts)
+
+    def inverse_kinematics(self, start: ArrayLike, goal: ArrayLike) -> NDArray[np.float64]:
+        """Find distinct contact-free configurations at a goal; see `inverse_kinematics`."""
+        return inverse_kinematics(self.simulator, start, goal)
+
+    def _solve_lot(
+        self, starts: NDArray[np.float64], goals: NDArray[np.float64]
+    ) -> OracleSolutions:
+        """From trials to bounds, motions and their replay."""
+        horizon, n = self.simulator.task.horizon, len(starts)
+        lot = _Lot(starts, goals, witnesses=starts.copy())
+        # The horizon comes first: most of what is out of reach is settled at once.
+        last = np.full(n, horizon)
+        steps_bounds, tight = self._bound_steps(lot, np.arange(n), last, last)
+        within = np.flatnonzero(steps_bounds <= horizon)
+        ones = np.ones(within.size, dtype=np.int64)
+        steps_bounds[within], tight[within] = self._bound_steps(lot, within, ones, last[within])
+        search = MotionSearch(self.simulator, starts, goals)
+        for extra in range(EXTRA_STEPS + 1):
+            search.try_steps(within, steps_bounds[within] + extra, lot.witnesses)
+        search.try_detours(within)
+        self._count_contact(lot, search, steps_bounds, tight)
+        distance_bounds = self._approach(lot, search, steps_bounds)
+        replay = self.simulator.rollout_actions(search.actions, starts, goals, record=True)
+        return OracleSolutions(
+            reachable=replay.success,
+            tight=tight,
+            steps=replay.steps,
+            steps_lower_bound=steps_bounds,
+            final_distance=replay.distance,
+            distance_lower_bound=distance_bounds,
+            actions=search.actions,
+            paths=replay.paths,
+            reasons=self._reasons(replay, steps_bounds, distance_bounds, search.has_solution),
+        )
+
+    def _count_contact(
+        self,
+        lot: "_Lot",
+        search: MotionSearch,
+        steps_bounds: NDArray[np.int64],
+        tight: NDArray[np.bool_],
+    ) -> None:
+        """Raise the bounds of motions that are slower, and of goals that none reaches."""
+        horizon = self.simulator.task.horizon
+        slow = np.flatnonzero(search.reached & (search.steps > steps_bounds))
+        steps_bounds[slow], tight[slow] = self._bound_steps(
+            lot, slow, steps_bounds[slow], search.steps[slow] - 1, contact=True
+        )
+        blocked = np.flatnonzero(~search.reached & (steps_bounds <= horizon))
+        last = np.full(blocked.size, horizon)
+        beyond, _ = self._bound_steps(lot, blocked, last, last, contact=True)
+        tight[blocked] = beyond > horizon
+        steps_bounds[blocked] = np.where(tight[blocked], beyond, steps_bounds[blocked])
+
+    def _approach(
+        self, lot: "_Lot", search: MotionSearch, steps_bounds: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        """Prove, and seek, how close motions come to the goals that none reaches."""
+        task, missed = self.simulator.task, np.flatnonzero(~search.reached)
+        distances = np.zeros(len(steps_bounds))
+        distances[missed] = self._bound_distance(lot, missed)
+        out_of_reach = steps_bounds > task.horizon
+        distances[out_of_reach] = np.fmax(distances[out_of_reach], task.tolerance)
+        search.try_approach(missed, np.fmax(distances[missed], task.tolerance), lot.witnesses)
+        return distances
+
+    def _bound_steps(
+        self,
+        lot: "_Lot",
+        rows: NDArray[np.int64],
+        fewest: NDArray[np.int64],
+        most: NDArray[np.int64],
+        *,
+        contact: bool = False,
+    ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Prove how many steps some trials take at least, and note what attains it."""
+        simulator, n = self.simulator, len(rows)
+        lower_bounds, tight = np.empty(n, dtype=np.int64), np.empty(n, dtype=bool)
+        witnesses = lot.witnesses[rows]
+        inputs = (self._arm, lot.starts[rows], lot.goals[rows], simulator.step_limit)
+        limits = (simulator.task.tolerance, contact, BUDGET, fewest, most)
+        arrays = (*inputs, *limits, lower_bounds, tight, witnesses)
+        run_rows(bound_steps, n, BUDGET * n, simulator.threads, *arrays)
+        lot.witnesses[rows] = witnesses
+        return lower_bounds, tight
+
+    def _bound_distance(self, lot: "_Lot", rows: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Prove how close the tool can come within the horizon, and note where it does."""
+        simulator, n = self.simulator, len(rows)
+        distances, configurations = np.empty((n, 2)), np.empty((n, simulator.arm.n_axes))
+        starts, goals = lot.starts[rows], lot.goals[rows]
+        box = step_box(simulator, starts, np.full(n, simulator.task.horizon))
+        inputs = (self._arm, *box, starts, goals, RESOLUTION, False, BUDGET)
+        arrays = (*inputs, distances, configurations)
+        run_rows(bound_distance, n, BUDGET * n, simulator.threads, *arrays)
+        lot.witnesses[rows] = configurations
+        return distances[:, 0]
+
+    def _reasons(
+        self,
+        replay: Rollouts,
+        steps_bounds: NDArray[np.int64],
+        distance_bounds: NDArray[np.float64],
+        has_solution: NDArray[np.bool_],
+    ) -> NDArray[np.str_]:
+        """Say, per trial, why no motion reaches the goal."""
+        horizon = self.simulator.task.horizon
+        reasons = []
+        for row, reached in enumerate(replay.success):
+            if reached:
+                reasons.append("")
+            elif steps_bounds[row] > horizon:
+                reasons.append(
+                    f"out of reach: proven to stay {distance_bounds[row]:.3f} m away or more "
+                    f"within {horizon} steps"
+                )
+            elif has_solution[row]:
+                reasons.append(f"no contact-free motion of {horizon} steps or less found")
+            else:
+                reasons.append("no contact-free configuration at the goal found")
+        return np.array(reasons, dtype=np.str_)
+
+
+class _Lot(NamedTuple):
+    """Trials that are solved together; arrays of n rows.
+
+    Attributes
+    ----------
+    starts, goals : ndarray
+        The trials.
+    witnesses : ndarray, shape (n, n_axes)
+        Configurations that attain what was proven last [rad or m].
+    """
+
+    starts: NDArray[np.float64]
+    goals: NDArray[np.float64]
+    witnesses: NDArray[np.float64]

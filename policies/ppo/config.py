@@ -1,0 +1,126 @@
+"""Settings of Proximal Policy Optimization."""
+
+from dataclasses import dataclass, field
+
+from kinarm.errors import InvalidInputError
+from kinarm.policies.config import (
+    NOT_NEGATIVE,
+    POSITIVE,
+    SHARE,
+    Schedule,
+    TrainingConfig,
+    scheduled,
+)
+from kinarm.problem import ReachProblem
+
+
+@dataclass(frozen=True, kw_only=True)
+class PPOConfig(TrainingConfig):
+    """Settings of a training of 1.2 million environment steps, as in the paper.
+
+    The paper gives no other settings; names and defaults are those of Stable-Baselines3, save that
+    16 environments fill its rollouts of 2000 steps and that minibatches are larger, for speed.
+
+    Parameters
+    ----------
+    problem, reward, seed, recipe
+        See `TrainingConfig`.
+    iterations : int
+        Rollouts, each followed by an update.
+    n_envs : int
+        Arms that are simulated at once.
+    n_steps : int
+        Steps of each arm between two updates.
+    batch_size : int
+        Environment steps per gradient step.
+    n_epochs : int
+        How often an update uses each environment step.
+    net_arch : tuple of int
+        Widths of the hidden layers of the actor and of the critic.
+    learning_rate : float
+        Step size of Adam.
+    learning_rate_schedule : {"constant", "linear"}
+        Whether it stays or falls linearly to zero.
+    gamma : float
+        Discount per step.
+    gae_lambda : float
+        Decay of generalised advantage estimation.
+    clip_range : float
+        How far the probability ratio may leave 1.
+    ent_coef : float
+        Weight of the entropy in the loss.
+    vf_coef : float
+        Weight of the critic's loss.
+    max_grad_norm : float
+        Gradients are shortened to this norm.
+    log_std_init : float
+        Logarithm of the standard deviation of the actions at the beginning.
+    training_tolerance : float, optional
+        Distance at which an episode of the training counts as a success; the task's if it is not
+        given [m].
+    symmetric : bool
+        Whether the policy is to treat mirror images alike, where the task is its own mirror
+        image (``both``); it then learns from goals on the right and from mirror images of those
+        on the left.
+    initial_start_spread : float
+        Spread of the start configurations at the beginning of the training.
+    widening : float
+        Share of the training in which the spread grows linearly to that of the task.
+    """
+
+    iterations: int = 600
+    n_envs: int = 16
+    n_steps: int = 125
+    batch_size: int = 500
+    n_epochs: int = 10
+    net_arch: tuple[int, ...] = (64, 64)
+    learning_rate: float = field(default=3e-4, metadata=POSITIVE)
+    learning_rate_schedule: Schedule = "constant"
+    gamma: float = field(default=0.99, metadata=SHARE)
+    gae_lambda: float = field(default=0.95, metadata=SHARE)
+    clip_range: float = field(default=0.2, metadata=POSITIVE)
+    ent_coef: float = field(default=0.0, metadata=NOT_NEGATIVE)
+    vf_coef: float = field(default=0.5, metadata=NOT_NEGATIVE)
+    max_grad_norm: float = field(default=0.5, metadata=POSITIVE)
+    log_std_init: float = 0.0
+    training_tolerance: float | None = field(default=None, metadata=POSITIVE)
+    symmetric: bool = False
+    initial_start_spread: float = field(default=1.0, metadata=SHARE)
+    widening: float = field(default=0.0, metadata=SHARE)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.net_arch:
+            raise InvalidInputError("net_arch must name at least one layer")
+        if self.batch_size == 1 or self.steps_per_iteration % self.batch_size:
+            raise InvalidInputError(
+                f"batch_size must be above 1 and divide the {self.steps_per_iteration} steps of a "
+                f"rollout, got {self.batch_size}"
+            )
+
+    @property
+    def steps_per_iteration(self) -> int:
+        """Environment steps of a rollout."""
+        return self.n_envs * self.n_steps
+
+    @property
+    def environment_steps(self) -> int:
+        """Environment steps of the whole training."""
+        return self.iterations * self.steps_per_iteration
+
+    @property
+    def training_problem(self) -> ReachProblem:
+        """What is trained on: the problem with the reward and tolerance of these settings."""
+        return self.problem.replace(reward=self.reward, tolerance=self.training_tolerance)
+
+    def learning_rate_at(self, done: float) -> float:
+        """Learning rate after this share of the training."""
+        return scheduled(self.learning_rate, self.learning_rate_schedule, done)
+
+    def start_spread_at(self, done: float) -> float:
+        """Spread of the start configurations after this share of the training."""
+        final = self.problem.task.start_spread
+        if done >= self.widening:
+            return final
+        grown = done / self.widening
+        return (1 - grown) * self.initial_start_spread + grown * final

@@ -1,0 +1,174 @@
+"""The drills of *Extending kinarm*: what the page shows is run as it stands."""
+
+import json
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kinarm.evaluation.commands import evaluate, replay
+from kinarm.policies import learners, load_policy, train
+from kinarm.problem import ReachProblem
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
+BLOCKS = dict(
+    re.findall(r"```\{code-block\} \w+\n:name: (\S+)\n\n(.*?)```", PAGE, re.MULTILINE | re.DOTALL)
+)
+MAINS = {"kinarm-train": train.main, "kinarm-eval": evaluate.main, "kinarm-replay": replay.main}
+
+
+def run(command: str) -> None:
+    """Run a command line in this process."""
+    prog, *arguments = shlex.split(command.replace("\\\n", " "))
+    with pytest.raises(SystemExit) as end:
+        MAINS[prog](arguments)
+    assert end.value.code == 0, command
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder to work in."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def hill_climbing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """The learner of the page, in one file and registered by one line."""
+    (folder / "hill_climbing.py").write_text(BLOCKS["hill_climbing.py"])
+    monkeypatch.syspath_prepend(str(folder))
+    monkeypatch.setattr(learners, "_MODULES", dict(learners._MODULES))
+    exec(BLOCKS["register"])
+    yield
+    sys.modules.pop("hill_climbing", None)
+
+
+def test_a_learner_is_one_file_and_one_registration(
+    hill_climbing: None, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run("kinarm-train hill-climbing --task left --stride 0.05 --iterations 30 --out h.npz")
+    policy = load_policy(folder / "h.npz")
+    assert policy.provenance.algorithm == "hill-climbing"
+    assert policy.problem.name == "left"
+    assert policy.provenance.config["stride"] == 0.05
+    curve = np.loadtxt(folder / "h.curve.csv", delimiter=",", skiprows=1)
+    assert curve[-5:, 1].mean() > curve[:5, 1].mean()
+    capsys.readouterr()
+    run("kinarm-eval --policy h.npz --trials 10 --no-oracle --json")
+    assert json.loads(capsys.readouterr().out)["results"][0]["policy"] == "h"
+
+
+def test_a_registered_learner_resumes_exactly(
+    hill_climbing: None, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    command = "kinarm-train hill-climbing --iterations 12 --out {}.npz"
+    run(command.format("whole"))
+    keep = train.CheckpointKeeper.update
+
+    def interrupted(keeper: train.CheckpointKeeper, state: learners.TrainingState) -> None:
+        keep(keeper, state)
+        if state.iteration == 5:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(train.CheckpointKeeper, "update", interrupted)
+    with pytest.raises(SystemExit) as end:
+        train.main(shlex.split(command.format("halves"))[1:])
+    assert end.value.code == 130
+    monkeypatch.setattr(train.CheckpointKeeper, "update", keep)
+    run(f"{command.format('halves')} --resume")
+    whole, halves = (load_policy(folder / f"{name}.npz") for name in ("whole", "halves"))
+    np.testing.assert_array_equal(whole.layers[0].weights, halves.layers[0].weights)
+
+
+def test_a_metric_is_one_entry(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from kinarm.evaluation import metrics
+
+    table = dict(metrics.METRICS)
+    exec(BLOCKS["metric"])
+    added = {**metrics.METRICS}
+    metrics.METRICS.clear()
+    metrics.METRICS.update(table)
+    for name, metric in added.items():
+        monkeypatch.setitem(metrics.METRICS, name, metric)
+    command = "kinarm-eval --policy ars-tuned-right-seed0 --trials 40 --no-oracle"
+    run(f"{command} --json")
+    (result,) = json.loads(capsys.readouterr().out)["results"]
+    outcomes = result["outcomes"]
+    ends = zip(outcomes["outcome"], outcomes["steps"], strict=True)
+    quick = np.mean([outcome == "success" and steps <= 16 for outcome, steps in ends])
+    assert result["quick"]["value"] == pytest.approx(quick)
+    run(f"{command} --markdown")
+    assert "quick %" in capsys.readouterr().out
+
+
+@pytest.fixture
+def post(folder: Path, write_robot: Callable[..., Path]) -> ReachProblem:
+    """The problem of the page, with an arm beside its file."""
+    shutil.copy(ROOT / "data" / "arms" / "paper.urdf", folder / "my_arm.urdf")
+    (folder / "post.toml").write_text(BLOCKS["post.toml"])
+    return ReachProblem.load("post.toml")
+
+
+def test_a_problem_is_one_file(post: ReachProblem, folder: Path) -> None:
+    assert post.name == "post"
+    assert [obstacle.name for obstacle in post.scene.obstacles] == ["right bench", "post"]
+    for command in BLOCKS["post-commands"].strip().splitlines():
+        run(command)
+    assert load_policy(folder / "post.npz").problem.digest == post.digest
+    document = json.loads((folder / "results" / "evaluation.json").read_text())
+    (entry,) = document["protocol"]["problems"].values()
+    assert entry["oracle"]["success"] is not None
+    assert (folder / "post.html").stat().st_size > 1e5
+
+
+ADDED_PART = """
+import numpy as np
+import kinarm
+from kinarm.observation import observation_layout
+from kinarm.policies.mirror import find_mirror
+
+env = kinarm.ReachEnv("right")
+observation, info = env.reset(seed=0)
+assert observation.shape == (49,) == env.observation_space.shape, observation.shape
+assert env.observation_space.contains(observation)
+assert abs(observation[-1] - info["distance"]) < 1e-12
+assert find_mirror(env.simulator.world).observations[-1] == 1
+assert "distance 1" in observation_layout()
+assert "48-48" in kinarm.ReachEnv.__doc__ or "distance from the tool" in kinarm.ReachEnv.__doc__
+try:
+    kinarm.policies.load_policy("ars-tuned-right")
+except kinarm.PolicyFileError as error:
+    assert "layout" in str(error)
+else:
+    raise AssertionError("a policy of another layout was accepted")
+"""
+
+
+@pytest.mark.slow
+def test_an_observation_part_is_a_formula_and_an_entry(folder: Path) -> None:
+    for part in ("kinarm", "policies", "evaluation", "data"):
+        leave = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(ROOT / part, folder / part, ignore=leave)
+    shutil.copy(ROOT / "pyproject.toml", folder)
+    source = folder / "kinarm" / "observation.py"
+    text = source.read_text()
+    formula, entry = BLOCKS["observation-formula"], BLOCKS["observation-entry"]
+    text = text.replace("\nPOLAR = ", f"\n{formula}\n\nPOLAR = ", 1)
+    head, tail = text.split(')\n"""The parts in their order', 1)
+    source.write_text(f'{head}{entry})\n"""The parts in their order{tail}')
+    subprocess.run(
+        [sys.executable, "-c", ADDED_PART],
+        check=True,
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(folder)},
+    )

@@ -1,0 +1,322 @@
+"""The document of an evaluation holds what it promises, and the table shows all of it."""
+
+import json
+from io import StringIO
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from kinarm.arm import Arm
+from kinarm.errors import InvalidInputError
+from kinarm.evaluation.bounds import bounds_document
+from kinarm.evaluation.document import EvaluationDocument, evaluation_document
+from kinarm.evaluation.entrants import ORACLE, Entrant
+from kinarm.evaluation.evaluation import evaluate, run_trials
+from kinarm.evaluation.metrics import METRICS, Metric
+from kinarm.evaluation.table import print_table
+from kinarm.reference import ReferenceSimulator
+from kinarm.simulator import Simulator
+
+RESULT_FIELDS = {
+    "policy": str,
+    "algorithm": str,
+    "recipe": str,
+    "task": str,
+    "trials": int,
+    "metrics": dict,
+}
+
+
+@pytest.fixture(scope="module", params=["evaluations", "bounded_evaluations"])
+def document(request):
+    """With and without bounds."""
+    return evaluation_document(request.getfixturevalue(request.param), "kinarm-eval --matrix")
+
+
+@pytest.fixture(scope="module")
+def bounded_document(bounded_evaluations):
+    """With a row for the oracle, too."""
+    trial_sets = {each.task: each.trials for each in bounded_evaluations}
+    oracle = [run_trials(ORACLE, trials, oracle=True) for trials in trial_sets.values()]
+    return evaluation_document([*bounded_evaluations, *oracle], "kinarm-eval")
+
+
+def printed(document, width: int = 250, **settings) -> str:
+    console = Console(file=StringIO(), width=width)
+    print_table(document, console, **settings)
+    return console.file.getvalue()
+
+
+def shown(document) -> list[dict[str, str]]:
+    """Rows of the table as a reader sees them, by heading."""
+    lines = printed(document).splitlines()
+    (heading,) = (line for line in lines if line.startswith("┃"))
+    return [
+        dict(zip(cells(heading, "┃"), cells(line, "│"), strict=True))
+        for line in lines
+        if line.startswith("│")
+    ]
+
+
+def cells(line: str, border: str) -> list[str]:
+    inside = line.strip().removeprefix(border).removesuffix(border)
+    return [cell.strip() for cell in inside.split(border)]
+
+
+def test_document_is_plain_json_without_nan(document):
+    assert json.loads(json.dumps(document, allow_nan=False)) == document
+
+
+def test_document_has_protocol_and_results_at_the_top(document):
+    assert {"protocol", "results"} <= set(document)
+
+
+def test_results_are_one_per_policy_and_task(document):
+    assert [(row["policy"], row["task"]) for row in document["results"]] == [
+        ("made-right-seed0", "right"),
+        ("made-right-seed1", "right"),
+        ("made-right-seed2", "right"),
+        ("zero", "right"),
+        ("made-left-seed0", "left"),
+    ]
+
+
+def test_every_result_has_every_field(document):
+    for row in (*document["results"], *document["pooled"]):
+        for name, kind in RESULT_FIELDS.items():
+            assert type(row[name]) is kind, name
+        assert list(row["metrics"]) == list(METRICS)
+        for name, metric in METRICS.items():
+            value, ci95 = row["metrics"][name]["value"], row["metrics"][name]["ci95"]
+            assert (ci95 is not None) == (metric.interval is not None), name
+            if ci95:
+                assert ci95[0] <= value <= ci95[1], name
+
+
+def test_protocol_tells_how_it_was_done(document, evaluations):
+    protocol = document["protocol"]
+    assert protocol["command"] == "kinarm-eval --matrix"
+    assert (protocol["seed"], protocol["arm"]) == (5, "paper")
+    assert protocol["arm_digest"] == Arm.load().digest
+    assert {"python", "numpy", "numba", "pin", "coal", "kinarm"} <= set(protocol["versions"])
+    assert isinstance(protocol["commit"], str)
+    assert set(protocol["tasks"]) == {"right", "left"}
+    assert protocol["tasks"]["right"]["trial_set_hash"] == evaluations[0].trials.digest
+    assert protocol["tasks"]["left"]["trial_set_hash"] == evaluations[-1].trials.digest
+
+
+def test_every_trial_of_every_result_is_listed(document):
+    for row in document["results"]:
+        entry, outcomes = document["protocol"]["tasks"][row["task"]], row["outcomes"]
+        lengths = {len(column) for column in (entry["starts"], entry["goals"], *outcomes.values())}
+        assert lengths == {row["trials"]}
+        assert {"final_distance", "steps", "outcome", "contact"} <= set(outcomes)
+        assert (
+            row["metrics"]["success"]["value"]
+            == outcomes["outcome"].count("success") / row["trials"]
+        )
+        for outcome, contact in zip(outcomes["outcome"], outcomes["contact"], strict=True):
+            assert (contact is not None) == (outcome == "collision")
+
+
+def test_listed_trials_can_be_simulated_again(document, skilled):
+    """By the reference path, from nothing but the numbers in the document."""
+    document = json.loads(json.dumps(document))
+    entry, row = document["protocol"]["tasks"]["right"], document["results"][1]
+    reference = ReferenceSimulator(Simulator(document["protocol"]["arm"], "right"))
+    for i in range(row["trials"]):
+        start, goal = np.array(entry["starts"][i]), np.array(entry["goals"][i])
+        episode = reference.rollout(skilled, start, goal)
+        assert row["outcomes"]["final_distance"][i] == pytest.approx(episode.distance, abs=1e-9)
+        assert row["outcomes"]["steps"][i] == len(episode.rewards)
+        assert row["outcomes"]["contact"][i] == (episode.contact and list(episode.contact))
+
+
+def test_training_seeds_are_recorded(document):
+    assert [row["training_seed"] for row in document["results"]] == [0, 1, 2, None, 0]
+    assert document["pooled"][0]["training_seeds"] == [0, 1, 2]
+
+
+def test_table_has_a_column_per_figure(document):
+    headings = list(shown(document)[0])
+    figures = ("success", "over seeds", "0.1", "0.2", "median", "mean", "p95", "contact", "steps")
+    for name in ("task", "policy", *figures, "of oracle", "step ratio"):
+        assert any(name in heading for heading in headings), name
+
+
+def test_table_has_a_row_per_recipe_and_baseline(document):
+    rows = [(row["task"], row["policy"]) for row in shown(document)]
+    assert sorted(rows) == [("left", "made-left-seed0"), ("right", "made-right"), ("right", "zero")]
+
+
+def test_table_shows_the_figures_of_the_document(document):
+    row = next(row for row in shown(document) if row["policy"] == "made-right")
+    figures, spread = document["pooled"][0]["metrics"], document["pooled"][0]["spread"]
+    low, high = (100 * end for end in figures["success"]["ci95"])
+    for end in (100 * figures["success"]["value"], low, high):
+        assert f"{end:.1f}" in row["success %"]
+    assert row["<= 0.1 m"] == f"{100 * figures['within_0.1']['value']:.1f}"
+    assert row["<= 0.2 m"] == f"{100 * figures['within_0.2']['value']:.1f}"
+    assert row["median m"].startswith(f"{figures['median_distance']['value']:.3f} ")
+    assert row["mean m"] == f"{figures['mean_distance']['value']:.3f}"
+    assert row["contact %"] == f"{100 * figures['collision']['value']:.1f}"
+    worst, best = (100 * spread["success"][end] for end in ("min", "max"))
+    assert row["over seeds %"] == f"{worst:.1f}..{best:.1f} (3 seeds)"
+
+
+def test_results_stand_beside_the_oracle(bounded_document, bounded_evaluations):
+    assert json.loads(json.dumps(bounded_document, allow_nan=False)) == bounded_document
+    for row, evaluation in zip(bounded_document["results"], bounded_evaluations, strict=False):
+        ratios = evaluation.step_ratio
+        figures = {name: entry["value"] for name, entry in row["metrics"].items()}
+        assert figures["relative_success"] == figures["success"]
+        assert figures["step_ratio"] == (np.median(ratios) if len(ratios) else None)
+        assert figures["step_ratio_p95"] == (np.percentile(ratios, 95) if len(ratios) else None)
+
+
+def test_protocol_tells_the_bounds_of_its_tasks(bounded_document, bounded_evaluations):
+    tasks = bounded_document["protocol"]["tasks"]
+    for evaluation in bounded_evaluations:
+        expected = json.loads(json.dumps(bounds_document(evaluation.bounds)))
+        assert tasks[evaluation.task]["oracle"] == expected
+        column = tasks[evaluation.task]["oracle"]["trials"]["steps_lower_bound"]
+        assert len(column) == len(tasks[evaluation.task]["starts"])
+
+
+def test_without_bounds_there_are_none(evaluations):
+    document = evaluation_document(evaluations, "")
+    assert all(entry["oracle"] is None for entry in document["protocol"]["tasks"].values())
+    for row in (*document["results"], *document["pooled"]):
+        assert row["metrics"]["relative_success"]["value"] is None
+    assert {row["of oracle %"] + row["step ratio"] for row in shown(document)} == {""}
+
+
+def test_table_shows_the_bounds(bounded_document):
+    rows = {(row["task"], row["policy"]): row for row in shown(bounded_document)}
+    pooled = bounded_document["pooled"][0]["metrics"]
+    row = rows["right", "made-right"]
+    assert row["of oracle %"] == f"{100 * pooled['relative_success']['value']:.1f}"
+    median, p95 = (pooled[name]["value"] for name in ("step_ratio", "step_ratio_p95"))
+    assert row["step ratio"] == f"{median:.2f} (p95 {p95:.2f})"
+    assert (rows["right", "zero"]["of oracle %"], rows["right", "zero"]["step ratio"]) == (
+        "0.0",
+        "",
+    )
+
+
+def test_table_has_one_row_a_task_for_the_oracle(bounded_document):
+    rows = [row for row in shown(bounded_document) if row["policy"] == "oracle"]
+    assert [(row["task"], row["of oracle %"]) for row in rows] == [
+        ("right", "100.0"),
+        ("left", "100.0"),
+    ]
+    assert all(row["step ratio"].startswith("1.") for row in rows)
+    assert all(row["success %"].startswith("100.0 ") for row in rows)
+
+
+def test_table_is_sorted_by_success(document):
+    rows = (*document["results"], *document["pooled"])
+    rates = {row["policy"]: row["metrics"]["success"]["value"] for row in rows}
+    right = [rates[row["policy"]] for row in shown(document) if row["task"] == "right"]
+    assert right == sorted(right, reverse=True)
+    assert right[0] > right[-1]
+
+
+def test_table_keeps_a_policy_beside_a_group_of_its_recipe(evaluations, skilled, trials):
+    """One's own policy does not vanish because shipped seeds share its recipe."""
+    mine = run_trials(Entrant.from_policy("mine", skilled), trials)
+    document = evaluation_document([*evaluations, mine], "")
+    assert "mine" in [row["policy"] for row in shown(document)]
+
+
+def test_table_works_for_a_single_trial(skilled):
+    document = evaluation_document([evaluate(skilled, trials=1)], "")
+    assert [row["task"] for row in shown(document)] == ["right"]
+
+
+@pytest.mark.parametrize("width", [80, 100, 120, 160])
+def test_a_narrow_table_has_fewer_columns_but_whole_figures(document, width):
+    text = printed(document, width)
+    assert "…" not in text
+    assert max(map(len, text.splitlines())) <= width
+    for name in ("task", "policy", "success", "median", "made-right", "made-left-seed0"):
+        assert name in text
+
+
+def test_a_wider_table_has_no_fewer_columns(document):
+    counts = [printed(document, width).splitlines()[0].count("┳") for width in range(60, 180, 10)]
+    assert counts == sorted(counts)
+    assert counts[0] < counts[-1]
+
+
+def test_markdown_holds_the_same_rows_at_every_width(document):
+    for width in (60, 250):
+        heading, rule, *lines = printed(document, width, markdown=True).strip().splitlines()
+        assert set(rule) <= set("|-: ")
+        names = cells(heading, "|")
+        rows = [dict(zip(names, cells(line, "|"), strict=True)) for line in lines]
+        assert rows == shown(document)
+
+
+def test_a_new_metric_is_one_entry(evaluations, monkeypatch):
+    """Documents and tables show whatever the table of metrics holds."""
+    metric = Metric(
+        meaning="share of trials that end within half a metre",
+        formula=lambda trials: (trials.distance <= 0.5).mean(axis=-1),
+        unit="%",
+        interval="Wilson",
+        heading="<= 0.5 m",
+        digits=1,
+        spread_heading="spread of it %",
+    )
+    monkeypatch.setitem(METRICS, "within_0.5", metric)
+    again = [type(each)(each.entrant, each.trials, each.rollouts) for each in evaluations]
+    document = evaluation_document(again, "")
+    for row, evaluation in zip(document["results"], again, strict=True):
+        assert row["metrics"]["within_0.5"] == evaluation.within(0.5).to_json()
+    rates = [100 * each.within(0.5).value for each in again[:3]]
+    row = next(row for row in shown(document) if row["policy"] == "made-right")
+    assert row["<= 0.5 m"] == f"{sum(rates) / 3:.1f}"
+    assert row["spread of it %"] == f"{min(rates):.1f}..{max(rates):.1f} (3 seeds)"
+
+
+@pytest.fixture
+def stored(evaluations, tmp_path):
+    """A document in a file, and a function that changes it there."""
+    path = tmp_path / "evaluation.json"
+    document = json.loads(json.dumps(evaluation_document(evaluations, "")))
+
+    def store(change=lambda document: None):
+        changed = json.loads(json.dumps(document))
+        change(changed)
+        path.write_text(json.dumps(changed))
+        return path
+
+    return store
+
+
+def test_a_document_is_read_as_it_was_written(stored, evaluations):
+    document = EvaluationDocument.load(stored())
+    trials = document.trials("right", Arm.load())
+    assert trials.digest == evaluations[0].trials.digest
+    assert document.result("made-right", None)["policy"] == "made-right-seed0"
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda d: d.pop("results"), "it lacks 'results'"),
+        (lambda d: d["protocol"].pop("seed"), "protocol lacks 'seed'"),
+        (lambda d: d["protocol"]["tasks"]["left"].pop("goals"), "task 'left' lacks 'goals'"),
+        (lambda d: d["protocol"]["tasks"]["left"].update(horizon="64"), "task 'left'.*'horizon'"),
+        (lambda d: d["protocol"]["tasks"]["left"]["goals"].append([1]), "goals of 'left'"),
+        (lambda d: d["results"][2].update(task="up"), "result 2 is of the unknown task 'up'"),
+        (lambda d: d["results"][1]["outcomes"]["steps"].pop(), "result 1 .* different lengths"),
+        (lambda d: d["results"].insert(0, 3), "result 0 is no object"),
+        (lambda d: d["protocol"].update(format_version=9), "format version 9; this kinarm reads"),
+    ],
+)
+def test_a_damaged_document_is_refused_with_the_place(stored, change, words):
+    with pytest.raises(InvalidInputError, match=rf"evaluation\.json' .*{words}"):
+        EvaluationDocument.load(stored(change))

@@ -1,0 +1,469 @@
+"""Evaluations: their figures against the episodes, and the episodes against the reference path."""
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinarm.arm import Arm
+from kinarm.errors import InvalidInputError, PolicyFileError, SceneError, UnknownNameError
+from kinarm.evaluation.entrants import BASELINES, ORACLE, Entrant, find_entrants
+from kinarm.evaluation.evaluation import evaluate, pool, run_trials
+from kinarm.evaluation.trials import TrialSet
+from kinarm.policies.oracle import Oracle
+from kinarm.reference import ReferenceSimulator
+from kinarm.scene import Bench, Scene
+from kinarm.simulator import Simulator
+from kinarm.task import load_task
+
+IMPORT_PUBLIC_NAMES = """
+import types
+import kinarm.evaluation
+from kinarm.evaluation import *
+modules = [n for n in kinarm.evaluation.__all__ if isinstance(globals()[n], types.ModuleType)]
+assert not modules, f"these names are modules: {modules}"
+"""
+
+
+COMPARED = ("relative_success", "step_ratio", "step_ratio_p95")
+
+
+def oracle_figures(evaluation):
+    """Figures that compare with the oracle, in documents."""
+    return [evaluation.to_json()["metrics"][name]["value"] for name in COMPARED]
+
+
+def test_public_names_are_what_they_say():
+    answer = subprocess.run(
+        [sys.executable, "-c", IMPORT_PUBLIC_NAMES], capture_output=True, text=True, check=False
+    )
+    assert answer.returncode == 0, answer.stderr
+
+
+def test_every_outcome_occurs(skilled_evaluation):
+    """The fixture is worth something: what follows sees every way in which a trial can end."""
+    assert set(skilled_evaluation.outcomes) == {"success", "collision", "horizon"}
+
+
+def test_episodes_are_those_of_the_reference(skilled, skilled_evaluation):
+    trials, rollouts = skilled_evaluation.trials, skilled_evaluation.rollouts
+    reference = ReferenceSimulator(trials.simulator)
+    for i in range(len(trials)):
+        episode = reference.rollout(skilled, trials.starts[i], trials.goals[i])
+        assert rollouts.distance[i] == pytest.approx(episode.distance, abs=1e-9)
+        assert rollouts.steps[i] == len(episode.rewards)
+        expected = "success" if episode.success else "collision" if episode.contact else "horizon"
+        assert skilled_evaluation.outcomes[i] == expected
+        assert skilled_evaluation.contacts[i] == episode.contact
+
+
+def test_figures_are_those_of_the_episodes(skilled_evaluation):
+    distance = np.array(skilled_evaluation.rollouts.distance)
+    outcomes = skilled_evaluation.outcomes
+    document = skilled_evaluation.to_json()
+    figures = {name: entry["value"] for name, entry in document["metrics"].items()}
+    assert document["trials"] == 60
+    assert figures["success"] == outcomes.count("success") / 60
+    assert figures["collision"] == outcomes.count("collision") / 60
+    assert figures["within_0.1"] == sum(distance <= 0.1) / 60
+    assert figures["within_0.2"] == sum(distance <= 0.2) / 60
+    assert figures["mean_distance"] == pytest.approx(sum(distance) / 60)
+    assert figures["max_distance"] == max(distance)
+    assert figures["mean_steps"] == pytest.approx(sum(skilled_evaluation.rollouts.steps) / 60)
+
+
+def test_success_is_the_share_within_the_tolerance(skilled_evaluation):
+    distance = skilled_evaluation.rollouts.distance
+    np.testing.assert_array_equal(
+        np.array(skilled_evaluation.outcomes) == "success", distance <= 0.05
+    )
+    assert skilled_evaluation.within(0.05) == skilled_evaluation.success
+
+
+def test_shares_within_rise_with_the_distance(skilled_evaluation):
+    rates = [skilled_evaluation.within(d).value for d in (0, 0.05, 0.1, 0.2, 0.5, 5)]
+    assert rates == sorted(rates)
+    assert (rates[0], rates[-1]) == (0, 1)
+
+
+def test_attributes_agree_with_the_document(skilled_evaluation):
+    document = skilled_evaluation.to_json()
+    for name in ("success", "collision"):
+        estimate = getattr(skilled_evaluation, name)
+        assert document["metrics"][name] == estimate.to_json()
+        assert skilled_evaluation.metrics[name] == estimate
+    assert document["task"] == skilled_evaluation.task == "right"
+
+
+def test_contact_pairs_name_bodies(skilled_evaluation):
+    arm = skilled_evaluation.trials.simulator.arm
+    links = {frame.name for frame in arm.model.frames}
+    bodies = links | {"ground", "left bench", "right bench"}
+    touched = [pair for pair in skilled_evaluation.contacts if pair]
+    assert touched
+    assert {name for pair in touched for name in pair} <= bodies
+
+
+def test_the_still_baseline_never_moves():
+    evaluation = evaluate("zero", "both", trials=30, seed=2)
+    rollouts, arm = evaluation.rollouts, Arm.load()
+    np.testing.assert_array_equal(rollouts.configurations, evaluation.trials.starts)
+    assert set(evaluation.outcomes) == {"horizon"}
+    assert (rollouts.steps == 64).all()
+    tools = np.array([arm.tool_position(start) for start in evaluation.trials.starts])
+    expected = np.linalg.norm(tools - evaluation.trials.goals, axis=1)
+    np.testing.assert_allclose(rollouts.distance, expected, atol=1e-12)
+
+
+def test_the_random_baseline_is_reproducible_and_independent_of_the_number_of_trials():
+    few, many = (evaluate("random", "right", trials=n, seed=1) for n in (6, 25))
+    again = evaluate("random", "right", trials=25, seed=1)
+    np.testing.assert_array_equal(many.rollouts.configurations, again.rollouts.configurations)
+    np.testing.assert_array_equal(many.rollouts.configurations[:6], few.rollouts.configurations)
+    np.testing.assert_array_equal(many.rollouts.steps[:6], few.rollouts.steps)
+
+
+def test_the_random_baseline_moves_differently_in_every_trial_and_seed():
+    one, other = (evaluate("random", "right", trials=20, seed=seed) for seed in (1, 2))
+    moves = np.concatenate(
+        [e.rollouts.configurations[:, :5] - e.trials.starts[:, :5] for e in (one, other)]
+    )
+    moved = moves[moves.any(axis=1)]
+    assert len(moved) > 30
+    assert len(np.unique(moved.round(9), axis=0)) == len(moved)
+
+
+def test_every_entrant_faces_the_same_trials(skilled):
+    entrants = ("zero", "random", skilled, lambda observations: np.ones((len(observations), 5)))
+    made = [evaluate(entrant, "right", trials=8, seed=3).trials for entrant in entrants]
+    assert len({trials.digest for trials in made}) == 1
+
+
+def test_trials_are_those_of_the_trial_set(skilled):
+    expected = TrialSet.draw(Simulator(task="right"), 8, 3)
+    rollouts = evaluate(skilled, trials=8, seed=3).rollouts
+    np.testing.assert_array_equal(rollouts.starts, expected.starts)
+    np.testing.assert_array_equal(rollouts.goals, expected.goals)
+
+
+def test_a_policy_faces_its_own_task_by_default(train_novice):
+    assert evaluate(train_novice("left"), trials=2).task == "left"
+    assert evaluate(train_novice("left"), "right", trials=2).task == "right"
+
+
+def test_a_policy_file_does_as_the_policy_does(skilled, tmp_path):
+    skilled.save(tmp_path / "mine.npz")
+    from_file, direct = (evaluate(p, trials=10) for p in (tmp_path / "mine.npz", skilled))
+    assert from_file.entrant.name == "mine"
+    np.testing.assert_array_equal(from_file.rollouts.distance, direct.rollouts.distance)
+
+
+def test_a_function_does_as_the_policy_in_it_does(skilled):
+    def wrapped(observations):
+        return skilled(observations)
+
+    function, compiled = (evaluate(p, "right", trials=40) for p in (wrapped, skilled))
+    assert (function.entrant.name, function.entrant.policy) == ("wrapped", None)
+    np.testing.assert_array_equal(function.rollouts.steps, compiled.rollouts.steps)
+    np.testing.assert_allclose(function.rollouts.distance, compiled.rollouts.distance, atol=1e-9)
+
+
+def test_a_function_that_stands_still_is_the_still_baseline():
+    def still(observations):
+        return np.zeros((len(observations), 5))
+
+    function, baseline = (evaluate(p, "right", trials=5) for p in (still, "zero"))
+    np.testing.assert_array_equal(function.rollouts.distance, baseline.rollouts.distance)
+
+
+@pytest.mark.parametrize(
+    "actions", [np.zeros(5), np.zeros((1, 4)), np.full((3, 5), np.nan), "left", None]
+)
+def test_a_function_with_bad_actions_is_refused(actions):
+    with pytest.raises(InvalidInputError, match="actions must"):
+        evaluate(lambda _: actions, "right", trials=3)
+
+
+def test_an_entrant_can_be_put_to_the_trials_directly(skilled):
+    entrant = Entrant.from_policy("mine", skilled)
+    assert evaluate(entrant, trials=2).entrant is entrant
+
+
+def test_a_task_of_ones_own(skilled):
+    strict, lax = (
+        evaluate(skilled, load_task("right", tolerance=tolerance), trials=40)
+        for tolerance in (0.02, 0.2)
+    )
+    assert strict.success.value < lax.success.value
+    assert lax.trials.simulator.task.tolerance == 0.2
+
+
+def test_a_policy_for_another_arm_is_refused_unless_allowed(skilled):
+    with pytest.raises(PolicyFileError, match=r"trained for arm 'paper', not for 'paper_flange'"):
+        evaluate(skilled, arm="paper_flange", trials=2)
+    allowed = evaluate(skilled, arm="paper_flange", trials=2, allow_other_arm=True)
+    assert allowed.trials.simulator.arm.name == "paper_flange"
+
+
+def test_run_trials_refuses_another_arm_too(skilled):
+    trials = TrialSet.draw(Simulator("lrmate200ic_5l"), 2, 0)
+    with pytest.raises(PolicyFileError, match="trained for arm"):
+        run_trials(Entrant.from_policy("mine", skilled), trials)
+    assert len(run_trials(Entrant.from_policy("mine", skilled), trials, True).rollouts) == 2
+
+
+def test_run_trials_on_a_scene_of_ones_own():
+    scene = Scene(benches=(Bench(name="right", x=(0.2, 0.6), y=(-0.8, -0.5), height=0.1),))
+    trials = TrialSet.draw(Simulator(task="right", scene=scene), 5, 0)
+    evaluation = run_trials(BASELINES["zero"], trials)
+    np.testing.assert_allclose(evaluation.trials.goals[:, 2], 0.125, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        ({"task": None}, InvalidInputError, "was not trained on a task"),
+        ({"task": "upwards"}, UnknownNameError, "available: left, right, both"),
+        ({"policy": "nobody"}, UnknownNameError, "unknown policy 'nobody'"),
+        ({"policy": "nobody.npz"}, PolicyFileError, "cannot read"),
+        ({"arm": "nobody"}, UnknownNameError, "available: lrmate200ic_5l, paper, paper_flange"),
+        ({"trials": 0}, InvalidInputError, "trials must be a whole number of at least 1, got 0"),
+        ({"seed": -1}, InvalidInputError, "seed must be a whole number of at least 0, got -1"),
+    ],
+)
+def test_bad_arguments_are_refused(arguments, error, message):
+    with pytest.raises(error, match=message):
+        evaluate(**{"policy": "zero", "task": "right", "trials": 2, **arguments})
+
+
+def test_a_task_on_a_missing_bench_is_refused():
+    simulator_scene = Scene(benches=(Bench(name="far", x=(5, 6), y=(5, 6), height=1),))
+    with pytest.raises((SceneError, UnknownNameError), match="available: far"):
+        Simulator(task="right", scene=simulator_scene)
+
+
+def test_pooling_gathers_training_seeds_of_a_task(evaluations):
+    (pooled,) = pool(evaluations)
+    assert (pooled.name, pooled.task, len(pooled.members)) == ("made-right", "right", 3)
+    assert [member.entrant.name for member in pooled.members] == [
+        f"made-right-seed{seed}" for seed in (0, 1, 2)
+    ]
+
+
+def test_pooling_keeps_tasks_apart(skilled):
+    entrants = [Entrant.from_policy(f"mine-seed{seed}", skilled) for seed in (0, 1)]
+    made = [evaluate(e, task, trials=2) for e in entrants for task in ("left", "right")]
+    assert [(p.name, p.task, len(p.members)) for p in pool(made)] == [
+        ("mine", "left", 2),
+        ("mine", "right", 2),
+    ]
+
+
+def test_a_single_seed_is_not_pooled(evaluations):
+    assert pool(evaluations[2:]) == ()
+
+
+def test_pooled_figures_are_those_of_all_seeds(evaluations):
+    members = evaluations[:3]
+    document = pool(evaluations)[0].to_json()
+    figures = {name: entry["value"] for name, entry in document["metrics"].items()}
+    distance = np.concatenate([member.rollouts.distance for member in members])
+    steps = np.concatenate([member.rollouts.steps for member in members])
+    assert document["trials"] == 60
+    assert figures["mean_distance"] == pytest.approx(distance.mean())
+    assert figures["median_distance"] == pytest.approx(np.median(distance))
+    assert figures["max_distance"] == distance.max()
+    assert figures["success"] == pytest.approx(np.mean(distance <= 0.05))
+    assert figures["within_0.2"] == pytest.approx(np.mean(distance <= 0.2))
+    assert figures["mean_steps"] == pytest.approx(steps.mean())
+    assert figures["median_steps"] == np.median(steps)
+
+
+def test_pooled_spread_is_over_the_seeds(evaluations):
+    pooled = pool(evaluations)[0]
+    rates = [member.success.value for member in evaluations[:3]]
+    medians = [sorted(member.rollouts.distance)[29:31] for member in evaluations[:3]]
+    spread = pooled.to_json()["spread"]
+    assert spread["success"]["each"] == list(pooled.success_rates) == rates
+    assert (spread["success"]["min"], spread["success"]["max"]) == (min(rates), max(rates))
+    mean = sum(rates) / 3
+    deviation = (sum((rate - mean) ** 2 for rate in rates) / 2) ** 0.5
+    assert spread["success"]["std"] == pytest.approx(deviation)
+    assert spread["median_distance"]["each"] == pytest.approx([sum(m) / 2 for m in medians])
+    assert not {"step_ratio", "relative_success"} & set(spread)
+
+
+def test_pooled_interval_is_no_narrower_than_its_trials_allow(evaluations):
+    """60 trials with the pooled rate have a Wilson interval at least this wide."""
+    success = pool(evaluations)[0].to_json()["metrics"]["success"]
+    p, z, n = success["value"], 1.959963984540054, 60
+    half = z * (p * (1 - p) / n + z**2 / (4 * n**2)) ** 0.5 / (1 + z**2 / n)
+    assert success["ci95"][1] - success["ci95"][0] >= 2 * half - 1e-12
+
+
+def test_pooled_training_seeds_are_told(evaluations):
+    assert pool(evaluations)[0].to_json()["training_seeds"] == [0, 1, 2]
+
+
+def test_step_ratio_is_that_of_the_trials_that_succeeded(bounded):
+    rollouts, starts, goals = bounded.rollouts, bounded.trials.starts, bounded.trials.goals
+    solutions = Oracle(task="right").solve_batch(starts, goals)
+    expected = [
+        rollouts.steps[trial] / solution.steps_lower_bound
+        for trial, solution in enumerate(solutions)
+        if rollouts.success[trial]
+    ]
+    assert 0 < len(expected) < 60
+    assert bounded.step_ratio.tolist() == expected
+    assert bounded.metrics["step_ratio"].value == np.median(expected)
+    assert bounded.metrics["step_ratio_p95"].value == np.percentile(expected, 95)
+
+
+@pytest.mark.parametrize("reached", [range(60), range(0, 60, 3), [7]])
+def test_relative_success_is_the_ratio_of_two_rates(bounded, reached):
+    reachable = np.isin(np.arange(60), list(reached))
+    made = replace(bounded, bounds=replace(bounded.bounds, reachable=reachable))
+    successes, possible = bounded.outcomes.count("success"), len(reached)
+    relative = made.metrics["relative_success"].value
+    assert relative == pytest.approx((successes / 60) / (possible / 60))
+
+
+def test_a_policy_that_never_succeeds_has_no_step_ratio():
+    evaluation = evaluate("zero", "right", trials=4, oracle=True)
+    assert evaluation.step_ratio.shape == (0,)
+    assert oracle_figures(evaluation) == [0, None, None]
+
+
+@pytest.mark.parametrize("name", ["oracle", "zero"])
+def test_where_the_oracle_reaches_nothing_there_is_nothing_to_compare_with(name):
+    evaluation = evaluate(name, load_task("right", horizon=1), trials=4, oracle=True)
+    assert not evaluation.bounds.reachable.any()
+    assert oracle_figures(evaluation) == [None, None, None]
+
+
+def test_without_the_oracle_there_are_no_bounds(skilled_evaluation):
+    assert skilled_evaluation.bounds is None
+    assert oracle_figures(skilled_evaluation) == [None, None, None]
+    with pytest.raises(InvalidInputError, match="there are no bounds"):
+        _ = skilled_evaluation.step_ratio
+
+
+def test_evaluations_are_made_without_the_oracle_unless_asked_for(skilled, monkeypatch):
+    monkeypatch.setattr(Oracle, "solve_batch", None)
+    assert evaluate(skilled, trials=3, seed=99).bounds is None
+
+
+def test_the_oracle_changes_nothing_but_the_bounds(skilled_evaluation, bounded):
+    alone, beside = skilled_evaluation.to_json(), bounded.to_json()
+    for name in COMPARED:
+        assert alone["metrics"].pop(name) == {"value": None, "ci95": None}
+        assert beside["metrics"].pop(name)["value"] is not None
+    assert alone == beside
+
+
+def test_the_oracle_evaluated_by_name():
+    evaluation = evaluate("oracle", task="right", trials=5, seed=5, oracle=True)
+    expected = Oracle(task="right").solve_batch(evaluation.trials.starts, evaluation.trials.goals)
+    np.testing.assert_array_equal(evaluation.bounds.paths, expected.paths)
+    np.testing.assert_array_equal(evaluation.rollouts.steps, expected.steps)
+    np.testing.assert_array_equal(evaluation.rollouts.distance, expected.final_distance)
+    assert set(evaluation.outcomes) == {"success"}
+    np.testing.assert_array_equal(
+        evaluation.step_ratio, expected.steps / expected.steps_lower_bound
+    )
+
+
+def test_the_oracle_evaluated_without_bounds():
+    evaluation = evaluate("oracle", task="right", trials=5, seed=5)
+    assert evaluation.success.value == 1
+    assert evaluation.bounds is None
+
+
+def test_the_oracle_has_no_task_of_its_own():
+    with pytest.raises(InvalidInputError, match="'oracle' was not trained on a task"):
+        evaluate("oracle", trials=1)
+
+
+def test_the_oracle_is_all_that_is_possible_where_not_everything_is():
+    evaluation = evaluate("oracle", "right", trials=12, seed=2, arm="paper_flange", oracle=True)
+    solved = int(evaluation.bounds.reachable.sum())
+    assert 0 < evaluation.success.value == solved / 12 < 1
+    assert (evaluation.metrics["relative_success"].value, evaluation.step_ratio.size) == (1, solved)
+
+
+@pytest.mark.parametrize(
+    ("arm", "name", "task"),
+    [
+        ("paper", "ars-tuned-both-seed0", "both"),
+        ("paper", "random", "left"),
+        ("paper", "oracle", "both"),
+        ("paper_flange", "oracle", "right"),
+        ("lrmate200ic_5l", "oracle", "right"),
+    ],
+)
+def test_nobody_is_better_than_proven_possible(arm, name, task):
+    evaluation = evaluate(name, task, trials=25, seed=2, arm=arm, oracle=True)
+    assert (evaluation.step_ratio >= 1).all()
+    rollouts, bounds = evaluation.rollouts, evaluation.bounds
+    assert (rollouts.distance >= bounds.distance_lower_bound).all()
+    assert not rollouts.success[bounds.steps_lower_bound > 64].any()
+
+
+def test_trials_are_solved_once_for_all_who_face_them(skilled, monkeypatch):
+    solve, calls = Oracle.solve_batch, []
+    monkeypatch.setattr(
+        Oracle, "solve_batch", lambda *args, **kw: calls.append(1) or solve(*args, **kw)
+    )
+    trials = TrialSet.draw(Simulator(task="right"), 3, seed=77)
+    for entrant in (Entrant.from_policy("mine", skilled), ORACLE, BASELINES["zero"]):
+        run_trials(entrant, trials, oracle=True)
+    assert len(calls) == 1
+
+
+def test_a_policy_for_another_arm_is_refused_before_the_oracle_is_asked(skilled, monkeypatch):
+    monkeypatch.setattr(Oracle, "solve_batch", None)
+    with pytest.raises(PolicyFileError, match="trained for arm"):
+        evaluate(skilled, arm="lrmate200ic_5l", trials=2, oracle=True)
+
+
+def test_pooled_step_ratio_is_over_all_seeds(trials):
+    members = [run_trials(e, trials, oracle=True) for e in find_entrants("ars-tuned-right")]
+    relative, median, p95 = oracle_figures(pool(members)[0])
+    ratios = [
+        member.rollouts.steps[trial] / member.bounds.steps_lower_bound[trial]
+        for member in members
+        for trial in np.flatnonzero(member.rollouts.success)
+    ]
+    assert 60 < len(ratios) < 240
+    assert median == pytest.approx(np.median(ratios))
+    assert p95 == pytest.approx(np.percentile(ratios, 95))
+    assert relative == pytest.approx(len(ratios) / 240)
+
+
+def test_pooled_figures_without_bounds_have_none(evaluations):
+    assert oracle_figures(pool(evaluations)[0]) == [None, None, None]
+
+
+def test_texts_of_evaluations_are_one_readable_line(evaluations, trials):
+    assert repr(trials) == f"TrialSet(60 trials of right, arm paper, seed 5: {trials.digest})"
+    assert repr(evaluations[3]).startswith("Evaluation(zero on 60 trials of right, success 0 (0..")
+    (pooled,) = pool(evaluations)
+    assert repr(pooled).startswith("PooledEvaluation(3 seeds of made-right on 60 trials of right,")
+    for made in (trials, pooled, *evaluations, *(each.entrant for each in evaluations)):
+        assert len(repr(made)) < 130
+        assert "\n" not in repr(made)
+
+
+def test_a_policy_that_does_not_fit_is_refused_before_bounds_are_solved(skilled, monkeypatch):
+    narrow = replace(skilled, mean=skilled.mean[1:], std=skilled.std[1:], layers=fewer(skilled))
+    monkeypatch.setattr(Oracle, "solve_batch", None)
+    with pytest.raises(PolicyFileError, match=r"maps 47 observations to 5 actions; arm 'paper'"):
+        evaluate(narrow, trials=2, seed=77, oracle=True)
+
+
+def fewer(policy):
+    """Layers that take one observation less."""
+    first, *others = policy.layers
+    return (first._replace(weights=first.weights[:, 1:]), *others)

@@ -1,0 +1,156 @@
+"""Histograms of the final distance: shares, panels, legends and reproducible files."""
+
+import numpy as np
+import pytest
+from matplotlib.patches import StepPatch
+
+from kinarm.evaluation.entrants import BASELINES, Entrant
+from kinarm.evaluation.evaluation import run_trials
+from kinarm.evaluation.figures import distance_histograms, save_figure
+from kinarm.evaluation.trials import TrialSet
+from kinarm.simulator import Simulator
+from kinarm.task import TASKS
+
+SVG_BEGINNING = b'<?xml version="1.0"'
+PNG_BEGINNING = b"\x89PNG\r\n\x1a\n"
+
+
+@pytest.fixture(scope="module")
+def figure(evaluations):
+    return distance_histograms(evaluations)
+
+
+def stairs(axes) -> list[StepPatch]:
+    return [patch for patch in axes.patches if isinstance(patch, StepPatch)]
+
+
+def legend(axes) -> list[str]:
+    return [text.get_text() for text in axes.get_legend().get_texts()]
+
+
+def test_a_panel_per_task(figure):
+    titles = [axes.get_title() for axes in figure.axes]
+    assert len(titles) == 2
+    assert "right" in titles[0]
+    assert "left" in titles[1]
+
+
+def test_axes_say_what_they_show(figure):
+    assert all("[m]" in axes.get_xlabel() for axes in figure.axes)
+    assert "share" in figure.axes[0].get_ylabel()
+
+
+def test_legends_name_every_group_once(figure):
+    assert [len(legend(axes)) for axes in figure.axes] == [2, 1]
+    assert "zero" in legend(figure.axes[0])
+
+
+def test_seeds_are_drawn_besides_their_mean(figure):
+    right, left = figure.axes
+    assert len(stairs(right)) == 3 + 1 + 1
+    assert len(stairs(left)) == 1
+
+
+def test_shares_of_every_line_sum_to_one(figure):
+    for axes in figure.axes:
+        for patch in stairs(axes):
+            assert patch.get_data().values.sum() == pytest.approx(1)
+
+
+def test_shares_are_those_of_the_trials(skilled_evaluation):
+    (patch,) = stairs(distance_histograms([skilled_evaluation]).axes[0])
+    distance = skilled_evaluation.rollouts.distance
+    for share, low, high in zip(patch.get_data().values, *ends(patch), strict=True):
+        inside = sum(low <= d < high for d in distance)
+        assert share == pytest.approx(inside / len(distance))
+
+
+def ends(patch: StepPatch) -> tuple[np.ndarray, np.ndarray]:
+    edges = patch.get_data().edges
+    return edges[:-1], edges[1:]
+
+
+def test_the_mean_line_is_the_mean_of_the_seeds(figure):
+    colours: dict[tuple, list] = {}
+    for patch in stairs(figure.axes[0]):
+        colours.setdefault(patch.get_edgecolor()[:3], []).append(patch)
+    patches = next(group for group in colours.values() if len(group) == 4)
+    thickest = max(patches, key=lambda patch: patch.get_linewidth())
+    seeds = [patch.get_data().values for patch in patches if patch is not thickest]
+    np.testing.assert_allclose(thickest.get_data().values, np.mean(seeds, axis=0))
+
+
+def test_the_tolerance_is_marked(figure):
+    for axes in figure.axes:
+        assert 0.05 in [line.get_xdata()[0] for line in axes.lines]
+
+
+@pytest.mark.parametrize("furthest", [0.001, 0.05, 0.15, 0.3, 0.35, 0.6, 0.7, 1.0, 1.4, 1.45])
+def test_no_trial_is_lost_at_the_last_edge(made_up, furthest):
+    (patch,) = stairs(distance_histograms([made_up([furthest, furthest / 2])]).axes[0])
+    assert patch.get_data().values.sum() == pytest.approx(1)
+
+
+def test_a_recipe_keeps_its_colour_in_every_panel(skilled, train_novice, evaluations):
+    right, left = evaluations[0].trials, evaluations[-1].trials
+    made = [
+        run_trials(BASELINES["zero"], right),
+        run_trials(Entrant.from_policy("ars-tuned-right-seed0", skilled), right),
+        run_trials(Entrant.from_policy("ars-tuned-left-seed0", train_novice("left")), left),
+        run_trials(BASELINES["zero"], left),
+    ]
+    first, second = (
+        [handle.get_edgecolor() for handle in axes.get_legend_handles_labels()[0]]
+        for axes in distance_histograms(made).axes
+    )
+    assert len(set(first)) == 2
+    assert set(first) == set(second)
+
+
+def test_groups_of_a_panel_can_be_told_apart(trials, train_novice):
+    """Policies of one recipe, trained on two tasks, and one's own, all on the same task."""
+    entrants = [
+        Entrant.from_policy("ars-tuned-right-seed0", train_novice("right")),
+        Entrant.from_policy("ars-tuned-left-seed0", train_novice("left")),
+        Entrant.from_policy("mine", train_novice("right", 2)),
+    ]
+    (axes,) = distance_histograms([run_trials(e, trials) for e in entrants]).axes
+    assert len(set(legend(axes))) == 3
+    assert len({patch.get_edgecolor() for patch in stairs(axes)}) == 3
+
+
+def test_every_line_of_a_matrix_has_a_look_of_its_own(train_novice):
+    policies = {
+        f"ars-{recipe}-{task}-seed0": train_novice(task, recipe=recipe)
+        for recipe in ("paper", "tuned")
+        for task in TASKS
+    }
+    entrants = [Entrant.from_policy(*item) for item in policies.items()] + [*BASELINES.values()]
+    trial_sets = [TrialSet.draw(Simulator(task=task), 4, seed=0) for task in TASKS]
+    matrix = [run_trials(entrant, trials) for trials in trial_sets for entrant in entrants]
+    for axes in distance_histograms(matrix).axes:
+        assert len(set(legend(axes))) == len(entrants)
+        looks = {(patch.get_edgecolor(), patch.get_linestyle()) for patch in stairs(axes)}
+        assert len(looks) == len(entrants)
+
+
+def test_files_are_written_and_reproducible(evaluations, tmp_path):
+    contents = []
+    for name in ("one", "two"):
+        folder = tmp_path / name
+        folder.mkdir()
+        paths = save_figure(distance_histograms(evaluations), folder, "histogram")
+        assert [path.name for path in paths] == ["histogram.png", "histogram.svg"]
+        contents.append([path.read_bytes() for path in paths])
+    assert contents[0] == contents[1]
+    png, svg = contents[0]
+    assert png.startswith(PNG_BEGINNING)
+    assert svg.startswith(SVG_BEGINNING)
+
+
+def test_saving_leaves_the_settings_of_matplotlib_alone(figure, tmp_path):
+    import matplotlib
+
+    before = dict(matplotlib.rcParams)
+    save_figure(figure, tmp_path, "histogram")
+    assert dict(matplotlib.rcParams) == before

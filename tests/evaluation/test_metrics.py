@@ -1,0 +1,219 @@
+"""Figures of merit against formulas written out here, and against a bootstrap written here."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kinarm.evaluation.metrics import METRICS, Metric, Outcomes, estimate_metrics
+from kinarm.evaluation.statistics import Estimate
+from kinarm.rollouts import Rollouts
+
+NAMES = {"mean": "mean_distance", "median": "median_distance", "iqm": "iqm_distance"}
+NAMES["p95"] = "p95_distance"
+
+
+def rollouts(distance: np.ndarray) -> Rollouts:
+    """Episodes with these final distances; the rest does not matter."""
+    none = np.zeros(len(distance))
+    return Rollouts(
+        starts=none,
+        goals=none,
+        success=distance <= 0.05,
+        collision=none > 0,
+        steps=none.astype(int),
+        distance=distance,
+        returns=-distance,
+        configurations=none,
+        targets=none,
+        moments=none,
+        paths=none,
+    )
+
+
+def figures_of(distances: np.ndarray) -> dict[str, Estimate]:
+    """All figures of merit of one or several training seeds."""
+    table = np.atleast_2d(distances)
+    return estimate_metrics(Outcomes(tuple(rollouts(row) for row in table)))
+
+
+def quantile(values: np.ndarray, p: float) -> float:
+    """Linear interpolation between order statistics."""
+    ordered = sorted(values)
+    position = p * (len(ordered) - 1)
+    below = math.floor(position)
+    above = min(below + 1, len(ordered) - 1)
+    return ordered[below] + (position - below) * (ordered[above] - ordered[below])
+
+
+def interquartile_mean(values: np.ndarray) -> float:
+    """Mean of what is left without the lowest and the highest quarter, rounded down."""
+    cut = len(values) // 4
+    kept = sorted(values)[cut : len(values) - cut]
+    return sum(kept) / len(kept)
+
+
+ESTIMATORS = {
+    "mean": lambda values: sum(values) / len(values),
+    "median": lambda values: quantile(values, 0.5),
+    "iqm": interquartile_mean,
+    "p95": lambda values: quantile(values, 0.95),
+}
+
+
+def own_bootstrap(table: np.ndarray, estimator, resamples: int = 2000) -> tuple[float, float]:
+    """Percentile interval; the same resampled trials for every row."""
+    rng = np.random.default_rng(987)
+    trials = table.shape[1]
+    estimates = [
+        estimator(table[:, rng.integers(0, trials, trials)].ravel()) for _ in range(resamples)
+    ]
+    return quantile(estimates, 0.025), quantile(estimates, 0.975)
+
+
+def skewed(n: int, seed: int = 0) -> np.ndarray:
+    """Final distances as policies have them: many small, some large."""
+    return np.random.default_rng(seed).gamma(1.5, 0.1, n)
+
+
+def test_distance_figures_by_hand():
+    figures = figures_of(np.array([0.8, 0.1, 0.4, 0.2, 0.3, 0.7, 0.6, 0.5]))
+    assert figures["mean_distance"].value == pytest.approx(0.45)
+    assert figures["median_distance"].value == pytest.approx(0.45)
+    assert figures["iqm_distance"].value == pytest.approx((0.3 + 0.4 + 0.5 + 0.6) / 4)
+    assert figures["p95_distance"].value == pytest.approx(0.7 + 0.65 * 0.1)
+    assert figures["max_distance"].value == 0.8
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 5, 6, 37, 200])
+def test_distance_figures_are_the_formulas(n):
+    values = skewed(n, seed=n)
+    figures = figures_of(values)
+    for name, estimator in ESTIMATORS.items():
+        assert figures[NAMES[name]].value == pytest.approx(estimator(values), abs=1e-12), name
+    assert figures["max_distance"].value == max(values)
+
+
+@pytest.mark.parametrize("rows", [1, 3])
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_distance_intervals_are_those_of_a_bootstrap(name, rows):
+    table = skewed(rows * 200, seed=7).reshape(rows, 200)
+    interval = figures_of(table if rows > 1 else table[0])[NAMES[name]].ci95
+    expected = own_bootstrap(table, ESTIMATORS[name])
+    np.testing.assert_allclose(interval, expected, atol=0.12 * (expected[1] - expected[0]))
+
+
+def test_seeds_that_agree_are_no_further_evidence():
+    values = skewed(100)
+    one = figures_of(values)
+    four = figures_of(np.stack([values] * 4))
+    width = one["mean_distance"].ci95[1] - one["mean_distance"].ci95[0]
+    assert four["mean_distance"].value == pytest.approx(one["mean_distance"].value)
+    np.testing.assert_allclose(
+        four["mean_distance"].ci95, one["mean_distance"].ci95, atol=0.12 * width
+    )
+
+
+def test_distance_interval_covers_the_truth_about_as_often_as_it_says():
+    covered = {"mean": 0, "median": 0}
+    truth = {"mean": 0.2, "median": 0.2 * math.log(2)}
+    for seed in range(150):
+        values = np.random.default_rng([seed, 31]).exponential(0.2, 100)
+        figures = figures_of(values)
+        for name in covered:
+            low, high = figures[NAMES[name]].ci95
+            covered[name] += low <= truth[name] <= high
+    assert all(0.87 <= count / 150 <= 0.99 for count in covered.values()), covered
+
+
+def test_figures_are_reproducible():
+    assert figures_of(skewed(30)) == figures_of(skewed(30))
+
+
+def test_a_single_trial_has_no_interval():
+    for values in (np.array([0.3]), np.full((2, 1), 0.3)):
+        figures = figures_of(values)
+        assert {figures[name].ci95 for name in NAMES.values()} == {None}
+
+
+def test_constant_trials_have_intervals_of_no_width():
+    for values in (np.full(20, 0.3), np.zeros(3)):
+        figures = figures_of(values)
+        for low, high in (figures[name].ci95 for name in NAMES.values()):
+            assert low == pytest.approx(values.flat[0], abs=1e-12)
+            assert high == pytest.approx(values.flat[0], abs=1e-12)
+
+
+distances = st.lists(st.floats(0, 2).map(lambda x: round(x, 6)), min_size=2, max_size=40)
+
+
+@given(distances)
+@settings(max_examples=40, deadline=None)
+def test_intervals_hold_their_estimates_and_lie_within_the_data(values):
+    figures = figures_of(np.array(values))
+    for name in NAMES.values():
+        value, (low, high) = figures[name]
+        assert min(values) - 1e-9 <= low <= value + 1e-9, name
+        assert value - 1e-9 <= high <= max(values) + 1e-9, name
+
+
+@given(distances, st.data())
+@settings(max_examples=40, deadline=None)
+def test_no_figure_falls_when_a_trial_ends_farther_away(values, data):
+    index = data.draw(st.integers(0, len(values) - 1))
+    worse = np.array(values)
+    worse[index] += data.draw(st.floats(0, 1))
+    before, after = figures_of(np.array(values)), figures_of(worse)
+    for name in (*NAMES.values(), "max_distance"):
+        assert after[name].value >= before[name].value - 1e-12, name
+
+
+@given(distances, st.randoms(use_true_random=False))
+@settings(max_examples=30, deadline=None)
+def test_the_order_of_trials_does_not_change_the_figures(values, random):
+    shuffled = list(values)
+    random.shuffle(shuffled)
+    one, other = (figures_of(np.array(each)) for each in (values, shuffled))
+    for name in (*NAMES.values(), "max_distance"):
+        assert one[name].value == pytest.approx(other[name].value, abs=1e-12), name
+
+
+@given(distances)
+@settings(max_examples=30, deadline=None)
+def test_twice_the_distance_is_twice_every_figure(values):
+    one, twice = (figures_of(factor * np.array(values)) for factor in (1, 2))
+    for name in NAMES.values():
+        assert twice[name].value == 2 * one[name].value
+        assert twice[name].ci95 == tuple(2 * end for end in one[name].ci95)
+
+
+def test_intervals_are_those_of_the_first_version():
+    """Whatever makes them quicker leaves them as they were."""
+    values = np.random.default_rng(3).gamma(1.5, 0.1, 50)
+    tables = np.random.default_rng(3)
+    tables.gamma(1.5, 0.1, 50)
+    pooled = tables.gamma(1.5, 0.1, (3, 50))
+    one, three = figures_of(values), figures_of(pooled)
+    assert one["mean_distance"].ci95 == (0.1223106919945877, 0.18493731176964187)
+    assert one["iqm_distance"].ci95 == (0.1018480723923996, 0.15768858526663912)
+    assert three["median_distance"].ci95 == (0.12073100495850403, 0.17574877984958098)
+    assert three["p95_distance"].ci95 == (0.36494706039837155, 0.542749156392868)
+
+
+def test_a_new_metric_is_one_entry(monkeypatch):
+    mean_return = Metric(
+        meaning="mean return", formula=lambda t: t.returns.mean(axis=-1), interval="bootstrap"
+    )
+    monkeypatch.setitem(METRICS, "mean_return", mean_return)
+    figures = figures_of(skewed(40))
+    assert figures["mean_return"].value == -figures["mean_distance"].value
+    low, high = figures["mean_distance"].ci95
+    assert figures["mean_return"].ci95 == pytest.approx((-high, -low))
+
+
+def test_every_metric_says_what_it_means():
+    for name, metric in METRICS.items():
+        assert metric.meaning, name
+        assert metric.beside is None or metric.beside[1] in METRICS

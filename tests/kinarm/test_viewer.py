@@ -1,0 +1,226 @@
+"""The page of a replay: what it holds, that it is reproducible, and what it refuses."""
+
+import base64
+import gzip
+import json
+import re
+import struct
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import umsgpack
+
+import kinarm
+from kinarm.errors import ArmError, InvalidInputError, OutputError
+from kinarm.recording import record_rollouts
+from kinarm.scene import Obstacle, Scene
+from kinarm.viewer import replay_page
+from kinarm.viewer.arm_shapes import arm_parts
+from kinarm.viewer.meshes import Mesh, box, capsule, cylinder, housing, lathe, tube
+
+
+def waving(simulator, count=3, seed=0):
+    """Recordings of random motions."""
+    rng = np.random.default_rng(seed)
+    starts, goals = simulator.sample(np.random.default_rng(0), count)
+    actions = rng.uniform(-1, 1, (count, simulator.task.horizon, simulator.n_actions))
+    rollouts = simulator.rollout_actions(actions, starts, goals, record=True)
+    return record_rollouts(simulator, rollouts, f"wave-{seed}")
+
+
+@pytest.fixture(scope="module")
+def recordings(simulator):
+    return waving(simulator)
+
+
+def elsewhere(recording, **changes):
+    """A recording as if another problem had been faced."""
+    return replace(recording, problem=recording.problem.replace(**changes))
+
+
+def unpacked(page, name):
+    text = re.search(rf'id="data-{name}">([^<]*)<', page.html).group(1)
+    return gzip.decompress(base64.b64decode(text))
+
+
+def commands(page):
+    content, at = unpacked(page, "scene"), 0
+    while at < len(content):
+        (length,) = struct.unpack_from("<I", content, at)
+        yield umsgpack.unpackb(content[at + 4 : at + 4 + length])
+        at += 4 + length
+
+
+def test_the_same_recordings_give_the_same_bytes(recordings):
+    assert replay_page(recordings).html == replay_page(list(recordings)).html
+
+
+def test_five_trials_are_small_and_quick(simulator):
+    recordings = waving(simulator, 5)
+    replay_page(recordings[:1])
+    began = time.perf_counter()
+    page = replay_page(recordings)
+    assert time.perf_counter() - began < 2
+    assert len(page.html.encode()) < 1_000_000
+
+
+def test_the_page_refers_to_nothing_outside(recordings):
+    html = replay_page(recordings).html
+    assert "default-src 'none'" in html
+    assert re.findall(r'(?:src|href)="(?!data:)[^"]*"', html) == []
+    assert "{{" not in html.split("<script")[0]
+
+
+def test_states_are_there_to_the_last_bit(recordings, simulator):
+    trials = json.loads(unpacked(replay_page(recordings), "trials"))
+    assert [trial["trial"] for trial in trials["trials"]] == [0, 1, 2]
+    for trial, recording in zip(trials["trials"], recordings, strict=True):
+        assert np.array(trial["runs"][0]["states"]).tobytes() == recording.states.tobytes()
+        assert trial["runs"][0]["distances"] == recording.distances.tolist()
+    assert trials["tool"] == simulator.arm.chain.tool.tolist()
+
+
+def test_the_scene_is_drawn(recordings):
+    paths = [command["path"] for command in commands(replay_page(recordings))]
+    for wanted in ("floor", "grid", "obstacles/0/top", "obstacles/1/body", "goal/cube", "flash"):
+        assert f"/meshcat/{wanted}" in paths
+    assert {f"/meshcat/trials/{number}/run" for number in range(3)} <= set(paths)
+    assert "/meshcat/trials/0/ghost" not in paths
+
+
+def test_obstacles_need_no_goals(recordings):
+    """Where goals lie on one, a slab covers it; a post is a box alone."""
+    post = Obstacle(name="post", lower=(0.3, 0.2, 0.1), upper=(0.35, 0.25, 0.6))
+    scene = Scene(obstacles=(post, *Scene().obstacles[:1]))
+    page = replay_page(elsewhere(recordings[0], scene=scene))
+    paths = {command["path"] for command in commands(page)}
+    assert {path for path in paths if "obstacles" in path} == {
+        "/meshcat/obstacles/0/body",
+        "/meshcat/obstacles/1/body",
+        "/meshcat/obstacles/1/top",
+    }
+    bare = Scene(obstacles=(), ground=False)
+    page = replay_page(elsewhere(recordings[0], scene=bare))
+    paths = {command["path"] for command in commands(page)}
+    assert not any("obstacles" in path or "floor" in path for path in paths)
+
+
+def test_an_arm_that_has_changed(recordings):
+    problem = recordings[0].problem
+    other = replace(problem, arm=replace(problem.arm, source="paper_flange"))
+    with pytest.raises(ArmError, match="'paper_flange' is another version"):
+        replay_page(replace(recordings[0], problem=other))
+
+
+def test_ids_are_not_random(recordings):
+    uuids = re.findall(rb"[0-9a-f]{8}-[0-9a-f]{4}-", unpacked(replay_page(recordings), "scene"))
+    assert uuids == []
+
+
+def test_ghosts(recordings, simulator):
+    page = replay_page(recordings, ghosts=waving(simulator, seed=1))
+    runs = json.loads(unpacked(page, "trials"))["trials"][0]["runs"]
+    assert [run["policy"] for run in runs] == ["wave-0", "wave-1"]
+    assert "<title>wave-0 and wave-1 · kinarm replay</title>" in page.html
+
+
+def test_names_are_escaped(recordings):
+    page = replay_page(replace(recordings[0], policy="</script><b>&"))
+    assert "<title>&lt;/script&gt;&lt;b&gt;&amp; · kinarm replay</title>" in page.html
+    assert "</script><b>" not in page.html
+
+
+def test_a_single_state(recordings):
+    first = recordings[0]
+    still = replace(first, states=first.states[:1], distances=first.distances[:1])
+    replay_page(replace(still, outcome="truncated", contact=None, contact_point=None, refused=None))
+
+
+def test_a_notebook_shows_it(recordings):
+    shown = replay_page(recordings)._repr_html_()
+    assert shown.startswith('<iframe srcdoc="&lt;!DOCTYPE html&gt;')
+    assert shown.count('"') % 2 == 0
+
+
+def test_it_is_written(recordings, tmp_path):
+    page = replay_page(recordings, tmp_path / "made.html")
+    assert (tmp_path / "made.html").read_text(encoding="utf-8") == page.html
+    assert isinstance(page, kinarm.ReplayPage)
+    assert re.fullmatch(r"ReplayPage\(0\.\d MB of HTML\)", repr(page))
+
+
+def test_it_cannot_be_written(recordings, tmp_path):
+    with pytest.raises(OutputError):
+        replay_page(recordings, tmp_path / "none" / "made.html")
+    with pytest.raises(OutputError):
+        replay_page(recordings, tmp_path)
+
+
+def test_what_cannot_share_a_page(recordings, simulator, simulators):
+    with pytest.raises(InvalidInputError, match="no recording"):
+        replay_page([])
+    with pytest.raises(InvalidInputError, match="different arms: 'paper' .* 'paper_flange'"):
+        replay_page([*recordings, *waving(simulators["paper_flange"])])
+    with pytest.raises(InvalidInputError, match="different scenes"):
+        replay_page([recordings[0], elsewhere(recordings[1], scene=Scene(ground=False))])
+    with pytest.raises(InvalidInputError, match="2 for 3"):
+        replay_page(recordings, ghosts=recordings[:2])
+    with pytest.raises(InvalidInputError, match="cannot be compared"):
+        replay_page(recordings, ghosts=recordings[::-1])
+
+
+@pytest.mark.parametrize("name", ["paper", "paper_flange", "lrmate200ic_5l", "sliding", "mesh"])
+def test_any_arm_can_be_drawn(simulators, name):
+    simulator = simulators[name]
+    page = replay_page(waving(simulator))
+    drawn = [command for command in commands(page) if command["type"] == "set_object"]
+    assert sum("/arm/" in command["path"] for command in drawn) >= 4
+    assert {part.joint for part in arm_parts(simulator.arm)} <= set(range(simulator.arm.n_axes + 1))
+
+
+def volume(mesh: Mesh) -> float:
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    return float((np.cross(a, b) * c).sum() / 6)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "expected"),
+    [
+        (box((1, 2, 3)), 6.0),
+        (capsule(1.0, 0.2), np.pi * 0.04 + np.pi * 0.032 / 3),
+        (capsule(0.0, 1.0), 4 * np.pi / 3),
+        *((cylinder(2.0, 0.5, 0.0, axis), np.pi / 2) for axis in "xyz"),
+        (lathe([(0, 1), (3, 0)]), np.pi),
+        (housing([(0, 0, 1, 2, 2), (1, 0, 1, 2, 2)]), 2 * np.pi),
+        (tube([(0, 0, 0), (1, 0, 0), (2, 0, 0)], 0.1, 64), 2 * np.pi * 0.01),
+    ],
+)
+def test_meshes_enclose_their_volume(mesh, expected):
+    """Closed and with their outside out; curves are polygons, hence 3 %."""
+    assert volume(mesh) == pytest.approx(expected, rel=0.03)
+
+
+def test_shipped_looks_have_their_outside_out(shipped_arms):
+    for arm in shipped_arms.values():
+        assert all(volume(part.mesh) > 0 for part in arm_parts(arm))
+
+
+def test_normals_are_those_of_a_box():
+    vertices, normals, faces = box((1, 1, 1)).with_normals()
+    assert (len(vertices), len(faces)) == (24, 12)
+    assert (np.abs(normals).max(axis=1) == 1).all()
+    assert ((normals * vertices).sum(axis=1) > 0).all()
+
+
+def test_normals_are_those_of_a_sphere():
+    vertices, normals, _ = capsule(0.0, 2.0).with_normals()
+    np.testing.assert_allclose(normals, vertices / 2, atol=0.05)
+
+
+def test_a_tube_grows_with_its_frames():
+    """Every stretch takes the same number of faces, also where the tool rests."""
+    points = [(0, 0, 0), (1, 0, 0), (1, 0, 0), (1, 1, 0)]
+    assert len(tube(points, 0.1).with_normals()[2]) == 12 * 3 + 2 * 6
+    assert np.isfinite(tube([(0, 0, 0)] * 4, 0.1).vertices).all()

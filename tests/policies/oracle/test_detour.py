@@ -1,0 +1,156 @@
+"""Detours: paths around a wall, and none where there is none."""
+
+import itertools
+
+import numpy as np
+import pytest
+from configurations import depths
+
+from kinarm.arm import Arm
+from kinarm.policies.oracle.detour import Tree, find_detour
+from kinarm.policies.oracle.motion import along_path, steps_between, straight
+from kinarm.problem import PROBLEMS
+from kinarm.scene import PAPER_BENCHES, Obstacle, Scene
+from kinarm.simulator import Simulator
+
+WALL = Obstacle(name="wall", lower=(0.35, -0.06, 0.0), upper=(0.8, 0.06, 0.9))
+START = np.array([-0.9, 0.3, 0.0, 0.0, 0.2, 0.7])
+END = np.array([0.9, 0.3, 0.0, 0.0, 0.2, 0.7])
+
+
+@pytest.fixture(scope="module")
+def walled():
+    """The default arm with a wall before it, which it has to pass above or behind."""
+    scene = Scene(obstacles=(*PAPER_BENCHES, WALL))
+    return Simulator(PROBLEMS["both"].replace(scene=scene), threads=1)
+
+
+@pytest.fixture(scope="module")
+def parted(make_joint, make_collision, write_robot):
+    """Two links in a plane, and a wall that the first one cannot pass."""
+    limit = '<limit lower="-3.1" upper="3.1" velocity="3" effort="0"/>'
+    bar = make_collision(
+        '<capsule radius="0.03" length="0.5"/>', xyz="0.25 0 0", rpy="0 1.5707963267948966 0"
+    )
+    joints = [make_joint(xyz="0 0 0.4", limit=limit), make_joint(xyz="0.5 0 0", limit=limit)]
+    arm = Arm.load(write_robot(joints, {1: bar}, tool="0.3 0 0"))
+    wall = Obstacle(name="wall", lower=(-1, 0.3, 0), upper=(1, 0.4, 1))
+    return Simulator(PROBLEMS["left"].replace(arm=arm, scene=Scene(obstacles=(wall,))))
+
+
+def generator(seed=0):
+    return np.random.default_rng(seed)
+
+
+def between(simulator, path, per_step=16):
+    """Configurations along a path, many for each step that it takes."""
+    parts = [path[:1]]
+    for first, second in itertools.pairwise(path):
+        count = 1 + int(per_step * steps_between(simulator, first, second))
+        parts.append(first + np.linspace(0, 1, count + 1)[1:, None] * (second - first))
+    return np.concatenate(parts)
+
+
+def length(simulator, path):
+    return steps_between(simulator, path[:-1], path[1:]).sum()
+
+
+def test_the_straight_way_is_blocked(walled):
+    ends = np.array([START, END])
+    assert not walled.world.contact_model.in_contact(ends).any()
+    way = between(walled, ends)
+    assert walled.world.contact_model.in_contact(way).mean() > 0.05
+
+
+@pytest.fixture(scope="module")
+def detours(walled):
+    return [find_detour(walled, START, END[None], generator(seed)) for seed in range(12)]
+
+
+class TestAroundTheWall:
+    def test_begins_and_ends_where_it_should(self, walled, detours):
+        arm = walled.arm
+        for path in detours:
+            np.testing.assert_array_equal(path[0], START)
+            np.testing.assert_array_equal(path[-1], END)
+            assert ((path >= arm.lower) & (path <= arm.upper)).all()
+            np.testing.assert_array_equal(path[:, 5], 0.7)
+            assert length(walled, path) > steps_between(walled, START, END)
+
+    def test_nothing_touches_on_the_way(self, walled, detours):
+        # Freedom is tested four times a step; in between, a path may graze what it passes.
+        free = []
+        for path in detours:
+            way = between(walled, path)
+            touching = walled.world.contact_model.in_contact(way)
+            free.append(not touching.any())
+            assert touching.mean() < 0.03
+            assert (depths(walled, way[touching]) < 2e-3).all()
+        assert np.mean(free) > 0.8
+
+    def test_motions_along_it_arrive_in_the_simulator(self, walled, detours):
+        goal = walled.arm.tool_position(END)[None]
+        actions = [along_path(walled, path, through_corners=True) for path in detours]
+        starts, goals = np.tile(START, (len(detours), 1)), np.repeat(goal, len(detours), axis=0)
+        outcome = walled.rollout_actions(actions, starts, goals)
+        assert outcome.success.mean() > 0.8
+        blocked = straight(walled, START[None], END[None], np.array([64]))
+        assert walled.rollout_actions(blocked, START[None], goal).collision[0]
+
+    def test_same_generator_same_path(self, walled):
+        paths = [find_detour(walled, START, END[None], generator(3)) for _ in range(2)]
+        np.testing.assert_array_equal(paths[0], paths[1])
+        other = find_detour(walled, START, END[None], generator(4))
+        assert other.shape != paths[0].shape or (other != paths[0]).any()
+
+    def test_threads_do_not_matter(self, walled):
+        other = Simulator(walled.problem, threads=2)
+        np.testing.assert_array_equal(
+            find_detour(walled, START, END[None], generator(5)),
+            find_detour(other, START, END[None], generator(5)),
+        )
+
+    def test_given_arrays_are_left_alone(self, walled):
+        start, ends = START.copy(), END[None].copy()
+        find_detour(walled, start, ends, generator())
+        np.testing.assert_array_equal(start, START)
+        np.testing.assert_array_equal(ends[0], END)
+
+
+class TestEnds:
+    def test_one_of_several_is_reached(self, walled):
+        ends = np.array([END, END + 0.2 * np.eye(6)[0], START + 0.1 * np.eye(6)[0]])
+        reached = set()
+        for seed in range(4):
+            path = find_detour(walled, START, ends, generator(seed))
+            matches = np.flatnonzero((ends == path[-1]).all(axis=1))
+            assert matches.size == 1
+            reached.add(int(matches[0]))
+        # The last one lies on this side of the wall.
+        assert 2 in reached
+
+    def test_free_way_is_nearly_straight(self, walled):
+        end = START + np.array([-0.4, 0.1, 0.2, 0.3, -0.1, 0])
+        path = find_detour(walled, START, end[None], generator())
+        assert length(walled, path) < 1.3 * steps_between(walled, START, end)
+
+    def test_none_behind_a_wall_that_cannot_be_passed(self, parted):
+        # From 0 to 3.0 rad the first link would have to cross the wall; the limits end at 3.1 rad
+        # on the other side, too.
+        start, end = np.array([0.0, 0.1]), np.array([3.0, 0.1])
+        assert not parted.world.contact_model.in_contact(np.array([start, end])).any()
+        assert find_detour(parted, start, end[None], generator()) is None
+
+    def test_reachable_end_beside_one_that_is_not(self, parted):
+        start, ends = np.array([0.0, 0.1]), np.array([[3.0, 0.1], [-2.5, 0.4]])
+        path = find_detour(parted, start, ends, generator())
+        np.testing.assert_array_equal(path[-1], ends[1])
+
+
+def test_nodes_lead_back_to_their_root():
+    tree = Tree(np.array([[0.0, 0.0], [1.0, 0.0]]))
+    first = tree.add(np.array([0.0, 1.0]), 0)
+    second = tree.add(np.array([0.0, 2.0]), first)
+    assert (first, second) == (2, 3)
+    np.testing.assert_array_equal(tree.path_to_root(second), [[0, 2], [0, 1], [0, 0]])
+    np.testing.assert_array_equal(tree.path_to_root(1), [[1, 0]])

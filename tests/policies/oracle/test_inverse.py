@@ -1,0 +1,292 @@
+"""Inverse kinematics: what is found is a solution, and what there is is found."""
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy.stats import qmc
+
+from kinarm.arm import Arm
+from kinarm.errors import InvalidInputError
+from kinarm.policies import inverse_kinematics
+from kinarm.policies.oracle.inverse import evenly_spread, project, solve_within, step_box
+from kinarm.policies.oracle.motion import steps_between
+from kinarm.problem import PROBLEMS
+from kinarm.simulator import Simulator
+
+SHIPPED = ("lrmate200ic_5l", "paper", "paper_flange")
+
+
+def tool_distances(simulator, configurations, goal):
+    tools = np.array([simulator.arm.tool_position(q) for q in configurations]).reshape(-1, 3)
+    return np.linalg.norm(tools - goal, axis=1)
+
+
+def assert_solutions(simulator, found, start, goal, separation=0.2):
+    """Within limits, horizon and tolerance, free, the nearest first, and apart."""
+    arm, n = simulator.arm, simulator.n_actions
+    assert found.shape[1:] == (arm.n_axes,)
+    assert ((found >= arm.lower) & (found <= arm.upper)).all()
+    np.testing.assert_array_equal(found[:, n:], np.tile(start[n:], (len(found), 1)))
+    assert (tool_distances(simulator, found, goal) <= simulator.task.tolerance).all()
+    assert not simulator.world.contact_model.in_contact(found).any()
+    steps = steps_between(simulator, start, found)
+    assert (np.diff(steps) >= 0).all()
+    assert (steps <= simulator.task.horizon + 1e-9).all()
+    for first, second in itertools.combinations(found, 2):
+        assert np.abs(first - second).max() > separation
+
+
+@pytest.fixture(scope="module")
+def planar(make_joint, write_robot):
+    """Two links of 0.5 m and 0.3 m in a horizontal plane, without shapes."""
+    limit = '<limit lower="-2.8" upper="2.8" velocity="5" effort="0"/>'
+    joints = [make_joint(xyz="0 0 0.4", limit=limit), make_joint(xyz="0.5 0 0", limit=limit)]
+    arm = Arm.load(write_robot(joints, tool="0.3 0 0"))
+    return Simulator(PROBLEMS["left"].replace(arm=arm, tolerance=1e-3), threads=1)
+
+
+def elbow_solutions(goal):
+    """Both configurations of the planar arm that put the tool at a point of the plane."""
+    radius, angle = np.hypot(goal[0], goal[1]), np.arctan2(goal[1], goal[0])
+    bend = np.arccos((radius**2 - 0.5**2 - 0.3**2) / (2 * 0.5 * 0.3))
+    lead = np.arctan2(0.3 * np.sin(bend), 0.5 + 0.3 * np.cos(bend))
+    return np.array([[angle - lead, bend], [angle + lead, -bend]])
+
+
+class TestSolutions:
+    @pytest.mark.parametrize("name", SHIPPED)
+    def test_are_solutions(self, simulators, name):
+        simulator = simulators[name]
+        starts, goals = simulator.sample(np.random.default_rng(1), 12)
+        counts = []
+        for start, goal in zip(starts, goals, strict=True):
+            found = inverse_kinematics(simulator, start, goal)
+            assert_solutions(simulator, found, start, goal)
+            counts.append(len(found))
+        assert np.median(counts) > 10
+
+    def test_lie_throughout_the_tolerance(self, simulator):
+        starts, goals = simulator.sample(np.random.default_rng(2), 10)
+        shares = (
+            np.concatenate(
+                [
+                    tool_distances(simulator, inverse_kinematics(simulator, start, goal), goal)
+                    for start, goal in zip(starts, goals, strict=True)
+                ]
+            )
+            / simulator.task.tolerance
+        )
+        assert (shares < 0.5).sum() > 3
+        assert (shares > 0.8).sum() > 30
+        assert shares.max() > 0.99
+
+    def test_both_elbows_of_a_planar_arm(self, planar):
+        rng = np.random.default_rng(3)
+        for _ in range(20):
+            angle, radius = rng.uniform(-1.8, 1.8), rng.uniform(0.35, 0.75)
+            goal = np.array([radius * np.cos(angle), radius * np.sin(angle), 0.4])
+            expected = elbow_solutions(goal)
+            assert (np.abs(expected) < 2.8).all()
+            found = inverse_kinematics(planar, np.zeros(2), goal)
+            assert len(found) == 2
+            for solution in expected:
+                assert np.abs(found - solution).max(axis=1).min() < 0.02
+
+    def test_current_configuration_comes_first_if_it_is_one(self, simulator):
+        start, _ = simulator.sample(np.random.default_rng(4), 1)
+        goal = simulator.arm.tool_position(start[0])
+        found = inverse_kinematics(simulator, start[0], goal)
+        np.testing.assert_array_equal(found[0], start[0])
+
+    @pytest.mark.parametrize(
+        "goal", [[0.0, 0.0, 5.0], [3.0, 0.0, 0.3], [0.0, -0.65, 0.1], [0.4, 0.0, -0.2]]
+    )
+    def test_none_where_there_is_none(self, simulator, goal):
+        found = inverse_kinematics(simulator, np.zeros(6), goal)
+        assert found.shape == (0, 6)
+
+    def test_horizon_limits_them(self):
+        simulator = Simulator(PROBLEMS["right"].replace(horizon=6), threads=1)
+        start = np.zeros(6)
+        near = simulator.arm.tool_position([0.4, 0.1, 0.1, 0, 0.2, 0])
+        found = inverse_kinematics(simulator, start, near)
+        assert len(found) > 0
+        assert_solutions(simulator, found, start, near)
+        far = simulator.arm.tool_position([2.0, 0.1, 0.1, 0, 0.2, 0])
+        assert len(inverse_kinematics(simulator, start, far)) == 0
+
+    def test_separation_thins_them_out(self, simulator):
+        start, goal = np.zeros(6), np.array([0.1, -0.65, 0.325])
+        counts = []
+        for separation in (0.05, 0.2, 1.0):
+            found = inverse_kinematics(simulator, start, goal, separation=separation)
+            assert_solutions(simulator, found, start, goal, separation)
+            counts.append(len(found))
+        assert counts[0] > counts[1] > counts[2] > 0
+
+    def test_axis_that_is_not_actuated_stays(self, simulator):
+        start = np.array([0.1, 0.2, 0.1, 0.3, 0.2, -4.0])
+        found = inverse_kinematics(simulator, start, [0.1, 0.65, 0.325])
+        assert_solutions(simulator, found, start, [0.1, 0.65, 0.325])
+        assert len(found) > 0
+
+
+class TestDeterminism:
+    def test_calls_and_threads_do_not_matter(self):
+        start, goal = np.zeros(6), np.array([0.3, -0.6, 0.325])
+        first, second = (Simulator("both", threads=threads) for threads in (1, 2))
+        found = [inverse_kinematics(simulator, start, goal) for simulator in (first, first, second)]
+        np.testing.assert_array_equal(found[0], found[1])
+        np.testing.assert_array_equal(found[0], found[2])
+
+    def test_given_arrays_are_left_alone(self, simulator):
+        start, goal = np.full(6, 0.1), np.array([0.3, -0.6, 0.325])
+        inverse_kinematics(simulator, start, goal)
+        np.testing.assert_array_equal(start, 0.1)
+        np.testing.assert_array_equal(goal, [0.3, -0.6, 0.325])
+
+
+class TestRefusals:
+    @pytest.mark.parametrize(
+        ("start", "goal", "message"),
+        [
+            ([0] * 5, [0, 0, 0], "start must have shape"),
+            ([np.nan] * 6, [0, 0, 0], "start must be finite"),
+            ([0] * 6, [0, 0], "goal must have shape"),
+            ([0] * 6, [0, 0, np.inf], "goal must be finite"),
+            ([0, 3, 0, 0, 0, 0], [0, 0, 0], "outside the limits"),
+        ],
+    )
+    def test_bad_trials(self, simulator, start, goal, message):
+        with pytest.raises(InvalidInputError, match=message):
+            inverse_kinematics(simulator, start, goal)
+
+    @pytest.mark.parametrize("samples", [0, -3, 2.5, True])
+    def test_bad_number_of_samples(self, simulator, samples):
+        with pytest.raises(InvalidInputError, match="samples must be a whole number"):
+            inverse_kinematics(simulator, np.zeros(6), [0, 0.65, 0.325], samples=samples)
+
+    def test_a_single_sample_is_the_start(self, simulator):
+        start = np.zeros(6)
+        goal = simulator.arm.tool_position(start) + np.array([0.02, 0, 0])
+        found = inverse_kinematics(simulator, start, goal, samples=1)
+        np.testing.assert_array_equal(found, [start])
+
+
+class TestSolveWithin:
+    def test_keeps_to_boxes_tolerances_and_owners(self, simulator):
+        starts, goals = simulator.sample(np.random.default_rng(5), 20)
+        steps, tolerances = np.arange(10, 50, 2), np.linspace(0.02, 0.2, 20)
+        found = solve_within(simulator, starts, goals, steps, tolerances, starts, 64)
+        assert (np.diff(found.owner) >= 0).all()
+        assert len(set(found.owner)) > 10
+        lower, upper = step_box(simulator, starts, steps)
+        for row, (q, owner) in enumerate(zip(found.configurations, found.owner, strict=True)):
+            assert (q[:5] >= lower[owner]).all(), row
+            assert (q[:5] <= upper[owner]).all()
+            away = np.linalg.norm(simulator.arm.tool_position(q) - goals[owner])
+            assert away <= tolerances[owner]
+        assert not simulator.world.contact_model.in_contact(found.configurations).any()
+
+    def test_goals_are_treated_alone(self, simulator):
+        starts, goals = simulator.sample(np.random.default_rng(6), 6)
+        steps, tolerances = np.full(6, 40), np.full(6, 0.05)
+        found = solve_within(simulator, starts, goals, steps, tolerances, starts, 32)
+        for i in range(6):
+            one = slice(i, i + 1)
+            parts = (starts[one], goals[one], steps[one], tolerances[one], starts[one])
+            alone = solve_within(simulator, *parts, 32)
+            np.testing.assert_array_equal(
+                alone.configurations, found.configurations[found.owner == i]
+            )
+
+    def test_the_guess_counts(self, planar):
+        # The best of few samples: two of them are the start and the guess.
+        goal, start = np.array([[0.2, 0.5, 0.4]]), np.zeros((1, 2))
+        guess = elbow_solutions(goal[0])[:1]
+        found = solve_within(
+            planar, start, goal, np.array([64]), np.array([1e-3]), guess, 2
+        ).configurations
+        assert np.abs(found - guess).max(axis=1).min() < 1e-12
+
+
+class TestProject:
+    def test_reports_true_distances_within_the_box(self, any_simulator):
+        simulator, n = any_simulator, any_simulator.n_actions
+        arm, rng = simulator.arm, np.random.default_rng(7)
+        starts = rng.uniform(arm.lower, arm.upper, (100, arm.n_axes))
+        goals = np.array([arm.tool_position(q) for q in rng.permutation(starts)[:10]])
+        lower, upper = step_box(simulator, starts[:10], np.full(10, 30))
+        owner = np.arange(100) % 10
+        begun = starts.copy()
+        begun[:, :n] = np.clip(begun[:, :n], lower[owner], upper[owner])
+        ended, distances = project(
+            simulator, begun, owner, (lower, upper), goals, np.full(100, 0.02)
+        )
+        np.testing.assert_array_equal(ended[:, n:], begun[:, n:])
+        assert (ended[:, :n] >= lower[owner]).all()
+        assert (ended[:, :n] <= upper[owner]).all()
+        for q, goal, distance in zip(ended, goals[owner], distances, strict=True):
+            away = np.linalg.norm(arm.tool_position(q) - goal)
+            assert distance == pytest.approx(away, abs=1e-12)
+        before = np.linalg.norm(
+            [arm.tool_position(q) - goal for q, goal in zip(begun, goals[owner], strict=True)],
+            axis=1,
+        )
+        assert np.median(distances) < np.median(before)
+
+    def test_leaves_what_is_close_enough(self, simulator):
+        starts, _ = simulator.sample(np.random.default_rng(8), 10)
+        goals = np.array([simulator.arm.tool_position(q) for q in starts])
+        goals[:, 2] += 0.019
+        box = step_box(simulator, starts, np.full(10, 64))
+        ended, distances = project(simulator, starts, np.arange(10), box, goals, np.full(10, 0.02))
+        np.testing.assert_array_equal(ended, starts)
+        np.testing.assert_allclose(distances, 0.019, atol=1e-12)
+
+    def test_reaches_what_can_be_reached(self, simulator):
+        rng, arm = np.random.default_rng(9), simulator.arm
+        begun = rng.uniform(arm.lower, arm.upper, (400, 6))
+        goals = np.array([arm.tool_position(q) for q in rng.uniform(arm.lower, arm.upper, (4, 6))])
+        box = tuple(np.tile(limit[:5], (4, 1)) for limit in (arm.lower, arm.upper))
+        owner = np.arange(400) % 4
+        _, distances = project(simulator, begun, owner, box, goals, np.full(400, 1e-4))
+        assert (distances <= 1e-4).mean() > 0.5
+
+
+def test_step_box_by_hand(simulator):
+    starts = np.array([[0.0, 2.4, -1.2, 0, 0, 5], [3.1, 0, 0, 0, 0, 0]])
+    lower, upper = step_box(simulator, starts, np.array([2, 3]))
+    # Two steps of 7, 7, 8, 9 and 9 degrees, then three; limits of 180, 140 and -72 degrees.
+    moves = np.deg2rad([[14, 14, 16, 18, 18], [21, 21, 24, 27, 27]])
+    expected_lower, expected_upper = starts[:, :5] - moves, starts[:, :5] + moves
+    expected_lower[0, 2] = np.deg2rad(-72)
+    expected_upper[0, 1] = np.deg2rad(140)
+    expected_upper[1, 0] = np.pi
+    np.testing.assert_allclose(lower, expected_lower, atol=1e-12)
+    np.testing.assert_allclose(upper, expected_upper, atol=1e-12)
+
+
+class TestEvenlySpread:
+    @pytest.mark.parametrize("dimensions", [1, 2, 3, 6, 7])
+    def test_shape_and_range(self, dimensions):
+        points = evenly_spread(500, dimensions)
+        assert points.shape == (500, dimensions)
+        assert ((points >= 0) & (points < 1)).all()
+        assert len(np.unique(points, axis=0)) == 500
+
+    def test_one_dimension_is_the_golden_ratio(self):
+        golden = (np.sqrt(5) - 1) / 2
+        expected = (0.5 + golden * np.arange(1, 30)) % 1
+        np.testing.assert_allclose(evenly_spread(29, 1)[:, 0], expected, atol=1e-12)
+
+    def test_more_points_continue_the_sequence(self):
+        np.testing.assert_array_equal(evenly_spread(10, 4), evenly_spread(99, 4)[:10])
+
+    @pytest.mark.parametrize("dimensions", [1, 2, 3, 6])
+    @pytest.mark.parametrize("count", [48, 512])
+    def test_is_more_even_than_chance(self, dimensions, count):
+        chance = np.random.default_rng(10).random((8, count, dimensions))
+        usual = np.mean([qmc.discrepancy(points) for points in chance])
+        assert qmc.discrepancy(evenly_spread(count, dimensions)) < 0.5 * usual

@@ -1,0 +1,123 @@
+"""The registry of learners, and its contract held by the toy of the docs: one file, one line."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import pytest
+
+from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.policies import (
+    Policy,
+    TrainingConfig,
+    find_learner,
+    learner_names,
+    learners,
+    load_checkpoint,
+    recipe,
+    register_learner,
+    save_checkpoint,
+    state_policy,
+    train,
+    train_policy,
+)
+
+TOY = Path(__file__).resolve().parents[2] / "docs" / "extending" / "toy_learner.py"
+
+
+@pytest.fixture
+def toy(monkeypatch):
+    """The module of the toy, registered."""
+    specification = importlib.util.spec_from_file_location("toy_learner", TOY)
+    module = importlib.util.module_from_spec(specification)
+    monkeypatch.setitem(sys.modules, "toy_learner", module)
+    specification.loader.exec_module(module)
+    monkeypatch.setattr(learners, "_MODULES", dict(learners._MODULES))
+    register_learner("toy", "toy_learner")
+    return module
+
+
+def command(*arguments):
+    """Run ``kinarm-train toy``; returns its exit status."""
+    with pytest.raises(SystemExit) as stopped:
+        train.main(["toy", *map(str, arguments)])
+    return stopped.value.code
+
+
+def test_names():
+    assert learner_names() == ("ars", "ppo")
+    for name in learner_names():
+        learner = find_learner(name)
+        assert learner.name == name
+        assert {"paper", "tuned"} <= set(learner.recipes)
+        for key, config in learner.recipes.items():
+            assert (type(config), config.recipe) == (learner.config, key)
+
+
+def test_unknown_learner():
+    with pytest.raises(UnknownNameError, match="unknown learner 'toy'; available: ars, ppo"):
+        find_learner("toy")
+
+
+def test_settings_of_nobody():
+    with pytest.raises(InvalidInputError, match="expected settings of ars, ppo, got Training"):
+        train_policy(TrainingConfig())
+
+
+def test_the_library_trains_it(toy):
+    states = []
+    config = recipe("toy", problem="left", seed=4, iterations=5)
+    result = train_policy(config, on_iteration=states.append)
+    assert [state.iteration for state in states] == [1, 2, 3, 4, 5]
+    assert result.policy.provenance.algorithm == "toy"
+    assert result.policy.problem.name == "left"
+    assert result.state is states[-1]
+    assert result.state.score == max(point.mean_return for point in result.curve)
+
+
+@pytest.mark.parametrize("stopped_after", [0, 2, 5])
+def test_its_checkpoints_resume_exactly(toy, tmp_path, stopped_after):
+    config = recipe("toy", "wide", iterations=5)
+    states = [toy.ToyTraining(config).initial_state()]
+    whole = train_policy(config, on_iteration=states.append)
+    save_checkpoint(tmp_path / "c.npz", config, states[stopped_after])
+    loaded, state = load_checkpoint(tmp_path / "c.npz")
+    assert (loaded, state.iteration) == (config, stopped_after)
+    assert state.score == states[stopped_after].score
+    resumed = train_policy(loaded, state=state)
+    assert [point[:4] for point in resumed.curve] == [point[:4] for point in whole.curve]
+    assert resumed.policy.layers[0].weights.tobytes() == whole.policy.layers[0].weights.tobytes()
+    assert resumed.policy.provenance == whole.policy.provenance
+
+
+def test_the_command_trains_it_and_goes_on(toy, tmp_path, capsys):
+    out = tmp_path / "p.npz"
+    config = recipe("toy", "wide", iterations=4, seed=3)
+    states = []
+    whole = train_policy(config, on_iteration=states.append)
+    save_checkpoint(tmp_path / "p.checkpoint.npz", config, states[1])
+    assert command("--out", out, "--resume") == 0
+    again = ("--recipe", "wide", "--iterations", 4, "--seed", 3)
+    assert command("--out", tmp_path / "q.npz", *again) == 0
+    for path in (out, tmp_path / "q.npz"):
+        weights = Policy.load(path).layers[0].weights
+        assert weights.tobytes() == whole.policy.layers[0].weights.tobytes()
+    assert "4 iterations" in capsys.readouterr().out
+
+
+def test_its_settings_are_options_with_help(toy, capsys):
+    assert command("--help") == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "--episodes N Episodes whose mean return judges a policy (20)" in text
+    assert "--noise X Standard deviation by which" in text
+
+
+def test_its_states_are_policies(toy):
+    config = recipe("toy")
+    state = toy.ToyTraining(config).initial_state()
+    assert state_policy(config, state).provenance.recipe == "paper"
+
+
+def test_its_options_are_its_own(toy):
+    with pytest.raises(InvalidInputError, match="toy has no option 'threads'"):
+        train_policy(recipe("toy"), threads=2)

@@ -1,0 +1,246 @@
+"""The environment for Stable-Baselines3 held against single environments and its own rules."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3")
+
+from stable_baselines3 import PPO
+from stable_baselines3.common.env_checker import check_env
+from stable_baselines3.common.vec_env import VecCheckNan, VecMonitor
+
+from kinarm.envs import ReachEnv
+from kinarm.errors import InvalidInputError
+from kinarm.policies.mirror import find_mirror
+from kinarm.policies.normalizer import Normalizer
+from kinarm.policies.ppo.vec_env import SB3VecEnv
+from kinarm.problem import PROBLEMS
+from kinarm.simulator import Simulator
+from kinarm.task import RewardWeights
+
+NUMBER = 7
+AXES = np.array([-1.0, 1.0, 1.0, -1.0, 1.0, -1.0])
+"""Signs of the axes in the mirror."""
+REWARD = RewardWeights(success=2.0, step=-0.1)
+END_KEYS = {"terminal_observation", "TimeLimit.truncated", "is_success", "episode"}
+
+
+@pytest.fixture(scope="module")
+def normalizer():
+    simulator = Simulator("both", threads=1)
+    return Normalizer.of(simulator.world.observe(*simulator.sample(np.random.default_rng(1), 500)))
+
+
+@pytest.fixture
+def make_env(normalizer):
+    def make(seed=0, *, number=NUMBER, mirrored=False, **settings):
+        overrides = {"reward": REWARD, "tolerance": 0.5, **settings}
+        simulator = Simulator(PROBLEMS["both"].replace(**overrides), threads=1)
+        env = SB3VecEnv(
+            simulator,
+            number,
+            rng=np.random.default_rng(seed),
+            mirror=find_mirror(simulator.world) if mirrored else None,
+        )
+        env.normalize_by(normalizer)
+        return env
+
+    return make
+
+
+def begin_single(env, row):
+    """A `ReachEnv` in the situation of one arm at its start."""
+    states, single = env.states(), ReachEnv(env.simulator.problem)
+    start = {"start": states.q[row], "goal": states.goal[row]}
+    return single, single.reset(seed=0, options=start)[0]
+
+
+def normalized(normalizer, observation):
+    """As the learner sees it, constants left out."""
+    moving = normalizer.std > 1e-6
+    return moving, (observation[moving] - normalizer.mean[moving]) / normalizer.std[moving]
+
+
+@pytest.mark.parametrize("horizon", [64, 3])
+def test_equals_single_environments(make_env, normalizer, horizon):
+    env = make_env(horizon=horizon)
+    rng = np.random.default_rng(0)
+    seen = env.reset()
+    singles = [begin_single(env, row) for row in range(NUMBER)]
+    returns, lengths = np.zeros(NUMBER), np.zeros(NUMBER, dtype=int)
+    ends = {"success": 0, "collision": 0, "truncated": 0}
+    for _ in range(150):
+        for row, (_, observation) in enumerate(singles):
+            moving, expected = normalized(normalizer, observation)
+            np.testing.assert_allclose(seen[row, moving], expected, rtol=1e-5, atol=1e-5)
+            np.testing.assert_array_equal(seen[row, ~moving], 0)
+        actions = rng.uniform(-1, 1, (NUMBER, 5)).astype(np.float32)
+        seen, rewards, dones, infos = env.step(actions)
+        for row, (single, _) in enumerate(singles):
+            observation, reward, terminated, truncated, info = single.step(actions[row])
+            returns[row] += reward
+            lengths[row] += 1
+            assert rewards[row] == np.float32(reward)
+            assert dones[row] == (terminated or truncated)
+            if not dones[row]:
+                assert infos[row] == {}
+                singles[row] = single, observation
+                continue
+            assert set(infos[row]) == END_KEYS
+            moving, expected = normalized(normalizer, observation)
+            final = infos[row]["terminal_observation"][moving]
+            np.testing.assert_allclose(final, expected, rtol=1e-5, atol=1e-5)
+            assert infos[row]["TimeLimit.truncated"] == truncated
+            assert infos[row]["is_success"] == info["success"]
+            assert infos[row]["episode"]["r"] == pytest.approx(returns[row], abs=1e-9)
+            assert infos[row]["episode"]["l"] == lengths[row]
+            ends["truncated"] += truncated
+            ends["success"] += info["success"]
+            ends["collision"] += info["collision"]
+            returns[row], lengths[row] = 0.0, 0
+            singles[row] = begin_single(env, row)
+    assert ends["collision"] > 2
+    assert (ends["truncated"] if horizon == 3 else ends["success"]) > 2
+
+
+def test_types_are_those_of_the_spaces(make_env):
+    env = make_env()
+    seen = env.reset()
+    assert env.observation_space.contains(seen[0])
+    assert seen.shape == (NUMBER, 48)
+    seen, rewards, dones, infos = env.step(np.zeros((NUMBER, 5), dtype=np.float32))
+    assert env.observation_space.contains(seen[0])
+    assert (rewards.dtype, dones.dtype) == (np.float32, bool)
+    assert rewards.shape == dones.shape == (NUMBER,)
+    assert len(infos) == NUMBER
+
+
+def test_passes_the_checks_of_stable_baselines3(make_env):
+    """Wrapped and trained as any environment of theirs."""
+    env = VecMonitor(VecCheckNan(make_env(), raise_exception=True))
+    model = PPO("MlpPolicy", env, n_steps=32, batch_size=56, n_epochs=2, device="cpu", seed=0)
+    model.learn(2 * 32 * NUMBER)
+    assert model.num_timesteps == 2 * 32 * NUMBER
+
+
+@pytest.mark.parametrize("problem", ["left", "right", "both"])
+@pytest.mark.filterwarnings("ignore:Your action space has dtype float64")
+def test_single_environment_passes_their_check(problem):
+    check_env(ReachEnv(problem))
+
+
+def test_same_generator_same_episodes(make_env):
+    first, second = make_env(3), make_env(3)
+    np.testing.assert_array_equal(first.reset(), second.reset())
+    rng = np.random.default_rng(0)
+    for _ in range(100):
+        actions = rng.uniform(-1, 1, (NUMBER, 5))
+        for a, b in zip(first.step(actions)[:3], second.step(actions)[:3], strict=True):
+            np.testing.assert_array_equal(a, b)
+
+
+def test_a_seed_of_theirs_is_not_needed(make_env):
+    """Scenarios come from the generator alone; `seed` of the base class changes nothing."""
+    first, second = make_env(3), make_env(3)
+    second.seed(9)
+    np.testing.assert_array_equal(first.reset(), second.reset())
+
+
+def test_restored_episodes_go_on_as_if_nothing_had_happened(make_env):
+    env = make_env(4)
+    env.reset()
+    rng = np.random.default_rng(0)
+    for _ in range(40):
+        seen = env.step(rng.uniform(-1, 1, (NUMBER, 5)))[0]
+    other = make_env(99)
+    np.testing.assert_array_equal(other.restore(env.states()), seen)
+    other.rng.bit_generator.state = env.rng.bit_generator.state
+    ended = 0
+    for _ in range(100):
+        actions = rng.uniform(-1, 1, (NUMBER, 5))
+        first, second = env.step(actions), other.step(actions)
+        for a, b in zip(first[:3], second[:3], strict=True):
+            np.testing.assert_array_equal(a, b)
+        for a, b in zip(first[3], second[3], strict=True):
+            assert a.get("episode") == b.get("episode")
+        ended += first[2].sum()
+    assert ended > 5
+
+
+def test_states_are_copies(make_env):
+    env = make_env()
+    env.reset()
+    states = env.states()
+    before = states.q.copy()
+    env.step(np.ones((NUMBER, 5)))
+    np.testing.assert_array_equal(states.q, before)
+
+
+def test_what_ended_holds_every_episode_once(make_env):
+    env = make_env(5)
+    env.reset()
+    rng = np.random.default_rng(0)
+    returns, successes = [], []
+    for _ in range(100):
+        for info in env.step(rng.uniform(-1, 1, (NUMBER, 5)))[3]:
+            if info:
+                returns.append(info["episode"]["r"])
+                successes.append(info["is_success"])
+    record = env.take_ended()
+    assert (record.returns, record.successes) == (returns, successes)
+    assert record.time > 0
+    assert env.take_ended() == ([], [], 0.0)
+
+
+class TestMirror:
+    def test_goals_always_lie_to_the_right(self, make_env, normalizer):
+        env = make_env(mirrored=True, number=50)
+        goal_y = env.reset()[:, 1] * normalizer.std[1] + normalizer.mean[1]
+        assert (goal_y < -0.5).all()
+        assert (env.states().goal[:, 1] > 0).any()
+
+    def test_mirror_images_look_and_fare_alike(self, make_env):
+        """The same situation and its mirror image, under the same actions."""
+        first, second = make_env(mirrored=True), make_env(mirrored=True)
+        first.reset()
+        states = first.states()
+        image = states._replace(q=states.q * AXES, goal=states.goal * [1, -1, 1])
+        second.restore(image)
+        running = np.ones(NUMBER, dtype=bool)
+        rng = np.random.default_rng(1)
+        for _ in range(20):
+            actions = rng.uniform(-1, 1, (NUMBER, 5))
+            a, b = first.step(actions), second.step(actions)
+            np.testing.assert_array_equal(a[2][running], b[2][running])
+            running &= ~a[2]
+            np.testing.assert_allclose(a[0][running], b[0][running], rtol=0, atol=1e-5)
+            np.testing.assert_allclose(a[1][running], b[1][running], rtol=0, atol=1e-6)
+        moved = first.states().q - states.q
+        assert (np.abs(moved[:, 0]) > 0.01).any()
+
+    def test_right_goals_are_untouched(self, make_env):
+        plain, mirrored = make_env(number=30), make_env(number=30, mirrored=True)
+        seen, looked = plain.reset(), mirrored.reset()
+        right = plain.states().goal[:, 1] < 0
+        np.testing.assert_array_equal(seen[right], looked[right])
+        actions = np.random.default_rng(2).uniform(-1, 1, (30, 5))
+        first, second = plain.step(actions), mirrored.step(actions)
+        for k in range(3):
+            np.testing.assert_array_equal(first[k][right], second[k][right])
+
+
+def test_arms_share_everything(make_env):
+    env = make_env()
+    assert env.get_attr("render_mode") == [None] * NUMBER
+    assert env.get_attr("simulator", indices=[0, 3]) == [env.simulator] * 2
+    assert env.env_is_wrapped(VecMonitor) == [False] * NUMBER
+    with pytest.raises(NotImplementedError, match="'simulator'"):
+        env.set_attr("simulator", None)
+    with pytest.raises(NotImplementedError, match="'jump'"):
+        env.env_method("jump")
+    env.close()
+
+
+def test_step_before_reset(make_env):
+    with pytest.raises(InvalidInputError, match="never begun"):
+        make_env().step(np.zeros((NUMBER, 5)))
