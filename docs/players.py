@@ -5,7 +5,7 @@ from docutils.parsers.rst import directives
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from kinarm.evaluation.commands.replay import ReplayRequest
+from kinarm.evaluation import ReplayRequest
 from kinarm.viewer import ReplayPage, replay_page
 
 

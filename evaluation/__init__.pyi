@@ -14,6 +14,7 @@ from .metrics import METRICS as METRICS
 from .metrics import Metric as Metric
 from .metrics import Outcomes as Outcomes
 from .replays.recorder import record as record
+from .replays.request import ReplayRequest as ReplayRequest
 from .report.page import report_page as report_page
 from .report.page import write_report as write_report
 from .statistics import Estimate as Estimate

@@ -201,15 +201,17 @@ def _control(
 ) -> Control:
     """Arrange networks or a table for the kernels."""
     mirror = None if networks is None else networks.mirror
-    nothing = np.zeros(0)
+    # Copies, which are writable: kernels are compiled anew for arrays that are read-only.
+    signs = (np.zeros(0), np.zeros(0)) if mirror is None else map(np.array, mirror)
+    observation_signs, action_signs = signs
     return Control(
         layers=np.zeros(0, dtype=np.int64) if networks is None else networks.layers,
         weights=np.zeros((0, 0)) if networks is None else networks.weights,
         policy=policy,
         activation=CODES["linear" if networks is None else networks.activation],
         output=CODES["linear" if networks is None else networks.output],
-        observation_signs=nothing if mirror is None else mirror.observations,
-        action_signs=nothing if mirror is None else mirror.actions,
+        observation_signs=observation_signs,
+        action_signs=action_signs,
         side=GOAL_SIDE,
         actions=actions,
     )

@@ -211,7 +211,8 @@ class Policy:
                     f"{header['observation']!r}, not {observation_layout()!r}"
                 )
             n_layers = sum(name.startswith("weights_") for name in arrays)
-            mirror = [arrays.get(f"mirror_{name}") for name in Mirror._fields]
+            signs = [f"mirror_{name}" for name in Mirror._fields]
+            mirrored = any(name in arrays for name in signs)
             return cls(
                 mean=arrays["mean"],
                 std=arrays["std"],
@@ -222,5 +223,5 @@ class Policy:
                 provenance=Provenance.from_json(header["provenance"]),
                 activation=header["activation"],
                 output=header["output"],
-                mirror=None if mirror[0] is None else Mirror(*mirror),
+                mirror=Mirror(*(arrays[name] for name in signs)) if mirrored else None,
             )

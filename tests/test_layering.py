@@ -18,10 +18,11 @@ FORBIDDEN = {
 SOURCES = [path for folder in PACKAGES for path in sorted((ROOT / folder).glob("**/*.py"))]
 
 
-def imported_modules(path):
-    """Names of everything that a source file imports, at any depth."""
+def imported_modules(path, *, at_once=False):
+    """Names of everything that a source file imports, at any depth or when it is loaded."""
     names = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for node in tree.body if at_once else ast.walk(tree):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -48,6 +49,28 @@ def test_imports_go_one_way(path):
         name for name in imported_modules(path) if any(lies_in(name, bad) for bad in forbidden)
     }
     assert not wrong
+
+
+def module_name(path):
+    folder, *rest = path.relative_to(ROOT).with_suffix("").parts
+    parts = [PACKAGES[folder], *rest]
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def test_no_module_needs_itself():
+    """Modules can be put in an order in which each loads earlier ones alone."""
+    names = {module_name(path): path for path in SOURCES}
+    waiting = {}
+    for name, path in names.items():
+        found = imported_modules(path, at_once=True) & set(names)
+        # A package counts only for what it defines itself.
+        packages = {
+            other for other in found if any(lies_in(each, other) for each in found - {other})
+        }
+        waiting[name] = found - packages - {name}
+    while ready := {name for name, needed in waiting.items() if not needed & set(waiting)}:
+        waiting = {name: needed for name, needed in waiting.items() if name not in ready}
+    assert not waiting
 
 
 def test_every_source_folder_was_searched():

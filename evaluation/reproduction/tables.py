@@ -134,14 +134,14 @@ def readings_table(results: Results, claims: Mapping[Reading, Sequence[Claim]]) 
     names = [claim.name for claim in claims[LITERAL] if not claim.name.startswith("sweep")]
     rows = []
     for reading, judged in claims.items():
-        verdicts = {claim.name: claim.verdict for claim in judged}
+        marks = {claim.name: MARKS[claim.verdict] for claim in judged}
         near = (np.mean(results.distances("ars", task, reading) <= NEAR) for task in PROBLEMS)
         rows.append(
             (
                 *(f"{reading.start_spread:g}", reading.reward, reading.sharing),
                 " / ".join(f"{100 * share:.0f}" for share in near),
-                *(MARKS[verdicts[name]] for name in names),
-                str(list(verdicts.values()).count("holds")),
+                *(marks.get(name, "") for name in names),
+                str(list(marks.values()).count("holds")),
             )
         )
     header = ("starts", "reward", "shared by", f"ARS <= {NEAR} m %, left / right / both")

@@ -57,8 +57,9 @@ def test_learners_have_help_of_their_own(run, learner):
         ),
         (
             "kinarm-replay",
-            "--policy --compare --problem --task --arm --trial --worst --collisions --trials --seed "
-            "--allow-other-arm --no-oracle --out --record --overwrite --live --port --no-browser",
+            "--policy --compare --problem --task --arm --trial --worst --collisions --trials "
+            "--seed --allow-other-arm --no-oracle --out --record --overwrite --live --port "
+            "--no-browser",
         ),
         ("kinarm-bench", "--repetitions --policy --ppo --json"),
     ],

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from kinarm.arm import Arm
-from kinarm.evaluation.commands.replay import ReplayRequest
+from kinarm.evaluation import ReplayRequest
 from kinarm.recording import load_recordings, save_recordings
 
 QUICK = ("--no-oracle",)

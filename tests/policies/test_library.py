@@ -3,8 +3,9 @@
 import pytest
 
 from kinarm.errors import PolicyFileError, UnknownNameError
-from kinarm.policies import library, load_policy, policy_names
-from kinarm.policies.library import group_of, policy_files
+from kinarm.policies import library
+from kinarm.policies.library import group_of, load_policy, policy_files, policy_names
+from kinarm.problem import PROBLEMS
 
 NAMES = ("ars-paper-left-seed0", "ars-tuned-right-seed0", "ars-tuned-right-seed10", "ppo-both")
 
@@ -80,8 +81,7 @@ def test_every_shipped_policy_loads_and_fits_its_arm(shipped_arms):
     policy_names.cache_clear()
     for name in policy_names():
         policy = load_policy(name)
-        trained = policy.provenance
-        policy.check_arm(shipped_arms[trained.arm])
-        assert trained.task in name
-        assert trained.recipe in name
-        assert name.endswith(f"seed{trained.seed}")
+        made = policy.provenance
+        policy.check_arm(shipped_arms[made.problem.arm.name])
+        assert made.problem == PROBLEMS[made.problem.name].pinned
+        assert name == f"{made.algorithm}-{made.recipe}-{made.problem.name}-seed{made.seed}"

@@ -1,54 +1,113 @@
-"""Reflection about the x-z plane, and policies that commute with it."""
+"""Reflection about the x-z plane, and policies that act in it or commute with it."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError
-from kinarm.policies import ARSConfig, train_policy
-from kinarm.policies.mirror import Mirror, is_symmetric
+from kinarm.observation import observation_signs
+from kinarm.policies.library import load_policy
+from kinarm.policies.mirror import commuting_weights, find_mirror, is_symmetric, task_mirror
 from kinarm.policies.normalizer import Normalizer
-from kinarm.scene import LEFT_BENCH, RIGHT_BENCH, Bench, Scene
+from kinarm.policies.policy import Layer
+from kinarm.problem import PROBLEMS
+from kinarm.scene import GoalRegion, Obstacle, Scene
 from kinarm.simulator import Simulator
+from kinarm.world import World
 
-TINY = ARSConfig(
-    task="both", symmetric=True, directions=4, top_directions=2, iterations=4, horizon=16
-)
 OPPOSITE = np.array([1, -1, 1])
+REVERSED = np.array([-1, 1, 1, -1, 1, -1])
+BOTH = PROBLEMS["both"]
 
 
 @pytest.fixture(scope="module")
 def mirror(simulator):
-    return Mirror.of(simulator)
+    return find_mirror(simulator.world)
 
 
-def test_axes_about_x_or_z_are_reversed(mirror):
-    np.testing.assert_array_equal(mirror.axes, [-1, 1, 1, -1, 1, -1])
-    np.testing.assert_array_equal(mirror.actions, [-1, 1, 1, -1, 1])
+@pytest.fixture(scope="module")
+def situations(simulator):
+    """Observations of random situations, goals on both sides."""
+    return simulator.world.observe(*simulator.sample(np.random.default_rng(0), 400))
 
 
-def test_observations_of_mirror_images(mirror, simulator):
-    rng = np.random.default_rng(0)
-    starts, goals = simulator.sample(rng, 100)
-    seen = simulator.reset(starts, goals).observation
-    mirrored = simulator.reset(starts * mirror.axes, goals * OPPOSITE).observation
-    np.testing.assert_allclose(mirrored, seen * mirror.observations, rtol=0, atol=1e-12)
+def reflected(starts, goals):
+    return starts * REVERSED, goals * OPPOSITE
 
 
-def test_arm_that_is_not_symmetric_is_refused(simulators):
-    with pytest.raises(InvalidInputError, match="'made' is not its own mirror image"):
-        Mirror.of(simulators["sliding"])
+def lively(policy, gain):
+    """The same policy with larger weights, so that its units saturate more or less."""
+    layers = tuple(Layer(gain * layer.weights, layer.bias) for layer in policy.layers)
+    return replace(policy, layers=layers)
 
 
-def test_scenes_that_are_symmetric():
-    scene = Scene()
-    assert is_symmetric(scene, ("left", "right"))
-    assert not is_symmetric(scene, ("left",))
-    higher = Bench(name="right", x=RIGHT_BENCH.x, y=RIGHT_BENCH.y, height=0.4)
-    assert not is_symmetric(Scene(benches=(LEFT_BENCH, higher)), ("left", "right"))
-    middle = Bench(name="middle", x=(0.5, 0.7), y=(-0.2, 0.2), height=0.3)
-    assert is_symmetric(Scene(benches=(middle,)), ("middle",))
+class TestFindMirror:
+    def test_axes_about_x_or_z_are_reversed(self, mirror):
+        np.testing.assert_array_equal(mirror.actions, REVERSED[:5])
+        np.testing.assert_array_equal(mirror.observations, observation_signs(6))
+
+    @pytest.mark.parametrize("name", ["paper", "paper_flange", "lrmate200ic_5l"])
+    def test_observations_of_mirror_images(self, simulators, name):
+        simulator = simulators[name]
+        mirror = find_mirror(simulator.world)
+        starts, goals = simulator.sample(np.random.default_rng(0), 100)
+        seen = simulator.world.observe(starts, goals)
+        image = simulator.world.observe(*reflected(starts, goals))
+        np.testing.assert_allclose(image, seen * mirror.observations, rtol=0, atol=1e-12)
+
+    def test_of_an_arm_of_four_axes(self, simulators):
+        assert find_mirror(simulators["mesh"].world).actions.tolist() == [-1, 1, 1, 1]
+
+    def test_is_checked_with_the_kinematics(self, simulators):
+        with pytest.raises(InvalidInputError, match="'made' is not its own mirror image"):
+            find_mirror(simulators["sliding"].world)
+
+    def test_limits_count(self, shipped_arms, tmp_path):
+        text = shipped_arms["paper"].urdf_path.read_text()
+        path = tmp_path / "lopsided.urdf"
+        path.write_text(re.sub('lower="[^"]*"', 'lower="-2"', text, count=1))
+        world = World(BOTH.replace(arm=Arm.load(path)))
+        with pytest.raises(InvalidInputError, match="'lopsided' is not its own mirror image"):
+            find_mirror(world)
+
+
+class TestIsSymmetric:
+    def test_of_the_papers_problems(self):
+        assert is_symmetric(BOTH)
+        assert not is_symmetric(PROBLEMS["left"])
+        assert not is_symmetric(PROBLEMS["right"])
+
+    def test_goals_on_both_sides_have_to_be_alike(self):
+        assert is_symmetric(BOTH.replace(goal_weights=(2, 2)))
+        assert not is_symmetric(BOTH.replace(goal_weights=(2, 1)))
+
+    def test_obstacles_count_whether_goals_lie_on_them_or_not(self):
+        right, left = Scene().obstacles
+        higher = replace(right, upper=(*right.upper[:2], 0.4))
+        assert not is_symmetric(BOTH.replace(scene=Scene(obstacles=(left, higher))))
+        assert not is_symmetric(BOTH.replace(scene=Scene(obstacles=(left,))))
+        middle = Obstacle(name="middle", lower=(0.5, -0.2, 0), upper=(0.7, 0.2, 0.3))
+        assert is_symmetric(BOTH.replace(scene=Scene(obstacles=(left, middle, right))))
+        assert is_symmetric(BOTH.replace(scene=Scene(obstacles=())))
+
+    def test_a_region_in_the_middle_is_its_own_image(self):
+        ahead = GoalRegion(name="ahead", lower=(0.3, -0.2, 0.3), upper=(0.5, 0.2, 0.9))
+        scene = Scene(goal_regions=(ahead,))
+        assert is_symmetric(BOTH.replace(scene=scene, goal_regions=("ahead",)))
+
+    def test_regions_that_the_task_does_not_name_do_not_count(self):
+        other = GoalRegion(name="other", lower=(0.3, 0, 0.3), upper=(0.5, 0.2, 0.9))
+        scene = Scene(goal_regions=(*Scene().goal_regions, other))
+        assert is_symmetric(BOTH.replace(scene=scene))
+
+    def test_mirror_of_a_task(self, simulator, mirror):
+        found = task_mirror(True, simulator.world)
+        np.testing.assert_array_equal(found.observations, mirror.observations)
+        assert task_mirror(False, simulator.world) is None
+        assert task_mirror(True, World("left")) is None
 
 
 def test_statistics_are_those_of_the_data_and_its_mirror_image():
@@ -60,35 +119,94 @@ def test_statistics_are_those_of_the_data_and_its_mirror_image():
     np.testing.assert_allclose(seen.std, both.std(axis=0), rtol=1e-12)
 
 
-def test_symmetric_policy_does_on_one_side_what_it_does_on_the_other(mirror):
-    policy = train_policy(TINY).policy
-    simulator = Simulator("paper", "both", threads=1)
-    starts, goals = simulator.sample(np.random.default_rng(2), 100)
-    first = simulator.rollout(policy, starts, goals, record=True)
-    second = simulator.rollout(policy, starts * mirror.axes, goals * OPPOSITE, record=True)
-    np.testing.assert_array_equal(first.steps, second.steps)
-    np.testing.assert_array_equal(first.collision, second.collision)
-    np.testing.assert_allclose(first.paths * mirror.axes, second.paths, rtol=0, atol=1e-9)
+class TestMirroredPolicy:
+    """On the left it does what the same policy without a mirror does on the right."""
+
+    @pytest.mark.parametrize("hidden", [(), (6,), (6, 7), (9, 8, 7)])
+    @pytest.mark.parametrize("gain", [1, 30])
+    @pytest.mark.parametrize("functions", [{}, {"activation": "relu", "output": "tanh"}])
+    def test_acts_as_given_on_the_right_and_as_its_image_on_the_left(
+        self, make_policy, mirror, situations, hidden, gain, functions
+    ):
+        policy = lively(make_policy(*hidden, constant=1, **functions), gain)
+        mirrored = replace(policy, mirror=mirror)
+        left = situations[:, 1] > 0
+        assert 100 < left.sum() < 300
+        right_actions = policy(situations[~left])
+        assert right_actions.std(axis=0).max() > 1e-3
+        np.testing.assert_array_equal(mirrored(situations[~left]), right_actions)
+        image = policy(situations[left] * mirror.observations) * mirror.actions
+        np.testing.assert_allclose(mirrored(situations[left]), image, rtol=0, atol=1e-14)
+
+    @pytest.mark.parametrize("hidden", [(), (8, 8)])
+    def test_compiled_rollouts_mirror_each_other(self, make_policy, mirror, simulator, hidden):
+        policy = replace(lively(make_policy(*hidden, seed=1), 5), mirror=mirror)
+        starts, goals = simulator.sample(np.random.default_rng(1), 200)
+        first = simulator.rollout(policy, starts, goals, record=True)
+        second = simulator.rollout(policy, *reflected(starts, goals), record=True)
+        np.testing.assert_array_equal(first.collision, second.collision)
+        np.testing.assert_array_equal(first.steps, second.steps)
+        np.testing.assert_allclose(first.paths * REVERSED, second.paths, rtol=0, atol=1e-9)
+
+    def test_compiled_rollouts_are_those_of_the_plain_policy_on_the_right(
+        self, make_policy, mirror
+    ):
+        plain = lively(make_policy(8, seed=2), 5)
+        mirrored = replace(plain, mirror=mirror)
+        simulator = Simulator("left", threads=1)
+        starts, goals = simulator.sample(np.random.default_rng(2), 150)
+        on_the_left = simulator.rollout(mirrored, starts, goals, record=True)
+        on_the_right = simulator.rollout(plain, *reflected(starts, goals), record=True)
+        np.testing.assert_array_equal(on_the_left.steps, on_the_right.steps)
+        np.testing.assert_allclose(
+            on_the_left.paths * REVERSED, on_the_right.paths, rtol=0, atol=1e-9
+        )
+
+    def test_called_compiled_and_reflected_by_hand_agree(self, make_policy, mirror, simulator):
+        policy = make_policy(8, 7, seed=3)
+        mirrored = replace(policy, mirror=mirror)
+
+        def by_hand(seen):
+            left = seen[:, 1:2] > 0
+            actions = policy(np.where(left, seen * mirror.observations, seen))
+            return np.where(left, actions * mirror.actions, actions)
+
+        starts, goals = simulator.sample(np.random.default_rng(3), 100)
+        found = [
+            simulator.rollout(way, starts, goals, record=True)
+            for way in (mirrored, lambda seen: mirrored(seen), by_hand)
+        ]
+        for other in found[1:]:
+            np.testing.assert_array_equal(found[0].steps, other.steps)
+            np.testing.assert_allclose(found[0].paths, other.paths, rtol=0, atol=1e-12)
 
 
-def test_symmetric_policy_has_half_the_parameters(mirror):
-    weights = train_policy(TINY).policy.layers[0].weights
-    np.testing.assert_array_equal(weights[~mirror.weights], 0)
-    assert (weights[mirror.weights] != 0).mean() > 0.8
-    assert mirror.weights.mean() == pytest.approx(0.5, abs=0.1)
+class TestCommutingPolicy:
+    """A linear policy without a mirror whose weights vanish where signs disagree."""
 
+    def test_weights_that_may_differ_from_zero(self, mirror):
+        allowed = commuting_weights(mirror)
+        assert allowed.shape == (5, 48)
+        agree = mirror.actions[:, None] == mirror.observations
+        np.testing.assert_array_equal(allowed, agree)
+        assert allowed.mean() == pytest.approx(0.5, abs=0.1)
 
-def test_single_bench_is_trained_without_symmetry(mirror):
-    weights = train_policy(replace(TINY, task="right")).policy.layers[0].weights
-    assert (weights[~mirror.weights] != 0).any()
+    def test_shipped_one_has_half_the_weights(self, mirror):
+        allowed = commuting_weights(mirror)
+        weights = load_policy("ars-tuned-both-seed0").layers[0].weights
+        np.testing.assert_array_equal(weights[~allowed], 0)
+        assert (weights[allowed] != 0).mean() > 0.8
 
+    def test_one_side_is_trained_without_symmetry(self, mirror):
+        weights = load_policy("ars-tuned-right-seed0").layers[0].weights
+        assert (weights[~commuting_weights(mirror)] != 0).any()
 
-def test_observations_reflected_to_the_right(mirror, simulator):
-    seen = simulator.world.observe(*simulator.sample(np.random.default_rng(3), 50))
-    left = mirror.seen_on_the_left(seen)
-    np.testing.assert_array_equal(left, seen[:, 1] > 0)
-    assert 10 < left.sum() < 40
-    reflected = mirror.to_the_right(seen)
-    np.testing.assert_array_equal(reflected[~left], seen[~left])
-    np.testing.assert_array_equal(reflected[left], seen[left] * mirror.observations)
-    assert not mirror.seen_on_the_left(reflected).any()
+    @pytest.mark.parametrize("name", ["ars-tuned-both-seed0", "ppo-tuned-both-seed0"])
+    def test_does_on_one_side_what_it_does_on_the_other(self, simulator, name):
+        policy = load_policy(name)
+        starts, goals = simulator.sample(np.random.default_rng(2), 100)
+        first = simulator.rollout(policy, starts, goals, record=True)
+        second = simulator.rollout(policy, *reflected(starts, goals), record=True)
+        np.testing.assert_array_equal(first.steps, second.steps)
+        np.testing.assert_array_equal(first.collision, second.collision)
+        np.testing.assert_allclose(first.paths * REVERSED, second.paths, rtol=0, atol=1e-9)

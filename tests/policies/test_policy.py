@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from kinarm.errors import InvalidInputError, OutputError, PolicyFileError
-from kinarm.policies import Layer, Policy, Provenance
+from kinarm.networks import Mirror
+from kinarm.observation import observation_layout
+from kinarm.policies.policy import Layer, Policy
+from kinarm.policies.provenance import Provenance
+from kinarm.problem import ReachProblem
+
+FUNCTIONS = {"linear": lambda x: x, "tanh": np.tanh, "relu": lambda x: np.maximum(x, 0)}
+MIRROR = Mirror(np.tile([1.0, -1, 1], 16), np.array([-1.0, 1, 1, -1, 1]))
 
 
 def contents(path):
@@ -23,6 +30,11 @@ def assert_bitwise_equal(first, second):
     for a, b in zip(first.layers, second.layers, strict=True):
         assert a.weights.tobytes() == b.weights.tobytes()
         assert a.bias.tobytes() == b.bias.tobytes()
+    assert (first.activation, first.output) == (second.activation, second.output)
+    assert (first.mirror is None) == (second.mirror is None)
+    if first.mirror is not None:
+        for a, b in zip(first.mirror, second.mirror, strict=True):
+            assert a.tobytes() == b.tobytes()
     assert first.provenance == second.provenance
 
 
@@ -58,8 +70,19 @@ class TestCall:
         expected = 0.3 * np.tanh(2 * 0.7) + 0.4 * np.tanh(0.5 - 0.7) - 0.1
         np.testing.assert_allclose(policy([0.7]), [expected])
 
+    @pytest.mark.parametrize("output", FUNCTIONS)
+    @pytest.mark.parametrize("activation", FUNCTIONS)
+    def test_functions_between_and_after_the_layers(self, make_policy, activation, output):
+        policy = make_policy(9, 7, activation=activation, output=output)
+        seen = np.random.default_rng(0).normal(size=(20, 48))
+        x = (seen - policy.mean) / policy.std
+        between, after = FUNCTIONS[activation], FUNCTIONS[output]
+        for number, (weights, bias) in enumerate(policy.layers):
+            x = (between(x) if number else x) @ weights.T + bias
+        np.testing.assert_allclose(policy(seen), np.clip(after(x), -1, 1), rtol=0, atol=1e-12)
+
     def test_batch_equals_single(self, make_policy):
-        policy = make_policy(8)
+        policy = make_policy(8, mirror=MIRROR)
         seen = np.random.default_rng(1).normal(size=(20, 48))
         batch = policy(seen)
         assert batch.shape == (20, 5)
@@ -81,8 +104,11 @@ class TestCall:
 
 class TestNetworks:
     @pytest.mark.parametrize("hidden", [(), (16,), (12, 9)])
-    def test_compiled_equals_python(self, make_policy, simulator, hidden):
-        policy = make_policy(*hidden, constant=3)
+    @pytest.mark.parametrize(
+        "settings", [{}, {"activation": "relu", "output": "tanh"}, {"mirror": MIRROR}]
+    )
+    def test_compiled_equals_python(self, make_policy, simulator, hidden, settings):
+        policy = make_policy(*hidden, constant=3, **settings)
         starts, goals = simulator.sample(np.random.default_rng(3), 200)
         compiled = simulator.rollout(policy, starts, goals, record=True)
         called = simulator.rollout(lambda seen: policy(seen), starts, goals, record=True)
@@ -115,11 +141,26 @@ class TestInvariants:
             with pytest.raises(ValueError, match="read-only"):
                 array.flat[0] = 1
 
+    def test_mirror_is_copied_and_frozen(self, make_policy):
+        signs = Mirror(MIRROR.observations.copy(), MIRROR.actions.copy())
+        policy = make_policy(mirror=signs)
+        signs.actions[:] = 9
+        np.testing.assert_array_equal(policy.mirror.actions, MIRROR.actions)
+        for array in policy.mirror:
+            with pytest.raises(ValueError, match="read-only"):
+                array[0] = 1
+
+    def test_shown_in_one_line(self, make_policy):
+        assert repr(make_policy(7)) == ("Policy(test none, problem 'right', seed 3, layers 48-7-5)")
+
+    def test_says_its_problem(self, make_policy):
+        assert make_policy().problem == ReachProblem.load("right").pinned
+
     def test_sizes(self, make_policy):
         assert (make_policy(7).n_observations, make_policy(7).n_actions) == (48, 5)
 
     def test_pickles(self, make_policy):
-        policy = make_policy(4)
+        policy = make_policy(4, mirror=MIRROR)
         assert_bitwise_equal(policy, pickle.loads(pickle.dumps(policy)))
 
     @pytest.mark.parametrize(
@@ -132,6 +173,10 @@ class TestInvariants:
             ({"layers": (Layer(np.ones((1, 3)), np.zeros(1)),)}, "weights of layer 0"),
             ({"layers": (Layer(np.ones((1, 2)), np.zeros(2)),)}, "bias of layer 0"),
             ({"layers": (Layer(np.full((1, 2), np.inf), np.zeros(1)),)}, "must be finite"),
+            ({"activation": "sine"}, "activation function 'sine'; available: linear, tanh, relu"),
+            ({"output": "sine"}, "activation function 'sine'"),
+            ({"mirror": Mirror([1.0], [1.0])}, "mirror of observations must have shape"),
+            ({"mirror": Mirror([1.0, 1.0], [1.0, 1.0])}, "mirror of actions must have shape"),
             (
                 {"layers": (Layer(np.ones((4, 2)), np.zeros(4)), Layer(np.ones((1, 3)), [0.0]))},
                 "weights of layer 1",
@@ -163,13 +208,16 @@ class TestCheckArm:
         from kinarm.arm import Arm
 
         with pytest.raises(PolicyFileError, match="another version of arm 'paper'"):
-            make_policy().check_arm(Arm.load("paper", n_actuated=6))
+            make_policy().check_arm(Arm.load("paper", actuated=("axis_1", "axis_2")))
 
 
 class TestFile:
     @pytest.mark.parametrize("hidden", [(), (6,), (6, 4)])
-    def test_round_trip_is_bitwise(self, make_policy, tmp_path, hidden):
-        policy = make_policy(*hidden)
+    @pytest.mark.parametrize(
+        "settings", [{}, {"activation": "relu", "output": "tanh", "mirror": MIRROR}]
+    )
+    def test_round_trip_is_bitwise(self, make_policy, tmp_path, hidden, settings):
+        policy = make_policy(*hidden, **settings)
         policy.save(tmp_path / "policy.npz")
         assert_bitwise_equal(policy, Policy.load(tmp_path / "policy.npz"))
 
@@ -226,11 +274,12 @@ class TestBadFile:
     def test_folder(self, tmp_path):
         self.refused(tmp_path, "cannot read policy")
 
-    @pytest.mark.parametrize("share", [0, 0.01, 0.3, 0.9, 0.999])
-    def test_truncated(self, saved, share):
+    def test_truncated_anywhere(self, saved):
         content = saved.read_bytes()
-        saved.write_bytes(content[: int(share * len(content))])
-        self.refused(saved, "policy")
+        for length in range(0, len(content), 97):
+            saved.write_bytes(content[:length])
+            with pytest.raises(PolicyFileError, match=f"^[^\n]*{saved.name}[^\n]*$"):
+                Policy.load(saved)
 
     def test_flipped_bits(self, saved):
         content = bytearray(saved.read_bytes())
@@ -265,11 +314,12 @@ class TestBadFile:
         np.savez(saved, **{**contents(saved), "mean": np.array([{}], dtype=object)})
         self.refused(saved, "policy")
 
-    def test_future_version(self, saved):
-        np.savez(saved, **{**contents(saved), "version": 2})
-        self.refused(saved, "format version 2; this kinarm reads up to 1")
+    @pytest.mark.parametrize(("version", "age"), [(1, "an earlier"), (3, "a later")])
+    def test_other_version(self, saved, version, age):
+        np.savez(saved, **{**contents(saved), "version": version})
+        self.refused(saved, f"format version {version}, of {age} kinarm; this one reads 2")
 
-    @pytest.mark.parametrize("key", ["version", "provenance", "mean", "std", "weights_0", "bias_0"])
+    @pytest.mark.parametrize("key", ["version", "header", "mean", "std", "weights_0", "bias_0"])
     def test_missing_entry(self, saved, key):
         kept = contents(saved)
         del kept[key]
@@ -286,9 +336,9 @@ class TestBadFile:
             ("bias_0", np.zeros(4)),
             ("mean", np.array(["a"] * 48)),
             ("version", np.array("one")),
-            ("provenance", np.array("{")),
-            ("provenance", np.array("[]")),
-            ("provenance", np.array("3")),
+            ("header", np.array("{")),
+            ("header", np.array("[]")),
+            ("header", np.array("{}")),
         ],
     )
     def test_bad_entry(self, saved, key, value):
@@ -303,14 +353,53 @@ class TestBadFile:
         np.savez(path, **kept)
         self.refused(path, "policy")
 
-    def test_provenance_with_missing_and_unknown_entries(self, saved):
-        kept = contents(saved)
-        entries = json.loads(str(kept["provenance"]))
-        del entries["seed"]
-        entries["mood"] = "good"
-        np.savez(saved, **{**kept, "provenance": json.dumps(entries)})
-        with pytest.raises(PolicyFileError, match="mood, seed"):
-            Policy.load(saved)
+    @pytest.mark.parametrize(
+        ("entry", "value", "message"),
+        [
+            ("provenance", {}, "provenance: 'algorithm' is missing"),
+            ("provenance", 3, "provenance: it must be a table, got 3"),
+            ("activation", "sine", "activation function 'sine'"),
+            ("output", None, "activation function None"),
+        ],
+    )
+    def test_bad_entry_of_the_header(self, saved, entry, value, message):
+        self.rewrite_header(saved, **{entry: value})
+        self.refused(saved, message)
+
+    @pytest.mark.parametrize("entry", ["provenance", "observation", "activation", "output"])
+    def test_missing_entry_of_the_header(self, saved, entry):
+        self.rewrite_header(saved, without=entry)
+        self.refused(saved, f"is not a complete kinarm policy: '{entry}'")
+
+    def test_provenance_with_an_unknown_entry(self, saved):
+        entries = json.loads(str(contents(saved)["header"]))["provenance"]
+        self.rewrite_header(saved, provenance={**entries, "mood": "good"})
+        self.refused(saved, "provenance: unknown key 'mood'; available: algorithm")
+
+    def test_problem_that_cannot_be(self, saved):
+        entries = json.loads(str(contents(saved)["header"]))["provenance"]
+        entries["problem"]["task"]["horizon"] = -1
+        self.rewrite_header(saved, provenance=entries)
+        self.refused(saved, "provenance: problem.task: horizon must be a whole number")
+
+    def test_observations_of_another_layout(self, saved):
+        self.rewrite_header(saved, observation="0: goal 3")
+        self.refused(saved, f"layout '0: goal 3', not '{observation_layout()}'")
+
+    def test_half_a_mirror(self, make_policy, saved):
+        make_policy(mirror=MIRROR).save(saved)
+        for name in ("mirror_observations", "mirror_actions"):
+            kept = contents(saved)
+            del kept[name]
+            spoilt = saved.with_name(f"{name}.npz")
+            np.savez(spoilt, **kept)
+            self.refused(spoilt, "mirror")
+
+    def rewrite_header(self, path, without=None, **changes):
+        kept = contents(path)
+        header = {**json.loads(str(kept["header"])), **changes}
+        header.pop(without, None)
+        np.savez(path, **{**kept, "header": json.dumps(header)})
 
     def test_later_loads_still_work(self, make_policy, saved):
         saved.write_bytes(b"")

@@ -2,13 +2,14 @@
 
 import json
 import re
+from dataclasses import dataclass
 from importlib import metadata
 
 import pytest
 
 from kinarm.errors import InvalidInputError
-from kinarm.policies import Provenance
-from kinarm.policies.provenance import package_versions, source_commit
+from kinarm.policies.provenance import Provenance, package_versions, source_commit
+from kinarm.problem import ReachProblem
 
 
 def test_round_trip_through_json(provenance):
@@ -16,17 +17,43 @@ def test_round_trip_through_json(provenance):
     assert Provenance.from_json(json.loads(text)) == provenance
 
 
-@pytest.mark.parametrize("entry", ["algorithm", "seed", "arm_digest", "commit"])
+@pytest.mark.parametrize("entry", ["algorithm", "recipe", "problem", "seed", "environment_steps"])
 def test_missing_entry_is_named(provenance, entry):
     entries = provenance.to_json()
     del entries[entry]
-    with pytest.raises(InvalidInputError, match=f"missing or unknown entries: {entry}"):
+    with pytest.raises(InvalidInputError, match=f"provenance: '{entry}' is missing: "):
         Provenance.from_json(entries)
 
 
 def test_unknown_entry_is_named(provenance):
-    with pytest.raises(InvalidInputError, match="entries: mood"):
+    with pytest.raises(InvalidInputError, match="provenance: unknown key 'mood'"):
         Provenance.from_json({**provenance.to_json(), "mood": "good"})
+
+
+@dataclass(frozen=True)
+class Settings:
+    problem: ReachProblem
+    recipe: str = "mine"
+    seed: int = 7
+    step_size: float = 0.1
+    widths: tuple[int, ...] = (8, 8)
+
+
+def test_of_a_training_here_and_now():
+    problem = ReachProblem.load("left").replace(tolerance=0.03)
+    made = Provenance.of("test", Settings(problem), 1234)
+    assert made == Provenance(
+        algorithm="test",
+        recipe="mine",
+        problem=problem.pinned,
+        seed=7,
+        environment_steps=1234,
+        config={"recipe": "mine", "seed": 7, "step_size": 0.1, "widths": [8, 8]},
+        versions=package_versions(),
+        commit=source_commit(),
+    )
+    assert made.problem.arm.digest == problem.arm_digest
+    assert Provenance.from_json(json.loads(json.dumps(made.to_json()))) == made
 
 
 def test_versions_of_what_matters():
