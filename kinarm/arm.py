@@ -109,7 +109,7 @@ class Arm:
 
     @property
     def name(self) -> str:
-        """Name of the arm: that of a shipped one, or of the file without its ending."""
+        """Name of a shipped arm, or of the file without its ending."""
         return self.specification.name
 
     @property
