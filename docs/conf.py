@@ -4,11 +4,9 @@ import re
 import sys
 import warnings
 from pathlib import Path
-from typing import get_args
 
 import matplotlib as mpl
 from docutils import nodes
-from numpy.typing import ArrayLike
 from sphinx import addnodes
 from sphinx.application import Sphinx
 
@@ -52,20 +50,12 @@ typehints_use_signature_return = True
 typehints_document_rtype = False
 always_use_bars_union = True
 
-
-def typehints_formatter(annotation: object, _config: object) -> str | None:
-    """Write `ArrayLike`, alone or with None, instead of the many types that it stands for."""
-    members, given = set(get_args(ArrayLike)), set(get_args(annotation))
-    if not members <= given:
-        return None
-    return " | ".join(["ArrayLike", *("None" for _ in given - members)])
-
-
 # Types of other projects: their inventories would have to be fetched.
 nitpick_ignore_regex = [
     (r"py:.*", r"(numpy|pinocchio|gymnasium|pathlib|collections|typing)\..*"),
     (r"py:data", r"Ellipsis"),
     (r"py:class", r"Figure"),  # matplotlib, which is imported when first used
+    (r"py:class", r".*\.[A-Z]\w*T"),  # type variables
 ]
 
 sphinx_gallery_conf = {
@@ -107,12 +97,21 @@ def _attribute_types_as_text(
             lines[number] = ""
 
 
+ARRAY = re.compile(r"ndarray\[tuple\[[~.\w]*Any, \.\.\.\], [~.\w]*dtype\[[~.\w]+\]\]")
+
+
+def _shorten_signature(*event: str | None) -> tuple[str, str | None] | None:
+    """Write array types as their names where signatures keep them, those of named tuples."""
+    *_, signature, returned = event
+    return None if signature is None else (ARRAY.sub("ndarray", signature), returned)
+
+
 def _shorten_annotations(_app: object, doctree: nodes.document) -> None:
     """Write array types as their names, and leave out that something returns None."""
     kinds = (addnodes.desc_annotation, addnodes.desc_returns)
     for node in list(doctree.findall(lambda node: isinstance(node, kinds))):
         text = "".join(child.astext() for child in node.children)
-        short = re.sub(r"ndarray\[tuple\[Any, \.\.\.\], dtype\[\w+\]\]", "ndarray", text)
+        short = ARRAY.sub("ndarray", text)
         if isinstance(node, addnodes.desc_returns) and text == "None":
             node.parent.remove(node)
         elif short != text:
@@ -122,4 +121,5 @@ def _shorten_annotations(_app: object, doctree: nodes.document) -> None:
 def setup(app: Sphinx) -> None:
     """Mend what napoleon and autodoc write."""
     app.connect("autodoc-process-docstring", _attribute_types_as_text, priority=900)
+    app.connect("autodoc-process-signature", _shorten_signature, priority=900)
     app.connect("doctree-read", _shorten_annotations)

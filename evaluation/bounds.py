@@ -40,8 +40,8 @@ def oracle_bounds(trials: TrialSet, on_progress: Progress | None = None) -> Orac
 
     Solutions are kept in the cache folder under a name made of the hash of the trials and of the
     oracle's version, for other processes, and in memory as long as the trials are. A file that
-    cannot be read is replaced; where none can be written, nothing is kept. Beyond `KEPT_FILES`
-    and `KEPT_BYTES`, the files that were used least recently go.
+    cannot be read is replaced; where none can be written, nothing is kept. Beyond ``KEPT_FILES``
+    and ``KEPT_BYTES``, the files that were used least recently go.
 
     Parameters
     ----------

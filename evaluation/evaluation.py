@@ -50,7 +50,7 @@ class Evaluation:
 
     @cached_property
     def metrics(self) -> dict[str, Estimate]:
-        """Every figure of merit by its name in `kinarm.evaluation.metrics.METRICS`."""
+        """Every figure of merit by its name in `kinarm.evaluation.METRICS`."""
         return estimate_metrics(Outcomes((self.rollouts,), self.bounds))
 
     @property
@@ -216,7 +216,7 @@ def evaluate(
     oracle : bool
         Whether to bound what any policy could do in the trials; see `Evaluation.bounds`.
     **overrides
-        Changes of the problem, such as ``tolerance``; see `ReachProblem.replace`.
+        Changes of the problem, such as ``tolerance``; see `kinarm.ReachProblem.replace`.
 
     Raises
     ------

@@ -58,5 +58,5 @@ class ArmSpecification:
 
     @property
     def name(self) -> str:
-        """Name of the arm: that of a shipped one, or of the file without its ending."""
+        """Name of a shipped arm, or of the file without its ending."""
         return self.source if self.source in arm_names() else Path(self.source).stem

@@ -17,7 +17,7 @@ class StepResult(NamedTuple):
     reward : ndarray
         Sum of the terms.
     terms : ndarray, shape (n, n_terms)
-        The weighted terms, in the order of `kinarm.task.REWARD_TERMS`; zero for episodes that
+        The weighted terms, in the order of `kinarm.REWARD_TERMS`; zero for episodes that
         were over before.
     success, collision, truncated : ndarray of bool
         How the step ended; all false for episodes that go on or were over before.

@@ -97,7 +97,7 @@ class TrainingConfig:
 
     @property
     def training_problem(self) -> ReachProblem:
-        """What is trained on: the problem with the reward of these settings."""
+        """The problem with the reward of these settings, which is what is trained on."""
         return self.problem.replace(reward=self.reward)
 
     def simulator(self, threads: int | None = None) -> "Simulator":

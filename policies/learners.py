@@ -84,7 +84,7 @@ class Learner(Generic[ConfigT, StateT]):
     adapt : callable, optional
         Adapts a recipe to the problem that it is for.
     options : tuple of str
-        Names of the options that `begin` takes.
+        Names of the options that ``begin`` takes.
     packages : tuple of str
         Modules that it needs beyond what kinarm requires.
     extra : str

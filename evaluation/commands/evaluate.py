@@ -43,7 +43,7 @@ class EvaluationRequest(ProblemOptions):
 
     By default a trained policy faces the problem that it was trained for, changed as the options
     say, and a baseline all problems in play. Problems that are named restrict the default
-    selection; together with named policies, or `matrix`, they say what those face. The oracle
+    selection; together with named policies, or ``matrix``, they say what those face. The oracle
     joins on every problem that is faced.
 
     Parameters
@@ -52,7 +52,7 @@ class EvaluationRequest(ProblemOptions):
         Shipped policy, recipe (all its seeds), random, zero, oracle, or .npz file; repeatable;
         by default all shipped ones, random and zero.
     problems : tuple of str
-        Left, right, both, or a problem file; repeatable. `problem` is for a single one.
+        Left, right, both, or a problem file; repeatable. ``problem`` is for a single one.
     trials : int
         Trials a problem.
     seed : int

@@ -110,7 +110,7 @@ class PPOConfig(TrainingConfig):
 
     @property
     def training_problem(self) -> ReachProblem:
-        """What is trained on: the problem with the reward and tolerance of these settings."""
+        """The problem with the reward and tolerance of these settings, which is trained on."""
         return self.problem.replace(reward=self.reward, tolerance=self.training_tolerance)
 
     def learning_rate_at(self, done: float) -> float:

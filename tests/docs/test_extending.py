@@ -41,35 +41,35 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def hill_climbing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def toy(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The learner of the page, in one file and registered by one line."""
-    (folder / "hill_climbing.py").write_text(BLOCKS["hill_climbing.py"])
-    monkeypatch.syspath_prepend(str(folder))
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "extending"))
     monkeypatch.setattr(learners, "_MODULES", dict(learners._MODULES))
     exec(BLOCKS["register"])
     yield
-    sys.modules.pop("hill_climbing", None)
+    sys.modules.pop("toy_learner", None)
 
 
 def test_a_learner_is_one_file_and_one_registration(
-    hill_climbing: None, folder: Path, capsys: pytest.CaptureFixture[str]
+    toy: None, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    run("kinarm-train hill-climbing --task left --stride 0.05 --iterations 30 --out h.npz")
-    policy = load_policy(folder / "h.npz")
-    assert policy.provenance.algorithm == "hill-climbing"
+    train_it, evaluate_it = BLOCKS["toy-commands"].strip().splitlines()
+    run(train_it)
+    policy = load_policy(folder / "toy.npz")
+    assert policy.provenance.algorithm == "toy"
     assert policy.problem.name == "left"
-    assert policy.provenance.config["stride"] == 0.05
-    curve = np.loadtxt(folder / "h.curve.csv", delimiter=",", skiprows=1)
-    assert curve[-5:, 1].mean() > curve[:5, 1].mean()
+    assert policy.provenance.config["noise"] == 0.03
     capsys.readouterr()
-    run("kinarm-eval --policy h.npz --trials 10 --no-oracle --json")
-    assert json.loads(capsys.readouterr().out)["results"][0]["policy"] == "h"
+    run(evaluate_it)
+    results = json.loads(capsys.readouterr().out)["results"]
+    ends = {row["policy"]: row["metrics"]["mean_distance"]["value"] for row in results}
+    assert ends["toy"] < ends["zero"]
 
 
 def test_a_registered_learner_resumes_exactly(
-    hill_climbing: None, folder: Path, monkeypatch: pytest.MonkeyPatch
+    toy: None, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    command = "kinarm-train hill-climbing --iterations 12 --out {}.npz"
+    command = "kinarm-train toy --iterations 12 --out {}.npz"
     run(command.format("whole"))
     keep = train.CheckpointKeeper.update
 
