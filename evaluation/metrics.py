@@ -116,7 +116,8 @@ class Metric:
     spread_heading : str
         Heading of a column for its range over training seeds, if there is to be one.
     priority : float
-        Where space is scarce, columns of low priority are left out first; those of infinite priority never.
+        Where space is scarce, columns of low priority are left out first, and those of infinite
+        priority never.
     """
 
     meaning: str
@@ -215,7 +216,7 @@ METRICS: dict[str, Metric] = {
         unit="m",
     ),
     "collision": Metric(
-        meaning="share of trials that ended in contact with a bench, the ground or the arm",
+        meaning="share of trials that ended in contact: obstacles, the ground or the arm itself",
         formula=lambda trials: trials.collision.mean(axis=-1),
         unit="%",
         interval="Wilson",

@@ -20,6 +20,9 @@ from kinarm.evaluation.report.maps import fates, level
 from kinarm.evaluation.report.page import page_template, report_page, write_report
 from kinarm.evaluation.report.worst import record_worst, worst_trials
 from kinarm.evaluation.table import table_rows
+from kinarm.problem import ReachProblem
+from kinarm.scene import GoalRegion, Obstacle, Scene
+from kinarm.task import ReachTask
 from kinarm.viewer import replay_page
 
 PIXEL = 0.051
@@ -294,6 +297,22 @@ class TestMap:
         assert float(rect.get("x")) > float(base.get("cx"))
         assert float(base.get("cx")) == pytest.approx(view.y[1] * maps.SCALE)
         assert float(base.get("cy")) == pytest.approx(view.x[1] * maps.SCALE)
+
+    def test_a_world_of_ones_own(self):
+        """A region in front of the arm, and a post before it."""
+        region = GoalRegion(name="front", lower=(0.4, -0.3, 0.2), upper=(0.7, 0.3, 0.5))
+        post = Obstacle(name="post", lower=(0.3, -0.4, 0), upper=(0.36, -0.34, 0.8))
+        far = Obstacle(name="far", lower=(5, 5, 0), upper=(6, 6, 1))
+        scene = Scene(obstacles=(post, far), goal_regions=(region,))
+        task = ReachTask(goal_regions=("front",))
+        made = evaluate("zero", ReachProblem(name="own", scene=scene, task=task), trials=20)
+        (results,) = group_results(evaluation_document([made], ""), [made])
+        (group,) = results.groups
+        rects = drawn_map(results, group).findall("rect")
+        assert [rect.find("title").text for rect in rects] == ["obstacle: post", "region: front"]
+        shares = [share for _, share in maps.failure_shares(group, region) if share is not None]
+        assert shares == [1.0] * len(shares)
+        assert "own" in report_page(evaluation_document([made], ""), [made])
 
     def test_failures_are_counted_where_they_happen(self, right):
         group, (region,) = right.contenders[0], right.goal_regions
