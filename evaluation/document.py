@@ -119,8 +119,7 @@ class EvaluationDocument:
         name = str(path)
         try:
             content = json.loads(Path(path).read_text(encoding="utf-8"))
-            check_fields("it", content, {"protocol": dict, "results": list})
-            check_fields("protocol", content["protocol"], {"format_version": int})
+            check_shape(content, {"protocol": {"format_version": int}, "results": list}, "it")
             version = content["protocol"]["format_version"]
             if version == FORMAT_VERSION:
                 check_document(content)
@@ -214,63 +213,74 @@ class EvaluationDocument:
                 )
 
 
-NULL = type(None)
+EACH, NULL = "*", type(None)
+"""Key that stands for every key of an object, and the type of what is not there."""
 
-PROBLEM_FIELDS = {
-    "problem": dict,
-    "trial_set_hash": str,
-    "starts": list,
-    "goals": list,
-    "oracle": (dict, NULL),
+SHAPE = {
+    "protocol": {
+        "seed": int,
+        "problems": {
+            EACH: {
+                "problem": dict,
+                "trial_set_hash": str,
+                "starts": list,
+                "goals": list,
+                "oracle": (dict, NULL),
+            }
+        },
+    },
+    "results": {
+        EACH: {
+            "policy": str,
+            "problem": str,
+            "trained_on": (str, NULL),
+            "outcomes": dict.fromkeys(ENDS, list),
+        }
+    },
 }
-
-RESULT_FIELDS = {"policy": str, "problem": str, "trained_on": (str, NULL), "outcomes": dict}
+"""What is needed of a document to face its trials again: types, by nested keys."""
 
 
 def check_document(content: dict[str, Any]) -> None:
-    """See that a document holds what is needed to face its trials again.
-
-    Parameters
-    ----------
-    content : dict
-        ``protocol`` and ``results``, of this version.
+    """See that a document of this version holds what is needed to face its trials again.
 
     Raises
     ------
     InvalidInputError
         If something is missing or of another kind, with the place where that is.
     """
-    problems = content["protocol"].get("problems")
-    check_fields("protocol", content["protocol"], {"seed": int, "problems": dict})
-    for name, entry in problems.items():
-        check_fields(f"problem {name!r}", entry, PROBLEM_FIELDS)
+    check_shape(content, SHAPE, "it")
+    for name, entry in content["protocol"]["problems"].items():
         for part in ("starts", "goals"):
             finite_array(f"{part} of {name!r}", entry[part], (None, None))
         if entry["oracle"]:
-            check_fields(f"oracle of {name!r}", entry["oracle"], {"trials": dict})
-            check_fields("its trials", entry["oracle"]["trials"], {"steps_lower_bound": list})
+            bounds = {"trials": {"steps_lower_bound": list}}
+            check_shape(entry["oracle"], bounds, f"oracle of {name!r}")
     for number, row in enumerate(content["results"]):
-        where = f"result {number}"
-        check_fields(where, row, RESULT_FIELDS)
-        check_fields(where, row["outcomes"], dict.fromkeys(ENDS, list))
-        if row["problem"] not in problems:
-            raise InvalidInputError(f"{where} is of the unknown problem {row['problem']!r}")
+        if row["problem"] not in content["protocol"]["problems"]:
+            raise InvalidInputError(f"results.{number} is of no known problem: {row['problem']!r}")
         if len({len(row["outcomes"][part]) for part in ENDS}) > 1:
-            raise InvalidInputError(f"{where} has outcomes of different lengths")
+            raise InvalidInputError(f"results.{number} has outcomes of different lengths")
 
 
-def check_fields(where: str, entries: Any, fields: Mapping[str, Any]) -> None:
-    """See that an object of a document has some fields, each of a type.
+def check_shape(value: Any, shape: Any, where: str) -> None:
+    """See that part of a document is of a type, or an object with some keys; see `SHAPE`.
 
     Raises
     ------
     InvalidInputError
-        If it has not, with its name.
+        If it is not; names the first place that is wrong.
     """
-    if not isinstance(entries, dict):
+    if not isinstance(shape, Mapping):
+        if not isinstance(value, shape):
+            raise InvalidInputError(f"{where} is of the wrong kind")
+        return
+    if EACH in shape and isinstance(value, list):
+        value = {str(number): entry for number, entry in enumerate(value)}
+    if not isinstance(value, Mapping):
         raise InvalidInputError(f"{where} is no object")
-    for field, kind in fields.items():
-        if field not in entries:
-            raise InvalidInputError(f"{where} lacks {field!r}")
-        if not isinstance(entries[field], kind):
-            raise InvalidInputError(f"{where} has no such {field!r} as it should")
+    for key in value if EACH in shape else shape:
+        if key not in value:
+            raise InvalidInputError(f"{where} lacks {key!r}")
+        inner = key if where == "it" else f"{where}.{key}"
+        check_shape(value[key], shape.get(EACH) or shape[key], inner)

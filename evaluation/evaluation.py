@@ -128,11 +128,6 @@ class PooledEvaluation:
         """What was faced."""
         return self.members[0].problem
 
-    @property
-    def success_rates(self) -> tuple[float, ...]:
-        """Success of each seed."""
-        return tuple(float(member.rollouts.success.mean()) for member in self.members)
-
     @cached_property
     def metrics(self) -> dict[str, Estimate]:
         """Every figure of merit over all seeds; intervals are those of the trials they share."""

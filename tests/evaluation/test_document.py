@@ -310,11 +310,17 @@ def test_a_document_is_read_as_it_was_written(stored, evaluations):
     [
         (lambda d: d.pop("results"), "it lacks 'results'"),
         (lambda d: d["protocol"].pop("seed"), "protocol lacks 'seed'"),
-        (lambda d: d["protocol"]["problems"]["left"].pop("goals"), "problem 'left' lacks 'goals'"),
+        (
+            lambda d: d["protocol"]["problems"]["left"].pop("goals"),
+            "protocol.problems.left lacks 'goals'",
+        ),
         (lambda d: d["protocol"]["problems"]["left"]["goals"].append([1]), "goals of 'left'"),
-        (lambda d: d["results"][2].update(problem="up"), "result 2 is of the unknown problem 'up'"),
-        (lambda d: d["results"][1]["outcomes"]["steps"].pop(), "result 1 .* different lengths"),
-        (lambda d: d["results"].insert(0, 3), "result 0 is no object"),
+        (lambda d: d["results"][2].update(problem="up"), "results.2 is of no known problem: 'up'"),
+        (
+            lambda d: d["results"][1]["outcomes"]["steps"].pop(),
+            "results.1 has .* different lengths",
+        ),
+        (lambda d: d["results"].insert(0, 3), "results.0 is no object"),
         (lambda d: d["protocol"].update(format_version=9), "format version 9; this kinarm reads"),
     ],
 )

@@ -276,7 +276,7 @@ def test_pooled_spread_is_over_the_seeds(evaluations):
     rates = [member.success.value for member in evaluations[:3]]
     medians = [sorted(member.rollouts.distance)[29:31] for member in evaluations[:3]]
     spread = pooled.to_json()["spread"]
-    assert spread["success"]["each"] == list(pooled.success_rates) == rates
+    assert spread["success"]["each"] == rates
     assert (spread["success"]["min"], spread["success"]["max"]) == (min(rates), max(rates))
     mean = sum(rates) / 3
     deviation = (sum((rate - mean) ** 2 for rate in rates) / 2) ** 0.5
