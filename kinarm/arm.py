@@ -1,7 +1,7 @@
 """Robot arms: a Pinocchio model with tool, limits, rated speeds and collision shapes."""
 
 import hashlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -52,6 +52,14 @@ class Arm:
     n_actuated: int
     home: NDArray[np.float64]
     chain: Chain
+
+    def __post_init__(self) -> None:
+        for array in (*self.chain, self.home):
+            array.flags.writeable = False
+
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]:
+        # Built anew, copies are read-only, too: kernels are not compiled once more for them.
+        return type(self), tuple(getattr(self, item.name) for item in fields(self))
 
     @classmethod
     def load(cls, arm: "ArmSpecification | str | Path" = DEFAULT_ARM, **changes: Any) -> "Arm":
@@ -223,5 +231,4 @@ def _home(home: ArrayLike | None, chain: Chain) -> NDArray[np.float64]:
     clipped: NDArray[np.float64] = np.clip(given, chain.lower, chain.upper)
     if home is not None and not np.array_equal(given, clipped):
         raise ArmError(f"home {given.tolist()} lies outside the limits")
-    clipped.flags.writeable = False
     return clipped

@@ -57,7 +57,7 @@ class Chain(NamedTuple):
         placements = [model.jointPlacements[i] for i in range(1, model.njoints)]
         subspaces = np.array([_motion_subspace(model.joints[i]) for i in range(1, model.njoints)])
         prismatic = np.logical_not(np.any(subspaces[:, 3:], axis=1))
-        chain = cls(
+        return cls(
             prismatic=prismatic,
             translation=np.array([placement.translation for placement in placements]),
             rotation=np.array([_quaternion(placement.rotation) for placement in placements]),
@@ -67,9 +67,6 @@ class Chain(NamedTuple):
             upper=np.array(model.upperPositionLimit),
             speed=np.array(model.velocityLimit),
         )
-        for array in chain:
-            array.flags.writeable = False
-        return chain
 
 
 def _motion_subspace(joint: pin.JointModel) -> NDArray[np.float64]:

@@ -99,6 +99,10 @@ class ContactModel:
     body_names: tuple[str, ...]
     shapes: ContactShapes
 
+    def __post_init__(self) -> None:
+        for array in self.shapes:
+            array.flags.writeable = False
+
     @classmethod
     def build(cls, arm: Arm, scene: Scene) -> "ContactModel":
         """Place an arm in a scene and choose the pairs to test."""
@@ -312,7 +316,7 @@ def _contact_shapes(
                 continue
             ends = np.array([capsules[mover].start, capsules[mover].end])
             travel[axis, column] = point_speed(arm.chain, axis, int(link[mover]), ends)
-    arrays = ContactShapes(
+    return ContactShapes(
         link=link,
         capsules=np.array([np.hstack(capsule) for capsule in capsules]).reshape(-1, 7),
         boxes=np.array([(each.lower, each.upper) for each in scene.obstacles]).reshape(-1, 2, 3),
@@ -320,9 +324,6 @@ def _contact_shapes(
         travel=travel,
         exact=np.array([is_capsule(shape) for shape in objects], dtype=bool),
     )
-    for array in arrays:
-        array.flags.writeable = False
-    return arrays
 
 
 def _keeps_height(chain: Chain, axis: int) -> bool:

@@ -1,7 +1,7 @@
 """The world of a problem: arm and scene, and what can be asked about configurations in it."""
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import available_threads, run_rows
 from kinarm._validation import finite_array, whole_number
@@ -51,16 +51,14 @@ class World:
         """Length of an action."""
         return self.arm.n_actuated
 
-    def observe(
-        self, configurations: NDArray[np.float64], goals: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def observe(self, configurations: ArrayLike, goals: ArrayLike) -> NDArray[np.float64]:
         """Observations of configurations, whether or not they touch something.
 
         Parameters
         ----------
-        configurations : ndarray, shape (n, n_axes)
+        configurations : array_like, shape (n, n_axes)
             Axis positions [rad or m].
-        goals : ndarray, shape (n, 3)
+        goals : array_like, shape (n, 3)
             Goal positions [m].
 
         Returns
@@ -69,16 +67,14 @@ class World:
         """
         return self._begun_at(configurations, goals).observation
 
-    def distances(
-        self, configurations: NDArray[np.float64], goals: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def distances(self, configurations: ArrayLike, goals: ArrayLike) -> NDArray[np.float64]:
         """Distances from the tool to goals, as in episodes.
 
         Parameters
         ----------
-        configurations : ndarray, shape (n, n_axes)
+        configurations : array_like, shape (n, n_axes)
             Axis positions [rad or m].
-        goals : ndarray, shape (n, 3)
+        goals : array_like, shape (n, 3)
             Goal positions [m].
 
         Returns
@@ -88,14 +84,12 @@ class World:
         """
         return self._begun_at(configurations, goals).distance
 
-    def screen(
-        self, configurations: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    def screen(self, configurations: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Find tool points, and which configurations touch something.
 
         Parameters
         ----------
-        configurations : ndarray, shape (n, n_axes)
+        configurations : array_like, shape (n, n_axes)
             Axis positions [rad or m].
 
         Returns
@@ -104,36 +98,35 @@ class World:
             Tool points [m].
         touching : ndarray of bool, shape (n,)
         """
-        n = len(configurations)
+        q = finite_array("configurations", configurations, (None, self.arm.n_axes))
+        n = len(q)
         tools, proven = np.empty((n, 3)), np.empty(n, dtype=bool)
-        arrays = (self.arm.chain, self.contact_model.shapes, configurations, tools, proven)
+        arrays = (self.arm.chain, self.contact_model.shapes, q, tools, proven)
         run_rows(screen, n, n, self.threads, *arrays)
         touching = ~proven
-        touching[touching] = self.contact_model.in_contact(configurations[touching])
+        touching[touching] = self.contact_model.in_contact(q[touching])
         return tools, touching
 
-    def contact(
-        self, configuration: NDArray[np.float64], target: NDArray[np.float64]
-    ) -> Contact | None:
+    def contact(self, configuration: ArrayLike, target: ArrayLike) -> Contact | None:
         """Describe the first contact on the way of a step, or return None.
 
         Parameters
         ----------
-        configuration, target : ndarray, shape (n_axes,)
+        configuration, target : array_like, shape (n_axes,)
             Ends of the step [rad or m].
         """
-        tested = self.substeps(configuration[None], target[None])[0]
+        q = finite_array("configuration", configuration, (self.arm.n_axes,))
+        aim = finite_array("target", target, (self.arm.n_axes,))
+        tested = self.substeps(q[None], aim[None])[0]
         touching = np.flatnonzero(self.contact_model.in_contact(tested))
         return self.contact_model.contact(tested[touching[0]]) if touching.size else None
 
-    def contact_pair(
-        self, configuration: NDArray[np.float64], target: NDArray[np.float64]
-    ) -> tuple[str, str] | None:
+    def contact_pair(self, configuration: ArrayLike, target: ArrayLike) -> tuple[str, str] | None:
         """Name the first two bodies that touch on the way of a step, or None.
 
         Parameters
         ----------
-        configuration, target : ndarray, shape (n_axes,)
+        configuration, target : array_like, shape (n_axes,)
             Ends of the step [rad or m].
         """
         contact = self.contact(configuration, target)
@@ -159,16 +152,11 @@ class World:
         inner = configurations[:, None] + shares[:, None] * (targets - configurations)[:, None]
         return np.concatenate([inner, targets[:, None]], axis=1)
 
-    def _begun_at(
-        self, configurations: NDArray[np.float64], goals: NDArray[np.float64]
-    ) -> Episodes:
+    def _begun_at(self, configurations: ArrayLike, goals: ArrayLike) -> Episodes:
         """Episodes that begin at configurations, whether or not those touch something."""
-        episodes = Episodes.allocate(
-            finite_array("configurations", configurations, (None, self.arm.n_axes)),
-            finite_array("goals", goals, (len(configurations), 3)),
-            n_pairs=len(self.contact_model.shapes.pairs),
-            horizon=1,
-        )
-        arrays = (np.arange(len(configurations)), self.arm.chain, self.contact_model.shapes)
-        begin(0, len(configurations), *arrays, episodes)
+        q = finite_array("configurations", configurations, (None, self.arm.n_axes))
+        goal = finite_array("goals", goals, (len(q), 3))
+        n_pairs = len(self.contact_model.shapes.pairs)
+        episodes = Episodes.allocate(q, goal, n_pairs=n_pairs, horizon=1)
+        begin(0, len(q), np.arange(len(q)), self.arm.chain, self.contact_model.shapes, episodes)
         return episodes

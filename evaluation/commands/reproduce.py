@@ -4,7 +4,7 @@ import argparse
 import json
 import sys
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -57,7 +57,7 @@ class ReproductionRequest:
         If there are no jobs.
     """
 
-    out: Path | None = None
+    out: Path | None = field(default=None, metadata={"metavar": "DIR"})
     jobs: int | None = None
     quick: bool = False
     ppo: bool = True

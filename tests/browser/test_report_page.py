@@ -13,7 +13,6 @@ from kinarm.evaluation.report.groups import group_results
 from kinarm.evaluation.report.page import write_report
 from kinarm.evaluation.report.worst import worst_trials
 from kinarm.evaluation.trials import TrialSet
-from kinarm.simulator import Simulator
 
 pytestmark = pytest.mark.slow
 
@@ -29,8 +28,8 @@ PLAYER = "document.querySelector('#worst iframe').contentWindow.kinarm"
 def evaluations():
     """Two recipes on one task, one on another, beside the oracle."""
     made = []
-    for task, names in (("right", ("ars-tuned-right", "ppo-tuned-right")), ("both", ("zero",))):
-        trials = TrialSet.draw(Simulator(task=task), 20, seed=3)
+    for problem, names in (("right", ("ars-tuned-right", "ppo-tuned-right")), ("both", ("zero",))):
+        trials = TrialSet.draw(problem, 20, seed=3)
         oracle_bounds(trials)
         entrants = [each for name in names for each in find_entrants(name)]
         made += [run_trials(each, trials, oracle=True) for each in (*entrants, ORACLE)]
@@ -45,7 +44,7 @@ def document(evaluations):
 @pytest.fixture(scope="module")
 def chosen(document, evaluations):
     """The worst trials in the order of the rows."""
-    return [worst for task in group_results(document, evaluations) for worst in worst_trials(task)]
+    return [worst for each in group_results(document, evaluations) for worst in worst_trials(each)]
 
 
 @pytest.fixture(scope="module")
@@ -141,9 +140,9 @@ def test_a_row_chooses_the_trial(visit, chosen, settings):
     for place in (len(chosen) - 1, 2):
         page.locator(f"tr[data-replay='{place}'] th").click()
         state = page.evaluate(f"{PLAYER}.state")
-        assert (state["policy"], state["task"], state["trial"]) == (
+        assert (state["policy"], state["problem"], state["trial"]) == (
             chosen[place].evaluation.entrant.name,
-            chosen[place].evaluation.task,
+            chosen[place].evaluation.problem.name,
             chosen[place].trial,
         )
         assert page.locator("tr[aria-current]").get_attribute("data-replay") == str(place)

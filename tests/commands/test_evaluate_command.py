@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from oracle_calls import count_calls
 
+from kinarm.errors import InvalidInputError
 from kinarm.evaluation.bounds import bounds_document
-from kinarm.evaluation.commands.evaluate import build_parser, evaluate_all
+from kinarm.evaluation.commands.evaluate import EvaluationRequest
 from kinarm.evaluation.evaluation import evaluate
+from kinarm.problem import PROBLEMS
 
 FILES = {"evaluation.json", "final_distance.png", "final_distance.svg"}
 
@@ -43,7 +45,7 @@ def relative_success(row):
 
 
 def faced(document) -> list[tuple[str, str]]:
-    return [(row["policy"], row["task"]) for row in document["results"]]
+    return [(row["policy"], row["problem"]) for row in document["results"]]
 
 
 def test_json_alone_is_printed_and_equals_the_library(evaluated, policy_folder):
@@ -54,7 +56,7 @@ def test_json_alone_is_printed_and_equals_the_library(evaluated, policy_folder):
     )
     rows = json.loads(json.dumps([expected.to_json(), oracle.to_json()]))
     assert document["results"] == rows
-    entry = document["protocol"]["tasks"]["right"]
+    entry = document["protocol"]["problems"]["right"]
     assert entry["oracle"] == json.loads(json.dumps(bounds_document(expected.bounds)))
     assert entry["trial_set_hash"] == expected.trials.digest
     np.testing.assert_array_equal(entry["starts"], expected.trials.starts)
@@ -71,9 +73,10 @@ def test_few_trials_are_the_beginning_of_many(evaluated, policy_folder):
 def test_defaults(evaluated, run, policy_folder):
     document = evaluated("--policy", "zero", "--task", "left")
     protocol = document["protocol"]
-    assert (protocol["trials"], protocol["seed"], protocol["arm"]) == (200, 0, "paper")
+    assert (protocol["trials"], protocol["seed"]) == (200, 0)
+    assert protocol["problems"]["left"]["arm"] == "paper"
     assert faced(document) == [("zero", "left"), ("oracle", "left")]
-    assert len(protocol["tasks"]["left"]["oracle"]["trials"]["steps"]) == 200
+    assert len(protocol["problems"]["left"]["oracle"]["trials"]["steps"]) == 200
     assert all(relative_success(row) is not None for row in document["results"])
 
 
@@ -99,21 +102,21 @@ def test_policies_of_several_kinds_at_once(evaluated, policy_folder):
     ]
 
 
-def test_named_task_is_what_named_policies_face(evaluated, policy_folder):
+def test_named_problem_is_what_named_policies_face(evaluated, policy_folder):
     document = evaluated(
-        *("--policy", policy_folder / "lefty.npz", "--task", "both", "--task", "right"),
+        *("--policy", policy_folder / "lefty.npz", "--problem", "both", "--problem", "right"),
         *("--trials", 3, "--no-oracle"),
     )
     assert faced(document) == [("lefty", "both"), ("lefty", "right")]
 
 
-def test_matrix_is_every_policy_on_every_task(evaluated, policy_folder):
+def test_matrix_is_every_policy_on_every_problem(evaluated, policy_folder):
     document = evaluated(
         *("--policy", policy_folder / "lefty.npz", "--policy", "zero", "--trials", 3, "--matrix")
     )
-    tasks = ("left", "right", "both")
+    problems = tuple(PROBLEMS)
     assert sorted(faced(document)) == sorted(
-        (name, task) for name in ("lefty", "zero", "oracle") for task in tasks
+        (name, problem) for name in ("lefty", "zero", "oracle") for problem in problems
     )
 
 
@@ -123,8 +126,10 @@ def test_a_policy_named_twice_is_evaluated_once(evaluated, policy_folder):
     assert faced(document) == [("mine-seed0", "right")]
 
 
-def test_a_task_named_twice_is_played_once(evaluated):
-    document = evaluated("--policy", "zero", "--task", "left", "--task", "left", "--trials", 2)
+def test_a_problem_named_twice_is_played_once(evaluated):
+    document = evaluated(
+        "--policy", "zero", "--problem", "left", "--problem", "left", "--trials", 2
+    )
     assert faced(document) == [("zero", "left"), ("oracle", "left")]
 
 
@@ -158,18 +163,19 @@ def test_a_file_called_like_a_baseline_does_not_replace_it(run, policy, tmp_path
     assert answer.status == 2 or kinds == {"ars", "baseline", "oracle"}
 
 
-def test_an_arm_of_ones_choice(evaluated, policy_folder):
+def test_a_policy_brings_its_own_arm(evaluated, policy_folder):
     arguments = ("--policy", policy_folder / "flange.npz", "--trials", 3)
-    document = evaluated(*arguments, "--arm", "paper_flange")
-    assert document["protocol"]["arm"] == "paper_flange"
+    document = evaluated(*arguments)
+    assert document["protocol"]["problems"]["right"]["arm"] == "paper_flange"
     assert faced(document) == [("flange", "right"), ("oracle", "right")]
 
 
 def test_another_arm_when_asked_for(evaluated, policy_folder):
     document = evaluated(
-        *("--policy", policy_folder / "flange.npz", "--trials", 3, "--allow-other-arm")
+        *("--policy", policy_folder / "flange.npz", "--trials", 3, "--allow-other-arm"),
+        *("--arm", "paper"),
     )
-    assert document["protocol"]["arm"] == "paper"
+    assert document["protocol"]["problems"]["right"]["arm"] == "paper"
     assert faced(document) == [("flange", "right"), ("oracle", "right")]
 
 
@@ -205,10 +211,15 @@ def test_folder_is_created_and_filled(run, policy_folder, tmp_path):
     assert json.loads((out / "evaluation.json").read_text()) == json.loads(answer.out)
 
 
-def test_earlier_results_are_replaced(run, tmp_path):
+def test_earlier_results_are_replaced_when_asked_for(run, tmp_path):
     (tmp_path / "evaluation.json").write_text("old")
     (tmp_path / "notes.txt").write_text("mine")
-    run("kinarm-eval", "--policy", "zero", "--task", "left", "--trials", 2, "--out", tmp_path)
+    arguments = ("--policy", "zero", "--problem", "left", "--trials", 2, "--out", tmp_path)
+    refused = run("kinarm-eval", *arguments)
+    assert refused.status == 2
+    assert "evaluation.json' exists: --overwrite replaces it" in refused.err
+    assert (tmp_path / "evaluation.json").read_text() == "old"
+    run("kinarm-eval", *arguments, "--overwrite")
     assert json.loads((tmp_path / "evaluation.json").read_text())["protocol"]["trials"] == 2
     assert (tmp_path / "notes.txt").read_text() == "mine"
 
@@ -235,7 +246,7 @@ def test_report_and_results_share_a_folder(run, tmp_path):
 
 def test_report_is_the_same_from_every_process(run, run_outside, policy_folder, tmp_path):
     arguments = ("--policy", policy_folder / "mine-seed0.npz", "--trials", 9)
-    arguments = (*arguments, "--report", tmp_path / "report")
+    arguments = (*arguments, "--report", tmp_path / "report", "--overwrite")
     pages = []
     for call in (run, run_outside):
         assert call("kinarm-eval", *arguments).status == 0
@@ -252,7 +263,7 @@ def test_files_are_the_same_from_every_process(run, run_outside, policy_folder, 
         assert (one / name).read_bytes() == (other / name).read_bytes(), name
     first, second = (json.loads((path / "evaluation.json").read_text()) for path in (one, other))
     assert first["results"] == second["results"]
-    assert first["protocol"]["tasks"] == second["protocol"]["tasks"]
+    assert first["protocol"]["problems"] == second["protocol"]["problems"]
     assert first["protocol"]["versions"] == second["protocol"]["versions"]
 
 
@@ -264,12 +275,12 @@ def test_without_policies_all_fitting_ones_and_the_baselines_take_part(evaluated
 def test_the_oracle_alone(evaluated):
     document = evaluated("--policy", "oracle", "--task", "right", "--trials", 5)
     (row,) = document["results"]
-    assert (row["policy"], row["algorithm"], row["task"]) == ("oracle", "oracle", "right")
+    assert (row["policy"], row["algorithm"], row["problem"]) == ("oracle", "oracle", "right")
     assert (row["trained_on"], row["training_seed"]) == (None, None)
     figures = {name: entry["value"] for name, entry in row["metrics"].items()}
     assert (figures["success"], figures["collision"]) == (1, 0)
     assert relative_success(row) == 1
-    bounds = document["protocol"]["tasks"]["right"]["oracle"]
+    bounds = document["protocol"]["problems"]["right"]["oracle"]
     assert row["outcomes"]["steps"] == bounds["trials"]["steps"]
     assert row["outcomes"]["final_distance"] == bounds["trials"]["final_distance"]
 
@@ -278,7 +289,7 @@ def test_the_oracle_lists_what_it_cannot_solve(evaluated):
     arguments = ("--policy", "oracle", "--task", "right", "--arm", "paper_flange", "--seed", 2)
     document = evaluated(*arguments, "--trials", 12)
     (row,) = document["results"]
-    bounds = document["protocol"]["tasks"]["right"]["oracle"]
+    bounds = document["protocol"]["problems"]["right"]["oracle"]
     solved = row["outcomes"]["outcome"].count("success")
     success = row["metrics"]["success"]["value"]
     assert 0 < success == bounds["success"]["value"] == solved / 12 < 1
@@ -296,8 +307,8 @@ def test_the_oracle_lists_what_it_cannot_solve(evaluated):
         (["zero"], ["left", "right", "both"]),
         (["zero", "oracle"], ["left", "right", "both"]),
         (["oracle"], ["left", "right", "both"]),
-        (["oracle", "oracle", "--task", "left", "--task", "left"], ["left"]),
-        (["zero", "oracle", "--task", "both", "--task", "left"], ["both", "left"]),
+        (["oracle", "oracle", "--problem", "left", "--problem", "left"], ["left"]),
+        (["zero", "oracle", "--problem", "both", "--problem", "left"], ["both", "left"]),
         (["oracle", "zero", "--matrix"], ["left", "right", "both"]),
     ],
 )
@@ -308,7 +319,7 @@ def test_the_oracle_faces_every_task_in_play_once(evaluated, arguments, tasks):
     others = [word for word in arguments if word not in ("zero", "oracle")]
     document = evaluated(*words, *others, "--trials", 2)
     assert [task for name, task in faced(document) if name == "oracle"] == tasks
-    assert list(document["protocol"]["tasks"]) == tasks
+    assert list(document["protocol"]["problems"]) == tasks
 
 
 def test_the_oracle_joins_those_who_are_entered_by_default(evaluated):
@@ -322,7 +333,7 @@ def test_the_oracle_joins_those_who_are_entered_by_default(evaluated):
 def test_without_the_oracle_nothing_is_solved(evaluated, solved, empty_cache):
     document = evaluated("--policy", "zero", "--trials", 2, "--no-oracle")
     assert faced(document) == [("zero", task) for task in ("left", "right", "both")]
-    assert all(entry["oracle"] is None for entry in document["protocol"]["tasks"].values())
+    assert all(entry["oracle"] is None for entry in document["protocol"]["problems"].values())
     assert all(relative_success(row) is None for row in document["results"])
     assert solved == []
     assert not empty_cache.exists()
@@ -332,7 +343,7 @@ def test_the_oracle_may_be_named_and_its_bounds_left_out(evaluated):
     document = evaluated("--policy", "oracle", "--task", "left", "--trials", 2, "--no-oracle")
     (row,) = document["results"]
     assert (row["metrics"]["success"]["value"], relative_success(row)) == (1, None)
-    assert document["protocol"]["tasks"]["left"]["oracle"] is None
+    assert document["protocol"]["problems"]["left"]["oracle"] is None
 
 
 def test_trials_are_solved_once_and_then_looked_up(evaluated, solved, empty_cache):
@@ -362,9 +373,12 @@ def test_a_cache_that_cannot_be_used_is_done_without(evaluated, tmp_path, monkey
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--policy", "zero", "--policy", "flange.npz"], ["'paper_flange'", "'paper'"]),
-        (["--policy", "flange.npz", "--task", "right"], ["'paper_flange'", "'paper'"]),
-        (["--policy", "flange.npz", "--matrix"], ["'paper_flange'", "'paper'"]),
+        (
+            ["--policy", "lefty.npz", "--policy", "flange.npz", "--matrix"],
+            ["called 'right'", "arm"],
+        ),
+        (["--policy", "flange.npz", "--problem", "right"], ["'paper_flange'", "'paper'"]),
+        (["--policy", "flange.npz", "--problem", "left"], ["'paper_flange'", "'paper'"]),
         (["--policy", "lefty.npz", "--arm", "paper_flange"], ["'paper_flange'", "'paper'"]),
         (["--policy", "zero", "--task", "left", "--out", "lefty.npz"], ["lefty.npz"]),
         (["--policy", "zero", "--task", "left", "--report", "lefty.npz"], ["lefty.npz"]),
@@ -415,10 +429,54 @@ def test_histograms_leave_out_the_oracle_unless_it_is_alone(run, policy_folder, 
 
 def test_what_is_being_done_is_told(empty_cache):
     told = []
-    options = build_parser().parse_args(["--policy", "zero", "--task", "right", "--trials", "3"])
-    evaluate_all(options, told.append)
-    evaluate_all(options, told.append)
+    request = EvaluationRequest(policies=("zero",), problem="right", trials=3)
+    request.evaluate(told.append)
+    request.evaluate(told.append)
     solving, *evaluating = told
     assert "right" in solving
     assert "3 of 3 trials solved" in solving
     assert evaluating == ["evaluating on right"] * 2
+
+
+def test_the_request_does_as_the_command_does(evaluated, policy_folder, tmp_path):
+    path = str(policy_folder / "mine-seed0.npz")
+    request = EvaluationRequest(policies=(path,), trials=4, tolerance=0.1, out=tmp_path)
+    document = json.loads(json.dumps(request.run()))
+    printed = evaluated("--policy", path, "--trials", 4, "--tolerance", 0.1)
+    assert document["results"] == printed["results"]
+    assert json.loads((tmp_path / "evaluation.json").read_text()) == document
+    assert "EvaluationRequest(" in document["protocol"]["command"]
+
+
+@pytest.mark.parametrize("settings", [{"trials": 0}, {"seed": -1}, {"trials": 2.5}])
+def test_bad_numbers_are_refused_where_the_request_is_made(settings):
+    with pytest.raises(InvalidInputError, match="whole number"):
+        EvaluationRequest(**settings)
+
+
+def test_changes_apply_to_what_policies_were_trained_for(policy_folder):
+    files = tuple(str(policy_folder / f"{name}.npz") for name in ("lefty", "mine-seed0"))
+    request = EvaluationRequest(policies=(*files, "zero"), tolerance=0.2, oracle=False)
+    faced = [(entrant.name, problem) for entrant, problem in request.pairs()]
+    assert [(name, problem.name) for name, problem in faced] == [
+        ("lefty", "left"),
+        ("zero", "left"),
+        ("mine-seed0", "right"),
+        ("zero", "right"),
+    ]
+    for _, problem in faced:
+        assert problem.digest == PROBLEMS[problem.name].replace(tolerance=0.2).digest
+
+
+def test_a_problem_file(evaluated, policy_folder, tmp_path):
+    PROBLEMS["right"].replace(name="lax", tolerance=0.3).save(tmp_path / "lax.toml")
+    document = evaluated(
+        *("--policy", policy_folder / "mine-seed0.npz", "--problem", tmp_path / "lax.toml"),
+        *("--problem", "right", "--trials", 3),
+    )
+    assert set(faced(document)) == {
+        (name, problem) for name in ("mine-seed0", "oracle") for problem in ("lax", "right")
+    }
+    entries = document["protocol"]["problems"]
+    assert entries["lax"]["problem"]["task"]["tolerance"] == 0.3
+    assert entries["lax"]["starts"] == entries["right"]["starts"]

@@ -13,8 +13,8 @@ PROGRAMS = {
     "kinarm-eval": "kinarm.evaluation.commands.evaluate",
     "kinarm-replay": "kinarm.evaluation.commands.replay",
     "kinarm-train": "kinarm.policies.train",
-    "kinarm-bench": "kinarm.evaluation.bench",
-    "kinarm-reproduce": "kinarm.evaluation.reproduce",
+    "kinarm-bench": "kinarm.evaluation.commands.bench",
+    "kinarm-reproduce": "kinarm.evaluation.commands.reproduce",
 }
 HEAVY = ("torch", "numba", "matplotlib", "pinocchio", "coal", "scipy", "stable_baselines3")
 

@@ -11,14 +11,15 @@ from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.entrants import BASELINES, Entrant
 from kinarm.evaluation.evaluation import Evaluation, run_trials
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies import Policy, ars_recipe, train_ars
-from kinarm.simulator import Simulator
+from kinarm.policies import Policy, recipe, train_policy
 
 
 @pytest.fixture(scope="session")
 def skilled() -> Policy:
     """A policy for ``right`` that succeeds, collides and times out, each in some trials."""
-    return train_ars(ars_recipe("tuned", task="right", seed=1, iterations=800, episodes=1)).policy
+    return train_policy(
+        recipe("ars", "tuned", problem="right", seed=1, iterations=800, episodes=1)
+    ).policy
 
 
 @pytest.fixture(scope="session")
@@ -26,15 +27,15 @@ def train_novice() -> Callable[..., Policy]:
     """Train a policy for a few iterations only."""
 
     @cache
-    def train(task: str = "right", seed: int = 0, recipe: str = "tuned") -> Policy:
-        return train_ars(ars_recipe(recipe, task=task, seed=seed, iterations=4)).policy
+    def train(problem: str = "right", seed: int = 0, named: str = "tuned") -> Policy:
+        return train_policy(recipe("ars", named, problem=problem, seed=seed, iterations=4)).policy
 
     return train
 
 
 @pytest.fixture(scope="session")
 def trials() -> TrialSet:
-    return TrialSet.draw(Simulator(task="right"), 60, seed=5)
+    return TrialSet.draw("right", 60, seed=5)
 
 
 @pytest.fixture(scope="session")
@@ -47,7 +48,7 @@ def evaluations(
     skilled: Policy, train_novice: Callable[..., Policy], trials: TrialSet
 ) -> list[Evaluation]:
     """Three training seeds of a recipe and a baseline on ``right``; one policy on ``left``."""
-    left = TrialSet.draw(Simulator(task="left"), 40, seed=5)
+    left = TrialSet.draw("left", 40, seed=5)
     made = {"made-right-seed0": train_novice("right", 0), "made-right-seed1": skilled}
     made["made-right-seed2"] = train_novice("right", 2)
     return [

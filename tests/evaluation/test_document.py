@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.bounds import bounds_document
 from kinarm.evaluation.document import EvaluationDocument, evaluation_document
@@ -15,6 +14,7 @@ from kinarm.evaluation.entrants import ORACLE, Entrant
 from kinarm.evaluation.evaluation import evaluate, run_trials
 from kinarm.evaluation.metrics import METRICS, Metric
 from kinarm.evaluation.table import print_table
+from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.reference import ReferenceSimulator
 from kinarm.simulator import Simulator
 
@@ -22,7 +22,7 @@ RESULT_FIELDS = {
     "policy": str,
     "algorithm": str,
     "recipe": str,
-    "task": str,
+    "problem": str,
     "trials": int,
     "metrics": dict,
 }
@@ -37,7 +37,7 @@ def document(request):
 @pytest.fixture(scope="module")
 def bounded_document(bounded_evaluations):
     """With a row for the oracle, too."""
-    trial_sets = {each.task: each.trials for each in bounded_evaluations}
+    trial_sets = {each.problem.name: each.trials for each in bounded_evaluations}
     oracle = [run_trials(ORACLE, trials, oracle=True) for trials in trial_sets.values()]
     return evaluation_document([*bounded_evaluations, *oracle], "kinarm-eval")
 
@@ -73,7 +73,7 @@ def test_document_has_protocol_and_results_at_the_top(document):
 
 
 def test_results_are_one_per_policy_and_task(document):
-    assert [(row["policy"], row["task"]) for row in document["results"]] == [
+    assert [(row["policy"], row["problem"]) for row in document["results"]] == [
         ("made-right-seed0", "right"),
         ("made-right-seed1", "right"),
         ("made-right-seed2", "right"),
@@ -97,18 +97,20 @@ def test_every_result_has_every_field(document):
 def test_protocol_tells_how_it_was_done(document, evaluations):
     protocol = document["protocol"]
     assert protocol["command"] == "kinarm-eval --matrix"
-    assert (protocol["seed"], protocol["arm"]) == (5, "paper")
-    assert protocol["arm_digest"] == Arm.load().digest
+    assert protocol["seed"] == 5
     assert {"python", "numpy", "numba", "pin", "coal", "kinarm"} <= set(protocol["versions"])
     assert isinstance(protocol["commit"], str)
-    assert set(protocol["tasks"]) == {"right", "left"}
-    assert protocol["tasks"]["right"]["trial_set_hash"] == evaluations[0].trials.digest
-    assert protocol["tasks"]["left"]["trial_set_hash"] == evaluations[-1].trials.digest
+    assert set(protocol["problems"]) == {"right", "left"}
+    for evaluation in evaluations:
+        entry, problem = protocol["problems"][evaluation.problem.name], evaluation.problem
+        assert entry["trial_set_hash"] == evaluation.trials.digest
+        assert (entry["arm"], entry["digest"]) == ("paper", problem.digest)
+        assert ReachProblem.from_json(entry["problem"]) == problem.pinned
 
 
 def test_every_trial_of_every_result_is_listed(document):
     for row in document["results"]:
-        entry, outcomes = document["protocol"]["tasks"][row["task"]], row["outcomes"]
+        entry, outcomes = document["protocol"]["problems"][row["problem"]], row["outcomes"]
         lengths = {len(column) for column in (entry["starts"], entry["goals"], *outcomes.values())}
         assert lengths == {row["trials"]}
         assert {"final_distance", "steps", "outcome", "contact"} <= set(outcomes)
@@ -123,8 +125,8 @@ def test_every_trial_of_every_result_is_listed(document):
 def test_listed_trials_can_be_simulated_again(document, skilled):
     """By the reference path, from nothing but the numbers in the document."""
     document = json.loads(json.dumps(document))
-    entry, row = document["protocol"]["tasks"]["right"], document["results"][1]
-    reference = ReferenceSimulator(Simulator(document["protocol"]["arm"], "right"))
+    entry, row = document["protocol"]["problems"]["right"], document["results"][1]
+    reference = ReferenceSimulator(Simulator(ReachProblem.from_json(entry["problem"])))
     for i in range(row["trials"]):
         start, goal = np.array(entry["starts"][i]), np.array(entry["goals"][i])
         episode = reference.rollout(skilled, start, goal)
@@ -141,12 +143,12 @@ def test_training_seeds_are_recorded(document):
 def test_table_has_a_column_per_figure(document):
     headings = list(shown(document)[0])
     figures = ("success", "over seeds", "0.1", "0.2", "median", "mean", "p95", "contact", "steps")
-    for name in ("task", "policy", *figures, "of oracle", "step ratio"):
+    for name in ("problem", "policy", *figures, "of oracle", "step ratio"):
         assert any(name in heading for heading in headings), name
 
 
 def test_table_has_a_row_per_recipe_and_baseline(document):
-    rows = [(row["task"], row["policy"]) for row in shown(document)]
+    rows = [(row["problem"], row["policy"]) for row in shown(document)]
     assert sorted(rows) == [("left", "made-left-seed0"), ("right", "made-right"), ("right", "zero")]
 
 
@@ -176,24 +178,24 @@ def test_results_stand_beside_the_oracle(bounded_document, bounded_evaluations):
 
 
 def test_protocol_tells_the_bounds_of_its_tasks(bounded_document, bounded_evaluations):
-    tasks = bounded_document["protocol"]["tasks"]
+    entries = bounded_document["protocol"]["problems"]
     for evaluation in bounded_evaluations:
         expected = json.loads(json.dumps(bounds_document(evaluation.bounds)))
-        assert tasks[evaluation.task]["oracle"] == expected
-        column = tasks[evaluation.task]["oracle"]["trials"]["steps_lower_bound"]
-        assert len(column) == len(tasks[evaluation.task]["starts"])
+        assert entries[evaluation.problem.name]["oracle"] == expected
+        column = entries[evaluation.problem.name]["oracle"]["trials"]["steps_lower_bound"]
+        assert len(column) == len(entries[evaluation.problem.name]["starts"])
 
 
 def test_without_bounds_there_are_none(evaluations):
     document = evaluation_document(evaluations, "")
-    assert all(entry["oracle"] is None for entry in document["protocol"]["tasks"].values())
+    assert all(entry["oracle"] is None for entry in document["protocol"]["problems"].values())
     for row in (*document["results"], *document["pooled"]):
         assert row["metrics"]["relative_success"]["value"] is None
     assert {row["of oracle %"] + row["step ratio"] for row in shown(document)} == {""}
 
 
 def test_table_shows_the_bounds(bounded_document):
-    rows = {(row["task"], row["policy"]): row for row in shown(bounded_document)}
+    rows = {(row["problem"], row["policy"]): row for row in shown(bounded_document)}
     pooled = bounded_document["pooled"][0]["metrics"]
     row = rows["right", "made-right"]
     assert row["of oracle %"] == f"{100 * pooled['relative_success']['value']:.1f}"
@@ -207,7 +209,7 @@ def test_table_shows_the_bounds(bounded_document):
 
 def test_table_has_one_row_a_task_for_the_oracle(bounded_document):
     rows = [row for row in shown(bounded_document) if row["policy"] == "oracle"]
-    assert [(row["task"], row["of oracle %"]) for row in rows] == [
+    assert [(row["problem"], row["of oracle %"]) for row in rows] == [
         ("right", "100.0"),
         ("left", "100.0"),
     ]
@@ -218,7 +220,7 @@ def test_table_has_one_row_a_task_for_the_oracle(bounded_document):
 def test_table_is_sorted_by_success(document):
     rows = (*document["results"], *document["pooled"])
     rates = {row["policy"]: row["metrics"]["success"]["value"] for row in rows}
-    right = [rates[row["policy"]] for row in shown(document) if row["task"] == "right"]
+    right = [rates[row["policy"]] for row in shown(document) if row["problem"] == "right"]
     assert right == sorted(right, reverse=True)
     assert right[0] > right[-1]
 
@@ -232,7 +234,7 @@ def test_table_keeps_a_policy_beside_a_group_of_its_recipe(evaluations, skilled,
 
 def test_table_works_for_a_single_trial(skilled):
     document = evaluation_document([evaluate(skilled, trials=1)], "")
-    assert [row["task"] for row in shown(document)] == ["right"]
+    assert [row["problem"] for row in shown(document)] == ["right"]
 
 
 @pytest.mark.parametrize("width", [80, 100, 120, 160])
@@ -240,7 +242,7 @@ def test_a_narrow_table_has_fewer_columns_but_whole_figures(document, width):
     text = printed(document, width)
     assert "…" not in text
     assert max(map(len, text.splitlines())) <= width
-    for name in ("task", "policy", "success", "median", "made-right", "made-left-seed0"):
+    for name in ("problem", "policy", "success", "median", "made-right", "made-left-seed0"):
         assert name in text
 
 
@@ -298,7 +300,7 @@ def stored(evaluations, tmp_path):
 
 def test_a_document_is_read_as_it_was_written(stored, evaluations):
     document = EvaluationDocument.load(stored())
-    trials = document.trials("right", Arm.load())
+    trials = document.trials("right")
     assert trials.digest == evaluations[0].trials.digest
     assert document.result("made-right", None)["policy"] == "made-right-seed0"
 
@@ -308,10 +310,9 @@ def test_a_document_is_read_as_it_was_written(stored, evaluations):
     [
         (lambda d: d.pop("results"), "it lacks 'results'"),
         (lambda d: d["protocol"].pop("seed"), "protocol lacks 'seed'"),
-        (lambda d: d["protocol"]["tasks"]["left"].pop("goals"), "task 'left' lacks 'goals'"),
-        (lambda d: d["protocol"]["tasks"]["left"].update(horizon="64"), "task 'left'.*'horizon'"),
-        (lambda d: d["protocol"]["tasks"]["left"]["goals"].append([1]), "goals of 'left'"),
-        (lambda d: d["results"][2].update(task="up"), "result 2 is of the unknown task 'up'"),
+        (lambda d: d["protocol"]["problems"]["left"].pop("goals"), "problem 'left' lacks 'goals'"),
+        (lambda d: d["protocol"]["problems"]["left"]["goals"].append([1]), "goals of 'left'"),
+        (lambda d: d["results"][2].update(problem="up"), "result 2 is of the unknown problem 'up'"),
         (lambda d: d["results"][1]["outcomes"]["steps"].pop(), "result 1 .* different lengths"),
         (lambda d: d["results"].insert(0, 3), "result 0 is no object"),
         (lambda d: d["protocol"].update(format_version=9), "format version 9; this kinarm reads"),
@@ -320,3 +321,23 @@ def test_a_document_is_read_as_it_was_written(stored, evaluations):
 def test_a_damaged_document_is_refused_with_the_place(stored, change, words):
     with pytest.raises(InvalidInputError, match=rf"evaluation\.json' .*{words}"):
         EvaluationDocument.load(stored(change))
+
+
+def test_a_problem_that_has_changed_is_refused(stored):
+    """By its hash, or by what is wrong with it."""
+
+    def changed(**task):
+        return stored(lambda d: d["protocol"]["problems"]["left"]["problem"]["task"].update(task))
+
+    with pytest.raises(InvalidInputError, match="do not match their hash"):
+        EvaluationDocument.load(changed(tolerance=0.2)).trials("left")
+    with pytest.raises(InvalidInputError, match=r"problem left: task.horizon must be a whole"):
+        EvaluationDocument.load(changed(horizon="64")).trials("left")
+
+
+def test_two_problems_of_one_name_are_refused(skilled):
+    both = [evaluate(skilled, trials=2, tolerance=tolerance) for tolerance in (0.05, 0.1)]
+    with pytest.raises(InvalidInputError, match=r"called 'right': .* task.tolerance is 0.1, not"):
+        evaluation_document(both, "")
+    named = evaluate(skilled, PROBLEMS["right"].replace(name="lax", tolerance=0.1), trials=2)
+    assert len(evaluation_document([both[0], named], "")["protocol"]["problems"]) == 2

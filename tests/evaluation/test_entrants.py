@@ -1,28 +1,31 @@
 """Who takes part: names, groups, files and baselines."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from kinarm.arm import Arm
-from kinarm.errors import PolicyFileError, UnknownNameError
+from kinarm.errors import InvalidInputError, PolicyFileError, UnknownNameError
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.entrants import (
     BASELINES,
     ORACLE,
     Entrant,
+    check_names,
     find_entrants,
     shipped_entrants,
 )
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies import policy_names
-from kinarm.simulator import Simulator
+from kinarm.problem import PROBLEMS
 
 
 @pytest.mark.parametrize("name", ["random", "zero"])
 def test_baselines_by_name(name):
     (entrant,) = find_entrants(name)
     assert entrant is BASELINES[name]
-    assert (entrant.algorithm, entrant.trained_on, entrant.policy) == ("baseline", None, None)
+    assert (entrant.algorithm, entrant.problem, entrant.policy) == ("baseline", None, None)
 
 
 def test_a_file_is_named_after_itself(skilled, tmp_path):
@@ -30,7 +33,7 @@ def test_a_file_is_named_after_itself(skilled, tmp_path):
     (entrant,) = find_entrants(tmp_path / "mine-seed4.npz")
     assert (entrant.name, entrant.group) == ("mine-seed4", "mine")
     assert (entrant.algorithm, entrant.recipe) == ("ars", "tuned*")
-    assert (entrant.trained_on, entrant.seed) == ("right", 1)
+    assert (entrant.problem.name, entrant.seed) == ("right", 1)
     np.testing.assert_array_equal(entrant.policy.layers[0].weights, skilled.layers[0].weights)
 
 
@@ -63,28 +66,23 @@ def test_functions_enter_under_their_own_name():
         return np.zeros((len(observations), 5))
 
     entrant = Entrant.from_function("careful", careful)
-    assert (entrant.name, entrant.group, entrant.trained_on) == ("careful", "careful", None)
+    assert (entrant.name, entrant.group, entrant.problem) == ("careful", "careful", None)
 
 
 def test_baselines_close_the_list_of_all_entrants():
-    names = [entrant.name for entrant in shipped_entrants(Arm.load())]
+    names = [entrant.name for entrant in shipped_entrants()]
     assert names[-2:] == ["random", "zero"]
     assert names[:-2] == list(policy_names())
-
-
-def test_policies_for_another_arm_are_not_entered():
-    entrants = shipped_entrants(Arm.load("paper_flange"))
-    assert [entrant.name for entrant in entrants] == ["random", "zero"]
 
 
 def test_the_oracle_by_name():
     (entrant,) = find_entrants("oracle")
     assert entrant is ORACLE
-    assert (entrant.algorithm, entrant.trained_on, entrant.policy) == ("oracle", None, None)
+    assert (entrant.algorithm, entrant.problem, entrant.policy) == ("oracle", None, None)
 
 
 def test_the_oracle_replays_what_it_found():
-    trials = TrialSet.draw(Simulator("paper_flange", "right"), 12, seed=2)
+    trials = TrialSet.draw(PROBLEMS["right"].replace(arm="paper_flange"), 12, seed=2)
     rollouts, bounds = ORACLE.run(trials), oracle_bounds(trials)
     assert 0 < bounds.reachable.sum() < 12
     np.testing.assert_array_equal(rollouts.success, bounds.reachable)
@@ -111,3 +109,15 @@ def test_a_policy_for_another_arm_is_told(skilled):
 def test_what_is_not_trained_fits_every_arm(shipped_arms, entrant):
     for arm in shipped_arms.values():
         entrant.check(arm)
+
+
+def test_names_have_to_tell_entrants_and_problems_apart(skilled):
+    right, lax = PROBLEMS["right"], PROBLEMS["right"].replace(tolerance=0.2)
+    mine = Entrant.from_policy("mine", skilled)
+    check_names([(mine, right), (ORACLE, right), (mine, PROBLEMS["left"])])
+    with pytest.raises(InvalidInputError, match=r"'right': .*task.tolerance is 0.2, not"):
+        check_names([(mine, right), (ORACLE, lax)])
+    with pytest.raises(InvalidInputError, match="two policies are called 'mine'"):
+        check_names([(mine, right), (mine, right)])
+    with pytest.raises(InvalidInputError, match="needs no file and elsewhere"):
+        check_names([(mine, right), (replace(mine, source="elsewhere"), lax.replace(name="lax"))])

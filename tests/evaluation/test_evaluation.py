@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 
 from kinarm.arm import Arm
-from kinarm.errors import InvalidInputError, PolicyFileError, SceneError, UnknownNameError
+from kinarm.errors import InvalidInputError, PolicyFileError, UnknownNameError
 from kinarm.evaluation.entrants import BASELINES, ORACLE, Entrant, find_entrants
 from kinarm.evaluation.evaluation import evaluate, pool, run_trials
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle import Oracle
+from kinarm.problem import PROBLEMS
 from kinarm.reference import ReferenceSimulator
-from kinarm.scene import Bench, Scene
-from kinarm.simulator import Simulator
-from kinarm.task import load_task
+from kinarm.scene import GoalRegion, Scene
 
 IMPORT_PUBLIC_NAMES = """
 import types
@@ -44,7 +43,7 @@ def test_public_names_are_what_they_say():
 
 def test_every_outcome_occurs(skilled_evaluation):
     """The fixture is worth something: what follows sees every way in which a trial can end."""
-    assert set(skilled_evaluation.outcomes) == {"success", "collision", "horizon"}
+    assert set(skilled_evaluation.outcomes) == {"success", "collision", "truncated"}
 
 
 def test_episodes_are_those_of_the_reference(skilled, skilled_evaluation):
@@ -54,7 +53,7 @@ def test_episodes_are_those_of_the_reference(skilled, skilled_evaluation):
         episode = reference.rollout(skilled, trials.starts[i], trials.goals[i])
         assert rollouts.distance[i] == pytest.approx(episode.distance, abs=1e-9)
         assert rollouts.steps[i] == len(episode.rewards)
-        expected = "success" if episode.success else "collision" if episode.contact else "horizon"
+        expected = "success" if episode.success else "collision" if episode.contact else "truncated"
         assert skilled_evaluation.outcomes[i] == expected
         assert skilled_evaluation.contacts[i] == episode.contact
 
@@ -94,7 +93,7 @@ def test_attributes_agree_with_the_document(skilled_evaluation):
         estimate = getattr(skilled_evaluation, name)
         assert document["metrics"][name] == estimate.to_json()
         assert skilled_evaluation.metrics[name] == estimate
-    assert document["task"] == skilled_evaluation.task == "right"
+    assert document["problem"] == skilled_evaluation.problem.name == "right"
 
 
 def test_contact_pairs_name_bodies(skilled_evaluation):
@@ -110,7 +109,7 @@ def test_the_still_baseline_never_moves():
     evaluation = evaluate("zero", "both", trials=30, seed=2)
     rollouts, arm = evaluation.rollouts, Arm.load()
     np.testing.assert_array_equal(rollouts.configurations, evaluation.trials.starts)
-    assert set(evaluation.outcomes) == {"horizon"}
+    assert set(evaluation.outcomes) == {"truncated"}
     assert (rollouts.steps == 64).all()
     tools = np.array([arm.tool_position(start) for start in evaluation.trials.starts])
     expected = np.linalg.norm(tools - evaluation.trials.goals, axis=1)
@@ -142,15 +141,15 @@ def test_every_entrant_faces_the_same_trials(skilled):
 
 
 def test_trials_are_those_of_the_trial_set(skilled):
-    expected = TrialSet.draw(Simulator(task="right"), 8, 3)
+    expected = TrialSet.draw("right", 8, 3)
     rollouts = evaluate(skilled, trials=8, seed=3).rollouts
     np.testing.assert_array_equal(rollouts.starts, expected.starts)
     np.testing.assert_array_equal(rollouts.goals, expected.goals)
 
 
-def test_a_policy_faces_its_own_task_by_default(train_novice):
-    assert evaluate(train_novice("left"), trials=2).task == "left"
-    assert evaluate(train_novice("left"), "right", trials=2).task == "right"
+def test_a_policy_faces_its_own_problem_by_default(train_novice):
+    assert evaluate(train_novice("left"), trials=2).problem.name == "left"
+    assert evaluate(train_novice("left"), "right", trials=2).problem.name == "right"
 
 
 def test_a_policy_file_does_as_the_policy_does(skilled, tmp_path):
@@ -191,13 +190,10 @@ def test_an_entrant_can_be_put_to_the_trials_directly(skilled):
     assert evaluate(entrant, trials=2).entrant is entrant
 
 
-def test_a_task_of_ones_own(skilled):
-    strict, lax = (
-        evaluate(skilled, load_task("right", tolerance=tolerance), trials=40)
-        for tolerance in (0.02, 0.2)
-    )
+def test_a_problem_of_ones_own(skilled):
+    strict, lax = (evaluate(skilled, tolerance=tolerance, trials=40) for tolerance in (0.02, 0.2))
     assert strict.success.value < lax.success.value
-    assert lax.trials.simulator.task.tolerance == 0.2
+    assert lax.problem.task.tolerance == 0.2
 
 
 def test_a_policy_for_another_arm_is_refused_unless_allowed(skilled):
@@ -208,15 +204,15 @@ def test_a_policy_for_another_arm_is_refused_unless_allowed(skilled):
 
 
 def test_run_trials_refuses_another_arm_too(skilled):
-    trials = TrialSet.draw(Simulator("lrmate200ic_5l"), 2, 0)
+    trials = TrialSet.draw(PROBLEMS["right"].replace(arm="lrmate200ic_5l"), 2, 0)
     with pytest.raises(PolicyFileError, match="trained for arm"):
         run_trials(Entrant.from_policy("mine", skilled), trials)
     assert len(run_trials(Entrant.from_policy("mine", skilled), trials, True).rollouts) == 2
 
 
 def test_run_trials_on_a_scene_of_ones_own():
-    scene = Scene(benches=(Bench(name="right", x=(0.2, 0.6), y=(-0.8, -0.5), height=0.1),))
-    trials = TrialSet.draw(Simulator(task="right", scene=scene), 5, 0)
+    region = GoalRegion(name="right", lower=(0.2, -0.8, 0.125), upper=(0.6, -0.5, 0.125))
+    trials = TrialSet.draw(PROBLEMS["right"].replace(scene=Scene(goal_regions=(region,))), 5, 0)
     evaluation = run_trials(BASELINES["zero"], trials)
     np.testing.assert_allclose(evaluation.trials.goals[:, 2], 0.125, atol=1e-12)
 
@@ -224,8 +220,8 @@ def test_run_trials_on_a_scene_of_ones_own():
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [
-        ({"task": None}, InvalidInputError, "was not trained on a task"),
-        ({"task": "upwards"}, UnknownNameError, "available: left, right, both"),
+        ({"problem": None}, InvalidInputError, "was not trained for a problem"),
+        ({"problem": "upwards"}, UnknownNameError, "available: left, right, both"),
         ({"policy": "nobody"}, UnknownNameError, "unknown policy 'nobody'"),
         ({"policy": "nobody.npz"}, PolicyFileError, "cannot read"),
         ({"arm": "nobody"}, UnknownNameError, "available: lrmate200ic_5l, paper, paper_flange"),
@@ -235,27 +231,21 @@ def test_run_trials_on_a_scene_of_ones_own():
 )
 def test_bad_arguments_are_refused(arguments, error, message):
     with pytest.raises(error, match=message):
-        evaluate(**{"policy": "zero", "task": "right", "trials": 2, **arguments})
+        evaluate(**{"policy": "zero", "problem": "right", "trials": 2, **arguments})
 
 
-def test_a_task_on_a_missing_bench_is_refused():
-    simulator_scene = Scene(benches=(Bench(name="far", x=(5, 6), y=(5, 6), height=1),))
-    with pytest.raises((SceneError, UnknownNameError), match="available: far"):
-        Simulator(task="right", scene=simulator_scene)
-
-
-def test_pooling_gathers_training_seeds_of_a_task(evaluations):
+def test_pooling_gathers_training_seeds_of_a_problem(evaluations):
     (pooled,) = pool(evaluations)
-    assert (pooled.name, pooled.task, len(pooled.members)) == ("made-right", "right", 3)
+    assert (pooled.name, pooled.problem.name, len(pooled.members)) == ("made-right", "right", 3)
     assert [member.entrant.name for member in pooled.members] == [
         f"made-right-seed{seed}" for seed in (0, 1, 2)
     ]
 
 
-def test_pooling_keeps_tasks_apart(skilled):
+def test_pooling_keeps_problems_apart(skilled):
     entrants = [Entrant.from_policy(f"mine-seed{seed}", skilled) for seed in (0, 1)]
     made = [evaluate(e, task, trials=2) for e in entrants for task in ("left", "right")]
-    assert [(p.name, p.task, len(p.members)) for p in pool(made)] == [
+    assert [(p.name, p.problem.name, len(p.members)) for p in pool(made)] == [
         ("mine", "left", 2),
         ("mine", "right", 2),
     ]
@@ -309,7 +299,7 @@ def test_pooled_training_seeds_are_told(evaluations):
 
 def test_step_ratio_is_that_of_the_trials_that_succeeded(bounded):
     rollouts, starts, goals = bounded.rollouts, bounded.trials.starts, bounded.trials.goals
-    solutions = Oracle(task="right").solve_batch(starts, goals)
+    solutions = Oracle("right").solve_batch(starts, goals)
     expected = [
         rollouts.steps[trial] / solution.steps_lower_bound
         for trial, solution in enumerate(solutions)
@@ -338,7 +328,7 @@ def test_a_policy_that_never_succeeds_has_no_step_ratio():
 
 @pytest.mark.parametrize("name", ["oracle", "zero"])
 def test_where_the_oracle_reaches_nothing_there_is_nothing_to_compare_with(name):
-    evaluation = evaluate(name, load_task("right", horizon=1), trials=4, oracle=True)
+    evaluation = evaluate(name, "right", horizon=1, trials=4, oracle=True)
     assert not evaluation.bounds.reachable.any()
     assert oracle_figures(evaluation) == [None, None, None]
 
@@ -364,8 +354,8 @@ def test_the_oracle_changes_nothing_but_the_bounds(skilled_evaluation, bounded):
 
 
 def test_the_oracle_evaluated_by_name():
-    evaluation = evaluate("oracle", task="right", trials=5, seed=5, oracle=True)
-    expected = Oracle(task="right").solve_batch(evaluation.trials.starts, evaluation.trials.goals)
+    evaluation = evaluate("oracle", "right", trials=5, seed=5, oracle=True)
+    expected = Oracle("right").solve_batch(evaluation.trials.starts, evaluation.trials.goals)
     np.testing.assert_array_equal(evaluation.bounds.paths, expected.paths)
     np.testing.assert_array_equal(evaluation.rollouts.steps, expected.steps)
     np.testing.assert_array_equal(evaluation.rollouts.distance, expected.final_distance)
@@ -376,13 +366,13 @@ def test_the_oracle_evaluated_by_name():
 
 
 def test_the_oracle_evaluated_without_bounds():
-    evaluation = evaluate("oracle", task="right", trials=5, seed=5)
+    evaluation = evaluate("oracle", "right", trials=5, seed=5)
     assert evaluation.success.value == 1
     assert evaluation.bounds is None
 
 
-def test_the_oracle_has_no_task_of_its_own():
-    with pytest.raises(InvalidInputError, match="'oracle' was not trained on a task"):
+def test_the_oracle_has_no_problem_of_its_own():
+    with pytest.raises(InvalidInputError, match="'oracle' was not trained for a problem"):
         evaluate("oracle", trials=1)
 
 
@@ -416,7 +406,7 @@ def test_trials_are_solved_once_for_all_who_face_them(skilled, monkeypatch):
     monkeypatch.setattr(
         Oracle, "solve_batch", lambda *args, **kw: calls.append(1) or solve(*args, **kw)
     )
-    trials = TrialSet.draw(Simulator(task="right"), 3, seed=77)
+    trials = TrialSet.draw("right", 3, seed=77)
     for entrant in (Entrant.from_policy("mine", skilled), ORACLE, BASELINES["zero"]):
         run_trials(entrant, trials, oracle=True)
     assert len(calls) == 1
@@ -447,7 +437,7 @@ def test_pooled_figures_without_bounds_have_none(evaluations):
 
 
 def test_texts_of_evaluations_are_one_readable_line(evaluations, trials):
-    assert repr(trials) == f"TrialSet(60 trials of right, arm paper, seed 5: {trials.digest})"
+    assert repr(trials) == "TrialSet(60 trials of right, seed 5)"
     assert repr(evaluations[3]).startswith("Evaluation(zero on 60 trials of right, success 0 (0..")
     (pooled,) = pool(evaluations)
     assert repr(pooled).startswith("PooledEvaluation(3 seeds of made-right on 60 trials of right,")

@@ -8,8 +8,7 @@ from kinarm.evaluation.entrants import BASELINES, Entrant
 from kinarm.evaluation.evaluation import run_trials
 from kinarm.evaluation.figures import distance_histograms, save_figure
 from kinarm.evaluation.trials import TrialSet
-from kinarm.simulator import Simulator
-from kinarm.task import TASKS
+from kinarm.problem import PROBLEMS
 
 SVG_BEGINNING = b'<?xml version="1.0"'
 PNG_BEGINNING = b"\x89PNG\r\n\x1a\n"
@@ -28,7 +27,7 @@ def legend(axes) -> list[str]:
     return [text.get_text() for text in axes.get_legend().get_texts()]
 
 
-def test_a_panel_per_task(figure):
+def test_a_panel_per_problem(figure):
     titles = [axes.get_title() for axes in figure.axes]
     assert len(titles) == 2
     assert "right" in titles[0]
@@ -121,12 +120,12 @@ def test_groups_of_a_panel_can_be_told_apart(trials, train_novice):
 
 def test_every_line_of_a_matrix_has_a_look_of_its_own(train_novice):
     policies = {
-        f"ars-{recipe}-{task}-seed0": train_novice(task, recipe=recipe)
-        for recipe in ("paper", "tuned")
-        for task in TASKS
+        f"ars-{named}-{problem}-seed0": train_novice(problem, named=named)
+        for named in ("paper", "tuned")
+        for problem in PROBLEMS
     }
     entrants = [Entrant.from_policy(*item) for item in policies.items()] + [*BASELINES.values()]
-    trial_sets = [TrialSet.draw(Simulator(task=task), 4, seed=0) for task in TASKS]
+    trial_sets = [TrialSet.draw(name, 4, seed=0) for name in PROBLEMS]
     matrix = [run_trials(entrant, trials) for trials in trial_sets for entrant in entrants]
     for axes in distance_histograms(matrix).axes:
         assert len(set(legend(axes))) == len(entrants)

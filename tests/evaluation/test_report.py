@@ -29,7 +29,7 @@ PIXEL = 0.051
 @pytest.fixture(scope="module")
 def faced(bounded_evaluations):
     """Several policies, seeds and tasks, the baseline and the oracle."""
-    trial_sets = {each.task: each.trials for each in bounded_evaluations}
+    trial_sets = {each.problem.name: each.trials for each in bounded_evaluations}
     oracle = [run_trials(ORACLE, trials, oracle=True) for trials in trial_sets.values()]
     return [*bounded_evaluations, *oracle]
 
@@ -92,7 +92,7 @@ def wilson(hits: int, trials: int) -> tuple[float, float]:
 
 class TestTable:
     def test_rows_are_those_of_the_table_in_its_order(self, page, document):
-        for task in document["protocol"]["tasks"]:
+        for task in document["protocol"]["problems"]:
             names = [text_of(row.find("th")) for row in rows_of(page, task)]
             assert names == [row["policy"] for row in table_rows(document, task)]
 
@@ -133,7 +133,7 @@ class TestTable:
         assert 'data-label="oracle"' not in page
 
     def test_the_best_of_each_task_stand_at_the_top(self, page, document):
-        for task in document["protocol"]["tasks"]:
+        for task in document["protocol"]["problems"]:
             row = next(r for r in table_rows(document, task) if r["algorithm"] == "ars")
             card = re.search(rf'<a href="#{task}" class="card">.*?</a>', page, re.DOTALL)[0]
             assert f">{100 * row['metrics']['success']['value']:.1f}<" in card
@@ -230,7 +230,7 @@ class TestMap:
     def test_markers_lie_at_the_goals(self, right):
         group = right.contenders[0]
         drawn = drawn_map(right, group)
-        view = maps.View.of(right.benches)
+        view = maps.View.of(right.goal_regions)
         goals = group.members[0].trials.goals
         markers = {}
         for marker in drawn.findall("path"):
@@ -271,27 +271,36 @@ class TestMap:
             outcomes = [member.outcomes[trial] for member in group.members]
             assert fate.reached == outcomes.count("success")
             assert fate.distance == pytest.approx(group.distances[:, trial].mean())
-            worst = next(o for o in ("collision", "horizon", "success") if o in outcomes)
+            worst = next(o for o in ("collision", "truncated", "success") if o in outcomes)
             assert fate.outcome == worst
 
-    def test_bench_and_base_are_to_scale(self, right):
+    def test_regions_obstacles_and_base_are_to_scale(self, right):
         drawn = drawn_map(right, right.contenders[0])
-        (bench,), view = right.benches, maps.View.of(right.benches)
-        rect, base = drawn.find("rect"), drawn.find("circle")
-        assert float(rect.get("width")) == pytest.approx((bench.y[1] - bench.y[0]) * maps.SCALE)
-        assert float(rect.get("height")) == pytest.approx((bench.x[1] - bench.x[0]) * maps.SCALE)
-        assert float(rect.get("x")) == pytest.approx((view.y[1] - bench.y[1]) * maps.SCALE)
+        (region,), view = right.goal_regions, maps.View.of(right.goal_regions)
+        rects, base = drawn.findall("rect"), drawn.find("circle")
+        assert [rect.find("title").text for rect in rects] == [
+            "obstacle: right bench",
+            "region: right",
+        ]
+        rect = rects[1]
+        assert float(rect.get("width")) == pytest.approx(
+            (region.upper[1] - region.lower[1]) * maps.SCALE
+        )
+        assert float(rect.get("height")) == pytest.approx(
+            (region.upper[0] - region.lower[0]) * maps.SCALE
+        )
+        assert float(rect.get("x")) == pytest.approx((view.y[1] - region.upper[1]) * maps.SCALE)
         # The right bench lies to the right of the base.
         assert float(rect.get("x")) > float(base.get("cx"))
         assert float(base.get("cx")) == pytest.approx(view.y[1] * maps.SCALE)
         assert float(base.get("cy")) == pytest.approx(view.x[1] * maps.SCALE)
 
     def test_failures_are_counted_where_they_happen(self, right):
-        group, (bench,) = right.contenders[0], right.benches
+        group, (region,) = right.contenders[0], right.goal_regions
         goals = group.members[0].trials.goals
-        width = (bench.x[1] - bench.x[0]) / maps.SLICES
-        for place, ((low, high), share) in enumerate(maps.failure_shares(group, bench)):
-            assert (low, high) == pytest.approx((bench.x[0] + place * width, low + width))
+        width = (region.upper[0] - region.lower[0]) / maps.SLICES
+        for place, ((low, high), share) in enumerate(maps.failure_shares(group, region)):
+            assert (low, high) == pytest.approx((region.lower[0] + place * width, low + width))
             inside = (low <= goals[:, 0]) & (goals[:, 0] < low + width)
             failed = [not o for m in group.members for o in m.rollouts.success[inside]]
             assert share == (pytest.approx(np.mean(failed)) if failed else None)
@@ -339,9 +348,9 @@ class TestWorst:
         assert [row.get("data-replay") for row in rows] == [str(n) for n in range(len(chosen))]
         for recording, worst in zip(record_worst(chosen), chosen, strict=True):
             _, evaluation, trial = worst
-            assert (recording.policy, recording.task, recording.trial) == (
+            assert (recording.policy, recording.problem.name, recording.trial) == (
                 evaluation.entrant.name,
-                evaluation.task,
+                evaluation.problem.name,
                 trial,
             )
             assert recording.final_distance == evaluation.rollouts.distance[trial]
@@ -360,8 +369,8 @@ class TestPage:
         told = text_of(content(page).find(".//section[@id='method']"))
         protocol = document["protocol"]
         assert protocol["command"] in told
-        assert protocol["arm_digest"] in told
-        for entry in protocol["tasks"].values():
+        assert protocol["problems"]["right"]["digest"] in told
+        for entry in protocol["problems"].values():
             assert entry["trial_set_hash"] in told
         for package, version in protocol["versions"].items():
             assert f"{package} {version}" in told
@@ -442,7 +451,7 @@ class TestPage:
 
     def test_policies_of_one_name_are_refused(self, skilled_evaluation):
         twice = [skilled_evaluation, skilled_evaluation]
-        with pytest.raises(InvalidInputError, match="a name of its own"):
+        with pytest.raises(InvalidInputError, match="two policies are called 'skilled'"):
             report_page(evaluation_document(twice, ""), twice)
 
     def test_a_single_policy_is_the_title(self, skilled_evaluation):

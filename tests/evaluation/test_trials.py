@@ -6,21 +6,20 @@ import sys
 import numpy as np
 import pytest
 
-from kinarm.errors import InvalidInputError, SceneError
+from kinarm.errors import InvalidInputError, ProblemError
 from kinarm.evaluation.trials import TrialSet, trial_generator
-from kinarm.scene import Bench, Scene
+from kinarm.problem import PROBLEMS
+from kinarm.scene import PAPER_BENCHES, Obstacle, Scene
 from kinarm.simulator import Simulator
-from kinarm.task import RewardWeights, load_task
 
 PRINT_DIGEST = """
 from kinarm.evaluation import TrialSet
-from kinarm.simulator import Simulator
-print(TrialSet.draw(Simulator(task="both"), 7, seed=3).digest)
+print(TrialSet.draw("both", 7, seed=3).digest)
 """
 
 
-def draw(task="both", trials=7, seed=3, arm="paper", **settings):
-    return TrialSet.draw(Simulator(arm, load_task(task, **settings)), trials, seed)
+def draw(problem="both", trials=7, seed=3, **overrides):
+    return TrialSet.draw(PROBLEMS[problem].replace(**overrides), trials, seed)
 
 
 def same(one: TrialSet, other: TrialSet) -> bool:
@@ -31,21 +30,26 @@ def test_equal_arguments_give_equal_trials():
     assert same(draw(), draw())
 
 
-def test_other_randomness_and_threads_do_not_matter():
+def test_other_randomness_does_not_matter():
     expected = draw()
     np.random.default_rng().random(10)
-    alone = TrialSet.draw(Simulator(task="both", threads=1), 7, 3)
-    used = Simulator(task="both", threads=2)
-    used.sample(np.random.default_rng(8), 5)
-    assert same(expected, alone)
-    assert same(expected, TrialSet.draw(used, 7, 3))
+    Simulator("both", threads=1).sample(np.random.default_rng(8), 5)
+    assert same(expected, draw())
+
+
+def test_a_problem_by_name_file_or_object(tmp_path):
+    PROBLEMS["both"].save(tmp_path / "mine.toml")
+    for problem in ("both", tmp_path / "mine.toml", PROBLEMS["both"]):
+        trials = TrialSet.draw(problem, 7, seed=3)
+        assert same(trials, draw())
+        assert trials.digest == draw().digest
 
 
 def test_rewards_and_horizon_do_not_move_the_trials():
-    assert same(draw(), draw(horizon=9, reward=RewardWeights(success=4)))
+    assert same(draw(), draw(horizon=9, reward={"success": 4}))
 
 
-@pytest.mark.parametrize("other", [{"seed": 4}, {"task": "left"}])
+@pytest.mark.parametrize("other", [{"seed": 4}, {"problem": "left"}])
 def test_other_arguments_give_other_trials(other):
     assert not same(draw(), draw(**other))
 
@@ -78,14 +82,14 @@ def test_starts_are_legal(arm):
     assert (loaded.lower <= trials.starts).all()
     assert (trials.starts <= loaded.upper).all()
     assert (trials.starts[:, loaded.n_actuated :] == 0).all()
-    assert not trials.simulator.contact_model.in_contact(trials.starts).any()
+    assert not trials.simulator.world.contact_model.in_contact(trials.starts).any()
     tools = np.array([loaded.tool_position(start) for start in trials.starts])
     assert (np.linalg.norm(tools - trials.goals, axis=1) > 0.05).all()
 
 
-@pytest.mark.parametrize(("task", "side"), [("right", -1), ("left", 1)])
-def test_goals_lie_on_the_bench_of_the_task(task, side):
-    x, y, z = draw(task, trials=100).goals.T
+@pytest.mark.parametrize(("problem", "side"), [("right", -1), ("left", 1)])
+def test_goals_lie_in_the_region_of_the_task(problem, side):
+    x, y, z = draw(problem, trials=100).goals.T
     assert (np.abs(x) <= 0.5).all()
     assert ((side * y >= 0.55) & (side * y <= 0.75)).all()
     np.testing.assert_allclose(z, 0.325, atol=1e-12)
@@ -93,7 +97,7 @@ def test_goals_lie_on_the_bench_of_the_task(task, side):
     assert x.max() > 0.4
 
 
-def test_task_both_draws_both_sides_about_equally_often():
+def test_both_draws_both_sides_about_equally_often():
     right = int((draw("both", trials=200, seed=0).goals[:, 1] < 0).sum())
     assert abs(right - 100) < 4 * np.sqrt(200 / 4)
 
@@ -124,11 +128,12 @@ def test_digest_is_the_same_in_every_process():
     "other",
     [
         {"seed": 4},
-        {"task": "left"},
+        {"problem": "left"},
         {"arm": "lrmate200ic_5l"},
         {"trials": 8},
         {"tolerance": 0.04},
         {"horizon": 65},
+        {"reward": {"success": 4}},
     ],
 )
 def test_digest_tells_different_trials_apart(other):
@@ -136,15 +141,14 @@ def test_digest_tells_different_trials_apart(other):
 
 
 def test_digest_depends_on_obstacles_that_the_starts_do_not_show():
-    far = Bench(name="far", x=(5, 6), y=(5, 6), height=1)
-    scene = Scene(benches=(*Scene().benches, far))
-    other = TrialSet.draw(Simulator(task="both", scene=scene), 7, 3)
+    far = Obstacle(name="far", lower=(5, 5, 0), upper=(6, 6, 1))
+    other = draw(scene=Scene(obstacles=(*PAPER_BENCHES, far)))
     assert same(draw(), other)
     assert draw().digest != other.digest
 
 
-def test_digest_does_not_depend_on_the_reward():
-    assert draw().digest == draw(reward=RewardWeights(success=4)).digest
+def test_digest_does_not_depend_on_the_name():
+    assert draw().digest == draw(name="mine").digest
 
 
 @pytest.mark.parametrize(("trials", "seed"), [(0, 0), (-1, 0), (1, -1)])
@@ -154,7 +158,6 @@ def test_numbers_out_of_range_are_refused(trials, seed):
 
 
 def test_a_scene_without_free_starts_is_refused():
-    block = Bench(name="right", x=(-2, 2), y=(-2, 2), height=2)
-    simulator = Simulator(task="right", scene=Scene(benches=(block,)))
-    with pytest.raises(SceneError, match=r"no contact-free start .* touches"):
-        TrialSet.draw(simulator, 1, 0)
+    block = Obstacle(name="block", lower=(-2, -2, 0), upper=(2, 2, 2))
+    with pytest.raises(ProblemError, match=r"no contact-free start .* touches"):
+        draw("right", scene=Scene(obstacles=(block,)))

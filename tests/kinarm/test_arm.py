@@ -1,5 +1,6 @@
 """The shipped arms, robots from URDF, and what is refused."""
 
+import copy
 import pickle
 
 import coal
@@ -151,10 +152,16 @@ def test_tool_position_refuses_a_bad_configuration(shipped_arms, bad):
 
 def test_arm_pickles(shipped_arms):
     arm = shipped_arms["paper"]
-    copy = pickle.loads(pickle.dumps(arm))
-    assert copy.digest == arm.digest
+    other = pickle.loads(pickle.dumps(arm))
+    assert (other.digest, other.specification) == (arm.digest, arm.specification)
     q = np.linspace(-1, 1, 6)
-    np.testing.assert_array_equal(copy.tool_position(q), arm.tool_position(q))
+    np.testing.assert_array_equal(other.tool_position(q), arm.tool_position(q))
+
+
+@pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda arm: pickle.loads(pickle.dumps(arm))])
+def test_copies_are_read_only_too(shipped_arms, duplicate):
+    arm = duplicate(shipped_arms["paper"])
+    assert not any(array.flags.writeable for array in (*arm.chain, arm.home))
 
 
 class TestDigest:

@@ -303,7 +303,7 @@ class TestFile:
 
 
 class TestRoundTrip:
-    @settings(max_examples=150)
+    @settings(max_examples=80)
     @given(problems())
     def test_json_and_toml_are_without_loss(self, problem):
         text = json.dumps(problem.to_json())

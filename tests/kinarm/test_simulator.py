@@ -3,6 +3,7 @@
 import copy
 import math
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,8 +11,11 @@ from simulators import changed
 
 from kinarm.episodes import COLLISION, RUNNING
 from kinarm.errors import InvalidInputError, StartInContactError, UnknownNameError
-from kinarm.networks import Networks
+from kinarm.kernels.rollout import advance, begin, screen
+from kinarm.networks import Mirror, Networks
+from kinarm.observation import observation_signs
 from kinarm.reference import ReferenceSimulator
+from kinarm.scene import Scene
 from kinarm.simulator import Simulator
 from kinarm.task import REWARD_TERMS
 
@@ -408,6 +412,29 @@ def test_coal_is_asked_only_where_freedom_is_not_proven(simulator):
     assert idle.judged == 0
     idle.rollout_actions(np.tile([0.0, 1, 0, 0, 0], (1, 64, 1)), HOME, FAR_GOAL)
     assert 0 < idle.judged < 4 * 64
+
+
+def test_kernels_are_compiled_once_for_all(simulators, scenarios):
+    """Whatever the arm and the policy, and for copies, too."""
+    mirror = Mirror(observation_signs(6), np.ones(5))
+    for array in mirror:
+        array.flags.writeable = False
+    simulator = simulators["paper"]
+    networks = linear_policies(simulator, 1, 26)
+    simulator.rollout(networks, *scenarios)
+    kernels = (advance, begin, screen)
+    before = [len(kernel.signatures) for kernel in kernels]
+    for policy in (networks, replace(networks, mirror=mirror), in_numpy(networks)):
+        simulator.rollout(policy, *scenarios)
+    for other in (pickle.loads(pickle.dumps(simulator)), copy.deepcopy(simulator)):
+        other.rollout(networks, *scenarios)
+    for name, other in simulators.items():
+        starts, goals = other.sample(np.random.default_rng(0), 5)
+        other.rollout(linear_policies(other, 1, 27), starts, goals, record=name == "mesh")
+    bare = changed(simulator, scene=Scene(obstacles=(), ground=False))
+    bare.rollout(networks, HOME, FAR_GOAL)
+    simulator.world.screen(np.asfortranarray(scenarios[0]))
+    assert [len(kernel.signatures) for kernel in kernels] == before
 
 
 def test_rollouts_know_their_length(simulator, scenarios):

@@ -55,6 +55,9 @@ class TestObserve:
             with pytest.raises(InvalidInputError, match=message):
                 ask(configurations, goals)
 
+        with pytest.raises(InvalidInputError, match="configurations must"):
+            simulator.world.screen(configurations[:, :5])
+
     def test_touching_configurations_are_observed_like_others(self, simulator):
         seen = simulator.world.observe(FALLING[None], np.ones((1, 3)))
         np.testing.assert_allclose(seen[0, 3:6], 1 - simulator.arm.tool_position(FALLING))
@@ -67,6 +70,14 @@ class TestObserve:
 
 
 class TestContact:
+    @pytest.mark.parametrize("end", [np.zeros(5), np.full(6, np.nan), 0.0])
+    def test_bad_ends(self, simulator, end):
+        for ask in (simulator.world.contact, simulator.world.contact_pair):
+            with pytest.raises(InvalidInputError, match="target must"):
+                ask(np.zeros(6), end)
+            with pytest.raises(InvalidInputError, match="configuration must"):
+                ask(end, np.zeros(6))
+
     def test_none_where_nothing_touches(self, simulator):
         assert simulator.world.contact(np.zeros(6), np.full(6, 0.01)) is None
         assert simulator.world.contact_pair(np.zeros(6), np.full(6, 0.01)) is None

@@ -264,7 +264,7 @@ class TestBadFile:
     def refused(self, path, message):
         with pytest.raises(PolicyFileError, match=message) as caught:
             Policy.load(path)
-        gc.collect()  # a file left open is reported here, not in a later test
+        gc.collect(1)  # a file left open is reported here, not in a later test
         assert path.name in str(caught.value)
         assert "\n" not in str(caught.value)
 

@@ -51,6 +51,18 @@ class TestCarryOut:
             rollouts = trials.simulator.rollout(policy, trials.starts, trials.goals)
             np.testing.assert_allclose(run.snapshot_distance[row], rollouts.distance, atol=1e-6)
 
+    def test_the_last_snapshot_of_a_symmetric_training_is_its_policy(self, tmp_path):
+        """Statistics of the mirror images are part of it."""
+        config = recipe("ars", "tuned", problem="both", iterations=3)
+        training = Training(purpose="ars", config=config)
+        carry_out(training, PROTOCOL, tmp_path, threads=1)
+        store = RunStore(tmp_path, PROTOCOL)
+        policy = Policy.load(store.policy_path(training))
+        trials = TrialSet.draw(PROBLEMS["both"], 5, seed=1)
+        last = trials.simulator.rollout(policy, trials.starts, trials.goals).distance
+        found = store.load(training).snapshot_distance[-1]
+        np.testing.assert_array_equal(found, last.astype(np.float32))
+
     def test_wall_time_grows(self, store):
         times = store.load(TRAINING).wall_time
         assert times[0] > 0
