@@ -132,11 +132,11 @@ def observation_table(n_joints: int) -> str:
             f"`{part.name}`",
             part.meaning,
             part.unit,
-            " ".join("+" if sign > 0 else "−" for sign in part.signs),
+            f"`{' '.join(f'{sign:+d}'[0] for sign in part.signs)}`",
         ]
         for part in OBSERVATION
     ]
-    return markdown(["index", "part", "meaning", "unit", "signs under y → −y"], rows)
+    return markdown(["index", "part", "meaning", "unit", "signs in the mirror"], rows)
 
 
 def recipe_table(recipes: Mapping[str, object]) -> str:
