@@ -102,8 +102,12 @@ def problems_table() -> str:
     """The paper's problems, and their environments."""
     environments = {problem: name for name, problem in ENVIRONMENTS.items()}
     rows = [
-        [f"`{name}`", f"task {number}", " and ".join(problem.task.goal_regions)]
-        + [f"`{environments[name]}`"]
+        [
+            f"`{name}`",
+            f"task {number}",
+            " and ".join(problem.task.goal_regions),
+            f"`{environments[name]}`",
+        ]
         for number, (name, problem) in enumerate(PROBLEMS.items(), start=1)
     ]
     return markdown(["problem", "in the paper", "goal regions", "environment"], rows)

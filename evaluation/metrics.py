@@ -116,7 +116,8 @@ class Metric:
     spread_heading : str
         Heading of a column for its range over training seeds, if there is to be one.
     priority : float
-        Where space is scarce, columns of low priority are left out first; those of infinite priority never.
+        Where space is scarce, columns of low priority are left out first; those of infinite
+        priority never.
     """
 
     meaning: str
