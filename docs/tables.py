@@ -102,8 +102,12 @@ def problems_table() -> str:
     """The paper's problems, and their environments."""
     environments = {problem: name for name, problem in ENVIRONMENTS.items()}
     rows = [
-        [f"`{name}`", f"task {number}", " and ".join(problem.task.goal_regions)]
-        + [f"`{environments[name]}`"]
+        [
+            f"`{name}`",
+            f"task {number}",
+            " and ".join(problem.task.goal_regions),
+            f"`{environments[name]}`",
+        ]
         for number, (name, problem) in enumerate(PROBLEMS.items(), start=1)
     ]
     return markdown(["problem", "in the paper", "goal regions", "environment"], rows)
@@ -128,11 +132,11 @@ def observation_table(n_joints: int) -> str:
             f"`{part.name}`",
             part.meaning,
             part.unit,
-            " ".join("+" if sign > 0 else "−" for sign in part.signs),
+            f"`{' '.join(f'{sign:+d}'[0] for sign in part.signs)}`",
         ]
         for part in OBSERVATION
     ]
-    return markdown(["index", "part", "meaning", "unit", "signs under y → −y"], rows)
+    return markdown(["index", "part", "meaning", "unit", "signs in the mirror"], rows)
 
 
 def recipe_table(recipes: Mapping[str, object]) -> str:

@@ -89,7 +89,7 @@ def _load(path: Path, trials: TrialSet) -> OracleSolutions | None:
     simulator, n = trials.simulator, len(trials)
     expected = {
         "actions": (n, simulator.task.horizon, simulator.n_actions),
-        "paths": (n, simulator.task.horizon + 1, simulator.arm.n_axes),
+        "paths": (n, simulator.task.horizon + 1, simulator.arm.n_joints),
     }
     fits = (array.shape == expected.get(name, (n,)) for name, array in solutions.arrays().items())
     if not all(fits):

@@ -83,7 +83,7 @@ class Entrant:
         if not allow_other_arm:
             self.policy.check_arm(arm)
         widths = (self.policy.n_observations, self.policy.n_actions)
-        expected = (observation_size(arm.n_axes), arm.n_actuated)
+        expected = (observation_size(arm.n_joints), arm.n_actuated)
         if widths != expected:
             raise PolicyFileError(
                 "policy {!r} maps {} observations to {} actions; arm {!r} has {} and {}".format(

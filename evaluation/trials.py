@@ -40,7 +40,7 @@ class TrialSet:
         What they are faced in.
     seed : int
         Seed of the set.
-    starts : ndarray, shape (n, n_axes)
+    starts : ndarray, shape (n, n_joints)
         Start configurations [rad or m].
     goals : ndarray, shape (n, 3)
         Goal positions [m].

@@ -1,4 +1,4 @@
-"""Robot arms: a Pinocchio model with tool, limits, rated speeds and collision shapes."""
+"""Robot arms: a Pinocchio model with tool, limits and collision shapes."""
 
 import hashlib
 from dataclasses import dataclass, fields, replace
@@ -38,8 +38,8 @@ class Arm:
     geometry : pinocchio.GeometryModel
         Collision shapes: primitives, or convex hulls of meshes; no collision pairs.
     n_actuated : int
-        Axes that actions move: the first ``n_actuated`` ones; the others stay at `home`.
-    home : ndarray, shape (n_axes,)
+        Joints that actions move: the first ``n_actuated`` ones; the others stay at `home`.
+    home : ndarray, shape (n_joints,)
         Reference configuration [rad or m].
     chain : Chain
         The kinematics as flat arrays, for the compiled simulator.
@@ -118,27 +118,27 @@ class Arm:
         return self.specification.tool_frame
 
     @property
-    def n_axes(self) -> int:
+    def n_joints(self) -> int:
         """Number of joints."""
-        return self.chain.n_axes
+        return self.chain.n_joints
 
     @property
     def lower(self) -> NDArray[np.float64]:
-        """Lower limits of the axes, shape (n_axes,) [rad or m]."""
+        """Lower limits of the joints, shape (n_joints,) [rad or m]."""
         return self.chain.lower
 
     @property
     def upper(self) -> NDArray[np.float64]:
-        """Upper limits of the axes, shape (n_axes,) [rad or m]."""
+        """Upper limits of the joints, shape (n_joints,) [rad or m]."""
         return self.chain.upper
 
     @property
-    def speed(self) -> NDArray[np.float64]:
-        """Rated speeds of the axes, shape (n_axes,) [rad/s or m/s]."""
-        return self.chain.speed
+    def velocity_limits(self) -> NDArray[np.float64]:
+        """Velocity limits of the joints, shape (n_joints,) [rad/s or m/s]."""
+        return self.chain.velocity_limits
 
     @property
-    def axis_names(self) -> tuple[str, ...]:
+    def joint_names(self) -> tuple[str, ...]:
         """Names of the joints, from the base to the tool."""
         return tuple(self.model.names)[1:]
 
@@ -169,15 +169,15 @@ class Arm:
 
         Parameters
         ----------
-        configuration : array_like, shape (n_axes,)
-            Axis positions [rad or m].
+        configuration : array_like, shape (n_joints,)
+            Joint positions [rad or m].
 
         Returns
         -------
         ndarray, shape (3,)
             Tool point in the world frame [m].
         """
-        q = finite_array("configuration", configuration, (self.n_axes,))
+        q = finite_array("configuration", configuration, (self.n_joints,))
         data = self.model.createData()
         pin.framesForwardKinematics(self.model, data, q)
         return np.array(
@@ -185,25 +185,25 @@ class Arm:
         )
 
     def __repr__(self) -> str:
-        return f"Arm({self.name!r}, {self.n_axes} axes, {self.n_actuated} actuated)"
+        return f"Arm({self.name!r}, {self.n_joints} axes, {self.n_actuated} actuated)"
 
 
 def _trailing_idle_axes(model: pin.Model, chain: Chain) -> int:
-    """Count the axes at the end of the chain that pass through the tool point."""
+    """Count the joints at the end of the chain that pass through the tool point."""
     point = chain.tool
-    for idle, joint in enumerate(reversed(range(chain.n_axes))):
+    for idle, joint in enumerate(reversed(range(chain.n_joints))):
         offset = np.linalg.norm(np.cross(chain.axis[joint], point))
         if chain.prismatic[joint] or offset > 1e-9:
             return idle
         point = model.jointPlacements[joint + 1].act(point)
-    return chain.n_axes
+    return chain.n_joints
 
 
 def _n_actuated(specification: ArmSpecification, model: pin.Model, chain: Chain, path: Path) -> int:
     """How many joints actions move: those named, which come first, or all that move the tool."""
     names, named = list(model.names)[1:], specification.actuated
     if named is None:
-        n_actuated = chain.n_axes - _trailing_idle_axes(model, chain)
+        n_actuated = chain.n_joints - _trailing_idle_axes(model, chain)
         if n_actuated == 0:
             raise ArmError(
                 f"no joint of {path.name} moves the tool frame {specification.tool_frame!r}"
@@ -227,7 +227,9 @@ def _velocity_limits(given: tuple[float, ...], model: pin.Model, path: Path) -> 
 
 def _home(home: ArrayLike | None, chain: Chain) -> NDArray[np.float64]:
     """Check a home configuration, or take zero clipped to the limits."""
-    given = finite_array("home", np.zeros(chain.n_axes) if home is None else home, (chain.n_axes,))
+    given = finite_array(
+        "home", np.zeros(chain.n_joints) if home is None else home, (chain.n_joints,)
+    )
     clipped: NDArray[np.float64] = np.clip(given, chain.lower, chain.upper)
     if home is not None and not np.array_equal(given, clipped):
         raise ArmError(f"home {given.tolist()} lies outside the limits")

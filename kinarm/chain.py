@@ -24,8 +24,8 @@ class Chain(NamedTuple):
         Tool point in the last joint frame [m].
     lower, upper : ndarray, shape (n,)
         Limits [rad or m].
-    speed : ndarray, shape (n,)
-        Rated speeds [rad/s or m/s].
+    velocity_limits : ndarray, shape (n,)
+        Velocity limits [rad/s or m/s].
     """
 
     prismatic: NDArray[np.bool_]
@@ -35,10 +35,10 @@ class Chain(NamedTuple):
     tool: NDArray[np.float64]
     lower: NDArray[np.float64]
     upper: NDArray[np.float64]
-    speed: NDArray[np.float64]
+    velocity_limits: NDArray[np.float64]
 
     @property
-    def n_axes(self) -> int:
+    def n_joints(self) -> int:
         """Number of joints."""
         return len(self.lower)
 
@@ -65,7 +65,7 @@ class Chain(NamedTuple):
             tool=np.array(frame.placement.translation),
             lower=np.array(model.lowerPositionLimit),
             upper=np.array(model.upperPositionLimit),
-            speed=np.array(model.velocityLimit),
+            velocity_limits=np.array(model.velocityLimit),
         )
 
 

@@ -26,7 +26,7 @@ BETWEEN_CAPSULES, WITH_BOX, WITH_GROUND = range(3)
 """Kinds of pairs in `ContactShapes.pairs`."""
 
 MOUNT_SAMPLES = 721
-"""Positions of the first axis at which the mounting is tested."""
+"""Positions of the first joint at which the mounting is tested."""
 
 
 class ContactShapes(NamedTuple):
@@ -44,7 +44,7 @@ class ContactShapes(NamedTuple):
     pairs : ndarray of int, shape (n_pairs, 3)
         Kind of the pair, index of a shape, and index of the other shape or box.
     travel : ndarray, shape (n_actuated, n_pairs)
-        Bound on how far an axis moves the two bodies of a pair relative to each other
+        Bound on how far a joint moves the two bodies of a pair relative to each other
         [m/rad, or m/m].
     exact : ndarray of bool, shape (n_shapes,)
         Whether the capsule is the shape, rather than encloses it.
@@ -63,8 +63,8 @@ class Contact(NamedTuple):
 
     Attributes
     ----------
-    configuration : ndarray, shape (n_axes,)
-        Axis positions at which they do [rad or m].
+    configuration : ndarray, shape (n_joints,)
+        Joint positions at which they do [rad or m].
     pair : tuple of str
         Their names.
     point : ndarray, shape (3,)
@@ -150,8 +150,8 @@ class ContactModel:
 
         Parameters
         ----------
-        configurations : ndarray, shape (n, n_axes)
-            Axis positions [rad or m].
+        configurations : ndarray, shape (n, n_joints)
+            Joint positions [rad or m].
 
         Returns
         -------
@@ -168,8 +168,8 @@ class ContactModel:
 
         Parameters
         ----------
-        configuration : ndarray, shape (n_axes,)
-            Axis positions [rad or m].
+        configuration : ndarray, shape (n_joints,)
+            Joint positions [rad or m].
         """
         contact = self.contact(configuration)
         return contact.pair if contact else None
@@ -179,8 +179,8 @@ class ContactModel:
 
         Parameters
         ----------
-        configuration : ndarray, shape (n_axes,)
-            Axis positions [rad or m].
+        configuration : ndarray, shape (n_joints,)
+            Joint positions [rad or m].
         """
         data, results = self._workspace
         if not pin.computeCollisions(
@@ -276,7 +276,7 @@ def _uninformative_pairs(arm: Arm, geometry: pin.GeometryModel, n_shapes: int) -
     """Pairs within the arm that touch at home, and pairs of the mounting.
 
     The mounting is the first link against the world, where it touches everywhere or nowhere
-    along the range of the first axis, which is sampled at 721 positions.
+    along the range of the first joint, which is sampled at 721 positions.
     """
     data, geometry_data = arm.model.createData(), make_verdicts_reliable(geometry.createData())
     pairs, objects = list(geometry.collisionPairs), geometry.geometryObjects
@@ -327,7 +327,7 @@ def _contact_shapes(
 
 
 def _keeps_height(chain: Chain, axis: int) -> bool:
-    """Whether an axis is a vertical revolute one at the base, which leaves heights unchanged."""
+    """Whether a joint is a vertical revolute one at the base, which leaves heights unchanged."""
     if axis != 0 or chain.prismatic[0]:
         return False
     w, x, y, z = chain.rotation[0]

@@ -83,9 +83,9 @@ class Episodes(NamedTuple):
         Steps taken.
     stop : ndarray of int, shape (n,)
         Step count at which to hand an episode back.
-    q : ndarray, shape (n, n_axes)
+    q : ndarray, shape (n, n_joints)
         Configuration [rad or m].
-    target : ndarray, shape (n, n_axes)
+    target : ndarray, shape (n, n_joints)
         Where the step under way leads.
     doubt : ndarray of int, shape (n,)
         Bit k - 1 set: configuration k of the step under way is not proven free.
@@ -107,7 +107,7 @@ class Episodes(NamedTuple):
         Sums of the observations acted upon, less ``shift``, and of their squares.
     shift : ndarray, shape (n_observations,)
         Subtracted before summing, for accuracy.
-    path : ndarray, shape (n, horizon + 1, n_axes) or (0, 0, n_axes)
+    path : ndarray, shape (n, horizon + 1, n_joints) or (0, 0, n_joints)
         Configurations visited.
     """
 
@@ -143,7 +143,7 @@ class Episodes(NamedTuple):
 
         Parameters
         ----------
-        starts : ndarray, shape (n, n_axes)
+        starts : ndarray, shape (n, n_joints)
             Start configurations [rad or m].
         goals : ndarray, shape (n, 3)
             Goal positions [m].
@@ -156,8 +156,8 @@ class Episodes(NamedTuple):
         shift : ndarray, shape (n_observations,), optional
             Collect sums of the observations about this point.
         """
-        n, n_axes = starts.shape
-        n_observations = observation_size(n_axes)
+        n, n_joints = starts.shape
+        n_observations = observation_size(n_joints)
         collected = 0 if shift is None else n
         recorded = (n, horizon + 1) if record else (0, 0)
         return cls(
@@ -176,5 +176,5 @@ class Episodes(NamedTuple):
             total=np.zeros(n),
             moments=np.zeros((collected, 2, n_observations)),
             shift=np.zeros(n_observations) if shift is None else np.array(shift),
-            path=np.full((*recorded, n_axes), np.nan),
+            path=np.full((*recorded, n_joints), np.nan),
         )

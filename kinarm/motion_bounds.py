@@ -1,4 +1,4 @@
-"""Certified bounds on how far the axes of a chain can move its points."""
+"""Certified bounds on how far the joints of a chain can move its points."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from kinarm.chain import Chain
 
 
 class MotionBounds(NamedTuple):
-    """What the compiled search for the closest approach knows of a chain, for its first n axes.
+    """What the compiled search for the closest approach knows of a chain, for its first n joints.
 
     Attributes
     ----------
@@ -17,7 +17,7 @@ class MotionBounds(NamedTuple):
         Bound on the second derivative of the tool point p by two axes [m/rad^2], so that
         p(q + e) differs from p(q) + J e by at most half the sum of |e_i| |e_j| curvature_ij.
     swing : ndarray, shape (n, n)
-        Bound on how fast an axis (row) moves the origin of a joint frame (column) [m/rad].
+        Bound on how fast a joint (row) moves the origin of a joint frame (column) [m/rad].
     length : ndarray, shape (n,)
         Bound on the distance from the origin of a joint frame to the tool point [m].
     """
@@ -28,13 +28,13 @@ class MotionBounds(NamedTuple):
 
     @classmethod
     def of(cls, chain: Chain, n: int) -> "MotionBounds":
-        """Bound the motion of a chain whose first n axes move.
+        """Bound the motion of a chain whose first n joints move.
 
-        The derivative of a joint's motion by a revolute axis before it is its cross product with
-        that axis, hence no longer than itself; a prismatic axis does not change it.
+        The derivative of a joint's motion by a revolute joint before it is its cross product with
+        that joint, hence no longer than itself; a prismatic joint does not change it.
         """
         origin = np.zeros((1, 3))
-        speed = [point_speed(chain, axis, chain.n_axes, chain.tool[None]) for axis in range(n)]
+        speed = [point_speed(chain, axis, chain.n_joints, chain.tool[None]) for axis in range(n)]
         curvature = np.zeros((n, n))
         for i in range(n):
             for j in range(i, n):
@@ -58,9 +58,9 @@ def link_lengths(chain: Chain) -> NDArray[np.float64]:
 
 
 def point_speed(chain: Chain, axis: int, link: int, points: NDArray[np.float64]) -> float:
-    """Bound on the speed of points of a link per unit speed of an axis [m/rad, or m/m].
+    """Bound on the speed of points of a link per unit speed of a joint [m/rad, or m/m].
 
-    A revolute axis moves a point by its distance from the axis. The joint after it starts at a
+    A revolute joint moves a point by its distance from the axis. The joint after it starts at a
     fixed distance from the axis, and the links beyond add at most their lengths.
 
     Parameters

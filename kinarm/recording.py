@@ -33,7 +33,7 @@ class Recording:
         What was faced, with the hash of its arm.
     trial : int
         Number of the trial in its set.
-    states : ndarray, shape (steps + 1, n_axes)
+    states : ndarray, shape (steps + 1, n_joints)
         Configurations, from the start to the end [rad or m].
     distances : ndarray, shape (steps + 1,)
         Distance from the tool to the goal at each of them [m].
@@ -45,7 +45,7 @@ class Recording:
         The two bodies that would have touched, if the last move was refused.
     contact_point : ndarray, shape (3,), optional
         Where they would have touched [m].
-    refused : ndarray, shape (n_axes,), optional
+    refused : ndarray, shape (n_joints,), optional
         The first configuration of the refused move at which they touch [rad or m].
     steps_lower_bound : int, optional
         Proven: no motion reaches the goal in fewer steps.

@@ -21,7 +21,7 @@ class ReferenceEpisode(NamedTuple):
 
     Attributes
     ----------
-    path : ndarray, shape (steps + 1, n_axes)
+    path : ndarray, shape (steps + 1, n_joints)
         Configurations visited [rad or m].
     observations : ndarray, shape (steps + 1, n_observations)
         Observations of them.
@@ -74,7 +74,7 @@ class ReferenceSimulator:
         ----------
         policy : callable
             Maps an observation, shape (n_observations,), to an action, shape (n_actions,).
-        start : ndarray, shape (n_axes,)
+        start : ndarray, shape (n_joints,)
             Start configuration [rad or m].
         goal : ndarray, shape (3,)
             Goal position [m].
@@ -130,7 +130,7 @@ class ReferenceSimulator:
         """World orientations of the joint frames as quaternions composed along the chain."""
         world = pin.Quaternion.Identity()
         quaternions = []
-        for k in range(self.arm.n_axes):
+        for k in range(self.arm.n_joints):
             world = world * pin.Quaternion(self.arm.model.jointPlacements[k + 1].rotation)
             if not self.arm.chain.prismatic[k]:
                 turn = np.sin(q[k] / 2) * self.arm.chain.axis[k]

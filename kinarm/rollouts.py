@@ -41,7 +41,7 @@ class Rollouts:
 
     Attributes
     ----------
-    starts : ndarray, shape (n, n_axes)
+    starts : ndarray, shape (n, n_joints)
         Start configurations [rad or m].
     goals : ndarray, shape (n, 3)
         Goal positions [m].
@@ -53,13 +53,13 @@ class Rollouts:
         Final distance from the tool to the goal [m].
     returns : ndarray, shape (n,)
         Sums of rewards.
-    configurations : ndarray, shape (n, n_axes)
+    configurations : ndarray, shape (n, n_joints)
         Final configurations [rad or m].
-    targets : ndarray, shape (n, n_axes)
+    targets : ndarray, shape (n, n_joints)
         Where the last step led; it differs from the final configuration if it was refused.
     moments : ndarray, shape (n, 2, n_observations), or empty
         Sums of the observations acted upon, less the given shift, and of their squares.
-    paths : ndarray, shape (n, horizon + 1, n_axes), or empty
+    paths : ndarray, shape (n, horizon + 1, n_joints), or empty
         Configurations visited, NaN after the end.
     """
 

@@ -15,7 +15,7 @@ def draw_scenarios(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Draw starts and goals.
 
-    Goals are uniform over the task's regions. Each actuated axis starts uniformly within its
+    Goals are uniform over the task's regions. Each actuated joint starts uniformly within its
     limits, scaled by the start spread, rejected until the arm touches nothing and its tool is
     farther from the goal than the tolerance.
 
@@ -32,7 +32,7 @@ def draw_scenarios(
 
     Returns
     -------
-    starts : ndarray, shape (count, n_axes)
+    starts : ndarray, shape (count, n_joints)
         Configurations [rad or m].
     goals : ndarray, shape (count, 3)
         Goal positions [m].
@@ -85,7 +85,7 @@ class ScenarioStream:
         self._ready: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
 
     def next(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return a start, shape (n_axes,), and a goal, shape (3,)."""
+        """Return a start, shape (n_joints,), and a goal, shape (3,)."""
         if not self._ready:
             starts, goals = draw_scenarios(self._world, self._rng, PREFETCHED)
             self._ready = list(zip(starts, goals, strict=True))[::-1]

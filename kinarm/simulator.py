@@ -26,11 +26,11 @@ PolicyFunction = Callable[[NDArray[np.float64]], ArrayLike]
 class Simulator:
     """Steps batches of rate-limited joint kinematics with contact checks.
 
-    An action in [-1, 1] (clipped) moves its axis by at most the rated speed times the time step,
-    within the limits. The motion of a step is tested for contact at evenly spaced configurations,
-    the last one included; a move that touches something is refused and ends the episode. An
-    episode also ends when the tool comes within the tolerance of the goal, and is truncated at
-    the horizon.
+    An action in [-1, 1] (clipped) moves its joint by at most its velocity limit times the time
+    step, within the limits. The motion of a step is tested for contact at evenly spaced
+    configurations, the last one included; a move that touches something is refused and ends the
+    episode. An episode also ends when the tool comes within the tolerance of the goal, and is
+    truncated at the horizon.
 
     Results depend on nothing but the inputs: not on the number of threads, nor on how episodes
     are batched.
@@ -58,7 +58,7 @@ class Simulator:
         self.judged = 0
         task, stepping, arm = self.task, self.problem.stepping, self.arm
         self._rules = Rules(
-            step_limit=arm.speed[: arm.n_actuated] * stepping.time_step,
+            step_limit=arm.velocity_limits[: arm.n_actuated] * stepping.time_step,
             tested=stepping.tested_configurations,
             tolerance=float(task.tolerance),
             horizon=int(task.horizon),
@@ -97,7 +97,7 @@ class Simulator:
 
     @property
     def step_limit(self) -> NDArray[np.float64]:
-        """Largest move of each actuated axis in a step, shape (n_actions,) [rad or m]."""
+        """Largest move of each actuated joint in a step, shape (n_actions,) [rad or m]."""
         return self._rules.step_limit.copy()
 
     def sample(
@@ -111,7 +111,7 @@ class Simulator:
 
         Parameters
         ----------
-        starts : array_like, shape (n, n_axes)
+        starts : array_like, shape (n, n_joints)
             Start configurations within the limits [rad or m].
         goals : array_like, shape (n, 3)
             Goal positions [m].
@@ -135,7 +135,7 @@ class Simulator:
         episodes : Episodes
             What `reset` returned.
         actions : array_like, shape (n, n_actions)
-            Fractions of the rated speeds, clipped to [-1, 1].
+            Fractions of the velocity limits, clipped to [-1, 1].
 
         Raises
         ------
@@ -173,7 +173,7 @@ class Simulator:
             One policy for all episodes, or one for each. Policies that offer ``networks()`` run
             compiled; a function from observations (n, n_observations) to actions (n, n_actions)
             is called once a step for all running episodes.
-        starts : array_like, shape (n, n_axes)
+        starts : array_like, shape (n, n_joints)
             Start configurations [rad or m].
         goals : array_like, shape (n, 3)
             Goal positions [m].
@@ -213,7 +213,7 @@ class Simulator:
         Parameters
         ----------
         actions : array_like, shape (n, horizon, n_actions)
-            Fractions of the rated speeds, clipped to [-1, 1].
+            Fractions of the velocity limits, clipped to [-1, 1].
         starts, goals, record
             As for `rollout`.
         """
@@ -262,7 +262,7 @@ class Simulator:
         self, starts: ArrayLike, goals: ArrayLike
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Copy starts and goals, or refuse them as `reset` does."""
-        q = finite_array("starts", starts, (None, self.arm.n_axes))
+        q = finite_array("starts", starts, (None, self.arm.n_joints))
         goal = finite_array("goals", goals, (len(q), 3))
         outside = ((q < self.arm.lower) | (q > self.arm.upper)).any(axis=1)
         if outside.any():

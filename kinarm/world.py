@@ -44,7 +44,7 @@ class World:
     @property
     def n_observations(self) -> int:
         """Length of an observation."""
-        return observation_size(self.arm.n_axes)
+        return observation_size(self.arm.n_joints)
 
     @property
     def n_actions(self) -> int:
@@ -56,8 +56,8 @@ class World:
 
         Parameters
         ----------
-        configurations : array_like, shape (n, n_axes)
-            Axis positions [rad or m].
+        configurations : array_like, shape (n, n_joints)
+            Joint positions [rad or m].
         goals : array_like, shape (n, 3)
             Goal positions [m].
 
@@ -72,8 +72,8 @@ class World:
 
         Parameters
         ----------
-        configurations : array_like, shape (n, n_axes)
-            Axis positions [rad or m].
+        configurations : array_like, shape (n, n_joints)
+            Joint positions [rad or m].
         goals : array_like, shape (n, 3)
             Goal positions [m].
 
@@ -89,8 +89,8 @@ class World:
 
         Parameters
         ----------
-        configurations : array_like, shape (n, n_axes)
-            Axis positions [rad or m].
+        configurations : array_like, shape (n, n_joints)
+            Joint positions [rad or m].
 
         Returns
         -------
@@ -98,7 +98,7 @@ class World:
             Tool points [m].
         touching : ndarray of bool, shape (n,)
         """
-        q = finite_array("configurations", configurations, (None, self.arm.n_axes))
+        q = finite_array("configurations", configurations, (None, self.arm.n_joints))
         n = len(q)
         tools, proven = np.empty((n, 3)), np.empty(n, dtype=bool)
         arrays = (self.arm.chain, self.contact_model.shapes, q, tools, proven)
@@ -112,11 +112,11 @@ class World:
 
         Parameters
         ----------
-        configuration, target : array_like, shape (n_axes,)
+        configuration, target : array_like, shape (n_joints,)
             Ends of the step [rad or m].
         """
-        q = finite_array("configuration", configuration, (self.arm.n_axes,))
-        aim = finite_array("target", target, (self.arm.n_axes,))
+        q = finite_array("configuration", configuration, (self.arm.n_joints,))
+        aim = finite_array("target", target, (self.arm.n_joints,))
         tested = self.substeps(q[None], aim[None])[0]
         touching = np.flatnonzero(self.contact_model.in_contact(tested))
         return self.contact_model.contact(tested[touching[0]]) if touching.size else None
@@ -126,7 +126,7 @@ class World:
 
         Parameters
         ----------
-        configuration, target : array_like, shape (n_axes,)
+        configuration, target : array_like, shape (n_joints,)
             Ends of the step [rad or m].
         """
         contact = self.contact(configuration, target)
@@ -139,12 +139,12 @@ class World:
 
         Parameters
         ----------
-        configurations, targets : ndarray, shape (n, n_axes)
+        configurations, targets : ndarray, shape (n, n_joints)
             Ends of the steps [rad or m].
 
         Returns
         -------
-        ndarray, shape (n, n_tested, n_axes)
+        ndarray, shape (n, n_tested, n_joints)
             Evenly spaced; the last one is the target.
         """
         n_tested = self.problem.stepping.tested_configurations
@@ -154,7 +154,7 @@ class World:
 
     def _begun_at(self, configurations: ArrayLike, goals: ArrayLike) -> Episodes:
         """Episodes that begin at configurations, whether or not those touch something."""
-        q = finite_array("configurations", configurations, (None, self.arm.n_axes))
+        q = finite_array("configurations", configurations, (None, self.arm.n_joints))
         goal = finite_array("goals", goals, (len(q), 3))
         n_pairs = len(self.contact_model.shapes.pairs)
         episodes = Episodes.allocate(q, goal, n_pairs=n_pairs, horizon=1)

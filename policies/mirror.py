@@ -1,10 +1,10 @@
 """Reflection about the x-z plane: what it does to observations and actions.
 
 The reflection y -> -y maps the right bench to the left one and an arm that is symmetric about its
-x-z plane to itself, with axes that turn about x or z reversed. In kinarm's observations and actions
-it only changes signs. A linear policy commutes with it exactly if its weights vanish wherever the
-signs of input and output disagree: it then does on one bench what it does on the other. Any other
-network does so if it sees goals on the left in the mirror; see `kinarm.Networks`.
+x-z plane to itself, with joints that turn about x or z reversed. In kinarm's observations and
+actions it only changes signs. A linear policy commutes with it exactly if its weights vanish
+wherever the signs of input and output disagree: it then does on one bench what it does on the
+other. Any other network does so if it sees goals on the left in the mirror; see `kinarm.Networks`.
 """
 
 import numpy as np
@@ -47,7 +47,7 @@ def find_mirror(world: World) -> Mirror:
     arm = world.arm
     along_y = np.abs(arm.chain.axis[:, 1]) > 0.5
     axes = np.where(along_y ^ arm.chain.prismatic, 1.0, -1.0)
-    mirror = Mirror(observation_signs(arm.n_axes), axes[: arm.n_actuated])
+    mirror = Mirror(observation_signs(arm.n_joints), axes[: arm.n_actuated])
     if not _is_mirror(mirror, axes, world):
         raise InvalidInputError(
             f"arm {arm.name!r} is not its own mirror image: train it without symmetric"
@@ -62,7 +62,7 @@ def _is_mirror(mirror: Mirror, axes: NDArray[np.float64], world: World) -> bool:
     if not np.allclose(limits, [arm.lower, arm.upper], rtol=0, atol=ACCURACY):
         return False
     rng = np.random.default_rng(0)
-    q = rng.uniform(arm.lower, arm.upper, (TESTED_CONFIGURATIONS, arm.n_axes))
+    q = rng.uniform(arm.lower, arm.upper, (TESTED_CONFIGURATIONS, arm.n_joints))
     goals = rng.normal(size=(TESTED_CONFIGURATIONS, 3))
     seen = world.observe(q, goals)
     reflected = world.observe(axes * q, goals * (1.0, -1.0, 1.0))

@@ -128,7 +128,7 @@ class Policy:
         Returns
         -------
         ndarray, shape (n_actions,) or (n, n_actions)
-            Fractions of the rated speeds in [-1, 1].
+            Fractions of the velocity limits in [-1, 1].
         """
         given = np.asarray(observations, dtype=float)
         shape = (self.n_observations,) if given.ndim == 1 else (None, self.n_observations)

@@ -4,12 +4,16 @@ import json
 import re
 import subprocess
 import sys
+from operator import itemgetter
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parent.parent
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+README, RESULTS, REPRODUCTION = (
+    (ROOT / page).read_text(encoding="utf-8")
+    for page in ("README.md", "docs/results.md", "docs/reproduction.md")
+)
 
 
 def blocks_after(heading, kind):
@@ -35,9 +39,19 @@ def test_python_examples_run(tmp_path):
 def test_results_are_those_of_the_command(tmp_path):
     command = blocks_after("Results", "sh")[0].split()
     assert command[0] == "kinarm-eval"
+    assert " ".join(command) in RESULTS
     code = f"from kinarm.evaluation.commands.evaluate import main; main({command[1:]!r})"
-    table = run(code, tmp_path).strip()
-    assert table in README
+    assert run(code, tmp_path).strip() in RESULTS
+
+
+def test_the_short_table_is_that_of_the_results():
+    successes = {}
+    rows = re.findall(r"^\| (left|right|both) +\| (\S+) +\| +(.*?) \|", RESULTS, re.MULTILINE)
+    for problem, policy, success in rows:
+        successes.setdefault(policy.removesuffix(f"-{problem}"), []).append(success)
+    assert {"oracle", "random", "ars-paper", "ppo-tuned"} <= set(successes)
+    for policy, (left, right, both) in successes.items():
+        assert f"| `{policy}` | {left} | {right} | {both} |" in README
 
 
 def test_verdicts_are_the_recorded_ones():
@@ -45,9 +59,10 @@ def test_verdicts_are_the_recorded_ones():
     readings = {reading["name"]: reading["claims"] for reading in document["readings"]}
     shared = {claim["name"]: claim for claim in readings["spread1-progress-iteration"]}
     for claim in readings["spread1-progress-none"]:
-        cells = [verdict_cell(claim)]
-        cells.append(verdict_cell(shared[claim["name"]]) if claim["name"] in shared else "")
-        assert f"| {claim['statement']} | {' | '.join(cells)} |" in README
+        both = [claim, shared.get(claim["name"])]
+        for page, cell in ((README, itemgetter("verdict")), (REPRODUCTION, verdict_cell)):
+            cells = (cell(each) if each else "" for each in both)
+            assert f"| {claim['statement']} | {' | '.join(cells)} |" in page
     assert f"{document['trainings']} trainings" in README
     assert f"{document['environment_steps'] / 1e6:.0f} million" in README
 

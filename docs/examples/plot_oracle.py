@@ -17,10 +17,9 @@ long.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from kinarm import Simulator
 from kinarm.evaluation import TrialSet, evaluate, oracle_bounds
 
-trials = TrialSet.draw(Simulator("paper", "both"), trials=400, seed=3)
+trials = TrialSet.draw("both", trials=400, seed=3)
 bounds = oracle_bounds(trials)
 gap = (bounds.steps - bounds.steps_lower_bound)[bounds.reachable]
 print(f"a motion was found in {100 * bounds.reachable.mean():.1f} % of the trials")
@@ -34,7 +33,7 @@ print(f"the proof is complete in {100 * bounds.tight.mean():.1f} %")
 # The policy is a trained linear one; only trials that it solves are shown.
 
 policy = evaluate("ars-tuned-both", trials=400, seed=3, oracle=True)
-oracle = evaluate("oracle", task="both", trials=400, seed=3, oracle=True)
+oracle = evaluate("oracle", "both", trials=400, seed=3, oracle=True)
 solved = policy.rollouts.success
 
 figure, axes = plt.subplots(figsize=(5.2, 5.0), layout="constrained")

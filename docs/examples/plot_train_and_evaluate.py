@@ -9,10 +9,10 @@ seen, beside random actions.
 # %%
 # Train
 # -----
-# :py:func:`~kinarm.policies.recipe` returns settings by name, with replacements. All perturbed
-# policies of an iteration face the same four starts and goals, success earns a bonus, and the step
-# size falls linearly to zero. :py:func:`~kinarm.policies.train_policy` returns the policy and one
-# point of the learning curve per iteration.
+# :py:func:`~kinarm.policies.recipe` returns settings for a problem by name, with replacements. All
+# perturbed policies of an iteration face the same four starts and goals, success earns a bonus, and
+# the step size falls linearly to zero. :py:func:`~kinarm.policies.train_policy` returns the policy
+# and one point of the learning curve per iteration.
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -51,12 +51,12 @@ panels[1].set(xlabel="environment steps [million]", ylim=(0, 1))
 # Evaluate
 # --------
 # :py:func:`~kinarm.evaluation.evaluate` puts a policy to trials whose starts and goals depend on
-# task, arm and seed alone. The baseline ``"random"`` acts uniformly at random in the same trials.
+# problem and seed alone. The baseline ``"random"`` acts uniformly at random in the same trials.
 # Shares come with 95 % Wilson intervals.
 
 evaluations = {
     "trained": evaluate(result.policy, trials=200),
-    "random": evaluate("random", task="right", trials=200),
+    "random": evaluate("random", "right", trials=200),
 }
 for name, evaluation in evaluations.items():
     low, high = evaluation.success.ci95

@@ -6,9 +6,9 @@ Where episodes start and where the cubes lie, seen from above.
 """
 
 # %%
-# :py:meth:`kinarm.Simulator.sample` draws episodes of a task. The centres of the cubes are uniform
-# over the benches. The start is uniform over the *joint* range, less the configurations in
-# contact; the tool points that follow from it by forward kinematics
+# :py:meth:`kinarm.Simulator.sample` draws starts and goals of a problem. The centres of the cubes
+# are uniform over the benches. The start is uniform over the *joint* range, less the configurations
+# in contact; the tool points that follow from it by forward kinematics
 # (:py:meth:`kinarm.Arm.tool_position`) are not uniform in space. Lengths are in metres.
 
 import matplotlib.pyplot as plt

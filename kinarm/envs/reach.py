@@ -38,12 +38,12 @@ def observation_space(simulator: Simulator) -> Space[Array]:
         goal_upper=np.max([region.upper for region in regions], axis=0) + task.tolerance,
         reach=simulator.arm.reach,
     )
-    lower, upper = observation_bounds(ranges, simulator.arm.n_axes)
+    lower, upper = observation_bounds(ranges, simulator.arm.n_joints)
     return cast("Space[Array]", Box(lower, upper, dtype=np.float64))
 
 
 def action_space(simulator: Simulator) -> Space[Array]:
-    """Fractions of the rated speeds."""
+    """Fractions of the velocity limits."""
     return cast("Space[Array]", Box(-1.0, 1.0, (simulator.n_actions,), dtype=np.float64))
 
 
@@ -60,11 +60,11 @@ class ReachEnv(gymnasium.Env[Array, Array]):
 
     Notes
     -----
-    **Action** (n = number of actuated axes, 5 for the shipped arms), ``Box(-1, 1, (n,))``:
-    fraction of each axis's rated speed during one time step of 0.02 s. At full speed the axes of
-    the default arm move 7, 7, 8, 9 and 9 degrees a step. Larger actions are clipped.
+    **Action** (n = number of actuated joints, 5 for the shipped arms), ``Box(-1, 1, (n,))``:
+    fraction of each joint's velocity limit during one time step of 0.02 s. At full speed the joints
+    of the default arm move 7, 7, 8, 9 and 9 degrees a step. Larger actions are clipped.
 
-    **Observation** (6 + 7 axes, 48 for the shipped arms), float64, world frame with z up:
+    **Observation** (6 + 7 joints, 48 for the shipped arms), float64, world frame with z up:
 
     OBSERVATION_TABLE
 
@@ -75,7 +75,7 @@ class ReachEnv(gymnasium.Env[Array, Array]):
     when a move touches something) and ``reward_success`` (0), with the default weights in
     brackets; see `kinarm.RewardWeights`.
 
-    **Start**: each actuated axis uniform within its limits, rejected until the arm touches
+    **Start**: each actuated joint uniform within its limits, rejected until the arm touches
     nothing and the tool is farther from the goal than the tolerance. Goals are uniform over the
     regions of the task. ``reset(options={"start": q, "goal": p})`` sets either.
 

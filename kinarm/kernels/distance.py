@@ -151,7 +151,7 @@ def clearance(
         Index of the pair.
     pairs, capsules, link, boxes : ndarray
         See `ContactShapes`.
-    poses : ndarray, shape (n_axes + 1, POSE)
+    poses : ndarray, shape (n_joints + 1, POSE)
         Forward kinematics.
     """
     kind, i, j = pairs[pair, 0], pairs[pair, 1], pairs[pair, 2]

@@ -27,13 +27,13 @@ def forward_kinematics(
     ----------
     prismatic, translation, rotation, axis : ndarray
         See `Chain`.
-    configurations : ndarray, shape (n, n_axes)
-        Axis positions [rad or m].
+    configurations : ndarray, shape (n, n_joints)
+        Joint positions [rad or m].
     row : int
         Which of them.
-    poses : ndarray, shape (n_axes + 1, POSE)
+    poses : ndarray, shape (n_joints + 1, POSE)
         Row 0 is the world, row k the frame of the k-th joint. Quaternions are composed along the
-        chain, so they are continuous in the axis positions.
+        chain, so they are continuous in the joint positions.
     """
     for i in range(POSE):
         poses[0, i] = 1.0 if i == 0 or i == 4 or i == 8 or i == 12 else 0.0
@@ -104,18 +104,18 @@ def point_jacobian(
     point: tuple[float, float, float],
     jacobian: NDArray[np.float64],
 ) -> None:
-    """Fill in how fast a point beyond the axes moves per unit speed of each.
+    """Fill in how fast a point beyond the joints moves per unit speed of each.
 
     Parameters
     ----------
     prismatic, axis : ndarray
         See `Chain`.
-    poses : ndarray, shape (n_axes + 1, POSE)
+    poses : ndarray, shape (n_joints + 1, POSE)
         Forward kinematics.
     point : tuple of float
         The point in the world frame [m].
     jacobian : ndarray, shape (3, n)
-        Output, for the first n axes, in the world frame [m/rad, or m/m].
+        Output, for the first n joints, in the world frame [m/rad, or m/m].
     """
     for k in range(jacobian.shape[1]):
         c = k + 1

@@ -42,7 +42,7 @@ def spend_slack(
         Which episode.
     travel : ndarray, shape (n_actuated, n_pairs)
         See `ContactShapes`.
-    q, target : ndarray, shape (n, n_axes)
+    q, target : ndarray, shape (n, n_joints)
         Ends of the step [rad or m].
     slack : ndarray, shape (n, n_pairs)
         Lower bounds of the distances at ``q``; on return, at ``target`` [m].
@@ -90,10 +90,10 @@ def prove_step(
         Configurations n at which the motion of a step is tested.
     q, target, slack, motion : ndarray
         As `spend_slack` took and left them; on return, ``slack`` is renewed.
-    poses : ndarray, shape (n_axes + 1, POSE)
+    poses : ndarray, shape (n_joints + 1, POSE)
         Forward kinematics at ``target``.
-    between, middle, listed : ndarray, shape (n_axes + 1, POSE), (1, n_axes) and (2, n_pairs + 1)
-        Work space.
+    between, middle, listed : ndarray
+        Work space, shape (n_joints + 1, POSE), (1, n_joints) and (2, n_pairs + 1).
 
     Returns
     -------
@@ -102,7 +102,7 @@ def prove_step(
     """
     prismatic, translation, rotation, axes = chain[:4]
     link, capsules, boxes, pairs = shapes[:4]
-    n_pairs, n_axes = slack.shape[1], q.shape[1]
+    n_pairs, n_joints = slack.shape[1], q.shape[1]
     doubt, n_spent, n_open, open_between = 0, 0, 0, 0
     for pair in range(n_pairs):
         listed[0, n_spent] = pair
@@ -126,7 +126,7 @@ def prove_step(
     for k in range(1, tested):
         bit = 1 << (k - 1)
         if open_between & bit:
-            for axis in range(n_axes):
+            for axis in range(n_joints):
                 middle[0, axis] = q[row, axis] + k / tested * (target[row, axis] - q[row, axis])
             forward_kinematics(prismatic, translation, rotation, axes, middle, 0, between)
             for index in range(n_open):

@@ -18,7 +18,7 @@ from kinarm.kernels.observing import observe
 from kinarm.kernels.proof import is_apart, prove_step, spend_slack
 from kinarm.kernels.reward import add_reward
 
-LAYOUT = "44e27401f131"
+LAYOUT = "ee97471718c0"
 """Hash of what is compiled in from other files; a test tells when to renew it.
 
 Numba's disk cache notices changes only in this file, so changing this line is what makes it
@@ -44,8 +44,8 @@ def screen(
         Range of rows to work on.
     chain, shapes
         The arm and its contact pairs.
-    configurations : ndarray, shape (n, n_axes)
-        Axis positions [rad or m].
+    configurations : ndarray, shape (n, n_joints)
+        Joint positions [rad or m].
     tools : ndarray, shape (n, 3)
         Output: tool points [m].
     proven : ndarray of bool, shape (n,)
@@ -53,11 +53,11 @@ def screen(
     """
     prismatic, translation, rotation, axes, tool = chain[:5]
     link, capsules, boxes, pairs = shapes[:4]
-    n_axes = configurations.shape[1]
-    poses = np.empty((n_axes + 1, POSE))
+    n_joints = configurations.shape[1]
+    poses = np.empty((n_joints + 1, POSE))
     for i in range(first, last):
         forward_kinematics(prismatic, translation, rotation, axes, configurations, i, poses)
-        tools[i, 0], tools[i, 1], tools[i, 2] = to_world(poses, n_axes, tool[0], tool[1], tool[2])
+        tools[i, 0], tools[i, 1], tools[i, 2] = to_world(poses, n_joints, tool[0], tool[1], tool[2])
         proven[i] = True
         for pair in range(pairs.shape[0]):
             if not is_apart(clearance(pair, pairs, capsules, link, boxes, poses)):
@@ -124,9 +124,9 @@ def advance(
     ]
     terms, total, moments, shift, path = episodes[11:]
     step_limit, travel = rules.step_limit, shapes.travel
-    n_axes, n_actuated, n_observations = q.shape[1], step_limit.shape[0], observation.shape[1]
-    poses, between = np.empty((n_axes + 1, POSE)), np.empty((n_axes + 1, POSE))
-    motion, middle = np.empty(slack.shape[1]), np.empty((1, n_axes))
+    n_joints, n_actuated, n_observations = q.shape[1], step_limit.shape[0], observation.shape[1]
+    poses, between = np.empty((n_joints + 1, POSE)), np.empty((n_joints + 1, POSE))
+    motion, middle = np.empty(slack.shape[1]), np.empty((1, n_joints))
     listed = np.empty((2, slack.shape[1] + 1), dtype=np.int64)
     widest = n_observations
     for layer in range(layers.shape[0]):
@@ -179,7 +179,7 @@ def advance(
                 status[e] = SUCCESS
             elif steps[e] >= rules.horizon:
                 status[e] = TRUNCATED
-            for axis in range(n_axes):
+            for axis in range(n_joints):
                 q[e, axis] = target[e, axis]
                 if path.shape[0] > 0:
                     path[e, steps[e], axis] = q[e, axis]

@@ -37,7 +37,7 @@ def arm_parts(arm: Arm) -> tuple[Part, ...]:
     if not found or sum(len(part.mesh.faces) for part in found) > MOST_TRIANGLES:
         found = _plain_parts(arm.geometry)
     tool = from_coal(coal.Sphere(TOOL_RADIUS)).moved(arm.chain.tool)
-    return (*found, Part(arm.n_axes, ACCENT, tool))
+    return (*found, Part(arm.n_joints, ACCENT, tool))
 
 
 def _visual_shapes(arm: Arm) -> pin.GeometryModel | None:

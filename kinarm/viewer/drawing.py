@@ -194,7 +194,7 @@ def draw_arm(window: Visualizer, arm: Arm) -> list[Visualizer]:
         The base and the joints; a joint's transform is that in its parent.
     """
     frames = [window]
-    for number in range(1, arm.n_axes + 1):
+    for number in range(1, arm.n_joints + 1):
         frames.append(frames[-1][f"axis_{number}"])
     surfaces: dict[tuple[int, Finish], list[Mesh]] = defaultdict(list)
     for part in arm_parts(arm):

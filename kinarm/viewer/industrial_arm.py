@@ -47,7 +47,7 @@ AXES = np.array([(0, 0, 1), (0, 1, 0), (0, -1, 0), (-1, 0, 0), (0, -1, 0), (-1, 
 def fits(arm: Arm) -> bool:
     """Whether an arm has the axes and offsets that these looks are made for."""
     chain = arm.chain
-    if chain.n_axes != 6 or chain.prismatic.any() or not np.allclose(chain.axis, AXES):
+    if chain.n_joints != 6 or chain.prismatic.any() or not np.allclose(chain.axis, AXES):
         return False
     upper, forearm = chain.translation[2][2], chain.translation[3][0]
     expected = [(0, 0, 0.33), (0.075, 0, 0), (0, 0, upper), (forearm, 0, 0.075)]

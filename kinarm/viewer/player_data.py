@@ -29,7 +29,7 @@ def player_data(trials: Sequence[Sequence[Recording]], arm: Arm) -> dict[str, An
                 "axis": chain.axis[k].tolist(),
                 "slides": bool(chain.prismatic[k]),
             }
-            for k in range(arm.n_axes)
+            for k in range(arm.n_joints)
         ],
         "tool": chain.tool.tolist(),
         "links": {

@@ -110,7 +110,7 @@ def shared_scenarios(
 
     Returns
     -------
-    starts, goals : ndarray, shape (2 N episodes, n_axes) and (2 N episodes, 3)
+    starts, goals : ndarray, shape (2 N episodes, n_joints) and (2 N episodes, 3)
         In the order sign, direction, episode.
     """
     copies = {"none": 1, "pair": 2, "iteration": 2 * config.directions}[config.sharing]

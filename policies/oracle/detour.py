@@ -21,7 +21,7 @@ class Tree:
 
     Parameters
     ----------
-    roots : ndarray, shape (k, n_axes)
+    roots : ndarray, shape (k, n_joints)
         Configurations to grow from [rad or m].
     """
 
@@ -56,16 +56,16 @@ def find_detour(
     ----------
     simulator : Simulator
         Arm and scene.
-    start : ndarray, shape (n_axes,)
+    start : ndarray, shape (n_joints,)
         Contact-free start [rad or m].
-    ends : ndarray, shape (k, n_axes)
+    ends : ndarray, shape (k, n_joints)
         Contact-free ends [rad or m].
     rng : numpy.random.Generator
         Source of randomness.
 
     Returns
     -------
-    ndarray, shape (m, n_axes), or None
+    ndarray, shape (m, n_joints), or None
         The path from the start to an end; None if none was found.
     """
     path = _connect(simulator, start, ends, rng)

@@ -24,7 +24,7 @@ class Solutions(NamedTuple):
 
     Attributes
     ----------
-    configurations : ndarray, shape (m, n_axes)
+    configurations : ndarray, shape (m, n_joints)
         In the order of their owners [rad or m].
     owner : ndarray of int, shape (m,)
         Which goal they belong to.
@@ -45,14 +45,14 @@ def inverse_kinematics(
     """Find the distinct contact-free configurations that reach a goal within the horizon.
 
     Evenly spread configurations and the current one are moved into the ball about the goal by
-    damped least squares within the limits. An arm with more axes than a position has coordinates
+    damped least squares within the limits. An arm with more joints than a position has coordinates
     has a continuum of solutions: those returned differ from each other.
 
     Parameters
     ----------
     simulator : Simulator
         Arm, scene and tolerance.
-    start : array_like, shape (n_axes,)
+    start : array_like, shape (n_joints,)
         Current configuration; axes that are not actuated stay there [rad or m].
     goal : array_like, shape (3,)
         Goal position [m].
@@ -63,7 +63,7 @@ def inverse_kinematics(
 
     Returns
     -------
-    ndarray, shape (k, n_axes)
+    ndarray, shape (k, n_joints)
         The solution that takes the fewest steps first [rad or m]; k may be 0.
 
     Raises
@@ -72,7 +72,7 @@ def inverse_kinematics(
         If a shape is wrong, an entry is not finite, the start is beyond the limits or a number
         is not positive.
     """
-    q = finite_array("start", start, (simulator.arm.n_axes,))
+    q = finite_array("start", start, (simulator.arm.n_joints,))
     g = finite_array("goal", goal, (3,))
     starts, goals = simulator.check_scenarios(q[None], g[None])
     horizon, tolerance = np.array([simulator.task.horizon]), np.array([simulator.task.tolerance])
@@ -85,7 +85,7 @@ def inverse_kinematics(
     while len(remaining):
         distinct.append(remaining[0])
         remaining = remaining[np.abs(remaining - remaining[0]).max(axis=1) > separation]
-    return np.array(distinct).reshape(-1, simulator.arm.n_axes)
+    return np.array(distinct).reshape(-1, simulator.arm.n_joints)
 
 
 def solve_within(
@@ -103,7 +103,7 @@ def solve_within(
     ----------
     simulator : Simulator
         Arm and scene.
-    starts : ndarray, shape (m, n_axes)
+    starts : ndarray, shape (m, n_joints)
         Configurations to be close to [rad or m].
     goals : ndarray, shape (m, 3)
         Goal positions [m].
@@ -111,12 +111,12 @@ def solve_within(
         How many steps away solutions may be.
     tolerances : ndarray, shape (m,)
         How far the tool may be from the goals [m].
-    guesses : ndarray, shape (m, n_axes)
+    guesses : ndarray, shape (m, n_joints)
         One more configuration to begin with [rad or m].
     samples : int
         Configurations to begin with, per goal: the start, the guess, and evenly spread ones.
     """
-    m, n_axes = len(starts), simulator.arm.n_axes
+    m, n_joints = len(starts), simulator.arm.n_joints
     box = step_box(simulator, starts, steps)
     spread = evenly_spread(samples, simulator.n_actions + 1)
     beginnings = _beginnings(starts, guesses, box, spread[:, :-1])
@@ -126,7 +126,7 @@ def solve_within(
     allowed = (tolerances * (1.0 - RESERVE))[owner]
     radius = allowed * np.tile(shares, m)
     configurations, distances = project(
-        simulator, beginnings.reshape(-1, n_axes), owner, box, goals, radius
+        simulator, beginnings.reshape(-1, n_joints), owner, box, goals, radius
     )
     near = np.flatnonzero(distances <= allowed)
     _, touching = simulator.world.screen(configurations[near])
@@ -140,7 +140,7 @@ def _beginnings(
     box: tuple[NDArray[np.float64], NDArray[np.float64]],
     spread: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Start, guess and evenly spread configurations of boxes, shape (m, samples, n_axes)."""
+    """Start, guess and evenly spread configurations of boxes, shape (m, samples, n_joints)."""
     lower, upper = box[0][:, None], box[1][:, None]
     samples, moved = len(spread), slice(lower.shape[-1])
     beginnings = np.repeat(starts[:, None], samples, axis=1)
@@ -165,7 +165,7 @@ def project(
     ----------
     simulator : Simulator
         The arm.
-    configurations : ndarray, shape (m samples, n_axes)
+    configurations : ndarray, shape (m samples, n_joints)
         Within the limits [rad or m].
     owner : ndarray of int, shape (m samples,)
         Which goal they belong to.
@@ -178,7 +178,7 @@ def project(
 
     Returns
     -------
-    configurations : ndarray, shape (m samples, n_axes)
+    configurations : ndarray, shape (m samples, n_joints)
         Where they ended [rad or m].
     distances : ndarray, shape (m samples,)
         From the tool to the goal [m].
@@ -192,7 +192,7 @@ def project(
 def step_box(
     simulator: Simulator, starts: NDArray[np.float64], steps: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Corners of what the actuated axes can reach in some steps, shapes (m, n_actions)."""
+    """Corners of what the actuated joints can reach in some steps, shapes (m, n_actions)."""
     moved = slice(simulator.n_actions)
     extent = steps[:, None] * simulator.step_limit
     lower = np.maximum(simulator.arm.lower[moved], starts[:, moved] - extent)

@@ -11,13 +11,13 @@ def steps_between(
 ) -> NDArray[np.float64]:
     """Steps that the straight motion between configurations takes, before rounding up.
 
-    The slowest axis decides: the largest of |dq_i| / (rate_i dt) over the actuated axes.
+    The slowest joint decides: the largest of |dq_i| / (rate_i dt) over the actuated joints.
 
     Parameters
     ----------
     simulator : Simulator
-        Knows how far an axis moves in a step.
-    first, second : ndarray, shape (..., n_axes)
+        Knows how far a joint moves in a step.
+    first, second : ndarray, shape (..., n_joints)
         Configurations [rad or m].
 
     Returns
@@ -42,8 +42,8 @@ def two_segments(
     Parameters
     ----------
     simulator : Simulator
-        Knows how far an axis moves in a step.
-    starts, vias, ends : ndarray, shape (m, n_axes)
+        Knows how far a joint moves in a step.
+    starts, vias, ends : ndarray, shape (m, n_joints)
         Configurations [rad or m].
     turn, steps : ndarray of int, shape (m,)
         Steps until ``vias`` and until ``ends``. Where they are equal, ``ends`` are not visited.
@@ -82,8 +82,8 @@ def along_path(
     Parameters
     ----------
     simulator : Simulator
-        Knows how far an axis moves in a step.
-    path : ndarray, shape (k, n_axes)
+        Knows how far a joint moves in a step.
+    path : ndarray, shape (k, n_joints)
         Configurations to pass [rad or m].
     through_corners : bool
         Whether a step ends at every configuration; else steps cut corners, and are fewer.

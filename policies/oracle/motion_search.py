@@ -42,7 +42,7 @@ class MotionSearch:
     ----------
     simulator : Simulator
         Arm, scene and task.
-    starts, goals : ndarray, shape (n, n_axes) and (n, 3)
+    starts, goals : ndarray, shape (n, n_joints) and (n, 3)
         The trials [rad or m], [m].
 
     Attributes
@@ -87,7 +87,7 @@ class MotionSearch:
             Trials.
         steps : ndarray of int, shape (m,)
             Steps of the motions; beyond the horizon there are none.
-        guesses : ndarray, shape (n, n_axes)
+        guesses : ndarray, shape (n, n_joints)
             Configurations close to the goals, of all trials [rad or m].
         """
         for samples in SAMPLES:
@@ -129,7 +129,7 @@ class MotionSearch:
             Trials.
         distances : ndarray, shape (m,)
             Smallest distances that may be possible [m].
-        guesses : ndarray, shape (n, n_axes)
+        guesses : ndarray, shape (n, n_joints)
             As for `try_steps`.
         """
         for nearer in APPROACHES:

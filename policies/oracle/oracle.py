@@ -88,7 +88,7 @@ class Oracle:
 
         Parameters
         ----------
-        start : array_like, shape (n_axes,)
+        start : array_like, shape (n_joints,)
             Contact-free start configuration [rad or m].
         goal : array_like, shape (3,)
             Goal position [m].
@@ -100,7 +100,7 @@ class Oracle:
         StartInContactError
             If the start touches something.
         """
-        q = finite_array("start", start, (self.simulator.arm.n_axes,))
+        q = finite_array("start", start, (self.simulator.arm.n_joints,))
         return self.solve_batch(q[None], finite_array("goal", goal, (3,))[None])[0]
 
     def solve_batch(
@@ -110,7 +110,7 @@ class Oracle:
 
         Parameters
         ----------
-        starts : array_like, shape (n, n_axes)
+        starts : array_like, shape (n, n_joints)
             Contact-free start configurations [rad or m].
         goals : array_like, shape (n, 3)
             Goal positions [m].
@@ -223,7 +223,7 @@ class Oracle:
     def _bound_distance(self, lot: "_Lot", rows: NDArray[np.int64]) -> NDArray[np.float64]:
         """Prove how close the tool can come within the horizon, and note where it does."""
         simulator, n = self.simulator, len(rows)
-        distances, configurations = np.empty((n, 2)), np.empty((n, simulator.arm.n_axes))
+        distances, configurations = np.empty((n, 2)), np.empty((n, simulator.arm.n_joints))
         starts, goals = lot.starts[rows], lot.goals[rows]
         box = step_box(simulator, starts, np.full(n, simulator.task.horizon))
         inputs = (self._arm, *box, starts, goals, RESOLUTION, False, BUDGET)
@@ -264,7 +264,7 @@ class _Lot(NamedTuple):
     ----------
     starts, goals : ndarray
         The trials.
-    witnesses : ndarray, shape (n, n_axes)
+    witnesses : ndarray, shape (n, n_joints)
         Configurations that attain what was proven last [rad or m].
     """
 

@@ -29,7 +29,7 @@ class OracleSolution:
         Distance from the tool to the goal at the end of the motion [m].
     distance_lower_bound : float
         Proven: no motion within the horizon ends closer to the goal [m]. Zero if one reaches it.
-    path : ndarray, shape (steps + 1, n_axes)
+    path : ndarray, shape (steps + 1, n_joints)
         Configurations of the motion, as the simulator went through them [rad or m].
     actions : ndarray, shape (steps, n_actions)
         Actions of the motion.
@@ -62,7 +62,7 @@ class OracleSolutions:
         See `OracleSolution` [m].
     actions : ndarray, shape (n, horizon, n_actions)
         Actions of the motions, zero after their end.
-    paths : ndarray, shape (n, horizon + 1, n_axes)
+    paths : ndarray, shape (n, horizon + 1, n_joints)
         Configurations of the motions, NaN after their end [rad or m].
     reasons : ndarray of str, shape (n,)
         Why no motion reaches the goal; empty if one does.

@@ -16,7 +16,7 @@ class EpisodeStates(NamedTuple):
 
     Attributes
     ----------
-    q : ndarray, shape (n, n_axes)
+    q : ndarray, shape (n, n_joints)
         Configurations [rad or m].
     goal : ndarray, shape (n, 3)
         Goal positions [m].

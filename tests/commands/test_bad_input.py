@@ -52,7 +52,7 @@ UNUSABLE_ROBOTS = {
     "floating base": (robot(joint("floating", "")), "fixed"),
     "continuous joint": (robot(joint("continuous", "")), "limits"),
     "no limits": (robot(joint("revolute", "")), "urdf"),
-    "no rated speed": (robot(joint("revolute", LIMITS.replace('velocity="1"', ""))), "urdf"),
+    "no velocity limit": (robot(joint("revolute", LIMITS.replace('velocity="1"', ""))), "urdf"),
     "no joint": (robot(joint("fixed", "")), "urdf"),
 }
 

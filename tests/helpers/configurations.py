@@ -6,7 +6,7 @@ import pinocchio as pin
 
 def random_configurations(simulator, seed, count):
     arm = simulator.arm
-    return np.random.default_rng(seed).uniform(arm.lower, arm.upper, (count, arm.n_axes))
+    return np.random.default_rng(seed).uniform(arm.lower, arm.upper, (count, arm.n_joints))
 
 
 def contact_boundary(simulator, seed, count):

@@ -58,7 +58,7 @@ def test_limits_and_speeds_are_those_of_the_data_sheet(shipped_arms, name):
     arm = shipped_arms[name]
     np.testing.assert_array_equal(arm.lower, np.deg2rad(LOWER))
     np.testing.assert_array_equal(arm.upper, np.deg2rad(UPPER))
-    np.testing.assert_array_equal(arm.speed, np.deg2rad(SPEED[name]))
+    np.testing.assert_array_equal(arm.velocity_limits, np.deg2rad(SPEED[name]))
 
 
 @pytest.mark.parametrize("name", ["paper", "paper_flange"])
@@ -120,13 +120,13 @@ def test_positive_axis_two_leans_forward_and_positive_axis_three_raises(shipped_
 
 def test_five_axes_are_actuated(shipped_arms):
     for arm in shipped_arms.values():
-        assert (arm.n_axes, arm.n_actuated) == (6, 5)
+        assert (arm.n_joints, arm.n_actuated) == (6, 5)
         np.testing.assert_array_equal(arm.home, np.zeros(6))
 
 
 def test_arrays_are_read_only(shipped_arms):
     arm = shipped_arms["paper"]
-    for array in (*arm.chain, arm.home, arm.lower, arm.upper, arm.speed):
+    for array in (*arm.chain, arm.home, arm.lower, arm.upper, arm.velocity_limits):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1
 
@@ -227,7 +227,7 @@ class TestGenericRobots:
         path = write_robot([make_joint(), make_joint("prismatic", axis="1 0 0")])
         arm = Arm.load(path)
         assert arm.name == "made"
-        assert arm.axis_names == ("joint_1", "joint_2")
+        assert arm.joint_names == ("joint_1", "joint_2")
         np.testing.assert_array_equal(arm.chain.prismatic, [False, True])
         assert arm.urdf_path == path.resolve()
 
@@ -284,7 +284,7 @@ class TestGenericRobots:
     def test_velocity_limits_can_be_given(self):
         limits = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
         arm = Arm.load("paper", velocity_limits=limits)
-        np.testing.assert_array_equal(arm.speed, limits)
+        np.testing.assert_array_equal(arm.velocity_limits, limits)
         np.testing.assert_array_equal(arm.model.velocityLimit, limits)
         simulator = Simulator(ReachProblem.load("right").replace(arm=arm), threads=1)
         np.testing.assert_allclose(simulator.step_limit, 0.02 * np.array(limits[:5]))
@@ -468,7 +468,7 @@ class TestRefusals:
     def test_no_rated_speed(self, make_joint, write_robot, velocity):
         limit = f'<limit lower="-1" upper="1" {velocity} effort="0"/>'
         path = write_robot([make_joint(limit=limit)])
-        with pytest.raises(ArmError, match="'joint_1'.*no rated speed"):
+        with pytest.raises(ArmError, match="'joint_1'.*no velocity limit"):
             Arm.load(path)
 
     @pytest.mark.parametrize(

@@ -57,7 +57,7 @@ def bounds_of(arm):
 
 
 def drawn(arm, rng, count):
-    return rng.uniform(arm.lower, arm.upper, (count, arm.n_axes))
+    return rng.uniform(arm.lower, arm.upper, (count, arm.n_joints))
 
 
 def frame_poses(arm, q):
@@ -68,7 +68,7 @@ def frame_poses(arm, q):
 
 
 def velocities(arm, q, link, point):
-    """How fast a point of a link moves per unit speed of each axis, shape (3, n_axes)."""
+    """How fast a point of a link moves per unit speed of each axis, shape (3, n_joints)."""
     data = arm.model.createData()
     pin.computeJointJacobians(arm.model, data, q)
     frame = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -94,7 +94,7 @@ def remainder_shares(arm, before, after):
     deviations, allowed = [], []
     for q, moved in zip(before, after, strict=True):
         e = moved - q
-        linear = arm.tool_position(q) + velocities(arm, q, arm.n_axes, arm.chain.tool) @ e
+        linear = arm.tool_position(q) + velocities(arm, q, arm.n_joints, arm.chain.tool) @ e
         deviations.append(np.linalg.norm(arm.tool_position(moved) - linear))
         turn = np.abs(e[:n])
         allowed.append(turn @ curvature @ turn / 2)
@@ -104,7 +104,9 @@ def remainder_shares(arm, before, after):
 class TestPointSpeed:
     def test_bounds_the_columns_of_the_jacobian(self, arm):
         chain = arm.chain
-        speeds = [point_speed(chain, i, arm.n_axes, chain.tool[None]) for i in range(arm.n_axes)]
+        speeds = [
+            point_speed(chain, i, arm.n_joints, chain.tool[None]) for i in range(arm.n_joints)
+        ]
         frame = arm.model.getFrameId(arm.tool_frame, pin.FrameType.BODY)
         data, columns = arm.model.createData(), []
         for q in drawn(arm, np.random.default_rng(0), 1500):
@@ -118,7 +120,7 @@ class TestPointSpeed:
 
     def test_bounds_any_point_between_given_ones_of_any_link(self, arm):
         rng = np.random.default_rng(1)
-        for link in range(1, arm.n_axes + 1):
+        for link in range(1, arm.n_joints + 1):
             corners = rng.normal(size=(4, 3)) * 0.3
             between = rng.dirichlet(np.full(4, 0.3), 40) @ corners
             bound = [point_speed(arm.chain, axis, link, corners) for axis in range(link)]
@@ -163,10 +165,12 @@ class TestCurvature:
         curvature, n, h = bounds_of(arm).curvature, arm.n_actuated, 1e-4
         rng = np.random.default_rng(3)
         largest = np.zeros((n, n))
-        for q in rng.uniform(arm.lower + 2 * h, arm.upper - 2 * h, (60, arm.n_axes)):
+        for q in rng.uniform(arm.lower + 2 * h, arm.upper - 2 * h, (60, arm.n_joints)):
             for i in range(n):
                 ahead, behind = (
-                    velocities(arm, q + s * h * np.eye(arm.n_axes)[i], arm.n_axes, arm.chain.tool)
+                    velocities(
+                        arm, q + s * h * np.eye(arm.n_joints)[i], arm.n_joints, arm.chain.tool
+                    )
                     for s in (1, -1)
                 )
                 change = np.linalg.norm(ahead - behind, axis=0)[:n] / (2 * h)

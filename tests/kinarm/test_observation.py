@@ -36,7 +36,7 @@ def situations(any_simulator):
 class TestParts:
     def test_equal_pinocchio(self, any_simulator, situations):
         arm, world = any_simulator.arm, any_simulator.world
-        places = part_slices(arm.n_axes)
+        places = part_slices(arm.n_joints)
         data = arm.model.createData()
         distances = world.distances(*situations[:2])
         for q, goal, seen, distance in zip(*situations, distances, strict=True):
@@ -45,7 +45,7 @@ class TestParts:
             np.testing.assert_array_equal(seen[places["goal"]], goal)
             offset = seen[places["goal_minus_tool"]]
             np.testing.assert_allclose(offset, goal - tool, rtol=0, atol=1e-12)
-            positions = np.concatenate([data.oMi[k + 1].translation for k in range(arm.n_axes)])
+            positions = np.concatenate([data.oMi[k + 1].translation for k in range(arm.n_joints)])
             np.testing.assert_allclose(seen[places["position"]], positions, rtol=0, atol=1e-12)
             quaternions = seen[places["orientation"]].reshape(-1, 4)
             for k, (w, x, y, z) in enumerate(quaternions):
@@ -79,7 +79,7 @@ class TestTable:
         assert len(observation_signs(n_joints)) == observation_size(n_joints)
 
     def test_length_is_that_of_the_kernel(self, any_simulator, situations):
-        n = observation_size(any_simulator.arm.n_axes)
+        n = observation_size(any_simulator.arm.n_joints)
         assert situations[2].shape == (200, n)
         assert any_simulator.n_observations == any_simulator.world.n_observations == n
 
@@ -105,7 +105,7 @@ class TestSigns:
     def test_are_those_of_the_reflection_by_pinocchio(self, any_simulator, situations):
         """A frame R, p reflected about y = 0 is S R S, S p with S = diag(1, -1, 1)."""
         arm = any_simulator.arm
-        places, signs = part_slices(arm.n_axes), observation_signs(arm.n_axes)
+        places, signs = part_slices(arm.n_joints), observation_signs(arm.n_joints)
         data = arm.model.createData()
         for q, goal, seen in zip(*situations, strict=True):
             reflected = seen * signs
@@ -136,8 +136,8 @@ class TestBounds:
         lower = rng.normal(size=3)
         upper = lower + rng.random(3)
         ranges = Ranges(goal_lower=lower, goal_upper=upper, reach=world.arm.reach)
-        low, high = observation_bounds(ranges, world.arm.n_axes)
-        q = rng.uniform(world.arm.lower, world.arm.upper, (50, world.arm.n_axes))
+        low, high = observation_bounds(ranges, world.arm.n_joints)
+        q = rng.uniform(world.arm.lower, world.arm.upper, (50, world.arm.n_joints))
         seen = world.observe(q, rng.uniform(lower, upper, (50, 3)))
         assert (seen >= low).all()
         assert (seen <= high).all()

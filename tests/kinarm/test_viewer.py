@@ -177,7 +177,9 @@ def test_any_arm_can_be_drawn(simulators, name):
     page = replay_page(waving(simulator))
     drawn = [command for command in commands(page) if command["type"] == "set_object"]
     assert sum("/arm/" in command["path"] for command in drawn) >= 4
-    assert {part.joint for part in arm_parts(simulator.arm)} <= set(range(simulator.arm.n_axes + 1))
+    assert {part.joint for part in arm_parts(simulator.arm)} <= set(
+        range(simulator.arm.n_joints + 1)
+    )
 
 
 def volume(mesh: Mesh) -> float:

@@ -25,7 +25,7 @@ from kinarm.policies.oracle.kernels.box_bound import (
 )
 from kinarm.policies.oracle.kernels.overlap import overlaps
 
-LAYOUT = "847240101a0f"
+LAYOUT = "7faee9a2216f"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 FOUND, EXCLUDED, EXHAUSTED = range(3)
@@ -73,7 +73,7 @@ def halve(
 ) -> None:
     """Replace a box by its halves, of which the one with the point proposed is examined first.
 
-    It is cut across the axis that has the largest part in what the linear model misses: that is
+    It is cut across the joint that has the largest part in what the linear model misses: that is
     what keeps the bound from excluding it.
     """
     n = step.shape[0]
@@ -112,7 +112,7 @@ def search(
     arm : ArmInScene
         The arm and its contact pairs.
     lower, upper : ndarray, shape (n,)
-        Corners of the box, in the first n axes [rad or m].
+        Corners of the box, in the first n joints [rad or m].
     goal : tuple of float
         The goal [m].
     enough : float
@@ -124,8 +124,8 @@ def search(
         Whether configurations that are proven to touch something are ruled out.
     budget : int
         Boxes to examine.
-    best : ndarray, shape (1, n_axes)
-        A configuration whose axes beyond the first n count. On return, the closest one found.
+    best : ndarray, shape (1, n_joints)
+        A configuration whose joints beyond the first n count. On return, the closest one found.
     boxes : ndarray, shape (BOXES, 2 n + 1)
         Work space: corners of the boxes that wait, and the distance proven of each.
 
@@ -139,8 +139,8 @@ def search(
         Lower bound of the distance over the box [m].
     """
     chain, bounds, shapes = arm
-    n, n_axes = lower.shape[0], best.shape[1]
-    poses, jacobian, offset = np.empty((n_axes + 1, POSE)), np.empty((3, n)), np.empty(3)
+    n, n_joints = lower.shape[0], best.shape[1]
+    poses, jacobian, offset = np.empty((n_joints + 1, POSE)), np.empty((3, n)), np.empty(3)
     half, step, parts, q = np.empty(n), np.empty(n), np.empty(n), best.copy()
     boxes[0, :n], boxes[0, n : 2 * n], boxes[0, 2 * n] = lower, upper, 0.0
     waiting, examined = 1, 0
@@ -218,12 +218,12 @@ def bound_steps(
         Range of rows to work on.
     arm : ArmInScene
         The arm and its contact pairs.
-    starts : ndarray, shape (m, n_axes)
+    starts : ndarray, shape (m, n_joints)
         Start configurations [rad or m].
     goals : ndarray, shape (m, 3)
         Goals [m].
     step_limit : ndarray, shape (n,)
-        Largest move of each actuated axis in a step [rad or m].
+        Largest move of each actuated joint in a step [rad or m].
     tolerance : float
         Distance at which a goal is reached [m].
     contact : bool
@@ -237,7 +237,7 @@ def bound_steps(
     tight : ndarray of bool, shape (m,)
         Output: whether a configuration that counts reaches the goal in that many steps, or none
         does in ``most``; else the budget ran out.
-    witnesses : ndarray, shape (m, n_axes)
+    witnesses : ndarray, shape (m, n_joints)
         Output: that configuration, where there is one.
     """
     n = step_limit.shape[0]
@@ -289,9 +289,9 @@ def bound_distance(
     arm : ArmInScene
         The arm and its contact pairs.
     lower, upper : ndarray, shape (m, n)
-        Corners of the boxes that the first n axes can reach [rad or m].
-    starts : ndarray, shape (m, n_axes)
-        Configurations whose other axes count [rad or m].
+        Corners of the boxes that the first n joints can reach [rad or m].
+    starts : ndarray, shape (m, n_joints)
+        Configurations whose other joints count [rad or m].
     goals : ndarray, shape (m, 3)
         Goals [m].
     resolution : float
@@ -302,7 +302,7 @@ def bound_distance(
         Boxes to examine.
     distances : ndarray, shape (m, 2)
         Output: the distance proven, and that of the closest configuration found [m].
-    configurations : ndarray, shape (m, n_axes)
+    configurations : ndarray, shape (m, n_joints)
         Output: the closest configuration found [rad or m].
     """
     best, boxes = np.empty((1, starts.shape[1])), np.empty((BOXES, 2 * lower.shape[1] + 1))

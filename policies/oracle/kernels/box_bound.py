@@ -21,7 +21,7 @@ from kinarm.kernels.kinematics import forward_kinematics, to_world
 from kinarm.motion_bounds import MotionBounds
 
 SWEEPS = 8
-"""Passes of the descent over the axes."""
+"""Passes of the descent over the joints."""
 
 NEGLIGIBLE = 1e-12
 """Length, and square of one, below which a vector has no direction to speak of [m, m^2]."""
@@ -55,7 +55,7 @@ def joint_bound(
     bound = 0.0
     for k in range(half.shape[0]):
         x, y, z = poses[k + 1, 13] - goal[0], poses[k + 1, 14] - goal[1], poses[k + 1, 15] - goal[2]
-        # Only the axes up to a joint move its origin; those beyond it are in its length.
+        # Only the joints up to a joint move its origin; those beyond it are in its length.
         motion = length[k]
         for i in range(k + 1):
             motion += half[i] * swing[i, k]
@@ -73,7 +73,7 @@ def linear_bound(
 ) -> float:
     """Lower bound of |offset + J e| over |e_i| <= half_i, and the e that nearly attains it.
 
-    A descent, one axis at a time, moves e to where the linear model comes closest to the goal.
+    A descent, one joint at a time, moves e to where the linear model comes closest to the goal.
     What remains there points in the direction u of the best bound, but the bound holds for any
     u: the descent need not have converged. It stops as soon as the bound exceeds ``enough``.
     """
@@ -97,7 +97,7 @@ def linear_bound(
         for i in range(n):
             jx, jy, jz = jacobian[0, i], jacobian[1, i], jacobian[2, i]
             square = jx * jx + jy * jy + jz * jz
-            # An axis that does not move the tool, such as one through it, stays where it is.
+            # A joint that does not move the tool, such as one through it, stays where it is.
             if square > NEGLIGIBLE:
                 moved = step[i] - (x * jx + y * jy + z * jz) / square
                 moved = min(max(moved, -half[i]), half[i])
@@ -112,7 +112,7 @@ def linear_bound(
 def model_error(
     curvature: NDArray[np.float64], half: NDArray[np.float64], parts: NDArray[np.float64]
 ) -> float:
-    """Bound of what the linear model misses in a box [m], and what each axis has part in it."""
+    """Bound of what the linear model misses in a box [m], and what each joint has part in it."""
     error = 0.0
     for i in range(half.shape[0]):
         parts[i] = 0.0

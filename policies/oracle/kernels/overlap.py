@@ -104,7 +104,7 @@ def overlaps(
     ----------
     chain, shapes
         The arm and its contact pairs.
-    poses : ndarray, shape (n_axes + 1, POSE)
+    poses : ndarray, shape (n_joints + 1, POSE)
         Forward kinematics at the centre of the box.
     half : ndarray, shape (n,)
         Half-widths of the box [rad or m].
@@ -152,8 +152,8 @@ def overlaps(
             x += width * abs(jacobian[0, axis])
             y += width * abs(jacobian[1, axis])
             z += width * abs(jacobian[2, axis])
-            # The rest is of second order: a revolute axis turns its own motion, and that of every
-            # later axis, by its angle. A pair of axes counts once, an axis with itself by half.
+            # The rest is of second order: a revolute joint turns its own motion, and that of every
+            # later joint, by its angle. A pair of joints counts once, a joint with itself by half.
             if not prismatic[axis]:
                 later = 0.5 * width * travel[axis, pair]
                 for other in range(axis + 1, min(n, link[i])):

@@ -9,7 +9,7 @@ from kinarm.chain import Chain
 from kinarm.kernels.compiling import inlined, kernel
 from kinarm.kernels.kinematics import POSE, forward_kinematics, point_jacobian, to_world
 
-LAYOUT = "1d397fd0c367"
+LAYOUT = "2deb1bdfb233"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 ITERATIONS = 24
@@ -19,7 +19,7 @@ DAMPING = 1e-4
 """Added to the diagonal of J J^T, which limits steps near singular configurations [m^2]."""
 
 LONGEST_STEP = 0.5
-"""Largest move of an axis in an iteration [rad or m]."""
+"""Largest move of a joint in an iteration [rad or m]."""
 
 
 @inlined
@@ -74,25 +74,25 @@ def damped_least_squares(
     owner : ndarray of int, shape (m,)
         Which goal and limits a configuration belongs to.
     lower, upper : ndarray, shape (n_goals, n)
-        Limits of the first n axes; the others stay as they are [rad or m].
+        Limits of the first n joints; the others stay as they are [rad or m].
     goals : ndarray, shape (n_goals, 3)
         Goals [m].
     radius : ndarray, shape (m,)
         Distance at which a configuration is left as it is [m].
-    configurations : ndarray, shape (m, n_axes)
+    configurations : ndarray, shape (m, n_joints)
         Within the limits; changed in place [rad or m].
     distances : ndarray, shape (m,)
         Output: distance from the tool to the goal [m].
     """
     prismatic, translation, rotation, axis, tool = chain[:5]
-    n_axes, n = configurations.shape[1], lower.shape[1]
-    poses, jacobian, step = np.empty((n_axes + 1, POSE)), np.empty((3, n)), np.empty(n)
+    n_joints, n = configurations.shape[1], lower.shape[1]
+    poses, jacobian, step = np.empty((n_joints + 1, POSE)), np.empty((3, n)), np.empty(n)
     q = configurations
     for row in range(first, last):
         goal = owner[row]
         for iteration in range(ITERATIONS + 1):
             forward_kinematics(prismatic, translation, rotation, axis, q, row, poses)
-            x, y, z = to_world(poses, n_axes, tool[0], tool[1], tool[2])
+            x, y, z = to_world(poses, n_joints, tool[0], tool[1], tool[2])
             dx, dy, dz = goals[goal, 0] - x, goals[goal, 1] - y, goals[goal, 2] - z
             distance = math.sqrt(dx * dx + dy * dy + dz * dz)
             distances[row] = distance
@@ -101,7 +101,7 @@ def damped_least_squares(
             point_jacobian(prismatic, axis, poses, (x, y, z), jacobian)
             # Aimed at half the radius, a step that falls short still arrives.
             share = 1.0 - 0.5 * radius[row] / distance
-            # An axis that rests on a limit and would leave it is taken out of the Jacobian, so that
+            # A joint that rests on a limit and would leave it is taken out of the Jacobian, so that
             # the others make up for it. That changes their steps: until none is blocked.
             blocked = True
             while blocked:

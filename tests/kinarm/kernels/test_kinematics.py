@@ -32,13 +32,13 @@ def fill(chain, configurations, frame, point, poses, jacobians):
 def poses_and_jacobians(arm, configurations, frame, point, n):
     """World poses of all frames, and Jacobians of a point of one for the first n joints."""
     count = len(configurations)
-    poses, found = np.empty((count, arm.n_axes + 1, POSE)), np.full((count, 3, n), np.nan)
+    poses, found = np.empty((count, arm.n_joints + 1, POSE)), np.full((count, 3, n), np.nan)
     fill(arm.chain, configurations, frame, np.asarray(point), poses, found)
     return poses, found
 
 
 def poses_of(arm, configurations):
-    return poses_and_jacobians(arm, configurations, arm.n_axes, arm.chain.tool, 1)[0]
+    return poses_and_jacobians(arm, configurations, arm.n_joints, arm.chain.tool, 1)[0]
 
 
 def jacobians(arm, configurations, frame, point, n):
@@ -52,7 +52,7 @@ class TestForwardKinematics:
         data = arm.model.createData()
         for q, frames in zip(configurations, poses_of(arm, configurations), strict=True):
             pin.forwardKinematics(arm.model, data, q)
-            for k in range(1, arm.n_axes + 1):
+            for k in range(1, arm.n_joints + 1):
                 rotation = frames[k, 4:13].reshape(3, 3)
                 np.testing.assert_allclose(rotation, data.oMi[k].rotation, rtol=0, atol=1e-12)
                 position = data.oMi[k].translation
@@ -68,7 +68,7 @@ class TestForwardKinematics:
 
     def test_quaternions_have_no_sign_flips_over_the_range_of_any_joint(self, any_simulator):
         arm = any_simulator.arm
-        for joint in range(arm.n_axes):
+        for joint in range(arm.n_joints):
             path = np.tile(random_configurations(any_simulator, 3, 1), (2001, 1))
             path[:, joint] = np.linspace(arm.lower[joint], arm.upper[joint], 2001)
             quaternions = poses_of(arm, path)[:, 1:, :4]
@@ -83,7 +83,7 @@ class TestToolJacobian:
     def test_equals_pinocchio(self, any_simulator):
         arm = any_simulator.arm
         configurations = random_configurations(any_simulator, 1, 300)
-        compiled = jacobians(arm, configurations, arm.n_axes, arm.chain.tool, arm.n_axes)
+        compiled = jacobians(arm, configurations, arm.n_joints, arm.chain.tool, arm.n_joints)
         frame = arm.model.getFrameId(arm.tool_frame, pin.FrameType.BODY)
         data = arm.model.createData()
         for q, jacobian in zip(configurations, compiled, strict=True):
@@ -95,8 +95,8 @@ class TestToolJacobian:
     def test_equals_finite_differences(self, any_simulator):
         arm = any_simulator.arm
         configurations = random_configurations(any_simulator, 2, 60)
-        compiled = jacobians(arm, configurations, arm.n_axes, arm.chain.tool, arm.n_axes)
-        moves = STEP * np.eye(arm.n_axes)
+        compiled = jacobians(arm, configurations, arm.n_joints, arm.chain.tool, arm.n_joints)
+        moves = STEP * np.eye(arm.n_joints)
         for q, jacobian in zip(configurations, compiled, strict=True):
             for joint, move in enumerate(moves):
                 change = arm.tool_position(q + move) - arm.tool_position(q - move)
@@ -107,9 +107,9 @@ class TestToolJacobian:
     def test_first_joints_alone(self, any_simulator):
         arm = any_simulator.arm
         configurations = random_configurations(any_simulator, 3, 20)
-        whole = jacobians(arm, configurations, arm.n_axes, arm.chain.tool, arm.n_axes)
-        for n in range(1, arm.n_axes):
-            part = jacobians(arm, configurations, arm.n_axes, arm.chain.tool, n)
+        whole = jacobians(arm, configurations, arm.n_joints, arm.chain.tool, arm.n_joints)
+        for n in range(1, arm.n_joints):
+            part = jacobians(arm, configurations, arm.n_joints, arm.chain.tool, n)
             np.testing.assert_array_equal(part, whole[:, :, :n])
 
     def test_by_hand(self, shipped_arms):
@@ -133,6 +133,6 @@ def test_points_of_other_links_by_finite_differences(any_simulator, frame):
         return data.oMi[frame].act(point)
 
     for q, jacobian in zip(configurations, compiled, strict=True):
-        for joint, move in enumerate(STEP * np.eye(arm.n_axes)[:frame]):
+        for joint, move in enumerate(STEP * np.eye(arm.n_joints)[:frame]):
             change = (place(q + move) - place(q - move)) / (2 * STEP)
             np.testing.assert_allclose(jacobian[:, joint], change, rtol=0, atol=1e-8)

@@ -25,7 +25,7 @@ def tool_distances(simulator, configurations, goal):
 def assert_solutions(simulator, found, start, goal, separation=0.2):
     """Within limits, horizon and tolerance, free, the nearest first, and apart."""
     arm, n = simulator.arm, simulator.n_actions
-    assert found.shape[1:] == (arm.n_axes,)
+    assert found.shape[1:] == (arm.n_joints,)
     assert ((found >= arm.lower) & (found <= arm.upper)).all()
     np.testing.assert_array_equal(found[:, n:], np.tile(start[n:], (len(found), 1)))
     assert (tool_distances(simulator, found, goal) <= simulator.task.tolerance).all()
@@ -215,7 +215,7 @@ class TestProject:
     def test_reports_true_distances_within_the_box(self, any_simulator):
         simulator, n = any_simulator, any_simulator.n_actions
         arm, rng = simulator.arm, np.random.default_rng(7)
-        starts = rng.uniform(arm.lower, arm.upper, (100, arm.n_axes))
+        starts = rng.uniform(arm.lower, arm.upper, (100, arm.n_joints))
         goals = np.array([arm.tool_position(q) for q in rng.permutation(starts)[:10]])
         lower, upper = step_box(simulator, starts[:10], np.full(10, 30))
         owner = np.arange(100) % 10

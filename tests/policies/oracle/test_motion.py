@@ -33,7 +33,9 @@ def free(make_joint, write_robot):
 def drawn(simulator, seed, count, last=0.4):
     """Random configurations; the axis that is not actuated stays where it is."""
     arm = simulator.arm
-    configurations = np.random.default_rng(seed).uniform(arm.lower, arm.upper, (count, arm.n_axes))
+    configurations = np.random.default_rng(seed).uniform(
+        arm.lower, arm.upper, (count, arm.n_joints)
+    )
     configurations[:, simulator.n_actions :] = last
     return configurations
 
@@ -54,7 +56,7 @@ def assert_within_rates(actions):
 
 
 def test_only_three_axes_are_actuated(free):
-    assert (free.n_actions, free.arm.n_axes) == (3, 4)
+    assert (free.n_actions, free.arm.n_joints) == (3, 4)
     np.testing.assert_allclose(free.step_limit, LIMITS)
 
 

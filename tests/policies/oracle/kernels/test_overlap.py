@@ -31,7 +31,7 @@ def claims(simulator, centres, halves=None, share=1.0):
     n = simulator.n_actions
     if halves is None:
         halves, share = np.ones((len(centres), n)), 0.0
-    poses, jacobian = np.empty((simulator.arm.n_axes + 1, POSE)), np.empty((3, n))
+    poses, jacobian = np.empty((simulator.arm.n_joints + 1, POSE)), np.empty((3, n))
     claimed = np.empty(len(centres), dtype=bool)
     shapes = simulator.world.contact_model.shapes
     claims_of(simulator.arm.chain, shapes, centres, halves, share, poses, jacobian, claimed)
@@ -166,7 +166,7 @@ class TestBoxes:
         rng = np.random.default_rng(10)
         tested = np.concatenate(
             [within(centres[i], halves[i], rng, 16) for i in claimed[:4000]]
-            or [np.zeros((0, any_simulator.arm.n_axes))]
+            or [np.zeros((0, any_simulator.arm.n_joints))]
         )
         assert certainly_free(any_simulator, tested).size == 0
         if any_simulator.world.contact_model.shapes.exact.all():
