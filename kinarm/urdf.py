@@ -103,9 +103,7 @@ def check_supported(model: pin.Model, path: Path, tool_frame: str) -> int:
             raise ArmError(f"joint {name!r} of {path.name} has no usable limits: {lower}..{upper}")
         speed = model.velocityLimit[index - 1]
         if not (np.isfinite(speed) and 0 < speed < 1e10):
-            raise ArmError(
-                f"joint {name!r} of {path.name} has no velocity limit: velocity={speed}"
-            )
+            raise ArmError(f"joint {name!r} of {path.name} has no velocity limit: velocity={speed}")
     if not model.existFrame(tool_frame, pin.FrameType.BODY):
         frames = [frame.name for frame in model.frames if frame.type == pin.FrameType.BODY]
         raise ArmError(
