@@ -5,16 +5,19 @@ BIN := $(VENV)/bin
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
 # An editable install links the modules that exist: a new one, or new metadata, calls for another.
-MODULES := $(shell ls kinarm/*.py kinarm/*/*.* policies/*.py evaluation/*.py evaluation/*/*.* data/*/* | cksum | cut -d' ' -f1)
+MODULES := $(shell find kinarm policies evaluation data -name __pycache__ -prune -o -type f -print | sort | cksum | cut -d' ' -f1)
 INSTALLED = $(VENV)/.installed-$(1)-$(MODULES)
 
-.PHONY: eval test lint docs clean
+.PHONY: eval test test-slow lint docs clean
 
 eval: $(call INSTALLED,core) ## evaluate all shipped policies on 200 trials a task
 	$(BIN)/kinarm-eval --trials 200
 
-test: $(call INSTALLED,test) ## run the tests
-	$(BIN)/python -m pytest --cov --cov-report=term
+test: $(call INSTALLED,test) ## run the tests, but for the slow ones
+	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow" --cov --cov-report=term
+
+test-slow: $(call INSTALLED,test) ## run the slow tests, those in a browser included
+	$(BIN)/python -m pytest -n auto --dist loadfile -m slow
 
 lint: $(call INSTALLED,dev) ## check style, format and types
 	$(BIN)/ruff check .

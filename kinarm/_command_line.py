@@ -115,7 +115,7 @@ def _add_option(
         options["dest"] = name
         options["required"] = item.default is MISSING and item.default_factory is MISSING
     elif item.default is not MISSING:
-        options |= {"nargs": "?", "default": item.default}  # argparse would parse SUPPRESS
+        options["nargs"] = "?"
     if hint is bool:
         negative = item.default is True and "flag" not in item.metadata
         action = argparse.BooleanOptionalAction if negatable or negative else "store_true"

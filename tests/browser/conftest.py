@@ -23,6 +23,13 @@ FLAGS = (
 )
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What needs a browser takes long: without a graphics card, it draws in software."""
+    for item in items:
+        if item.path.parent == Path(__file__).parent:
+            item.add_marker("slow")
+
+
 def do_without(reason: str) -> None:
     """Skip, unless the environment demands a browser."""
     if os.environ.get(REQUIRED) == "1":

@@ -65,6 +65,8 @@ class Baking:
         Where it goes.
     oven : Oven
         What it is baked in.
+    window : tuple of float
+        Width and height [m].
     """
 
     recipe: Path | None = field(default=None, metadata={"flag": "recipe"})
@@ -78,6 +80,7 @@ class Baking:
     knead: bool = True
     out: Path | None = field(default=None, metadata={"flag": "--output"})
     oven: Oven = field(default_factory=Oven)
+    window: tuple[float, float] = (0.4, 0.3)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,11 +91,14 @@ class Mixing:
     ----------
     what : str
         What is mixed.
+    bowl : str
+        What it is mixed in.
     speed : int
         Turns.
     """
 
     what: str = field(metadata={"flag": "what"})
+    bowl: str
     speed: int = 1
 
 
@@ -124,6 +130,7 @@ class TestOptions:
             *("cake.toml", "--guests", 7, "--share", "1e-1", "--shape", "roll"),
             *("--names", "Ann", "Bob", "--minutes", 5, "--topping", "rye", "--topping", "salt"),
             *("--quiet", "--no-knead", "--output", "bread", "--oven-heat", 500, "--no-oven-fan"),
+            *("--window", 1, 2),
         )
         assert given_options(options, Baking) == {
             "recipe": Path("cake.toml"),
@@ -137,6 +144,7 @@ class TestOptions:
             "knead": False,
             "out": Path("bread"),
             "oven": {"heat": 500.0, "fan": False},
+            "window": (1.0, 2.0),
         }
 
     def test_fields_can_be_left_out(self, capsys):
@@ -144,17 +152,24 @@ class TestOptions:
             capsys, "--guests", 3, skip=("guests",)
         )
 
-    def test_positional_without_a_default_has_to_be_given(self, capsys):
-        assert request_of(parsed("eggs", kind=Mixing), Mixing) == Mixing(what="eggs")
-        assert "what" in refused(capsys, kind=Mixing)
+    def test_what_has_no_default_has_to_be_given(self, capsys):
+        options = parsed("eggs", "--bowl", "pan", kind=Mixing)
+        assert request_of(options, Mixing) == Mixing(what="eggs", bowl="pan")
+        said = "the following arguments are required"
+        assert f"{said}: what" in refused(capsys, "--bowl", "pan", kind=Mixing)
+        assert f"{said}: --bowl" in refused(capsys, "eggs", kind=Mixing)
+
+    def test_what_is_false_by_default_can_be_negatable(self):
+        options = parsed("--no-quiet", negatable=True)
+        assert given_options(options, Baking) == {"quiet": False}
 
     def test_options_of_others_are_left_alone(self):
         parser = Parser(prog="bake")
         add_options(parser, Baking)
         add_options(parser.add_argument_group("mixing"), Mixing)
-        options = parser.parse_args(["--guests", "3", "--speed", "2", "cake.toml", "eggs"])
+        options = parser.parse_args(["--guests", "3", "--bowl", "pan", "cake.toml", "eggs"])
         assert given_options(options, Baking) == {"guests": 3, "recipe": Path("cake.toml")}
-        assert request_of(options, Mixing) == Mixing(what="eggs", speed=2)
+        assert request_of(options, Mixing) == Mixing(what="eggs", bowl="pan")
 
     def test_help_comes_from_the_docstring(self, capsys, monkeypatch):
         monkeypatch.setenv("COLUMNS", "200")
@@ -186,6 +201,7 @@ class TestOptions:
             (("--oven-heat", "hot"), "argument --oven-heat: must be a finite number, got 'hot'"),
             (("--guests",), "argument --guests: expected one argument"),
             (("--names",), "argument --names: expected at least one argument"),
+            (("--window", 1), "argument --window: expected 2 arguments"),
             (("--no-quiet",), "unrecognized arguments: --no-quiet"),
             (("--icing",), "unrecognized arguments: --icing"),
         ],
