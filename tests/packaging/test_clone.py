@@ -45,8 +45,9 @@ def test_on_the_path_without_installation(package, tmp_path):
 def test_a_folder_called_kinarm_elsewhere_gains_no_path(tmp_path):
     """The guard is for clones: a copy without a pyproject.toml beside it stays as it is."""
     copy = tmp_path / "kinarm"
-    copy.mkdir()
-    for name in ("__init__.py", "__init__.pyi"):
+    (copy / "envs").mkdir(parents=True)
+    modules = ("__init__.py", "__init__.pyi")
+    for name in (*modules, *(f"envs/{each}" for each in (*modules, "registration.py"))):
         (copy / name).write_bytes((ROOT / "kinarm" / name).read_bytes())
     code = "import kinarm; print(list(kinarm.__path__))"
     done = subprocess.run(
