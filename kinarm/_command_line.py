@@ -9,9 +9,9 @@ import sys
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import MISSING, Field, is_dataclass
 from pathlib import Path
-from typing import Any, Literal, NoReturn, TypeVar, get_args, get_origin
+from typing import Any, Literal, NoReturn, TypeVar, get_args, get_origin, get_type_hints
 
-from kinarm._fields import alternatives, expected, init_fields, summary_of, type_hints
+from kinarm._fields import alternatives, expected, init_fields, summary_of
 from kinarm.errors import KinarmError
 
 Request = TypeVar("Request")
@@ -93,7 +93,7 @@ def _add_option(
     negatable: bool = False,
 ) -> None:
     """Add the option of one field, or those of a nested dataclass."""
-    hint = alternatives(type_hints(kind)[item.name])[0]
+    hint = alternatives(get_type_hints(kind)[item.name])[0]
     if isinstance(hint, type) and is_dataclass(hint):
         for inner in init_fields(hint).values():
             _add_option(parser, hint, inner, f"{prefix}{item.name}.", negatable=True)

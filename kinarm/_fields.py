@@ -60,7 +60,7 @@ def from_plain(kind: type[T], entries: object, where: str, path: str = "") -> T:
     for name, item in known.items():
         if name not in entries and item.default is MISSING and item.default_factory is MISSING:
             raise InvalidInputError(f"{where}: '{path}{name}' is missing: {summary_of(kind, name)}")
-    hints = type_hints(kind)
+    hints = get_type_hints(kind)
     values = {
         name: _value(hints[name], entry, where, f"{path}{name}", kind)
         for name, entry in entries.items()
@@ -85,7 +85,7 @@ def check_fields(given: Any) -> None:
         If a value has the wrong type; names the field and what is expected.
     """
     kind = type(given)
-    hints = type_hints(kind)
+    hints = get_type_hints(kind)
     for name in init_fields(kind):
         value = _value(hints[name], getattr(given, name), "", name, kind)
         object.__setattr__(given, name, value)
@@ -153,11 +153,6 @@ def alternatives(hint: Any) -> tuple[Any, ...]:
     if get_origin(hint) in (Union, types.UnionType):
         return tuple(part for part in get_args(hint) if part is not type(None))
     return (hint,)
-
-
-def type_hints(kind: type) -> dict[str, Any]:
-    """Resolved types of the fields of a dataclass."""
-    return get_type_hints(kind)
 
 
 def init_fields(kind: type) -> dict[str, Field[Any]]:
