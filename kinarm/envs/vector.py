@@ -120,6 +120,7 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
             over = np.flatnonzero(~before).tolist()
             raise InvalidInputError(f"episodes {over} are over: reset them with reset_mask")
         result = self.simulator.step(episodes, actions)
+        ends = result.terminated, result.truncated  # before the infos take over the arrays
         infos = self._step_infos(episodes, result, before)
         ended = np.flatnonzero(before & (episodes.status != RUNNING))
         if self.autoreset_mode is AutoresetMode.NEXT_STEP and not before.all():
@@ -127,7 +128,6 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         if self.autoreset_mode is AutoresetMode.SAME_STEP and ended.size:
             self._keep_final(episodes, ended, infos)
             self._renew(episodes, ended, infos)
-        ends = result.terminated, result.truncated
         return episodes.observation.copy(), result.reward, *ends, infos
 
     def _step_infos(
