@@ -9,9 +9,9 @@ import sys
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import MISSING, Field, is_dataclass
 from pathlib import Path
-from typing import Any, Literal, NoReturn, TypeVar, get_args, get_origin
+from typing import Any, Literal, NoReturn, TypeVar, get_args, get_origin, get_type_hints
 
-from kinarm._fields import alternatives, expected, init_fields, summary_of, type_hints
+from kinarm._fields import alternatives, expected, init_fields, summary_of
 from kinarm.errors import KinarmError
 
 Request = TypeVar("Request")
@@ -77,18 +77,8 @@ def add_options(
     Names, types and help come from the dataclass and its docstring. A field's metadata may hold
     ``flag`` (another name of the option, or one without dashes for a positional argument),
     ``metavar``, and ``repeat`` (a tuple is collected from repetitions of the option). The fields
-    of a nested dataclass get its name as a prefix, such as ``--reward-success``.
-
-    Parameters
-    ----------
-    parser : argparse.ArgumentParser or group
-        What to add them to.
-    kind : type
-        The dataclass.
-    skip : collection of str
-        Fields to leave out.
-    negatable : bool
-        Whether there is an option ``--no-x`` also for what is false by default.
+    of a nested dataclass get its name as a prefix, such as ``--reward-success``. If ``negatable``,
+    there is an option ``--no-x`` also for what is false by default.
     """
     for name, item in init_fields(kind).items():
         if name not in skip:
@@ -103,7 +93,7 @@ def _add_option(
     negatable: bool = False,
 ) -> None:
     """Add the option of one field, or those of a nested dataclass."""
-    hint = alternatives(type_hints(kind)[item.name])[0]
+    hint = alternatives(get_type_hints(kind)[item.name])[0]
     if isinstance(hint, type) and is_dataclass(hint):
         for inner in init_fields(hint).values():
             _add_option(parser, hint, inner, f"{prefix}{item.name}.", negatable=True)
@@ -165,15 +155,7 @@ def _parser_of(hint: Any) -> Callable[[str], Any]:
 
 
 def given_options(options: argparse.Namespace, kind: type) -> dict[str, Any]:
-    """What the command line gives of a dataclass's fields; nested ones as mappings.
-
-    Parameters
-    ----------
-    options : Namespace
-        What a parser with the options of `add_options` parsed.
-    kind : type
-        The dataclass.
-    """
+    """What the command line gives of a dataclass's fields; nested ones as mappings."""
     given: dict[str, Any] = {}
     for name, value in vars(options).items():
         outer, _, inner = name.partition(".")

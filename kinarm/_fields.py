@@ -4,7 +4,6 @@ A dataclass says once what its fields are called, which type and default they ha
 Parameters of its docstring, what they mean; files, messages and options follow from that.
 """
 
-import json
 import re
 import types
 from collections.abc import Mapping
@@ -39,48 +38,15 @@ def to_plain(value: Any) -> Any:
     return str(value) if isinstance(value, Path) else value
 
 
-def to_toml(entries: Mapping[str, Any], path: str = "") -> str:
-    """Write a mapping of plain values as TOML: its values first, then its tables."""
-    values = {key: entry for key, entry in entries.items() if not _is_table(entry)}
-    text = "".join(f"{key} = {_toml_value(entry)}\n" for key, entry in values.items())
-    for key, entry in entries.items():
-        if isinstance(entry, Mapping):
-            text += f"\n[{path}{key}]\n{to_toml(entry, f'{path}{key}.')}"
-        elif _is_table(entry):
-            for row in entry:
-                text += f"\n[[{path}{key}]]\n{to_toml(row, f'{path}{key}.')}"
-    return text
-
-
-def _is_table(entry: object) -> bool:
-    rows = isinstance(entry, list) and bool(entry) and isinstance(entry[0], Mapping)
-    return rows or isinstance(entry, Mapping)
-
-
-def _toml_value(entry: object) -> str:
-    """Write one value; what JSON writes of texts, numbers and lists is TOML, too."""
-    return json.dumps(entry, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
 def from_plain(kind: type[T], entries: object, where: str, path: str = "") -> T:
-    """Build a dataclass of plain values, and say what is wrong with them if it cannot be.
-
-    Parameters
-    ----------
-    kind : type
-        A dataclass.
-    entries : mapping
-        Plain values by the names of the fields; those with a default may be missing.
-    where : str
-        Where they come from, for messages, such as the name of a file.
-    path : str
-        Names of the tables around them, each followed by a dot.
+    """Build a dataclass of plain values by the names of its fields, or say what is wrong.
 
     Raises
     ------
     InvalidInputError
         If a key is unknown or missing, or a value has the wrong type or is refused by the
-        dataclass; in one line that names the source, the key and what is expected.
+        dataclass; in one line that names the source ``where``, the key, led by the ``path`` of
+        the tables around it, and what is expected.
     """
     if not isinstance(entries, Mapping):
         table = path.removesuffix(".") or "it"
@@ -94,7 +60,7 @@ def from_plain(kind: type[T], entries: object, where: str, path: str = "") -> T:
     for name, item in known.items():
         if name not in entries and item.default is MISSING and item.default_factory is MISSING:
             raise InvalidInputError(f"{where}: '{path}{name}' is missing: {summary_of(kind, name)}")
-    hints = type_hints(kind)
+    hints = get_type_hints(kind)
     values = {
         name: _value(hints[name], entry, where, f"{path}{name}", kind)
         for name, entry in entries.items()
@@ -119,7 +85,7 @@ def check_fields(given: Any) -> None:
         If a value has the wrong type; names the field and what is expected.
     """
     kind = type(given)
-    hints = type_hints(kind)
+    hints = get_type_hints(kind)
     for name in init_fields(kind):
         value = _value(hints[name], getattr(given, name), "", name, kind)
         object.__setattr__(given, name, value)
@@ -187,11 +153,6 @@ def alternatives(hint: Any) -> tuple[Any, ...]:
     if get_origin(hint) in (Union, types.UnionType):
         return tuple(part for part in get_args(hint) if part is not type(None))
     return (hint,)
-
-
-def type_hints(kind: type) -> dict[str, Any]:
-    """Resolved types of the fields of a dataclass."""
-    return get_type_hints(kind)
 
 
 def init_fields(kind: type) -> dict[str, Field[Any]]:

@@ -21,20 +21,8 @@ def run_rows(kernel: Callable[..., None], n: int, work: int, threads: int, *arra
     """Call ``kernel(first, last, *arrays)`` for ranges that cover n rows.
 
     Kernels release the GIL and treat rows independently, so the result depends neither on the
-    number of threads nor on the ranges.
-
-    Parameters
-    ----------
-    kernel : callable
-        A compiled kernel.
-    n : int
-        Number of rows.
-    work : int
-        Estimate of the work in episode steps; little work is done by the calling thread.
-    threads : int
-        Threads to use.
-    *arrays
-        Further arguments of the kernel.
+    number of threads nor on the ranges. Little ``work``, estimated in episode steps, is done by
+    the calling thread.
     """
     if threads == 1 or n == 0 or work < PARALLEL_STEPS:
         kernel(0, n, *arrays)

@@ -7,21 +7,13 @@ from kinarm.errors import InvalidInputError
 
 
 def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
-    """Copy an argument into a contiguous float64 array, or refuse it.
-
-    Parameters
-    ----------
-    name : str
-        Name of the argument, for the message.
-    value : array_like
-        What was given.
-    shape : tuple
-        Expected shape; None stands for any length.
+    """Copy an argument into a contiguous float64 array.
 
     Raises
     ------
     InvalidInputError
-        If it is not numeric, has another shape or holds an entry that is not finite.
+        If it is not numeric, has another shape, in which None stands for any length, or holds an
+        entry that is not finite.
     """
     try:
         array = np.array(value, dtype=np.float64, order="C")
@@ -40,13 +32,7 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> 
 
 
 def whole_number(name: str, value: object, at_least: int) -> int:
-    """Return a whole number that is large enough, or refuse it.
-
-    Raises
-    ------
-    InvalidInputError
-        If it is not an integer, or too small.
-    """
+    """Return a whole number that is large enough, or raise InvalidInputError."""
     if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < at_least:
         raise InvalidInputError(
             f"{name} must be a whole number of at least {at_least}, got {value!r}"

@@ -19,22 +19,12 @@ class Capsule(NamedTuple):
 
 
 def enclosing_capsule(shape: pin.GeometryObject) -> Capsule:
-    """Capsule that equals a capsule or sphere, or encloses any other shape.
-
-    Parameters
-    ----------
-    shape : pinocchio.GeometryObject
-        Capsule, sphere, cylinder, box or convex hull.
-
-    Returns
-    -------
-    Capsule
-        In the frame of the shape's parent joint.
+    """Capsule around a shape, in the frame of its joint; it equals a capsule or sphere.
 
     Raises
     ------
     ArmError
-        For any other kind of shape.
+        If the shape is no capsule, sphere, cylinder, box or convex hull.
     """
     body = shape.geometry
     if isinstance(body, coal.Sphere):

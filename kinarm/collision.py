@@ -108,9 +108,9 @@ class ContactModel:
         """Place an arm in a scene and choose the pairs to test."""
         geometry = arm.geometry.copy()
         n_shapes = geometry.ngeoms
-        obstacles = _add_scene(geometry, scene)
+        _add_scene(geometry, scene)
+        surroundings = [shape.name for shape in geometry.geometryObjects][n_shapes:]
         candidates = _candidate_pairs(geometry, n_shapes, len(scene.obstacles))
-        geometry.removeAllCollisionPairs()
         for first, second, _ in candidates:
             geometry.addCollisionPair(pin.CollisionPair(first, second))
         dropped = _uninformative_pairs(arm, geometry, n_shapes)
@@ -121,7 +121,7 @@ class ContactModel:
         return cls(
             arm=arm,
             geometry=geometry,
-            body_names=(*body_names(arm), *obstacles),
+            body_names=(*body_names(arm), *surroundings),
             shapes=_contact_shapes(arm, scene, kept, n_shapes),
         )
 
@@ -216,19 +216,14 @@ def make_verdicts_reliable(data: pin.GeometryData) -> pin.GeometryData:
     return data
 
 
-def _add_scene(geometry: pin.GeometryModel, scene: Scene) -> tuple[str, ...]:
-    """Add obstacles, then the ground, to a geometry model; return their names."""
-    names = []
+def _add_scene(geometry: pin.GeometryModel, scene: Scene) -> None:
+    """Add obstacles, then the ground, to a geometry model."""
     for obstacle in scene.obstacles:
-        placement = pin.SE3(np.eye(3), obstacle.centre)
-        box = coal.Box(*obstacle.size)
-        names.append(obstacle.name)
-        geometry.addGeometryObject(pin.GeometryObject(names[-1], 0, placement, box))
+        placement, box = pin.SE3(np.eye(3), obstacle.centre), coal.Box(*obstacle.size)
+        geometry.addGeometryObject(pin.GeometryObject(obstacle.name, 0, placement, box))
     if scene.ground:
-        names.append("ground")
         halfspace = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
         geometry.addGeometryObject(pin.GeometryObject("ground", 0, pin.SE3.Identity(), halfspace))
-    return tuple(names)
 
 
 def body_names(arm: Arm) -> tuple[str, ...]:

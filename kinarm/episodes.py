@@ -141,20 +141,8 @@ class Episodes(NamedTuple):
     ) -> "Episodes":
         """Allocate episodes at their starts; the kernel ``begin`` fills in the rest.
 
-        Parameters
-        ----------
-        starts : ndarray, shape (n, n_joints)
-            Start configurations [rad or m].
-        goals : ndarray, shape (n, 3)
-            Goal positions [m].
-        n_pairs : int
-            Number of contact pairs.
-        horizon : int
-            Steps of a whole episode.
-        record : bool
-            Keep the configurations visited.
-        shift : ndarray, shape (n_observations,), optional
-            Collect sums of the observations about this point.
+        ``record`` keeps the configurations visited, and a ``shift``, shape (n_observations,),
+        collects sums of the observations about this point.
         """
         n, n_joints = starts.shape
         n_observations = observation_size(n_joints)

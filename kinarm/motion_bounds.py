@@ -34,11 +34,10 @@ class MotionBounds(NamedTuple):
         that joint, hence no longer than itself; a prismatic joint does not change it.
         """
         origin = np.zeros((1, 3))
-        speed = [point_speed(chain, axis, chain.n_joints, chain.tool[None]) for axis in range(n)]
-        curvature = np.zeros((n, n))
-        for i in range(n):
-            for j in range(i, n):
-                curvature[i, j] = curvature[j, i] = 0.0 if chain.prismatic[i] else speed[j]
+        moved = range(n)
+        speed = np.array([point_speed(chain, k, chain.n_joints, chain.tool[None]) for k in moved])
+        i, j = np.indices((n, n))
+        curvature = np.where(chain.prismatic[np.minimum(i, j)], 0.0, speed[np.maximum(i, j)])
         swing = np.array(
             [
                 [point_speed(chain, i, k + 1, origin) if i <= k else 0.0 for k in range(n)]
@@ -61,18 +60,9 @@ def point_speed(chain: Chain, axis: int, link: int, points: NDArray[np.float64])
     """Bound on the speed of points of a link per unit speed of a joint [m/rad, or m/m].
 
     A revolute joint moves a point by its distance from the axis. The joint after it starts at a
-    fixed distance from the axis, and the links beyond add at most their lengths.
-
-    Parameters
-    ----------
-    chain : Chain
-        The chain.
-    axis : int
-        Which axis, from 0.
-    link : int
-        Link that carries the points: k is that of the k-th joint, from 1.
-    points : ndarray, shape (n, 3)
-        Points in the frame of the link [m]; the bound holds for their convex hull.
+    fixed distance from the axis, and the links beyond add at most their lengths. Joints count
+    from 0, links from 1: link k is that of the k-th joint. The points, shape (n, 3) [m], are those
+    of the link's frame; the bound holds for their convex hull.
     """
     if chain.prismatic[axis]:
         return 1.0

@@ -153,18 +153,10 @@ def network_control(
     n: int,
     widths: tuple[int, int],
 ) -> Control:
-    """Arrange networks for the kernels.
+    """Arrange the networks of n episodes for the kernels.
 
-    Parameters
-    ----------
-    policies : Networks, policy or sequence of policies
-        One for all episodes, or one for each, or as many as `policy_index` refers to.
-    policy_index : array_like of int, shape (n,), optional
-        Which network drives which episode.
-    n : int
-        Number of episodes.
-    widths : tuple of int
-        Length of an observation and of an action.
+    There is one policy for all of them, or one for each, or ``policy_index`` tells which drives
+    which; ``widths`` are the lengths of an observation and of an action.
 
     Raises
     ------
@@ -188,30 +180,30 @@ def network_control(
         whole = index.shape == (n,) and np.issubdtype(index.dtype, np.integer)
         if not whole or (n and not 0 <= index.min() <= index.max() < count):
             raise InvalidInputError(f"policy_index must hold {n} whole numbers in 0..{count - 1}")
-    return _control(networks, index.astype(np.int64), np.zeros((0, 0, 0)))
+    control = table_control(np.zeros((0, 0, 0)))._replace(
+        layers=networks.layers,
+        weights=networks.weights,
+        policy=index.astype(np.int64),
+        activation=CODES[networks.activation],
+        output=CODES[networks.output],
+    )
+    if networks.mirror is None:
+        return control
+    # Copies, which are writable: kernels are compiled anew for arrays that are read-only.
+    signs, action_signs = map(np.array, networks.mirror)
+    return control._replace(observation_signs=signs, action_signs=action_signs)
 
 
 def table_control(actions: NDArray[np.float64]) -> Control:
     """Take actions from a table, shape (n, n_steps, n_actions); one step serves every step."""
-    return _control(None, np.zeros(0, dtype=np.int64), actions)
-
-
-def _control(
-    networks: Networks | None, policy: NDArray[np.int64], actions: NDArray[np.float64]
-) -> Control:
-    """Arrange networks or a table for the kernels."""
-    mirror = None if networks is None else networks.mirror
-    # Copies, which are writable: kernels are compiled anew for arrays that are read-only.
-    signs = (np.zeros(0), np.zeros(0)) if mirror is None else map(np.array, mirror)
-    observation_signs, action_signs = signs
     return Control(
-        layers=np.zeros(0, dtype=np.int64) if networks is None else networks.layers,
-        weights=np.zeros((0, 0)) if networks is None else networks.weights,
-        policy=policy,
-        activation=CODES["linear" if networks is None else networks.activation],
-        output=CODES["linear" if networks is None else networks.output],
-        observation_signs=observation_signs,
-        action_signs=action_signs,
+        layers=np.zeros(0, dtype=np.int64),
+        weights=np.zeros((0, 0)),
+        policy=np.zeros(0, dtype=np.int64),
+        activation=LINEAR,
+        output=LINEAR,
+        observation_signs=np.zeros(0),
+        action_signs=np.zeros(0),
         side=GOAL_SIDE,
         actions=actions,
     )

@@ -9,12 +9,8 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kinarm.kernels.compiling import inlined
-
-Array = NDArray[np.float64]
-Vector = tuple[float, float, float]
+from kinarm.kernels.compiling import Array, Vector, inlined
 
 VERSION = 1
 """To be raised when the meaning of a part changes, but neither its name nor its length."""

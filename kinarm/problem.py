@@ -14,7 +14,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from kinarm._fields import check_fields, from_plain, init_fields, to_plain, to_toml
+import tomli_w
+
+from kinarm._fields import check_fields, from_plain, init_fields, to_plain
 from kinarm._files import first_line, write_text
 from kinarm._validation import whole_number
 from kinarm.arm_specification import ArmSpecification
@@ -237,7 +239,7 @@ class ReachProblem:
 
     def to_toml(self) -> str:
         """As the text of a problem file; `load` reads it without loss."""
-        return to_toml(self.to_json())
+        return tomli_w.dumps(self.to_json())
 
     def save(self, path: str | Path) -> None:
         """Write a problem file.
@@ -313,10 +315,7 @@ def _merged(below: Any, above: Any) -> Any:
     """Tables merged key by key; everything else from above."""
     if not (isinstance(below, Mapping) and isinstance(above, Mapping)):
         return above
-    keys = dict.fromkeys((*below, *above))
-    return {
-        key: _merged(below.get(key, above.get(key)), above.get(key, below.get(key))) for key in keys
-    }
+    return {**below, **{key: _merged(below.get(key), entry) for key, entry in above.items()}}
 
 
 def _flattened(value: Any, path: str = "") -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm._archive import Archive, load_archive, reading, save_archive
+from kinarm._archive import load_archive, reading, save_archive
 from kinarm._validation import finite_array, whole_number
 from kinarm.errors import InvalidInputError, RecordingFileError
 from kinarm.problem import ReachProblem
@@ -181,20 +181,15 @@ def load_recordings(path: str | Path) -> list[Recording]:
     """
     archive = load_archive(path, KIND, FORMAT_VERSION, RecordingFileError)
     with reading(repr(str(path)), KIND, RecordingFileError):
-        return _recordings(archive)
-
-
-def _recordings(archive: Archive) -> list[Recording]:
-    """Rebuild recordings from what a file holds."""
-    header, recordings = archive.header, []
-    problems = [ReachProblem.from_json(entries) for entries in header["problems"]]
-    for number, entries in enumerate(header["recordings"]):
-        given = {**entries, "problem": problems[entries["problem"]]}
-        given |= {name: archive.arrays.get(f"{name}_{number}") for name in ARRAYS}
-        if given["contact"] is not None:
-            given["contact"] = tuple(given["contact"])
-        recordings.append(Recording(**given))
-    return recordings
+        problems = [ReachProblem.from_json(entries) for entries in archive.header["problems"]]
+        recordings = []
+        for number, entries in enumerate(archive.header["recordings"]):
+            given = {**entries, "problem": problems[entries["problem"]]}
+            given |= {name: archive.arrays.get(f"{name}_{number}") for name in ARRAYS}
+            if given["contact"] is not None:
+                given["contact"] = tuple(given["contact"])
+            recordings.append(Recording(**given))
+        return recordings
 
 
 def record_rollouts(

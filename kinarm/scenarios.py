@@ -69,15 +69,7 @@ def draw_scenarios(
 
 
 class ScenarioStream:
-    """Starts and goals of successive episodes, drawn a few at a time.
-
-    Parameters
-    ----------
-    world : World
-        The world of the problem.
-    rng : numpy.random.Generator
-        Source of randomness.
-    """
+    """Starts and goals of successive episodes, drawn a few at a time."""
 
     def __init__(self, world: World, rng: np.random.Generator) -> None:
         self._world = world

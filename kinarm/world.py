@@ -68,19 +68,12 @@ class World:
         return self._begun_at(configurations, goals).observation
 
     def distances(self, configurations: ArrayLike, goals: ArrayLike) -> NDArray[np.float64]:
-        """Distances from the tool to goals, as in episodes.
+        """Distances from the tool to goals [m], shape (n,).
 
         Parameters
         ----------
-        configurations : array_like, shape (n, n_joints)
-            Joint positions [rad or m].
-        goals : array_like, shape (n, 3)
-            Goal positions [m].
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Distances [m].
+        configurations, goals : array_like
+            As for `observe`.
         """
         return self._begun_at(configurations, goals).distance
 

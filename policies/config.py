@@ -4,9 +4,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from numbers import Real
-from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
 
-from kinarm._fields import alternatives, init_fields, type_hints
+from kinarm._fields import alternatives, init_fields
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
 from kinarm.problem import PROBLEMS, ReachProblem
@@ -89,7 +89,7 @@ class TrainingConfig:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "problem", ReachProblem.load(self.problem))
-        hints = type_hints(type(self))
+        hints = get_type_hints(type(self))
         for name, item in init_fields(type(self)).items():
             hint, value = alternatives(hints[name])[0], getattr(self, name)
             if value is not None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm._archive import CORRUPT, load_archive, save_archive
+from kinarm._archive import load_archive, save_archive
 from kinarm._files import write_text
 from kinarm.errors import KinarmError, PolicyFileError
 from kinarm.evaluation.reproduction.study import Protocol, Training
@@ -139,7 +139,7 @@ class RunStore:
             header, arrays = load_archive(path, KIND, FORMAT_VERSION, KinarmError)
             fits = header == self._header(training)
             run = TrainedRun(**arrays, wall_time=wall_time)
-        except (OSError, KinarmError, *CORRUPT):
+        except (OSError, KinarmError, RecursionError, TypeError, ValueError):
             return None
         return run if fits and len(run.wall_time) == len(run.returns) else None
 

@@ -9,13 +9,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from kinarm._validation import whole_number
-from kinarm.envs.reach import (
-    Array,
-    action_space,
-    make_simulator,
-    observation_space,
-    pick_scenario,
-)
+from kinarm.envs.reach import Array, action_space, make_simulator, observation_space, pick_scenario
 from kinarm.episodes import RUNNING, Episodes
 from kinarm.errors import InvalidInputError
 from kinarm.problem import ProblemLike
@@ -126,7 +120,7 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
             over = np.flatnonzero(~before).tolist()
             raise InvalidInputError(f"episodes {over} are over: reset them with reset_mask")
         result = self.simulator.step(episodes, actions)
-        terminated = result.terminated
+        ends = result.terminated, result.truncated  # before the infos take over the arrays
         infos = self._step_infos(episodes, result, before)
         ended = np.flatnonzero(before & (episodes.status != RUNNING))
         if self.autoreset_mode is AutoresetMode.NEXT_STEP and not before.all():
@@ -134,13 +128,7 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         if self.autoreset_mode is AutoresetMode.SAME_STEP and ended.size:
             self._keep_final(episodes, ended, infos)
             self._renew(episodes, ended, infos)
-        return (
-            episodes.observation.copy(),
-            result.reward,
-            terminated,
-            result.truncated,
-            infos,
-        )
+        return episodes.observation.copy(), result.reward, *ends, infos
 
     def _step_infos(
         self, episodes: Episodes, result: StepResult, stepped: NDArray[np.bool_]

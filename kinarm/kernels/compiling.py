@@ -3,8 +3,12 @@
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
+import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
+Array = NDArray[np.float64]
+Vector = tuple[float, float, float]
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 

@@ -6,17 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.collision import BETWEEN_CAPSULES, WITH_BOX, WITH_GROUND
-from kinarm.kernels.compiling import inlined
+from kinarm.kernels.compiling import Array, Vector, inlined
 from kinarm.kernels.kinematics import to_world
 
 
 @inlined
-def between_segments(
-    a: tuple[float, float, float],
-    b: tuple[float, float, float],
-    c: tuple[float, float, float],
-    d: tuple[float, float, float],
-) -> tuple[float, float, float]:
+def between_segments(a: Vector, b: Vector, c: Vector, d: Vector) -> Vector:
     """Vector from a point of the segment cd to one of ab, (nearly) the closest ones."""
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     vx, vy, vz = d[0] - c[0], d[1] - c[1], d[2] - c[2]
@@ -39,12 +34,7 @@ def between_segments(
 
 
 @inlined
-def segment_gap(
-    a: tuple[float, float, float],
-    b: tuple[float, float, float],
-    c: tuple[float, float, float],
-    d: tuple[float, float, float],
-) -> float:
+def segment_gap(a: Vector, b: Vector, c: Vector, d: Vector) -> float:
     """Lower bound of the distance between the segments ab and cd, certified by a plane.
 
     The vector between (nearly) closest points only proposes the plane; the bound is the gap
@@ -61,12 +51,7 @@ def segment_gap(
 
 
 @inlined
-def closest_to_box(
-    a: tuple[float, float, float],
-    b: tuple[float, float, float],
-    lower: tuple[float, float, float],
-    upper: tuple[float, float, float],
-) -> float:
+def closest_to_box(a: Vector, b: Vector, lower: Vector, upper: Vector) -> float:
     """Where on the segment ab, from 0 to 1, it is (nearly) closest to a box.
 
     By a safeguarded Newton iteration on the squared distance, which is convex along the segment.
@@ -106,12 +91,7 @@ def closest_to_box(
 
 
 @inlined
-def box_gap(
-    a: tuple[float, float, float],
-    b: tuple[float, float, float],
-    lower: tuple[float, float, float],
-    upper: tuple[float, float, float],
-) -> float:
+def box_gap(a: Vector, b: Vector, lower: Vector, upper: Vector) -> float:
     """Lower bound of the distance between the segment ab and a box, certified by a plane.
 
     The vector between (nearly) closest points proposes the plane.
@@ -138,22 +118,12 @@ def box_gap(
 def clearance(
     pair: int,
     pairs: NDArray[np.int64],
-    capsules: NDArray[np.float64],
+    capsules: Array,
     link: NDArray[np.int64],
-    boxes: NDArray[np.float64],
-    poses: NDArray[np.float64],
+    boxes: Array,
+    poses: Array,
 ) -> float:
-    """Lower bound of the distance between the two bodies of a pair [m].
-
-    Parameters
-    ----------
-    pair : int
-        Index of the pair.
-    pairs, capsules, link, boxes : ndarray
-        See `ContactShapes`.
-    poses : ndarray, shape (n_joints + 1, POSE)
-        Forward kinematics.
-    """
+    """Lower bound of the distance between the two bodies of a pair [m]."""
     kind, i, j = pairs[pair, 0], pairs[pair, 1], pairs[pair, 2]
     radius = capsules[i, 6]
     a = to_world(poses, link[i], capsules[i, 0], capsules[i, 1], capsules[i, 2])

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.kernels.compiling import inlined
+from kinarm.kernels.compiling import Array, Vector, inlined
 
 POSE = 16
 """Entries of a frame's pose: quaternion w x y z, rotation matrix by rows, position."""
@@ -14,26 +14,16 @@ POSE = 16
 @inlined
 def forward_kinematics(
     prismatic: NDArray[np.bool_],
-    translation: NDArray[np.float64],
-    rotation: NDArray[np.float64],
-    axis: NDArray[np.float64],
-    configurations: NDArray[np.float64],
+    translation: Array,
+    rotation: Array,
+    axis: Array,
+    configurations: Array,
     row: int,
-    poses: NDArray[np.float64],
+    poses: Array,
 ) -> None:
-    """Fill in the world poses of all joint frames.
+    """Fill in the world poses of all joint frames at a row of configurations [rad or m].
 
-    Parameters
-    ----------
-    prismatic, translation, rotation, axis : ndarray
-        See `Chain`.
-    configurations : ndarray, shape (n, n_joints)
-        Joint positions [rad or m].
-    row : int
-        Which of them.
-    poses : ndarray, shape (n_joints + 1, POSE)
-        Row 0 is the world, row k the frame of the k-th joint. Quaternions are composed along the
-        chain, so they are continuous in the joint positions.
+    Quaternions are composed along the chain, so they are continuous in the joint positions.
     """
     for i in range(POSE):
         poses[0, i] = 1.0 if i == 0 or i == 4 or i == 8 or i == 12 else 0.0
@@ -85,9 +75,7 @@ def forward_kinematics(
 
 
 @inlined
-def to_world(
-    poses: NDArray[np.float64], frame: int, x: float, y: float, z: float
-) -> tuple[float, float, float]:
+def to_world(poses: Array, frame: int, x: float, y: float, z: float) -> Vector:
     """Map a point of a joint frame to the world."""
     return (
         poses[frame, 13] + (poses[frame, 4] * x + poses[frame, 5] * y + poses[frame, 6] * z),
@@ -98,24 +86,11 @@ def to_world(
 
 @inlined
 def point_jacobian(
-    prismatic: NDArray[np.bool_],
-    axis: NDArray[np.float64],
-    poses: NDArray[np.float64],
-    point: tuple[float, float, float],
-    jacobian: NDArray[np.float64],
+    prismatic: NDArray[np.bool_], axis: Array, poses: Array, point: Vector, jacobian: Array
 ) -> None:
-    """Fill in how fast a point beyond the joints moves per unit speed of each.
+    """Fill in how fast a point moves per unit speed of each of the first joints [m/rad, or m/m].
 
-    Parameters
-    ----------
-    prismatic, axis : ndarray
-        See `Chain`.
-    poses : ndarray, shape (n_joints + 1, POSE)
-        Forward kinematics.
-    point : tuple of float
-        The point in the world frame [m].
-    jacobian : ndarray, shape (3, n)
-        Output, for the first n joints, in the world frame [m/rad, or m/m].
+    The point lies beyond them; it and the Jacobian, shape (3, n), are those of the world frame.
     """
     for k in range(jacobian.shape[1]):
         c = k + 1

@@ -2,11 +2,8 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from kinarm.episodes import RELU, TANH, Control
-from kinarm.kernels.compiling import inlined
+from kinarm.kernels.compiling import Array, inlined
 
 NARROW = 16
 """Layers of fewer outputs keep their sums in registers."""
@@ -14,14 +11,14 @@ NARROW = 16
 
 @inlined
 def narrow_layer(
-    weights: NDArray[np.float64],
+    weights: Array,
     policy: int,
     offset: int,
     n_in: int,
     n_out: int,
-    inputs: NDArray[np.float64],
+    inputs: Array,
     source: int,
-    outputs: NDArray[np.float64],
+    outputs: Array,
     sink: int,
 ) -> None:
     """Apply an affine layer of few outputs: sums stay in registers, five at a time."""
@@ -51,14 +48,14 @@ def narrow_layer(
 
 @inlined
 def wide_layer(
-    weights: NDArray[np.float64],
+    weights: Array,
     policy: int,
     offset: int,
     n_in: int,
     n_out: int,
-    inputs: NDArray[np.float64],
+    inputs: Array,
     source: int,
-    outputs: NDArray[np.float64],
+    outputs: Array,
     sink: int,
 ) -> None:
     """Apply an affine layer of many outputs: the loop over outputs fills vector registers."""
@@ -71,7 +68,7 @@ def wide_layer(
 
 
 @inlined
-def activate(kind: int, values: NDArray[np.float64], row: int, n: int) -> None:
+def activate(kind: int, values: Array, row: int, n: int) -> None:
     """Apply an activation function to the first n entries of a row."""
     if kind == TANH:
         for j in range(n):
@@ -82,30 +79,12 @@ def activate(kind: int, values: NDArray[np.float64], row: int, n: int) -> None:
 
 
 @inlined
-def act(
-    control: Control,
-    observations: NDArray[np.float64],
-    e: int,
-    work: NDArray[np.float64],
-    action: NDArray[np.float64],
-) -> None:
+def act(control: Control, observations: Array, e: int, work: Array, action: Array) -> None:
     """Let an episode's network choose its action.
 
     A network with a mirror has learnt goals on the right alone: for a goal on the left it is
-    given the reflected observation, and its action is reflected in turn.
-
-    Parameters
-    ----------
-    control : Control
-        The networks.
-    observations : ndarray, shape (n_episodes, n_observations)
-        Inputs.
-    e : int
-        Episode.
-    work : ndarray, shape (3, widest layer)
-        Work space: two layers by turns, and a reflected observation.
-    action : ndarray, shape (n_actions,)
-        Output, in [-1, 1].
+    given the reflected observation, and its action is reflected in turn. The work space, shape
+    (3, widest layer), holds two layers by turns, and a reflected observation.
     """
     layers, weights, policy = control.layers, control.weights, control.policy[e]
     n_layers, offset = layers.shape[0] - 1, 0

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.collision import ContactShapes
-from kinarm.kernels.compiling import inlined
+from kinarm.kernels.compiling import Array, inlined
 from kinarm.kernels.distance import clearance
 from kinarm.kernels.kinematics import forward_kinematics
 
@@ -27,27 +27,11 @@ def is_apart(bound: float) -> bool:
 
 @inlined
 def spend_slack(
-    row: int,
-    travel: NDArray[np.float64],
-    q: NDArray[np.float64],
-    target: NDArray[np.float64],
-    slack: NDArray[np.float64],
-    motion: NDArray[np.float64],
+    row: int, travel: Array, q: Array, target: Array, slack: Array, motion: Array
 ) -> bool:
     """Reduce an episode's slack by the motion of a step; return whether some pair has none left.
 
-    Parameters
-    ----------
-    row : int
-        Which episode.
-    travel : ndarray, shape (n_actuated, n_pairs)
-        See `ContactShapes`.
-    q, target : ndarray, shape (n, n_joints)
-        Ends of the step [rad or m].
-    slack : ndarray, shape (n, n_pairs)
-        Lower bounds of the distances at ``q``; on return, at ``target`` [m].
-    motion : ndarray, shape (n_pairs,)
-        Output: bounds of the relative motion of the pairs [m].
+    Fills in bounds of the relative ``motion`` of the pairs, shape (n_pairs,) [m].
     """
     n_pairs = slack.shape[1]
     for pair in range(n_pairs):
@@ -69,36 +53,21 @@ def prove_step(
     chain: Chain,
     shapes: ContactShapes,
     tested: int,
-    q: NDArray[np.float64],
-    target: NDArray[np.float64],
-    slack: NDArray[np.float64],
-    motion: NDArray[np.float64],
-    poses: NDArray[np.float64],
-    between: NDArray[np.float64],
-    middle: NDArray[np.float64],
+    q: Array,
+    target: Array,
+    slack: Array,
+    motion: Array,
+    poses: Array,
+    between: Array,
+    middle: Array,
     listed: NDArray[np.int64],
 ) -> int:
     """Prove the tested configurations of a step free where the slack ran out, and renew it.
 
-    Parameters
-    ----------
-    row : int
-        Which episode.
-    chain, shapes
-        The arm and its contact pairs.
-    tested : int
-        Configurations n at which the motion of a step is tested.
-    q, target, slack, motion : ndarray
-        As `spend_slack` took and left them; on return, ``slack`` is renewed.
-    poses : ndarray, shape (n_joints + 1, POSE)
-        Forward kinematics at ``target``.
-    between, middle, listed : ndarray
-        Work space, shape (n_joints + 1, POSE), (1, n_joints) and (2, n_pairs + 1).
-
-    Returns
-    -------
-    int
-        Bit k - 1 is set if configuration k could not be proven free.
+    Takes slack and motion as `spend_slack` left them and the poses at the target; ``between``,
+    ``middle`` and ``listed`` are work space, shape (n_joints + 1, POSE), (1, n_joints) and
+    (2, n_pairs + 1). Returns a number whose bit k - 1 is set if configuration k could not be
+    proven free.
     """
     prismatic, translation, rotation, axes = chain[:4]
     link, capsules, boxes, pairs = shapes[:4]

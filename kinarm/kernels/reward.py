@@ -3,10 +3,7 @@
 A new term is a field of `kinarm.task.RewardWeights` and its formula here, in the same order.
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
-from kinarm.kernels.compiling import inlined
+from kinarm.kernels.compiling import Array, inlined
 
 PROGRESS, CLOSER, STEP, COLLISION, SUCCESS = range(5)
 """Columns of the terms; from `COLLISION` on, they are paid when an episode ends."""
@@ -14,31 +11,18 @@ PROGRESS, CLOSER, STEP, COLLISION, SUCCESS = range(5)
 
 @inlined
 def add_reward(
-    weights: NDArray[np.float64],
+    weights: Array,
     before: float,
     after: float,
     collided: bool,
     reached: bool,
-    terms: NDArray[np.float64],
-    total: NDArray[np.float64],
+    terms: Array,
+    total: Array,
     e: int,
 ) -> None:
     """Fill in the weighted terms of an episode's step, and add them to its return.
 
-    Parameters
-    ----------
-    weights : ndarray, shape (n_terms,)
-        Weights of the terms.
-    before, after : float
-        Distance from the tool to the goal before and after the step [m].
-    collided, reached : bool
-        How the step ended.
-    terms : ndarray, shape (n_episodes, n_terms)
-        Output: the weighted terms.
-    total : ndarray, shape (n_episodes,)
-        Sums of rewards.
-    e : int
-        Episode.
+    ``before`` and ``after`` are the distances from the tool to the goal about the step [m].
     """
     terms[e, PROGRESS] = weights[PROGRESS] * (before - after)
     terms[e, CLOSER] = weights[CLOSER] * ((after < before) - (after > before))

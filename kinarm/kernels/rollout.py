@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from kinarm.chain import Chain
 from kinarm.collision import ContactShapes
 from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Control, Episodes, Rules
-from kinarm.kernels.compiling import kernel
+from kinarm.kernels.compiling import Array, kernel
 from kinarm.kernels.distance import clearance
 from kinarm.kernels.kinematics import POSE, forward_kinematics, to_world
 from kinarm.kernels.network import act
@@ -18,7 +18,7 @@ from kinarm.kernels.observing import observe
 from kinarm.kernels.proof import is_apart, prove_step, spend_slack
 from kinarm.kernels.reward import add_reward
 
-LAYOUT = "ee97471718c0"
+LAYOUT = "f7eee40a4eba"
 """Hash of what is compiled in from other files; a test tells when to renew it.
 
 Numba's disk cache notices changes only in this file, so changing this line is what makes it
@@ -32,25 +32,11 @@ def screen(
     last: int,
     chain: Chain,
     shapes: ContactShapes,
-    configurations: NDArray[np.float64],
-    tools: NDArray[np.float64],
+    configurations: Array,
+    tools: Array,
     proven: NDArray[np.bool_],
 ) -> None:
-    """Find the tool points of configurations, and which are proven free of contact.
-
-    Parameters
-    ----------
-    first, last : int
-        Range of rows to work on.
-    chain, shapes
-        The arm and its contact pairs.
-    configurations : ndarray, shape (n, n_joints)
-        Joint positions [rad or m].
-    tools : ndarray, shape (n, 3)
-        Output: tool points [m].
-    proven : ndarray of bool, shape (n,)
-        Output: whether every pair is certified to be apart.
-    """
+    """Find the tool points of configurations, shape (n, 3) [m], and which are proven free."""
     prismatic, translation, rotation, axes, tool = chain[:5]
     link, capsules, boxes, pairs = shapes[:4]
     n_joints = configurations.shape[1]
@@ -187,17 +173,7 @@ def advance(
 
 @kernel
 def refuse(rows: NDArray[np.int64], rules: Rules, episodes: Episodes) -> None:
-    """End episodes whose step touches something: the arm stays where it is.
-
-    Parameters
-    ----------
-    rows : ndarray of int
-        Which episodes.
-    rules : Rules
-        Task and motion limits.
-    episodes : Episodes
-        Changed in place.
-    """
+    """End episodes whose step touches something: the arm stays where it is."""
     for index in range(rows.shape[0]):
         e = rows[index]
         episodes.status[e] = COLLISION

@@ -23,12 +23,8 @@ TOOL_RADIUS = 0.012
 def arm_parts(arm: Arm) -> tuple[Part, ...]:
     """All parts of an arm.
 
-    Parameters
-    ----------
-    arm : Arm
-        One with the geometry of the shipped ones looks like an industrial arm; any other shows
-        the visual shapes of its URDF, or where there are none that can be read, its collision
-        shapes.
+    One with the geometry of the shipped ones looks like an industrial arm; any other shows the
+    visual shapes of its URDF, or where there are none that can be read, its collision shapes.
     """
     if industrial_arm.fits(arm):
         return tuple(industrial_arm.parts(arm))

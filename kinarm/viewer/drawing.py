@@ -186,12 +186,9 @@ def draw_goal(window: Visualizer, problem: ReachProblem) -> None:
 
 
 def draw_arm(window: Visualizer, arm: Arm) -> list[Visualizer]:
-    """Draw an arm as nested groups, one for each joint.
+    """Draw an arm as nested groups: the base and the joints, which are returned.
 
-    Returns
-    -------
-    list of meshcat.Visualizer
-        The base and the joints; a joint's transform is that in its parent.
+    A joint's transform is that in its parent.
     """
     frames = [window]
     for number in range(1, arm.n_joints + 1):

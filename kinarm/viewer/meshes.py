@@ -46,15 +46,7 @@ class Mesh:
         return cls(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
 
     def with_normals(self) -> tuple[Array, Array, NDArray[np.int64]]:
-        """Split corners where faces meet at an edge, and give every corner its normal.
-
-        Returns
-        -------
-        vertices, normals : ndarray, shape (k, 3)
-            Corners [m] and unit vectors.
-        faces : ndarray of int, shape (m, 3)
-            Indices of corners.
-        """
+        """Vertices, normals, faces: split where faces meet at an edge, each corner has a normal."""
         places, welded = np.unique(np.round(self.vertices, 6), axis=0, return_inverse=True)
         corners = welded.reshape(-1)[self.faces]
         a, b, c = (places[corners[:, k]] for k in range(3))
@@ -71,11 +63,9 @@ def _corner_normals(corners: NDArray[np.int64], weighted: Array, flat: Array) ->
     order = np.argsort(corners, kind="stable")
     counts = np.bincount(corners)
     starts = np.cumsum(counts) - counts
-    mine = np.repeat(order, counts[corners[order]])
-    group = np.repeat(corners[order], counts[corners[order]])
-    within = np.arange(len(group)) - np.repeat(
-        np.cumsum(counts[corners[order]]) - counts[corners[order]], counts[corners[order]]
-    )
+    n_joined = counts[corners[order]]
+    mine, group = np.repeat(order, n_joined), np.repeat(corners[order], n_joined)
+    within = np.arange(len(group)) - np.repeat(np.cumsum(n_joined) - n_joined, n_joined)
     theirs = order[starts[group] + within]
     joins = (flat[mine // 3] * flat[theirs // 3]).sum(axis=1) >= CREASE
     empty = np.linalg.norm(weighted, axis=1) == 0
@@ -87,12 +77,9 @@ def _corner_normals(corners: NDArray[np.int64], weighted: Array, flat: Array) ->
 
 
 def loft(rings: Array) -> Mesh:
-    """Skin a stack of closed rings, stretch by stretch, and close it at both ends.
+    """Skin a stack of closed rings, shape (n_rings, n_points, 3), and close it at both ends.
 
-    Parameters
-    ----------
-    rings : ndarray, shape (n_rings, n_points, 3)
-        Anticlockwise when seen against the direction of the stack [m].
+    Stretch by stretch; the points go anticlockwise seen against the direction of the stack [m].
     """
     levels, around = rings.shape[:2]
     here = np.arange(around)
@@ -112,15 +99,7 @@ def loft(rings: Array) -> Mesh:
 
 
 def lathe(profile: Sequence[tuple[float, float]], axis: str = "z") -> Mesh:
-    """Turn a profile about an axis through the origin.
-
-    Parameters
-    ----------
-    profile : sequence of (position, radius)
-        From one end of the axis to the other [m].
-    axis : str
-        ``"x"``, ``"y"`` or ``"z"``.
-    """
+    """Turn a profile of positions and radii [m] about an axis through the origin."""
     angle = np.linspace(0, 2 * np.pi, SEGMENTS, endpoint=False)
     position, radius = np.array(profile, dtype=float).T
     across = radius[:, None] * np.cos(angle), radius[:, None] * np.sin(angle)
@@ -197,17 +176,7 @@ def capsule(length: float, radius: float) -> Mesh:
 
 
 def tube(points: ArrayLike, radius: float, sides: int = 6) -> Mesh:
-    """A tube along at least two points, with 2 * ``sides`` faces for one stretch after the other.
-
-    Parameters
-    ----------
-    points : array_like, shape (n, 3)
-        Its middle [m].
-    radius : float
-        Its radius [m].
-    sides : int
-        Straight pieces around it.
-    """
+    """A tube along at least two points [m], with 2 * ``sides`` faces for each stretch in turn."""
     middle = np.asarray(points, dtype=float)
     forward = np.gradient(middle, axis=0)
     lengths = np.linalg.norm(forward, axis=1)

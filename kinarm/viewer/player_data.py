@@ -10,15 +10,7 @@ from kinarm.viewer.drawing import OUTCOME_COLOURS, TRACE_SIDES
 
 
 def player_data(trials: Sequence[Sequence[Recording]], arm: Arm) -> dict[str, Any]:
-    """Describe an arm and what it did.
-
-    Parameters
-    ----------
-    trials : sequence of sequence of Recording
-        One or two recordings of each trial.
-    arm : Arm
-        The arm that was recorded.
-    """
+    """Describe an arm and what it did in one or two recordings of each trial."""
     chain = arm.chain
     return {
         "arm": arm.name,

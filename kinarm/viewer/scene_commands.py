@@ -9,14 +9,7 @@ import umsgpack
 
 from kinarm.arm import Arm
 from kinarm.recording import Recording
-from kinarm.viewer.drawing import (
-    FLASH,
-    draw_arm,
-    draw_goal,
-    draw_surroundings,
-    draw_trace,
-    put,
-)
+from kinarm.viewer.drawing import FLASH, draw_arm, draw_goal, draw_surroundings, draw_trace, put
 from kinarm.viewer.meshes import capsule
 
 FLASH_RADIUS = 0.025
@@ -24,19 +17,9 @@ FLASH_RADIUS = 0.025
 
 
 def scene_commands(trials: Sequence[Sequence[Recording]], arm: Arm) -> bytes:
-    """Draw surroundings, goal, arm and the ways of the tool.
+    """Draw surroundings, goal, arm and the ways of the tool in each trial's recordings.
 
-    Parameters
-    ----------
-    trials : sequence of sequence of Recording
-        One or two recordings of each trial.
-    arm : Arm
-        The arm that was recorded.
-
-    Returns
-    -------
-    bytes
-        Commands as Meshcat's viewer decodes them, each led by its length.
+    Returns the commands as Meshcat's viewer decodes them, each led by its length.
     """
     capture = CapturingWindow()
     window = meshcat.Visualizer(window=capture)
@@ -52,13 +35,7 @@ def scene_commands(trials: Sequence[Sequence[Recording]], arm: Arm) -> bytes:
 
 
 class CapturingWindow:
-    """Stands in for Meshcat's window and keeps every command, in order.
-
-    Attributes
-    ----------
-    commands : list of bytes
-        As Meshcat's viewer decodes them.
-    """
+    """Stands in for Meshcat's window and keeps every command as bytes, in order."""
 
     def __init__(self) -> None:
         self.commands: list[bytes] = []
