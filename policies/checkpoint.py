@@ -83,12 +83,7 @@ def load_checkpoint(path: str | Path) -> Checkpoint:
 def arrays_of(name: str, value: Any) -> dict[str, NDArray[Any]]:
     """Flatten a value into arrays; parts of records get names such as ``state.theta``.
 
-    Parameters
-    ----------
-    name : str
-        Name of the value.
-    value : dataclass, named tuple, tuple of named tuples of numbers, dict, array or number
-        The value. Dictionaries are kept as JSON.
+    Dictionaries are kept as JSON, tuples of named tuples of numbers as tables.
     """
     if is_dataclass(value) or hasattr(value, "_fields"):
         parts = [(part, getattr(value, part)) for part in _field_names(type(value))]

@@ -3,10 +3,9 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from numbers import Real
-from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, Literal
 
-from kinarm._fields import alternatives, init_fields
+from kinarm._fields import check_fields, init_fields
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
 from kinarm.problem import PROBLEMS, ReachProblem
@@ -30,37 +29,20 @@ SHARE = {"must": "lie in [0, 1]", "holds": lambda value: 0 <= value <= 1}
 """What a number must be: metadata of a field."""
 
 
-def checked(name: str, value: Any, hint: Any, demands: Mapping[str, Any]) -> Any:
-    """Return a setting, in Python's own type, or refuse it.
+def check_range(name: str, value: Any, demands: Mapping[str, Any]) -> None:
+    """Refuse a number that is not finite or breaks what its field's metadata demand.
 
-    Parameters
-    ----------
-    name : str
-        Name of the setting.
-    value : object
-        Its value.
-    hint : type
-        Type that it must have; numbers, choices and tuples of whole numbers are checked.
-    demands : mapping
-        What a number must be, such as `POSITIVE`; for whole numbers ``at_least``, by default 1.
-
-    Raises
-    ------
-    InvalidInputError
-        If the value has another type or is out of range.
+    Whole numbers, those of tuples, too, must be ``at_least`` so large, or 1 if it is not said.
     """
-    if hint is int:
-        return whole_number(name, value, demands.get("at_least", 1))
-    if hint == tuple[int, ...]:
-        return tuple(whole_number(name, each, 1) for each in value)
-    if get_origin(hint) is Literal and value not in get_args(hint):
-        raise InvalidInputError(f"{name} must be one of {', '.join(get_args(hint))}, got {value!r}")
-    if hint is not float:
-        return value
-    finite = isinstance(value, Real) and math.isfinite(value)
-    if not (finite and ("holds" not in demands or demands["holds"](value))):
-        raise InvalidInputError(f"{name} must {demands.get('must', 'be finite')}, got {value}")
-    return float(value)
+    if isinstance(value, tuple):
+        for each in value:
+            check_range(name, each, demands)
+    elif type(value) is int:
+        whole_number(name, value, demands.get("at_least", 1))
+    elif isinstance(value, float):
+        must, holds = demands.get("must", "be finite"), demands.get("holds", math.isfinite)
+        if not (math.isfinite(value) and holds(value)):
+            raise InvalidInputError(f"{name} must {must}, got {value}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,11 +71,9 @@ class TrainingConfig:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "problem", ReachProblem.load(self.problem))
-        hints = get_type_hints(type(self))
+        check_fields(self)
         for name, item in init_fields(type(self)).items():
-            hint, value = alternatives(hints[name])[0], getattr(self, name)
-            if value is not None:
-                object.__setattr__(self, name, checked(name, value, hint, item.metadata))
+            check_range(name, getattr(self, name), item.metadata)
 
     @property
     def training_problem(self) -> ReachProblem:

@@ -103,15 +103,22 @@ class Learner(Generic[ConfigT, StateT]):
     packages: tuple[str, ...] = ()
     extra: str = ""
 
-    def check_installed(self) -> None:
-        """Refuse to go on without the packages that the learner needs.
+    def check_installed(self, *others: str) -> None:
+        """Refuse to go on without the packages that the learner needs, and others.
 
         Raises
         ------
         MissingExtraError
             If one is missing; it says how to install it.
         """
-        require_packages(self.packages, self.extra)
+        for package in (*self.packages, *others):
+            if find_spec(package) is None:
+                raise MissingExtraError(package, self.extra)
+
+
+def imported(module: str, name: str) -> Callable[..., Any]:
+    """A callable of a module that is imported when it is first called: it takes long to load."""
+    return lambda *given, **options: getattr(import_module(module), name)(*given, **options)
 
 
 class TrainingResult(NamedTuple):
@@ -244,16 +251,3 @@ def run_training(
 def state_policy(config: TrainingConfig, state: TrainingState) -> "Policy":
     """Freeze a state of a training into a policy, with all that belongs to it."""
     return learner_of(config).policy(config, state)
-
-
-def require_packages(packages: tuple[str, ...], extra: str) -> None:
-    """Refuse to go on without optional packages.
-
-    Raises
-    ------
-    MissingExtraError
-        If one is missing; it says how to install it.
-    """
-    for package in packages:
-        if find_spec(package) is None:
-            raise MissingExtraError(package, extra)

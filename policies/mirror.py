@@ -22,17 +22,7 @@ ACCURACY = 1e-9
 
 
 def commuting_weights(mirror: Mirror) -> NDArray[np.bool_]:
-    """Where a linear policy that commutes with a reflection may have weights.
-
-    Parameters
-    ----------
-    mirror : Mirror
-        The reflection.
-
-    Returns
-    -------
-    ndarray of bool, shape (n_actions, n_observations)
-    """
+    """Where a linear policy that commutes with a reflection may have weights."""
     return np.outer(mirror.actions, mirror.observations) > 0
 
 

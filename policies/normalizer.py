@@ -10,13 +10,7 @@ CONSTANT_BELOW = 1e-6
 
 
 def input_scale(std: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Factors that normalise inputs: 1 / std, and 0 for constant ones.
-
-    Parameters
-    ----------
-    std : ndarray, shape (n_observations,)
-        Standard deviations.
-    """
+    """Factors that normalise inputs: 1 / std, and 0 for constant ones."""
     constant = std < CONSTANT_BELOW
     return np.where(constant, 0.0, 1.0 / np.where(constant, 1.0, std))
 
@@ -29,21 +23,8 @@ def fold_normalizer(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Make affine layers that take observations as they are of ones that take normalised ones.
 
-    The sums are taken in a fixed order, not by BLAS, whose order depends on the processor.
-
-    Parameters
-    ----------
-    weights : ndarray, shape (..., n_out, n_observations)
-        Weights of the layers.
-    bias : ndarray, shape (..., n_out)
-        Their biases.
-    mean, std : ndarray, shape (n_observations,)
-        Statistics by which their inputs are normalised.
-
-    Returns
-    -------
-    weights, bias : ndarray
-        Of the same shapes.
+    Weights have the shape (..., n_out, n_observations), biases (..., n_out). The sums are taken in
+    a fixed order, not by BLAS, whose order depends on the processor.
     """
     scaled = weights * input_scale(std)
     return scaled, bias - (scaled * mean).sum(axis=-1)

@@ -7,31 +7,16 @@ from dataclasses import dataclass, field
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from kinarm._fields import from_plain, to_plain
+from kinarm.policies.config import TrainingConfig
 from kinarm.problem import ReachProblem
 
 RECORDED_PACKAGES = (
     *("kinarm", "numpy", "numba", "pin", "coal", "gymnasium", "scipy"),
     *("torch", "stable-baselines3"),
 )
-
-
-class Config(Protocol):
-    """What the settings of every learner say."""
-
-    @property
-    def problem(self) -> ReachProblem:
-        """The problem that the policy is for."""
-
-    @property
-    def recipe(self) -> str:
-        """Name of the settings."""
-
-    @property
-    def seed(self) -> int:
-        """Seed of the training."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +53,7 @@ class Provenance:
     commit: str = ""
 
     @classmethod
-    def of(cls, algorithm: str, config: Config, environment_steps: int) -> "Provenance":
+    def of(cls, algorithm: str, config: TrainingConfig, environment_steps: int) -> "Provenance":
         """Record a training that took place here and now, with these settings."""
         settings = to_plain(config)
         return cls(

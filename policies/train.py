@@ -88,11 +88,12 @@ class TrainRequest(ProblemOptions):
         """
         from kinarm.policies.curve import write_curve
 
-        config, state = self._resumed() if self.resume else (self._config(), None)
+        path = checkpoint_path(self.out)
+        config, state = self._resumed(path) if self.resume else (self._config(path), None)
         check_output(self.out, overwrite=self.overwrite, suffix=".npz")
         options = {} if self.tensorboard is None else {"tensorboard": self.tensorboard}
         training = begin_training(config, **options)
-        keeper = CheckpointKeeper(config, checkpoint_path(self.out))
+        keeper = CheckpointKeeper(config, path)
         with TrainingProgress(config) as progress:
 
             def on_iteration(state: TrainingState) -> None:
@@ -109,16 +110,14 @@ class TrainRequest(ProblemOptions):
         except (KinarmError, KeyboardInterrupt):
             keeper.save()
             raise
-        checkpoint_path(self.out).unlink(missing_ok=True)
+        path.unlink(missing_ok=True)
         return result
 
-    def _config(self) -> "TrainingConfig":
-        """Settings of a new training."""
-        checkpoint = checkpoint_path(self.out)
-        if checkpoint.exists():
+    def _config(self, path: Path) -> "TrainingConfig":
+        """Settings of a new training, unless there is the checkpoint of an unfinished one."""
+        if path.exists():
             raise InvalidInputError(
-                f"{str(checkpoint)!r} holds an unfinished training: go on with --resume, "
-                "or delete it"
+                f"{str(path)!r} holds an unfinished training: go on with --resume, or delete it"
             )
         named = self.recipe or "paper"
         problem = self.resolve(default=recipe(self.learner, named).problem)
@@ -127,11 +126,10 @@ class TrainRequest(ProblemOptions):
         )
         return config
 
-    def _resumed(self) -> "Checkpoint":
+    def _resumed(self, path: Path) -> "Checkpoint":
         """The training to go on with, which must be the one that is asked for."""
         from kinarm.policies.checkpoint import load_checkpoint
 
-        path = checkpoint_path(self.out)
         if not path.exists():
             raise PolicyFileError(f"nothing to resume: there is no {str(path)!r}")
         checkpoint = load_checkpoint(path)

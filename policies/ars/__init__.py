@@ -1,28 +1,9 @@
 """Augmented Random Search, for the registry of learners."""
 
-from typing import TYPE_CHECKING
-
 from kinarm.policies.ars.config import ARSConfig
 from kinarm.policies.ars.recipes import RECIPES, adapted
 from kinarm.policies.ars.state import ARSState
-from kinarm.policies.learners import Learner
-
-if TYPE_CHECKING:
-    from kinarm.policies.ars.algorithm import ARSTraining
-    from kinarm.policies.policy import Policy
-
-
-def _begin(config: ARSConfig, threads: int | None = None) -> "ARSTraining":
-    from kinarm.policies.ars.algorithm import ARSTraining
-
-    return ARSTraining(config, threads)
-
-
-def _policy(config: ARSConfig, state: ARSState) -> "Policy":
-    from kinarm.policies.ars.algorithm import linear_policy
-
-    return linear_policy(config, state)
-
+from kinarm.policies.learners import Learner, imported
 
 LEARNER = Learner(
     name="ars",
@@ -31,7 +12,7 @@ LEARNER = Learner(
     state=ARSState,
     recipes=RECIPES,
     adapt=adapted,
-    begin=_begin,
-    policy=_policy,
+    begin=imported("kinarm.policies.ars.algorithm", "ARSTraining"),
+    policy=imported("kinarm.policies.ars.algorithm", "linear_policy"),
     options=("threads",),
 )

@@ -20,12 +20,7 @@ from kinarm.world import World
 class ARSTraining:
     """A training under way; all that changes is in the `ARSState`.
 
-    Parameters
-    ----------
-    config : ARSConfig
-        The settings.
-    threads : int, optional
-        Threads of the simulator; the result does not depend on it.
+    The result does not depend on the simulator's number of threads.
     """
 
     def __init__(self, config: ARSConfig, threads: int | None = None) -> None:
@@ -54,22 +49,8 @@ def ars_iteration(
 ) -> ARSState:
     """One pass through the loop of Algorithm 1.
 
-    Parameters
-    ----------
-    config : ARSConfig
-        The settings.
-    simulator : Simulator
-        Where episodes are run.
-    state : ARSState
-        State before the iteration.
-    mirror : Mirror, optional
-        Reflection that the policy has to commute with.
-
-    Returns
-    -------
-    ARSState
-        State after it. The statistics are frozen within an iteration: they are updated at its
-        end with all observations of its episodes.
+    With a mirror, the policy commutes with it. The statistics are frozen within an iteration: they
+    are updated at its end with all observations of its episodes.
     """
     began, rng = time.perf_counter(), state.random_generator()
     N, theta, normalizer = config.directions, state.theta, state.normalizer
@@ -108,50 +89,33 @@ def shared_scenarios(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Draw the starts and goals of an iteration's episodes, shared as configured.
 
-    Returns
-    -------
-    starts, goals : ndarray, shape (2 N episodes, n_joints) and (2 N episodes, 3)
-        In the order sign, direction, episode.
+    They come in the order sign, direction, episode: 2 N times ``episodes`` rows.
     """
     copies = {"none": 1, "pair": 2, "iteration": 2 * config.directions}[config.sharing]
     starts, goals = simulator.sample(rng, 2 * config.directions * config.episodes // copies)
     return np.tile(starts, (copies, 1)), np.tile(goals, (copies, 1))
 
 
-def policy_normalizer(
-    config: ARSConfig, seen: Normalizer, mirror: Mirror | None
-) -> Normalizer | None:
-    """Statistics by which the policy normalises its inputs, if it does."""
+def policy_normalizer(config: ARSConfig, seen: Normalizer, mirror: Mirror | None) -> Normalizer:
+    """Statistics by which the policy normalises its inputs; empty if it does not."""
     if not config.normalize:
-        return None
+        return Normalizer.empty(len(seen.mean))
     return seen if mirror is None else seen.mirrored(mirror.observations)
 
 
-def linear_networks(theta: NDArray[np.float64], normalizer: Normalizer | None) -> Networks:
+def linear_networks(theta: NDArray[np.float64], normalizer: Normalizer) -> Networks:
     """Policies theta diag(Sigma)^(-1/2) (x - mu) with the normaliser folded in.
 
-    Parameters
-    ----------
-    theta : ndarray, shape (n, n_actions, n_observations)
-        Parameters.
-    normalizer : Normalizer or None
-        Statistics of the observations; None leaves them as they are.
+    Parameters have the shape (n, n_actions, n_observations).
     """
     bias = np.zeros(theta.shape[:2])
-    if normalizer is None:
-        return Networks.linear(theta, bias)
     return Networks.linear(*fold_normalizer(theta, bias, normalizer.mean, normalizer.std))
 
 
 def top_directions(returns: NDArray[np.float64], b: int) -> NDArray[np.int64]:
     """Indices of exactly b directions with the largest max(r+, r-); ties keep their order.
 
-    Parameters
-    ----------
-    returns : ndarray, shape (2, N)
-        Returns of the positive and negative perturbations.
-    b : int
-        How many.
+    Returns of the positive and of the negative perturbations have the shape (2, N).
     """
     return np.argsort(-returns.max(axis=0), kind="stable")[:b]
 
@@ -164,19 +128,9 @@ def ars_step(
 ) -> NDArray[np.float64]:
     """Update of theta: alpha / (b sigma_R) times the sum of (r+ - r-) delta over the top b.
 
-    sigma_R is the population standard deviation of the returns of all perturbations, as the
-    paper defines it in section 2.1; the step is zero when all returns tie.
-
-    Parameters
-    ----------
-    config : ARSConfig
-        The settings.
-    delta : ndarray, shape (N, n_actions, n_observations)
-        Perturbations.
-    returns : ndarray, shape (2, N)
-        Returns of theta + nu delta and theta - nu delta.
-    step_size : float
-        Learning rate alpha.
+    sigma_R is the population standard deviation of the returns of all perturbations, shape (2, N),
+    as the paper defines it in section 2.1; the step is zero when all returns tie. Perturbations
+    delta have the shape (N, n_actions, n_observations).
     """
     b = config.top_directions
     top = top_directions(returns, b)
@@ -192,12 +146,10 @@ def ars_step(
 def linear_policy(config: ARSConfig, state: ARSState) -> Policy:
     """Freeze a state of the training into a policy."""
     mirror = task_mirror(config.symmetric, World(config.problem, threads=1))
-    n_actions, n_observations = state.theta.shape
     normalizer = policy_normalizer(config, state.normalizer, mirror)
-    normalizer = normalizer or Normalizer.empty(n_observations)
     return Policy(
         mean=normalizer.mean,
         std=normalizer.std,
-        layers=(Layer(state.theta, np.zeros(n_actions)),),
+        layers=(Layer(state.theta, np.zeros(len(state.theta))),),
         provenance=Provenance.of("ars", config, state.environment_steps),
     )

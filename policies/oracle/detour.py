@@ -17,13 +17,7 @@ SHORTCUTS = 120
 
 
 class Tree:
-    """Configurations that are connected by contact-free straight motions.
-
-    Parameters
-    ----------
-    roots : ndarray, shape (k, n_joints)
-        Configurations to grow from [rad or m].
-    """
+    """Configurations that are connected by contact-free straight motions, from some roots."""
 
     def __init__(self, roots: NDArray[np.float64]) -> None:
         self.nodes = roots.copy()
@@ -52,33 +46,9 @@ def find_detour(
 ) -> NDArray[np.float64] | None:
     """Find a contact-free path of straight segments to one of several configurations.
 
-    Parameters
-    ----------
-    simulator : Simulator
-        Arm and scene.
-    start : ndarray, shape (n_joints,)
-        Contact-free start [rad or m].
-    ends : ndarray, shape (k, n_joints)
-        Contact-free ends [rad or m].
-    rng : numpy.random.Generator
-        Source of randomness.
-
-    Returns
-    -------
-    ndarray, shape (m, n_joints), or None
-        The path from the start to an end; None if none was found.
+    A tree grows from either side, in turns, until they meet. Start and ends are contact-free; the
+    path, shape (m, n_joints), leads from the start to an end. None if none was found.
     """
-    path = _connect(simulator, start, ends, rng)
-    return None if path is None else _shorten(simulator, path, rng)
-
-
-def _connect(
-    simulator: Simulator,
-    start: NDArray[np.float64],
-    ends: NDArray[np.float64],
-    rng: np.random.Generator,
-) -> NDArray[np.float64] | None:
-    """Grow a tree from either side, in turns, until they meet."""
     moved, n = slice(simulator.n_actions), simulator.n_actions
     lower, upper = simulator.arm.lower[moved], simulator.arm.upper[moved]
     growing, other = Tree(start[None]), Tree(ends)
@@ -93,7 +63,7 @@ def _connect(
             if met is not None and steps_between(simulator, other.nodes[met], node) < 1e-9:
                 near, far = growing.path_to_root(grown)[::-1], other.path_to_root(met)[1:]
                 path = np.array(near + far)
-                return path if from_start else path[::-1]
+                return _shorten(simulator, path if from_start else path[::-1], rng)
         growing, other, from_start = other, growing, not from_start
     return None
 
@@ -108,27 +78,20 @@ def _extend(
         return nearest
     origin = tree.nodes[nearest]
     towards = origin + min(1.0, longest / distances[nearest]) * (sample - origin)
-    on_the_way = _tested_configurations(simulator, origin, towards)
-    free = _count_free(simulator, on_the_way)
+    on_the_way, free = _straight_way(simulator, origin, towards)
     return tree.add(on_the_way[free - 1], nearest) if free else None
 
 
-def _tested_configurations(
+def _straight_way(
     simulator: Simulator, first: NDArray[np.float64], second: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Configurations as far apart as those at which a step is tested, without the first."""
+) -> tuple[NDArray[np.float64], int]:
+    """Configurations as far apart as a step tests them, and how many in a row touch nothing."""
     tested_each = simulator.problem.stepping.tested_configurations
     count = max(1, int(np.ceil(tested_each * steps_between(simulator, first, second))))
-    shares = np.arange(1, count + 1)[:, None] / count
-    tested: NDArray[np.float64] = first + shares * (second - first)
+    tested = first + np.arange(1, count + 1)[:, None] / count * (second - first)
     tested[-1] = second
-    return tested
-
-
-def _count_free(simulator: Simulator, configurations: NDArray[np.float64]) -> int:
-    """How many configurations in a row touch nothing."""
-    _, touching = simulator.world.screen(configurations)
-    return int(touching.argmax()) if touching.any() else len(configurations)
+    _, touching = simulator.world.screen(tested)
+    return tested, int(touching.argmax()) if touching.any() else count
 
 
 def _shorten(
@@ -146,8 +109,8 @@ def _shorten(
         )
         if steps_between(simulator, first, second) > b - a - 1e-6:
             continue
-        tested = _tested_configurations(simulator, first, second)
-        if _count_free(simulator, tested) == len(tested):
+        tested, free = _straight_way(simulator, first, second)
+        if free == len(tested):
             before, after = path[arrival < a], path[arrival > b]
             path = np.concatenate([before, first[None], second[None], after])
     return path

@@ -99,27 +99,19 @@ def solve_within(
 ) -> Solutions:
     """Find contact-free configurations close to goals that are at most some steps away.
 
-    Parameters
-    ----------
-    simulator : Simulator
-        Arm and scene.
-    starts : ndarray, shape (m, n_joints)
-        Configurations to be close to [rad or m].
-    goals : ndarray, shape (m, 3)
-        Goal positions [m].
-    steps : ndarray of int, shape (m,)
-        How many steps away solutions may be.
-    tolerances : ndarray, shape (m,)
-        How far the tool may be from the goals [m].
-    guesses : ndarray, shape (m, n_joints)
-        One more configuration to begin with [rad or m].
-    samples : int
-        Configurations to begin with, per goal: the start, the guess, and evenly spread ones.
+    Row by row: the tool within ``tolerances`` of ``goals`` [m], and ``steps`` or fewer from
+    ``starts``. The search begins at as many ``samples``: the start, the guess, and evenly spread
+    configurations.
     """
     m, n_joints = len(starts), simulator.arm.n_joints
     box = step_box(simulator, starts, steps)
     spread = evenly_spread(samples, simulator.n_actions + 1)
-    beginnings = _beginnings(starts, guesses, box, spread[:, :-1])
+    lower, upper, moved = box[0][:, None], box[1][:, None], slice(simulator.n_actions)
+    beginnings = np.repeat(starts[:, None], samples, axis=1)
+    beginnings[:, :, moved] = lower + spread[:, :-1] * (upper - lower)
+    beginnings[:, 1 % samples] = guesses
+    beginnings[:, 0] = starts
+    beginnings[:, :, moved] = np.clip(beginnings[:, :, moved], lower, upper)
     # Half of the solutions may rest on the rim of the ball, the others lie throughout it.
     shares = np.where(np.arange(samples) % 2 == 0, 1.0, np.cbrt(spread[:, -1]))
     owner = np.repeat(np.arange(m), samples)
@@ -134,23 +126,6 @@ def solve_within(
     return Solutions(configurations[free], owner[free])
 
 
-def _beginnings(
-    starts: NDArray[np.float64],
-    guesses: NDArray[np.float64],
-    box: tuple[NDArray[np.float64], NDArray[np.float64]],
-    spread: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Start, guess and evenly spread configurations of boxes, shape (m, samples, n_joints)."""
-    lower, upper = box[0][:, None], box[1][:, None]
-    samples, moved = len(spread), slice(lower.shape[-1])
-    beginnings = np.repeat(starts[:, None], samples, axis=1)
-    beginnings[:, :, moved] = lower + spread * (upper - lower)
-    beginnings[:, 1 % samples] = guesses
-    beginnings[:, 0] = starts
-    beginnings[:, :, moved] = np.clip(beginnings[:, :, moved], lower, upper)
-    return beginnings
-
-
 def project(
     simulator: Simulator,
     configurations: NDArray[np.float64],
@@ -161,27 +136,9 @@ def project(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Move configurations towards goals by damped least squares; contact is ignored.
 
-    Parameters
-    ----------
-    simulator : Simulator
-        The arm.
-    configurations : ndarray, shape (m samples, n_joints)
-        Within the limits [rad or m].
-    owner : ndarray of int, shape (m samples,)
-        Which goal they belong to.
-    box : tuple of ndarray, shape (m, n_actions)
-        Limits per goal [rad or m].
-    goals : ndarray, shape (m, 3)
-        Goal positions [m].
-    radius : ndarray, shape (m samples,)
-        Distances at which they rest [m].
-
-    Returns
-    -------
-    configurations : ndarray, shape (m samples, n_joints)
-        Where they ended [rad or m].
-    distances : ndarray, shape (m samples,)
-        From the tool to the goal [m].
+    Returns where they ended [rad or m], and the distances from tool to goal [m]. ``owner`` says
+    which row of the box's corners and of the goals belongs to each, and ``radius`` how far from
+    the goal it may rest [m].
     """
     ended, distances = configurations.copy(), np.empty(len(configurations))
     arrays = (simulator.arm.chain, owner, *box, goals, radius, ended, distances)
@@ -204,10 +161,6 @@ def evenly_spread(count: int, dimensions: int) -> NDArray[np.float64]:
     """Points of low discrepancy in the unit cube: multiples of powers of a root, modulo 1.
 
     The root solves x^(d + 1) = x + 1, which for d = 1 is the golden ratio (Roberts 2018).
-
-    Returns
-    -------
-    ndarray, shape (count, dimensions)
     """
     root = 2.0
     for _ in range(64):

@@ -12,17 +12,6 @@ def steps_between(
     """Steps that the straight motion between configurations takes, before rounding up.
 
     The slowest joint decides: the largest of |dq_i| / (rate_i dt) over the actuated joints.
-
-    Parameters
-    ----------
-    simulator : Simulator
-        Knows how far a joint moves in a step.
-    first, second : ndarray, shape (..., n_joints)
-        Configurations [rad or m].
-
-    Returns
-    -------
-    ndarray, shape (...)
     """
     moved = np.abs(second - first)[..., : simulator.n_actions] / simulator.step_limit
     steps: NDArray[np.float64] = moved.max(axis=-1)
@@ -39,18 +28,8 @@ def two_segments(
 ) -> NDArray[np.float64]:
     """Actions that move straight to one configuration, then straight to another, then rest.
 
-    Parameters
-    ----------
-    simulator : Simulator
-        Knows how far a joint moves in a step.
-    starts, vias, ends : ndarray, shape (m, n_joints)
-        Configurations [rad or m].
-    turn, steps : ndarray of int, shape (m,)
-        Steps until ``vias`` and until ``ends``. Where they are equal, ``ends`` are not visited.
-
-    Returns
-    -------
-    ndarray, shape (m, horizon, n_actions)
+    ``vias`` are reached after ``turn`` steps, ``ends`` after ``steps``; where these are equal, the
+    ends are not visited. Shape (m, horizon, n_actions).
     """
     moved = slice(simulator.n_actions)
     after = np.maximum(steps - turn, 1)
@@ -79,19 +58,8 @@ def along_path(
 ) -> NDArray[np.float64] | None:
     """Actions that follow a path of straight segments at full speed, then rest.
 
-    Parameters
-    ----------
-    simulator : Simulator
-        Knows how far a joint moves in a step.
-    path : ndarray, shape (k, n_joints)
-        Configurations to pass [rad or m].
-    through_corners : bool
-        Whether a step ends at every configuration; else steps cut corners, and are fewer.
-
-    Returns
-    -------
-    ndarray, shape (horizon, n_actions), or None
-        None if the horizon is too short.
+    A step ends at every configuration if the path is followed ``through_corners``; else steps cut
+    corners, and are fewer. Shape (horizon, n_actions); None if the horizon is too short.
     """
     lengths = steps_between(simulator, path[:-1], path[1:])
     if through_corners:

@@ -38,15 +38,12 @@ class MotionSearch:
     A motion that reaches the goal costs its steps, one that misses it more, and contact is
     out of the question. What counts is the outcome in the simulator.
 
-    Parameters
-    ----------
-    simulator : Simulator
-        Arm, scene and task.
-    starts, goals : ndarray, shape (n, n_joints) and (n, 3)
-        The trials [rad or m], [m].
-
     Attributes
     ----------
+    starts, goals : ndarray, shape (n, n_joints) and (n, 3)
+        The trials [rad or m], [m].
+    witnesses : ndarray, shape (n, n_joints)
+        Configurations that attain what was proven last, from which goals are sought [rad or m].
     actions : ndarray, shape (n, horizon, n_actions)
         The motions; at rest where there is none.
     costs : ndarray, shape (n,)
@@ -60,6 +57,7 @@ class MotionSearch:
     ) -> None:
         n = len(starts)
         self.simulator, self.starts, self.goals = simulator, starts, goals
+        self.witnesses = starts.copy()
         self.actions = np.zeros((n, simulator.task.horizon, simulator.n_actions))
         self.costs = np.full(n, np.inf)
         self.has_solution = np.zeros(n, dtype=bool)
@@ -76,19 +74,10 @@ class MotionSearch:
         steps: NDArray[np.int64] = np.fmin(self.costs, self.simulator.task.horizon + 1).astype(int)
         return steps
 
-    def try_steps(
-        self, rows: NDArray[np.int64], steps: NDArray[np.int64], guesses: NDArray[np.float64]
-    ) -> None:
-        """Look for motions of a number of steps where none reaches the goal yet.
+    def try_steps(self, rows: NDArray[np.int64], steps: NDArray[np.int64]) -> None:
+        """Look for motions of so many steps in trials where none reaches the goal yet.
 
-        Parameters
-        ----------
-        rows : ndarray of int, shape (m,)
-            Trials.
-        steps : ndarray of int, shape (m,)
-            Steps of the motions; beyond the horizon there are none.
-        guesses : ndarray, shape (n, n_joints)
-            Configurations close to the goals, of all trials [rad or m].
+        Beyond the horizon there are none.
         """
         for samples in SAMPLES:
             due = ~self.reached[rows] & (steps <= self.simulator.task.horizon)
@@ -96,9 +85,8 @@ class MotionSearch:
             if rows.size == 0:
                 return
             tolerances = np.full(rows.size, self.simulator.task.tolerance)
-            solutions = self._solutions(rows, steps, tolerances, guesses, samples)
+            solutions = self._try_straight(rows, steps, tolerances, samples)
             self.has_solution[rows[solutions.owner]] = True
-            self._try_straight(rows, steps, solutions)
         self._try_vias(rows, steps, solutions, np.flatnonzero(~self.reached[rows] & (steps > 1)))
 
     def try_detours(self, rows: NDArray[np.int64]) -> None:
@@ -108,7 +96,10 @@ class MotionSearch:
             if len(ends) == 0:
                 continue
             self.has_solution[row] = True
-            rng = self._generator(row)
+            # Random numbers of a trial are a function of its start and goal.
+            numbers = np.concatenate([self.starts[row], self.goals[row]]) + 0.0
+            digest = hashlib.sha256(numbers.tobytes()).digest()
+            rng = np.random.default_rng(np.frombuffer(digest, dtype=np.uint32))
             for _ in range(DETOURS):
                 path = find_detour(self.simulator, self.starts[row], ends, rng)
                 if path is None:
@@ -118,19 +109,10 @@ class MotionSearch:
                     if actions is not None:
                         self._replay(np.array([row]), actions[None])
 
-    def try_approach(
-        self, rows: NDArray[np.int64], distances: NDArray[np.float64], guesses: NDArray[np.float64]
-    ) -> None:
+    def try_approach(self, rows: NDArray[np.int64], distances: NDArray[np.float64]) -> None:
         """Look for motions that end close to goals which none reaches.
 
-        Parameters
-        ----------
-        rows : ndarray of int, shape (m,)
-            Trials.
-        distances : ndarray, shape (m,)
-            Smallest distances that may be possible [m].
-        guesses : ndarray, shape (n, n_joints)
-            As for `try_steps`.
+        The distances are the smallest ones that may be possible [m].
         """
         for nearer in APPROACHES:
             due = np.isinf(self.costs[rows])
@@ -138,31 +120,22 @@ class MotionSearch:
             if rows.size == 0:
                 return
             steps = np.full(rows.size, self.simulator.task.horizon)
-            solutions = self._solutions(rows, steps, distances + nearer, guesses, SAMPLES[-1])
-            self._try_straight(rows, steps, solutions)
+            solutions = self._try_straight(rows, steps, distances + nearer, SAMPLES[-1])
             self._try_vias(rows, steps, solutions, np.flatnonzero(np.isinf(self.costs[rows])))
 
-    def _solutions(
+    def _try_straight(
         self,
         rows: NDArray[np.int64],
         steps: NDArray[np.int64],
         tolerances: NDArray[np.float64],
-        guesses: NDArray[np.float64],
         samples: int,
     ) -> Solutions:
-        """Find configurations close to the goals; owners count within ``rows``."""
-        starts, goals = self.starts[rows], self.goals[rows]
-        return solve_within(
-            self.simulator, starts, goals, steps, tolerances, guesses[rows], samples
-        )
-
-    def _try_straight(
-        self, rows: NDArray[np.int64], steps: NDArray[np.int64], solutions: Solutions
-    ) -> None:
-        """Try the straight motions to all solutions."""
-        trials, total = rows[solutions.owner], steps[solutions.owner]
-        ends = solutions.configurations
-        self._replay(trials, straight(self.simulator, self.starts[trials], ends, total))
+        """Try straight motions to configurations close to the goals; owners count in ``rows``."""
+        starts, goals, guesses = self.starts[rows], self.goals[rows], self.witnesses[rows]
+        found = solve_within(self.simulator, starts, goals, steps, tolerances, guesses, samples)
+        owner, ends = found.owner, found.configurations
+        self._replay(rows[owner], straight(self.simulator, starts[owner], ends, steps[owner]))
+        return found
 
     def _try_vias(
         self,
@@ -188,12 +161,6 @@ class MotionSearch:
         vias = starts.copy()
         vias[:, :moved] = lower + spread[:, :-1] * (upper - lower)
         self._replay(rows[owner], two_segments(self.simulator, starts, vias, ends, turn, total))
-
-    def _generator(self, row: int) -> np.random.Generator:
-        """Random generator of a trial, a function of its start and goal."""
-        numbers = np.concatenate([self.starts[row], self.goals[row]]) + 0.0
-        digest = hashlib.sha256(numbers.tobytes()).digest()
-        return np.random.default_rng(np.frombuffer(digest, dtype=np.uint32))
 
     def _replay(self, trials: NDArray[np.int64], actions: NDArray[np.float64]) -> None:
         """Run motions in the simulator, and keep the best of each trial if it is a better one."""

@@ -20,7 +20,6 @@ nothing.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -143,19 +142,18 @@ class Oracle:
     ) -> OracleSolutions:
         """From trials to bounds, motions and their replay."""
         horizon, n = self.simulator.task.horizon, len(starts)
-        lot = _Lot(starts, goals, witnesses=starts.copy())
+        search = MotionSearch(self.simulator, starts, goals)
         # The horizon comes first: most of what is out of reach is settled at once.
         last = np.full(n, horizon)
-        steps_bounds, tight = self._bound_steps(lot, np.arange(n), last, last)
+        steps_bounds, tight = self._bound_steps(search, np.arange(n), last, last)
         within = np.flatnonzero(steps_bounds <= horizon)
         ones = np.ones(within.size, dtype=np.int64)
-        steps_bounds[within], tight[within] = self._bound_steps(lot, within, ones, last[within])
-        search = MotionSearch(self.simulator, starts, goals)
+        steps_bounds[within], tight[within] = self._bound_steps(search, within, ones, last[within])
         for extra in range(EXTRA_STEPS + 1):
-            search.try_steps(within, steps_bounds[within] + extra, lot.witnesses)
+            search.try_steps(within, steps_bounds[within] + extra)
         search.try_detours(within)
-        self._count_contact(lot, search, steps_bounds, tight)
-        distance_bounds = self._approach(lot, search, steps_bounds)
+        self._count_contact(search, steps_bounds, tight)
+        distance_bounds = self._approach(search, steps_bounds)
         replay = self.simulator.rollout_actions(search.actions, starts, goals, record=True)
         return OracleSolutions(
             reachable=replay.success,
@@ -170,39 +168,35 @@ class Oracle:
         )
 
     def _count_contact(
-        self,
-        lot: "_Lot",
-        search: MotionSearch,
-        steps_bounds: NDArray[np.int64],
-        tight: NDArray[np.bool_],
+        self, search: MotionSearch, steps_bounds: NDArray[np.int64], tight: NDArray[np.bool_]
     ) -> None:
         """Raise the bounds of motions that are slower, and of goals that none reaches."""
         horizon = self.simulator.task.horizon
         slow = np.flatnonzero(search.reached & (search.steps > steps_bounds))
         steps_bounds[slow], tight[slow] = self._bound_steps(
-            lot, slow, steps_bounds[slow], search.steps[slow] - 1, contact=True
+            search, slow, steps_bounds[slow], search.steps[slow] - 1, contact=True
         )
         blocked = np.flatnonzero(~search.reached & (steps_bounds <= horizon))
         last = np.full(blocked.size, horizon)
-        beyond, _ = self._bound_steps(lot, blocked, last, last, contact=True)
+        beyond, _ = self._bound_steps(search, blocked, last, last, contact=True)
         tight[blocked] = beyond > horizon
         steps_bounds[blocked] = np.where(tight[blocked], beyond, steps_bounds[blocked])
 
     def _approach(
-        self, lot: "_Lot", search: MotionSearch, steps_bounds: NDArray[np.int64]
+        self, search: MotionSearch, steps_bounds: NDArray[np.int64]
     ) -> NDArray[np.float64]:
         """Prove, and seek, how close motions come to the goals that none reaches."""
         task, missed = self.simulator.task, np.flatnonzero(~search.reached)
         distances = np.zeros(len(steps_bounds))
-        distances[missed] = self._bound_distance(lot, missed)
+        distances[missed] = self._bound_distance(search, missed)
         out_of_reach = steps_bounds > task.horizon
         distances[out_of_reach] = np.fmax(distances[out_of_reach], task.tolerance)
-        search.try_approach(missed, np.fmax(distances[missed], task.tolerance), lot.witnesses)
+        search.try_approach(missed, np.fmax(distances[missed], task.tolerance))
         return distances
 
     def _bound_steps(
         self,
-        lot: "_Lot",
+        search: MotionSearch,
         rows: NDArray[np.int64],
         fewest: NDArray[np.int64],
         most: NDArray[np.int64],
@@ -212,24 +206,24 @@ class Oracle:
         """Prove how many steps some trials take at least, and note what attains it."""
         simulator, n = self.simulator, len(rows)
         lower_bounds, tight = np.empty(n, dtype=np.int64), np.empty(n, dtype=bool)
-        witnesses = lot.witnesses[rows]
-        inputs = (self._arm, lot.starts[rows], lot.goals[rows], simulator.step_limit)
+        witnesses = search.witnesses[rows]
+        inputs = (self._arm, search.starts[rows], search.goals[rows], simulator.step_limit)
         limits = (simulator.task.tolerance, contact, BUDGET, fewest, most)
         arrays = (*inputs, *limits, lower_bounds, tight, witnesses)
         run_rows(bound_steps, n, BUDGET * n, simulator.threads, *arrays)
-        lot.witnesses[rows] = witnesses
+        search.witnesses[rows] = witnesses
         return lower_bounds, tight
 
-    def _bound_distance(self, lot: "_Lot", rows: NDArray[np.int64]) -> NDArray[np.float64]:
+    def _bound_distance(self, search: MotionSearch, rows: NDArray[np.int64]) -> NDArray[np.float64]:
         """Prove how close the tool can come within the horizon, and note where it does."""
         simulator, n = self.simulator, len(rows)
         distances, configurations = np.empty((n, 2)), np.empty((n, simulator.arm.n_joints))
-        starts, goals = lot.starts[rows], lot.goals[rows]
+        starts, goals = search.starts[rows], search.goals[rows]
         box = step_box(simulator, starts, np.full(n, simulator.task.horizon))
         inputs = (self._arm, *box, starts, goals, RESOLUTION, False, BUDGET)
         arrays = (*inputs, distances, configurations)
         run_rows(bound_distance, n, BUDGET * n, simulator.threads, *arrays)
-        lot.witnesses[rows] = configurations
+        search.witnesses[rows] = configurations
         return distances[:, 0]
 
     def _reasons(
@@ -241,33 +235,16 @@ class Oracle:
     ) -> NDArray[np.str_]:
         """Say, per trial, why no motion reaches the goal."""
         horizon = self.simulator.task.horizon
-        reasons = []
-        for row, reached in enumerate(replay.success):
-            if reached:
-                reasons.append("")
-            elif steps_bounds[row] > horizon:
-                reasons.append(
-                    f"out of reach: proven to stay {distance_bounds[row]:.3f} m away or more "
-                    f"within {horizon} steps"
-                )
-            elif has_solution[row]:
-                reasons.append(f"no contact-free motion of {horizon} steps or less found")
-            else:
-                reasons.append("no contact-free configuration at the goal found")
+        reasons = np.where(
+            has_solution,
+            f"no contact-free motion of {horizon} steps or less found",
+            "no contact-free configuration at the goal found",
+        ).tolist()
+        for row in np.flatnonzero(steps_bounds > horizon):
+            reasons[row] = (
+                f"out of reach: proven to stay {distance_bounds[row]:.3f} m away or more "
+                f"within {horizon} steps"
+            )
+        for row in np.flatnonzero(replay.success):
+            reasons[row] = ""
         return np.array(reasons, dtype=np.str_)
-
-
-class _Lot(NamedTuple):
-    """Trials that are solved together; arrays of n rows.
-
-    Attributes
-    ----------
-    starts, goals : ndarray
-        The trials.
-    witnesses : ndarray, shape (n, n_joints)
-        Configurations that attain what was proven last [rad or m].
-    """
-
-    starts: NDArray[np.float64]
-    goals: NDArray[np.float64]
-    witnesses: NDArray[np.float64]

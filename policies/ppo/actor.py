@@ -16,13 +16,6 @@ from kinarm.world import World
 def actor_policy(config: PPOConfig, state: PPOState) -> Policy:
     """Freeze the actor of a state into a policy, which takes its mean action.
 
-    Parameters
-    ----------
-    config : PPOConfig
-        The settings of the training.
-    state : PPOState
-        The state.
-
     Raises
     ------
     InvalidInputError

@@ -14,6 +14,7 @@ from torch.nn.utils import parameters_to_vector, vector_to_parameters
 
 from kinarm.errors import InvalidInputError
 from kinarm.policies.curve import CurvePoint
+from kinarm.policies.learners import learner_of
 from kinarm.policies.mirror import task_mirror
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.ppo.config import PPOConfig
@@ -53,18 +54,16 @@ class PPOTraining:
     """Environment and model of a training; all that changes is in the `PPOState`.
 
     It runs on one thread: its networks and batches are small, and so the result does not depend
-    on the number of processors. Several seeds are best trained by as many processes.
-
-    Parameters
-    ----------
-    config : PPOConfig
-        The settings.
-    tensorboard : str or Path, optional
-        Folder for the logs of Stable-Baselines3.
+    on the number of processors. Several seeds are best trained by as many processes. On demand,
+    Stable-Baselines3 writes its logs to the folder ``tensorboard``.
     """
 
     @alone_in_torch()
     def __init__(self, config: PPOConfig, tensorboard: str | Path | None = None) -> None:
+        outputs: list[KVWriter] = []
+        if tensorboard is not None:
+            learner_of(config).check_installed("tensorboard")
+            outputs.append(TensorBoardOutputFormat(str(tensorboard)))
         rng = seed_iteration(config.seed, 0)
         simulator = config.simulator(threads=1)
         mirror = task_mirror(config.symmetric, simulator.world)
@@ -90,9 +89,6 @@ class PPOTraining:
             },
             device="cpu",
         )
-        outputs: list[KVWriter] = []
-        if tensorboard is not None:
-            outputs.append(TensorBoardOutputFormat(str(tensorboard)))
         self.model.set_logger(Logger(folder=None, output_formats=outputs))
         self._first_parameters = self.parameters()
 
@@ -145,13 +141,7 @@ class PPOTraining:
         )
 
     def load(self, state: PPOState) -> None:
-        """Put a state into the model and the environment.
-
-        Raises
-        ------
-        InvalidInputError
-            If it has another number of parameters or of arms.
-        """
+        """Put a state into the model and the environment, if it has as many parameters and arms."""
         config, model = self.config, self.model
         sizes = (len(state.parameters), len(state.episodes.goal))
         expected = (len(self.parameters()), config.n_envs)

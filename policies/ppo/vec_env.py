@@ -17,17 +17,7 @@ from kinarm.simulator import Simulator
 
 
 class EndedEpisodes(NamedTuple):
-    """The episodes that ended in an `SB3VecEnv` since the last look.
-
-    Attributes
-    ----------
-    returns : list of float
-        Their returns.
-    successes : list of bool
-        Whether they reached the goal.
-    time : float
-        Time spent in steps [s].
-    """
+    """Episodes of an `SB3VecEnv` since the last look: returns, successes, time in steps [s]."""
 
     returns: list[float]
     successes: list[bool]
@@ -37,20 +27,9 @@ class EndedEpisodes(NamedTuple):
 class SB3VecEnv(VecEnv):
     """Many arms, stepped by one call of the compiled simulator.
 
-    Episodes that end are replaced at once. With a mirror, an arm
+    Episodes that end are replaced at once; ``rng`` draws starts and goals. With a mirror, an arm
     whose goal lies to the left is seen in the mirror, and its actions are reflected likewise, so
     that a learner only ever meets goals to the right.
-
-    Parameters
-    ----------
-    simulator : Simulator
-        Arm, scene, task and reward.
-    num_envs : int
-        Number of arms.
-    rng : numpy.random.Generator
-        Draws starts and goals.
-    mirror : Mirror, optional
-        Reflection that sends goals on the left to the right.
 
     Attributes
     ----------
@@ -103,13 +82,7 @@ class SB3VecEnv(VecEnv):
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """Move every arm for one time step.
 
-        Returns
-        -------
-        observations : ndarray, shape (num_envs, n_observations)
-            Those of new episodes where one ended.
-        rewards : ndarray, shape (num_envs,)
-        dones : ndarray of bool, shape (num_envs,)
-        infos : list of dict
+        Returns observations (those of new episodes where one ended), rewards, dones and infos.
         """
         began = time.perf_counter()
         episodes = self._begun_episodes()

@@ -138,7 +138,7 @@ class TestNetworks:
 
     def test_without_normaliser_are_theta_itself(self):
         theta = np.random.default_rng(11).normal(size=(2, 5, 48))
-        networks = linear_networks(theta, None)
+        networks = linear_networks(theta, Normalizer.empty(48))
         np.testing.assert_array_equal(networks.weights[:, 240:], 0)
         np.testing.assert_array_equal(networks.weights[1, :240].reshape(48, 5), theta[1].T)
 

@@ -25,7 +25,7 @@ from kinarm.policies.oracle.kernels.box_bound import (
 )
 from kinarm.policies.oracle.kernels.overlap import overlaps
 
-LAYOUT = "792e75dbbd85"
+LAYOUT = "02d0657101a2"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 FOUND, EXCLUDED, EXHAUSTED = range(3)
@@ -107,36 +107,21 @@ def search(
 ) -> tuple[int, float, float]:
     """Search a box for a configuration that brings the tool close to the goal.
 
-    Parameters
-    ----------
-    arm : ArmInScene
-        The arm and its contact pairs.
-    lower, upper : ndarray, shape (n,)
-        Corners of the box, in the first n joints [rad or m].
-    goal : tuple of float
-        The goal [m].
-    enough : float
-        Distance at which the search ends [m].
-    resolution : float
-        By how much the smallest distance found may exceed the proven one [m]; if it is infinite,
-        the search only decides whether some configuration is close enough.
-    contact : bool
-        Whether configurations that are proven to touch something are ruled out.
-    budget : int
-        Boxes to examine.
-    best : ndarray, shape (1, n_joints)
-        A configuration whose joints beyond the first n count. On return, the closest one found.
-    boxes : ndarray, shape (BOXES, 2 n + 1)
-        Work space: corners of the boxes that wait, and the distance proven of each.
+    The box, from ``lower`` to ``upper``, is of the first n joints. The search ends at a distance of
+    ``enough`` [m], or after ``budget`` boxes. The smallest distance found may exceed the proven one
+    by ``resolution`` [m]; if that is infinite, the search only decides whether some configuration
+    is close enough. With ``contact``, what is proven to touch something is ruled out.
+
+    ``best``, shape (1, n_joints), brings the other joints and takes the closest configuration.
+    ``boxes``, shape (BOXES, 2 n + 1), is work space: corners of the boxes that wait, and the
+    distance proven of each.
 
     Returns
     -------
     outcome : int
         `FOUND`, `EXCLUDED` or `EXHAUSTED`.
-    distance : float
-        That of the closest configuration found [m].
-    proven : float
-        Lower bound of the distance over the box [m].
+    distance, proven : float
+        That of the closest configuration found, and a lower bound over the box [m].
     """
     chain, bounds, shapes = arm
     n, n_joints = lower.shape[0], best.shape[1]
@@ -210,35 +195,12 @@ def bound_steps(
     tight: NDArray[np.bool_],
     witnesses: NDArray[np.float64],
 ) -> None:
-    """Prove how many steps it takes at least to bring the tool to the goal.
+    """Prove how many steps it takes at least to bring the tool to goals, for some rows.
 
-    Parameters
-    ----------
-    first, last : int
-        Range of rows to work on.
-    arm : ArmInScene
-        The arm and its contact pairs.
-    starts : ndarray, shape (m, n_joints)
-        Start configurations [rad or m].
-    goals : ndarray, shape (m, 3)
-        Goals [m].
-    step_limit : ndarray, shape (n,)
-        Largest move of each actuated joint in a step [rad or m].
-    tolerance : float
-        Distance at which a goal is reached [m].
-    contact : bool
-        Whether configurations that are proven to touch something are ruled out.
-    budget : int
-        Boxes to examine for each number of steps.
-    fewest, most : ndarray of int, shape (m,)
-        Numbers of steps to examine; fewer than ``fewest`` are impossible.
-    lower_bounds : ndarray of int, shape (m,)
-        Output: fewer steps are impossible.
-    tight : ndarray of bool, shape (m,)
-        Output: whether a configuration that counts reaches the goal in that many steps, or none
-        does in ``most``; else the budget ran out.
-    witnesses : ndarray, shape (m, n_joints)
-        Output: that configuration, where there is one.
+    Numbers of steps from ``fewest`` to ``most`` are examined, each by a `search` with the budget;
+    fewer than ``fewest`` are impossible. Written are ``lower_bounds``, below which no number of
+    steps suffices; whether they are ``tight``, that is, some configuration that counts reaches the
+    goal in so many steps, or none does in ``most``; and such configurations as ``witnesses``.
     """
     n = step_limit.shape[0]
     lower, upper, best = np.empty(n), np.empty(n), np.empty((1, starts.shape[1]))
@@ -280,30 +242,10 @@ def bound_distance(
     distances: NDArray[np.float64],
     configurations: NDArray[np.float64],
 ) -> None:
-    """Bound from below how close the tool can come to the goal.
+    """Bound from below how close the tool can come to goals, for some rows; see `search`.
 
-    Parameters
-    ----------
-    first, last : int
-        Range of rows to work on.
-    arm : ArmInScene
-        The arm and its contact pairs.
-    lower, upper : ndarray, shape (m, n)
-        Corners of the boxes that the first n joints can reach [rad or m].
-    starts : ndarray, shape (m, n_joints)
-        Configurations whose other joints count [rad or m].
-    goals : ndarray, shape (m, 3)
-        Goals [m].
-    resolution : float
-        By how much the distance found may exceed the proven one [m].
-    contact : bool
-        Whether configurations that are proven to touch something are ruled out.
-    budget : int
-        Boxes to examine.
-    distances : ndarray, shape (m, 2)
-        Output: the distance proven, and that of the closest configuration found [m].
-    configurations : ndarray, shape (m, n_joints)
-        Output: the closest configuration found [rad or m].
+    Written are the distances, shape (m, 2), proven and found [m], and the closest configurations
+    found; joints beyond those of the boxes stay as in ``starts``.
     """
     best, boxes = np.empty((1, starts.shape[1])), np.empty((BOXES, 2 * lower.shape[1] + 1))
     for row in range(first, last):

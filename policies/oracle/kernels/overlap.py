@@ -100,18 +100,8 @@ def overlaps(
 ) -> bool:
     """Whether some pair of bodies is proven to touch throughout a box of configurations.
 
-    Parameters
-    ----------
-    chain, shapes
-        The arm and its contact pairs.
-    poses : ndarray, shape (n_joints + 1, POSE)
-        Forward kinematics at the centre of the box.
-    half : ndarray, shape (n,)
-        Half-widths of the box [rad or m].
-    share : float
-        Scales the box; 0 leaves its centre alone.
-    jacobian : ndarray, shape (3, n)
-        Work space.
+    The box is centred where the ``poses`` are, with half-widths ``share`` times ``half``; a share
+    of 0 leaves its centre alone. The Jacobian, shape (3, n), is work space.
     """
     prismatic, axes = chain.prismatic, chain.axis
     link, capsules, boxes, pairs, travel, exact = shapes

@@ -65,24 +65,9 @@ def damped_least_squares(
 ) -> None:
     """Move configurations until the tool is within a radius of the goal, by damped Newton steps.
 
-    Parameters
-    ----------
-    first, last : int
-        Range of rows to work on.
-    chain : Chain
-        The arm.
-    owner : ndarray of int, shape (m,)
-        Which goal and limits a configuration belongs to.
-    lower, upper : ndarray, shape (n_goals, n)
-        Limits of the first n joints; the others stay as they are [rad or m].
-    goals : ndarray, shape (n_goals, 3)
-        Goals [m].
-    radius : ndarray, shape (m,)
-        Distance at which a configuration is left as it is [m].
-    configurations : ndarray, shape (m, n_joints)
-        Within the limits; changed in place [rad or m].
-    distances : ndarray, shape (m,)
-        Output: distance from the tool to the goal [m].
+    For rows ``first`` to ``last``, ``configurations`` are changed in place, and ``distances`` from
+    the tool to the goal written [m]. ``owner`` says which row of goals and limits (of the first n
+    joints; the others stay) belongs to each, and ``radius`` at which distance it is left [m].
     """
     prismatic, translation, rotation, axis, tool = chain[:5]
     n_joints, n = configurations.shape[1], lower.shape[1]
