@@ -28,7 +28,7 @@ NOT_FROM_FILE = ("task", "scene", "tolerance", "horizon", "start_spread", "seed"
 
 @dataclass(frozen=True, kw_only=True)
 class ReplayRequest(ProblemOptions):
-    """Trials to watch: on a page that plays offline, or live.
+    """Write one HTML file that replays trials offline, or show them live.
 
     Parameters
     ----------
