@@ -45,15 +45,7 @@ class LocalExecutor:
     threads: int = 1
 
     def carry_out(self, work: Callable[[TaskT], object], tasks: Iterable[TaskT]) -> Iterator[TaskT]:
-        """Do the work for every task, begun in the given order; yield tasks as they finish.
-
-        Abandoned or interrupted, it leaves what is finished and drops what is not.
-
-        Raises
-        ------
-        WorkerError
-            If a worker ends unexpectedly.
-        """
+        """As for any `Executor`; interrupted, it leaves what is finished and drops the rest."""
         from joblib import Parallel, delayed, parallel_config
 
         with parallel_config(
