@@ -18,10 +18,6 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
 
-REPORT_PRIORITY = SPREAD_PRIORITY
-"""Priority of the least important columns that the page shows; see `Metric.priority`."""
-
-
 def write_report(
     folder: str | Path, document: dict[str, Any], evaluations: Sequence[Evaluation]
 ) -> Path:
@@ -117,7 +113,7 @@ def shown_columns(results: ProblemResults) -> list[Column]:
     return [
         column
         for column in metric_columns()
-        if column.priority >= REPORT_PRIORITY
+        if column.priority >= SPREAD_PRIORITY
         and any(column.cell(group.row).value for group in results.groups)
     ]
 
@@ -135,5 +131,5 @@ def _title(problems: Sequence[ProblemResults]) -> str:
 def _subtitle(protocol: dict[str, Any], problems: Sequence[ProblemResults]) -> str:
     """What was faced, in a line."""
     faced = f"problem {problems[0].name}" if len(problems) == 1 else f"{len(problems)} problems"
-    arms = " and ".join(dict.fromkeys(results.arm.name for results in problems))
+    arms = " and ".join(dict.fromkeys(results.entry["arm"] for results in problems))
     return f"{faced} · {protocol['trials']} trials each · arm {arms} · seed {protocol['seed']}"
