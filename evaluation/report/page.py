@@ -1,12 +1,12 @@
 """The page as a whole."""
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kinarm._files import check_folder, write_text
 from kinarm.evaluation.evaluation import Evaluation
-from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.report import maps
 from kinarm.evaluation.report.charts import histogram_chart, profile_chart
 from kinarm.evaluation.report.groups import ProblemResults, group_results
@@ -100,7 +100,7 @@ def page_template() -> "Template":
     )
     environment.globals.update(
         maps=maps,
-        success_cell=lambda row: metric_cell("success", METRICS["success"], row),
+        success_cell=partial(metric_cell, "success"),
         profile_chart=profile_chart,
         histogram_chart=histogram_chart,
         shown_columns=shown_columns,
