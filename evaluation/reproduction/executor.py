@@ -45,7 +45,15 @@ class LocalExecutor:
     threads: int = 1
 
     def carry_out(self, work: Callable[[TaskT], object], tasks: Iterable[TaskT]) -> Iterator[TaskT]:
-        """As for any `Executor`; interrupted, it leaves what is finished and drops the rest."""
+        """Do the work for every task, begun in the given order; yield tasks as they finish.
+
+        Abandoned or interrupted, it leaves what is finished and drops what is not.
+
+        Raises
+        ------
+        WorkerError
+            If a worker ends unexpectedly.
+        """
         from joblib import Parallel, delayed, parallel_config
 
         with parallel_config(
