@@ -32,6 +32,12 @@ COMPUTING_PACKAGES = ("numpy", "numba", "pin", "coal")
 ARCHIVE = ("bounds", 1)
 """Kind and version of the files."""
 
+TRIAL_BOUNDS = (
+    *("reachable", "steps", "steps_lower_bound", "tight"),
+    *("final_distance", "distance_lower_bound"),
+)
+"""What documents hold of every trial."""
+
 _known: WeakKeyDictionary[TrialSet, OracleSolutions] = WeakKeyDictionary()
 
 
@@ -128,13 +134,9 @@ def _delete_least_recently_used(folder: Path) -> None:
 def bounds_document(solutions: OracleSolutions) -> dict[str, Any]:
     """What the oracle knows about a set of trials, as a dictionary that JSON can hold.
 
-    Returns
-    -------
-    dict
-        ``success``, ``unsolved`` (trials that no motion was found for, and why), ``steps`` and
-        ``steps_lower_bound`` of all trials and their ``gap`` where one was found (mean, median,
-        95th percentile and maximum), ``tight_share``, and ``trials`` with the bounds of every
-        trial.
+    ``unsolved`` are the trials that no motion was found for, and why; ``gap`` is that between
+    ``steps`` and ``steps_lower_bound`` of the others, and ``tight_share`` the share of trials whose
+    number of steps is proven.
     """
     missed = np.flatnonzero(~solutions.reachable)
     gap = (solutions.steps - solutions.steps_lower_bound)[solutions.reachable]
@@ -147,14 +149,7 @@ def bounds_document(solutions: OracleSolutions) -> dict[str, Any]:
         "steps_lower_bound": _summary(solutions.steps_lower_bound),
         "gap": _summary(gap) if gap.size else None,
         "tight_share": float(solutions.tight.mean()),
-        "trials": {
-            "reachable": solutions.reachable.tolist(),
-            "steps": solutions.steps.tolist(),
-            "steps_lower_bound": solutions.steps_lower_bound.tolist(),
-            "tight": solutions.tight.tolist(),
-            "final_distance": solutions.final_distance.tolist(),
-            "distance_lower_bound": solutions.distance_lower_bound.tolist(),
-        },
+        "trials": {name: getattr(solutions, name).tolist() for name in TRIAL_BOUNDS},
     }
 
 

@@ -114,13 +114,7 @@ class Entrant:
     @classmethod
     def from_function(cls, name: str, function: PolicyFunction) -> "Entrant":
         """Enter a function from observations (n, n_observations) to actions (n, n_actions)."""
-        return cls(
-            name=name,
-            run=_running(function),
-            algorithm="function",
-            recipe="",
-            group=name,
-        )
+        return cls(name, _running(function), algorithm="function", recipe="", group=name)
 
 
 def _running(policy: Policy | PolicyFunction) -> Run:
@@ -144,12 +138,9 @@ def _run_zero(trials: TrialSet, *, record: bool = False) -> Rollouts:
 def _run_random(trials: TrialSet, *, record: bool = False) -> Rollouts:
     simulator = trials.simulator
     shape = (simulator.task.horizon, simulator.n_actions)
-    actions = [
-        trial_generator(trials.seed, trial, stream=1).uniform(-1, 1, shape)
-        for trial in range(len(trials))
-    ]
-    table = np.array(actions)
-    return simulator.rollout_actions(table, trials.starts, trials.goals, record=record)
+    generators = [trial_generator(trials.seed, trial, stream=1) for trial in range(len(trials))]
+    actions = np.array([generator.uniform(-1, 1, shape) for generator in generators])
+    return simulator.rollout_actions(actions, trials.starts, trials.goals, record=record)
 
 
 def _run_oracle(trials: TrialSet, *, record: bool = False) -> Rollouts:

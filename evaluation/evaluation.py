@@ -92,10 +92,7 @@ class Evaluation:
     def to_json(self) -> dict[str, Any]:
         """Figures of merit and every trial, as a dictionary that JSON can hold."""
         return {
-            **_rows_head(self.entrant.name, self.entrant, self.problem),
-            "training_seed": self.entrant.seed,
-            "trials": len(self.trials),
-            "metrics": _metrics_json(self.metrics),
+            **_row_head(self.entrant.name, self, self.metrics, training_seed=self.entrant.seed),
             "outcomes": {
                 "final_distance": self.rollouts.distance.tolist(),
                 "steps": self.rollouts.steps.tolist(),
@@ -149,11 +146,13 @@ class PooledEvaluation:
     def to_json(self) -> dict[str, Any]:
         """Figures of merit as a dictionary that JSON can hold."""
         return {
-            **_rows_head(self.name, self.members[0].entrant, self.problem),
-            "members": [member.entrant.name for member in self.members],
-            "training_seeds": [member.entrant.seed for member in self.members],
-            "trials": len(self.members[0].trials),
-            "metrics": _metrics_json(self.metrics),
+            **_row_head(
+                self.name,
+                self.members[0],
+                self.metrics,
+                members=[member.entrant.name for member in self.members],
+                training_seeds=[member.entrant.seed for member in self.members],
+            ),
             "spread": self.spread,
         }
 
@@ -163,19 +162,21 @@ class PooledEvaluation:
         return f"PooledEvaluation({len(self.members)} seeds of {summary})"
 
 
-def _rows_head(name: str, entrant: Entrant, problem: ReachProblem) -> dict[str, Any]:
-    """What a row of a document is about."""
+def _row_head(
+    name: str, evaluation: Evaluation, metrics: dict[str, Estimate], **seeds: Any
+) -> dict[str, Any]:
+    """What a row of a document is about, and its figures."""
+    entrant = evaluation.entrant
     return {
         "policy": name,
         "algorithm": entrant.algorithm,
         "recipe": entrant.recipe,
-        "problem": problem.name,
+        "problem": evaluation.problem.name,
         "trained_on": entrant.problem.name if entrant.problem else None,
+        **seeds,
+        "trials": len(evaluation.trials),
+        "metrics": {key: estimate.to_json() for key, estimate in metrics.items()},
     }
-
-
-def _metrics_json(metrics: dict[str, Estimate]) -> dict[str, Any]:
-    return {name: estimate.to_json() for name, estimate in metrics.items()}
 
 
 def _summary(name: str, trials: TrialSet, success: Estimate) -> str:
@@ -242,16 +243,7 @@ def _entrant_of(policy: str | Path | Policy | Entrant | PolicyFunction) -> Entra
 def run_trials(
     entrant: Entrant, trials: TrialSet, allow_other_arm: bool = False, *, oracle: bool = False
 ) -> Evaluation:
-    """Let an entrant face a set of trials.
-
-    Parameters
-    ----------
-    entrant : Entrant
-        The policy.
-    trials : TrialSet
-        What it faces.
-    allow_other_arm, oracle
-        As for `evaluate`.
+    """Let an entrant face a set of trials; see `evaluate`.
 
     Raises
     ------

@@ -72,13 +72,7 @@ def _stairs(
 
 
 def series_label(evaluation: Evaluation) -> str:
-    """Name of what the training seeds of a recipe share, and its problem if it is another one.
-
-    Parameters
-    ----------
-    evaluation : Evaluation
-        Of one training seed.
-    """
+    """Name of what the training seeds of a recipe share, and its problem if it is another one."""
     entrant, trained_for = evaluation.entrant, evaluation.entrant.problem
     if trained_for is None:
         return entrant.name

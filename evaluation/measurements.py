@@ -47,28 +47,13 @@ class Timing(NamedTuple):
 
 
 def measure(policy_name: str, repetitions: int, *, ppo: bool = False) -> dict[str, Any]:
-    """Measure everything.
-
-    Parameters
-    ----------
-    policy_name : str
-        Trained policy to run, on the problem that it is for.
-    repetitions : int
-        How often each figure is measured.
-    ppo : bool
-        Time a training with PPO as well, once.
-
-    Returns
-    -------
-    dict
-        Figures that JSON can hold: rates [steps/s], shares, and times [s].
-    """
+    """Measure everything that a `BenchmarkRequest` asks for."""
     policy = load_policy(policy_name)
     problem = policy.problem
     simulator = Simulator(problem)
-    rollouts = [
-        row for size in BATCHES for row in measure_rollouts(simulator, policy, size, repetitions)
-    ]
+    rollouts = []
+    for size in BATCHES:
+        rollouts += measure_rollouts(simulator, policy, size, repetitions)
     reference = measure_reference(simulator, policy, repetitions)
     fast = [row for row in rollouts if row["batch"] == HEADLINE_BATCH][-1]
     few = min(repetitions, SLOW_REPETITIONS)
@@ -110,28 +95,21 @@ def measure_rollouts(
     actions = rng.uniform(-1, 1, (batch, simulator.task.horizon, simulator.n_actions))
     tested = simulator.problem.stepping.tested_configurations
 
-    def run_random() -> int:
-        return int(simulator.rollout_actions(actions, starts, goals).steps.sum())
-
-    def run_trained() -> int:
-        return int(simulator.rollout(policy, starts, goals).steps.sum())
-
+    runs: dict[str, Callable[[], int]] = {
+        "random": lambda: int(simulator.rollout_actions(actions, starts, goals).steps.sum()),
+        "trained": lambda: int(simulator.rollout(policy, starts, goals).steps.sum()),
+    }
     rows = []
-    for name, run in (("random", run_random), ("trained", run_trained)):
+    for name, run in runs.items():
         judged_before = simulator.judged
         steps = run()
+        row = {"batch": batch, "actions": name}
         judged_share = (simulator.judged - judged_before) / (tested * steps)
         for threads in sorted({1, available_threads()}):
             simulator.threads = threads
-            rows.append(
-                {
-                    "batch": batch,
-                    "actions": name,
-                    "threads": threads,
-                    "steps_per_second": timed(run, repetitions)._asdict(),
-                    "judged_share": judged_share,
-                }
-            )
+            rate = timed(run, repetitions)._asdict()
+            rates = {"threads": threads, "steps_per_second": rate, "judged_share": judged_share}
+            rows.append(row | rates)
     return rows
 
 
@@ -204,10 +182,7 @@ def measure_oracle(problem: ReachProblem, repetitions: int) -> dict[str, Any]:
 def measure_ppo(problem: ReachProblem) -> dict[str, Any]:
     """Time, steps and the simulator's share of a training with PPO's tuned recipe.
 
-    Returns
-    -------
-    dict
-        Figures that JSON can hold, or under ``skipped`` why there are none.
+    Where it cannot be trained, ``skipped`` says why.
     """
     config = recipe("ppo", "tuned", problem=problem)
     try:
@@ -237,8 +212,5 @@ def measure_evaluation() -> dict[str, float]:
             subprocess.run(command, stdout=subprocess.DEVNULL, check=True, env=env)
             seconds.append(time.perf_counter() - began)
     peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
-    return {
-        "seconds_without_bounds": seconds[0],
-        "seconds": seconds[1],
-        "peak_memory_mb": peak / 1024,
-    }
+    before, after = seconds
+    return {"seconds_without_bounds": before, "seconds": after, "peak_memory_mb": peak / 1024}

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Literal
 
 import numpy as np
@@ -175,11 +175,6 @@ def interquartile_mean(values: NDArray[np.float64], axis: int) -> Any:
     return trim_mean(values, 0.25, axis=axis)
 
 
-def percentile_95(values: NDArray[np.float64], axis: int) -> Any:
-    """95th percentile of some values."""
-    return np.quantile(values, 0.95, axis=axis)
-
-
 METRICS: dict[str, Metric] = {
     "success": Metric(
         meaning="share of trials that ended within the tolerance, without contact",
@@ -209,7 +204,9 @@ METRICS: dict[str, Metric] = {
     ),
     "mean_distance": distance_metric("mean", np.mean, "mean m", priority=2),
     "iqm_distance": distance_metric("interquartile mean (of the middle half)", interquartile_mean),
-    "p95_distance": distance_metric("95th percentile", percentile_95, "p95 m", priority=2),
+    "p95_distance": distance_metric(
+        "95th percentile", partial(np.quantile, q=0.95), "p95 m", priority=2
+    ),
     "max_distance": Metric(
         meaning="largest final distance",
         formula=lambda trials: trials.distance.max(),
@@ -256,18 +253,9 @@ METRICS: dict[str, Metric] = {
 
 
 def estimate_metrics(outcomes: Outcomes) -> dict[str, Estimate]:
-    """Work out all `METRICS`, with their intervals.
-
-    Parameters
-    ----------
-    outcomes : Outcomes
-        What happened. Metrics that need bounds stay empty where there are none.
-    """
-    known = {
-        name: metric
-        for name, metric in METRICS.items()
-        if outcomes.bounds is not None or not metric.needs_bounds
-    }
+    """Work out all `METRICS`, with their intervals; without bounds, some stay empty."""
+    bounded = outcomes.bounds is not None
+    known = {name: each for name, each in METRICS.items() if bounded or not each.needs_bounds}
     bootstrapped = [name for name, metric in known.items() if metric.interval == "bootstrap"]
 
     def resampled_figures(numbers: NDArray[np.int64]) -> NDArray[np.float64]:

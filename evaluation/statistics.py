@@ -54,16 +54,9 @@ class Estimate(NamedTuple):
 
 
 def wilson_interval(hits: int, trials: int, seeds: int = 1) -> Interval:
-    """95 % interval of a share of trials; see `Estimate.share` for several seeds.
+    """95 % interval of a share of trials, from the hits of all seeds together.
 
-    Parameters
-    ----------
-    hits : int
-        Hits of all seeds together.
-    trials : int
-        Trials that every seed faced.
-    seeds : int
-        Number of seeds.
+    Every seed faced the trials; see `Estimate.share`.
     """
     few, many = hits // seeds, -(-hits // seeds)
     return _wilson_interval(few, trials)[0], _wilson_interval(many, trials)[1]
@@ -81,14 +74,9 @@ def _wilson_interval(hits: int, trials: int) -> Interval:
 def performance_profile(
     distances: NDArray[np.float64], limits: Iterable[float]
 ) -> tuple[Estimate, ...]:
-    """Shares of trials whose final distance is at most each of some limits.
+    """Shares of trials whose final distance is at most each of some limits [m].
 
-    Parameters
-    ----------
-    distances : ndarray, shape (n_trials,) or (n_seeds, n_trials)
-        Final distances [m]; several seeds face the same trials, see `Estimate.share`.
-    limits : iterable of float
-        The limits [m].
+    Distances [m] have shape (n_trials,) or (n_seeds, n_trials); see `Estimate.share`.
     """
     return tuple(Estimate.share(distances <= limit) for limit in limits)
 

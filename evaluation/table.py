@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from kinarm.evaluation.metrics import ALWAYS, METRICS, Metric
+from kinarm.evaluation.metrics import ALWAYS, METRICS
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -17,15 +17,7 @@ SPREAD_PRIORITY = 5
 
 
 class Cell(NamedTuple):
-    """A figure as text.
-
-    Attributes
-    ----------
-    value : str
-        The figure; empty if there is none.
-    beside : str
-        Its interval, or whatever else is shown with it.
-    """
+    """A figure as text, empty if there is none, and its interval or what else is beside it."""
 
     value: str = ""
     beside: str = ""
@@ -36,18 +28,9 @@ class Cell(NamedTuple):
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the table.
+    """A column of the table, with what it says of a row of the document.
 
-    Attributes
-    ----------
-    heading : str
-        What stands above it.
-    meaning : str
-        What its figures mean.
-    priority : float
-        Columns of low priority are left out first.
-    cell : callable
-        From a row of the document to what the column says of it.
+    Columns of low priority are left out first.
     """
 
     heading: str
@@ -61,18 +44,18 @@ def metric_columns() -> list[Column]:
     columns = []
     for name, metric in METRICS.items():
         if metric.heading:
-            cell = partial(metric_cell, name, metric)
+            cell = partial(metric_cell, name)
             columns.append(Column(metric.heading, metric.meaning, metric.priority, cell))
         if metric.spread_heading:
             meaning = f"range over training seeds, and their number: {metric.meaning}"
-            cell = partial(spread_cell, name, metric)
+            cell = partial(spread_cell, name)
             columns.append(Column(metric.spread_heading, meaning, SPREAD_PRIORITY, cell))
     return columns
 
 
-def metric_cell(name: str, metric: Metric, row: dict[str, Any]) -> Cell:
+def metric_cell(name: str, row: dict[str, Any]) -> Cell:
     """What a row of the document says of a metric."""
-    estimate = row["metrics"][name]
+    metric, estimate = METRICS[name], row["metrics"][name]
     if estimate["value"] is None:
         return Cell()
     beside = ""
@@ -84,12 +67,13 @@ def metric_cell(name: str, metric: Metric, row: dict[str, Any]) -> Cell:
     return Cell(metric.write(estimate["value"]), beside)
 
 
-def spread_cell(name: str, metric: Metric, row: dict[str, Any]) -> Cell:
+def spread_cell(name: str, row: dict[str, Any]) -> Cell:
     """What a row of the document says of a metric's range over training seeds, if there are."""
     spread = row.get("spread", {}).get(name)
     if spread is None:
         return Cell()
-    return Cell(metric.write_range(spread["min"], spread["max"]), f"{len(spread['each'])} seeds")
+    extremes = METRICS[name].write_range(spread["min"], spread["max"])
+    return Cell(extremes, f"{len(spread['each'])} seeds")
 
 
 def text_column(key: str) -> Column:
@@ -100,14 +84,7 @@ def text_column(key: str) -> Column:
 def print_table(document: dict[str, Any], console: "Console", *, markdown: bool = False) -> None:
     """Print the figures of a document, without the less important columns if space is scarce.
 
-    Parameters
-    ----------
-    document : dict
-        What `evaluation_document` returned.
-    console : rich.console.Console
-        Where to print.
-    markdown : bool
-        Whether to print Markdown, always with all columns.
+    Markdown is always printed with all columns.
     """
     columns = [text_column("problem"), text_column("policy"), *metric_columns()]
     if markdown:
@@ -133,17 +110,7 @@ def print_table(document: dict[str, Any], console: "Console", *, markdown: bool 
 def evaluation_table(
     document: dict[str, Any], columns: Sequence[Column], *, markdown: bool = False
 ) -> "Table":
-    """The figures of a document as a table; several training seeds share a row.
-
-    Parameters
-    ----------
-    document : dict
-        What `evaluation_document` returned.
-    columns : sequence of Column
-        What it shows.
-    markdown : bool
-        Whether the table is to be printed as Markdown.
-    """
+    """The figures of a document as a table; several training seeds share a row."""
     from rich import box
     from rich.table import Table
 
@@ -160,15 +127,7 @@ def evaluation_table(
 
 
 def table_rows(document: dict[str, Any], problem: str) -> list[dict[str, Any]]:
-    """Pooled results of a problem and the results that are not part of them, best first.
-
-    Parameters
-    ----------
-    document : dict
-        What `evaluation_document` returned.
-    problem : str
-        Name of one of its problems.
-    """
+    """Pooled results of a problem and the results that are not part of them, best first."""
     pooled = [row for row in document["pooled"] if row["problem"] == problem]
     members = {name for row in pooled for name in row["members"]}
     single = [row for row in document["results"] if row["problem"] == problem]

@@ -20,6 +20,9 @@ Request = TypeVar("Request")
 class Parser(argparse.ArgumentParser):
     """An argument parser that reports bad usage in one line and exits with status 2."""
 
+    def __init__(self, **options: Any) -> None:
+        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **options)
+
     def error(self, message: str) -> NoReturn:
         """Print one line on standard error and exit."""
         self.exit(2, f"{self.prog}: {' '.join(message.split())} (see {self.prog} --help)\n")
@@ -173,6 +176,32 @@ def request_of(options: argparse.Namespace, kind: type[Request]) -> Request:
     return kind(**given_options(options, kind))
 
 
-def command_text(prog: str, arguments: Sequence[str] | None) -> str:
-    """The command as typed, for the record."""
-    return shlex.join([prog, *(sys.argv[1:] if arguments is None else arguments)])
+def run_request(
+    prog: str,
+    kind: type[Request],
+    report: Callable[[Request, str], None],
+    arguments: Sequence[str] | None,
+    *,
+    epilog: str = "",
+    skip: Collection[str] = (),
+) -> NoReturn:
+    """Run a command line all of whose options are the fields of one request; see `run_command`.
+
+    Parameters
+    ----------
+    prog : str
+        Name of the command; what it does is the first line of the request's docstring.
+    kind : type
+        The request, a dataclass.
+    report : callable
+        Runs a request and prints what it came to; its second argument is the command as typed.
+    arguments : sequence of str, optional
+        What is typed after the name; by default that of this process.
+    epilog, skip
+        What help ends with, and fields that are no options.
+    """
+    typed = sys.argv[1:] if arguments is None else arguments
+    parser = Parser(prog=prog, description=(kind.__doc__ or "").partition("\n")[0], epilog=epilog)
+    add_options(parser, kind, skip=skip)
+    command = shlex.join([prog, *typed])
+    run_command(prog, lambda: report(request_of(parser.parse_args(typed), kind), command))

@@ -247,7 +247,6 @@ def _add_learner(parsers: "argparse._SubParsersAction[Parser]", learner: Learner
         help=learner.title,
         description=f"Train a policy with {learner.title}. Recipes: {', '.join(learner.recipes)}.",
         epilog=(needs if learner.extra else "") + EPILOG.format(name=learner.name),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     unused = () if "tensorboard" in learner.options else ("tensorboard",)
     add_options(parser, TrainRequest, skip=("learner", "settings", *unused))

@@ -1,16 +1,13 @@
 """``kinarm-bench``: how fast everything is on this machine."""
 
-import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from kinarm._command_line import Parser, add_options, request_of, run_command
+from kinarm._command_line import run_request
 from kinarm._validation import whole_number
-
-PROG = "kinarm-bench"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,78 +57,57 @@ class BenchmarkRequest:
         return measure(self.policy, self.repetitions, ppo=self.ppo)
 
 
-def build_parser() -> Parser:
-    """The options of the command."""
-    parser = Parser(prog=PROG, description="Measure how fast kinarm is on this machine.")
-    add_options(parser, BenchmarkRequest)
-    return parser
-
-
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line."""
-    run_command(PROG, lambda: _bench(build_parser().parse_args(arguments)))
+    run_request("kinarm-bench", BenchmarkRequest, _report, arguments)
 
 
-def _bench(options: argparse.Namespace) -> None:
+def _report(request: BenchmarkRequest, _: str) -> None:
     """Run a request, and print its figures."""
-    request = request_of(options, BenchmarkRequest)
-    document = request.run()
-    if request.json:
-        json.dump(document, sys.stdout)
-        sys.stdout.write("\n")
-        return
     from rich.console import Console
-
-    console = Console(width=None if sys.stdout.isatty() else 110, highlight=False)
-    console.print(_table(document))
-
-
-def _table(document: dict[str, Any]) -> Any:
-    """The figures as a table."""
     from rich.table import Table
 
-    from kinarm.evaluation.measurements import VECTOR_ENVS
-
+    document = request.run()
+    if request.json:
+        print(json.dumps(document))
+        return
     table = Table(title=f"kinarm-bench, policy {document['policy']}", title_justify="left")
     table.add_column("what")
-    table.add_column("median", justify="right")
-    table.add_column("best", justify="right")
-    table.add_column("judged by Coal", justify="right")
+    for heading in ("median", "best", "judged by Coal"):
+        table.add_column(heading, justify="right")
+    for row in _rows(document):
+        table.add_row(*row) if row else table.add_section()
+    Console(width=None if sys.stdout.isatty() else 110, highlight=False).print(table)
+
+
+def _rows(document: dict[str, Any]) -> Iterator[tuple[str, ...]]:
+    """Rows of the table; an empty one ends a section."""
+    from kinarm.evaluation.measurements import VECTOR_ENVS
+
     for row in document["rollouts"]:
         plural = "s" if row["threads"] > 1 else ""
-        table.add_row(
-            f"rollouts, {row['batch']} {row['actions']} episodes, {row['threads']} thread{plural}",
-            *_rates(row["steps_per_second"]),
-            f"{100 * row['judged_share']:.3f} %",
-        )
-    table.add_section()
-    table.add_row(f"batch environment, {VECTOR_ENVS} arms", *_rates(document["vector_environment"]))
-    table.add_row("single environment", *_rates(document["single_environment"]))
-    table.add_row("reference path (Pinocchio + Coal)", *_rates(document["reference"]))
-    table.add_row(
-        "speed-up over the reference (512 trained)", f"{document['speed_up_over_reference']:.0f} x"
-    )
-    training = document["table_1_training"]
-    table.add_section()
-    table.add_row(
-        f"training of Table 1 ({training['environment_steps'] / 1e6:.1f} million steps)",
-        *(f"{training['seconds'][name]:.2f} s" for name in RATES),
-    )
-    for row in _ppo_rows(document.get("ppo_training")):
-        table.add_row(*row)
-    oracle = document["oracle"]
-    table.add_row(
-        f"oracle, {oracle['trials']} trials",
-        *(f"{oracle['trials'] / oracle['trials_per_second'][name]:.1f} s" for name in RATES),
-    )
+        what = f"{row['batch']} {row['actions']} episodes, {row['threads']} thread{plural}"
+        judged = f"{100 * row['judged_share']:.3f} %"
+        yield f"rollouts, {what}", *_rates(row["steps_per_second"]), judged
+    yield ()
+    yield f"batch environment, {VECTOR_ENVS} arms", *_rates(document["vector_environment"])
+    yield "single environment", *_rates(document["single_environment"])
+    yield "reference path (Pinocchio + Coal)", *_rates(document["reference"])
+    speed_up = f"{document['speed_up_over_reference']:.0f} x"
+    yield "speed-up over the reference (512 trained)", speed_up
+    yield ()
+    training, oracle = document["table_1_training"], document["oracle"]
+    steps = f"{training['environment_steps'] / 1e6:.1f} million steps"
+    seconds = (f"{training['seconds'][name]:.2f} s" for name in RATES)
+    yield f"training of Table 1 ({steps})", *seconds
+    yield from _ppo_rows(document.get("ppo_training"))
+    seconds = (f"{oracle['trials'] / oracle['trials_per_second'][name]:.1f} s" for name in RATES)
+    yield f"oracle, {oracle['trials']} trials", *seconds
     evaluation = document["evaluation"]
+    memory = f"{evaluation['peak_memory_mb']:.0f} MB"
     for known, name in (("unknown", "seconds_without_bounds"), ("known", "seconds")):
-        table.add_row(
-            f"kinarm-eval --trials 200, bounds {known}",
-            f"{evaluation[name]:.1f} s",
-            f"{evaluation['peak_memory_mb']:.0f} MB",
-        )
-    return table
+        what = f"kinarm-eval --trials 200, bounds {known}"
+        yield what, f"{evaluation[name]:.1f} s", memory
 
 
 def _ppo_rows(training: dict[str, Any] | None) -> list[tuple[str, ...]]:

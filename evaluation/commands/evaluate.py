@@ -1,6 +1,5 @@
 """``kinarm-eval``: put policies to the trials and report how they did."""
 
-import argparse
 import json
 import sys
 from collections.abc import Callable, Sequence
@@ -9,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from kinarm._command_line import Parser, add_options, command_text, request_of, run_command
+from kinarm._command_line import run_request
 from kinarm._files import check_output, write_text
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
@@ -19,8 +18,6 @@ if TYPE_CHECKING:
     from kinarm.evaluation.entrants import Entrant
     from kinarm.evaluation.evaluation import Evaluation
     from kinarm.problem import ReachProblem
-
-PROG = "kinarm-eval"
 
 EPILOG = """
 examples:
@@ -39,7 +36,7 @@ Pair = tuple["Entrant", "ReachProblem"]
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluationRequest(ProblemOptions):
-    """Put policies to random reaching trials, and report how they did.
+    """Put policies to random reaching trials and report how they did.
 
     By default a trained policy faces the problem that it was trained for, changed as the options
     say, and a baseline all problems in play. Problems that are named restrict the default
@@ -255,43 +252,23 @@ def _tell_bounds(tell: Callable[[str], object], problem: str, done: int, total: 
     tell(f"what could any policy reach on {problem}? {done} of {total} trials solved")
 
 
-def build_parser() -> Parser:
-    """The options of the command."""
-    parser = Parser(
-        prog=PROG,
-        description="Put policies to random reaching trials and report how they did.",
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    add_options(parser, EvaluationRequest, skip=("problem",))
-    return parser
-
-
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line."""
-    run_command(PROG, lambda: _evaluate(arguments))
+    skip = ("problem",)
+    run_request("kinarm-eval", EvaluationRequest, _report, arguments, epilog=EPILOG, skip=skip)
 
 
-def _evaluate(arguments: Sequence[str] | None) -> None:
-    """Run a request, and print what it came to."""
-    request = request_of(build_parser().parse_args(arguments), EvaluationRequest)
-    from rich.console import Console
-
-    with Console(stderr=True).status("evaluating; the first run compiles") as status:
-        document = request.run(command_text(PROG, arguments), status.update)
-    if request.json:
-        json.dump(document, sys.stdout)
-        sys.stdout.write("\n")
-    else:
-        _print(request, document)
-
-
-def _print(request: EvaluationRequest, document: dict[str, Any]) -> None:
-    """Print the table, and what it stands on."""
+def _report(request: EvaluationRequest, command: str) -> None:
+    """Run a request, and print the table and what it stands on, or JSON."""
     from rich.console import Console
 
     from kinarm.evaluation.table import print_table
 
+    with Console(stderr=True).status("evaluating; the first run compiles") as status:
+        document = request.run(command, status.update)
+    if request.json:
+        print(json.dumps(document))
+        return
     console = Console(width=None if sys.stdout.isatty() else 200, highlight=False)
     print_table(document, console, markdown=request.markdown)
     if not request.markdown:

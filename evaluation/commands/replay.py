@@ -1,12 +1,9 @@
 """``kinarm-replay``: watch trials in a browser, from one file or live."""
 
-import argparse
 from collections.abc import Sequence
 
-from kinarm._command_line import Parser, add_options, request_of, run_command
+from kinarm._command_line import run_request
 from kinarm.evaluation.replays.request import ReplayRequest
-
-PROG = "kinarm-replay"
 
 EPILOG = """
 examples:
@@ -20,25 +17,13 @@ examples:
 """
 
 
-def build_parser() -> Parser:
-    """The options of the command."""
-    parser = Parser(
-        prog=PROG,
-        description="Write one HTML file that replays trials offline, or show them live.",
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    add_options(parser, ReplayRequest)
-    return parser
-
-
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line."""
-    run_command(PROG, lambda: _replay(build_parser().parse_args(arguments)))
+    run_request("kinarm-replay", ReplayRequest, _report, arguments, epilog=EPILOG)
 
 
-def _replay(options: argparse.Namespace) -> None:
-    request_of(options, ReplayRequest).run(lambda line: print(line, flush=True))
+def _report(request: ReplayRequest, _: str) -> None:
+    request.run(lambda line: print(line, flush=True))
 
 
 if __name__ == "__main__":

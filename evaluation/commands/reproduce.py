@@ -1,15 +1,14 @@
 """``kinarm-reproduce``: train what the paper trained, and see which of its claims hold."""
 
-import argparse
 import json
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kinarm._command_line import Parser, add_options, command_text, request_of, run_command
+from kinarm._command_line import run_request
 from kinarm._files import check_folder, write_text
 from kinarm._parallel import available_threads
 from kinarm._validation import whole_number
@@ -21,8 +20,6 @@ if TYPE_CHECKING:
     from kinarm.evaluation.reproduction.results import Results
     from kinarm.evaluation.reproduction.runs import RunStore
     from kinarm.evaluation.reproduction.study import Study
-
-PROG = "kinarm-reproduce"
 
 EPILOG = """
 needs the extra ppo: pip install 'kinarm[ppo]' (or --no-ppo)
@@ -126,46 +123,27 @@ class ReproductionRequest:
             ) from None
 
 
-def build_parser() -> Parser:
-    """The options of the command."""
-    parser = Parser(
-        prog=PROG,
-        description="Train everything that the paper trained, and judge its claims.",
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    add_options(parser, ReproductionRequest)
-    return parser
-
-
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line."""
-    run_command(PROG, lambda: _reproduce(arguments))
+    run_request("kinarm-reproduce", ReproductionRequest, _report, arguments, epilog=EPILOG)
 
 
-def _reproduce(arguments: Sequence[str] | None) -> None:
+def _report(request: ReproductionRequest, command: str) -> None:
     """Run a request, and print its verdicts."""
-    request = request_of(build_parser().parse_args(arguments), ReproductionRequest)
-    _print(request.run(command=command_text(PROG, arguments)))
-    if request.study.warning:
-        sys.stdout.write(f"{request.study.warning}\n")
-    page = request.folder / "REPRODUCTION.md"
-    sys.stdout.write(f"written: {page}, with tables and figures beside it\n")
-
-
-def _print(claims: "Iterable[Claim]") -> None:
-    """Print the verdicts."""
     from rich.console import Console
     from rich.table import Table
 
+    from kinarm.evaluation.reproduction.intervals import estimate_text
+
     table = Table("claim", "measured (95 %)", "claimed", "verdict", header_style="bold")
-    for claim in claims:
-        measured, claimed = zip(
-            *((str(part.estimate), f"{part.claimed} {part.threshold:g}") for part in claim.parts),
-            strict=True,
-        )
-        table.add_row(claim.statement, "\n".join(measured), "\n".join(claimed), claim.verdict)
+    for claim in request.run(command=command):
+        measured = "\n".join(estimate_text(part.estimate) for part in claim.parts)
+        claimed = "\n".join(f"{part.claimed} {part.threshold:g}" for part in claim.parts)
+        table.add_row(claim.statement, measured, claimed, claim.verdict)
     Console(width=None if sys.stdout.isatty() else 120, highlight=False).print(table)
+    if request.study.warning:
+        print(request.study.warning)
+    print(f"written: {request.folder / 'REPRODUCTION.md'}, with tables and figures beside it")
 
 
 def _claim_folder(folder: Path, study: "Study") -> None:
@@ -203,7 +181,7 @@ def _train(
     jobs = min(jobs, len(missing))
     threads = max(1, available_threads() // jobs)
     work = partial(carry_out, protocol=study.protocol, folder=store.folder, threads=threads)
-    with StudyProgress(study, missing, jobs, console) as progress:
+    with StudyProgress(len(study.trainings), missing, jobs, console) as progress:
         for training in (executor or LocalExecutor(jobs, threads)).carry_out(work, missing):
             progress.finished(training)
     return Results.load(study, store)

@@ -28,16 +28,9 @@ LowerBounds = Callable[[Sequence[int]], Sequence[int]]
 
 @dataclass(frozen=True)
 class Candidates:
-    """Recordings to choose from.
+    """Recordings to choose from, and how many are played where nothing says which.
 
-    Attributes
-    ----------
-    runs : list of list of Recording
-        One list, or two in the same order.
-    lower_bounds : callable or None
-        See `LowerBounds`; None keeps what the recordings say.
-    played : int
-        How many are played where nothing says which.
+    Without `LowerBounds`, what the recordings say of them is kept.
     """
 
     runs: Runs
@@ -73,13 +66,7 @@ def faced_problem(entrants: Sequence[Entrant], options: ProblemOptions) -> Reach
 
 
 def find_candidates(request: ReplayRequest) -> Candidates:
-    """Make or read what a request asks for.
-
-    Raises
-    ------
-    KinarmError
-        If a file, name or number cannot be used.
-    """
+    """Make or read the recordings to choose from."""
     names = request.compare or (request.policy,)
     if request.source is None:
         return _fresh_candidates(request, names)
@@ -136,7 +123,8 @@ def _recorded_candidates(
     """Take recordings from a file; ``arm`` says where the URDF of their arm lies now."""
     found = [each for each in load_recordings(path) if problem in (None, each.problem.name)]
     if arm is not None:
-        found = [_with_arm_from(arm, each) for each in found]
+        moved = (each.problem.replace(arm=replace(each.problem.arm, source=arm)) for each in found)
+        found = [replace(each, problem=new) for each, new in zip(found, moved, strict=True)]
     runs: Runs = []
     for name in names:
         run = [each for each in found if name in (None, each.policy, group_of(each.policy))]
@@ -148,8 +136,55 @@ def _recorded_candidates(
     return Candidates(runs, None, len(runs[0]))
 
 
-def _with_arm_from(source: str, recording: Recording) -> Recording:
-    """The same recording, its arm to be read from elsewhere; the arm's hash stays."""
-    problem = recording.problem
-    arm = replace(problem.arm, source=source)
-    return replace(recording, problem=problem.replace(arm=arm))
+def chosen_recordings(request: ReplayRequest) -> Runs:
+    """What a request asks for, with what is proven of it; the first run decides.
+
+    Raises
+    ------
+    KinarmError
+        If a file, name or number cannot be used, or there are too few trials.
+    """
+    candidates = find_candidates(request)
+    first = candidates.runs[0]
+    if request.trial:
+        positions = _positions_of(request.trial, first)
+    elif request.collisions:
+        positions = _positions_of_collisions(first)
+    elif request.worst is not None:
+        positions = _positions_of_worst(request.worst, first)
+    else:
+        positions = list(range(len(first)))[: candidates.played]
+    runs = [[run[position] for position in positions] for run in candidates.runs]
+    if candidates.lower_bounds is None or not request.oracle:
+        return runs
+    bounds = candidates.lower_bounds(positions)
+    return [
+        [replace(each, steps_lower_bound=bound) for each, bound in zip(run, bounds, strict=True)]
+        for run in runs
+    ]
+
+
+def _positions_of(trials: Sequence[int], recordings: Sequence[Recording]) -> list[int]:
+    numbers = [recording.trial for recording in recordings]
+    for trial in trials:
+        if trial not in numbers:
+            raise InvalidInputError(
+                f"there is no trial {trial}: they go from {min(numbers)} to {max(numbers)}"
+            )
+    return [k for trial in trials for k, number in enumerate(numbers) if number == trial]
+
+
+def _positions_of_collisions(recordings: Sequence[Recording]) -> list[int]:
+    collided = [k for k, each in enumerate(recordings) if each.outcome == "collision"]
+    if not collided:
+        raise InvalidInputError(f"none of the {len(recordings)} trials ended in contact")
+    return collided
+
+
+def _positions_of_worst(count: int, recordings: Sequence[Recording]) -> list[int]:
+    if count > len(recordings):
+        raise InvalidInputError(
+            f"--worst {count} asks for more trials than there are: {len(recordings)}"
+        )
+    farthest = sorted(range(len(recordings)), key=lambda k: -recordings[k].final_distance)
+    return farthest[:count]

@@ -40,23 +40,11 @@ def fresh_recordings(entrant: Entrant, simulator: Simulator, seed: int) -> Itera
 
 
 def follow(
-    server: LiveServer,
-    entrant: Entrant,
-    simulator: Simulator,
-    seed: int,
+    server: LiveServer, entrant: Entrant, simulator: Simulator, seed: int
 ) -> Iterator[Recording]:
     """Show one trial after the other, without end, and hand out its recording.
 
-    Parameters
-    ----------
-    server : LiveServer
-        Where to show them.
-    entrant : Entrant
-        What drives the arm.
-    simulator : Simulator
-        What is faced.
-    seed : int
-        Seed of the first trial; the next ones count up.
+    The seed is that of the first trial; the next ones count up.
     """
     window, arm = server.window, simulator.arm
     draw_surroundings(window, simulator.scene)

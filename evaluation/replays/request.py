@@ -28,7 +28,7 @@ NOT_FROM_FILE = ("task", "scene", "tolerance", "horizon", "start_spread", "seed"
 
 @dataclass(frozen=True, kw_only=True)
 class ReplayRequest(ProblemOptions):
-    """Trials to watch: on a page that plays offline, or live.
+    """Write one HTML file that replays trials offline, or show them live.
 
     Parameters
     ----------
@@ -147,10 +147,9 @@ class ReplayRequest(ProblemOptions):
         KinarmError
             If a file, name or number cannot be used.
         """
-        from kinarm.evaluation.replays.candidates import find_candidates
-        from kinarm.evaluation.replays.choosing import choose
+        from kinarm.evaluation.replays.candidates import chosen_recordings
 
-        return choose(find_candidates(self), self)
+        return chosen_recordings(self)
 
     def _write(self, report: Callable[[str], object]) -> "ReplayPage":
         from rich.console import Console

@@ -46,19 +46,14 @@ def _finish(axes: "Axes", tolerance: float, title: str) -> None:
     style(axes.set_xlabel(title, fontsize=12, labelpad=4), "tick middle")
     for line in (*axes.get_xgridlines(), *axes.get_ygridlines()):
         style(line, "grid")
-    for labels, side in ((axes.get_xticklabels(), "middle"), (axes.get_yticklabels(), "end")):
-        for label in labels:
-            style(label, f"tick {side}")
+    for label in axes.get_xticklabels():
+        style(label, "tick middle")
+    for label in axes.get_yticklabels():
+        style(label, "tick end")
 
 
 def profile_chart(results: ProblemResults) -> Drawing:
-    """Draw the profiles of a problem with their 95 % bands.
-
-    Parameters
-    ----------
-    results : ProblemResults
-        The problem; its oracle is drawn, too, if it took part.
-    """
+    """Draw the profiles of a problem with their 95 % bands, the oracle's as well."""
     limits = profile_limits(results)
     figure, axes = _chart(PROFILE_HEIGHT, above=14)
     axes.set(xscale="log", xlim=limits[[0, -1]], ylim=(0, 1))
@@ -114,11 +109,6 @@ def histogram_chart(results: ProblemResults) -> Drawing:
     """Draw the histograms of a problem below each other, all on the same scales.
 
     The height of a bar is the square root of its share, so that rare failures can be seen.
-
-    Parameters
-    ----------
-    results : ProblemResults
-        The problem.
     """
     rows = len(results.groups)
     furthest = max(float(group.distances.max()) for group in results.groups)
@@ -152,14 +142,9 @@ def histogram_chart(results: ProblemResults) -> Drawing:
 
 
 def bin_shares(group: Group, edges: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Share of a group's trials, of all seeds alike, that ended in each bin.
+    """Share of a group's trials, of all seeds alike, that ended in each bin, shape (n,).
 
-    Parameters
-    ----------
-    group : Group
-        The group.
-    edges : ndarray, shape (n + 1,)
-        Edges of the bins [m]; every bin is open at its upper one, but the last.
+    Every bin is open at its upper edge [m], but the last.
     """
     counts, _ = np.histogram(group.distances, edges)
     shares: NDArray[np.float64] = counts / group.distances.size

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.evaluation import Evaluation
 from kinarm.evaluation.figures import series_label
 from kinarm.evaluation.table import table_rows
-from kinarm.scene import GoalRegion, Scene
+from kinarm.evaluation.trials import TrialSet
+from kinarm.scene import GoalRegion
 from kinarm.task import ReachTask
 
 COLOURS = 6
@@ -27,16 +27,9 @@ UNTRAINED = ("baseline", "oracle")
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """A row of the table, with the evaluations behind it.
+    """A row of the table, the evaluations behind it, one per training seed, and its style.
 
-    Attributes
-    ----------
-    row : dict
-        The row, one of `kinarm.evaluation.table.table_rows`.
-    members : tuple of Evaluation
-        One per training seed.
-    style : str
-        Classes of the style sheet that give it its colour and dash.
+    The style is the classes of the style sheet that give it its colour and dash.
     """
 
     row: dict[str, Any]
@@ -53,6 +46,11 @@ class Group:
         """Whether it is neither a baseline nor the oracle."""
         return self.row["algorithm"] not in UNTRAINED
 
+    @property
+    def is_pooled(self) -> bool:
+        """Whether several training seeds share the row."""
+        return len(self.members) > 1
+
     @cached_property
     def distances(self) -> NDArray[np.float64]:
         """Final distances [m], shape (n_seeds, n_trials)."""
@@ -61,36 +59,21 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class ProblemResults:
-    """Everything about one problem.
-
-    Attributes
-    ----------
-    name : str
-        Name of the problem.
-    entry : dict
-        What the document's protocol says about it.
-    groups : tuple of Group
-        In the order of the table.
-    """
+    """A problem, what the document's protocol says about it, and its groups as in the table."""
 
     name: str
     entry: dict[str, Any]
     groups: tuple[Group, ...]
 
     @property
-    def trials(self) -> int:
-        """Number of trials."""
-        return len(self.entry["goals"])
+    def trials(self) -> TrialSet:
+        """What was faced."""
+        return self.groups[0].members[0].trials
 
     @property
     def task(self) -> ReachTask:
         """Its goals and endings."""
-        return self.groups[0].members[0].problem.task
-
-    @property
-    def arm(self) -> Arm:
-        """What reaches."""
-        return self.groups[0].members[0].trials.simulator.arm
+        return self.trials.problem.task
 
     @property
     def tolerance(self) -> float:
@@ -106,17 +89,8 @@ class ProblemResults:
     @property
     def goal_regions(self) -> tuple[GoalRegion, ...]:
         """Where goals lie."""
-        return tuple(self.scene.goal_region(name) for name in self.task.goal_regions)
-
-    @property
-    def scene(self) -> Scene:
-        """What stands around."""
-        return self.groups[0].members[0].problem.scene
-
-    @property
-    def pooled(self) -> bool:
-        """Whether several training seeds share a row."""
-        return any(len(group.members) > 1 for group in self.contenders)
+        scene = self.trials.problem.scene
+        return tuple(scene.goal_region(name) for name in self.task.goal_regions)
 
     @property
     def contenders(self) -> tuple[Group, ...]:
@@ -131,13 +105,6 @@ def group_results(
 ) -> tuple[ProblemResults, ...]:
     """Bring the rows of the table together with the evaluations behind them.
 
-    Parameters
-    ----------
-    document : dict
-        What `evaluation_document` made of the evaluations.
-    evaluations : sequence of Evaluation
-        The evaluations.
-
     Raises
     ------
     InvalidInputError
@@ -146,33 +113,22 @@ def group_results(
     known = {(each.entrant.name, each.problem.name): each for each in evaluations}
     if list(known) != [(row["policy"], row["problem"]) for row in document["results"]]:
         raise InvalidInputError("a report needs the document of the very evaluations that it shows")
-    styles = _styles(evaluations)
-    return tuple(
-        ProblemResults(
-            problem,
-            entry,
-            tuple(_group(row, known, styles) for row in table_rows(document, problem)),
-        )
-        for problem, entry in document["protocol"]["problems"].items()
-    )
-
-
-def _group(
-    row: dict[str, Any], known: dict[tuple[str, str], Evaluation], styles: dict[str, str]
-) -> Group:
-    names = row.get("members", [row["policy"]])
-    members = tuple(known[name, row["problem"]] for name in names)
-    return Group(row, members, styles[series_label(members[0])])
+    styles, found = _styles(evaluations), []
+    for problem, entry in document["protocol"]["problems"].items():
+        groups = []
+        for row in table_rows(document, problem):
+            names = row.get("members", [row["policy"]])
+            members = tuple(known[name, problem] for name in names)
+            groups.append(Group(row, members, styles[series_label(members[0])]))
+        found.append(ProblemResults(problem, entry, tuple(groups)))
+    return tuple(found)
 
 
 def _styles(evaluations: Sequence[Evaluation]) -> dict[str, str]:
     """Classes by what the seeds and problems of a recipe share, in the order of appearance."""
-    styles: dict[str, str] = {}
-    policies = 0
-    for evaluation in evaluations:
-        label, entrant = series_label(evaluation), evaluation.entrant
-        if label in styles:
-            continue
+    entrants = {series_label(evaluation): evaluation.entrant for evaluation in evaluations}
+    styles, policies = {}, 0
+    for label, entrant in entrants.items():
         if entrant.algorithm in UNTRAINED:
             styles[label] = f"reference {entrant.name}"
         else:

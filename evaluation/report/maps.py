@@ -9,7 +9,6 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kinarm.evaluation.report.groups import Group, ProblemResults
 from kinarm.scene import GoalRegion, Obstacle
@@ -50,13 +49,7 @@ SYMBOLS = {
 
 
 class View(NamedTuple):
-    """What a map shows of the world, seen from above: x points up and y to the left.
-
-    Attributes
-    ----------
-    x, y : tuple of float
-        Lower and upper bound [m].
-    """
+    """Bounds of a map of the world, seen from above [m]: x points up and y to the left."""
 
     x: tuple[float, float]
     y: tuple[float, float]
@@ -91,15 +84,9 @@ class View(NamedTuple):
 class Fate(NamedTuple):
     """What became of one trial in the hands of one or several training seeds.
 
-    Attributes
-    ----------
-    reached : int
-        How many seeds reached the goal.
-    distance : float
-        Mean of the final distances [m].
-    outcome : str
-        ``"collision"`` if any seed touched something, else ``"truncated"`` if any ran out of
-        steps, else ``"success"``.
+    How many reached the goal, the mean of their final distances [m], and the outcome:
+    ``"collision"`` if any touched something, else ``"truncated"`` if any ran out of steps, else
+    ``"success"``.
     """
 
     reached: int
@@ -115,10 +102,7 @@ def fates(group: Group) -> tuple[Fate, ...]:
         collision.any(axis=0), "collision", np.where(success.all(axis=0), "success", "truncated")
     )
     columns = (success.sum(axis=0), group.distances.mean(axis=0), outcomes)
-    return tuple(
-        Fate(int(reached), float(distance), str(outcome))
-        for reached, distance, outcome in zip(*columns, strict=True)
-    )
+    return tuple(map(Fate._make, zip(*(column.tolist() for column in columns), strict=True)))
 
 
 def level(distance: float, tolerance: float) -> int:
@@ -129,17 +113,7 @@ def level(distance: float, tolerance: float) -> int:
 
 
 class Marker(NamedTuple):
-    """A goal on a map.
-
-    Attributes
-    ----------
-    path : str
-        Where it lies, and its shape.
-    level : int
-        Its colour.
-    title : str
-        What is said where the pointer is.
-    """
+    """A goal on a map: its place and shape, its colour, and what is said where the pointer is."""
 
     path: str
     level: int
@@ -151,22 +125,16 @@ def markers(results: ProblemResults, group: Group) -> list[Marker]:
     view, shown = View.of(results.goal_regions), fates(group)[:MARKERS]
     goals, seeds = group.members[0].trials.goals, len(group.members)
     order = np.argsort([fate.distance for fate in shown], kind="stable").tolist()
-    return [
-        Marker(
-            f"M{view.across(goals[trial, 1]):.1f},{view.down(goals[trial, 0]):.1f}"
-            + SYMBOLS[shown[trial].outcome],
-            level(shown[trial].distance, results.tolerance),
-            _marker_title(trial, goals[trial], shown[trial], seeds),
-        )
-        for trial in order
-    ]
-
-
-def _marker_title(trial: int, goal: NDArray[np.float64], fate: Fate, seeds: int) -> str:
-    place = f"trial {trial}, goal ({goal[0]:.2f}, {goal[1]:.2f})"
-    if seeds == 1:
-        return f"{place}: {fate.distance:.3f} m, {OUTCOMES[fate.outcome]}"
-    return f"{place}: {fate.reached} of {seeds} seeds reached it, mean {fate.distance:.3f} m"
+    found = []
+    for trial in order:
+        (x, y, _), fate = goals[trial], shown[trial]
+        path = f"M{view.across(y):.1f},{view.down(x):.1f}{SYMBOLS[fate.outcome]}"
+        ending = f"{fate.distance:.3f} m, {OUTCOMES[fate.outcome]}"
+        if seeds > 1:
+            ending = f"{fate.reached} of {seeds} seeds reached it, mean {fate.distance:.3f} m"
+        title = f"trial {trial}, goal ({x:.2f}, {y:.2f}): {ending}"
+        found.append(Marker(path, level(fate.distance, results.tolerance), title))
+    return found
 
 
 def failure_shares(
@@ -174,17 +142,7 @@ def failure_shares(
 ) -> list[tuple[tuple[float, float], float | None]]:
     """Share of trials that did not succeed, in slices of a region along x, all seeds alike.
 
-    Parameters
-    ----------
-    group : Group
-        Whose trials.
-    region : GoalRegion
-        The region.
-
-    Returns
-    -------
-    list of tuple
-        Ends of each slice [m], ascending, and its share; None where no goal lies.
+    Each with the ends of its slice [m], ascending; None where no goal lies.
     """
     goals = group.members[0].trials.goals
     failed = 1 - np.mean([member.rollouts.success for member in group.members], axis=0)
@@ -200,10 +158,8 @@ def description(results: ProblemResults, group: Group) -> str:
     """What a map shows, for those who cannot see it."""
     outcomes = [fate.outcome for fate in fates(group)]
     every = " by every training seed" if len(group.members) > 1 else ""
-    reached = outcomes.count("success")
-    return (
-        f"{group.name} on {results.name}: of {len(outcomes)} goals, {reached} were reached{every}"
-    )
+    reached = f"of {len(outcomes)} goals, {outcomes.count('success')} were reached{every}"
+    return f"{group.name} on {results.name}: {reached}"
 
 
 def level_ranges(results: ProblemResults) -> list[str]:

@@ -1,12 +1,12 @@
 """The page as a whole."""
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kinarm._files import check_folder, write_text
 from kinarm.evaluation.evaluation import Evaluation
-from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.report import maps
 from kinarm.evaluation.report.charts import histogram_chart, profile_chart
 from kinarm.evaluation.report.groups import ProblemResults, group_results
@@ -16,10 +16,6 @@ from kinarm.viewer import replay_page
 
 if TYPE_CHECKING:
     from jinja2 import Template
-
-
-REPORT_PRIORITY = SPREAD_PRIORITY
-"""Priority of the least important columns that the page shows; see `Metric.priority`."""
 
 
 def write_report(
@@ -104,7 +100,7 @@ def page_template() -> "Template":
     )
     environment.globals.update(
         maps=maps,
-        success_cell=lambda row: metric_cell("success", METRICS["success"], row),
+        success_cell=partial(metric_cell, "success"),
         profile_chart=profile_chart,
         histogram_chart=histogram_chart,
         shown_columns=shown_columns,
@@ -117,7 +113,7 @@ def shown_columns(results: ProblemResults) -> list[Column]:
     return [
         column
         for column in metric_columns()
-        if column.priority >= REPORT_PRIORITY
+        if column.priority >= SPREAD_PRIORITY
         and any(column.cell(group.row).value for group in results.groups)
     ]
 
@@ -135,5 +131,5 @@ def _title(problems: Sequence[ProblemResults]) -> str:
 def _subtitle(protocol: dict[str, Any], problems: Sequence[ProblemResults]) -> str:
     """What was faced, in a line."""
     faced = f"problem {problems[0].name}" if len(problems) == 1 else f"{len(problems)} problems"
-    arms = " and ".join(dict.fromkeys(results.arm.name for results in problems))
+    arms = " and ".join(dict.fromkeys(results.entry["arm"] for results in problems))
     return f"{faced} · {protocol['trials']} trials each · arm {arms} · seed {protocol['seed']}"

@@ -17,22 +17,10 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 
 class Shape(NamedTuple):
-    """A path or a text of a drawing.
+    """A path, or a text and its place, of a drawing.
 
-    Attributes
-    ----------
-    classes : str
-        Its classes in the style sheet.
-    series, colour : str
-        Name of the policy that it belongs to, or empty, and the classes that tell it apart.
-    title : str
-        What is said where the pointer is, or empty.
-    path : str
-        The path; empty for a text.
-    text : str
-        The text; empty for a path.
-    x, y : str
-        Where a text stands.
+    It has classes of the style sheet; the name of the policy that it belongs to, or empty, and
+    the classes that tell that apart; and what is said where the pointer is, or empty.
     """
 
     classes: str
@@ -46,16 +34,9 @@ class Shape(NamedTuple):
 
 
 class Drawing(NamedTuple):
-    """What a page needs to show a figure.
+    """What a page needs to show a figure: its size, its shapes from the lowest to the topmost.
 
-    Attributes
-    ----------
-    width, height : float
-        Its size.
-    shapes : list of Shape
-        From the lowest to the topmost.
-    description : str
-        What it shows, for those who cannot see it.
+    The description says what it shows, for those who cannot see it.
     """
 
     width: float
@@ -73,13 +54,7 @@ def style(artist: "Artist", classes: str, group: Group | None = None, title: str
 def draw(figure: "Figure", description: str) -> Drawing:
     """Let Matplotlib work out where everything lies.
 
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-        The figure, a point of which is a unit of the page. Only what `style` was called for is
-        kept.
-    description : str
-        What it shows.
+    A point of the figure is a unit of the page. Only what `style` was called for is kept.
     """
     import matplotlib
 

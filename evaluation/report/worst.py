@@ -19,17 +19,7 @@ AT_LEAST = 3
 
 
 class WorstTrial(NamedTuple):
-    """A trial that went badly.
-
-    Attributes
-    ----------
-    group : Group
-        Whose it was.
-    evaluation : Evaluation
-        Which training seed's.
-    trial : int
-        Its number.
-    """
+    """A trial that went badly: whose it was, of which training seed, and its number."""
 
     group: Group
     evaluation: Evaluation
@@ -37,13 +27,7 @@ class WorstTrial(NamedTuple):
 
 
 def worst_trials(results: ProblemResults) -> tuple[WorstTrial, ...]:
-    """Choose the worst trials of the best groups of a problem: failures first, the farthest first.
-
-    Parameters
-    ----------
-    results : ProblemResults
-        The problem.
-    """
+    """The worst trials of the best groups of a problem: failures first, the farthest first."""
     groups = results.contenders[:BEST_GROUPS]
     share = max(AT_LEAST, TRIALS // len(groups))
     return tuple(found for group in groups for found in _worst_of(group, share))
@@ -96,30 +80,14 @@ def oracle_steps(results: ProblemResults, trial: int) -> str:
 
 
 def record_worst(chosen: Sequence[WorstTrial]) -> list[Recording]:
-    """Let policies face the trials again and keep what they do, state by state.
-
-    Parameters
-    ----------
-    chosen : sequence of WorstTrial
-        The trials.
-
-    Returns
-    -------
-    list of Recording
-        One for each, in the same order.
-    """
+    """Let policies face the trials again and keep what they do: one recording for each."""
     numbers: dict[Evaluation, list[int]] = {}
     for worst in chosen:
         numbers.setdefault(worst.evaluation, []).append(worst.trial)
-    recordings = {
-        (evaluation, recording.trial): recording
-        for evaluation, trials in numbers.items()
-        for recording in record(
-            evaluation.entrant,
-            evaluation.trials,
-            trials,
-            bounds=evaluation.bounds,
-            allow_other_arm=True,  # it was checked when the evaluation was made
-        )
-    }
+    recordings = {}
+    for each, trials in numbers.items():
+        # Whether a policy may face another arm was checked when the evaluation was made.
+        options: dict[str, Any] = {"bounds": each.bounds, "allow_other_arm": True}
+        for recording in record(each.entrant, each.trials, trials, **options):
+            recordings[each, recording.trial] = recording
     return [recordings[worst.evaluation, worst.trial] for worst in chosen]

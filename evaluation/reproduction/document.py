@@ -1,7 +1,5 @@
 """Write what a reproduction came to: ``REPRODUCTION.md``, ``claims.json``, tables and figures."""
 
-import csv
-import io
 import json
 from collections.abc import Callable
 from dataclasses import asdict
@@ -13,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from kinarm._files import write_text
-from kinarm.errors import InvalidInputError
 from kinarm.evaluation.figures import save_figure
 from kinarm.evaluation.reproduction.claims import Claim, assess
 from kinarm.evaluation.reproduction.figures import figure_2, figure_3, learning_curves
@@ -40,33 +37,16 @@ FIGURES: dict[str, Callable[[Results], Any]] = {
 
 
 def write_all(results: Results, store: RunStore, command: str) -> tuple[Claim, ...]:
-    """Write all files of a finished reproduction.
+    """Write all files of a finished reproduction, and return the claims of the literal reading.
 
-    Parameters
-    ----------
-    results : Results
-        All finished trainings.
-    store : RunStore
-        Where they lie.
-    command : str
-        The command that made them, for the record.
-
-    Returns
-    -------
-    tuple of Claim
-        The claims under the literal reading.
+    The command that made them is for the record.
 
     Raises
     ------
-    InvalidInputError
-        If a training is not finished.
     OutputError
         If a file cannot be written.
     """
-    if results.missing:
-        raise InvalidInputError(f"{len(results.missing)} trainings are not finished")
-    readings = results.study.readings()
-    claims = {reading: assess(results, reading) for reading in readings}
+    claims = {reading: assess(results, reading) for reading in results.study.readings()}
     document = claims_document(results, claims, store, command)
     folder = store.folder
     write_text(folder / "claims.json", json.dumps(document, indent=1) + "\n")
@@ -100,22 +80,15 @@ def claims_document(
 
 def runs_csv(results: Results) -> str:
     """One line per training."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(RUN_COLUMNS)
+    lines: list[tuple[str, ...]] = [RUN_COLUMNS]
     for training, run in results.runs.items():
-        config, distance = training.config, run.distance
-        writer.writerow(
-            [
-                training.name,
-                *(training.purpose, config.problem.name, config.seed, training.reading.name),
-                int(run.environment_steps[-1]),
-                *(float(np.mean(distance <= limit)) for limit in (0.05, 0.1, 0.2)),
-                *(f"{value:.4f}" for value in (distance.mean(), np.median(distance))),
-                float(run.collision.mean()),
-            ]
-        )
-    return text.getvalue()
+        problem, distance = training.config.problem.name, run.distance
+        made = (training.purpose, problem, training.config.seed, training.reading.name)
+        within = (float(np.mean(distance <= limit)) for limit in (0.05, 0.1, 0.2))
+        distances = (f"{value:.4f}" for value in (distance.mean(), np.median(distance)))
+        row = (training.name, *made, int(run.environment_steps[-1]), *within, *distances)
+        lines.append((*map(str, row), str(float(run.collision.mean()))))
+    return "".join(",".join(line) + "\n" for line in lines)
 
 
 RUN_COLUMNS = (

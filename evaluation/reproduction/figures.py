@@ -76,12 +76,10 @@ def figure_3(results: Results) -> "Figure":
         distance = np.linspace(0.0, SHOWN_DISTANCE, 481)
         highest = 0.0
         for learner, style in STYLES.items():
-            seeds = [density(run.distance, distance) for run in results.select(learner, task)]
-            if not seeds:
-                continue
-            axes.plot(distance, np.transpose(seeds), color=style["color"], lw=0.6, alpha=0.5)
-            axes.plot(distance, np.mean(seeds, axis=0), lw=2.2, **style)
-            highest = max(highest, float(np.max(seeds)))
+            if runs := results.select(learner, task):
+                seeds = np.array([density(run.distance, distance) for run in runs])
+                _seeds_and_mean(axes, np.tile(distance, (len(runs), 1)), seeds, style, lw=2.2)
+                highest = max(highest, float(seeds.max()))
         trials = results.trial_set(task)
         reached = oracle_bounds(trials).final_distance
         axes.fill_between(
@@ -99,19 +97,8 @@ def density(samples: NDArray[np.float64], positions: NDArray[np.float64]) -> NDA
     """Kernel density of distances, reflected at zero so that none is lost below it.
 
     The kernel is normal, with Silverman's robust bandwidth: a few trials that end far away must
-    not blur where the many end.
-
-    Parameters
-    ----------
-    samples : ndarray, shape (n,)
-        Distances [m].
-    positions : ndarray, shape (m,)
-        Where to evaluate it [m].
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        Densities [1/m]; their integral over positive distances is 1.
+    not blur where the many end. From samples, shape (n,), and positions, shape (m,) [m], to
+    densities, shape (m,) [1/m], whose integral over positive distances is 1.
     """
     from scipy.stats import iqr, norm
 
@@ -126,12 +113,7 @@ def density(samples: NDArray[np.float64], positions: NDArray[np.float64]) -> NDA
 def learning_curves(results: Results, against: Literal["steps", "time"]) -> "Figure":
     """How well policies do in the course of their training, a column per task.
 
-    Parameters
-    ----------
-    results : Results
-        All finished trainings.
-    against : {"steps", "time"}
-        Whether progress is shown against environment steps or against wall time.
+    Progress is shown against environment steps or against wall time.
     """
     figure, panels = _panels((10.5, 6.4), 2, len(PROBLEMS), sharex=True, sharey="row")
     label, across = ACROSS[against]
@@ -140,8 +122,8 @@ def learning_curves(results: Results, against: Literal["steps", "time"]) -> "Fig
             if runs := results.select(learner, task):
                 x = np.array([across(run) for run in runs])
                 distance = np.array([run.snapshot_distance for run in runs])
-                _curves(above, x, (distance <= NEAR).mean(axis=2), style)
-                _curves(below, x, np.median(distance, axis=2), style)
+                _seeds_and_mean(above, x, (distance <= NEAR).mean(axis=2), style)
+                _seeds_and_mean(below, x, np.median(distance, axis=2), style)
         above.set_title(f"task {task}")
         below.set(xlabel=label, xscale="linear" if against == "steps" else "log")
     panels[0, 0].set(ylabel=f"share of trials within {NEAR} m", ylim=(0, 1))
@@ -157,12 +139,16 @@ ACROSS: dict[str, tuple[str, Callable[[TrainedRun], NDArray[np.float64]]]] = {
 """What learning curves can be drawn against: label, and values at the snapshots."""
 
 
-def _curves(
-    axes: "Axes", x: NDArray[np.float64], y: NDArray[np.float64], style: dict[str, Any]
+def _seeds_and_mean(
+    axes: "Axes",
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    style: dict[str, Any],
+    lw: float = 2,
 ) -> None:
-    """Curves of the seeds faintly, and the mean of what they do at the same iteration boldly."""
+    """Curves of the seeds faintly, and the mean of what they do at the same place boldly."""
     axes.plot(x.T, y.T, color=style["color"], lw=0.6, alpha=0.5)
-    axes.plot(x.mean(axis=0), y.mean(axis=0), lw=2, **style)
+    axes.plot(x.mean(axis=0), y.mean(axis=0), lw=lw, **style)
 
 
 def _panels(

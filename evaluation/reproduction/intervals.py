@@ -6,28 +6,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-LEVEL = 0.95
+from kinarm.evaluation.statistics import LEVEL, Estimate
 
 
-class Estimate(NamedTuple):
-    """A statistic and its 95 % interval.
-
-    Attributes
-    ----------
-    value : float
-        The statistic.
-    ci95 : tuple of float, or None
-        Its interval; None where the data do not tell, such as with a single seed.
-    """
-
-    value: float
-    ci95: tuple[float, float] | None
-
-    def __str__(self) -> str:
-        if np.isnan(self.value):
-            return "not measurable"
-        interval = "no interval" if self.ci95 is None else "{:.3f}..{:.3f}".format(*self.ci95)
-        return f"{self.value:.3f} ({interval})"
+def estimate_text(estimate: Estimate) -> str:
+    """A statistic and its interval in words; a single seed has no interval."""
+    if estimate.value is None:
+        return "not measurable"
+    interval = "{:.3f}..{:.3f}".format(*estimate.ci95) if estimate.ci95 else "no interval"
+    return f"{estimate.value:.3f} ({interval})"
 
 
 class Term(NamedTuple):
@@ -58,11 +45,6 @@ def contrast(terms: Sequence[Term]) -> Estimate:
     each set of crossed trials; what is particular to a seed on a trial is in both, which errs on
     the wide side. The interval is Student's, with the degrees of freedom of
     Welch and Satterthwaite.
-
-    Parameters
-    ----------
-    terms : sequence of Term
-        What is summed.
     """
     value = sum(term.weight * float(term.values.mean()) for term in terms)
     parts = [(term.weight**2 * _mean_variance(term.values.mean(axis=1))) for term in terms]
@@ -78,13 +60,8 @@ def contrast(terms: Sequence[Term]) -> Estimate:
 def student(value: float, components: Iterable[tuple[float, int]]) -> Estimate:
     """Interval from independent components of the variance.
 
-    Parameters
-    ----------
-    value : float
-        The statistic.
-    components : iterable of (float, int)
-        Estimated variances that add up to that of the statistic, and their degrees of freedom;
-        without any freedom in one of them there is no interval.
+    They are estimated variances that add up to that of the statistic, and their degrees of
+    freedom; without any freedom in one of them there is no interval.
     """
     from scipy.stats import t
 
@@ -116,11 +93,8 @@ def mean_share(shares: NDArray[np.float64], n_trials: int) -> Estimate:
     moderate = (value * n_trials + 2) / (n_trials + 4)
     binomial = moderate * (1 - moderate) / (n_trials + 4)
     components = [(_mean_variance(shares), len(shares) - 1), (binomial, n_trials - 1)]
-    estimate = student(value, components)
-    if estimate.ci95 is None:
-        return estimate
-    low, high = estimate.ci95
-    return Estimate(value, (max(low, 0.0), min(high, 1.0)))
+    ci95 = student(value, components).ci95
+    return Estimate(value, ci95 and (max(ci95[0], 0.0), min(ci95[1], 1.0)))
 
 
 def superiority(pairs: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> Estimate:

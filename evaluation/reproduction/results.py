@@ -15,15 +15,7 @@ from kinarm.policies.ars.config import ARSConfig
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """What all trainings of a study came to.
-
-    Attributes
-    ----------
-    study : Study
-        What was trained.
-    runs : mapping of Training to TrainedRun
-        What each finished training came to.
-    """
+    """What the finished trainings of a study came to."""
 
     study: Study
     runs: Mapping[Training, TrainedRun]

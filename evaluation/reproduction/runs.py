@@ -18,7 +18,9 @@ from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import package_versions
 from kinarm.semantics import SEMANTICS
 
-KIND, FORMAT_VERSION = "trained run", 1
+ARCHIVE = ("trained run", 1)
+"""Kind and version of the files."""
+
 PPO_PACKAGES = ("torch", "stable-baselines3")
 
 
@@ -61,19 +63,9 @@ class TrainedRun:
         return self.environment_steps[self.snapshots]
 
     def steps_to_level(self, distance: float, share: float) -> float:
-        """Environment steps at the first snapshot that ended near often enough.
+        """Environment steps at the first snapshot with a share of trials within a distance [m].
 
-        Parameters
-        ----------
-        distance : float
-            What counts as near [m].
-        share : float
-            In which share of the snapshot's trials.
-
-        Returns
-        -------
-        float
-            The steps; infinity if there is no such snapshot.
+        Infinity if there is no such snapshot.
         """
         reached = (self.snapshot_distance <= distance).mean(axis=1) >= share
         return float(self.snapshot_steps[reached.argmax()]) if reached.any() else float("inf")
@@ -85,34 +77,26 @@ class TrainedRun:
         return last
 
 
+@dataclass(frozen=True)
 class RunStore:
-    """The folder in which the trained runs of a study lie.
+    """The output folder of a reproduction, in which the trained runs of a study lie.
 
     A run consists of the policy, its wall times and ``runs/NAME.npz``, written in this order:
     where the last is complete and fits the others, the training is finished. Wall times are kept
     apart, so that all other files depend on the settings alone.
-
-    Parameters
-    ----------
-    folder : Path
-        The output folder of the reproduction.
-    protocol : Protocol
-        How policies are judged.
     """
 
-    def __init__(self, folder: Path, protocol: Protocol) -> None:
-        self.folder = folder
-        self.protocol = protocol
+    folder: Path
+    protocol: Protocol
 
     def policy_path(self, training: Training) -> Path:
         """Where the trained policy lies."""
         return self.folder / "policies" / f"{training.name}.npz"
 
-    def _run_path(self, training: Training) -> Path:
-        return self.folder / "runs" / f"{training.name}.npz"
-
-    def _timing_path(self, training: Training) -> Path:
-        return self.folder / "timing" / f"{training.name}.json"
+    def _paths(self, training: Training) -> tuple[Path, Path]:
+        """Where wall times and run lie."""
+        name = training.name
+        return self.folder / "timing" / f"{name}.json", self.folder / "runs" / f"{name}.npz"
 
     def save(self, training: Training, policy: Policy, run: TrainedRun) -> None:
         """Write a finished training.
@@ -122,21 +106,20 @@ class RunStore:
         OutputError
             If a file cannot be written.
         """
-        for path in (self.policy_path, self._timing_path, self._run_path):
-            path(training).parent.mkdir(parents=True, exist_ok=True)
+        timing_path, run_path = self._paths(training)
+        for path in (self.policy_path(training), timing_path, run_path):
+            path.parent.mkdir(parents=True, exist_ok=True)
         policy.save(self.policy_path(training))
         arrays = dict(vars(run))
-        wall_time = arrays.pop("wall_time").round(4).tolist()
-        write_text(self._timing_path(training), json.dumps(wall_time))
-        header = self._header(training)
-        save_archive(self._run_path(training), KIND, FORMAT_VERSION, arrays, header, compress=True)
+        write_text(timing_path, json.dumps(arrays.pop("wall_time").round(4).tolist()))
+        save_archive(run_path, *ARCHIVE, arrays, self._header(training), compress=True)
 
     def load(self, training: Training) -> TrainedRun | None:
         """Read a finished training; None if it is not finished, incomplete or of other settings."""
         try:
-            wall_time = np.array(json.loads(self._timing_path(training).read_text()), dtype=float)
-            path = self._run_path(training)
-            header, arrays = load_archive(path, KIND, FORMAT_VERSION, KinarmError)
+            timing_path, run_path = self._paths(training)
+            wall_time = np.array(json.loads(timing_path.read_text()), dtype=float)
+            header, arrays = load_archive(run_path, *ARCHIVE, KinarmError)
             fits = header == self._header(training)
             run = TrainedRun(**arrays, wall_time=wall_time)
         except (OSError, KinarmError, RecursionError, TypeError, ValueError):

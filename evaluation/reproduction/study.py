@@ -94,17 +94,7 @@ class Protocol:
 
 @dataclass(frozen=True, kw_only=True)
 class Training:
-    """One training of a study.
-
-    Parameters
-    ----------
-    purpose : {"sweep", "ars", "ppo"}
-        What it is for.
-    config : ARSConfig or PPOConfig
-        The settings.
-    reading : Reading
-        The reading that they follow.
-    """
+    """One training of a study: what it is for, its settings, and the reading they follow."""
 
     purpose: Purpose
     config: ARSConfig | PPOConfig
@@ -139,17 +129,7 @@ class Training:
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """A set of trainings and the protocol by which they are judged.
-
-    Parameters
-    ----------
-    name : str
-        ``"full"`` or ``"quick"``.
-    trainings : tuple of Training
-        What is trained.
-    protocol : Protocol
-        How it is judged.
-    """
+    """A set of trainings, ``"full"`` or ``"quick"``, and how they are judged."""
 
     name: str
     trainings: tuple[Training, ...]
@@ -168,31 +148,18 @@ class Study:
 
 
 def full_study(*, ppo: bool = True) -> Study:
-    """The whole paper: 36 trainings for the sweep, and 4 seeds a task under every reading.
-
-    Parameters
-    ----------
-    ppo : bool
-        Whether PPO takes part.
-    """
+    """The whole paper: 36 trainings for the sweep, and 4 seeds a task under every reading."""
     readings = [
         Reading(start_spread=spread, reward=reward, sharing=sharing)
         for spread, reward, sharing in product((1.0, 0.1), get_args(Scaling), get_args(Sharing))
     ]
-    trainings = (*_sweep(range(4)), *_ars(readings, range(4)))
-    if ppo:
-        trainings = (*trainings, *_ppo(readings, range(4)))
-    return Study(name="full", trainings=trainings, protocol=Protocol())
+    trainings = [*_sweep(range(4)), *_ars(readings, range(4))]
+    trainings += _ppo(readings, range(4)) if ppo else ()
+    return Study(name="full", trainings=tuple(trainings), protocol=Protocol())
 
 
 def quick_study(*, ppo: bool = True) -> Study:
-    """A smoke version of `full_study`: everything is there, but nothing is trained to the end.
-
-    Parameters
-    ----------
-    ppo : bool
-        Whether PPO takes part.
-    """
+    """A smoke version of `full_study`: everything is there, but nothing is trained to the end."""
     readings = (LITERAL, Reading(start_spread=0.1, reward="sign", sharing="iteration"))
     trainings = (
         *_sweep(range(2), iterations=6),
@@ -206,16 +173,9 @@ def quick_study(*, ppo: bool = True) -> Study:
 def _sweep(seeds: Iterable[int], iterations: int = SWEEP_ITERATIONS) -> Iterator[Training]:
     """The sweep on the paper's task 1, with half of the perturbations on top as in Table 1."""
     for rate, perturbations, seed in product(SWEEP_RATES, SWEEP_PERTURBATIONS, seeds):
-        config = recipe(
-            "ars",
-            "paper",
-            problem=LITERAL.problem("left"),
-            seed=seed,
-            step_size=rate,
-            directions=perturbations,
-            top_directions=perturbations // 2,
-            iterations=iterations,
-        )
+        directions = {"directions": perturbations, "top_directions": perturbations // 2}
+        settings = {"seed": seed, "step_size": rate, "iterations": iterations, **directions}
+        config = recipe("ars", "paper", problem=LITERAL.problem("left"), **settings)
         yield Training(purpose="sweep", config=config)
 
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.reproduction.claims import LEVELS, Claim, steps_to_levels
+from kinarm.evaluation.reproduction.intervals import estimate_text
 from kinarm.evaluation.reproduction.results import Results
 from kinarm.evaluation.reproduction.runs import TrainedRun
 from kinarm.evaluation.reproduction.study import LEARNERS, LITERAL, NEAR, Reading
@@ -16,15 +17,7 @@ MARKS = {"holds": "holds", "does not hold": "no", "undecided": "?"}
 
 
 def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Format a table.
-
-    Parameters
-    ----------
-    header : sequence of str
-        Column headings.
-    rows : iterable of sequence of str
-        Cells.
-    """
+    """Format a table of some columns."""
     lines = [header, ["---"] * len(header), *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
 
@@ -35,7 +28,7 @@ def claims_table(claims: Iterable[Claim]) -> str:
         (
             claim.statement if part is claim.parts[0] else "",
             part.measure,
-            str(part.estimate),
+            estimate_text(part.estimate),
             f"{part.claimed} {part.threshold:g}",
             f"**{claim.verdict}**" if part is claim.parts[0] else "",
         )
@@ -71,15 +64,10 @@ def _learner_cells(runs: Sequence[TrainedRun], tolerance: float, possible: float
     distance = np.array([run.distance for run in runs])
     success = float((distance <= tolerance).mean())
     contact = np.mean([run.collision.mean() for run in runs])
-    return [
-        f"{100 * success:.1f}",
-        f"{100 * success / possible:.1f}" if possible else "",
-        _near_cell(distance),
-        f"{np.median(distance):.3f}",
-        f"{distance.mean():.3f}",
-        f"{100 * contact:.1f}",
-        _steps_cell(runs),
-    ]
+    of_oracle = f"{100 * success / possible:.1f}" if possible else ""
+    distances = (f"{np.median(distance):.3f}", f"{distance.mean():.3f}")
+    shares = (f"{100 * success:.1f}", of_oracle, _near_cell(distance))
+    return [*shares, *distances, f"{100 * contact:.1f}", _steps_cell(runs)]
 
 
 def _near_cell(distance: NDArray[np.float64]) -> str:
@@ -136,14 +124,10 @@ def readings_table(results: Results, claims: Mapping[Reading, Sequence[Claim]]) 
     for reading, judged in claims.items():
         marks = {claim.name: MARKS[claim.verdict] for claim in judged}
         near = (np.mean(results.distances("ars", task, reading) <= NEAR) for task in PROBLEMS)
-        rows.append(
-            (
-                *(f"{reading.start_spread:g}", reading.reward, reading.sharing),
-                " / ".join(f"{100 * share:.0f}" for share in near),
-                *(marks.get(name, "") for name in names),
-                str(list(marks.values()).count("holds")),
-            )
-        )
+        shares = " / ".join(f"{100 * share:.0f}" for share in near)
+        held = str(list(marks.values()).count("holds"))
+        found = (*(marks.get(name, "") for name in names), held)
+        rows.append((f"{reading.start_spread:g}", reading.reward, reading.sharing, shares, *found))
     header = ("starts", "reward", "shared by", f"ARS <= {NEAR} m %, left / right / both")
     return markdown((*header, *(f"`{name}`" for name in names), "hold"), rows)
 

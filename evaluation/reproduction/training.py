@@ -38,19 +38,7 @@ def snapshot_iterations(iterations: int, snapshots: int) -> NDArray[np.int64]:
 
 
 def carry_out(training: Training, protocol: Protocol, folder: Path, threads: int) -> None:
-    """Train, judge and save.
-
-    Parameters
-    ----------
-    training : Training
-        What is trained.
-    protocol : Protocol
-        How it is judged.
-    folder : Path
-        The output folder of the reproduction.
-    threads : int
-        Threads of a learner's simulator; the result does not depend on it.
-    """
+    """Train, judge and save to the output folder; the result does not depend on the threads."""
     _load_kernels()
     config = training.config
     trials = trial_set(config.problem, protocol.snapshot_trials, protocol.snapshot_seed)
@@ -62,9 +50,8 @@ def carry_out(training: Training, protocol: Protocol, folder: Path, threads: int
             rollouts = _face(state_policy(config, state), trials)
             distance.append(rollouts.distance.astype(np.float32))
 
-    options: dict[str, Any] = (
-        {"threads": threads} if "threads" in learner_of(config).options else {}
-    )
+    takes_threads = "threads" in learner_of(config).options
+    options: dict[str, Any] = {"threads": threads} if takes_threads else {}
     policy, curve, _ = train_policy(config, on_iteration=judge, **options)
     final = _face(policy, final_trials(config.problem, protocol))
     run = TrainedRun(

@@ -21,7 +21,6 @@ HEAVY = ("torch", "numba", "matplotlib", "pinocchio", "coal", "scipy", "stable_b
 SHOW_HELP = """
 import contextlib, importlib, io, sys
 module = importlib.import_module({module!r})
-module.build_parser()
 with contextlib.redirect_stdout(io.StringIO()) as text:
     try:
         module.main(["--help"])

@@ -12,10 +12,10 @@ import pytest
 from kinarm._command_line import (
     Parser,
     add_options,
-    command_text,
     given_options,
     request_of,
     run_command,
+    run_request,
 )
 from kinarm.errors import ArmError, WorkerError
 from kinarm.problem_options import ProblemOptions
@@ -293,7 +293,24 @@ class TestCommands:
         os.close(writing)
         assert (done.returncode, done.stderr) == (0, b"")
 
-    def test_command_as_typed(self, monkeypatch):
-        assert command_text("bake", ["a b", "--share=1"]) == "bake 'a b' --share=1"
-        monkeypatch.setattr(sys, "argv", ["/usr/bin/bake", "cake"])
-        assert command_text("bake", None) == "bake cake"
+    @pytest.mark.parametrize("given", [True, False])
+    def test_a_request_is_run_with_the_command_as_typed(self, monkeypatch, given):
+        typed, reported = ["a b", "--share=1"], []
+        monkeypatch.setattr(sys, "argv", ["/usr/bin/bake", *(["other"] if given else typed)])
+        with pytest.raises(SystemExit) as stopped:
+            run_request(
+                "bake", Baking, lambda *both: reported.append(both), typed if given else None
+            )
+        assert not stopped.value.code
+        assert reported == [(Baking(recipe=Path("a b"), share=1.0), "bake 'a b' --share=1")]
+
+    def test_help_of_a_request_begins_with_its_first_line_and_keeps_the_epilog(self, capsys):
+        with pytest.raises(SystemExit) as stopped:
+            run_request(
+                "bake", Baking, print, ["--help"], epilog="try:\n  bake it", skip=("share",)
+            )
+        shown = capsys.readouterr().out
+        assert not stopped.value.code
+        assert "Bake something.\n" in shown
+        assert shown.endswith("try:\n  bake it\n")
+        assert "--share" not in shown
