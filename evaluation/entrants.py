@@ -157,7 +157,7 @@ BASELINES = {
 ORACLE = Entrant("oracle", _run_oracle, "oracle", "oracle", "oracle")
 """The motions that the oracle found, replayed."""
 
-UNTRAINED = {**BASELINES, ORACLE.name: ORACLE}
+UNTRAINED_ENTRANTS = {**BASELINES, ORACLE.name: ORACLE}
 
 
 def find_entrants(name_or_file: str | Path) -> tuple[Entrant, ...]:
@@ -176,12 +176,12 @@ def find_entrants(name_or_file: str | Path) -> tuple[Entrant, ...]:
     PolicyFileError
         If a file cannot be used.
     """
-    if name_or_file in UNTRAINED:
-        return (UNTRAINED[str(name_or_file)],)
+    if name_or_file in UNTRAINED_ENTRANTS:
+        return (UNTRAINED_ENTRANTS[str(name_or_file)],)
     try:
         paths = policy_files(name_or_file)
     except UnknownNameError as error:
-        available = (*UNTRAINED, *error.available)
+        available = (*UNTRAINED_ENTRANTS, *error.available)
         raise UnknownNameError(error.kind, error.given, available) from None
     return tuple(
         Entrant.from_policy(path.stem, Policy.load(path), path.resolve()) for path in paths

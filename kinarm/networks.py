@@ -29,7 +29,7 @@ ACTIVATIONS: dict[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
 """Activation functions by name, as the kernels apply them."""
 
 Activation = Literal["linear", "tanh", "relu"]
-CODES = {"linear": LINEAR, "tanh": TANH, "relu": RELU}
+ACTIVATION_CODES = {"linear": LINEAR, "tanh": TANH, "relu": RELU}
 
 
 class Mirror(NamedTuple):
@@ -184,8 +184,8 @@ def network_control(
         layers=networks.layers,
         weights=networks.weights,
         policy=index.astype(np.int64),
-        activation=CODES[networks.activation],
-        output=CODES[networks.output],
+        activation=ACTIVATION_CODES[networks.activation],
+        output=ACTIVATION_CODES[networks.output],
     )
     if networks.mirror is None:
         return control
@@ -218,5 +218,5 @@ def check_activations(*names: str) -> None:
         If there is no such function.
     """
     for name in names:
-        if name not in CODES:
+        if name not in ACTIVATION_CODES:
             raise UnknownNameError("activation function", name, get_args(Activation))

@@ -16,12 +16,12 @@ from kinarm.evaluation.trials import TrialSet
 from kinarm.scene import GoalRegion
 from kinarm.task import ReachTask
 
-COLOURS = 6
+PAGE_COLOURS = 6
 """Colours of the style sheet for policies; beyond them, lines are dashed."""
 
-DASHES = 4
+PAGE_DASHES = 4
 
-UNTRAINED = ("baseline", "oracle")
+UNTRAINED_ALGORITHMS = ("baseline", "oracle")
 """Algorithms of the entrants that policies are compared with."""
 
 
@@ -44,7 +44,7 @@ class Group:
     @property
     def is_policy(self) -> bool:
         """Whether it is neither a baseline nor the oracle."""
-        return self.row["algorithm"] not in UNTRAINED
+        return self.row["algorithm"] not in UNTRAINED_ALGORITHMS
 
     @property
     def is_pooled(self) -> bool:
@@ -129,9 +129,11 @@ def _styles(evaluations: Sequence[Evaluation]) -> dict[str, str]:
     entrants = {series_label(evaluation): evaluation.entrant for evaluation in evaluations}
     styles, policies = {}, 0
     for label, entrant in entrants.items():
-        if entrant.algorithm in UNTRAINED:
+        if entrant.algorithm in UNTRAINED_ALGORITHMS:
             styles[label] = f"reference {entrant.name}"
         else:
-            styles[label] = f"colour{policies % COLOURS} dash{policies // COLOURS % DASHES}"
+            styles[label] = (
+                f"colour{policies % PAGE_COLOURS} dash{policies // PAGE_COLOURS % PAGE_DASHES}"
+            )
             policies += 1
     return styles

@@ -16,7 +16,7 @@ from kinarm.scene import GoalRegion, Obstacle
 SCALE = 200
 """Units of the SVG to a metre."""
 
-MARGIN = 0.07
+MAP_MARGIN = 0.07
 """Beside the outermost region and the arm's base [m]."""
 
 BASE_RADIUS = 0.1
@@ -34,10 +34,10 @@ BAR_OFFSET, BAR_LENGTH = 0.02, 0.25
 AXIS_LENGTH = 0.2
 """Of the world axes [m]."""
 
-LEVELS = 6
+DISTANCE_COLOURS = 6
 """Colours of distances: within the tolerance, and twice the distance from one to the next."""
 
-OUTCOMES = {"success": "reached", "truncated": "out of steps", "collision": "contact"}
+OUTCOME_WORDS = {"success": "reached", "truncated": "out of steps", "collision": "contact"}
 """How outcomes are called on the page."""
 
 SYMBOLS = {
@@ -57,9 +57,9 @@ class View(NamedTuple):
     @classmethod
     def of(cls, regions: Iterable[GoalRegion]) -> "View":
         """Show some regions, the arm's base and the axes with their names."""
-        corners = [(-BASE_RADIUS,) * 2, (AXIS_LENGTH + MARGIN,) * 2]
+        corners = [(-BASE_RADIUS,) * 2, (AXIS_LENGTH + MAP_MARGIN,) * 2]
         corners += [corner[:2] for region in regions for corner in (region.lower, region.upper)]
-        low, high = np.min(corners, axis=0) - MARGIN, np.max(corners, axis=0) + MARGIN
+        low, high = np.min(corners, axis=0) - MAP_MARGIN, np.max(corners, axis=0) + MAP_MARGIN
         return cls((float(low[0]), float(high[0])), (float(low[1]), float(high[1])))
 
     def shows(self, box: Obstacle | GoalRegion) -> bool:
@@ -106,10 +106,10 @@ def fates(group: Group) -> tuple[Fate, ...]:
 
 
 def level(distance: float, tolerance: float) -> int:
-    """Which of the `LEVELS` colours a distance [m] gets."""
+    """Which of the `DISTANCE_COLOURS` colours a distance [m] gets."""
     if distance <= tolerance:
         return 0
-    return min(int(np.ceil(np.log2(distance / tolerance) - 1e-12)), LEVELS - 1)
+    return min(int(np.ceil(np.log2(distance / tolerance) - 1e-12)), DISTANCE_COLOURS - 1)
 
 
 class Marker(NamedTuple):
@@ -129,7 +129,7 @@ def markers(results: ProblemResults, group: Group) -> list[Marker]:
     for trial in order:
         (x, y, _), fate = goals[trial], shown[trial]
         path = f"M{view.across(y):.1f},{view.down(x):.1f}{SYMBOLS[fate.outcome]}"
-        ending = f"{fate.distance:.3f} m, {OUTCOMES[fate.outcome]}"
+        ending = f"{fate.distance:.3f} m, {OUTCOME_WORDS[fate.outcome]}"
         if seeds > 1:
             ending = f"{fate.reached} of {seeds} seeds reached it, mean {fate.distance:.3f} m"
         title = f"trial {trial}, goal ({x:.2f}, {y:.2f}): {ending}"
@@ -164,6 +164,6 @@ def description(results: ProblemResults, group: Group) -> str:
 
 def level_ranges(results: ProblemResults) -> list[str]:
     """Ranges of distances [m] that the colours stand for."""
-    bounds = [f"{results.tolerance * 2**step:g}" for step in range(LEVELS - 1)]
+    bounds = [f"{results.tolerance * 2**step:g}" for step in range(DISTANCE_COLOURS - 1)]
     between = [f"{low}\N{EN DASH}{high}" for low, high in pairwise(bounds)]
     return [f"≤ {bounds[0]}", *between, f"> {bounds[-1]}"]

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from kinarm.evaluation.evaluation import Evaluation
 from kinarm.evaluation.replays.recorder import record
 from kinarm.evaluation.report.groups import Group, ProblemResults
-from kinarm.evaluation.report.maps import OUTCOMES
+from kinarm.evaluation.report.maps import OUTCOME_WORDS
 from kinarm.recording import Recording
 
 BEST_GROUPS = 4
@@ -67,7 +67,11 @@ def describe_outcome(worst: WorstTrial) -> str:
     """How a trial ended, and what touched what."""
     outcome = worst.evaluation.outcomes[worst.trial]
     pair = worst.evaluation.contacts[worst.trial]
-    return f"{OUTCOMES[outcome]}: {pair[0]} \N{EN DASH} {pair[1]}" if pair else OUTCOMES[outcome]
+    return (
+        f"{OUTCOME_WORDS[outcome]}: {pair[0]} \N{EN DASH} {pair[1]}"
+        if pair
+        else OUTCOME_WORDS[outcome]
+    )
 
 
 def oracle_steps(results: ProblemResults, trial: int) -> str:

@@ -23,12 +23,20 @@ from kinarm.evaluation.statistics import Estimate
 
 Verdict = Literal["holds", "does not hold", "undecided"]
 
-LEVELS = ((0.2, 0.25), (0.2, 0.5), (0.2, 0.75), (0.1, 0.25), (0.1, 0.5), (0.05, 0.25), (0.05, 0.5))
+LEARNING_LEVELS = (
+    (0.2, 0.25),
+    (0.2, 0.5),
+    (0.2, 0.75),
+    (0.1, 0.25),
+    (0.1, 0.5),
+    (0.05, 0.25),
+    (0.05, 0.5),
+)
 """Distances [m] and shares of trials by which the speed of learning is measured."""
 
 
 @dataclass(frozen=True)
-class Part:
+class ClaimPart:
     """A statistic that a claim puts on one side of a threshold.
 
     Attributes
@@ -71,13 +79,13 @@ class Claim:
         Short and unique.
     statement : str
         The finding.
-    parts : tuple of Part
+    parts : tuple of ClaimPart
         What it means in numbers; all have to be so.
     """
 
     name: str
     statement: str
-    parts: tuple[Part, ...]
+    parts: tuple[ClaimPart, ...]
 
     @property
     def verdict(self) -> Verdict:
@@ -140,7 +148,7 @@ def mostly_near(results: Results, reading: Reading, task: str) -> Claim:
     """Section 4: on tasks 1 and 2, most trials end within 0.2."""
     near = results.distances("ars", task, reading) <= NEAR
     estimate = mean_share(near.mean(axis=1), near.shape[1])
-    part = Part(f"share of trials within {NEAR} m", estimate, "above", 0.5)
+    part = ClaimPart(f"share of trials within {NEAR} m", estimate, "above", 0.5)
     return Claim(f"ars-{task}", f"ARS mostly ends within {NEAR} m on {task}", (part,))
 
 
@@ -160,8 +168,8 @@ def one_bench_is_poor(results: Results, reading: Reading) -> Claim:
     better, worse = bench_shares(near, results.trial_set("both", reading).goals[:, 1] > 0)
     label = f"share of trials within {NEAR} m on a policy's {{}} bench"
     parts = (
-        Part(label.format("better"), better, "above", 0.5),
-        Part(label.format("worse"), worse, "below", 0.5),
+        ClaimPart(label.format("better"), better, "above", 0.5),
+        ClaimPart(label.format("worse"), worse, "below", 0.5),
     )
     statement = "On both, ARS does well on one bench and poorly on the other"
     return Claim("ars-one-bench", statement, parts)
@@ -189,7 +197,7 @@ def bench_shares(near: NDArray[np.bool_], left: NDArray[np.bool_]) -> tuple[Esti
     return mean_share(better, per_bench), mean_share(worse, per_bench)
 
 
-def ars_less_ppo(results: Results, reading: Reading, *tasks: str) -> Part:
+def ars_less_ppo(results: Results, reading: Reading, *tasks: str) -> ClaimPart:
     """Mean final distance of ARS, less that of PPO on the same trials."""
     weights: dict[Purpose, float] = {"ars": 1.0 / len(tasks), "ppo": -1.0 / len(tasks)}
     terms = [
@@ -211,13 +219,13 @@ def ars_needs_fewer_steps(results: Results, reading: Reading) -> Claim:
             pairs.append((ars[reached], ppo[reached]))
     estimate = superiority(pairs) if pairs else Estimate(None)
     measure = "probability that ARS reaches a level of success in fewer environment steps than PPO"
-    part = Part(measure, estimate, "above", 0.5)
+    part = ClaimPart(measure, estimate, "above", 0.5)
     return Claim("ars-samples", "ARS needs fewer environment steps than PPO", (part,))
 
 
 def steps_to_levels(runs: Iterable[TrainedRun]) -> NDArray[np.float64]:
-    """Environment steps to `LEVELS`, shape (n_levels, n_runs); infinity for never."""
-    return np.array([[run.steps_to_level(*level) for level in LEVELS] for run in runs]).T
+    """Environment steps to `LEARNING_LEVELS`, shape (n_levels, n_runs); infinity for never."""
+    return np.array([[run.steps_to_level(*level) for level in LEARNING_LEVELS] for run in runs]).T
 
 
 def low_rate_is_worse(results: Results) -> Claim:
@@ -262,7 +270,7 @@ def _sweep_difference(
     settings: Mapping[tuple[float, int], Sequence[TrainedRun]],
     chosen: Callable[[float, int], bool],
     distance: Callable[[TrainedRun], NDArray[Any]] = attrgetter("distance"),
-) -> Part:
+) -> ClaimPart:
     """Mean of the settings that are chosen, less that of all others."""
     n = sum(chosen(*setting) for setting in settings)
     terms = [
@@ -275,6 +283,6 @@ def _sweep_difference(
     return _difference(measure, terms)
 
 
-def _difference(measure: str, terms: Sequence[Term]) -> Part:
+def _difference(measure: str, terms: Sequence[Term]) -> ClaimPart:
     """A difference that the claim puts above zero."""
-    return Part(measure, contrast(terms), "above", 0.0)
+    return ClaimPart(measure, contrast(terms), "above", 0.0)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from kinarm.evaluation.reproduction.study import Training
+from kinarm.evaluation.reproduction.study import PlannedTraining
 
 LINE_SECONDS = 30.0
 """How often a line is printed, at most, where there is no terminal."""
@@ -20,7 +20,7 @@ class StudyProgress:
     ----------
     total : int
         Number of trainings of the study.
-    waiting : sequence of Training
+    waiting : sequence of PlannedTraining
         Those that are still to be done, in the order in which they begin.
     jobs : int
         How many run at a time.
@@ -29,7 +29,7 @@ class StudyProgress:
     """
 
     def __init__(
-        self, total: int, waiting: Sequence[Training], jobs: int, console: Console
+        self, total: int, waiting: Sequence[PlannedTraining], jobs: int, console: Console
     ) -> None:
         self._total, self._waiting, self._jobs = total, list(waiting), jobs
         self._printed = time.monotonic()
@@ -53,7 +53,7 @@ class StudyProgress:
     def __exit__(self, *_: object) -> None:
         self._progress.stop()
 
-    def finished(self, training: Training) -> None:
+    def finished(self, training: PlannedTraining) -> None:
         """Take note of a finished training."""
         self._waiting.remove(training)
         self._show(training.cost)

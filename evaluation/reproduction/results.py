@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.evaluation.reproduction.runs import RunStore, TrainedRun
-from kinarm.evaluation.reproduction.study import LITERAL, Purpose, Reading, Study, Training
+from kinarm.evaluation.reproduction.study import LITERAL, PlannedTraining, Purpose, Reading, Study
 from kinarm.evaluation.reproduction.training import final_trials
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.ars.config import ARSConfig
@@ -18,7 +18,7 @@ class Results:
     """What the finished trainings of a study came to."""
 
     study: Study
-    runs: Mapping[Training, TrainedRun]
+    runs: Mapping[PlannedTraining, TrainedRun]
 
     @classmethod
     def load(cls, study: Study, store: RunStore) -> "Results":
@@ -27,7 +27,7 @@ class Results:
         return cls(study, {key: run for key, run in found.items() if run is not None})
 
     @property
-    def missing(self) -> tuple[Training, ...]:
+    def missing(self) -> tuple[PlannedTraining, ...]:
         """Trainings that are not finished."""
         return tuple(t for t in self.study.trainings if t not in self.runs)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from kinarm._archive import load_archive, save_archive
 from kinarm._files import write_text
 from kinarm.errors import KinarmError, PolicyFileError
-from kinarm.evaluation.reproduction.study import Protocol, Training
+from kinarm.evaluation.reproduction.study import PlannedTraining, Protocol
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import package_versions
 from kinarm.semantics import SEMANTICS
@@ -89,16 +89,16 @@ class RunStore:
     folder: Path
     protocol: Protocol
 
-    def policy_path(self, training: Training) -> Path:
+    def policy_path(self, training: PlannedTraining) -> Path:
         """Where the trained policy lies."""
         return self.folder / "policies" / f"{training.name}.npz"
 
-    def _paths(self, training: Training) -> tuple[Path, Path]:
+    def _paths(self, training: PlannedTraining) -> tuple[Path, Path]:
         """Where wall times and run lie."""
         name = training.name
         return self.folder / "timing" / f"{name}.json", self.folder / "runs" / f"{name}.npz"
 
-    def save(self, training: Training, policy: Policy, run: TrainedRun) -> None:
+    def save(self, training: PlannedTraining, policy: Policy, run: TrainedRun) -> None:
         """Write a finished training.
 
         Raises
@@ -114,7 +114,7 @@ class RunStore:
         write_text(timing_path, json.dumps(arrays.pop("wall_time").round(4).tolist()))
         save_archive(run_path, *ARCHIVE, arrays, self._header(training), compress=True)
 
-    def load(self, training: Training) -> TrainedRun | None:
+    def load(self, training: PlannedTraining) -> TrainedRun | None:
         """Read a finished training; None if it is not finished, incomplete or of other settings."""
         try:
             timing_path, run_path = self._paths(training)
@@ -126,7 +126,7 @@ class RunStore:
             return None
         return run if fits and len(run.wall_time) == len(run.returns) else None
 
-    def _header(self, training: Training) -> dict[str, Any]:
+    def _header(self, training: PlannedTraining) -> dict[str, Any]:
         """Everything that a run depends on, and the hash of its policy."""
         versions = package_versions()
         if training.purpose != "ppo":
@@ -140,7 +140,7 @@ class RunStore:
             "policy": hashlib.sha256(policy).hexdigest(),
         }
 
-    def commits(self, trainings: Iterable[Training]) -> tuple[str, ...]:
+    def commits(self, trainings: Iterable[PlannedTraining]) -> tuple[str, ...]:
         """Commits at which finished trainings were made."""
         made = set()
         for training in trainings:

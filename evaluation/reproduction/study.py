@@ -93,7 +93,7 @@ class Protocol:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Training:
+class PlannedTraining:
     """One training of a study: what it is for, its settings, and the reading they follow."""
 
     purpose: Purpose
@@ -132,7 +132,7 @@ class Study:
     """A set of trainings, ``"full"`` or ``"quick"``, and how they are judged."""
 
     name: str
-    trainings: tuple[Training, ...]
+    trainings: tuple[PlannedTraining, ...]
     protocol: Protocol
 
     @property
@@ -170,22 +170,26 @@ def quick_study(*, ppo: bool = True) -> Study:
     return Study(name="quick", trainings=trainings, protocol=protocol)
 
 
-def _sweep(seeds: Iterable[int], iterations: int = SWEEP_ITERATIONS) -> Iterator[Training]:
+def _sweep(seeds: Iterable[int], iterations: int = SWEEP_ITERATIONS) -> Iterator[PlannedTraining]:
     """The sweep on the paper's task 1, with half of the perturbations on top as in Table 1."""
     for rate, perturbations, seed in product(SWEEP_RATES, SWEEP_PERTURBATIONS, seeds):
         directions = {"directions": perturbations, "top_directions": perturbations // 2}
         settings = {"seed": seed, "step_size": rate, "iterations": iterations, **directions}
         config = recipe("ars", "paper", problem=LITERAL.problem("left"), **settings)
-        yield Training(purpose="sweep", config=config)
+        yield PlannedTraining(purpose="sweep", config=config)
 
 
-def _ars(readings: Iterable[Reading], seeds: Iterable[int], **settings: Any) -> Iterator[Training]:
+def _ars(
+    readings: Iterable[Reading], seeds: Iterable[int], **settings: Any
+) -> Iterator[PlannedTraining]:
     """Table 1."""
     for reading in readings:
         yield from _comparison("ars", reading, seeds, sharing=reading.sharing, **settings)
 
 
-def _ppo(readings: Iterable[Reading], seeds: Iterable[int], **settings: Any) -> Iterator[Training]:
+def _ppo(
+    readings: Iterable[Reading], seeds: Iterable[int], **settings: Any
+) -> Iterator[PlannedTraining]:
     """The comparison with PPO (section 4)."""
     for reading in dict.fromkeys(reading.for_ppo for reading in readings):
         yield from _comparison("ppo", reading, seeds, **settings)
@@ -193,10 +197,10 @@ def _ppo(readings: Iterable[Reading], seeds: Iterable[int], **settings: Any) -> 
 
 def _comparison(
     learner: Literal["ars", "ppo"], reading: Reading, seeds: Iterable[int], **settings: Any
-) -> Iterator[Training]:
+) -> Iterator[PlannedTraining]:
     """Trainings of a learner on all tasks under a reading."""
     for task, seed in product(PROBLEMS, seeds):
         problem = reading.problem(task)
         weights = reading.weights(problem)
         config = recipe(learner, "paper", problem=problem, seed=seed, reward=weights, **settings)
-        yield Training(purpose=learner, config=config, reading=reading)
+        yield PlannedTraining(purpose=learner, config=config, reading=reading)

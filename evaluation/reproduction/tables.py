@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.evaluation.bounds import oracle_bounds
-from kinarm.evaluation.reproduction.claims import LEVELS, Claim, steps_to_levels
+from kinarm.evaluation.reproduction.claims import LEARNING_LEVELS, Claim, steps_to_levels
 from kinarm.evaluation.reproduction.intervals import estimate_text
 from kinarm.evaluation.reproduction.results import Results
 from kinarm.evaluation.reproduction.runs import TrainedRun
@@ -100,7 +100,7 @@ def speed_table(results: Results) -> str:
     rows = []
     for task in PROBLEMS:
         steps = [steps_to_levels(results.select(purpose, task)) for purpose in shown]
-        for number, (distance, share) in enumerate(LEVELS):
+        for number, (distance, share) in enumerate(LEARNING_LEVELS):
             cells = (_median_cell(learner[number]) for learner in steps)
             rows.append((task, f"{share:.0%} within {distance:g} m", *cells))
     header = ("task", "level", *(f"{LEARNERS[purpose]}, steps" for purpose in shown))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.evaluation.reproduction.runs import RunStore, TrainedRun
-from kinarm.evaluation.reproduction.study import LITERAL, Protocol, Training
+from kinarm.evaluation.reproduction.study import LITERAL, PlannedTraining, Protocol
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.learners import TrainingState, learner_of, state_policy, train_policy
 from kinarm.policies.policy import Policy
@@ -37,7 +37,7 @@ def snapshot_iterations(iterations: int, snapshots: int) -> NDArray[np.int64]:
     return np.unique(ends.astype(np.int64)) - 1
 
 
-def carry_out(training: Training, protocol: Protocol, folder: Path, threads: int) -> None:
+def carry_out(training: PlannedTraining, protocol: Protocol, folder: Path, threads: int) -> None:
     """Train, judge and save to the output folder; the result does not depend on the threads."""
     _load_kernels()
     config = training.config

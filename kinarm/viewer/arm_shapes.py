@@ -8,7 +8,7 @@ import pinocchio as pin
 from kinarm.arm import Arm
 from kinarm.viewer import industrial_arm
 from kinarm.viewer.meshes import from_coal
-from kinarm.viewer.parts import ACCENT, GRAPHITE, PAINT, Finish, Part
+from kinarm.viewer.parts import ACCENT, GRAPHITE, PAINT, ArmPart, Finish
 
 MOST_TRIANGLES = 60_000
 """Above this, visual meshes make way for the hulls that decide contact."""
@@ -20,7 +20,7 @@ TOOL_RADIUS = 0.012
 
 
 @lru_cache(maxsize=8)
-def arm_parts(arm: Arm) -> tuple[Part, ...]:
+def arm_parts(arm: Arm) -> tuple[ArmPart, ...]:
     """All parts of an arm.
 
     One with the geometry of the shipped ones looks like an industrial arm; any other shows the
@@ -33,7 +33,7 @@ def arm_parts(arm: Arm) -> tuple[Part, ...]:
     if not found or sum(len(part.mesh.faces) for part in found) > MOST_TRIANGLES:
         found = _plain_parts(arm.geometry)
     tool = from_coal(coal.Sphere(TOOL_RADIUS)).moved(arm.chain.tool)
-    return (*found, Part(arm.n_joints, ACCENT, tool))
+    return (*found, ArmPart(arm.n_joints, ACCENT, tool))
 
 
 def _visual_shapes(arm: Arm) -> pin.GeometryModel | None:
@@ -44,7 +44,7 @@ def _visual_shapes(arm: Arm) -> pin.GeometryModel | None:
         return None
 
 
-def _painted_parts(geometry: pin.GeometryModel) -> list[Part]:
+def _painted_parts(geometry: pin.GeometryModel) -> list[ArmPart]:
     """Parts in the colours of their shapes."""
     parts = []
     for shape in geometry.geometryObjects:
@@ -54,11 +54,11 @@ def _painted_parts(geometry: pin.GeometryModel) -> list[Part]:
     return parts
 
 
-def _plain_parts(geometry: pin.GeometryModel) -> list[Part]:
+def _plain_parts(geometry: pin.GeometryModel) -> list[ArmPart]:
     """Parts in colours of our own."""
     return [_shape_part(shape, PLAIN[shape.parentJoint % 2]) for shape in geometry.geometryObjects]
 
 
-def _shape_part(shape: pin.GeometryObject, finish: Finish) -> Part:
+def _shape_part(shape: pin.GeometryObject, finish: Finish) -> ArmPart:
     placement, mesh = shape.placement, from_coal(shape.geometry)
-    return Part(shape.parentJoint, finish, mesh.moved(placement.translation, placement.rotation))
+    return ArmPart(shape.parentJoint, finish, mesh.moved(placement.translation, placement.rotation))

@@ -101,7 +101,7 @@ class _Sun(Object):
         return {"object": {**light, "shadow": {**shadow, "camera": camera}}}
 
 
-CODES = {
+BUFFER_TYPES = {
     "float32": ("Float32Array", 0x17),
     "int8": ("Int8Array", 0x11),
     "uint32": ("Uint32Array", 0x16),
@@ -109,7 +109,7 @@ CODES = {
 
 
 def _typed_array(array: NDArray[np.generic], size: int) -> dict[str, object]:
-    name, code = CODES[array.dtype.name]
+    name, code = BUFFER_TYPES[array.dtype.name]
     data = umsgpack.Ext(code, np.ascontiguousarray(array).tobytes())
     return {"itemSize": size, "type": name, "array": data, "normalized": name == "Int8Array"}
 

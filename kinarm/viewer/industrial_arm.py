@@ -11,7 +11,7 @@ import numpy as np
 
 from kinarm.arm import Arm
 from kinarm.viewer.meshes import Mesh, box, capsule, cylinder, housing, lathe, loft
-from kinarm.viewer.parts import ACCENT, GRAPHITE, PAINT, STEEL, Part
+from kinarm.viewer.parts import ACCENT, GRAPHITE, PAINT, STEEL, ArmPart
 
 TIP = 0.014
 """Radius of the ball at the end of the tool, whose surface is the tool point [m]."""
@@ -61,7 +61,7 @@ def fits(arm: Arm) -> bool:
     )
 
 
-def parts(arm: Arm) -> Iterator[Part]:
+def parts(arm: Arm) -> Iterator[ArmPart]:
     """All parts of an arm that `fits`."""
     chain = arm.chain
     yield from _base()
@@ -73,7 +73,7 @@ def parts(arm: Arm) -> Iterator[Part]:
     yield from _hand(float(chain.tool[0]))
 
 
-def _base() -> Iterator[Part]:
+def _base() -> Iterator[ArmPart]:
     casting = [
         (0.02, -0.005, 0.122, 0.108, 4.5),
         (0.05, -0.005, 0.116, 0.104, 4.0),
@@ -81,31 +81,31 @@ def _base() -> Iterator[Part]:
         (0.12, 0.0, 0.097, 0.097, 2.1),
         (0.15, 0, 0.096, 0.096, 2),
     ]
-    yield Part(0, PAINT, housing(casting))
-    yield Part(0, GRAPHITE, box((0.27, 0.25, 0.022), 0.006).moved((-0.012, 0, 0.011)))
-    yield Part(0, GRAPHITE, box((0.05, 0.13, 0.07), 0.008).moved((-0.125, 0, 0.062)))
+    yield ArmPart(0, PAINT, housing(casting))
+    yield ArmPart(0, GRAPHITE, box((0.27, 0.25, 0.022), 0.006).moved((-0.012, 0, 0.011)))
+    yield ArmPart(0, GRAPHITE, box((0.05, 0.13, 0.07), 0.008).moved((-0.125, 0, 0.062)))
     for y in (-0.035, 0.0, 0.035):
-        yield Part(0, STEEL, cylinder(0.02, 0.012, 0.002, "x").moved((-0.156, y, 0.064)))
+        yield ArmPart(0, STEEL, cylinder(0.02, 0.012, 0.002, "x").moved((-0.156, y, 0.064)))
     for x in (-0.125, 0.101):
         for y in (-0.105, 0.105):
-            yield Part(0, STEEL, cylinder(0.01, 0.0085, 0.002).moved((x, y, 0.026)))
+            yield ArmPart(0, STEEL, cylinder(0.01, 0.0085, 0.002).moved((x, y, 0.026)))
 
 
-def _shoulder() -> Iterator[Part]:
+def _shoulder() -> Iterator[ArmPart]:
     second_axis = (0.075, 0, 0)
     ring = [(-0.182, 0.088), (-0.18, 0.1), (-0.168, 0.1), (-0.166, 0.088)]
     motor = [(0.06, 0.062), (0.13, 0.061), (0.14, 0.055), (0.142, 0.03)]
     bearing = [(-0.122, 0.052), (-0.118, 0.06), (-0.07, 0.062), (0.07, 0.062)]
     cap = [(-0.124, 0.03), (-0.121, 0.034), (-0.115, 0.034)]
-    yield Part(1, STEEL, lathe(ring))
-    yield Part(1, PAINT, housing(SHOULDER))
-    yield Part(1, GRAPHITE, lathe(bearing, "y").moved(second_axis))
-    yield Part(1, GRAPHITE, lathe(motor, "y").moved(second_axis))
-    yield Part(1, STEEL, lathe(cap, "y").moved(second_axis))
-    yield Part(1, GRAPHITE, cylinder(0.09, 0.05, 0.007).moved((-0.045, 0, -0.045)))
+    yield ArmPart(1, STEEL, lathe(ring))
+    yield ArmPart(1, PAINT, housing(SHOULDER))
+    yield ArmPart(1, GRAPHITE, lathe(bearing, "y").moved(second_axis))
+    yield ArmPart(1, GRAPHITE, lathe(motor, "y").moved(second_axis))
+    yield ArmPart(1, STEEL, lathe(cap, "y").moved(second_axis))
+    yield ArmPart(1, GRAPHITE, cylinder(0.09, 0.05, 0.007).moved((-0.045, 0, -0.045)))
 
 
-def _upper_arm(length: float) -> Iterator[Part]:
+def _upper_arm(length: float) -> Iterator[ArmPart]:
     lower_hub = [(0.05, 0.078), (0.056, 0.082), (0.086, 0.078), (0.092, 0.06)]
     upper_hub = [(0.056, 0.058), (0.06, 0.062), (0.087, 0.06), (0.091, 0.046)]
     cheek = [
@@ -121,15 +121,15 @@ def _upper_arm(length: float) -> Iterator[Part]:
         (length - 0.115, -0.006, 0.036, 0.068, 4.0),
         (length - 0.085, -0.006, 0.026, 0.066, 4.0),
     ]
-    yield Part(2, PAINT, housing(web))
+    yield ArmPart(2, PAINT, housing(web))
     for side in (-1, 1):
-        yield Part(2, PAINT, lathe(_towards(side, lower_hub), "y"))
-        yield Part(2, PAINT, lathe(_towards(side, upper_hub), "y").moved((0, 0, length)))
-        yield Part(2, PAINT, housing(cheek).moved((0, 0.072 * side, 0)))
-        yield Part(2, STEEL, cylinder(0.006, 0.04, 0.002, "y").moved((0, 0.093 * side, length)))
+        yield ArmPart(2, PAINT, lathe(_towards(side, lower_hub), "y"))
+        yield ArmPart(2, PAINT, lathe(_towards(side, upper_hub), "y").moved((0, 0, length)))
+        yield ArmPart(2, PAINT, housing(cheek).moved((0, 0.072 * side, 0)))
+        yield ArmPart(2, STEEL, cylinder(0.006, 0.04, 0.002, "y").moved((0, 0.093 * side, length)))
     for angle in np.arange(6) * np.pi / 3 + 0.26:
         place = (0.05 * np.cos(angle), -0.093, 0.05 * np.sin(angle))
-        yield Part(2, STEEL, cylinder(0.006, 0.006, 0.001, "y").moved(place))
+        yield ArmPart(2, STEEL, cylinder(0.006, 0.006, 0.001, "y").moved(place))
 
 
 def _towards(side: int, profile: list[tuple[float, float]]) -> list[tuple[float, float]]:
@@ -137,27 +137,27 @@ def _towards(side: int, profile: list[tuple[float, float]]) -> list[tuple[float,
     return profile if side > 0 else [(-position, radius) for position, radius in profile[::-1]]
 
 
-def _elbow() -> Iterator[Part]:
+def _elbow() -> Iterator[ArmPart]:
     fourth_axis = (0, 0, 0.075)
     snout = [(0.05, 0.054), (0.08, 0.055), (0.092, 0.051), (0.096, 0.046)]
     ring = [(0.094, 0.044), (0.096, 0.048), (0.106, 0.048), (0.108, 0.044)]
     motor = [(-0.118, 0.03), (-0.112, 0.038), (-0.06, 0.041), (-0.05, 0.041)]
-    yield Part(3, PAINT, housing(ELBOW))
-    yield Part(3, GRAPHITE, cylinder(0.112, 0.054, 0.004, "y"))
-    yield Part(3, PAINT, lathe(snout, "x").moved(fourth_axis))
-    yield Part(3, STEEL, lathe(ring, "x").moved(fourth_axis))
-    yield Part(3, GRAPHITE, lathe(motor, "x").moved(fourth_axis))
+    yield ArmPart(3, PAINT, housing(ELBOW))
+    yield ArmPart(3, GRAPHITE, cylinder(0.112, 0.054, 0.004, "y"))
+    yield ArmPart(3, PAINT, lathe(snout, "x").moved(fourth_axis))
+    yield ArmPart(3, STEEL, lathe(ring, "x").moved(fourth_axis))
+    yield ArmPart(3, GRAPHITE, lathe(motor, "x").moved(fourth_axis))
 
 
-def _forearm(length: float) -> Iterator[Part]:
+def _forearm(length: float) -> Iterator[ArmPart]:
     start = 0.108 - length
     rear = [(start, 0.044), (start + 0.008, 0.05), (start + 0.06, 0.049)]
     front = [(-0.1, 0.041), (-0.075, 0.044), (-0.068, 0.04)]
-    yield Part(4, PAINT, lathe([*rear, *front], "x"))
+    yield ArmPart(4, PAINT, lathe([*rear, *front], "x"))
     for side in (-1, 1):
-        yield Part(4, PAINT, _fork().moved((0, 0.043 * side, 0)))
-        yield Part(4, GRAPHITE, cylinder(0.008, 0.026, 0.002, "y").moved((0, 0.0545 * side, 0)))
-        yield Part(4, STEEL, cylinder(0.003, 0.012, 0.001, "y").moved((0, 0.0595 * side, 0)))
+        yield ArmPart(4, PAINT, _fork().moved((0, 0.043 * side, 0)))
+        yield ArmPart(4, GRAPHITE, cylinder(0.008, 0.026, 0.002, "y").moved((0, 0.0545 * side, 0)))
+        yield ArmPart(4, STEEL, cylinder(0.003, 0.012, 0.001, "y").moved((0, 0.0595 * side, 0)))
 
 
 def _fork() -> Mesh:
@@ -170,22 +170,22 @@ def _fork() -> Mesh:
     return loft(np.array([np.insert(scale * outline, 1, y, axis=1) for y, scale in levels]))
 
 
-def _wrist() -> Iterator[Part]:
+def _wrist() -> Iterator[ArmPart]:
     barrel = [(0.0, 0.028), (0.03, 0.03), (0.058, 0.031), (0.062, 0.028)]
-    yield Part(5, STEEL, cylinder(0.062, 0.033, 0.003, "y"))
-    yield Part(5, GRAPHITE, lathe(barrel, "x"))
+    yield ArmPart(5, STEEL, cylinder(0.062, 0.033, 0.003, "y"))
+    yield ArmPart(5, GRAPHITE, lathe(barrel, "x"))
 
 
-def _hand(tool: float) -> Iterator[Part]:
+def _hand(tool: float) -> Iterator[ArmPart]:
     flange = [(-0.017, 0.028), (-0.015, 0.0315), (-0.002, 0.0315), (0.0, 0.03)]
-    yield Part(6, STEEL, lathe(flange, "x"))
+    yield ArmPart(6, STEEL, lathe(flange, "x"))
     for angle in np.arange(4) * np.pi / 2 + np.pi / 4:
         place = (0.0005, 0.0235 * np.cos(angle), 0.0235 * np.sin(angle))
-        yield Part(6, GRAPHITE, cylinder(0.004, 0.0032, 0.0005, "x").moved(place))
+        yield ArmPart(6, GRAPHITE, cylinder(0.004, 0.0032, 0.0005, "x").moved(place))
     if tool == 0:
         return
     holder = [(0.0, 0.021), (0.02, 0.021), (0.034, 0.013), (0.04, 0.011)]
     rod = [(0.036, 0.0095), (0.04, 0.01), (tool - 0.03, 0.0085), (tool - 0.026, 0.0075)]
-    yield Part(6, GRAPHITE, lathe(holder, "x"))
-    yield Part(6, STEEL, lathe(rod, "x"))
-    yield Part(6, ACCENT, capsule(0.0, TIP).moved((tool - TIP, 0, 0)))
+    yield ArmPart(6, GRAPHITE, lathe(holder, "x"))
+    yield ArmPart(6, STEEL, lathe(rod, "x"))
+    yield ArmPart(6, ACCENT, capsule(0.0, TIP).moved((tool - TIP, 0, 0)))

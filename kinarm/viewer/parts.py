@@ -27,7 +27,7 @@ class Finish(NamedTuple):
     glow: bool = False
 
 
-class Part(NamedTuple):
+class ArmPart(NamedTuple):
     """A piece of an arm.
 
     Attributes

@@ -234,6 +234,7 @@ def test_truncated_policy_files_are_refused(run, tmp_path, policy_folder, share)
     check_refused(run("kinarm-eval", "--policy", path), "short.npz")
 
 
+@pytest.mark.slow
 @given(st.data())
 @settings(
     max_examples=60,

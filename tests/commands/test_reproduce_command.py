@@ -40,6 +40,7 @@ def reference(run_outside, tmp_path_factory):
     return place / "reproduction-quick", answer
 
 
+@pytest.mark.slow
 class TestQuick:
     def test_prints_verdicts_and_says_where_the_rest_is(self, reference):
         _, answer = reference
@@ -104,6 +105,7 @@ class InThisProcess:
             yield task
 
 
+@pytest.mark.slow
 def test_python_gets_the_same_from_a_request_and_another_executor(reference, tmp_path):
     """Nothing is left to do in a copy without two of the runs but these two."""
     folder = tmp_path / "copy"

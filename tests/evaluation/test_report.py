@@ -15,7 +15,7 @@ from kinarm.evaluation.document import evaluation_document
 from kinarm.evaluation.entrants import BASELINES, ORACLE, Entrant
 from kinarm.evaluation.evaluation import evaluate, run_trials
 from kinarm.evaluation.report import charts, maps
-from kinarm.evaluation.report.groups import COLOURS, DASHES, group_results
+from kinarm.evaluation.report.groups import PAGE_COLOURS, PAGE_DASHES, group_results
 from kinarm.evaluation.report.maps import fates, level
 from kinarm.evaluation.report.page import page_template, report_page, write_report
 from kinarm.evaluation.report.worst import record_worst, worst_trials
@@ -423,10 +423,10 @@ class TestPage:
 
     def test_classes_are_in_the_style_sheet(self, page):
         styles = (resources.files("kinarm.evaluation.report") / "templates/page.css").read_text()
-        for kind, count in (("colour", COLOURS), ("d", maps.LEVELS)):
+        for kind, count in (("colour", PAGE_COLOURS), ("d", maps.LEVELS)):
             for place in range(count):
                 assert f".{kind}{place} {{" in styles
-        for place in range(1, DASHES):
+        for place in range(1, PAGE_DASHES):
             assert f".dash{place} .line" in styles
         for name in (*BASELINES, "oracle"):
             assert f".{name} .line" in styles
@@ -458,7 +458,7 @@ class TestPage:
                 skilled_evaluation, entrant=replace(Entrant.from_policy(name, made), group=name)
             )
             for name, made in (
-                (f"policy{n}", skilled_evaluation.entrant.policy) for n in range(COLOURS + 2)
+                (f"policy{n}", skilled_evaluation.entrant.policy) for n in range(PAGE_COLOURS + 2)
             )
         ]
         (task,) = group_results(evaluation_document(many, ""), many)

@@ -6,7 +6,7 @@ import pytest
 
 from kinarm.evaluation.reproduction.results import Results
 from kinarm.evaluation.reproduction.runs import TrainedRun
-from kinarm.evaluation.reproduction.study import Study, Training, full_study
+from kinarm.evaluation.reproduction.study import PlannedTraining, Study, full_study
 
 
 @pytest.fixture(scope="session")
@@ -19,7 +19,7 @@ def study() -> Study:
 def results_of(study: Study) -> Callable[..., Results]:
     """Make results from a function from trainings to runs."""
 
-    def make(run_of: Callable[[Training], TrainedRun]) -> Results:
+    def make(run_of: Callable[[PlannedTraining], TrainedRun]) -> Results:
         return Results(study, {training: run_of(training) for training in study.trainings})
 
     return make

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from made_up_runs import made_up
 
-from kinarm.evaluation.reproduction.claims import Claim, Part, assess, bench_shares
+from kinarm.evaluation.reproduction.claims import Claim, ClaimPart, assess, bench_shares
 from kinarm.evaluation.reproduction.study import LITERAL, Protocol, Reading
 from kinarm.evaluation.reproduction.training import final_trials
 from kinarm.evaluation.statistics import Estimate
@@ -188,12 +188,12 @@ class TestVerdict:
     )
     def test_of_a_part(self, ci95, above, below):
         estimate = Estimate(0.5, ci95)
-        assert Part("", estimate, "above", 0.5).verdict == above
-        assert Part("", estimate, "below", 0.5).verdict == below
+        assert ClaimPart("", estimate, "above", 0.5).verdict == above
+        assert ClaimPart("", estimate, "below", 0.5).verdict == below
 
     def test_of_a_claim_with_several_parts(self):
         yes, no, perhaps = (
-            Part("", Estimate(0, interval), "above", 0.0)
+            ClaimPart("", Estimate(0, interval), "above", 0.0)
             for interval in ((1.0, 2.0), (-2.0, -1.0), (-1.0, 1.0))
         )
         assert Claim("", "", (yes, yes)).verdict == "holds"

@@ -9,14 +9,14 @@ from made_up_runs import made_up
 from kinarm.evaluation.reproduction import runs
 from kinarm.evaluation.reproduction.results import Results
 from kinarm.evaluation.reproduction.runs import RunStore
-from kinarm.evaluation.reproduction.study import Protocol, Study, Training
+from kinarm.evaluation.reproduction.study import PlannedTraining, Protocol, Study
 from kinarm.evaluation.reproduction.training import carry_out
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies import Policy, recipe, train_policy
 from kinarm.problem import PROBLEMS
 
 PROTOCOL = Protocol(trials=12, snapshots=3, snapshot_trials=5)
-TRAINING = Training(
+TRAINING = PlannedTraining(
     purpose="ars", config=recipe("ars", "paper", problem="left", iterations=7, directions=12)
 )
 
@@ -54,7 +54,7 @@ class TestCarryOut:
     def test_the_last_snapshot_of_a_symmetric_training_is_its_policy(self, tmp_path):
         """Statistics of the mirror images are part of it."""
         config = recipe("ars", "tuned", problem="both", iterations=3)
-        training = Training(purpose="ars", config=config)
+        training = PlannedTraining(purpose="ars", config=config)
         carry_out(training, PROTOCOL, tmp_path, threads=1)
         store = RunStore(tmp_path, PROTOCOL)
         policy = Policy.load(store.policy_path(training))
