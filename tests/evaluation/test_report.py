@@ -423,7 +423,7 @@ class TestPage:
 
     def test_classes_are_in_the_style_sheet(self, page):
         styles = (resources.files("kinarm.evaluation.report") / "templates/page.css").read_text()
-        for kind, count in (("colour", PAGE_COLOURS), ("d", maps.LEVELS)):
+        for kind, count in (("colour", PAGE_COLOURS), ("d", maps.DISTANCE_COLOURS)):
             for place in range(count):
                 assert f".{kind}{place} {{" in styles
         for place in range(1, PAGE_DASHES):
