@@ -55,6 +55,7 @@ nitpick_ignore_regex = [
     (r"py:.*", r"(numpy|pinocchio|gymnasium|pathlib|collections|typing)\..*"),
     (r"py:data", r"Ellipsis"),
     (r"py:class", r"Figure"),  # matplotlib, which is imported when first used
+    (r"py:class", r"NDArray|ndarray|np\.\w+"),  # NumPy's, where annotations are kept as they are written
     (r"py:class", r".*\.[A-Z]\w*T"),  # type variables
 ]
 
@@ -97,7 +98,9 @@ def _attribute_types_as_text(
             lines[number] = ""
 
 
-ARRAY = re.compile(r"ndarray\[tuple\[[~.\w]*Any, \.\.\.\], [~.\w]*dtype\[[~.\w]+\]\]")
+ARRAY = re.compile(
+    r"ndarray\[tuple\[[~.\w]*Any, \.\.\.\], [~.\w]*dtype\[[~.\w]+\]\]|NDArray\[np\.\w+\]"
+)
 
 
 def _shorten_signature(*event: str | None) -> tuple[str, str | None] | None:

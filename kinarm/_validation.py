@@ -1,5 +1,7 @@
 """Checks of arguments that come from users."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

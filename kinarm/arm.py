@@ -1,5 +1,7 @@
 """Robot arms: a Pinocchio model with tool, limits and collision shapes."""
 
+from __future__ import annotations
+
 import hashlib
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -62,7 +64,7 @@ class Arm:
         return type(self), tuple(getattr(self, item.name) for item in fields(self))
 
     @classmethod
-    def load(cls, arm: "ArmSpecification | str | Path" = DEFAULT_ARM, **changes: Any) -> "Arm":
+    def load(cls, arm: ArmSpecification | str | Path = DEFAULT_ARM, **changes: Any) -> Arm:
         """Load a shipped arm by name, or any supported arm from a URDF file.
 
         Parameters

@@ -1,8 +1,10 @@
 """Sources of actions for the compiled simulator: batches of dense networks, and tables."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple, Protocol, Union, get_args, runtime_checkable
+from typing import Literal, NamedTuple, Protocol, get_args, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +19,7 @@ from kinarm.observation import GOAL_SIDE
 class CompiledPolicy(Protocol):
     """A policy that can run inside the compiled simulator."""
 
-    def networks(self) -> "Networks":
+    def networks(self) -> Networks:
         """The policy as a batch of one network, its normaliser included."""
 
 
@@ -96,7 +98,7 @@ class Networks:
         check_activations(self.activation, self.output)
 
     @classmethod
-    def linear(cls, matrices: NDArray[np.float64], biases: NDArray[np.float64]) -> "Networks":
+    def linear(cls, matrices: NDArray[np.float64], biases: NDArray[np.float64]) -> Networks:
         """Linear policies.
 
         Parameters
@@ -111,9 +113,7 @@ class Networks:
         return cls(np.array([n_in, n_out]), np.concatenate([flat, biases], axis=1))
 
     @classmethod
-    def collect(
-        cls, policies: Union["Networks", CompiledPolicy, Sequence[CompiledPolicy]]
-    ) -> "Networks":
+    def collect(cls, policies: Networks | CompiledPolicy | Sequence[CompiledPolicy]) -> Networks:
         """Gather policies into one batch.
 
         Raises

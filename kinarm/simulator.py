@@ -1,5 +1,7 @@
 """The simulator: a problem, stepped in batches of episodes."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -157,7 +159,7 @@ class Simulator:
 
     def rollout(
         self,
-        policies: "Networks | CompiledPolicy | Sequence[CompiledPolicy] | PolicyFunction",
+        policies: Networks | CompiledPolicy | Sequence[CompiledPolicy] | PolicyFunction,
         starts: ArrayLike,
         goals: ArrayLike,
         *,

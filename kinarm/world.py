@@ -1,5 +1,7 @@
 """The world of a problem: arm and scene, and what can be asked about configurations in it."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

@@ -1,5 +1,7 @@
 """One class for every trained policy: a normaliser, dense layers and a clip."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -194,7 +196,7 @@ class Policy:
         save_archive(path, "policy", FORMAT_VERSION, arrays, header)
 
     @classmethod
-    def load(cls, path: str | Path) -> "Policy":
+    def load(cls, path: str | Path) -> Policy:
         """Read a policy that `save` wrote.
 
         Raises

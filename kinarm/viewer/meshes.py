@@ -1,5 +1,7 @@
 """Triangle meshes from profiles and primitives, with normals that keep sharp edges sharp."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -31,15 +33,13 @@ class Mesh:
     vertices: Array
     faces: NDArray[np.int64]
 
-    def moved(
-        self, translation: ArrayLike = (0, 0, 0), rotation: ArrayLike | None = None
-    ) -> "Mesh":
+    def moved(self, translation: ArrayLike = (0, 0, 0), rotation: ArrayLike | None = None) -> Mesh:
         """Rotate by a matrix, then translate [m]."""
         turned = self.vertices if rotation is None else self.vertices @ np.asarray(rotation).T
         return Mesh(turned + np.asarray(translation, dtype=float), self.faces)
 
     @classmethod
-    def joined(cls, meshes: Sequence["Mesh"]) -> "Mesh":
+    def joined(cls, meshes: Sequence[Mesh]) -> Mesh:
         """Put meshes into one."""
         offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
         faces = [mesh.faces + offset for mesh, offset in zip(meshes, offsets, strict=True)]

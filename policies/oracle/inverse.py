@@ -3,6 +3,8 @@
 Kinematics and Jacobian are those of the Pinocchio model, flattened for the compiled kernels.
 """
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

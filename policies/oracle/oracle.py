@@ -19,6 +19,8 @@ reaches the goal without contact. It need not be the fastest one, and that none 
 nothing.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 
 import numpy as np
