@@ -317,7 +317,8 @@ class Simulator:
                 self.judged += rows.size
         episodes.status[paused[~refused]] = RUNNING
         episodes.cleared[paused] = ~refused
-        refuse(paused[refused], self._rules, episodes)
+        if refused.any():
+            refuse(paused[refused], self._rules, episodes)
 
     def _follow(self, policy: PolicyFunction, episodes: Episodes) -> None:
         """Drive episodes to their end with a Python function."""

@@ -141,12 +141,12 @@ class ReachTask:
             Goal points in the world [m].
         """
         regions = [scene.goal_region(name) for name in self.goal_regions]
-        lower = np.array([region.lower for region in regions])
-        extent = np.array([region.upper for region in regions]) - lower
+        lower, upper = np.array([(r.lower, r.upper) for r in regions]).transpose(1, 0, 2)
+        extent = upper - lower
         moving = np.flatnonzero(extent.any(axis=0))
         uniforms = rng.random((count, 1 + len(moving)))
-        weights = np.array(self.goal_weights or np.ones(len(regions)))
-        ends = np.cumsum(weights / weights.sum())[:-1]
+        weights = self.goal_weights or (1.0,) * len(regions)
+        ends = np.cumsum(weights[:-1]) / sum(weights)
         chosen = np.searchsorted(ends, uniforms[:, 0], side="right")
         goals: NDArray[np.float64] = lower[chosen]
         goals[:, moving] += uniforms[:, 1:] * extent[chosen][:, moving]
