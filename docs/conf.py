@@ -55,7 +55,10 @@ nitpick_ignore_regex = [
     (r"py:.*", r"(numpy|pinocchio|gymnasium|pathlib|collections|typing)\..*"),
     (r"py:data", r"Ellipsis"),
     (r"py:class", r"Figure"),  # matplotlib, which is imported when first used
-    (r"py:class", r"NDArray|ndarray|np\.\w+"),  # NumPy's, where annotations are kept as they are written
+    (
+        r"py:class",
+        r"NDArray|ndarray|np\.\w+",
+    ),  # NumPy's, where annotations are kept as they are written
     (r"py:class", r".*\.[A-Z]\w*T"),  # type variables
 ]
 

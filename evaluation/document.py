@@ -107,6 +107,9 @@ class EvaluationDocument:
     protocol: dict[str, Any]
     results: list[dict[str, Any]]
 
+    def __repr__(self) -> str:
+        return f"EvaluationDocument({self.name!r}, {len(self.results)} results)"
+
     @classmethod
     def load(cls, path: str | Path) -> "EvaluationDocument":
         """Read a document.

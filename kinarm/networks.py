@@ -97,6 +97,10 @@ class Networks:
         object.__setattr__(self, "weights", weights)
         check_activations(self.activation, self.output)
 
+    def __repr__(self) -> str:
+        widths = "-".join(map(str, self.layers.tolist()))
+        return f"Networks({len(self.weights)} of layers {widths})"
+
     @classmethod
     def linear(cls, matrices: NDArray[np.float64], biases: NDArray[np.float64]) -> Networks:
         """Linear policies.

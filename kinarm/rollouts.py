@@ -96,3 +96,7 @@ class Rollouts:
 
     def __len__(self) -> int:
         return len(self.steps)
+
+    def __repr__(self) -> str:
+        reached, touched = int(self.success.sum()), int(self.collision.sum())
+        return f"Rollouts({len(self)} episodes, {reached} successes, {touched} collisions)"

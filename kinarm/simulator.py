@@ -67,6 +67,9 @@ class Simulator:
             reward=task.reward.vector,
         )
 
+    def __repr__(self) -> str:
+        return f"Simulator({self.problem!r})"
+
     @property
     def problem(self) -> ReachProblem:
         """What is stepped."""

@@ -43,6 +43,9 @@ class World:
         self.arm = Arm.load(self.problem.arm)
         self.contact_model = ContactModel.build(self.arm, self.problem.scene)
 
+    def __repr__(self) -> str:
+        return f"World({self.problem!r})"
+
     @property
     def n_observations(self) -> int:
         """Length of an observation."""

@@ -85,6 +85,9 @@ class OracleSolutions:
     def __len__(self) -> int:
         return len(self.steps)
 
+    def __repr__(self) -> str:
+        return f"OracleSolutions({len(self)} trials, {int(self.reachable.sum())} reached)"
+
     def __iter__(self) -> Iterator[OracleSolution]:
         return (self[index] for index in range(len(self)))
 
