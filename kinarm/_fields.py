@@ -5,8 +5,9 @@ Parameters of its docstring, what they mean; files, messages and options follow 
 """
 
 import re
+import tomllib
 import types
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import cache
@@ -15,6 +16,7 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 
 import numpy as np
 
+from kinarm._files import first_line
 from kinarm.errors import InvalidInputError, KinarmError
 
 T = TypeVar("T")
@@ -36,6 +38,36 @@ def to_plain(value: Any) -> Any:
     if isinstance(value, np.generic):
         return value.item()
     return str(value) if isinstance(value, Path) else value
+
+
+def read_toml(
+    path: Path, what: str, bases: Collection[str], default: str
+) -> tuple[str, dict[str, Any]]:
+    """Read a TOML file whose entry ``base`` names one of some bases that it adds to.
+
+    Returns
+    -------
+    base : str
+        The name, or the default.
+    entries : dict
+        All other entries.
+
+    Raises
+    ------
+    InvalidInputError
+        If the file cannot be read, is no TOML or names no such base; it is called ``what``.
+    """
+    name = str(path)
+    try:
+        entries = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InvalidInputError(f"cannot read {what} {name!r}: {error.strerror}") from error
+    except (ValueError, RecursionError) as error:
+        raise InvalidInputError(f"{name}: not a {what} file: {first_line(error)}") from error
+    base = entries.pop("base", default)
+    if not isinstance(base, str) or base not in bases:
+        raise InvalidInputError(f"{name}: base must be one of {', '.join(bases)}, got {base!r}")
+    return base, entries
 
 
 def from_plain(kind: type[T], entries: object, where: str, path: str = "") -> T:

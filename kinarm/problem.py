@@ -7,7 +7,6 @@ it.
 import hashlib
 import json
 import math
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -16,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
-from kinarm._fields import check_fields, from_plain, init_fields, to_plain
-from kinarm._files import first_line, write_text
+from kinarm._fields import check_fields, from_plain, init_fields, read_toml, to_plain
+from kinarm._files import write_text
 from kinarm._validation import whole_number
 from kinarm.arm_specification import ArmSpecification
 from kinarm.errors import InvalidInputError, ProblemError, UnknownNameError
@@ -296,18 +295,9 @@ def _check_names(what: str, given: Mapping[str, Any], *kinds: type) -> None:
 
 def _read_problem(path: Path) -> ReachProblem:
     """Read a problem file; what it leaves out is that of the problem ``base``."""
-    name = str(path)
-    try:
-        entries = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InvalidInputError(f"cannot read problem {name!r}: {error.strerror}") from error
-    except (ValueError, RecursionError) as error:
-        raise InvalidInputError(f"{name}: not a problem file: {first_line(error)}") from error
-    base = entries.pop("base", "right")
-    if not isinstance(base, str) or base not in PROBLEMS:
-        raise InvalidInputError(f"{name}: base must be one of {', '.join(PROBLEMS)}, got {base!r}")
+    base, entries = read_toml(path, "problem", PROBLEMS, "right")
     given = {"name": path.stem, **entries}
-    problem = from_plain(ReachProblem, _merged(to_plain(PROBLEMS[base]), given), name)
+    problem = from_plain(ReachProblem, _merged(to_plain(PROBLEMS[base]), given), str(path))
     return replace(problem, arm=problem.arm.resolved(path.resolve().parent))
 
 

@@ -1,13 +1,11 @@
 """Recipes: settings by name, or from a file."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from kinarm._fields import from_plain, init_fields, to_plain
-from kinarm._files import first_line
+from kinarm._fields import from_plain, init_fields, read_toml, to_plain
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.policies.learners import Learner, find_learner
 from kinarm.problem import ReachProblem
@@ -68,17 +66,7 @@ def _named_recipe(learner: Learner[Any, Any], name: str, circumstances: Mapping[
 
 def _read_recipe(learner: Learner[Any, Any], path: Path, circumstances: Mapping[str, Any]) -> Any:
     """Settings of a file for a problem and a seed, which may be in the file."""
-    name = str(path)
-    try:
-        entries = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InvalidInputError(f"cannot read recipe {name!r}: {error.strerror}") from error
-    except ValueError as error:
-        raise InvalidInputError(f"{name}: not a recipe file: {first_line(error)}") from error
-    base = entries.pop("base", "paper")
-    if base not in learner.recipes:
-        choices = ", ".join(learner.recipes)
-        raise InvalidInputError(f"{name}: base must be one of {choices}, got {base!r}")
+    base, entries = read_toml(path, "recipe", learner.recipes, "paper")
     known = {**circumstances}
     problem = entries.pop("problem", None)
     if problem is not None and "problem" not in known:
@@ -88,7 +76,7 @@ def _read_recipe(learner: Learner[Any, Any], path: Path, circumstances: Mapping[
     if isinstance(given.get("reward"), Mapping):
         weights = standard.reward or standard.problem.task.reward
         given["reward"] = {**to_plain(weights), **given["reward"]}
-    made = from_plain(learner.config, {**to_plain(standard), **given}, name)
+    made = from_plain(learner.config, {**to_plain(standard), **given}, str(path))
     return replace(made, problem=standard.problem)
 
 

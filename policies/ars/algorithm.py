@@ -145,7 +145,8 @@ def ars_step(
 
 def linear_policy(config: ARSConfig, state: ARSState) -> Policy:
     """Freeze a state of the training into a policy."""
-    mirror = task_mirror(config.symmetric, World(config.problem, threads=1))
+    # A world takes longer to build than an iteration: only where there may be a mirror.
+    mirror = task_mirror(True, World(config.problem, threads=1)) if config.symmetric else None
     normalizer = policy_normalizer(config, state.normalizer, mirror)
     return Policy(
         mean=normalizer.mean,

@@ -201,6 +201,8 @@ class TestFile:
             ("[reward]\ncollision = 2", "mine.toml: reward: .*rewards contact"),
             ("reward = 1", "mine.toml: reward must be a table, got 1"),
             ('base = "best"', "mine.toml: base must be one of paper, tuned, v1, brs, got 'best'"),
+            ('base = ["paper"]', "mine.toml: base must be one of paper, tuned, v1, brs"),
+            (f"noise = {'[' * 10_000}", "mine.toml: not a recipe file"),
             ("problem = 3", "mine.toml: problem must be the name or file of a problem, got 3"),
             ("noise =", "mine.toml: not a recipe file: "),
         ],
