@@ -2,6 +2,8 @@ from .arm import Arm as Arm
 from .arm_specification import ArmSpecification as ArmSpecification
 from .arm_specification import arm_names as arm_names
 from .envs import ReachEnv as ReachEnv
+from .envs import ReachGoalEnv as ReachGoalEnv
+from .envs import ReachGoalVectorEnv as ReachGoalVectorEnv
 from .envs import ReachVectorEnv as ReachVectorEnv
 from .errors import ArmError as ArmError
 from .errors import InvalidInputError as InvalidInputError

@@ -49,6 +49,8 @@ class Part(NamedTuple):
         Formula; see `write_goal`.
     per_joint : bool
         Whether there is one for every joint.
+    of_goal : bool
+        Whether it depends on the goal.
     """
 
     name: str
@@ -58,6 +60,7 @@ class Part(NamedTuple):
     bounds: Callable[[Ranges], tuple[Array | float, Array | float]]
     write: Callable[[Array, Vector, Array, int, int, Array, int], None]
     per_joint: bool = False
+    of_goal: bool = False
 
     def length(self, n_joints: int) -> int:
         """Number of its entries in the observation of an arm."""
@@ -128,6 +131,7 @@ OBSERVATION = (
         signs=POLAR,
         bounds=lambda ranges: (ranges.goal_lower, ranges.goal_upper),
         write=write_goal,
+        of_goal=True,
     ),
     Part(
         name="goal_minus_tool",
@@ -136,6 +140,7 @@ OBSERVATION = (
         signs=POLAR,
         bounds=lambda ranges: (ranges.goal_lower - ranges.reach, ranges.goal_upper + ranges.reach),
         write=write_offset,
+        of_goal=True,
     ),
     Part(
         name="orientation",

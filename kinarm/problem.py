@@ -107,9 +107,9 @@ class ReachProblem:
 
         Parameters
         ----------
-        problem : str, Path or ReachProblem
+        problem : str, Path, mapping or ReachProblem
             ``"left"``, ``"right"`` or ``"both"``, the paper's tasks 1, 2 and 3; the path of a
-            TOML file; or a problem, which is returned as it is.
+            TOML file; what `to_json` returned; or a problem, which is returned as it is.
 
         Raises
         ------
@@ -120,6 +120,8 @@ class ReachProblem:
         """
         if isinstance(problem, ReachProblem):
             return problem
+        if isinstance(problem, Mapping):
+            return cls.from_json(problem)
         if str(problem) in PROBLEMS:
             return PROBLEMS[str(problem)]
         path = Path(problem)
@@ -251,8 +253,8 @@ class ReachProblem:
         write_text(path, self.to_toml())
 
 
-ProblemLike = ReachProblem | str | Path
-"""A problem, its name, or the path of its file."""
+ProblemLike = ReachProblem | str | Path | Mapping[str, Any]
+"""A problem, its name, the path of its file, or what `ReachProblem.to_json` returned."""
 
 PROBLEMS = {
     "left": ReachProblem(name="left", task=ReachTask(goal_regions=("left",))),

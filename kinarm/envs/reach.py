@@ -5,14 +5,20 @@ from typing import Any, cast
 
 import gymnasium
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Box, Space
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from kinarm._validation import finite_array
-from kinarm.episodes import RUNNING, Episodes
+from kinarm.envs.errors import ClosedEnvironmentError, ResetNeededError
+from kinarm.envs.interface import FlatInterface, Interface, Observations
+from kinarm.envs.portable import portable_spec
+from kinarm.envs.rendering import RENDER_MODES, EnvPictures
+from kinarm.episodes import COLLISION, RUNNING, SUCCESS, TRUNCATED, Episodes
 from kinarm.errors import InvalidInputError
-from kinarm.observation import Ranges, observation_bounds, observation_table
+from kinarm.observation import observation_table
 from kinarm.problem import ProblemLike, ReachProblem
+from kinarm.rollouts import StepResult
 from kinarm.scenarios import ScenarioStream
 from kinarm.simulator import Simulator
 from kinarm.task import REWARD_TERMS
@@ -21,39 +27,39 @@ Array = NDArray[np.float64]
 
 
 def make_simulator(
-    problem: ProblemLike, render_mode: None, threads: int | None, overrides: Mapping[str, Any]
+    problem: ProblemLike, threads: int | None, overrides: Mapping[str, Any]
 ) -> Simulator:
     """Build the simulator of an environment from the environment's arguments."""
-    if render_mode is not None:
-        raise InvalidInputError(f"render_mode must be None, got {render_mode!r}")
     return Simulator(ReachProblem.load(problem).replace(**overrides), threads=threads)
 
 
-def observation_space(simulator: Simulator) -> Space[Array]:
-    """Bounds of an observation: goals to within the tolerance, quaternions to within rounding."""
-    task = simulator.task
-    regions = [simulator.scene.goal_region(name) for name in task.goal_regions]
-    ranges = Ranges(
-        goal_lower=np.min([region.lower for region in regions], axis=0) - task.tolerance,
-        goal_upper=np.max([region.upper for region in regions], axis=0) + task.tolerance,
-        reach=simulator.arm.reach,
-    )
-    lower, upper = observation_bounds(ranges, simulator.arm.n_joints)
-    return cast("Space[Array]", Box(lower, upper, dtype=np.float64))
-
-
-def action_space(simulator: Simulator) -> Space[Array]:
+def action_space(simulator: Simulator) -> Space[Any]:
     """Fractions of the velocity limits."""
-    return cast("Space[Array]", Box(-1.0, 1.0, (simulator.n_actions,), dtype=np.float64))
+    return cast("Space[Any]", Box(-1.0, 1.0, (simulator.n_actions,), dtype=np.float32))
 
 
-class ReachEnv(gymnasium.Env[Array, Array]):
+def environment_metadata(simulator: Simulator, **others: Any) -> dict[str, Any]:
+    """What Gymnasium asks for: how it can be rendered, and how many steps make a second."""
+    rate = round(1 / simulator.problem.stepping.time_step)
+    return {"render_modes": list(RENDER_MODES), "render_fps": max(rate, 1), **others}
+
+
+class ReachEnv(gymnasium.Env[Any, Array]):
     """Reach a cube on a bench with a six-axis arm (paper, section 3).
 
     Parameters
     ----------
     problem : ReachProblem, str or Path
         ``"left"``, ``"right"``, ``"both"``, a problem file, or a problem.
+    render_mode : {"rgb_array", "rgb_array_list", "human"}, optional
+        What `render` returns: a picture, all pictures since it was last called, or nothing, while
+        a page in the browser follows the arm. Pictures need the extra ``render``.
+    width, height : int
+        Size of pictures [pixels].
+    camera : kinarm.viewer.Camera, optional
+        Where pictures are taken from.
+    observation_dtype : {"float64", "float32"}
+        Type of observations.
     **overrides
         What `kinarm.ReachProblem.replace` takes, such as ``arm``, ``tolerance``, ``horizon``,
         ``start_spread``, or ``reward={"success": 1.0}``.
@@ -62,9 +68,10 @@ class ReachEnv(gymnasium.Env[Array, Array]):
     -----
     **Action** (n = number of actuated joints, 5 for the shipped arms), ``Box(-1, 1, (n,))``:
     fraction of each joint's velocity limit during one time step of 0.02 s. At full speed the joints
-    of the default arm move 7, 7, 8, 9 and 9 degrees a step. Larger actions are clipped.
+    of the default arm move 7, 7, 8, 9 and 9 degrees a step. Larger actions are clipped; float64 is
+    accepted and not rounded.
 
-    **Observation** (6 + 7 joints, 48 for the shipped arms), float64, world frame with z up:
+    **Observation** (6 + 7 joints, 48 for the shipped arms), world frame with z up:
 
     OBSERVATION_TABLE
 
@@ -80,67 +87,144 @@ class ReachEnv(gymnasium.Env[Array, Array]):
     regions of the task. ``reset(options={"start": q, "goal": p})`` sets either.
 
     **End**: terminated when the tool is within 0.05 m of the goal, or when a move would touch the
-    ground, an obstacle or the arm itself (the move is refused); truncated after 64 steps.
+    ground, an obstacle or the arm itself (the move is refused); truncated after 64 steps. After
+    that nothing moves until `reset`: steps have the reward 0, and Gymnasium warns.
 
-    **Info**: ``distance`` [m]; and after a step ``success``, ``collision``, ``contact`` (names of
-    the two bodies that would have touched, or None) and the five reward terms.
+    **Info**: ``distance`` [m]; and after a step ``success`` and, the same, ``is_success``;
+    ``collision``, ``contact`` (names of the two bodies that would have touched, or None) and the
+    five reward terms.
 
     **Versions**: v0, the first.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  (as Gymnasium declares it)
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 50}  # noqa: RUF012  (as Gymnasium declares it)
 
     def __init__(
         self,
         problem: ProblemLike = "right",
         *,
-        render_mode: None = None,
+        render_mode: str | None = None,
+        width: int = 480,
+        height: int = 360,
+        camera: Any = None,
+        observation_dtype: DTypeLike = np.float64,
         **overrides: Any,
     ) -> None:
-        self.simulator = make_simulator(problem, render_mode, 1, overrides)
-        self.observation_space = observation_space(self.simulator)
+        self.simulator = make_simulator(problem, 1, overrides)
+        self.interface = self._make_interface(self.simulator, observation_dtype)
+        self.observation_space = self.interface.observation_space
         self.action_space = action_space(self.simulator)
+        self.metadata = environment_metadata(self.simulator)
+        self.render_mode = render_mode
+        picture = {"width": width, "height": height, "camera": camera}
+        self._pictures = EnvPictures(self.simulator, render_mode, 1, **picture)
         self._stream: ScenarioStream | None = None
         self._episode: Episodes | None = None
+        self._closed = False
+
+    def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> Interface:
+        """What the environment shows of its simulator."""
+        return FlatInterface(simulator, dtype)
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """What makes this environment again; it can be written as JSON."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = None if spec is None else portable_spec(spec, self.simulator)
+
+    _spec: EnvSpec | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Array, dict[str, Any]]:
+    ) -> tuple[Observations, dict[str, Any]]:
         """Begin an episode; ``options`` may set ``start`` and ``goal``."""
+        self._check_open()
         super().reset(seed=seed)
         if self._stream is None or seed is not None:
             self._stream = ScenarioStream(self.simulator.world, self.np_random)
         start, goal = pick_scenario(options, *self._stream.next())
-        self._episode = self.simulator.reset([start], [goal])
-        return self._episode.observation[0].copy(), {"distance": float(self._episode.distance[0])}
+        self._episode = episode = self.simulator.reset([start], [goal])
+        self._pictures.begin(np.zeros(1, dtype=np.int64), episode)
+        return self._observation(episode), {"distance": float(episode.distance[0])}
 
-    def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+    def step(self, action: Array) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
         """Move for one time step."""
-        episode = self._episode
-        if episode is None or episode.status[0] != RUNNING:
-            raise InvalidInputError("the episode is over or was never begun: call reset()")
+        episode = self._begun_episode()
         chosen = finite_array("action", action, (self.simulator.n_actions,))
+        if episode.status[0] != RUNNING:
+            return self._rest(episode)
         result = self.simulator.step(episode, chosen[None])
-        contact = None
-        if result.collision[0]:
-            contact = self.simulator.world.contact_pair(episode.q[0], episode.target[0])
-        info = {
-            "distance": float(episode.distance[0]),
-            "success": bool(result.success[0]),
-            "collision": bool(result.collision[0]),
-            "contact": contact,
-            **{
-                f"reward_{name}": term
-                for name, term in zip(REWARD_TERMS, result.terms[0].tolist(), strict=True)
-            },
-        }
+        reward, terminated, truncated = self.interface.judge(episode, result)
+        self._pictures.step(episode)
         return (
-            episode.observation[0].copy(),
-            float(result.reward[0]),
-            bool(result.terminated[0]),
-            bool(result.truncated[0]),
-            info,
+            self._observation(episode),
+            float(reward[0]),
+            bool(terminated[0]),
+            bool(truncated[0]),
+            self._info(episode, result),
         )
+
+    def render(self) -> Any:
+        """Take a picture of the arm; see ``render_mode``."""
+        self._begun_episode()
+        pictures = self._pictures.render()
+        if self.render_mode == "rgb_array_list":
+            return [picture for (picture,) in pictures]
+        return pictures and pictures[0]
+
+    def close(self) -> None:
+        """Close the live page, if there is one; the environment cannot be used any more."""
+        self._closed = True
+        self._pictures.close()
+
+    def _rest(self, episode: Episodes) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
+        """Answer a step after the end: nothing moves."""
+        gymnasium.logger.warn(
+            "step() was called although the episode is over: call reset() first. "
+            "Nothing moves until then, and rewards are 0."
+        )
+        status = episode.status
+        nothing = np.zeros((1, len(REWARD_TERMS)))
+        ends = (status == SUCCESS, status == COLLISION, status == TRUNCATED)
+        result = StepResult(nothing.sum(axis=1), nothing, *ends)
+        ended = bool(result.terminated[0]), bool(result.truncated[0])
+        return self._observation(episode), 0.0, *ended, self._info(episode, result)
+
+    def _observation(self, episode: Episodes) -> Observations:
+        shown = self.interface.observe(episode.observation)
+        if isinstance(shown, dict):
+            return {name: part[0] for name, part in shown.items()}
+        return shown[0]
+
+    def _info(self, episode: Episodes, result: StepResult) -> dict[str, Any]:
+        """What there is to tell about a step."""
+        collision = bool(result.collision[0])
+        contact = None
+        if collision:
+            contact = self.simulator.world.contact_pair(episode.q[0], episode.target[0])
+        success = bool(result.success[0])
+        terms = zip(REWARD_TERMS, result.terms[0].tolist(), strict=True)
+        return {
+            "distance": float(episode.distance[0]),
+            "success": success,
+            "is_success": success,
+            "collision": collision,
+            "contact": contact,
+            **{f"reward_{name}": term for name, term in terms if self.interface.tells_terms},
+        }
+
+    def _begun_episode(self) -> Episodes:
+        self._check_open()
+        if self._episode is None:
+            raise ResetNeededError("the environment was never begun: call reset()")
+        return self._episode
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise ClosedEnvironmentError("the environment is closed: make another one")
 
 
 def _rst_table(rows: "list[tuple[str, ...]]") -> str:

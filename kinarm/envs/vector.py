@@ -4,21 +4,34 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from gymnasium import logger
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from kinarm._validation import whole_number
-from kinarm.envs.reach import Array, action_space, make_simulator, observation_space, pick_scenario
-from kinarm.episodes import RUNNING, Episodes
+from kinarm.envs.errors import ClosedEnvironmentError, ResetNeededError
+from kinarm.envs.interface import FlatInterface, Interface, Observations
+from kinarm.envs.portable import portable_spec
+from kinarm.envs.reach import (
+    Array,
+    action_space,
+    environment_metadata,
+    make_simulator,
+    pick_scenario,
+)
+from kinarm.envs.rendering import RENDER_MODES, EnvPictures
+from kinarm.episodes import COLLISION, RUNNING, SUCCESS, TRUNCATED, Episodes
 from kinarm.errors import InvalidInputError
 from kinarm.problem import ProblemLike
 from kinarm.rollouts import StepResult
 from kinarm.scenarios import ScenarioStream
+from kinarm.simulator import Simulator
 from kinarm.task import REWARD_TERMS
 
 
-class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
+class ReachVectorEnv(VectorEnv[Any, Array, NDArray[Any]]):
     """A native batch of `ReachEnv`: all arms are stepped by one call of the compiled simulator.
 
     Sub-environment i behaves like a `ReachEnv` reset with ``seed + i``. Spaces, rewards, endings
@@ -31,19 +44,23 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
     problem : ReachProblem, str or Path
         As for `ReachEnv`.
     autoreset_mode : AutoresetMode or str
-        ``SameStep`` (default): an episode that ends is replaced at once; its last observation and
-        info are in ``final_obs`` and ``final_info``. ``NextStep``: the next call of `step`
-        resets it and ignores its action. ``Disabled``: reset it by
-        ``reset(options={"reset_mask": mask})``.
+        ``NextStep`` (default, as in Gymnasium): the step after the end of an episode begins the
+        next one and ignores its action. ``SameStep``: an episode that ends is replaced at once;
+        its last observation and info are in ``final_obs`` and ``final_info``. ``Disabled``: an
+        arm rests until ``reset(options={"reset_mask": mask})``.
     threads : int, optional
         As for `kinarm.Simulator`.
+    render_mode, width, height, camera, observation_dtype
+        As for `ReachEnv`; `render` returns as many pictures as there are arms.
+    max_episode_steps : int, optional
+        Another name of the horizon, which Gymnasium uses.
     **overrides
         As for `ReachEnv`.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012  (as Gymnasium declares it)
-        "render_modes": [],
-        "autoreset_mode": AutoresetMode.SAME_STEP,
+        "render_modes": list(RENDER_MODES),
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
 
     def __init__(
@@ -51,9 +68,14 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         num_envs: int = 1,
         problem: ProblemLike = "right",
         *,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
-        render_mode: None = None,
+        render_mode: str | None = None,
+        width: int = 480,
+        height: int = 360,
+        camera: Any = None,
+        observation_dtype: DTypeLike = np.float64,
+        max_episode_steps: int | None = None,
         **overrides: Any,
     ) -> None:
         num_envs = whole_number("num_envs", num_envs, 1)
@@ -64,27 +86,47 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
                 f"autoreset_mode must be one of {[mode.value for mode in AutoresetMode]}, "
                 f"got {autoreset_mode!r}"
             ) from error
-        self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
-        self.simulator = make_simulator(problem, render_mode, threads, overrides)
-        self.num_envs = num_envs
-        self.single_observation_space = observation_space(self.simulator)
+        horizon = {} if max_episode_steps is None else {"horizon": max_episode_steps}
+        self.simulator = make_simulator(problem, threads, {**horizon, **overrides})
+        self.interface = self._make_interface(self.simulator, observation_dtype)
+        self.metadata = environment_metadata(self.simulator, autoreset_mode=self.autoreset_mode)
+        self.num_envs, self.render_mode = num_envs, render_mode
+        self.single_observation_space = self.interface.observation_space
         self.single_action_space = action_space(self.simulator)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
+        picture = {"width": width, "height": height, "camera": camera}
+        self._pictures = EnvPictures(self.simulator, render_mode, num_envs, **picture)
         self._streams: list[ScenarioStream] = []
         self._episodes: Episodes | None = None
+
+    def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> Interface:
+        """What the environment shows of its simulator."""
+        return FlatInterface(simulator, dtype)
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """What makes this environment again; it can be written as JSON."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = None if spec is None else portable_spec(spec, self.simulator)
+
+    _spec: EnvSpec | None = None
 
     def reset(
         self,
         *,
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
-    ) -> tuple[Array, dict[str, Any]]:
+    ) -> tuple[Observations, dict[str, Any]]:
         """Begin episodes; see `ReachEnv.reset`.
 
         ``options`` may hold ``reset_mask``, a boolean array of shape (num_envs,), to reset only
         some, and one ``start`` or ``goal`` for all.
         """
+        self._check_open()
         chosen = dict(options or {})
         rows = self._masked_rows(chosen.pop("reset_mask", None))
         seeds = self._seeds(seed)
@@ -102,33 +144,64 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
             self._episodes = self.simulator.reset(starts, goals)
         else:
             self._restart(self._episodes, rows, starts, goals)
+        self._pictures.begin(rows, self._episodes)
         distance = np.zeros(self.num_envs)
         distance[rows] = self._episodes.distance[rows]
         mask = np.zeros(self.num_envs, dtype=bool)
         mask[rows] = True
-        return self._episodes.observation.copy(), {"distance": distance, "_distance": mask}
+        shown = self.interface.observe(self._episodes.observation)
+        return shown, {"distance": distance, "_distance": mask}
 
     def step(
         self, actions: Array
-    ) -> tuple[Array, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
+    ) -> tuple[Observations, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
         """Move every arm for one time step."""
-        episodes = self._episodes
-        if episodes is None:
-            raise InvalidInputError("the environment was never begun: call reset()")
+        episodes = self._begun_episodes()
         before = episodes.status == RUNNING
-        if self.autoreset_mode is AutoresetMode.DISABLED and not before.all():
-            over = np.flatnonzero(~before).tolist()
-            raise InvalidInputError(f"episodes {over} are over: reset them with reset_mask")
         result = self.simulator.step(episodes, actions)
-        ends = result.terminated, result.truncated  # before the infos take over the arrays
+        reward, terminated, truncated = self.interface.judge(episodes, result)
+        self._pictures.step(episodes)
         infos = self._step_infos(episodes, result, before)
-        ended = np.flatnonzero(before & (episodes.status != RUNNING))
-        if self.autoreset_mode is AutoresetMode.NEXT_STEP and not before.all():
-            self._renew(episodes, np.flatnonzero(~before), infos)
-        if self.autoreset_mode is AutoresetMode.SAME_STEP and ended.size:
-            self._keep_final(episodes, ended, infos)
-            self._renew(episodes, ended, infos)
-        return episodes.observation.copy(), result.reward, *ends, infos
+        if not before.all():
+            reward = np.where(before, reward, 0.0)
+            if self.autoreset_mode is AutoresetMode.DISABLED:
+                terminated, truncated = self._resting(episodes)
+            else:
+                self._renew(episodes, np.flatnonzero(~before), infos)
+        if self.autoreset_mode is AutoresetMode.SAME_STEP:
+            ended = np.flatnonzero(terminated | truncated)
+            if ended.size:
+                self._keep_final(episodes, ended, infos)
+                self._renew(episodes, ended, infos)
+        return self.interface.observe(episodes.observation), reward, terminated, truncated, infos
+
+    def render(self) -> Any:
+        """Take a picture of every arm; see ``render_mode``."""
+        self._begun_episodes()
+        return self._pictures.render()
+
+    def close_extras(self, **_: Any) -> None:
+        """Close the live page, if there is one; the environment cannot be used any more."""
+        self._pictures.close()
+
+    def _resting(self, episodes: Episodes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Which episodes are over, by themselves or at the horizon; some were before the step."""
+        logger.warn(
+            "step() was called although some episodes are over: reset them with reset_mask. "
+            "Nothing moves there until then, and rewards are 0."
+        )
+        status = episodes.status
+        return (status == SUCCESS) | (status == COLLISION), status == TRUNCATED
+
+    def _begun_episodes(self) -> Episodes:
+        self._check_open()
+        if self._episodes is None:
+            raise ResetNeededError("the environment was never begun: call reset()")
+        return self._episodes
+
+    def _check_open(self) -> None:
+        if self.closed:
+            raise ClosedEnvironmentError("the environment is closed: make another one")
 
     def _step_infos(
         self, episodes: Episodes, result: StepResult, stepped: NDArray[np.bool_]
@@ -140,10 +213,13 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         infos: dict[str, Any] = {
             "distance": episodes.distance.copy(),
             "success": result.success,
+            "is_success": result.success.copy(),
             "collision": result.collision,
             "contact": contact,
-            **{f"reward_{name}": result.terms[:, k] for k, name in enumerate(REWARD_TERMS)},
         }
+        if self.interface.tells_terms:
+            terms = zip(REWARD_TERMS, result.terms.T, strict=True)
+            infos |= {f"reward_{name}": values for name, values in terms}
         mask = stepped.copy()
         infos.update({f"_{key}": mask for key in infos if key != "distance"})
         infos["_distance"] = stepped.copy()
@@ -156,8 +232,12 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         mask = np.zeros(self.num_envs, dtype=bool)
         mask[ended] = True
         final_obs = np.full(self.num_envs, None, dtype=object)
-        for row in ended:
-            final_obs[row] = episodes.observation[row].copy()
+        shown = self.interface.observe(episodes.observation[ended])
+        for index, row in enumerate(ended):
+            if isinstance(shown, dict):
+                final_obs[row] = {name: part[index] for name, part in shown.items()}
+            else:
+                final_obs[row] = shown[index]
         final_info: dict[str, Any] = {}
         for key in [key for key in infos if not key.startswith("_")]:
             blank = None if infos[key].dtype == object else 0
@@ -172,6 +252,7 @@ class ReachVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         scenarios = [self._streams[row].next() for row in rows]
         starts, goals = (np.array(part) for part in zip(*scenarios, strict=True))
         self._restart(episodes, rows, starts, goals)
+        self._pictures.begin(rows, episodes)
         infos["distance"][rows] = episodes.distance[rows]
         infos["_distance"][rows] = True
 

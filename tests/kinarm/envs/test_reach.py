@@ -58,7 +58,7 @@ class TestContract:
     def test_stable_baselines_checker(self, name):
         checker = pytest.importorskip("stable_baselines3.common.env_checker")
         with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "Your action space has dtype float64")
+            warnings.simplefilter("error")
             checker.check_env(gymnasium.make(name).unwrapped)
 
     def test_same_seed_same_bits(self, name):
@@ -85,7 +85,7 @@ class TestContract:
 
 class TestSpaces:
     def test_shapes_and_types(self, env):
-        assert env.action_space == gymnasium.spaces.Box(-1, 1, (5,), np.float64)
+        assert env.action_space == gymnasium.spaces.Box(-1, 1, (5,), np.float32)
         assert env.observation_space.shape == (48,)
         assert env.observation_space.dtype == np.float64
 

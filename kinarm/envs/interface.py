@@ -1,0 +1,246 @@
+"""What an environment shows of the simulator: observations, rewards and how episodes end.
+
+The single environment, the native batch and the one for Stable-Baselines3 share an interface.
+"""
+
+from typing import Any, Literal, NamedTuple, Protocol, cast, get_args
+
+import numpy as np
+from gymnasium.spaces import Box, Dict, Space
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from kinarm.episodes import RUNNING, TRUNCATED, Episodes
+from kinarm.errors import InvalidInputError
+from kinarm.observation import OBSERVATION, Ranges, observation_bounds, part_slices
+from kinarm.rollouts import StepResult
+from kinarm.simulator import Simulator
+
+Array = NDArray[np.float64]
+Observations = Any
+"""An array, or a dictionary of arrays; one row per arm."""
+
+RewardType = Literal["sparse", "dense"]
+DTYPES = ("float64", "float32")
+
+
+class Verdict(NamedTuple):
+    """What a step came to, as a learner sees it; arrays of shape (n,).
+
+    Attributes
+    ----------
+    reward : ndarray
+        The reward.
+    terminated, truncated : ndarray of bool
+        Whether the episode ended by itself, or at the horizon.
+    """
+
+    reward: Array
+    terminated: NDArray[np.bool_]
+    truncated: NDArray[np.bool_]
+
+
+class Interface(Protocol):
+    """What an environment shows.
+
+    Attributes
+    ----------
+    observation_space : Space
+        Bounds of the observation of one arm.
+    tells_terms : bool
+        Whether the reward is the sum of the problem's reward terms, which infos then tell.
+    """
+
+    observation_space: Space[Any]
+    tells_terms: bool
+
+    def observe(self, observations: Array) -> Observations:
+        """Copy the simulator's observations, shape (n, n_observations), as they are shown."""
+
+    def judge(self, episodes: Episodes, result: StepResult) -> Verdict:
+        """Reward a step, and say which episodes are over; may let episodes go on."""
+
+
+class FlatInterface:
+    """The simulator's own observation and reward.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        What is shown.
+    dtype : dtype_like
+        Of observations: float64 or float32.
+    """
+
+    tells_terms = True
+
+    def __init__(self, simulator: Simulator, dtype: DTypeLike = np.float64) -> None:
+        self._dtype = checked_dtype(dtype)
+        self.observation_space = _box(*_bounds(simulator), self._dtype)
+
+    def observe(self, observations: Array) -> Observations:
+        """Copy observations in the type asked for."""
+        return observations.astype(self._dtype)
+
+    def judge(self, episodes: Episodes, result: StepResult) -> Verdict:  # noqa: ARG002
+        """Take the simulator's reward and endings."""
+        return Verdict(result.reward, result.terminated, result.truncated)
+
+
+class GoalInterface:
+    """Goals as a dictionary, and rewards that follow from goals alone.
+
+    A move that would touch something is refused, and the episode goes on: so rewards can be
+    computed for other goals than the one pursued, and giving up is never worth while.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        What is shown.
+    dtype : dtype_like
+        Of observations and goals: float64 or float32.
+    reward_type : {"sparse", "dense"}
+        -1 for every step that does not reach the goal and 0 for the one that does, or minus the
+        distance [m].
+
+    Raises
+    ------
+    InvalidInputError
+        If there is no such type.
+    """
+
+    tells_terms = False
+
+    def __init__(
+        self,
+        simulator: Simulator,
+        dtype: DTypeLike = np.float64,
+        reward_type: RewardType = "sparse",
+    ) -> None:
+        if reward_type not in get_args(RewardType):
+            raise InvalidInputError(
+                f"reward_type must be one of {list(get_args(RewardType))}, got {reward_type!r}"
+            )
+        self._dtype = checked_dtype(dtype)
+        self._sparse, self._tolerance = reward_type == "sparse", simulator.task.tolerance
+        self._horizon = simulator.task.horizon
+        n_joints = simulator.arm.n_joints
+        self._places = part_slices(n_joints)
+        parts = [self._places[part.name] for part in OBSERVATION if not part.of_goal]
+        self._own = np.concatenate([np.arange(place.start, place.stop) for place in parts])
+        lower, upper = _bounds(simulator)
+        goals = self._places["goal"]
+        reach = np.full(3, simulator.arm.reach)
+        self.observation_space: Space[Any] = Dict(
+            {
+                "observation": _box(lower[self._own], upper[self._own], self._dtype),
+                "achieved_goal": _box(-reach, reach, self._dtype),
+                "desired_goal": _box(lower[goals], upper[goals], self._dtype),
+            }
+        )
+
+    def observe(self, observations: Array) -> Observations:
+        """Split observations into ``observation``, ``achieved_goal`` and ``desired_goal``."""
+        goals = observations[:, self._places["goal"]]
+        tools = goals - observations[:, self._places["goal_minus_tool"]]
+        return {
+            "observation": observations[:, self._own].astype(self._dtype),
+            "achieved_goal": tools.astype(self._dtype),
+            "desired_goal": goals.astype(self._dtype),
+        }
+
+    def judge(self, episodes: Episodes, result: StepResult) -> Verdict:
+        """Reward by the goals, and let episodes go on whose move was refused."""
+        truncated = result.truncated
+        if result.collision.any():
+            rows = np.flatnonzero(result.collision)
+            over = episodes.steps[rows] >= self._horizon
+            episodes.status[rows] = np.where(over, TRUNCATED, RUNNING)
+            episodes.slack[rows] = 0.0  # what it was spent on did not happen
+            truncated = truncated | (episodes.status == TRUNCATED) & result.collision
+        shown = self.observe(episodes.observation)
+        reward = self.compute_reward(shown["achieved_goal"], shown["desired_goal"], {})
+        return Verdict(reward, result.success, truncated)
+
+    def compute_reward(
+        self,
+        achieved_goal: ArrayLike,
+        desired_goal: ArrayLike,
+        info: object,  # noqa: ARG002
+    ) -> Array:
+        """Reward of having achieved one goal while another was desired.
+
+        Parameters
+        ----------
+        achieved_goal, desired_goal : array_like, shape (..., 3)
+            Tool point and goal [m].
+        info : object
+            Not needed.
+
+        Returns
+        -------
+        ndarray, shape (...)
+        """
+        distance = _distances(achieved_goal, desired_goal)
+        if not self._sparse:
+            return -distance
+        return np.where(distance <= self._tolerance, 0.0, -1.0)
+
+    def compute_terminated(
+        self,
+        achieved_goal: ArrayLike,
+        desired_goal: ArrayLike,
+        info: object,  # noqa: ARG002
+    ) -> NDArray[np.bool_]:
+        """Whether the goal is reached; arguments as for `compute_reward`."""
+        return _distances(achieved_goal, desired_goal) <= self._tolerance
+
+    def compute_truncated(
+        self,
+        achieved_goal: ArrayLike,
+        desired_goal: ArrayLike,
+        info: object,  # noqa: ARG002
+    ) -> NDArray[np.bool_]:
+        """False: only the number of the step decides; arguments as for `compute_reward`."""
+        return np.zeros(_distances(achieved_goal, desired_goal).shape, dtype=bool)
+
+
+def checked_dtype(dtype: DTypeLike) -> np.dtype[Any]:
+    """Return a type that observations can have.
+
+    Raises
+    ------
+    InvalidInputError
+        If they cannot have it.
+    """
+    try:
+        name = np.dtype(dtype).name
+    except TypeError:
+        name = str(dtype)
+    if name not in DTYPES:
+        raise InvalidInputError(f"observation_dtype must be one of {list(DTYPES)}, got {dtype!r}")
+    return np.dtype(name)
+
+
+def _distances(first: ArrayLike, second: ArrayLike) -> Array:
+    """Distances between points, shape (..., 3) each."""
+    apart = np.asarray(first, dtype=np.float64) - np.asarray(second, dtype=np.float64)
+    squares = apart**2
+    # Term by term, so that the sum does not depend on how many points there are.
+    distance: Array = np.sqrt(squares[..., 0] + squares[..., 1] + squares[..., 2])
+    return distance
+
+
+def _bounds(simulator: Simulator) -> tuple[Array, Array]:
+    """Bounds of an observation: goals to within the tolerance, quaternions to within rounding."""
+    task = simulator.task
+    regions = [simulator.scene.goal_region(name) for name in task.goal_regions]
+    ranges = Ranges(
+        goal_lower=np.min([region.lower for region in regions], axis=0) - task.tolerance,
+        goal_upper=np.max([region.upper for region in regions], axis=0) + task.tolerance,
+        reach=simulator.arm.reach,
+    )
+    return observation_bounds(ranges, simulator.arm.n_joints)
+
+
+def _box(lower: Array, upper: Array, dtype: np.dtype[Any]) -> Space[Any]:
+    return cast("Space[Any]", Box(lower.astype(dtype), upper.astype(dtype), dtype=dtype.type))

@@ -1,0 +1,55 @@
+"""Specifications of environments that JSON can hold, whatever problem they are of."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from enum import Enum
+from typing import Any
+
+import numpy as np
+from gymnasium.envs.registration import EnvSpec
+
+from kinarm.simulator import Simulator
+
+SETTINGS = (
+    *("render_mode", "width", "height", "camera", "observation_dtype", "reward_type"),
+    *("num_envs", "autoreset_mode", "threads", "max_episode_steps", "vectorization_mode"),
+)
+"""Arguments of environments that are not part of their problem."""
+
+
+def portable_spec(spec: EnvSpec, simulator: Simulator) -> EnvSpec:
+    """Complete the specification of an environment, so that it can be written as JSON.
+
+    It states the horizon. A problem, or changes to one, that JSON cannot hold are replaced by
+    what `kinarm.ReachProblem.to_json` makes of the whole problem.
+
+    Parameters
+    ----------
+    spec : EnvSpec
+        As Gymnasium made it.
+    simulator : Simulator
+        That of the environment.
+    """
+    steps = spec.max_episode_steps or simulator.task.horizon
+    return replace(spec, kwargs=_portable(spec.kwargs, simulator), max_episode_steps=steps)
+
+
+def _portable(given: Mapping[str, Any], simulator: Simulator) -> dict[str, Any]:
+    """Arguments of an environment as JSON can hold them."""
+    settings = {name: _plain(given[name]) for name in SETTINGS if name in given}
+    kwargs = {**given, **settings}
+    try:
+        json.dumps(kwargs)
+    except TypeError:
+        return {"problem": simulator.problem.to_json(), **settings}
+    return kwargs
+
+
+def _plain(value: Any) -> Any:
+    """A setting as JSON can hold it."""
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, type | np.dtype):
+        return np.dtype(value).name
+    return value
