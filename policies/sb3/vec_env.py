@@ -12,7 +12,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from kinarm.envs.errors import ClosedEnvironmentError, ResetNeededError
 from kinarm.envs.interface import Interface, Observations
-from kinarm.envs.reach import action_space, pick_scenario
+from kinarm.envs.reach import action_space, environment_metadata, pick_scenario
 from kinarm.envs.rendering import EnvPictures
 from kinarm.episodes import Episodes
 from kinarm.errors import InvalidInputError
@@ -65,7 +65,7 @@ class SB3VecEnv(VecEnv):
         self.simulator, self.interface, self.spec = simulator, interface, spec
         self.render_mode = pictures.mode
         super().__init__(num_envs, interface.observation_space, action_space(simulator))
-        self.metadata["render_fps"] = round(1 / simulator.problem.stepping.time_step)
+        self.metadata = environment_metadata(simulator)
         self._pictures = pictures
         self._streams: dict[int, ScenarioStream] = {}
         self._episodes: Episodes | None = None
@@ -202,10 +202,12 @@ class SB3VecEnv(VecEnv):
 
     def _check_open(self) -> None:
         if self._closed:
-            raise ClosedEnvironmentError("the environment is closed: make another")
+            raise ClosedEnvironmentError("the environment is closed: make another one")
 
     def render(self, mode: str | None = None) -> Any:
         """Draw the arms, as the render mode says; see `ReachVectorEnv`.
+
+        A picture shows all arms side by side, as in every environment of Stable-Baselines3.
 
         Raises
         ------
@@ -213,9 +215,13 @@ class SB3VecEnv(VecEnv):
             If the environment is closed or was never reset.
         """
         self._begun_episodes()
-        if self.render_mode is None or mode not in (None, self.render_mode):
-            return super().render(mode)
-        return self._pictures.render()
+        if self.render_mode in ("human", "rgb_array_list") and mode in (None, self.render_mode):
+            return self._pictures.render()
+        return super().render(mode)
+
+    def get_images(self) -> list[NDArray[np.uint8]]:
+        """One picture of each arm, shape (height, width, 3), where the mode is ``rgb_array``."""
+        return list(self._pictures.render())
 
     def close(self) -> None:
         """Let go of what draws the arms; nothing can be done afterwards."""
