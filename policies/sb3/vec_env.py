@@ -48,7 +48,8 @@ class SB3VecEnv(VecEnv):
     The info of an episode that ended holds what Stable-Baselines3 and its wrappers look for:
     ``terminal_observation``, ``TimeLimit.truncated``, ``is_success`` and what ``Monitor`` adds,
     ``episode`` (return ``r``, length ``l``, time ``t`` since the environment was made [s]); besides
-    ``collision`` and ``distance`` [m]. All other infos are empty, which saves time.
+    ``collision`` and ``distance`` [m]. That of a move that was refused holds ``collision``. All
+    other infos are empty, which saves time.
 
     The arms share this object and its interface: ``get_attr`` reads from them, ``env_method`` calls
     methods of the interface such as ``compute_reward``, and ``set_attr`` sets for all arms.
@@ -154,6 +155,8 @@ class SB3VecEnv(VecEnv):
         self._returns += verdict.reward
         self._pictures.step(episodes)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        for row in np.flatnonzero(result.collision).tolist():
+            infos[row]["collision"] = True
         dones = verdict.terminated | verdict.truncated
         ended = np.flatnonzero(dones)
         if ended.size:

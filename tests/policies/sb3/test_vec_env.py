@@ -63,8 +63,10 @@ def test_equals_single_environments_of_theirs(env_id, horizon):
         for found, wanted in zip((observations, rewards, dones), expected[:3], strict=True):
             assert_same(found, wanted)
         for done, info, wanted in zip(dones, infos, expected[3], strict=True):
-            assert set(info) == (set(FINAL_KEYS) if done else set())
-            if done:
+            if not done:
+                assert info == ({"collision": True} if wanted["collision"] else {})
+            else:
+                assert set(info) == set(FINAL_KEYS)
                 final = info.pop("terminal_observation"), wanted.pop("terminal_observation")
                 assert_same(*final)
                 episode, monitored = info.pop("episode"), wanted.pop("episode")
