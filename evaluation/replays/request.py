@@ -35,7 +35,8 @@ class ReplayRequest(ProblemOptions):
     source : Path
         File to take trials from: evaluation.json of kinarm-eval, or recordings (.npz).
     policy : str
-        Shipped policy or recipe (its first seed), random, zero, oracle, or .npz file.
+        Shipped policy or recipe (its first seed), random, zero, oracle, .npz file,
+        Stable-Baselines3's model.zip (runs its code: only if you trust it), or module:function.
     compare : tuple of str
         Two policies on the same trials, the second as a ghost.
     trial : tuple of int
@@ -175,12 +176,16 @@ class ReplayRequest(ProblemOptions):
 
     def _serve(self, report: Callable[[str], object]) -> None:
         """Serve fresh trials until this is interrupted."""
-        from kinarm.evaluation.replays.candidates import faced_problem, first_entrant
+        from kinarm.evaluation.replays.candidates import (
+            faced_problem,
+            first_entrant,
+            stated_problem,
+        )
         from kinarm.evaluation.replays.following import follow
         from kinarm.simulator import Simulator
         from kinarm.viewer.live_server import PORT, LiveServer
 
-        entrant = first_entrant(self.policy)
+        entrant = first_entrant(self.policy, stated_problem(self))
         simulator = Simulator(faced_problem([entrant], self))
         entrant.check(simulator.arm, allow_other_arm=self.allow_other_arm)
         wanted = self.port or PORT

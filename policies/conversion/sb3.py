@@ -1,6 +1,7 @@
 """Actors of Stable-Baselines3 and sb3-contrib as policies."""
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,13 +28,14 @@ def policy_from_sb3(
     model = sb3_model(given)
     own = ReachProblem.load(problem) if problem is not None else model.problem
     if own is None:
-        raise InvalidInputError("the model does not say which problem it is for: name the problem")
+        raise InvalidInputError(
+            "the model does not say which problem it is for: give it (problem=, --problem)"
+        )
     statistics = model.vec_normalize
     if vec_normalize is not None:
         statistics = load_vec_normalize(vec_normalize)
-    simulator, actor = Simulator(own, threads=1), getattr(model.policy, "actor", None)
-    extractor = model.policy.pi_features_extractor if actor is None else actor.features_extractor
-    inputs = model_inputs(model.policy, extractor, simulator)
+    simulator = Simulator(own, threads=1)
+    inputs = model_inputs(model.policy, simulator)
     model.policy.set_training_mode(False)
     pieces = [
         inputs.selection,
@@ -46,7 +48,7 @@ def policy_from_sb3(
         std=np.ones(simulator.n_observations),
         layers=layers,
         activations=activations,
-        provenance=_provenance(model, own),
+        provenance=_provenance(model, own, statistics, vec_normalize),
     )
     _check_same_actions(policy, model.policy, statistics, inputs, simulator)
     return policy
@@ -68,15 +70,18 @@ def _actor_pieces(policy: Any) -> Iterator[Piece]:
         yield "tanh"
 
 
-def _provenance(model: SB3Model, problem: ReachProblem) -> Provenance:
-    """Where a converted policy comes from."""
+def _provenance(model: SB3Model, problem: ReachProblem, statistics: Any, source: Any) -> Provenance:
+    """Where a converted policy, and what normalised its observations, come from."""
+    settings = dict(model.settings)
+    if statistics is not None:
+        settings["vec_normalize"] = str(source) if isinstance(source, str | Path) else True
     return Provenance(
         algorithm=model.algorithm,
         recipe="sb3",
         problem=problem.pinned,
         seed=model.seed,
         environment_steps=model.steps,
-        config=model.settings,
+        config=settings,
         versions=package_versions(),
     )
 

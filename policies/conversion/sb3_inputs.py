@@ -38,7 +38,7 @@ class ModelInputs(NamedTuple):
     upper: dict[str, Array]
 
 
-def model_inputs(policy: Any, extractor: Any, simulator: Simulator) -> ModelInputs:
+def model_inputs(policy: Any, simulator: Simulator) -> ModelInputs:
     """Find out how a policy's features extractor puts its inputs together.
 
     Raises
@@ -47,6 +47,8 @@ def model_inputs(policy: Any, extractor: Any, simulator: Simulator) -> ModelInpu
         If it computes features, or the policy has other observations or actions than the arm.
     """
     _check_actions(policy.action_space, simulator)
+    actor = getattr(policy, "actor", None)
+    extractor = policy.pi_features_extractor if actor is None else actor.features_extractor
     kinds = {"FlattenExtractor": FlatInterface, "CombinedExtractor": GoalInterface}
     parts = {type(part).__name__ for part in getattr(extractor, "extractors", {}).values()}
     if type(extractor).__name__ not in kinds or parts - {"Flatten"}:
@@ -72,11 +74,12 @@ def model_inputs(policy: Any, extractor: Any, simulator: Simulator) -> ModelInpu
 def _check_actions(space: Any, simulator: Simulator) -> None:
     """Refuse actions that are not fractions of the joints' velocity limits."""
     if not isinstance(space, Box):
-        raise InvalidInputError(f"the model's actions are no vectors: {space}")
+        raise InvalidInputError(f"the model's actions are no vectors: {_described(space)}")
     if space.shape != (simulator.n_actions,) or (space.low != -1).any() or (space.high != 1).any():
         raise InvalidInputError(
-            f"the model's actions are {space}; arm {simulator.arm.name!r} takes "
-            f"{simulator.n_actions} numbers from -1 to 1"
+            f"the model's actions are {_described(space)} from {space.low.min():g} to "
+            f"{space.high.max():g}; arm {simulator.arm.name!r} takes {simulator.n_actions} numbers "
+            "from -1 to 1"
         )
 
 
@@ -97,8 +100,17 @@ def _check_observations(space: Any, interface: Interface, simulator: Simulator) 
         if all(fixed) and space["desired_goal"].shape == own["desired_goal"].shape:
             return
     raise InvalidInputError(
-        f"the model's observations are not those of arm {simulator.arm.name!r}: {space}"
+        f"the model's observations, {_described(space)}, are not those of arm "
+        f"{simulator.arm.name!r}, {_described(own)}, within its bounds: was it trained in another "
+        "environment, or in a wrapper that changes observations?"
     )
+
+
+def _described(space: Any) -> str:
+    """Kind and shape of a space, in a line."""
+    if isinstance(space, Dict):
+        return ", ".join(f"{key} {each.shape}" for key, each in space.items())
+    return f"{type(space).__name__} of shape {space.shape}"
 
 
 def _space_of_goals(space: Any, simulator: Simulator) -> Any:

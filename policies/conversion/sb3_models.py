@@ -17,6 +17,9 @@ FAMILIES = {
 }
 """Classes of policies that can be converted, and the algorithms that train them."""
 
+READING = ("model", PolicyFileError)
+"""What is read, and what is raised where it cannot be."""
+
 NOT_SETTINGS = ("verbose", "seed", "num_timesteps", "start_time", "tensorboard_log", "device")
 """Attributes of a model that say nothing about how it was trained, or are kept elsewhere."""
 
@@ -99,15 +102,14 @@ def _saved_model(path: Path) -> SB3Model:
     except ImportError as error:
         raise MissingExtraError("stable-baselines3", "ppo") from error
     name = repr(str(path))
-    with reading(name, "Stable-Baselines3 model", PolicyFileError), warnings.catch_warnings():
+    with reading(name, *READING, of="Stable-Baselines3"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # about attributes that are not needed here
-        with path.open("rb") as file:
-            data, parameters, _ = load_from_zip_file(file, device="cpu")
+        data, parameters, _ = load_from_zip_file(path, device="cpu")
         if not data or not isinstance(data.get("policy_class"), type):
             raise PolicyFileError(f"{name} holds no policy that Stable-Baselines3 can build here")
         kind = data["policy_class"]
     _check_family(kind)
-    with reading(name, "Stable-Baselines3 model", PolicyFileError):
+    with reading(name, *READING, of="Stable-Baselines3"):
         options = {key: each for key, each in data["policy_kwargs"].items() if key != "device"}
         if _family(kind) == "ActorCriticPolicy":
             options = {"use_sde": data["use_sde"], **options}

@@ -50,7 +50,7 @@ def load_vec_normalize(given: Any) -> Any:
     """
     if isinstance(given, str | Path):
         with (
-            reading(repr(str(given)), "VecNormalize", PolicyFileError),
+            reading(repr(str(given)), "VecNormalize", PolicyFileError, of="Stable-Baselines3"),
             Path(given).open("rb") as f,
         ):
             given = pickle.load(f)
