@@ -168,6 +168,9 @@ class ReplayRequest(ProblemOptions):
         if self.record is not None:
             save_recordings(self.record, [recording for run in runs for recording in run])
         page.save(out)
+        for note in dict.fromkeys(normalization_note(run[0]) for run in runs):
+            if note:
+                report(note)
         for trial in zip(*runs, strict=True):
             for recording in trial:
                 report(described(recording))
@@ -197,6 +200,13 @@ class ReplayRequest(ProblemOptions):
                 webbrowser.open(server.address)
             for recording in follow(server, entrant, simulator, self.seed or 0):
                 report(described(recording))
+
+
+def normalization_note(recording: "Recording") -> str:
+    """Which file normalised what a policy saw, in a line; empty if none did."""
+    policy = recording.provenance.get("policy") or {}
+    statistics = policy.get("config", {}).get("vec_normalize")
+    return f"{recording.policy}: observations normalised by {statistics}" if statistics else ""
 
 
 def described(recording: "Recording") -> str:

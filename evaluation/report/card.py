@@ -103,7 +103,7 @@ def policy_card(name: str, document: Mapping[str, Any], evaluation: Evaluation) 
         origin=_origin(policy.provenance),
         network=_network(policy),
         settings=_settings(policy.provenance.config),
-        problem=evaluation.problem,
+        problem=evaluation.problem.pinned,
         rows=figure_rows(rows[evaluation.entrant.name], oracle),
         has_oracle=oracle is not None,
         entry=document["protocol"]["problems"][evaluation.problem.name],
