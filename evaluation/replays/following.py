@@ -2,7 +2,7 @@
 
 import itertools
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -26,7 +26,10 @@ REST = 1.2
 
 
 def fresh_recordings(entrant: Entrant, simulator: Simulator, seed: int) -> Iterator[Recording]:
-    """Record one trial after the other, without end; each has a seed of its own."""
+    """Record one trial after the other, without end.
+
+    The seed is that of the first trial; the next ones count up.
+    """
     oracle = Oracle(simulator.problem)
     for number in itertools.count():
         trials = TrialSet.draw(simulator.problem, 1, seed + number)
@@ -40,18 +43,15 @@ def fresh_recordings(entrant: Entrant, simulator: Simulator, seed: int) -> Itera
 
 
 def follow(
-    server: LiveServer, entrant: Entrant, simulator: Simulator, seed: int
+    server: LiveServer, simulator: Simulator, recordings: Iterable[Recording]
 ) -> Iterator[Recording]:
-    """Show one trial after the other, without end, and hand out its recording.
-
-    The seed is that of the first trial; the next ones count up.
-    """
+    """Show one recording after the other, and hand it out when it is over."""
     window, arm = server.window, simulator.arm
     draw_surroundings(window, simulator.scene)
     aim_camera(window)
     draw_goal(window["goal"], simulator.problem)
     frames = draw_arm(window["arm"], arm)
-    for recording in fresh_recordings(entrant, simulator, seed):
+    for recording in recordings:
         goal = np.eye(4)
         goal[:3, 3] = recording.goal
         window["goal"].set_transform(goal)

@@ -20,6 +20,9 @@ FAMILIES = {
 READING = ("model", PolicyFileError)
 """What is read, and what is raised where it cannot be."""
 
+CONTRIB = ("sb3_contrib", "sb3_contrib.tqc", "sb3_contrib.tqc.policies")
+"""Modules that models of sb3-contrib need."""
+
 NOT_SETTINGS = ("verbose", "seed", "num_timesteps", "start_time", "tensorboard_log", "device")
 """Attributes of a model that say nothing about how it was trained, or are kept elsewhere."""
 
@@ -102,12 +105,17 @@ def _saved_model(path: Path) -> SB3Model:
     except ImportError as error:
         raise MissingExtraError("stable-baselines3", "ppo") from error
     name = repr(str(path))
-    with reading(name, *READING, of="Stable-Baselines3"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # about attributes that are not needed here
-        data, parameters, _ = load_from_zip_file(path, device="cpu")
-        if not data or not isinstance(data.get("policy_class"), type):
-            raise PolicyFileError(f"{name} holds no policy that Stable-Baselines3 can build here")
-        kind = data["policy_class"]
+    try:
+        with reading(name, *READING, of="Stable-Baselines3"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about attributes that are not needed here
+            data, parameters, _ = load_from_zip_file(path, device="cpu")
+    except PolicyFileError as error:
+        if getattr(error.__cause__, "name", None) in CONTRIB:
+            raise MissingExtraError("sb3-contrib", "zoo") from error
+        raise
+    if not data or not isinstance(data.get("policy_class"), type):
+        raise PolicyFileError(f"{name} holds no policy that Stable-Baselines3 can build here")
+    kind = data["policy_class"]
     _check_family(kind)
     with reading(name, *READING, of="Stable-Baselines3"):
         options = {key: each for key, each in data["policy_kwargs"].items() if key != "device"}

@@ -1,6 +1,7 @@
 """Models of Stable-Baselines3 and sb3-contrib as policies, against their own predictions."""
 
 import pickle
+import sys
 from contextlib import suppress
 from functools import partial
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from kinarm.envs import ReachEnv, ReachGoalEnv
-from kinarm.errors import InvalidInputError, KinarmError, PolicyFileError
+from kinarm.errors import InvalidInputError, KinarmError, MissingExtraError, PolicyFileError
 from kinarm.policies import Policy
 from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
@@ -336,6 +337,19 @@ class TestBadFile:
     def test_truncated(self, saved):
         saved.write_bytes(saved.read_bytes()[:2000])
         self.refused(saved, "is not a complete Stable-Baselines3 model")
+
+    def test_without_sb3_contrib(self, tmp_path, monkeypatch):
+        make_model("TQC").save(tmp_path / "model.zip")
+        for name in [each for each in sys.modules if each.startswith("sb3_contrib")]:
+            monkeypatch.delitem(sys.modules, name)
+        monkeypatch.setitem(sys.modules, "sb3_contrib", None)
+        with pytest.raises(MissingExtraError, match="sb3-contrib is not installed.*zoo"):
+            Policy.from_sb3(tmp_path / "model.zip", "right")
+
+    def test_without_stable_baselines3(self, saved, monkeypatch):
+        monkeypatch.setitem(sys.modules, "stable_baselines3.common.save_util", None)
+        with pytest.raises(MissingExtraError, match="stable-baselines3 is not installed.*ppo"):
+            Policy.from_sb3(saved, "right")
 
     def test_a_policy_of_kinarm(self, saved):
         Policy.from_sb3(saved, "right").save(saved)
