@@ -11,9 +11,7 @@ from kinarm.arm import Arm
 from kinarm.recording import Recording
 from kinarm.viewer.drawing import FLASH, draw_arm, draw_goal, draw_surroundings, draw_trace, put
 from kinarm.viewer.meshes import capsule
-
-FLASH_RADIUS = 0.025
-"""Radius of what lights up where two bodies touch [m]."""
+from kinarm.viewer.surroundings import FLASH_RADIUS
 
 
 def scene_commands(trials: Sequence[Sequence[Recording]], arm: Arm) -> bytes:
