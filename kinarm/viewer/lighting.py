@@ -9,12 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 SUN_PLACE = (-2.0, -1.0, 3.4)
-FILL_PLACE = (-2.5, 2.2, 1.8)
+FILL_PLACE = (-2.5, 1.8, -2.2)
 """Places of the lights, which shine on the origin from afar [m]."""
 
 SUN, SUN_INTENSITY = 0xFFF6E8, 0.62
 FILL, FILL_INTENSITY = 0xDCE8FF, 0.3
 SKY, GROUND, SKY_INTENSITY = 0xFFFFFF, 0xB9C0C8, 0.3
+"""Light from the left and from the right, as on that page."""
 
 ROOM = (
     (0x5C6066, (12, 12, 8), (0, 0, 2)),

@@ -15,7 +15,7 @@ from kinarm.viewer import lighting
 from kinarm.viewer.camera import Camera, CameraLike, picture_size
 from kinarm.viewer.kernels.lighting import Lights, Materials
 from kinarm.viewer.kernels.rasterising import draw_shadow, draw_view, project
-from kinarm.viewer.kernels.shading import Backdrop, Balls, Eye, shade
+from kinarm.viewer.kernels.shading import Backdrop, Balls, Eye, paint_floor, shade
 from kinarm.viewer.parts import Finish
 from kinarm.viewer.surroundings import (
     FLASH_RADIUS,
@@ -87,6 +87,8 @@ class Renderer:
         self._backdrop = self._make_backdrop()
         self._materials = _materials(self._scene.finishes)
         self._lights = _lights(self._scene.finishes)
+        self._floor = np.empty((self.height, self.width, 2, 3), dtype=np.float32)
+        paint_floor(self._eye, self._materials, self._lights, self._backdrop, self._floor)
         self._floor_nearness = self._make_floor_nearness()
         shape = (self.height, self.width, len(SAMPLES))
         self._nearness = np.empty(shape, dtype=np.float32)
@@ -151,6 +153,7 @@ class Renderer:
             self._lights,
             self._backdrop,
             self._balls(goal, contact),
+            self._floor,
             self._nearness,
             self._index,
             picture,

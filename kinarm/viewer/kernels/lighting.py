@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.kernels.compiling import Array, Vector, helper, inlined
+from kinarm.kernels.compiling import Array, Vector, inlined
 
 
 class Materials(NamedTuple):
@@ -34,10 +34,10 @@ class Lights(NamedTuple):
 
     Attributes
     ----------
-    directions, colours : ndarray, shape (n, 3)
-        Towards lights from afar, and how bright they are. The first is the sun, which casts shadows.
+    directions, colours : ndarray, shape (2, 3)
+        Towards two lights from afar, and how bright they are; the first, the sun, casts shadows.
     sky, ground : ndarray, shape (3,)
-        Light from above and from below, which fade into each other.
+        Light from the left (y) and from the right, which fade into each other.
     irradiance : ndarray, shape (n, n, 3)
         Light of the room on surfaces that face a direction, as an octahedral map.
     reflections : ndarray, shape (n_rooms, n, n, 3)
@@ -62,10 +62,23 @@ SHADOW_BIAS = 0.002
 """How much nearer the sun a shadow's cause must be [m]."""
 
 
+LOG_2 = math.log(2.0)
+
+Cell = tuple[int, int, float, float]
+"""Row and column in a map, and the shares of the next row and column."""
+
+
 @inlined
-def octahedral(x: float, y: float, z: float, size: int) -> tuple[int, int, float, float]:
-    """Cell of an octahedral map that a direction falls into, and where in the cell."""
-    span = 1.0 / (abs(x) + abs(y) + abs(z))
+def unit(x: float, y: float, z: float) -> Vector:
+    """Scale a vector to length 1."""
+    scale = 1.0 / max(math.sqrt(x * x + y * y + z * z), 1e-12)
+    return x * scale, y * scale, z * scale
+
+
+@inlined
+def octahedral(x: float, y: float, z: float, size: int) -> Cell:
+    """Cell of an octahedral map that a direction falls into."""
+    span = 1.0 / max(abs(x) + abs(y) + abs(z), 1e-12)
     u, v = x * span, y * span
     if z < 0.0:
         u, v = (1.0 - abs(v)) * math.copysign(1.0, u), (1.0 - abs(u)) * math.copysign(1.0, v)
@@ -75,8 +88,9 @@ def octahedral(x: float, y: float, z: float, size: int) -> tuple[int, int, float
 
 
 @inlined
-def look_up(table: Array, row: int, column: int, v: float, u: float, channel: int) -> float:
+def look_up(table: Array, cell: Cell, channel: int) -> float:
     """Value of a map between its nodes."""
+    row, column, v, u = cell
     upper = (1.0 - u) * table[row, column, channel] + u * table[row, column + 1, channel]
     lower = (1.0 - u) * table[row + 1, column, channel] + u * table[row + 1, column + 1, channel]
     return (1.0 - v) * upper + v * lower
@@ -104,80 +118,86 @@ def sunlit(lights: Lights, x: float, y: float, z: float) -> float:
     return light / 9.0
 
 
-@helper
+@inlined
+def shine(
+    lights: Lights, light: int, normal: Vector, view: Vector, square: float, facing: float
+) -> Vector:
+    """What a light from afar does to a surface.
+
+    Returns the cosine of the light's angle, and the cosine times GGX with Smith's visibility, in
+    two parts by Schlick's Fresnel term: for a mirror of colour 1, and for any surface.
+    """
+    x, y, z = normal
+    towards = lights.directions
+    lx, ly, lz = towards[light, 0], towards[light, 1], towards[light, 2]
+    cosine = x * lx + y * ly + z * lz
+    if cosine <= 0.0:
+        return 0.0, 0.0, 0.0
+    hx, hy, hz = unit(lx + view[0], ly + view[1], lz + view[2])
+    half = max(x * hx + y * hy + z * hz, 0.0)
+    tilt = view[0] * hx + view[1] * hy + view[2] * hz
+    fresnel = math.exp(LOG_2 * (-5.55473 * tilt - 6.98316) * tilt)
+    spread = half * half * (square - 1.0) + 1.0
+    hidden = cosine * math.sqrt(square + (1.0 - square) * facing * facing)
+    hidden += facing * math.sqrt(square + (1.0 - square) * cosine * cosine)
+    gloss = 0.5 * cosine * square / (spread * spread * max(hidden, 1e-6))
+    return cosine, gloss * (1.0 - fresnel), gloss * fresnel
+
+
+@inlined
 def light_up(
     materials: Materials,
     lights: Lights,
     material: int,
-    place: Vector,
+    share: float,
     normal: Vector,
     view: Vector,
 ) -> Vector:
-    """Light that a surface sends to the eye; ``normal`` and ``view`` are unit vectors.
+    """Light that a surface sends to the eye, if a share of the sun reaches it.
 
-    Direct light: GGX with Smith's visibility and Schlick's Fresnel term. The room's: Karis' fit
-    of what a rough surface reflects, and Fdez-Aguera's of what it reflects more than once.
+    ``normal`` and ``view`` are unit vectors.
+
+    The room's light follows Karis' fit of what a rough surface mirrors, and Fdez-Aguera's of what
+    it mirrors more than once.
     """
     x, y, z = normal
-    facing = max(x * view[0] + y * view[1] + z * view[2], 0.0)
     roughness, metalness = materials.roughness[material], materials.metalness[material]
     alpha = roughness * roughness
-    square = alpha * alpha
-    mirrored = 2.0 * (x * view[0] + y * view[1] + z * view[2])
-    rx = (mirrored * x - view[0]) * (1.0 - alpha) + x * alpha
-    ry = (mirrored * y - view[1]) * (1.0 - alpha) + y * alpha
-    rz = (mirrored * z - view[2]) * (1.0 - alpha) + z * alpha
+    along = x * view[0] + y * view[1] + z * view[2]
+    facing = max(along, 0.0)
 
-    # The room: shares that a mirror of colour 1 returns at once, and what any surface adds.
-    r0, r1 = 1.0 - roughness, 0.0425 - 0.0275 * roughness
-    r2, r3 = 1.04 - 0.572 * roughness, 0.022 * roughness - 0.04
-    bend = min(r0 * r0, 2.0 ** (-9.28 * facing)) * r0 + r1
-    slope, base = r2 - 1.04 * bend, r3 + 1.04 * bend
+    bend = math.exp(-9.28 * LOG_2 * facing)
+    bend = min((1.0 - roughness) ** 2, bend) * (1.0 - roughness) + 0.0425 - 0.0275 * roughness
+    slope = 1.04 - 0.572 * roughness - 1.04 * bend  # per mirrored light of a colour
+    base = 0.022 * roughness - 0.04 + 1.04 * bend  # and of any
     lost = 1.0 - slope - base
+    around = octahedral(x, y, z, lights.irradiance.shape[0])
+    table = lights.reflections[materials.room[material]]
+    mirrored = octahedral(
+        (2.0 * along * x - view[0]) * (1.0 - alpha) + x * alpha,
+        (2.0 * along * y - view[1]) * (1.0 - alpha) + y * alpha,
+        (2.0 * along * z - view[2]) * (1.0 - alpha) + z * alpha,
+        table.shape[0],
+    )
+    sun = shine(lights, 0, normal, view, alpha * alpha, facing)
+    fill = shine(lights, 1, normal, view, alpha * alpha, facing)
 
-    wide = lights.irradiance.shape[0]
-    row, column, v, u = octahedral(x, y, z, wide)
-    rooms = lights.reflections[materials.room[material]]
-    fine = rooms.shape[0]
-    row_r, column_r, v_r, u_r = octahedral(rx, ry, rz, fine)
-
-    # Lights from afar: cosine, and specular factor without the Fresnel term.
-    n_lights = lights.directions.shape[0]
-    up = 0.5 + 0.5 * z
-    sun = sunlit(lights, place[0], place[1], place[2])
-    red, green, blue = 0.0, 0.0, 0.0
+    light = (0.0, 0.0, 0.0)
     for channel in range(3):
         colour = materials.colour[material, channel]
         body = colour * (1.0 - metalness)
         mirror = 0.04 + (colour - 0.04) * metalness
-        around = look_up(lights.irradiance, row, column, v, u, channel)
-        single = mirror * slope + base
-        average = mirror + (1.0 - mirror) * 0.047619
-        multiple = single * average / (1.0 - lost * average) * lost
-        room = look_up(rooms, row_r, column_r, v_r, u_r, channel)
-        sky = lights.ground[channel] + up * (lights.sky[channel] - lights.ground[channel])
-        total = materials.emission[material, channel] + body * sky
-        total += room * single + around * (multiple + body * (1.0 - single - multiple))
-        for k in range(n_lights):
-            lx, ly, lz = lights.directions[k, 0], lights.directions[k, 1], lights.directions[k, 2]
-            cosine = x * lx + y * ly + z * lz
-            if cosine <= 0.0:
-                continue
-            hx, hy, hz = lx + view[0], ly + view[1], lz + view[2]
-            length = math.sqrt(hx * hx + hy * hy + hz * hz)
-            half = max(x * hx + y * hy + z * hz, 0.0) / length
-            towards = (view[0] * hx + view[1] * hy + view[2] * hz) / length
-            spread = half * half * (square - 1.0) + 1.0
-            shine = cosine * math.sqrt(square + (1.0 - square) * facing * facing)
-            shine += facing * math.sqrt(square + (1.0 - square) * cosine * cosine)
-            gloss = 0.5 * square / (spread * spread * max(shine, 1e-6))
-            fresnel = mirror + (1.0 - mirror) * 2.0 ** ((-5.55473 * towards - 6.98316) * towards)
-            share = cosine * (sun if k == 0 else 1.0)
-            total += share * lights.colours[k, channel] * (body + gloss * fresnel)
-        if channel == 0:
-            red = total
-        elif channel == 1:
-            green = total
-        else:
-            blue = total
-    return red, green, blue
+        room = look_up(lights.irradiance, around, channel)
+        once = mirror * slope + base
+        mean = mirror + (1.0 - mirror) * 0.047619
+        again = once * mean / (1.0 - lost * mean) * lost
+        total = materials.emission[material, channel]
+        total += once * look_up(table, mirrored, channel)
+        total += room * (again + body * (1.0 - once - again))
+        ground, sky = lights.ground[channel], lights.sky[channel]
+        total += body * (ground + (0.5 + 0.5 * y) * (sky - ground))
+        direct = body * sun[0] + mirror * sun[1] + sun[2]
+        total += share * lights.colours[0, channel] * direct
+        total += lights.colours[1, channel] * (body * fill[0] + mirror * fill[1] + fill[2])
+        light = light[1], light[2], total
+    return light

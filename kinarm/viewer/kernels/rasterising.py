@@ -105,7 +105,7 @@ def draw_shadow(shadowed: Array, faces: NDArray[np.int64], depth: NDArray[np.flo
         xi, yi, xj, yj = shadowed[i, 0], shadowed[i, 1], shadowed[j, 0], shadowed[j, 1]
         xk, yk = shadowed[k, 0], shadowed[k, 1]
         area = (xj - xi) * (yk - yi) - (xk - xi) * (yj - yi)
-        if area <= 0.0:
+        if area >= 0.0:
             continue
         left = max(0, math.floor(max(min(xi, xj, xk), -1.0)))
         right = min(width - 1, math.floor(min(max(xi, xj, xk), width + 0.0)))

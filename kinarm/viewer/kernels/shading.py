@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import Array, Vector, helper, inlined, kernel
 from kinarm.viewer.kernels.edges import edge
-from kinarm.viewer.kernels.lighting import Lights, Materials, light_up
+from kinarm.viewer.kernels.lighting import Lights, Materials, light_up, sunlit, unit
 
 LAYOUT = "-"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
@@ -117,13 +117,6 @@ def encoded(gamma: Array, value: float) -> float:
 
 
 @inlined
-def unit(x: float, y: float, z: float) -> Vector:
-    """Scale a vector to length 1."""
-    scale = 1.0 / max(math.sqrt(x * x + y * y + z * z), 1e-12)
-    return x * scale, y * scale, z * scale
-
-
-@inlined
 def line_of_sight(eye: Eye, x: float, y: float) -> Vector:
     """Direction of a place in the picture."""
     rays = eye.rays
@@ -165,10 +158,12 @@ def mixed(table: Array, corners: tuple[int, int, int], share: Vector) -> Vector:
 
 
 @inlined
-def line_cover(across: float, step: float, slope: float, width: float) -> float:
+def line_cover(across: float, radius: float, step: float, slope: float, width: float) -> float:
     """Share of a pixel that the nearest of lines covers; ``slope`` is a pixel's size [m]."""
-    distance = abs(across - step * math.floor(across / step + 0.5)) / max(slope, 1e-9)
-    return min(max(0.5 * width + 0.5 - distance, 0.0), 1.0) * min(width, 1.0)
+    line = step * math.floor(across / step + 0.5)
+    if abs(line) >= radius:
+        return 0.0
+    return min(max(0.5 * width + 0.5 - abs(across - line) / max(slope, 1e-9), 0.0), min(width, 1.0))
 
 
 @inlined
@@ -177,7 +172,8 @@ def grid_cover(eye: Eye, backdrop: Backdrop, x: float, y: float, ahead: float) -
     rays = eye.rays
     dx, dy, dz = line_of_sight(eye, x, y)
     px, py = eye.position[0] + ahead * dx, eye.position[1] + ahead * dy
-    if px * px + py * py > backdrop.grid_radius * backdrop.grid_radius:
+    radius, step, width = backdrop.grid_radius, backdrop.grid_step, backdrop.line_width
+    if px * px + py * py > radius * radius:
         return 0.0
     column_x = ahead * (rays[1, 0] - dx * rays[1, 2] / dz)
     column_y = ahead * (rays[1, 1] - dy * rays[1, 2] / dz)
@@ -185,12 +181,33 @@ def grid_cover(eye: Eye, backdrop: Backdrop, x: float, y: float, ahead: float) -
     row_y = ahead * (rays[2, 1] - dy * rays[2, 2] / dz)
     slope_x = math.sqrt(column_x * column_x + row_x * row_x)
     slope_y = math.sqrt(column_y * column_y + row_y * row_y)
-    step, width = backdrop.grid_step, backdrop.line_width
-    return max(line_cover(px, step, slope_x, width), line_cover(py, step, slope_y, width))
+    return max(
+        line_cover(px, radius, step, slope_x, width), line_cover(py, radius, step, slope_y, width)
+    )
 
 
-@helper
-def seen(
+@inlined
+def faded(backdrop: Backdrop, ahead: float) -> float:
+    """How much of a surface at a distance is lost in the background."""
+    share = (ahead - backdrop.fog[0]) / (backdrop.fog[1] - backdrop.fog[0])
+    share = min(max(share, 0.0), 1.0)
+    return share * share * (3.0 - 2.0 * share)
+
+
+@inlined
+def finished(backdrop: Backdrop, light: Vector, lines: float, fog: float) -> Vector:
+    """Encode light, with lines over it, in the fog."""
+    back, grid, gamma = backdrop.colour, backdrop.grid, backdrop.gamma
+    red, green, blue = encoded(gamma, light[0]), encoded(gamma, light[1]), encoded(gamma, light[2])
+    return (
+        (1.0 - fog) * (red + lines * (grid[0] - red)) + fog * back[0],
+        (1.0 - fog) * (green + lines * (grid[1] - green)) + fog * back[1],
+        (1.0 - fog) * (blue + lines * (grid[2] - blue)) + fog * back[2],
+    )
+
+
+@inlined
+def surface_colour(
     eye: Eye,
     surfaces: Surfaces,
     materials: Materials,
@@ -200,43 +217,79 @@ def seen(
     x: float,
     y: float,
 ) -> Vector:
-    """Colour at a place of the picture, where a triangle is seen, or the floor (-1)."""
-    back, gamma = backdrop.colour, backdrop.gamma
+    """Colour of a triangle that is seen at a place of the picture."""
     dx, dy, dz = line_of_sight(eye, x, y)
-    ex, ey, ez = eye.position[0], eye.position[1], eye.position[2]
-    lines = 0.0
-    if face >= 0:
-        corners = surfaces.faces[face, 0], surfaces.faces[face, 1], surfaces.faces[face, 2]
-        share = shares(surfaces, face, x, y)
-        place = mixed(surfaces.places, corners, share)
-        nx, ny, nz = mixed(surfaces.normals, corners, share)
-        normal = unit(nx, ny, nz)
-        material = surfaces.materials[corners[0]]
-        ahead = (
-            (place[0] - ex) * dx + (place[1] - ey) * dy + (place[2] - ez) * dz
-        ) / (dx * dx + dy * dy + dz * dz)
-    else:
-        ahead = -ez / dz if dz < 0.0 else -1.0
-        place = ex + ahead * dx, ey + ahead * dy, 0.0
-        radius = backdrop.floor_radius
-        if ahead <= 0.0 or place[0] * place[0] + place[1] * place[1] >= radius * radius:
-            return back[0], back[1], back[2]
-        normal = 0.0, 0.0, 1.0
-        material = FLOOR
-        lines = grid_cover(eye, backdrop, x, y, ahead)
-    fog = (ahead - backdrop.fog[0]) / (backdrop.fog[1] - backdrop.fog[0])
-    fog = min(max(fog, 0.0), 1.0)
-    fog = fog * fog * (3.0 - 2.0 * fog)
-    if fog == 1.0:
-        return back[0], back[1], back[2]
-    view = unit(-dx, -dy, -dz)
-    red, green, blue = light_up(materials, lights, material, place, normal, view)
-    red, green, blue = encoded(gamma, red), encoded(gamma, green), encoded(gamma, blue)
-    grid = backdrop.grid
+    corners = surfaces.faces[face, 0], surfaces.faces[face, 1], surfaces.faces[face, 2]
+    share = shares(surfaces, face, x, y)
+    px, py, pz = mixed(surfaces.places, corners, share)
+    nx, ny, nz = mixed(surfaces.normals, corners, share)
+    ahead = (
+        share[0] * surfaces.corners[corners[0], 2]
+        + share[1] * surfaces.corners[corners[1], 2]
+        + share[2] * surfaces.corners[corners[2], 2]
+    )
+    material = surfaces.materials[corners[0]]
+    view, sun = unit(-dx, -dy, -dz), sunlit(lights, px, py, pz)
+    light = light_up(materials, lights, material, sun, unit(nx, ny, nz), view)
+    return finished(backdrop, light, 0.0, faded(backdrop, ahead))
+
+
+@inlined
+def floor_distance(eye: Eye, backdrop: Backdrop, x: float, y: float) -> float:
+    """Distance ahead of the floor that is seen at a place of the picture; 0 if none is."""
+    dx, dy, dz = line_of_sight(eye, x, y)
+    if dz >= 0.0 or eye.position[2] <= 0.0:
+        return 0.0
+    ahead = -eye.position[2] / dz
+    px, py = eye.position[0] + ahead * dx, eye.position[1] + ahead * dy
+    return ahead if px * px + py * py < backdrop.floor_radius * backdrop.floor_radius else 0.0
+
+
+@kernel
+def paint_floor(
+    eye: Eye,
+    materials: Materials,
+    lights: Lights,
+    backdrop: Backdrop,
+    floor: NDArray[np.float32],
+) -> None:
+    """Colour the floor and what is behind it, shape (height, width, 2, 3): in shadow, in the sun."""
+    back = backdrop.colour
+    for row in range(floor.shape[0]):
+        for column in range(floor.shape[1]):
+            x, y = column + 0.5, row + 0.5
+            ahead = floor_distance(eye, backdrop, x, y)
+            for sun in range(2):
+                colour = back[0], back[1], back[2]
+                if ahead > 0.0:
+                    dx, dy, dz = line_of_sight(eye, x, y)
+                    up, view = (0.0, 0.0, 1.0), unit(-dx, -dy, -dz)
+                    light = light_up(materials, lights, FLOOR, float(sun), up, view)
+                    lines = grid_cover(eye, backdrop, x, y, ahead)
+                    colour = finished(backdrop, light, lines, faded(backdrop, ahead))
+                for channel in range(3):
+                    floor[row, column, sun, channel] = colour[channel]
+
+
+@inlined
+def floor_colour(
+    eye: Eye,
+    lights: Lights,
+    backdrop: Backdrop,
+    floor: NDArray[np.float32],
+    row: int,
+    column: int,
+) -> Vector:
+    """Colour of the floor at a pixel."""
+    ahead = floor_distance(eye, backdrop, column + 0.5, row + 0.5)
+    sun = 1.0
+    if ahead > 0.0:
+        dx, dy, _ = line_of_sight(eye, column + 0.5, row + 0.5)
+        sun = sunlit(lights, eye.position[0] + ahead * dx, eye.position[1] + ahead * dy, 0.0)
     return (
-        (1.0 - fog) * (red + lines * (grid[0] - red)) + fog * back[0],
-        (1.0 - fog) * (green + lines * (grid[1] - green)) + fog * back[1],
-        (1.0 - fog) * (blue + lines * (grid[2] - blue)) + fog * back[2],
+        floor[row, column, 0, 0] + sun * (floor[row, column, 1, 0] - floor[row, column, 0, 0]),
+        floor[row, column, 0, 1] + sun * (floor[row, column, 1, 1] - floor[row, column, 0, 1]),
+        floor[row, column, 0, 2] + sun * (floor[row, column, 1, 2] - floor[row, column, 0, 2]),
     )
 
 
@@ -271,6 +324,55 @@ def ball_cover(
     return covered / n_samples
 
 
+@helper
+def shade_row(
+    row: int,
+    eye: Eye,
+    surfaces: Surfaces,
+    materials: Materials,
+    lights: Lights,
+    backdrop: Backdrop,
+    balls: Balls,
+    floor: NDArray[np.float32],
+    nearness: NDArray[np.float32],
+    index: NDArray[np.int32],
+    picture: NDArray[np.uint8],
+) -> None:
+    """Colour a row of pixels."""
+    offsets = eye.offsets
+    n_samples = offsets.shape[0]
+    for column in range(index.shape[1]):
+        red, green, blue = 0.0, 0.0, 0.0
+        for sample in range(n_samples):
+            face = index[row, column, sample]
+            first, count, x, y = True, 0, 0.0, 0.0
+            for other in range(n_samples):
+                if index[row, column, other] == face:
+                    first = first and other >= sample
+                    count += 1
+                    x += offsets[other, 0]
+                    y += offsets[other, 1]
+            if not first:
+                continue
+            x, y = column + x / count, row + y / count
+            if face < 0:
+                r, g, b = floor_colour(eye, lights, backdrop, floor, row, column)
+            else:
+                r, g, b = surface_colour(eye, surfaces, materials, lights, backdrop, face, x, y)
+            red += count * r
+            green += count * g
+            blue += count * b
+        red, green, blue = red / n_samples, green / n_samples, blue / n_samples
+        for ball in range(balls.radii.shape[0]):
+            veil = balls.opacities[ball] * ball_cover(eye, balls, ball, nearness, row, column)
+            red += veil * (balls.colours[ball, 0] - red)
+            green += veil * (balls.colours[ball, 1] - green)
+            blue += veil * (balls.colours[ball, 2] - blue)
+        picture[row, column, 0] = int(255.0 * red + 0.5)
+        picture[row, column, 1] = int(255.0 * green + 0.5)
+        picture[row, column, 2] = int(255.0 * blue + 0.5)
+
+
 @kernel
 def shade(
     eye: Eye,
@@ -279,6 +381,7 @@ def shade(
     lights: Lights,
     backdrop: Backdrop,
     balls: Balls,
+    floor: NDArray[np.float32],
     nearness: NDArray[np.float32],
     index: NDArray[np.int32],
     picture: NDArray[np.uint8],
@@ -287,32 +390,7 @@ def shade(
 
     What is seen at several samples of a pixel is lit once, in their middle.
     """
-    height, width, n_samples = index.shape
-    for row in range(height):
-        for column in range(width):
-            red, green, blue = 0.0, 0.0, 0.0
-            for sample in range(n_samples):
-                face = index[row, column, sample]
-                first, count, x, y = True, 0, 0.0, 0.0
-                for other in range(n_samples):
-                    if index[row, column, other] == face:
-                        first = first and other >= sample
-                        count += 1
-                        x += eye.offsets[other, 0]
-                        y += eye.offsets[other, 1]
-                if not first:
-                    continue
-                x, y = column + x / count, row + y / count
-                r, g, b = seen(eye, surfaces, materials, lights, backdrop, face, x, y)
-                red += count * r
-                green += count * g
-                blue += count * b
-            red, green, blue = red / n_samples, green / n_samples, blue / n_samples
-            for ball in range(balls.radii.shape[0]):
-                veil = balls.opacities[ball] * ball_cover(eye, balls, ball, nearness, row, column)
-                red += veil * (balls.colours[ball, 0] - red)
-                green += veil * (balls.colours[ball, 1] - green)
-                blue += veil * (balls.colours[ball, 2] - blue)
-            picture[row, column, 0] = int(255.0 * red + 0.5)
-            picture[row, column, 1] = int(255.0 * green + 0.5)
-            picture[row, column, 2] = int(255.0 * blue + 0.5)
+    for row in range(index.shape[0]):
+        shade_row(
+            row, eye, surfaces, materials, lights, backdrop, balls, floor, nearness, index, picture
+        )
