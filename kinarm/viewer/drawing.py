@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from kinarm.arm import Arm
 from kinarm.problem import ReachProblem
-from kinarm.recording import Recording
 from kinarm.scene import Obstacle, Scene
 from kinarm.viewer.arm_shapes import arm_parts
 from kinarm.viewer.meshes import Mesh, capsule, cylinder, tube
@@ -185,10 +184,7 @@ def draw_arm(window: Visualizer, arm: Arm) -> list[Visualizer]:
     return frames
 
 
-def draw_trace(window: Visualizer, arm: Arm, recording: Recording) -> None:
-    """The way of the tool, in the colour of the outcome; nothing if there is no way."""
-    if recording.steps == 0:
-        return
-    points = [arm.tool_position(state) for state in recording.states]
-    finish = Finish(OUTCOME_COLOURS[recording.outcome], roughness=0.5)
-    put(window, finish, tube(points, TRACE_RADIUS, TRACE_SIDES))
+def draw_trace(window: Visualizer, points: NDArray[np.float64], outcome: str | None) -> None:
+    """The way of the tool, shape (n, 3) [m], in the colour of the outcome; nothing if there is none."""
+    if len(points) > 1:
+        put(window, TRACES[outcome], tube(points, TRACE_RADIUS, TRACE_SIDES))

@@ -78,9 +78,7 @@ class Renderer:
     ) -> None:
         self.problem = ReachProblem.load(problem)
         self.width, self.height = picture_size(width, height)
-        self.camera = (
-            Camera.of_replays(self.problem) if camera is None else Camera.checked(camera)
-        )
+        self.camera = Camera.of_replays(self.problem) if camera is None else Camera.checked(camera)
         self._scene = TriangleScene(self.problem, Arm.load(self.problem.arm))
         self._projection = self.camera.projection(self.width, self.height)
         self._eye = self._make_eye()

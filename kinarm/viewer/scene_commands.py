@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import meshcat
+import numpy as np
 import umsgpack
 
 from kinarm.arm import Arm
@@ -28,7 +29,8 @@ def scene_commands(trials: Sequence[Sequence[Recording]], arm: Arm) -> bytes:
     draw_arm(window["arm"], arm)
     for number, runs in enumerate(trials):
         for name, run in zip(("run", "ghost"), runs, strict=False):
-            draw_trace(window[f"trials/{number}/{name}"], arm, run)
+            points = np.array([arm.tool_position(state) for state in run.states])
+            draw_trace(window[f"trials/{number}/{name}"], points, run.outcome)
     return b"".join(struct.pack("<I", len(each)) + each for each in capture.commands)
 
 

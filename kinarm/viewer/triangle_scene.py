@@ -16,9 +16,9 @@ from kinarm.viewer.lighting import channels
 from kinarm.viewer.meshes import Mesh, tube
 from kinarm.viewer.parts import Finish
 from kinarm.viewer.surroundings import (
-    OUTCOME_COLOURS,
     TRACE_RADIUS,
     TRACE_SIDES,
+    TRACES,
     cube_mesh,
     obstacle_meshes,
 )
@@ -30,11 +30,6 @@ GROUND = Finish(0xD3D9DF, roughness=0.95)
 BODY = Finish(0x8F9AA8, roughness=0.8)
 SLAB = Finish(0xB3BDC8, roughness=0.7)
 CUBE = Finish(0x009E73, roughness=0.5)
-TRACES = {
-    None: Finish(0x4D5A68, roughness=0.5),
-    **{outcome: Finish(colour, roughness=0.5) for outcome, colour in OUTCOME_COLOURS.items()},
-}
-"""Of the way of the tool, by outcome; None while the episode goes on."""
 
 CUBE_GLOW, TOUCH_GLOW = 0x0B6B50, 0x8C2F00
 """Light that the cube emits when it is reached, and links that touch something."""

@@ -42,7 +42,10 @@ def project(places: Array, projection: Array, corners: Array) -> None:
         x, y, z = places[i, 0], places[i, 1], places[i, 2]
         for k in range(3):
             corners[i, k] = (
-                projection[k, 0] * x + projection[k, 1] * y + projection[k, 2] * z + projection[k, 3]
+                projection[k, 0] * x
+                + projection[k, 1] * y
+                + projection[k, 2] * z
+                + projection[k, 3]
             )
 
 

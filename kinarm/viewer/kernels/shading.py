@@ -319,7 +319,7 @@ def ball_cover(
                 return 0.0
             continue
         ahead = (along - math.sqrt(bend)) / square
-        if balls.on_top[ball] or 1.0 > nearness[row, column, sample] * ahead:
+        if balls.on_top[ball] or nearness[row, column, sample] * ahead < 1.0:
             covered += 1
     return covered / n_samples
 
