@@ -100,17 +100,16 @@ def scene_table() -> str:
 
 def problems_table() -> str:
     """The paper's problems, and their environments."""
-    environments = {problem: name for name, problem in ENVIRONMENTS.items()}
     rows = [
         [
             f"`{name}`",
             f"task {number}",
             " and ".join(problem.task.goal_regions),
-            f"`{environments[name]}`",
+            ", ".join(f"`{env}`" for env, problem_of in ENVIRONMENTS.items() if problem_of == name),
         ]
         for number, (name, problem) in enumerate(PROBLEMS.items(), start=1)
     ]
-    return markdown(["problem", "in the paper", "goal regions", "environment"], rows)
+    return markdown(["problem", "in the paper", "goal regions", "environments"], rows)
 
 
 def reward_table() -> str:

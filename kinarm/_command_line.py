@@ -54,6 +54,9 @@ def _status(prog: str, command: Callable[[], None]) -> int:
         _discard_output()
         return _report(prog, f"{error.filename or 'standard output'}: {error.strerror}", 1)
     except KeyboardInterrupt as interruption:
+        # CPython remembers an interrupt within `exec`, as imports are full of, and would end
+        # this process by the signal whatever it returns; it forgets it at the next `exec`.
+        exec("")
         return _report(prog, str(interruption) or "interrupted", 130)
     return 0
 

@@ -2,7 +2,7 @@
 
 import itertools
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from kinarm.evaluation.entrants import ORACLE, Entrant
@@ -22,7 +22,10 @@ REST = 1.2
 
 
 def fresh_recordings(entrant: Entrant, simulator: Simulator, seed: int) -> Iterator[Recording]:
-    """Record one trial after the other, without end; each has a seed of its own."""
+    """Record one trial after the other, without end.
+
+    The seed is that of the first trial; the next ones count up.
+    """
     oracle = Oracle(simulator.problem)
     for number in itertools.count():
         trials = TrialSet.draw(simulator.problem, 1, seed + number)
@@ -36,14 +39,11 @@ def fresh_recordings(entrant: Entrant, simulator: Simulator, seed: int) -> Itera
 
 
 def follow(
-    server: LiveServer, entrant: Entrant, simulator: Simulator, seed: int
+    server: LiveServer, simulator: Simulator, recordings: Iterable[Recording]
 ) -> Iterator[Recording]:
-    """Show one trial after the other, without end, and hand out its recording.
-
-    The seed is that of the first trial; the next ones count up.
-    """
+    """Show one recording after the other, and hand it out when it is over."""
     stage = LiveStage(server, simulator.problem, simulator.arm)
-    for recording in fresh_recordings(entrant, simulator, seed):
+    for recording in recordings:
         stage.begin(recording.states[0], recording.goal)
         for state in recording.states:
             stage.show(state)

@@ -3,6 +3,7 @@
 import webbrowser
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -176,13 +177,16 @@ class ReplayRequest(ProblemOptions):
     def _serve(self, report: Callable[[str], object]) -> None:
         """Serve fresh trials until this is interrupted."""
         from kinarm.evaluation.replays.candidates import faced_problem, first_entrant
-        from kinarm.evaluation.replays.following import follow
+        from kinarm.evaluation.replays.following import follow, fresh_recordings
         from kinarm.simulator import Simulator
         from kinarm.viewer.live_server import PORT, LiveServer
 
         entrant = first_entrant(self.policy)
         simulator = Simulator(faced_problem([entrant], self))
         entrant.check(simulator.arm, allow_other_arm=self.allow_other_arm)
+        fresh = fresh_recordings(entrant, simulator, self.seed or 0)
+        # The first one loads and compiles what is needed before the page is announced.
+        recordings = chain([next(fresh)], fresh)
         wanted = self.port or PORT
         with LiveServer(wanted) as server:
             if server.port != wanted:
@@ -190,7 +194,7 @@ class ReplayRequest(ProblemOptions):
             report(f"{entrant.name} at {server.address} (stop with Ctrl-C)")
             if self.browser:
                 webbrowser.open(server.address)
-            for recording in follow(server, entrant, simulator, self.seed or 0):
+            for recording in follow(server, simulator, recordings):
                 report(described(recording))
 
 

@@ -13,7 +13,7 @@ from kinarm.simulator import Simulator
 
 SETTINGS = (
     *("render_mode", "width", "height", "camera", "observation_dtype", "reward_type"),
-    *("num_envs", "autoreset_mode", "threads", "max_episode_steps", "vectorization_mode"),
+    *("num_envs", "autoreset_mode", "threads", "vectorization_mode"),
 )
 """Arguments of environments that are not part of their problem."""
 
@@ -32,7 +32,8 @@ def portable_spec(spec: EnvSpec, simulator: Simulator) -> EnvSpec:
         That of the environment.
     """
     steps = spec.max_episode_steps or simulator.task.horizon
-    return replace(spec, kwargs=_portable(spec.kwargs, simulator), max_episode_steps=steps)
+    given = {name: value for name, value in spec.kwargs.items() if name != "max_episode_steps"}
+    return replace(spec, kwargs=_portable(given, simulator), max_episode_steps=steps)
 
 
 def _portable(given: Mapping[str, Any], simulator: Simulator) -> dict[str, Any]:

@@ -186,10 +186,9 @@ class ReachEnv(gymnasium.Env[Any, Array]):
             "step() was called although the episode is over: call reset() first. "
             "Nothing moves until then, and rewards are 0."
         )
-        status = episode.status
-        nothing = np.zeros((1, len(REWARD_TERMS)))
+        nothing, status = np.zeros((1, len(REWARD_TERMS))), episode.status
         ends = (status == SUCCESS, status == COLLISION, status == TRUNCATED)
-        result = StepResult(nothing.sum(axis=1), nothing, *ends)
+        result = StepResult(nothing[:, 0], nothing, *ends)
         ended = bool(result.terminated[0]), bool(result.truncated[0])
         return self._observation(episode), 0.0, *ended, self._info(episode, result)
 

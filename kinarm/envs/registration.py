@@ -2,29 +2,30 @@
 
 from gymnasium.envs.registration import register, registry
 
-ENTRY_POINTS = {
+KINDS = {
     "Reach": ("kinarm.envs.reach:ReachEnv", "kinarm.envs.vector:ReachVectorEnv"),
     "ReachGoal": ("kinarm.envs.goal:ReachGoalEnv", "kinarm.envs.goal:ReachGoalVectorEnv"),
 }
-"""Classes of the single environment and of the native batch, by kind of environment."""
+"""Classes of the single environment and of the native batch."""
+
+TASKS = {"Left": "left", "Right": "right", "Both": "both"}
+"""Problems as they are called in ids."""
 
 ENVIRONMENTS = {
-    f"kinarm/{kind}{problem.capitalize()}-v0": problem
-    for kind in ENTRY_POINTS
-    for problem in ("left", "right", "both")
+    f"kinarm/{kind}{task}-v0": problem for kind in KINDS for task, problem in TASKS.items()
 }
 """Ids of the environments and their problems."""
 
 
 def register_environments() -> None:
     """Register the environments that are not registered yet."""
-    for name, problem in ENVIRONMENTS.items():
-        kind = name.removeprefix("kinarm/").split(problem.capitalize())[0]
-        entry_point, vector_entry_point = ENTRY_POINTS[kind]
-        if name not in registry:
-            register(
-                id=name,
-                entry_point=entry_point,
-                vector_entry_point=vector_entry_point,
-                kwargs={"problem": problem},
-            )
+    for kind, (entry_point, vector_entry_point) in KINDS.items():
+        for task, problem in TASKS.items():
+            name = f"kinarm/{kind}{task}-v0"
+            if name not in registry:
+                register(
+                    id=name,
+                    entry_point=entry_point,
+                    vector_entry_point=vector_entry_point,
+                    kwargs={"problem": problem},
+                )

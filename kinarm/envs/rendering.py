@@ -81,7 +81,7 @@ class EnvPictures:
     ) -> None:
         if mode is not None and mode not in RENDER_MODES:
             raise InvalidInputError(
-                f"render_mode must be one of {', '.join(RENDER_MODES)}, or None, got {mode!r}"
+                f"render_mode must be one of {list(RENDER_MODES)} or None, got {mode!r}"
             )
         self._size = _tile_size(num_envs, *picture_size(width, height))
         self._camera = None if camera is None else Camera.checked(camera)
@@ -134,8 +134,8 @@ class EnvPictures:
         Returns
         -------
         Pictures, list of Pictures or None
-            ``"rgb_array"``: a picture of each arm. ``"rgb_array_list"``: such pictures of all steps since
-            the last call, or since all arms began anew. ``"human"`` or no mode: None.
+            ``"rgb_array"``: a picture of each arm. ``"rgb_array_list"``: such pictures of all
+            steps since the last call, or since all arms began anew. ``"human"`` or no mode: None.
         """
         if self._mode == "rgb_array":
             return self._take()

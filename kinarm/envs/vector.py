@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from gymnasium import logger
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
@@ -22,7 +21,7 @@ from kinarm.envs.reach import (
     pick_scenario,
 )
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
-from kinarm.episodes import COLLISION, RUNNING, SUCCESS, TRUNCATED, Episodes
+from kinarm.episodes import RUNNING, Episodes
 from kinarm.errors import InvalidInputError
 from kinarm.problem import ProblemLike
 from kinarm.rollouts import StepResult
@@ -158,16 +157,16 @@ class ReachVectorEnv(VectorEnv[Any, Array, NDArray[Any]]):
         """Move every arm for one time step."""
         episodes = self._begun_episodes()
         before = episodes.status == RUNNING
+        if self.autoreset_mode is AutoresetMode.DISABLED and not before.all():
+            over = np.flatnonzero(~before).tolist()
+            raise InvalidInputError(f"episodes {over} are over: reset them with reset_mask")
         result = self.simulator.step(episodes, actions)
         reward, terminated, truncated = self.interface.judge(episodes, result)
         self._pictures.step(episodes)
         infos = self._step_infos(episodes, result, before)
-        if not before.all():
-            reward = np.where(before, reward, 0.0)
-            if self.autoreset_mode is AutoresetMode.DISABLED:
-                terminated, truncated = self._resting(episodes)
-            else:
-                self._renew(episodes, np.flatnonzero(~before), infos)
+        if self.autoreset_mode is AutoresetMode.NEXT_STEP and not before.all():
+            reward[~before] = 0.0
+            self._renew(episodes, np.flatnonzero(~before), infos)
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             ended = np.flatnonzero(terminated | truncated)
             if ended.size:
@@ -183,15 +182,6 @@ class ReachVectorEnv(VectorEnv[Any, Array, NDArray[Any]]):
     def close_extras(self, **_: Any) -> None:
         """Close the live page, if there is one; the environment cannot be used any more."""
         self._pictures.close()
-
-    def _resting(self, episodes: Episodes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Which episodes are over, by themselves or at the horizon; some were before the step."""
-        logger.warn(
-            "step() was called although some episodes are over: reset them with reset_mask. "
-            "Nothing moves there until then, and rewards are 0."
-        )
-        status = episodes.status
-        return (status == SUCCESS) | (status == COLLISION), status == TRUNCATED
 
     def _begun_episodes(self) -> Episodes:
         self._check_open()

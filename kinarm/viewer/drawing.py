@@ -22,6 +22,7 @@ from kinarm.viewer.surroundings import (
     OUTCOME_COLOURS,
     TRACE_RADIUS,
     TRACE_SIDES,
+    TRACES,
     cube_mesh,
     obstacle_meshes,
 )
@@ -185,6 +186,6 @@ def draw_arm(window: Visualizer, arm: Arm) -> list[Visualizer]:
 
 
 def draw_trace(window: Visualizer, points: NDArray[np.float64], outcome: str | None) -> None:
-    """The way of the tool, shape (n, 3) [m], in the colour of the outcome; nothing if there is none."""
+    """The way of the tool, shape (n, 3) [m], in the colour of the outcome; none if it is a point."""
     if len(points) > 1:
         put(window, TRACES[outcome], tube(points, TRACE_RADIUS, TRACE_SIDES))

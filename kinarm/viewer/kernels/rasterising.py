@@ -24,7 +24,7 @@ def place(
     places: Array,
     facings: Array,
 ) -> None:
-    """Move vertices and normals from their frames, poses of shape (n_frames, 3, 4), to the world."""
+    """Move vertices and normals from frames with poses, shape (n_frames, 3, 4), to the world."""
     for i in range(vertices.shape[0]):
         pose = frames[i]
         x, y, z = vertices[i, 0], vertices[i, 1], vertices[i, 2]

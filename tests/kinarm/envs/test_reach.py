@@ -9,7 +9,8 @@ import warnings
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.utils.env_checker import check_env, data_equivalence
 
 import kinarm
 from kinarm.envs.reach import ReachEnv
@@ -39,8 +40,12 @@ def bitwise_episode(env, seed, steps=80):
 def assert_bitwise_equal(first, second):
     assert len(first) == len(second)
     for a, b in zip(first, second, strict=True):
-        np.testing.assert_array_equal(a[0], b[0])
+        assert data_equivalence(a[0], b[0], exact=True)
         assert a[1:] == b[1:]
+
+
+def goal_of(observation):
+    return observation["desired_goal"] if isinstance(observation, dict) else observation[:3]
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +72,8 @@ class TestContract:
 
     def test_other_seed_other_episode(self, name):
         env = gymnasium.make(name)
-        assert not np.array_equal(env.reset(seed=1)[0], env.reset(seed=2)[0])
+        first, second = (goal_of(env.reset(seed=seed)[0]) for seed in (1, 2))
+        assert not np.array_equal(first, second)
 
     def test_observations_stay_in_the_space(self, name):
         env = gymnasium.make(name)
@@ -78,7 +84,7 @@ class TestContract:
         env = gymnasium.make(name)
         env.reset(seed=0)
         assert env.unwrapped.simulator.problem == ReachProblem.load(ENVIRONMENTS[name])
-        sides = {float(np.sign(env.reset()[0][1])) for _ in range(30)}
+        sides = {float(np.sign(goal_of(env.reset()[0])[1])) for _ in range(30)}
         expected = {"left": {1.0}, "right": {-1.0}, "both": {-1.0, 1.0}}
         assert sides == expected[ENVIRONMENTS[name]]
 
@@ -132,6 +138,7 @@ class TestEpisode:
         assert set(info) == {
             "distance",
             "success",
+            "is_success",
             "collision",
             "contact",
             *(f"reward_{term}" for term in REWARD_TERMS),
@@ -174,6 +181,18 @@ class TestEpisode:
         env.reset(options={"start": HOME, "goal": [0, 5, 5]})
         flags = [env.step(np.zeros(5))[2:4] for _ in range(64)]
         assert flags == [(False, False)] * 63 + [(False, True)]
+
+    def test_nothing_moves_after_the_end(self, env):
+        """As Gymnasium's CartPole: a warning, the same flags, no reward."""
+        goal = env.simulator.arm.tool_position([math.radians(7), 0, 0, 0, 0, 0])
+        env.reset(options={"start": HOME, "goal": goal})
+        over = env.step([1, 0, 0, 0, 0])
+        with pytest.warns(UserWarning, match="the episode is over"):
+            again = env.step([-1, 0, 0, 0, 0])
+        np.testing.assert_array_equal(again[0], over[0])
+        assert again[1:4] == (0.0, True, False)
+        assert again[4]["is_success"]
+        assert again[4]["distance"] == over[4]["distance"]
 
     def test_returned_arrays_are_not_overwritten(self, env):
         first, _ = env.reset(seed=0)
@@ -247,12 +266,51 @@ class TestSettings:
             made = gymnasium.make("kinarm/ReachLeft-v0", problem=given)
             assert made.unwrapped.simulator.problem == problem
 
-    def test_settings_survive_the_spec(self):
-        env = gymnasium.make("kinarm/ReachBoth-v0", horizon=9, reward={"success": 1.0})
+    @pytest.mark.parametrize(
+        "settings",
+        [
+            {"horizon": 9, "reward": {"success": 1.0}},
+            {"problem": ReachProblem.load("left").replace(horizon=7, time_step=0.01)},
+            {"problem": "left", "reward": RewardWeights(success=3), "arm": "paper_flange"},
+            {"scene": Scene(ground=False), "observation_dtype": np.float32, "width": 99},
+        ],
+    )
+    @pytest.mark.parametrize("make", [gymnasium.make, gymnasium.make_vec])
+    def test_settings_survive_the_spec(self, settings, make):
+        env = make("kinarm/ReachBoth-v0", **settings)
         text = env.spec.to_json()
         json.loads(text)
-        again = gymnasium.make(gymnasium.envs.registration.EnvSpec.from_json(text))
-        assert again.unwrapped.simulator.task == env.unwrapped.simulator.task
+        again = make(EnvSpec.from_json(text))
+        for made in (env, again):
+            assert made.spec.max_episode_steps == made.unwrapped.simulator.task.horizon
+        assert again.unwrapped.simulator.problem == env.unwrapped.simulator.problem
+        assert again.observation_space == env.observation_space
+        assert EnvSpec.from_json(again.spec.to_json()) == EnvSpec.from_json(text)
+
+    def test_shorter_time_limit_of_gymnasium(self):
+        env = gymnasium.make("kinarm/ReachBoth-v0", max_episode_steps=3)
+        env.reset(seed=0)
+        assert [env.step(np.zeros(5))[3] for _ in range(3)] == [False, False, True]
+        assert env.spec.max_episode_steps == 3
+
+    @pytest.mark.parametrize("dtype", ["float32", np.float32, "float64", np.dtype(np.float64)])
+    def test_type_of_observations(self, dtype):
+        env, exact = ReachEnv(observation_dtype=dtype), ReachEnv()
+        assert env.observation_space.dtype == np.dtype(dtype)
+        for made in (env, exact):
+            made.reset(seed=2)
+        shown, expected = (made.step(np.full(5, 0.3))[0] for made in (env, exact))
+        assert shown.dtype == np.dtype(dtype)
+        np.testing.assert_array_equal(shown, expected.astype(dtype))
+
+    def test_actions_are_not_rounded(self, env):
+        """The space is float32, as learners expect; finer actions are taken as they are."""
+        ends = []
+        for action in (1 / 3, np.float64(1 / 3), np.float32(1 / 3)):
+            env.reset(options={"start": HOME, "goal": [0, 5, 5]})
+            ends.append(env.step(np.full(5, action))[0])
+        np.testing.assert_array_equal(ends[0], ends[1])
+        assert 0 < np.abs(ends[2] - ends[0]).max() < 1e-7
 
     @pytest.mark.parametrize(
         ("settings", "error", "message"),
@@ -266,7 +324,12 @@ class TestSettings:
             ({"start_spread": 2}, ProblemError, "start_spread"),
             ({"reward": {"bonus": 1}}, InvalidInputError, "bonus"),
             ({"reward": {"success": math.nan}}, ProblemError, "success must be finite"),
-            ({"render_mode": "human"}, InvalidInputError, "render_mode must be None"),
+            (
+                {"render_mode": "film"},
+                InvalidInputError,
+                "render_mode must be .*rgb_array_list.*'film'",
+            ),
+            ({"observation_dtype": "int8"}, InvalidInputError, "observation_dtype must be one of"),
         ],
     )
     def test_bad_settings_are_refused(self, settings, error, message):
@@ -290,12 +353,21 @@ class TestErrors:
         with pytest.raises(InvalidInputError, match="call reset"):
             ReachEnv().step(np.zeros(5))
 
-    def test_step_after_the_end(self):
-        env = ReachEnv(horizon=1)
+    def test_step_before_reset_is_gymnasiums_error(self):
+        with pytest.raises(gymnasium.error.ResetNeeded):
+            ReachEnv().step(np.zeros(5))
+
+    @pytest.mark.parametrize("use", ["step", "render", "reset"])
+    def test_closed(self, use):
+        env = ReachEnv()
         env.reset(seed=0)
-        env.step(np.zeros(5))
-        with pytest.raises(InvalidInputError, match="call reset"):
-            env.step(np.zeros(5))
+        env.close()
+        env.close()
+        arguments = (np.zeros(5),) if use == "step" else ()
+        with pytest.raises(gymnasium.error.ClosedEnvironmentError, match="is closed"):
+            getattr(env, use)(*arguments)
+        with pytest.raises(InvalidInputError):
+            getattr(env, use)(*arguments)
 
     @pytest.mark.parametrize("action", [np.zeros(6), np.zeros((1, 5)), 0.0, [np.nan] * 5])
     def test_bad_action(self, env, action):
@@ -363,4 +435,7 @@ def test_registration_is_part_of_the_import():
         "kinarm/ReachLeft-v0": "left",
         "kinarm/ReachRight-v0": "right",
         "kinarm/ReachBoth-v0": "both",
+        "kinarm/ReachGoalLeft-v0": "left",
+        "kinarm/ReachGoalRight-v0": "right",
+        "kinarm/ReachGoalBoth-v0": "both",
     }

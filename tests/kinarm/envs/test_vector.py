@@ -1,5 +1,8 @@
 """The native batch environment held against a loop of single ones."""
 
+import copy
+import pickle
+
 import gymnasium
 import numpy as np
 import pytest
@@ -86,10 +89,12 @@ class TestAutoreset:
         assert native(mode).metadata["autoreset_mode"] == AutoresetMode(mode)
 
 
-class TestSameStep:
-    def test_is_the_default(self):
-        assert ReachVectorEnv().metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
+def test_default_autoreset_is_that_of_gymnasium():
+    ours, theirs = ReachVectorEnv(), SyncVectorEnv([ReachEnv])
+    assert ours.metadata["autoreset_mode"] == theirs.metadata["autoreset_mode"]
 
+
+class TestSameStep:
     def test_final_observation_belongs_to_the_ended_episode(self):
         batch = native("SameStep", horizon=2)
         first, _ = batch.reset(seed=0)
@@ -125,6 +130,7 @@ class TestDisabled:
         assert resets > 5
 
     def test_step_of_an_ended_episode_is_refused(self):
+        """As Gymnasium's own vector environments refuse it, but with a message."""
         batch = native("Disabled", horizon=1)
         batch.reset(seed=0)
         batch.step(np.zeros((NUMBER, 5)))
@@ -215,7 +221,8 @@ class TestErrors:
         [
             ({"num_envs": 0}, "num_envs must be a whole number of at least 1"),
             ({"autoreset_mode": "Later"}, "autoreset_mode must be one of.*NextStep.*'Later'"),
-            ({"render_mode": "human"}, "render_mode must be None"),
+            ({"render_mode": "film"}, "render_mode must be .*rgb_array_list.*'film'"),
+            ({"observation_dtype": "int8"}, "observation_dtype must be one of.*'int8'"),
             ({"problem": "up"}, "unknown problem 'up'"),
             ({"horizons": 3}, "unknown setting of a problem 'horizons'"),
         ],
@@ -267,3 +274,44 @@ def test_returned_arrays_are_not_overwritten():
     np.testing.assert_array_equal(kept[0], first)
     np.testing.assert_array_equal(kept[1], second[0])
     np.testing.assert_array_equal(kept[2], second[1])
+
+
+def test_actions_of_either_type():
+    batch = native("NextStep")
+    for dtype in (np.float32, np.float64):
+        batch.reset(seed=0)
+        assert np.isfinite(batch.step(np.full((NUMBER, 5), 0.5, dtype=dtype))[0]).all()
+
+
+@pytest.mark.parametrize("use", ["step", "render", "reset"])
+def test_closed(use):
+    batch = native("NextStep")
+    batch.reset(seed=0)
+    batch.close()
+    arguments = (np.zeros((NUMBER, 5)),) if use == "step" else ()
+    with pytest.raises(gymnasium.error.ClosedEnvironmentError, match="is closed"):
+        getattr(batch, use)(*arguments)
+
+
+@pytest.mark.parametrize(
+    "duplicate", [copy.deepcopy, lambda batch: pickle.loads(pickle.dumps(batch))]
+)
+def test_copies_continue_alike(duplicate):
+    batch = native("NextStep")
+    batch.reset(seed=8)
+    other = duplicate(batch)
+    rng = np.random.default_rng(6)
+    for _ in range(70):
+        actions = rng.uniform(-1, 1, (NUMBER, 5))
+        assert_same_results(batch.step(actions), other.step(actions))
+
+
+@pytest.mark.parametrize("kind", [gymnasium.vector.SyncVectorEnv, gymnasium.vector.AsyncVectorEnv])
+def test_vector_environments_of_single_ones(kind):
+    envs = kind([lambda: gymnasium.make(NAME)] * 2)
+    batch = native("NextStep", 2)
+    assert_same_results(envs.reset(seed=1), batch.reset(seed=1))
+    for _ in range(66):
+        actions = np.full((2, 5), 0.02)
+        assert_same_results(envs.step(actions), batch.step(actions))
+    envs.close()

@@ -1,0 +1,156 @@
+"""The goal-conditioned environments: the convention of Gymnasium-Robotics, and consistency."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+from kinarm.arm import Arm
+from kinarm.envs.goal import ReachGoalEnv, ReachGoalVectorEnv
+from kinarm.envs.reach import ReachEnv
+from kinarm.errors import InvalidInputError
+from kinarm.observation import part_slices
+
+NAMES = [f"kinarm/ReachGoal{task}-v0" for task in ("Left", "Right", "Both")]
+HOME = np.zeros(6)
+DOWN = {"start": HOME, "goal": [0, 5, 5]}
+
+
+def episodes(env, steps=300, seed=0):
+    """Observations, rewards, flags and infos of random steps."""
+    env.reset(seed=seed)
+    env.action_space.seed(seed)
+    for _ in range(steps):
+        result = env.step(np.sign(env.action_space.sample()))
+        yield result
+        if result[2] or result[3]:
+            env.reset()
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("reward_type", ["sparse", "dense"])
+def test_reward_and_endings_follow_from_the_goals(name, reward_type):
+    env = gymnasium.make(name, reward_type=reward_type, tolerance=0.6).unwrapped
+    ends = 0
+    for observation, reward, terminated, _, info in episodes(env, 1500):
+        goals = observation["achieved_goal"], observation["desired_goal"], info
+        assert env.compute_reward(*goals) == reward
+        assert env.compute_terminated(*goals) == terminated == info["is_success"]
+        assert not env.compute_truncated(*goals)
+        ends += terminated
+    assert ends > 3
+
+
+@pytest.mark.parametrize("reward_type", ["sparse", "dense"])
+def test_rewards_of_many_goals_at_once(reward_type):
+    env = ReachGoalEnv(reward_type=reward_type)
+    rng = np.random.default_rng(1)
+    achieved, desired = rng.uniform(-0.1, 0.1, (2, 500, 3))
+    rewards = env.compute_reward(achieved, desired, [{}] * 500)
+    distances = np.linalg.norm(achieved - desired, axis=1)
+    expected = -distances if reward_type == "dense" else -(distances > 0.05).astype(float)
+    np.testing.assert_allclose(rewards, expected, rtol=1e-12)
+    assert [env.compute_reward(a, d, {}) for a, d in zip(achieved, desired, strict=True)] == list(
+        rewards
+    )
+    np.testing.assert_array_equal(
+        env.compute_terminated(achieved, desired, [{}] * 500), distances <= 0.05
+    )
+    assert not env.compute_truncated(achieved, desired, [{}] * 500).any()
+
+
+def test_observation_is_that_of_the_flat_environment_taken_apart():
+    flat, goal = ReachEnv("both"), ReachGoalEnv("both")
+    plain, parts = flat.reset(seed=5)[0], goal.reset(seed=5)[0]
+    places = part_slices(6)
+    own = np.concatenate([plain[places["orientation"]], plain[places["position"]]])
+    np.testing.assert_array_equal(parts["observation"], own)
+    np.testing.assert_array_equal(parts["desired_goal"], plain[:3])
+    tool = flat.simulator.arm.tool_position(flat._episode.q[0])
+    np.testing.assert_allclose(parts["achieved_goal"], tool, atol=1e-15)
+
+
+def test_contact_refuses_the_move_and_the_episode_goes_on():
+    """The arm leans over until it would touch the ground; then it can lift again."""
+    env = ReachGoalEnv()
+    env.reset(options=DOWN)
+    for _ in range(40):
+        before = env.simulator.arm.tool_position(env._episode.q[0])
+        observation, reward, terminated, truncated, info = env.step([0, 1, 0, 0, 0])
+        if info["collision"]:
+            break
+    assert info["contact"] == ("hand", "ground")
+    assert (reward, terminated, truncated, info["is_success"]) == (-1.0, False, False, False)
+    np.testing.assert_allclose(observation["achieved_goal"], before, atol=1e-15)
+    lifted, _, _, _, info = env.step([0, -1, 0, 0, 0])
+    assert not info["collision"]
+    assert lifted["achieved_goal"][2] > before[2] + 0.05
+
+
+def test_after_a_refused_move_contact_is_still_found():
+    """Steps after refused ones are judged as in an episode that starts there."""
+    env, fresh = ReachGoalEnv("both"), ReachEnv("both")
+    rng = np.random.default_rng(2)
+    refused = compared = 0
+    env.reset(seed=3)
+    action = np.zeros(5)
+    for _ in range(4000):
+        start, goal = env._episode.q[0].copy(), env._episode.goal[0].copy()
+        if rng.random() < 0.5:
+            action = np.sign(rng.uniform(-1, 1, 5))
+        _, _, terminated, truncated, info = env.step(action)
+        if refused:
+            fresh.reset(options={"start": start, "goal": goal})
+            _, _, _, _, expected = fresh.step(action)
+            assert (info["collision"], info["is_success"]) == (
+                expected["collision"],
+                expected["success"],
+            )
+            assert info["distance"] == pytest.approx(expected["distance"], abs=1e-12)
+            compared += 1
+        refused += info["collision"]
+        if terminated or truncated:
+            env.reset()
+            refused = 0
+    assert compared > 500
+
+
+def test_horizon_truncates_whatever_touches():
+    env = ReachGoalEnv(horizon=20)
+    env.reset(options=DOWN)
+    flags = [env.step([0, 1, 0, 0, 0])[2:4] for _ in range(20)]
+    assert flags == [(False, False)] * 19 + [(False, True)]
+
+
+def test_batch_equals_single_environments():
+    batch = gymnasium.make_vec("kinarm/ReachGoalBoth-v0", num_envs=5, tolerance=0.3)
+    loop = gymnasium.make_vec(
+        "kinarm/ReachGoalBoth-v0", num_envs=5, tolerance=0.3, vectorization_mode="sync"
+    )
+    rng = np.random.default_rng(0)
+    first, second = batch.reset(seed=1), loop.reset(seed=1)
+    for _ in range(150):
+        for key in ("observation", "achieved_goal", "desired_goal"):
+            np.testing.assert_array_equal(first[0][key], second[0][key])
+        for one, other in zip(first[1:-1], second[1:-1], strict=True):
+            np.testing.assert_array_equal(one, other)
+        actions = np.sign(rng.uniform(-1, 1, (5, 5))).astype(np.float32)
+        first, second = batch.step(actions), loop.step(actions)
+    assert isinstance(batch, ReachGoalVectorEnv)
+
+
+def test_float32():
+    env = ReachGoalEnv(observation_dtype="float32")
+    for observation, reward, _, _, info in episodes(env, 100):
+        assert all(part.dtype == np.float32 for part in observation.values())
+        assert env.observation_space.contains(observation)
+        goals = observation["achieved_goal"], observation["desired_goal"]
+        assert env.compute_reward(*goals, info) == reward
+
+
+def test_achieved_goals_stay_within_reach():
+    assert ReachGoalEnv().observation_space["achieved_goal"].high[0] == Arm.load("paper").reach
+
+
+def test_unknown_reward_type():
+    with pytest.raises(InvalidInputError, match=r"reward_type must be one of .*'dense'.*'shaped'"):
+        ReachGoalEnv(reward_type="shaped")

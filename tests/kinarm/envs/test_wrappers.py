@@ -1,0 +1,134 @@
+"""Gymnasium's vector wrappers around the native batch, held against those around a loop."""
+
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium import wrappers as single
+from gymnasium.utils.env_checker import data_equivalence
+from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers import vector
+
+NUMBER = 3
+WRAPPERS = {
+    "TransformObservation": {"func": np.tanh},
+    "TransformAction": {"func": np.negative},
+    "TransformReward": {"func": np.negative},
+    "VectorizeTransformObservation": {
+        "wrapper": single.TransformObservation,
+        "func": np.tanh,
+        "observation_space": None,
+    },
+    "VectorizeTransformAction": {
+        "wrapper": single.TransformAction,
+        "func": np.negative,
+        "action_space": None,
+    },
+    "VectorizeTransformReward": {"wrapper": single.TransformReward, "func": np.negative},
+    "DictInfoToList": {},
+    "FlattenObservation": {},
+    "ReshapeObservation": {"shape": (6, 8)},
+    "RescaleObservation": {"min_obs": -1.0, "max_obs": 1.0},
+    "DtypeObservation": {"dtype": np.float32},
+    "NormalizeObservation": {},
+    "ClipAction": {},
+    "RescaleAction": {"min_action": -2.0, "max_action": 2.0},
+    "ClipReward": {"min_reward": -0.01, "max_reward": 0.01},
+    "NormalizeReward": {},
+    "RecordEpisodeStatistics": {},
+}
+"""Wrappers for arrays of numbers, and settings."""
+OF_NEXT_STEP = {
+    *("NormalizeObservation", "TransformObservation", "VectorizeTransformObservation"),
+    *("FlattenObservation", "ReshapeObservation", "RescaleObservation", "DtypeObservation"),
+}
+OF_PICTURES_OR_DICTIONARIES = {
+    *("GrayscaleObservation", "ResizeObservation", "FilterObservation"),
+    *("RecordVideo", "HumanRendering"),
+}
+OF_OTHER_ARRAYS = {"ArrayConversion", "JaxToNumpy", "JaxToTorch", "NumpyToTorch"}
+
+
+def pair(name, autoreset_mode):
+    """A wrapper around the batch, and around a loop of single environments."""
+    wrapper = getattr(vector, name)
+    batch = gymnasium.make_vec(
+        "kinarm/ReachBoth-v0", num_envs=NUMBER, horizon=20, autoreset_mode=autoreset_mode
+    )
+    loop = gymnasium.make_vec(
+        "kinarm/ReachBoth-v0",
+        num_envs=NUMBER,
+        horizon=20,
+        vectorization_mode="sync",
+        vector_kwargs={"autoreset_mode": autoreset_mode},
+    )
+    return [wrapper(env, **WRAPPERS[name]) for env in (batch, loop)]
+
+
+@pytest.mark.filterwarnings("ignore:.*precision lowered by casting")  # Gymnasium's own
+@pytest.mark.parametrize("name", WRAPPERS)
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+def test_wrapped_batch_equals_wrapped_loop(name, mode):
+    if mode is AutoresetMode.SAME_STEP and name in OF_NEXT_STEP:
+        pytest.skip("Gymnasium has it for NextStep only")
+    batch, loop = pair(name, mode)
+    assert batch.single_observation_space == loop.single_observation_space
+    assert batch.single_action_space == loop.single_action_space
+    first, second = batch.reset(seed=4), loop.reset(seed=4)
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        assert data_equivalence(first[0], second[0], exact=True)
+        if name == "DictInfoToList":
+            assert len(first[-1]) == NUMBER
+        if len(first) == 5:
+            np.testing.assert_array_equal(first[1], second[1])
+            np.testing.assert_array_equal(first[2] | first[3], second[2] | second[3])
+            if "episode" in second[-1]:
+                for key in ("r", "l"):
+                    np.testing.assert_array_equal(
+                        first[-1]["episode"][key], second[-1]["episode"][key]
+                    )
+        actions = rng.uniform(-1, 1, (NUMBER, 5)).astype(np.float32)
+        # Copies, since some wrappers change actions in place.
+        first, second = batch.step(actions.copy()), loop.step(actions.copy())
+    batch.close(), loop.close()
+
+
+def test_every_wrapper_is_accounted_for():
+    assert set(vector.__all__) == {*WRAPPERS, *OF_PICTURES_OR_DICTIONARIES, *OF_OTHER_ARRAYS}
+
+
+def test_dictionaries_of_goals_can_be_flattened_and_filtered():
+    for wrapper, length in (
+        (vector.FlattenObservation, 48),
+        (
+            lambda env: vector.FlattenObservation(
+                vector.FilterObservation(env, ["desired_goal", "achieved_goal"])
+            ),
+            6,
+        ),
+    ):
+        env = wrapper(gymnasium.make_vec("kinarm/ReachGoalRight-v0", num_envs=NUMBER))
+        observations, _ = env.reset(seed=0)
+        assert observations.shape == (NUMBER, length)
+        assert env.step(env.action_space.sample())[0].shape == (NUMBER, length)
+
+
+def test_torch():
+    pytest.importorskip("array_api_compat")
+    torch = pytest.importorskip("torch")
+    env = vector.NumpyToTorch(gymnasium.make_vec("kinarm/ReachRight-v0", num_envs=NUMBER))
+    observations, _ = env.reset(seed=0)
+    assert isinstance(observations, torch.Tensor)
+    results = env.step(torch.zeros((NUMBER, 5)))
+    assert all(isinstance(result, torch.Tensor) for result in results[:4])
+
+
+def test_statistics_of_single_environments():
+    env = single.RecordEpisodeStatistics(gymnasium.make("kinarm/ReachRight-v0", horizon=5))
+    env.reset(seed=0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        infos = [env.step(np.zeros(5, dtype=np.float32))[-1] for _ in range(5)]
+    assert infos[-1]["episode"]["l"] == 5
