@@ -128,7 +128,7 @@ class EnvPictures:
             stage.draw_trace(*self._way(0))
             stage.pace(self._simulator.problem.stepping.time_step)
 
-    def render(self) -> Pictures | list[Pictures] | None:
+    def render(self) -> Any:
         """Show the arms.
 
         Returns

@@ -90,7 +90,8 @@ class Camera(NamedTuple):
         turn = np.array([right, np.cross(ahead, right), ahead])
         focal = height / 2 / math.tan(math.radians(self.field_of_view) / 2)
         lens = np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]])
-        return lens @ np.column_stack([turn, -turn @ position])
+        projection: NDArray[np.float64] = lens @ np.column_stack([turn, -turn @ position])
+        return projection
 
 
 CameraLike = Camera | Mapping[str, Any] | Sequence[Any]

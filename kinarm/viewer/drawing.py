@@ -186,6 +186,6 @@ def draw_arm(window: Visualizer, arm: Arm) -> list[Visualizer]:
 
 
 def draw_trace(window: Visualizer, points: NDArray[np.float64], outcome: str | None) -> None:
-    """The way of the tool, shape (n, 3) [m], in the colour of the outcome; none if it is a point."""
+    """The way of the tool, shape (n, 3) [m], in the colour of the outcome; none of a point."""
     if len(points) > 1:
         put(window, TRACES[outcome], tube(points, TRACE_RADIUS, TRACE_SIDES))

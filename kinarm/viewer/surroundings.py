@@ -11,7 +11,7 @@ from kinarm.viewer.parts import Finish
 OUTCOME_COLOURS = {"success": 0x0072B2, "collision": 0xD55E00, "truncated": 0xE69F00}
 """Distinguishable with any colour vision (Okabe and Ito)."""
 
-TRACES = {
+TRACES: dict[str | None, Finish] = {
     None: Finish(0x4D5A68, roughness=0.5),
     **{outcome: Finish(colour, roughness=0.5) for outcome, colour in OUTCOME_COLOURS.items()},
 }

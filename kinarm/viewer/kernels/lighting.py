@@ -93,7 +93,8 @@ def look_up(table: Array, cell: Cell, channel: int) -> float:
     row, column, v, u = cell
     upper = (1.0 - u) * table[row, column, channel] + u * table[row, column + 1, channel]
     lower = (1.0 - u) * table[row + 1, column, channel] + u * table[row + 1, column + 1, channel]
-    return (1.0 - v) * upper + v * lower
+    value: float = (1.0 - v) * upper + v * lower
+    return value
 
 
 @inlined

@@ -6,13 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import Array, kernel
-from kinarm.viewer.kernels.edges import edge
+from kinarm.viewer.kernels.edges import edge, within
 
 LAYOUT = "-"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 NEAR = 0.01
 """Distance from the camera below which corners do not bound a triangle's picture [m]."""
+
+WIDE = 6
+"""Columns from which on it is worth while to find those of a row that a triangle reaches."""
 
 
 @kernel
@@ -82,13 +85,21 @@ def draw_view(
         aj, bj, cj = edge(xk, yk, wk, xi, yi, wi)
         ak, bk, ck = edge(xi, yi, wi, xj, yj, wj)
         scale = 1.0 / volume
+        ai, bi, ci = ai * scale, bi * scale, ci * scale
+        aj, bj, cj = aj * scale, bj * scale, cj * scale
+        ak, bk, ck = ak * scale, bk * scale, ck * scale
         for row in range(top, bottom + 1):
-            for column in range(left, right + 1):
+            first, last = left, right
+            if last - first > WIDE:
+                first, last = within(ai, bi, ci, row, first, last)
+                first, last = within(aj, bj, cj, row, first, last)
+                first, last = within(ak, bk, ck, row, first, last)
+            for column in range(first, last + 1):
                 for sample in range(n_samples):
                     x, y = column + offsets[sample, 0], row + offsets[sample, 1]
-                    share_i = (ai * x + bi * y + ci) * scale
-                    share_j = (aj * x + bj * y + cj) * scale
-                    share_k = (ak * x + bk * y + ck) * scale
+                    share_i = ai * x + bi * y + ci
+                    share_j = aj * x + bj * y + cj
+                    share_k = ak * x + bk * y + ck
                     if share_i >= 0.0 and share_j >= 0.0 and share_k >= 0.0:
                         near = share_i + share_j + share_k
                         if near > nearness[row, column, sample]:

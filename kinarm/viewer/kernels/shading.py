@@ -113,7 +113,8 @@ class Balls(NamedTuple):
 @inlined
 def encoded(gamma: Array, value: float) -> float:
     """Encode a linear value as sRGB."""
-    return gamma[int(min(max(value, 0.0), 1.0) * (gamma.shape[0] - 1) + 0.5)]
+    code: float = gamma[int(min(max(value, 0.0), 1.0) * (gamma.shape[0] - 1) + 0.5)]
+    return code
 
 
 @inlined
@@ -253,7 +254,7 @@ def paint_floor(
     backdrop: Backdrop,
     floor: NDArray[np.float32],
 ) -> None:
-    """Colour the floor and what is behind: shape (height, width, 2, 3), in shadow and in the sun."""
+    """Colour the floor and what is behind, shape (height, width, 2, 3): in shadow, and in the sun."""
     back = backdrop.colour
     for row in range(floor.shape[0]):
         for column in range(floor.shape[1]):
@@ -343,8 +344,11 @@ def shade_row(
     n_samples = offsets.shape[0]
     for column in range(index.shape[1]):
         red, green, blue = 0.0, 0.0, 0.0
+        done = 0
         for sample in range(n_samples):
             face = index[row, column, sample]
+            if done == n_samples:
+                break
             first, count, x, y = True, 0, 0.0, 0.0
             for other in range(n_samples):
                 if index[row, column, other] == face:
@@ -354,6 +358,7 @@ def shade_row(
                     y += offsets[other, 1]
             if not first:
                 continue
+            done += count
             x, y = column + x / count, row + y / count
             if face < 0:
                 r, g, b = floor_colour(eye, lights, backdrop, floor, row, column)
