@@ -16,8 +16,9 @@ from kinarm.problem import ReachProblem
 Point = tuple[float, float, float]
 
 FIELD_OF_VIEW = 30.0
-TARGET, EYE = (0.05, 0.1, 0.3), (-2.26, 1.78, 1.44)
-"""What the replay page looks at, and from where relative to it, if goals lie on the left [m]."""
+TARGET, EYE = (0.05, 0.1, 0.38), (-2.42, 1.9, 1.5)
+"""Middle of the picture, and the camera relative to it, if goals lie on the left [m]: as on the
+replay page, a little farther so that an upright arm fits in."""
 
 
 class Camera(NamedTuple):

@@ -10,7 +10,7 @@ from kinarm.kernels.compiling import Array, Vector, helper, inlined, kernel
 from kinarm.viewer.kernels.edges import edge
 from kinarm.viewer.kernels.lighting import Lights, Materials, light_up, sunlit, unit
 
-LAYOUT = "-"
+LAYOUT = "ece975bd5724"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 FLOOR = 0
