@@ -33,6 +33,7 @@ HEADLINE_BATCH = 512
 """Batch whose trained rollouts on all threads are compared with the reference path."""
 VECTOR_ENVS = 64
 VECTOR_STEPS, SINGLE_STEPS = 200, 2000
+PICTURES = 40
 ORACLE_TRIALS = 200
 REFERENCE_TRIALS = 24
 SLOW_REPETITIONS = 3
@@ -68,6 +69,7 @@ def measure(policy_name: str, repetitions: int, *, ppo: bool = False) -> dict[st
         "speed_up_over_reference": fast["steps_per_second"]["median"] / reference.median,
         "vector_environment": measure_vector_env(problem, repetitions)._asdict(),
         "single_environment": measure_single_env(problem, repetitions)._asdict(),
+        "pictures": measure_pictures(simulator, policy, repetitions)._asdict(),
         "table_1_training": measure_training(problem, few),
         "oracle": measure_oracle(problem, few),
         "evaluation": measure_evaluation(),
@@ -152,6 +154,26 @@ def measure_single_env(problem: ReachProblem, repetitions: int) -> Timing:
             if terminated or truncated:
                 env.reset()
         return SINGLE_STEPS
+
+    return timed(run, repetitions)
+
+
+def measure_pictures(simulator: Simulator, policy: Policy, repetitions: int) -> Timing:
+    """Pictures per second of an environment's usual size, on one core; some show a whole episode."""
+    from kinarm.viewer import Renderer
+
+    renderer = Renderer(simulator.problem)
+    starts, goals = simulator.sample(np.random.default_rng(0), PICTURES)
+    rollouts = simulator.rollout(policy, starts, goals, record=True)
+    ways = [
+        [simulator.arm.tool_position(state) for state in path[: steps + 1]]
+        for path, steps in zip(rollouts.paths, rollouts.steps, strict=True)
+    ]
+
+    def run() -> int:
+        for state, goal, way in zip(rollouts.configurations, goals, ways, strict=True):
+            renderer.render(state, goal, trace=way)
+        return len(goals)
 
     return timed(run, repetitions)
 

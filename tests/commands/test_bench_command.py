@@ -16,6 +16,7 @@ def small(monkeypatch):
     evaluation = {"seconds_without_bounds": 9.87, "seconds": 4.32, "peak_memory_mb": 321.0}
     monkeypatch.setattr(measurements, "BATCHES", (512,))
     monkeypatch.setattr(measurements, "ORACLE_TRIALS", 4)
+    monkeypatch.setattr(measurements, "PICTURES", 2)
     monkeypatch.setattr(measurements, "measure_evaluation", lambda: evaluation)
     monkeypatch.setattr(measurements, "recipe", partial(recipe, iterations=2))
 
@@ -29,6 +30,7 @@ def test_json_alone_is_printed(run, policy_folder):
         "rollouts",
         "vector_environment",
         "single_environment",
+        "pictures",
         "reference",
         "speed_up_over_reference",
         "table_1_training",
@@ -48,6 +50,7 @@ def test_table_shows_every_figure(run, monkeypatch, policy_folder):
         "rollouts": [{**row, "steps_per_second": rate}],
         "vector_environment": {"median": 400001.0, "best": 400002.0},
         "single_environment": {"median": 20001.0, "best": 20002.0},
+        "pictures": {"median": 53.0, "best": 59.0},
         "reference": {"median": 5001.0, "best": 5002.0},
         "speed_up_over_reference": 246.8,
         "table_1_training": {
@@ -71,6 +74,7 @@ def test_table_shows_every_figure(run, monkeypatch, policy_folder):
         "2,345,678",
         "400,001",
         "20,001",
+        "53 pictures/s",
         "5,001",
         "247 x",
         "1.250 %",

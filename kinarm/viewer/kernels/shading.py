@@ -192,7 +192,8 @@ def faded(backdrop: Backdrop, ahead: float) -> float:
     """How much of a surface at a distance is lost in the background."""
     share = (ahead - backdrop.fog[0]) / (backdrop.fog[1] - backdrop.fog[0])
     share = min(max(share, 0.0), 1.0)
-    return share * share * (3.0 - 2.0 * share)
+    fog: float = share * share * (3.0 - 2.0 * share)
+    return fog
 
 
 @inlined
@@ -243,7 +244,8 @@ def floor_distance(eye: Eye, backdrop: Backdrop, x: float, y: float) -> float:
         return 0.0
     ahead = -eye.position[2] / dz
     px, py = eye.position[0] + ahead * dx, eye.position[1] + ahead * dy
-    return ahead if px * px + py * py < backdrop.floor_radius * backdrop.floor_radius else 0.0
+    radius: float = backdrop.floor_radius
+    return ahead if px * px + py * py < radius * radius else 0.0
 
 
 @kernel
@@ -322,7 +324,8 @@ def ball_cover(
         ahead = (along - math.sqrt(bend)) / square
         if balls.on_top[ball] or nearness[row, column, sample] * ahead < 1.0:
             covered += 1
-    return covered / n_samples
+    cover: float = covered / n_samples
+    return cover
 
 
 @helper
