@@ -65,7 +65,7 @@ class Camera(NamedTuple):
             raise InvalidInputError(f"camera must be a Camera, got {camera!r}; {fields}")
         position, target = (
             finite_array(f"camera's {name}", value, (3,))
-            for name, value in zip(cls._fields, camera, strict=False)
+            for name, value in zip(cls._fields, camera[:2], strict=False)
         )
         angle = camera[2] if len(camera) == 3 else FIELD_OF_VIEW
         if isinstance(angle, bool) or not isinstance(angle, int | float) or not 0 < angle < 180:

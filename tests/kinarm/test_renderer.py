@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinarm.arm import Arm
-from kinarm.collision import Contact
+from kinarm.collision import Contact, body_names
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.problem import ReachProblem
 from kinarm.scene import Obstacle, Scene
@@ -43,14 +43,6 @@ def pixel(camera, size, point):
     return np.array([width / 2 + scale * (ray @ right), height / 2 - scale * up])
 
 
-def middle(picture, colour, within=40):
-    """Mean column and row of the pixels of a colour."""
-    alike = (np.abs(picture.astype(int) - colour) <= within).all(axis=2)
-    assert alike.any()
-    rows, columns = np.nonzero(alike)
-    return np.array([columns.mean(), rows.mean()]) + 0.5
-
-
 def first_hits(eye, rays, corners):
     """Distances along rays to the nearest of triangles, shape (n, 3, 3), after Moeller-Trumbore."""
     start, to_b, to_c = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
@@ -74,7 +66,7 @@ class TestWhereThingsAre:
         size = (400, 300)
         renderer = Renderer("right", width=size[0], height=size[1], camera=camera)
         for goal in ((0.3, -0.6, 0.325), (-0.2, -0.7, 0.325), (0.5, -0.5, 0.8)):
-            picture = renderer.render(HOME, goal)
+            picture = renderer.render(HOME, goal).astype(int)
             green = (picture[..., 1] > picture[..., 0] + 60).nonzero()
             seen = np.array([green[1].mean(), green[0].mean()]) + 0.5
             np.testing.assert_allclose(seen, pixel(camera, size, goal), atol=2.5)
@@ -89,7 +81,7 @@ class TestWhereThingsAre:
         traced = renderer.render(configuration, GOAL, trace=trace, outcome="truncated").astype(int)
         changed = np.argwhere((traced[..., 0] > 200) & (np.abs(traced - plain).max(axis=2) > 40))
         lowest = changed[changed[:, 0].argmax()]
-        np.testing.assert_allclose(lowest[::-1] + 0.5, pixel(camera, size, tool), atol=4)
+        np.testing.assert_allclose(lowest[::-1] + 0.5, pixel(camera, size, tool), atol=6)
 
     @pytest.mark.parametrize("camera", CAMERAS)
     def test_samples_see_what_rays_hit(self, camera):
@@ -108,7 +100,7 @@ class TestWhereThingsAre:
         corners = surfaces.places[surfaces.faces]
         distance = first_hits(np.array(camera.position), rays, corners)
         seen = nearness[rows, columns, 0]
-        assert 30 < np.isfinite(distance).sum() < 390
+        assert 20 < np.isfinite(distance).sum() < 390
         assert ((seen > 0) == np.isfinite(distance)).mean() > 0.99  # but for rays along edges
         both = (seen > 0) & np.isfinite(distance)
         apart = np.abs(1 / seen[both] - distance[both])
@@ -146,7 +138,7 @@ class TestLight:
         camera = Camera((0.0, -0.65, 2.0), (0.0, -0.65, 0.3), 20.0)
         renderer = Renderer("left", width=200, height=100, camera=camera)
         picture = renderer.render(np.deg2rad([90, -30, 0, 0, 0, 0]), (0, 0.65, 0.325))
-        patch = picture[45:55, 20:180].astype(int)
+        patch = picture[5:95, 92:108].astype(int)
         assert patch.std(axis=(0, 1)).max() < 1.5
 
     def test_edges_are_smooth(self, renderer):
@@ -185,14 +177,16 @@ class TestOutcomes:
 
     def test_contact_flashes_and_the_link_glows(self, renderer):
         point = np.array([0.2, -0.5, 0.5])
-        contact = Contact(HOME, ("link_3", "right bench"), point)
+        link = body_names(Arm.load("paper"))[3]
+        contact = Contact(HOME, (link, "right bench"), point)
         plain = renderer.render(HOME, GOAL, outcome="collision").astype(int)
         flashed = renderer.render(HOME, GOAL, outcome="collision", contact=contact).astype(int)
         row, column = pixel(renderer.camera, (240, 180), point).astype(int)[::-1]
         assert flashed[row, column, 0] - flashed[row, column, 2] > 50
         changed = (np.abs(flashed - plain).max(axis=2) > 5).sum()
-        ball = math.pi * (0.0375 * 240) ** 2 / 4
-        assert changed > ball
+        focal = 90 / math.tan(math.radians(15))
+        ball = math.pi * (focal * 0.0375 / math.dist(point, renderer.camera.position)) ** 2
+        assert changed > 3 * ball
 
 
 class TestPictures:
