@@ -143,7 +143,9 @@ class ComparisonRequest:
             ) from None
         return comparison
 
-    def _train(self, missing: "list[PlannedRun]", folder: Path, executor: "Executor | None") -> None:
+    def _train(
+        self, missing: "list[PlannedRun]", folder: Path, executor: "Executor | None"
+    ) -> None:
         """Carry out what is missing, and tell of every training that is finished."""
         from rich.console import Console
 

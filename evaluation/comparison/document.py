@@ -57,7 +57,7 @@ def _learners(comparison: Comparison) -> Iterable[ComparedLearner]:
 
 def curves_csv(comparison: Comparison) -> str:
     """One line per point of a learning curve."""
-    lines = [("problem", "learner", "seed", "trials", *CurvePoint._fields)]
+    lines: list[tuple[str, ...]] = [("problem", "learner", "seed", "trials", *CurvePoint._fields)]
     for run, curve in comparison.curves.items():
         made = (run.problem.name, run.learner.name, str(run.seed), str(run.protocol.trials))
         lines += [(*made, *map(str, point)) for point in curve]

@@ -17,6 +17,7 @@ from kinarm.policies.provenance import package_versions
 from kinarm.problem import ReachProblem
 from kinarm.semantics import SEMANTICS
 
+
 @dataclass(frozen=True, kw_only=True)
 class Protocol:
     """How trainings are judged.

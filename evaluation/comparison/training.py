@@ -80,12 +80,14 @@ class Judge:
         if not (due or last) or (self.curve and self.curve[-1][0] == environment_steps):
             return
         now = clocks()
+        wall_time, processor_time = now - self._began
         trials = self._trials
         rollouts = trials.simulator.rollout(policy(), trials.starts, trials.goals)
         self.curve.append(
             CurvePoint(
-                environment_steps,
-                *(now - self._began).round(3).tolist(),
+                environment_steps=environment_steps,
+                seconds=round(float(wall_time), 3),
+                processor_seconds=round(float(processor_time), 3),
                 successes=int(rollouts.success.sum()),
                 collisions=int(rollouts.collision.sum()),
                 median_distance=round(float(np.median(rollouts.distance)), 5),
@@ -114,7 +116,7 @@ def train_recipe(run: PlannedRun, judge: Judge) -> None:
         over = state.iteration == config.iterations or (
             run.steps is not None and state.environment_steps >= run.steps
         )
-        judge.look(state.environment_steps, lambda: state_policy(config, state), last=over)  # noqa: B023 - called at once
+        judge.look(state.environment_steps, partial(state_policy, config, state), last=over)
 
 
 def train_sb3(run: PlannedRun, judge: Judge) -> None:
@@ -124,7 +126,7 @@ def train_sb3(run: PlannedRun, judge: Judge) -> None:
     length = run.learner.environment_steps
     with alone_in_torch():
         model = sb3_model(run.learner, run.problem, run.seed)
-        policy = partial(acting, model)
+        policy = partial(Policy.from_sb3, model, run.problem)
 
         def on_step(*_: object) -> bool:
             judge.look(model.num_timesteps, policy)
@@ -141,11 +143,13 @@ def sb3_model(learner: ComparedLearner, problem: ReachProblem, seed: int) -> "Ba
     from stable_baselines3.common.utils import LinearSchedule
     from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
-    goals = {"reward_type": "sparse"} if learner.hindsight else {}
-    env: VecEnv = sb3_vec_env(problem, learner.n_envs, threads=1, **goals, **learner.train_on)
+    kind = "sparse" if learner.hindsight else None
+    env: VecEnv = sb3_vec_env(
+        problem, learner.n_envs, reward_type=kind, threads=1, **learner.train_on
+    )
     if learner.normalize:
         env = VecNormalize(env, norm_reward=False)
-    settings = dict(learner.settings)
+    settings: dict[str, Any] = dict(learner.settings)
     if learner.hindsight:
         from kinarm.policies.sb3.hindsight import HindsightReplayBuffer
 
@@ -158,12 +162,3 @@ def sb3_model(learner: ComparedLearner, problem: ReachProblem, seed: int) -> "Ba
     algorithm = getattr(import_module(ALGORITHMS[learner.algorithm]), learner.algorithm)
     model: BaseAlgorithm = algorithm(env=env, seed=seed, device="cpu", **settings)
     return model
-
-
-def acting(model: Any) -> Any:
-    env = model.get_env()
-    def policy(o):
-        seen = env.get_attr("interface", 0)[0].observe(o)
-        if hasattr(env, "normalize_obs"): seen = env.normalize_obs(seen)
-        return model.predict(seen, deterministic=True)[0]
-    return policy
