@@ -72,7 +72,8 @@ def comparison_page(comparison: Comparison, document: dict[str, Any]) -> str:
             "# Learners compared\n",
             f"Made by `{document['command']}` at commit {document['commit'] or 'unknown'}. All "
             f"policies faced the same {protocol['trials']} trials a problem, seed "
-            f"{protocol['seed']}; 95 % intervals in brackets, of the trials that the seeds share.\n",
+            f"{protocol['seed']}; in brackets 95 % intervals, of the trials that the seeds share. "
+            "Every training had one thread; minutes are processor time without judging.\n",
             markdown(HEADER, result_rows(comparison)),
             f"![Success against environment steps and against time]({NAME}.png)\n",
             settings_table(_learners(comparison)),

@@ -8,29 +8,43 @@ from stable_baselines3 import HerReplayBuffer
 
 if TYPE_CHECKING:
     from stable_baselines3.common.type_aliases import DictReplayBufferSamples
+    from stable_baselines3.common.vec_env import VecNormalize
+
+Indices = NDArray[np.int64]
+Goals = NDArray[np.floating[Any]]
 
 
 class HindsightReplayBuffer(HerReplayBuffer):
-    """`HerReplayBuffer` that also asks anew whether an episode is over when it changes the goal.
+    """`HerReplayBuffer` that asks anew whether an episode is over when it substitutes a goal.
 
     The one of Stable-Baselines3 computes the reward for the substituted goal, but keeps from the
     original one whether the episode ended. Where reaching ends it, as in `ReachGoalEnv`, a learner
-    would look for what comes after the goal, of which it never learns anything.
+    would look for what comes after the goal, of which it never learns anything. What of a reward
+    does not depend on the goal, such as that for a collision, is kept without ``copy_info_dict``.
     """
 
-    def _sample_goals(
-        self, batch_indices: NDArray[np.int64], env_indices: NDArray[np.int64]
-    ) -> NDArray[np.floating[Any]]:
-        """Goals to substitute, shape (n, 3) [m]; takes note of those that are reached."""
-        goals: NDArray[np.floating[Any]] = super()._sample_goals(batch_indices, env_indices)
-        achieved = self.next_observations["achieved_goal"][batch_indices, env_indices]
-        (self._reached,) = self.env.env_method(
-            "compute_terminated", achieved, goals, {}, indices=[0]
-        )
+    def _sample_goals(self, batch_indices: Indices, env_indices: Indices) -> Goals:
+        """Goals to substitute, shape (n, 3) [m]; takes note of what else has to change."""
+        goals: Goals = super()._sample_goals(batch_indices, env_indices)
+        where = batch_indices, env_indices
+        achieved = self.next_observations["achieved_goal"][where]
+        desired = self.next_observations["desired_goal"][where]
+        self._reached = self._ask("compute_terminated", achieved, goals)
+        self._besides = self.rewards[where] - self._ask("compute_reward", achieved, desired)
         return goals
 
-    def _get_virtual_samples(self, *given: Any, **named: Any) -> "DictReplayBufferSamples":
+    def _ask(self, method: str, achieved: Goals, desired: Goals) -> NDArray[Any]:
+        """Ask the environment about pairs of goals."""
+        (answer,) = self.env.env_method(method, achieved, desired, {}, indices=[0])
+        return np.asarray(answer, dtype=np.float32)
+
+    def _get_virtual_samples(
+        self, batch_indices: Indices, env_indices: Indices, env: "VecNormalize | None" = None
+    ) -> "DictReplayBufferSamples":
         """Transitions with substituted goals, which end where these are reached."""
-        samples = super()._get_virtual_samples(*given, **named)
+        samples = super()._get_virtual_samples(batch_indices, env_indices, env)
+        besides = self._normalize_reward(self._besides.reshape(-1, 1), env)
         reached = self.to_torch(self._reached).reshape(-1, 1)
-        return samples._replace(dones=samples.dones.maximum(reached.to(samples.dones.dtype)))
+        return samples._replace(
+            dones=samples.dones.maximum(reached), rewards=samples.rewards + self.to_torch(besides)
+        )
