@@ -36,6 +36,7 @@ HEADLINE_BATCH = 512
 VECTOR_ENVS = 64
 VECTOR_STEPS, SINGLE_STEPS = 200, 2000
 DUMMY_STEPS = 20
+PICTURES = 40
 ORACLE_TRIALS = 200
 REFERENCE_TRIALS = 24
 SLOW_REPETITIONS = 3
@@ -72,6 +73,7 @@ def measure(policy_name: str, repetitions: int, *, ppo: bool = False) -> dict[st
         "vector_environment": measure_vector_env(problem, repetitions)._asdict(),
         "single_environment": measure_single_env(problem, repetitions)._asdict(),
         "stable_baselines3": measure_sb3(problem, repetitions),
+        "pictures": measure_pictures(simulator, policy, repetitions)._asdict(),
         "table_1_training": measure_training(problem, few),
         "oracle": measure_oracle(problem, few),
         "evaluation": measure_evaluation(),
@@ -193,6 +195,26 @@ def measure_sb3(problem: ReachProblem, repetitions: int) -> dict[str, Any]:
         "dummy": dummy._asdict(),
         "speed_up": batch.median / dummy.median,
     }
+
+
+def measure_pictures(simulator: Simulator, policy: Policy, repetitions: int) -> Timing:
+    """Pictures per second of an environment's usual size, on one core; some show a whole episode."""
+    from kinarm.viewer import Renderer
+
+    renderer = Renderer(simulator.problem)
+    starts, goals = simulator.sample(np.random.default_rng(0), PICTURES)
+    rollouts = simulator.rollout(policy, starts, goals, record=True)
+    ways = [
+        [simulator.arm.tool_position(state) for state in path[: steps + 1]]
+        for path, steps in zip(rollouts.paths, rollouts.steps, strict=True)
+    ]
+
+    def run() -> int:
+        for state, goal, way in zip(rollouts.configurations, goals, ways, strict=True):
+            renderer.render(state, goal, trace=way)
+        return len(goals)
+
+    return timed(run, repetitions)
 
 
 def measure_training(problem: ReachProblem, repetitions: int) -> dict[str, Any]:

@@ -5,18 +5,14 @@ import time
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-import numpy as np
-import pinocchio as pin
-
-from kinarm.arm import Arm
 from kinarm.evaluation.entrants import ORACLE, Entrant
 from kinarm.evaluation.replays.recorder import record
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle import Oracle
 from kinarm.recording import Recording, record_rollouts
 from kinarm.simulator import Simulator
-from kinarm.viewer.drawing import aim_camera, draw_arm, draw_goal, draw_surroundings, draw_trace
 from kinarm.viewer.live_server import LiveServer
+from kinarm.viewer.live_stage import LiveStage
 
 SLOWDOWN = 2.5
 """How much slower than the arm the page shows its motion."""
@@ -46,27 +42,13 @@ def follow(
     server: LiveServer, simulator: Simulator, recordings: Iterable[Recording]
 ) -> Iterator[Recording]:
     """Show one recording after the other, and hand it out when it is over."""
-    window, arm = server.window, simulator.arm
-    draw_surroundings(window, simulator.scene)
-    aim_camera(window)
-    draw_goal(window["goal"], simulator.problem)
-    frames = draw_arm(window["arm"], arm)
+    stage = LiveStage(server, simulator.problem, simulator.arm)
     for recording in recordings:
-        goal = np.eye(4)
-        goal[:3, 3] = recording.goal
-        window["goal"].set_transform(goal)
-        window["trace"].delete()
+        stage.begin(recording.states[0], recording.goal)
         for state in recording.states:
-            for frame, placement in zip(frames[1:], joint_placements(arm, state), strict=True):
-                frame.set_transform(placement)
+            stage.show(state)
             time.sleep(SLOWDOWN * simulator.problem.stepping.time_step)
-        draw_trace(window["trace"], arm, recording)
+        points = [simulator.arm.tool_position(state) for state in recording.states]
+        stage.draw_trace(points, recording.outcome)
         yield recording
         time.sleep(REST)
-
-
-def joint_placements(arm: Arm, configuration: np.ndarray) -> list[np.ndarray]:
-    """Pose of every joint in its parent, as homogeneous matrices, shape (4, 4)."""
-    data = arm.model.createData()
-    pin.forwardKinematics(arm.model, data, configuration)
-    return [data.liMi[joint].homogeneous for joint in range(1, arm.model.njoints)]

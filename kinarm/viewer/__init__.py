@@ -1,5 +1,5 @@
-"""The viewer: recordings as pages that play offline, and scenes that are served live."""
+"""The viewer: pictures, recordings as pages that play offline, and scenes that are served live."""
 
-from kinarm.viewer.page import ReplayPage, replay_page
+import lazy_loader
 
-__all__ = ["ReplayPage", "replay_page"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

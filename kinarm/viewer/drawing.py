@@ -11,14 +11,21 @@ from numpy.typing import NDArray
 
 from kinarm.arm import Arm
 from kinarm.problem import ReachProblem
-from kinarm.recording import Recording
-from kinarm.scene import GoalRegion, Obstacle, Scene
+from kinarm.scene import Obstacle, Scene
 from kinarm.viewer.arm_shapes import arm_parts
-from kinarm.viewer.meshes import Mesh, box, capsule, cylinder, tube
+from kinarm.viewer.meshes import Mesh, capsule, cylinder, tube
 from kinarm.viewer.parts import Finish
-
-OUTCOME_COLOURS = {"success": 0x0072B2, "collision": 0xD55E00, "truncated": 0xE69F00}
-"""Distinguishable with any colour vision (Okabe and Ito)."""
+from kinarm.viewer.surroundings import (
+    FLOOR_RADIUS,
+    GRID_RADIUS,
+    GRID_STEP,
+    OUTCOME_COLOURS,
+    TRACE_RADIUS,
+    TRACE_SIDES,
+    TRACES,
+    cube_mesh,
+    obstacle_meshes,
+)
 
 FLOOR = Finish(0xE9ECEF, roughness=0.95)
 OBSTACLE = Finish(0xB4BCC6, roughness=0.8)
@@ -28,13 +35,6 @@ HALO = Finish(0x009E73, opacity=0.16, glow=True)
 FLASH = Finish(OUTCOME_COLOURS["collision"], opacity=0.5, glow=True)
 GRID_COLOUR = 0xC6CCD3
 BACKGROUND = [0.93, 0.945, 0.96]
-
-FLOOR_RADIUS, GRID_RADIUS, GRID_STEP = 12.0, 2.0, 0.25
-SLAB_THICKNESS = 0.02
-"""Thickness of the slab that covers an obstacle on which goals lie [m]."""
-
-TRACE_RADIUS = 0.0042
-TRACE_SIDES = 6
 
 SUN_PLACE = [-2.0, -1.0, 3.4]
 CLUTTER = ("/Axes", "/Grid", "/Lights/PointLightPositiveX", "/Lights/PointLightNegativeX")
@@ -142,25 +142,10 @@ def draw_surroundings(window: Visualizer, scene: Scene) -> None:
 
 def _draw_obstacle(window: Visualizer, obstacle: Obstacle, scene: Scene) -> None:
     """A box; where goals lie on it, with a slab like that of a bench."""
-    size, centre = obstacle.size, obstacle.centre
-    if not any(_lies_on(region, obstacle, scene.cube_edge) for region in scene.goal_regions):
-        put(window["body"], OBSTACLE, box(size, 0.04 * size.min()).moved(centre))
-        return
-    top = min(SLAB_THICKNESS, size[2] / 2)
-    inset = np.minimum(0.03, 0.2 * size[:2])
-    slab = box((*size[:2], top), 0.2 * top).moved((0, 0, (size[2] - top) / 2))
-    body = box((*size[:2] - inset, size[2] - top)).moved((0, 0, -top / 2))
-    put(window["top"], GOAL_SLAB, slab.moved(centre))
-    put(window["body"], OBSTACLE, body.moved(centre))
-
-
-def _lies_on(region: GoalRegion, obstacle: Obstacle, edge: float) -> bool:
-    """Whether cubes with a given edge [m], centred in a region, lie on an obstacle."""
-    gap = region.lower[2] - obstacle.upper[2]
-    above = all(
-        region.lower[k] < obstacle.upper[k] and obstacle.lower[k] < region.upper[k] for k in (0, 1)
-    )
-    return above and 0 <= gap <= edge
+    meshes = obstacle_meshes(obstacle, scene)
+    if meshes.top is not None:
+        put(window["top"], GOAL_SLAB, meshes.top)
+    put(window["body"], OBSTACLE, meshes.body)
 
 
 def _grid_lines() -> NDArray[np.float64]:
@@ -180,8 +165,7 @@ def aim_camera(window: Visualizer) -> None:
 
 def draw_goal(window: Visualizer, problem: ReachProblem) -> None:
     """The cube, and a halo within which the goal counts as reached, about the origin."""
-    edge = problem.scene.cube_edge or 0.01
-    put(window["cube"], CUBE, box((edge, edge, edge), 0.08 * edge))
+    put(window["cube"], CUBE, cube_mesh(problem.scene))
     put(window["halo"], HALO, capsule(0.0, problem.task.tolerance))
 
 
@@ -201,10 +185,7 @@ def draw_arm(window: Visualizer, arm: Arm) -> list[Visualizer]:
     return frames
 
 
-def draw_trace(window: Visualizer, arm: Arm, recording: Recording) -> None:
-    """The way of the tool, in the colour of the outcome; nothing if there is no way."""
-    if recording.steps == 0:
-        return
-    points = [arm.tool_position(state) for state in recording.states]
-    finish = Finish(OUTCOME_COLOURS[recording.outcome], roughness=0.5)
-    put(window, finish, tube(points, TRACE_RADIUS, TRACE_SIDES))
+def draw_trace(window: Visualizer, points: NDArray[np.float64], outcome: str | None) -> None:
+    """The way of the tool, shape (n, 3) [m], in the colour of the outcome; none of a point."""
+    if len(points) > 1:
+        put(window, TRACES[outcome], tube(points, TRACE_RADIUS, TRACE_SIDES))

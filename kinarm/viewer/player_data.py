@@ -6,7 +6,7 @@ from typing import Any
 from kinarm.arm import Arm
 from kinarm.collision import body_names
 from kinarm.recording import Recording
-from kinarm.viewer.drawing import OUTCOME_COLOURS, TRACE_SIDES
+from kinarm.viewer.surroundings import OUTCOME_COLOURS, TRACE_SIDES
 
 
 def player_data(trials: Sequence[Sequence[Recording]], arm: Arm) -> dict[str, Any]:

@@ -5,15 +5,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import meshcat
+import numpy as np
 import umsgpack
 
 from kinarm.arm import Arm
 from kinarm.recording import Recording
 from kinarm.viewer.drawing import FLASH, draw_arm, draw_goal, draw_surroundings, draw_trace, put
 from kinarm.viewer.meshes import capsule
-
-FLASH_RADIUS = 0.025
-"""Radius of what lights up where two bodies touch [m]."""
+from kinarm.viewer.surroundings import FLASH_RADIUS
 
 
 def scene_commands(trials: Sequence[Sequence[Recording]], arm: Arm) -> bytes:
@@ -30,7 +29,8 @@ def scene_commands(trials: Sequence[Sequence[Recording]], arm: Arm) -> bytes:
     draw_arm(window["arm"], arm)
     for number, runs in enumerate(trials):
         for name, run in zip(("run", "ghost"), runs, strict=False):
-            draw_trace(window[f"trials/{number}/{name}"], arm, run)
+            points = np.array([arm.tool_position(state) for state in run.states])
+            draw_trace(window[f"trials/{number}/{name}"], points, run.outcome)
     return b"".join(struct.pack("<I", len(each)) + each for each in capture.commands)
 
 

@@ -16,6 +16,7 @@ def small(monkeypatch):
     evaluation = {"seconds_without_bounds": 9.87, "seconds": 4.32, "peak_memory_mb": 321.0}
     monkeypatch.setattr(measurements, "BATCHES", (512,))
     monkeypatch.setattr(measurements, "ORACLE_TRIALS", 4)
+    monkeypatch.setattr(measurements, "PICTURES", 2)
     monkeypatch.setattr(measurements, "measure_evaluation", lambda: evaluation)
     monkeypatch.setattr(measurements, "recipe", partial(recipe, iterations=2))
 
@@ -30,6 +31,7 @@ def test_json_alone_is_printed(run, policy_folder):
         "vector_environment",
         "single_environment",
         "stable_baselines3",
+        "pictures",
         "reference",
         "speed_up_over_reference",
         "table_1_training",
@@ -54,6 +56,7 @@ def test_table_shows_every_figure(run, monkeypatch, policy_folder):
             "dummy": {"median": 15001.0, "best": 15002.0},
             "speed_up": 30.4,
         },
+        "pictures": {"median": 53.0, "best": 59.0},
         "reference": {"median": 5001.0, "best": 5002.0},
         "speed_up_over_reference": 246.8,
         "table_1_training": {
@@ -80,6 +83,7 @@ def test_table_shows_every_figure(run, monkeypatch, policy_folder):
         "450,001",
         "15,002",
         "30 x",
+        "53 pictures/s",
         "5,001",
         "247 x",
         "1.250 %",

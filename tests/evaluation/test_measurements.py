@@ -34,6 +34,7 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
 
     patch.setattr(measurements, "BATCHES", (6, 512))
     patch.setattr(measurements, "ORACLE_TRIALS", 4)
+    patch.setattr(measurements, "PICTURES", 2)
     patch.setattr(measurements, "recipe", partial(recipe, iterations=3))
     patch.setattr(subprocess, "run", run_less)
 
@@ -44,6 +45,7 @@ def rates(document) -> list[dict[str, float]]:
         document["reference"],
         document["vector_environment"],
         document["single_environment"],
+        document["pictures"],
     ]
 
 

@@ -1,0 +1,114 @@
+"""Where pictures are taken from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm._validation import finite_array, whole_number
+from kinarm.errors import InvalidInputError
+from kinarm.problem import ReachProblem
+
+Point = tuple[float, float, float]
+
+FIELD_OF_VIEW = 30.0
+TARGET, EYE = (0.05, 0.1, 0.38), (-2.42, 1.9, 1.5)
+"""Middle of the picture, and the camera relative to it, if goals lie on the left [m]: as on the
+replay page, a little farther so that an upright arm fits in."""
+
+
+class Camera(NamedTuple):
+    """A pinhole camera.
+
+    Attributes
+    ----------
+    position, target : tuple of float
+        Where it stands and what is in the middle of the picture, in the world [m].
+    field_of_view : float
+        Angle between the picture's upper and lower edges [degrees].
+    """
+
+    position: Point
+    target: Point
+    field_of_view: float = FIELD_OF_VIEW
+
+    @classmethod
+    def of_replays(cls, problem: ReachProblem) -> Camera:
+        """Stand where the replay page does: behind the arm, on the side of most goals."""
+        regions = [problem.scene.goal_region(name) for name in problem.task.goal_regions]
+        across = sum(region.lower[1] + region.upper[1] for region in regions)
+        side = 1.0 if across > 0 else -1.0
+        target = np.array(TARGET) * (1, side, 1)
+        eye = target + np.array(EYE) * (1, side, 1)
+        return cls(_point(eye), _point(target))
+
+    @classmethod
+    def checked(cls, camera: CameraLike) -> Camera:
+        """Make a camera of a mapping of its attributes or a sequence of their values.
+
+        Raises
+        ------
+        InvalidInputError
+            If it is neither, or a camera that sees nothing.
+        """
+        fields = f"expected {', '.join(cls._fields)}"
+        if isinstance(camera, Mapping):
+            unknown = sorted(set(camera) - set(cls._fields))
+            if unknown or not {"position", "target"} <= set(camera):
+                raise InvalidInputError(f"camera has {sorted(camera)}; {fields}")
+            camera = tuple(camera.get(name, FIELD_OF_VIEW) for name in cls._fields)
+        if not isinstance(camera, Sequence) or isinstance(camera, str) or len(camera) not in (2, 3):
+            raise InvalidInputError(f"camera must be a Camera, got {camera!r}; {fields}")
+        position, target = (
+            finite_array(f"camera's {name}", value, (3,))
+            for name, value in zip(cls._fields, camera[:2], strict=False)
+        )
+        angle = camera[2] if len(camera) == 3 else FIELD_OF_VIEW
+        if isinstance(angle, bool) or not isinstance(angle, int | float) or not 0 < angle < 180:
+            raise InvalidInputError(
+                f"camera's field_of_view must be between 0 and 180 degrees, got {angle!r}"
+            )
+        if np.linalg.norm(target - position) < 1e-6:
+            raise InvalidInputError(f"camera's position and target are the same: {position}")
+        return cls(_point(position), _point(target), float(angle))
+
+    def projection(self, width: int, height: int) -> NDArray[np.float64]:
+        """World to picture, shape (3, 4).
+
+        A point [x, y, z, 1] goes to its column and row in a picture of a size [pixels], both times
+        its distance along the line of sight, and that distance [m].
+        """
+        position, target = np.array(self.position), np.array(self.target)
+        ahead = (target - position) / np.linalg.norm(target - position)
+        right = np.cross(ahead, (0.0, 0.0, 1.0))
+        if np.linalg.norm(right) < 1e-9:  # straight up or down: x goes up in the picture
+            right = np.cross(ahead, (1.0, 0.0, 0.0))
+        right /= np.linalg.norm(right)
+        turn = np.array([right, np.cross(ahead, right), ahead])
+        focal = height / 2 / math.tan(math.radians(self.field_of_view) / 2)
+        lens = np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]])
+        projection: NDArray[np.float64] = lens @ np.column_stack([turn, -turn @ position])
+        return projection
+
+
+CameraLike = Camera | Mapping[str, Any] | Sequence[Any]
+
+
+def picture_size(width: object, height: object) -> tuple[int, int]:
+    """Check the size of a picture [pixels].
+
+    Raises
+    ------
+    InvalidInputError
+        If a side is not a whole number of at least 1.
+    """
+    return whole_number("width", width, 1), whole_number("height", height, 1)
+
+
+def _point(numbers: NDArray[np.float64]) -> Point:
+    x, y, z = (float(number) for number in numbers)
+    return x, y, z

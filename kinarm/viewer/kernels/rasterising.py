@@ -1,0 +1,141 @@
+"""Vertices to places, and triangles to the samples of a picture and to the texels of a shadow."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.kernels.compiling import Array, kernel
+from kinarm.viewer.kernels.edges import edge, within
+
+LAYOUT = "1e9b3fb77115"
+"""Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
+
+NEAR = 0.01
+"""Distance from the camera below which corners do not bound a triangle's picture [m]."""
+
+WIDE = 6
+"""Columns from which on it is worth while to find those of a row that a triangle reaches."""
+
+
+@kernel
+def place(
+    vertices: Array,
+    normals: Array,
+    frames: NDArray[np.int64],
+    poses: Array,
+    places: Array,
+    facings: Array,
+) -> None:
+    """Move vertices and normals from frames with poses, shape (n_frames, 3, 4), to the world."""
+    for i in range(vertices.shape[0]):
+        pose = frames[i]
+        x, y, z = vertices[i, 0], vertices[i, 1], vertices[i, 2]
+        u, v, w = normals[i, 0], normals[i, 1], normals[i, 2]
+        for k in range(3):
+            a, b, c = poses[pose, k, 0], poses[pose, k, 1], poses[pose, k, 2]
+            places[i, k] = a * x + b * y + c * z + poses[pose, k, 3]
+            facings[i, k] = a * u + b * v + c * w
+
+
+@kernel
+def project(places: Array, projection: Array, corners: Array) -> None:
+    """Apply a projection, shape (3, 4), to places."""
+    for i in range(places.shape[0]):
+        x, y, z = places[i, 0], places[i, 1], places[i, 2]
+        for k in range(3):
+            corners[i, k] = (
+                projection[k, 0] * x
+                + projection[k, 1] * y
+                + projection[k, 2] * z
+                + projection[k, 3]
+            )
+
+
+@kernel
+def draw_view(
+    corners: Array,
+    faces: NDArray[np.int64],
+    offsets: Array,
+    nearness: NDArray[np.float32],
+    index: NDArray[np.int32],
+) -> None:
+    """Find the nearest front of a triangle at every sample.
+
+    Barycentric coordinates over the distance are linear in the picture (Olano and Greer, 1997),
+    so triangles that reach behind the camera need no clipping.
+    """
+    height, width, n_samples = index.shape
+    for face in range(faces.shape[0]):
+        i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
+        xi, yi, wi = corners[i, 0], corners[i, 1], corners[i, 2]
+        xj, yj, wj = corners[j, 0], corners[j, 1], corners[j, 2]
+        xk, yk, wk = corners[k, 0], corners[k, 1], corners[k, 2]
+        ai, bi, ci = edge(xj, yj, wj, xk, yk, wk)
+        volume = ai * xi + bi * yi + ci * wi
+        if volume >= 0.0 or max(wi, wj, wk) < NEAR:
+            continue
+        left, right, top, bottom = 0, width - 1, 0, height - 1
+        if min(wi, wj, wk) >= NEAR:
+            ui, uj, uk, vi, vj, vk = xi / wi, xj / wj, xk / wk, yi / wi, yj / wj, yk / wk
+            left = max(left, math.floor(max(min(ui, uj, uk), -1.0)))
+            right = min(right, math.floor(min(max(ui, uj, uk), width + 0.0)))
+            top = max(top, math.floor(max(min(vi, vj, vk), -1.0)))
+            bottom = min(bottom, math.floor(min(max(vi, vj, vk), height + 0.0)))
+        aj, bj, cj = edge(xk, yk, wk, xi, yi, wi)
+        ak, bk, ck = edge(xi, yi, wi, xj, yj, wj)
+        scale = 1.0 / volume
+        ai, bi, ci = ai * scale, bi * scale, ci * scale
+        aj, bj, cj = aj * scale, bj * scale, cj * scale
+        ak, bk, ck = ak * scale, bk * scale, ck * scale
+        for row in range(top, bottom + 1):
+            first, last = left, right
+            if last - first > WIDE:
+                first, last = within(ai, bi, ci, row, first, last)
+                first, last = within(aj, bj, cj, row, first, last)
+                first, last = within(ak, bk, ck, row, first, last)
+            for column in range(first, last + 1):
+                for sample in range(n_samples):
+                    x, y = column + offsets[sample, 0], row + offsets[sample, 1]
+                    share_i = ai * x + bi * y + ci
+                    share_j = aj * x + bj * y + cj
+                    share_k = ak * x + bk * y + ck
+                    if share_i >= 0.0 and share_j >= 0.0 and share_k >= 0.0:
+                        near = share_i + share_j + share_k
+                        if near > nearness[row, column, sample]:
+                            nearness[row, column, sample] = near
+                            index[row, column, sample] = face
+
+
+@kernel
+def draw_shadow(shadowed: Array, faces: NDArray[np.int64], depth: NDArray[np.float32]) -> None:
+    """Keep how near the sun the nearest back of a triangle is, at the middle of every texel.
+
+    Backs instead of fronts keep what the sun shines on from shadowing itself.
+    """
+    height, width = depth.shape
+    for face in range(faces.shape[0]):
+        i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
+        xi, yi, xj, yj = shadowed[i, 0], shadowed[i, 1], shadowed[j, 0], shadowed[j, 1]
+        xk, yk = shadowed[k, 0], shadowed[k, 1]
+        area = (xj - xi) * (yk - yi) - (xk - xi) * (yj - yi)
+        if area >= 0.0:
+            continue
+        left = max(0, math.floor(max(min(xi, xj, xk), -1.0)))
+        right = min(width - 1, math.floor(min(max(xi, xj, xk), width + 0.0)))
+        top = max(0, math.floor(max(min(yi, yj, yk), -1.0)))
+        bottom = min(height - 1, math.floor(min(max(yi, yj, yk), height + 0.0)))
+        scale = 1.0 / area
+        for row in range(top, bottom + 1):
+            for column in range(left, right + 1):
+                x, y = column + 0.5, row + 0.5
+                share_j = ((x - xi) * (yk - yi) - (xk - xi) * (y - yi)) * scale
+                share_k = ((xj - xi) * (y - yi) - (x - xi) * (yj - yi)) * scale
+                share_i = 1.0 - share_j - share_k
+                if share_i >= 0.0 and share_j >= 0.0 and share_k >= 0.0:
+                    near = (
+                        share_i * shadowed[i, 2]
+                        + share_j * shadowed[j, 2]
+                        + share_k * shadowed[k, 2]
+                    )
+                    depth[row, column] = max(depth[row, column], near)

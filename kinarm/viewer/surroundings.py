@@ -1,0 +1,66 @@
+"""What stands around an arm, and the colours of what may happen to it."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from kinarm.scene import GoalRegion, Obstacle, Scene
+from kinarm.viewer.meshes import Mesh, box
+from kinarm.viewer.parts import Finish
+
+OUTCOME_COLOURS = {"success": 0x0072B2, "collision": 0xD55E00, "truncated": 0xE69F00}
+"""Distinguishable with any colour vision (Okabe and Ito)."""
+
+TRACES: dict[str | None, Finish] = {
+    None: Finish(0x4D5A68, roughness=0.5),
+    **{outcome: Finish(colour, roughness=0.5) for outcome, colour in OUTCOME_COLOURS.items()},
+}
+"""Finish of the tool's way, by outcome; None while the episode goes on."""
+
+FLOOR_RADIUS, GRID_RADIUS, GRID_STEP = 12.0, 2.0, 0.25
+"""Of the floor, and of the lines on it [m]."""
+
+SLAB_THICKNESS = 0.02
+"""Thickness of the slab that covers an obstacle on which goals lie [m]."""
+
+TRACE_RADIUS = 0.0042
+TRACE_SIDES = 6
+FLASH_RADIUS = 0.025
+"""Radius of what lights up where two bodies touch [m]."""
+
+CUBE_CHAMFER = 0.08
+"""Of the cube's edges, as a share of their length."""
+
+
+class ObstacleMeshes(NamedTuple):
+    """An obstacle in the world; where goals lie on it, with a slab like that of a bench."""
+
+    body: Mesh
+    top: Mesh | None
+
+
+def obstacle_meshes(obstacle: Obstacle, scene: Scene) -> ObstacleMeshes:
+    """Shapes of an obstacle."""
+    size, centre = obstacle.size, obstacle.centre
+    if not any(_lies_on(region, obstacle, scene.cube_edge) for region in scene.goal_regions):
+        return ObstacleMeshes(box(size, 0.04 * size.min()).moved(centre), None)
+    top = min(SLAB_THICKNESS, size[2] / 2)
+    inset = np.minimum(0.03, 0.2 * size[:2])
+    slab = box((*size[:2], top), 0.2 * top).moved((0, 0, (size[2] - top) / 2))
+    body = box((*size[:2] - inset, size[2] - top)).moved((0, 0, -top / 2))
+    return ObstacleMeshes(body.moved(centre), slab.moved(centre))
+
+
+def _lies_on(region: GoalRegion, obstacle: Obstacle, edge: float) -> bool:
+    """Whether cubes with a given edge [m], centred in a region, lie on an obstacle."""
+    gap = region.lower[2] - obstacle.upper[2]
+    above = all(
+        region.lower[k] < obstacle.upper[k] and obstacle.lower[k] < region.upper[k] for k in (0, 1)
+    )
+    return above and 0 <= gap <= edge
+
+
+def cube_mesh(scene: Scene) -> Mesh:
+    """The cube that marks a goal, about the origin."""
+    edge = scene.cube_edge or 0.01
+    return box((edge, edge, edge), CUBE_CHAMFER * edge)

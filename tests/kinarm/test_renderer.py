@@ -1,0 +1,307 @@
+"""Pictures: what is where, in light and shadow, held against formulas and rays."""
+
+import math
+
+import numpy as np
+import pytest
+
+from kinarm.arm import Arm
+from kinarm.collision import Contact, body_names
+from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.problem import ReachProblem
+from kinarm.scene import Obstacle, Scene
+from kinarm.viewer import Camera, Renderer
+from kinarm.viewer.kernels.rasterising import draw_view, project
+from kinarm.viewer.lighting import SUN_PLACE, irradiance_map, reflection_map, to_linear, to_srgb
+from kinarm.viewer.triangle_scene import TriangleScene
+
+CAMERAS = (
+    Camera((-2.3, -1.8, 1.7), (0.1, 0.0, 0.3)),
+    Camera((0.4, 2.5, 0.4), (0.0, 0.0, 0.4), 45.0),
+    Camera((0.3, 0.0, 3.0), (0.3, 0.0, 0.0), 60.0),  # straight down
+)
+GOAL = np.array([0.22, -0.64, 0.325])
+BENT = np.deg2rad([-73.8, 36.6, 22.8, -10.4, -52.4, 0.0])
+HOME = np.zeros(6)
+
+
+@pytest.fixture(scope="module")
+def renderer():
+    return Renderer("right", width=240, height=180)
+
+
+def pixel(camera, size, point):
+    """Column and row at which a pinhole camera sees a point, by angles to its axes."""
+    width, height = size
+    position, target, angle = (np.array(part, dtype=float) for part in camera)
+    ahead = (target - position) / math.dist(target, position)
+    above = [1.0, 0, 0] if abs(ahead[2]) > 0.999 else [0, 0, 1.0]
+    right = np.cross(ahead, above) / np.linalg.norm(np.cross(ahead, above))
+    ray = np.asarray(point) - position
+    scale = height / 2 / math.tan(math.radians(angle) / 2) / (ray @ ahead)
+    up = ray @ np.cross(right, ahead)
+    return np.array([width / 2 + scale * (ray @ right), height / 2 - scale * up])
+
+
+def first_hits(eye, rays, corners):
+    """Distances along rays to the nearest of triangles, shape (n, 3, 3), after Moeller-Trumbore."""
+    start, to_b, to_c = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    nearest = []
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for ray in rays:
+            normal = np.cross(ray, to_c)
+            scale = 1 / (to_b * normal).sum(axis=1)
+            u = scale * ((eye - start) * normal).sum(axis=1)
+            aside = np.cross(eye - start, to_b)
+            v = scale * (aside @ ray)
+            distance = scale * (aside * to_c).sum(axis=1)
+            hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (distance > 0) & (scale > 0)
+            nearest.append(distance[hit].min(initial=np.inf))
+    return np.array(nearest)
+
+
+class TestWhereThingsAre:
+    @pytest.mark.parametrize("camera", CAMERAS)
+    def test_cube_is_where_a_pinhole_camera_sees_it(self, camera):
+        size = (400, 300)
+        renderer = Renderer("right", width=size[0], height=size[1], camera=camera)
+        for goal in ((0.3, -0.6, 0.325), (-0.2, -0.7, 0.325), (0.5, -0.5, 0.8)):
+            picture = renderer.render(HOME, goal).astype(int)
+            green = (picture[..., 1] > picture[..., 0] + 60).nonzero()
+            seen = np.array([green[1].mean(), green[0].mean()]) + 0.5
+            np.testing.assert_allclose(seen, pixel(camera, size, goal), atol=2.5)
+
+    @pytest.mark.parametrize("configuration", [HOME, BENT])
+    def test_the_way_ends_at_the_tool(self, configuration):
+        arm, camera, size = Arm.load("paper"), CAMERAS[0], (480, 360)
+        tool = arm.tool_position(configuration)
+        renderer = Renderer("right", width=size[0], height=size[1], camera=camera)
+        trace = tool + np.linspace(0, 1, 30)[:, None] * [0, 0, 0.2]
+        plain = renderer.render(configuration, GOAL).astype(int)
+        traced = renderer.render(configuration, GOAL, trace=trace, outcome="truncated").astype(int)
+        changed = np.argwhere((traced[..., 0] > 200) & (np.abs(traced - plain).max(axis=2) > 40))
+        lowest = changed[changed[:, 0].argmax()]
+        np.testing.assert_allclose(lowest[::-1] + 0.5, pixel(camera, size, tool), atol=6)
+
+    @pytest.mark.parametrize("camera", CAMERAS)
+    def test_samples_see_what_rays_hit(self, camera):
+        """Distances in the depth buffer are those along rays to the triangles, one by one."""
+        width, height = 64, 48
+        scene = TriangleScene(ReachProblem.load("right"), Arm.load("paper"))
+        surfaces = scene.surfaces(BENT, GOAL, np.empty((0, 3)), None)
+        projection = camera.projection(width, height)
+        project(surfaces.places, projection, surfaces.corners)
+        nearness = np.zeros((height, width, 1), dtype=np.float32)
+        index = np.full((height, width, 1), -1, dtype=np.int32)
+        draw_view(surfaces.corners, surfaces.faces, np.array([(0.5, 0.5)]), nearness, index)
+        rows, columns = np.divmod(np.random.default_rng(0).permutation(width * height)[:400], width)
+        pixels = np.column_stack([columns + 0.5, rows + 0.5, np.ones(400)])
+        rays = np.linalg.solve(projection[:, :3], pixels.T).T
+        corners = surfaces.places[surfaces.faces]
+        distance = first_hits(np.array(camera.position), rays, corners)
+        seen = nearness[rows, columns, 0]
+        assert 20 < np.isfinite(distance).sum() < 390
+        assert ((seen > 0) == np.isfinite(distance)).mean() > 0.99  # but for rays along edges
+        both = (seen > 0) & np.isfinite(distance)
+        apart = np.abs(1 / seen[both] - distance[both])
+        assert np.quantile(apart, 0.99) < 1e-4
+
+    def test_halo_has_the_outline_of_a_sphere(self):
+        """Seen from afar it is a disc, whose area tells the tolerance."""
+        camera = Camera((0.3, -5.0, 1.0), (0.3, -0.6, 1.0), 10.0)
+        areas = []
+        for tolerance in (0.05, 0.1):
+            problem = ReachProblem.load("right").replace(tolerance=tolerance)
+            renderer = Renderer(problem, width=300, height=300, camera=camera)
+            picture = renderer.render(HOME, (0.3, -0.6, 1.2)).astype(int)
+            areas.append((picture[..., 1] - picture[..., 0] > 12).sum())
+        focal = 150 / math.tan(math.radians(5))
+        for tolerance, area in zip((0.05, 0.1), areas, strict=True):
+            expected = math.pi * (focal * tolerance / 4.4) ** 2
+            assert area == pytest.approx(expected, rel=0.05)
+
+
+class TestLight:
+    def test_shadow_falls_away_from_the_sun(self, renderer):
+        """Where the line from the sun through the elbow meets the floor, it is darker."""
+        elbow = np.array([0.075, 0.0, 0.63])
+        sun = np.array(SUN_PLACE)
+        spot = elbow - elbow[2] / sun[2] * sun
+        column, row = pixel(renderer.camera, (240, 180), spot).astype(int)
+        upright = renderer.render(HOME, GOAL)[row, column].astype(int)
+        aside = np.deg2rad([150, 100, 0, 0, 0, 0])
+        lit = renderer.render(aside, GOAL)[row, column].astype(int)
+        assert (lit - upright > 25).all()
+
+    def test_sunlit_surfaces_do_not_shadow_themselves(self):
+        """The tops of the benches are even: none of the pattern that rounding would make."""
+        camera = Camera((0.0, -0.65, 2.0), (0.0, -0.65, 0.3), 20.0)
+        renderer = Renderer("left", width=200, height=100, camera=camera)
+        picture = renderer.render(np.deg2rad([90, -30, 0, 0, 0, 0]), (0, 0.65, 0.325))
+        patch = picture[5:95, 92:108].astype(int)
+        assert patch.std(axis=(0, 1)).max() < 1.5
+
+    def test_edges_are_smooth(self, renderer):
+        """On an edge between two even areas, there are shades between their colours."""
+        picture = renderer.render(BENT, GOAL).astype(int)
+        changes = np.abs(np.diff(picture[..., 2], axis=1))
+        assert ((changes > 5) & (changes < 60)).sum() > (changes >= 60).sum()
+
+    def test_octahedral_maps_hold_means_of_the_room(self):
+        assert irradiance_map().shape == (17, 17, 3)
+        sharp, dull = reflection_map(0.2), reflection_map(1.0)
+        assert sharp.std() > 1.5 * dull.std()
+        # All nodes of the map's rim that face straight down are the same direction.
+        corners = dull[[0, 0, -1, -1], [0, -1, 0, -1]]
+        np.testing.assert_allclose(corners, corners[:1].repeat(4, axis=0), atol=1e-9)
+
+    def test_srgb_there_and_back(self):
+        values = np.linspace(0, 1, 101)
+        np.testing.assert_allclose(to_srgb(to_linear(values)), values, atol=1e-6)
+        assert to_srgb(0.5) == pytest.approx(0.7354, abs=1e-4)
+
+
+class TestOutcomes:
+    def test_cube_lights_up_on_success(self, renderer):
+        row, column = pixel(renderer.camera, (240, 180), GOAL).astype(int)[::-1]
+        dark = renderer.render(HOME, GOAL)[row, column].astype(int)
+        light = renderer.render(HOME, GOAL, outcome="success")[row, column].astype(int)
+        assert (light > dark).all()
+
+    @pytest.mark.parametrize("outcome", ["success", "collision", "truncated"])
+    def test_way_has_a_colour_of_its_own(self, renderer, outcome):
+        trace = np.array([(-0.3, -0.4, z) for z in np.linspace(0.2, 0.8, 20)])
+        neutral = renderer.render(HOME, GOAL, trace=trace)
+        coloured = renderer.render(HOME, GOAL, trace=trace, outcome=outcome)
+        assert np.abs(neutral.astype(int) - coloured).max() > 60
+
+    def test_contact_flashes_and_the_link_glows(self, renderer):
+        point = np.array([0.2, -0.5, 0.5])
+        link = body_names(Arm.load("paper"))[3]
+        contact = Contact(HOME, (link, "right bench"), point)
+        plain = renderer.render(HOME, GOAL, outcome="collision").astype(int)
+        flashed = renderer.render(HOME, GOAL, outcome="collision", contact=contact).astype(int)
+        row, column = pixel(renderer.camera, (240, 180), point).astype(int)[::-1]
+        assert flashed[row, column, 0] - flashed[row, column, 2] > 50
+        changed = (np.abs(flashed - plain).max(axis=2) > 5).sum()
+        focal = 90 / math.tan(math.radians(15))
+        ball = math.pi * (focal * 0.0375 / math.dist(point, renderer.camera.position)) ** 2
+        assert changed > 3 * ball
+
+
+class TestPictures:
+    @pytest.mark.parametrize("size", [(480, 360), (1, 1), (37, 91)])
+    def test_shape_and_type(self, size):
+        picture = Renderer("both", width=size[0], height=size[1]).render(HOME, GOAL)
+        assert (picture.shape, picture.dtype) == ((size[1], size[0], 3), np.uint8)
+
+    def test_same_bytes_again(self, renderer):
+        trace = np.random.default_rng(0).uniform(0, 0.5, (40, 3))
+        first = renderer.render(BENT, GOAL, trace=trace, outcome="success")
+        renderer.render(HOME, -GOAL)
+        for other in (renderer, Renderer("right", width=240, height=180)):
+            again = other.render(BENT, GOAL, trace=trace, outcome="success")
+            np.testing.assert_array_equal(again, first)
+
+    def test_pictures_are_not_overwritten(self, renderer):
+        first = renderer.render(HOME, GOAL)
+        kept = first.copy()
+        renderer.render(BENT, GOAL)
+        np.testing.assert_array_equal(first, kept)
+
+    def test_of_other_arms(self, simulators):
+        for name in ("sliding", "mesh", "lrmate200ic_5l"):
+            simulator = simulators[name]
+            renderer = Renderer(simulator.problem, width=80, height=60)
+            first, second = (
+                renderer.render(q, GOAL) for q in simulator.sample(np.random.default_rng(0), 2)[0]
+            )
+            assert (first != second).any()
+
+    def test_without_ground(self):
+        scene = Scene(ground=False, obstacles=(), goal_regions=Scene().goal_regions)
+        problem = ReachProblem.load("right").replace(scene=scene)
+        picture = Renderer(problem, width=64, height=48).render(HOME, GOAL)
+        assert (picture[-1] == picture[-1, 0]).all()
+
+    def test_camera_between_things_and_under_the_floor(self):
+        for camera in (
+            Camera((0.0, -0.65, 0.2), (0, 0, 0.3)),  # in a bench
+            Camera((0.0, 0.0, 0.5), (1, 0, 0.3)),  # in the arm
+            Camera((-2.0, -1.0, -0.5), (0, 0, 0.3)),
+            Camera((0.0, -0.4, 0.35), (0.3, -0.6, 0.3), 120.0),
+        ):
+            picture = Renderer("right", width=64, height=48, camera=camera).render(BENT, GOAL)
+            assert picture.std() > 0
+
+    def test_obstacles_in_the_floor_are_hidden_by_it(self):
+        sunk = Obstacle(name="sunk", lower=(-0.4, -0.4, -0.5), upper=(-0.3, -0.3, -0.2))
+        scenes = [Scene(obstacles=(*Scene().obstacles, *more)) for more in ((), (sunk,))]
+        without, with_sunk = (
+            Renderer(ReachProblem.load("right").replace(scene=scene), width=120, height=90).render(
+                HOME, GOAL
+            )
+            for scene in scenes
+        )
+        np.testing.assert_array_equal(with_sunk, without)
+
+    def test_repr(self, renderer):
+        assert repr(renderer) == "Renderer(right, 240 x 180)"
+
+
+class TestCamera:
+    def test_stands_on_the_side_of_the_goals(self):
+        left, right = (Camera.of_replays(ReachProblem.load(name)) for name in ("left", "right"))
+        assert left.position[1] > 0 > right.position[1]
+        assert left.position[0] == right.position[0] < 0
+
+    def test_of_plain_values(self):
+        expected = Camera((1.0, 2.0, 3.0), (0.0, 0.0, 0.5), 40.0)
+        given = {"position": [1, 2, 3], "target": [0, 0, 0.5], "field_of_view": 40}
+        for camera in (given, list(given.values()), expected, tuple(expected)):
+            assert Camera.checked(camera) == expected
+        assert Camera.checked([[1, 2, 3], [0, 0, 0.5]]) == expected._replace(field_of_view=30.0)
+
+    @pytest.mark.parametrize(
+        ("camera", "message"),
+        [
+            ("above", "camera must be a Camera, got 'above'; expected position, target"),
+            (3, "camera must be a Camera, got 3"),
+            ([[1, 2, 3]], "camera must be a Camera"),
+            ({"position": (1, 2, 3)}, r"camera has \['position'\]; expected position, target"),
+            ({"position": (1, 2, 3), "target": (0, 0, 0), "zoom": 2}, r"'zoom'.*field_of_view"),
+            ([[1, 2], [0, 0, 0]], r"camera's position must have shape \(3\)"),
+            ([[1, 2, 3], [0, 0, math.nan]], "camera's target must be finite"),
+            ([[1, 2, 3], [1, 2, 3]], "position and target are the same"),
+            ([[1, 2, 3], [0, 0, 0], 180], "field_of_view must be between 0 and 180 degrees"),
+            ([[1, 2, 3], [0, 0, 0], "wide"], "field_of_view must be between 0 and 180 degrees"),
+        ],
+    )
+    def test_bad_ones_are_refused(self, camera, message):
+        with pytest.raises(InvalidInputError, match=message):
+            Renderer("right", camera=camera)
+
+
+class TestBadInput:
+    @pytest.mark.parametrize("side", ["width", "height"])
+    @pytest.mark.parametrize("value", [0, -3, 2.5, True, "wide"])
+    def test_size(self, side, value):
+        with pytest.raises(InvalidInputError, match=f"{side} must be a whole number of at least 1"):
+            Renderer("right", **{side: value})
+
+    @pytest.mark.parametrize(
+        ("changes", "message"),
+        [
+            ({"configuration": np.zeros(5)}, "configuration must have shape"),
+            ({"goal": [0, 0]}, "goal must have shape"),
+            ({"goal": [0, 0, math.inf]}, "goal must be finite"),
+            ({"trace": np.zeros((3, 2))}, "trace must have shape"),
+        ],
+    )
+    def test_arrays(self, renderer, changes, message):
+        with pytest.raises(InvalidInputError, match=message):
+            renderer.render(**{"configuration": HOME, "goal": GOAL, **changes})
+
+    def test_outcome(self, renderer):
+        with pytest.raises(UnknownNameError, match="available: success, collision, truncated"):
+            renderer.render(HOME, GOAL, outcome="boredom")
