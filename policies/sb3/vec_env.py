@@ -25,7 +25,7 @@ Indices = int | Iterable[int] | None
 
 
 class SB3VecEnv(VecEnv):
-    """Many arms, stepped by one call of the compiled simulator; made by `sb3_vec_env`.
+    """Many arms, stepped by one call of the compiled simulator; made by `kinarm.policies.sb3_vec_env`.
 
     Arm i goes through the same episodes as a single environment that is reset with the seed + i, as
     in the ``DummyVecEnv`` of Stable-Baselines3. An episode that ends is replaced at once.
@@ -41,7 +41,7 @@ class SB3VecEnv(VecEnv):
     spec : EnvSpec, optional
         Of the single environment, if it is registered.
     render_mode, **picture
-        As for `ReachEnv`: mode, ``width``, ``height`` and ``camera`` of pictures.
+        As for `kinarm.ReachEnv`: mode, ``width``, ``height`` and ``camera`` of pictures.
 
     Notes
     -----
@@ -210,7 +210,7 @@ class SB3VecEnv(VecEnv):
             raise ClosedEnvironmentError("the environment is closed: make another one")
 
     def render(self, mode: str | None = None) -> Any:
-        """Draw the arms, as the render mode says; see `ReachVectorEnv`.
+        """Draw the arms, as the render mode says; see `kinarm.ReachVectorEnv`.
 
         A picture shows all arms side by side, as in every environment of Stable-Baselines3.
 
