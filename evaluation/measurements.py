@@ -159,7 +159,7 @@ def measure_single_env(problem: ReachProblem, repetitions: int) -> Timing:
 
 
 def measure_pictures(simulator: Simulator, policy: Policy, repetitions: int) -> Timing:
-    """Pictures per second of an environment's usual size, on one core; some show a whole episode."""
+    """Pictures per second of an environment's usual size, on one core, with the tool's ways."""
     from kinarm.viewer import Renderer
 
     renderer = Renderer(simulator.problem)
