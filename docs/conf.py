@@ -29,6 +29,7 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx_autodoc_typehints",
     "sphinx_gallery.gen_gallery",
+    "cards",
     "players",
     "tables",
 ]

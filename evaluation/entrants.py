@@ -10,12 +10,14 @@ import numpy as np
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError, UnknownNameError
 from kinarm.evaluation.bounds import oracle_bounds
+from kinarm.evaluation.imported import imported_policy, is_import_path
 from kinarm.evaluation.trials import TrialSet, trial_generator
 from kinarm.networks import Networks
 from kinarm.observation import observation_size
+from kinarm.policies.conversion.vec_normalize import find_vec_normalize
 from kinarm.policies.library import group_of, policy_files, policy_names
 from kinarm.policies.policy import Policy
-from kinarm.problem import ReachProblem
+from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.rollouts import Rollouts
 from kinarm.simulator import PolicyFunction
 
@@ -57,6 +59,12 @@ class Entrant:
     seed: int | None = None
     policy: Policy | None = None
     source: Path | None = None
+
+    @property
+    def note(self) -> str:
+        """What is to be known about it besides, in a line; empty if there is nothing."""
+        statistics = self.policy and self.policy.provenance.config.get("vec_normalize")
+        return f"{self.name}: observations normalised by {statistics}" if statistics else ""
 
     @property
     def problem(self) -> ReachProblem | None:
@@ -160,14 +168,19 @@ ORACLE = Entrant("oracle", _run_oracle, "oracle", "oracle", "oracle")
 UNTRAINED_ENTRANTS = {**BASELINES, ORACLE.name: ORACLE}
 
 
-def find_entrants(name_or_file: str | Path) -> tuple[Entrant, ...]:
+def find_entrants(
+    name_or_file: str | Path, problem: ProblemLike | None = None
+) -> tuple[Entrant, ...]:
     """Find what a name stands for.
 
     Parameters
     ----------
     name_or_file : str or Path
-        A baseline, ``"oracle"``, a shipped policy, a group of them (all training seeds), or a
-        policy file.
+        A baseline, ``"oracle"``, a shipped policy, a group of them (all training seeds), a
+        policy file, a model of Stable-Baselines3 (.zip) or ``"module:function"``. A model and a
+        module run code: open only those that you trust.
+    problem : ReachProblem, str or Path, optional
+        What a model is for, as its file does not say; others say it themselves.
 
     Raises
     ------
@@ -175,17 +188,41 @@ def find_entrants(name_or_file: str | Path) -> tuple[Entrant, ...]:
         If it is none of these.
     PolicyFileError
         If a file cannot be used.
+    InvalidInputError
+        If a model cannot be converted or its problem is not given, or a module cannot be imported.
     """
-    if name_or_file in UNTRAINED_ENTRANTS:
-        return (UNTRAINED_ENTRANTS[str(name_or_file)],)
+    text = str(name_or_file)
+    if text in UNTRAINED_ENTRANTS:
+        return (UNTRAINED_ENTRANTS[text],)
+    if text.endswith(".zip"):
+        return (_model_entrant(Path(text), problem),)
+    if is_import_path(text):
+        return (_imported_entrant(text),)
     try:
         paths = policy_files(name_or_file)
     except UnknownNameError as error:
-        available = (*UNTRAINED_ENTRANTS, *error.available)
+        available = (*UNTRAINED_ENTRANTS, *error.available, "path/to/model.zip", "module:function")
         raise UnknownNameError(error.kind, error.given, available) from None
     return tuple(
         Entrant.from_policy(path.stem, Policy.load(path), path.resolve()) for path in paths
     )
+
+
+def _model_entrant(path: Path, problem: ProblemLike | None) -> Entrant:
+    """A model of Stable-Baselines3, with the statistics that lie beside it."""
+    try:
+        policy = Policy.from_sb3(path, problem, find_vec_normalize(path))
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{str(path)!r}: {error}") from error
+    return Entrant.from_policy(path.stem, policy, path.resolve())
+
+
+def _imported_entrant(name: str) -> Entrant:
+    """A policy, or a function, of a module."""
+    found = imported_policy(name)
+    if isinstance(found, Policy):
+        return Entrant.from_policy(name, found)
+    return Entrant.from_function(name, found)
 
 
 def shipped_entrants() -> tuple[Entrant, ...]:

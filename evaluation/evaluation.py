@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.entrants import Entrant, find_entrants
+from kinarm.evaluation.imported import Predictor, policy_function
 from kinarm.evaluation.metrics import Outcomes, estimate_metrics
 from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.trials import TrialSet
@@ -93,6 +94,7 @@ class Evaluation:
         """Figures of merit and every trial, as a dictionary that JSON can hold."""
         return {
             **_row_head(self.entrant.name, self, self.metrics, training_seed=self.entrant.seed),
+            "note": self.entrant.note,
             "outcomes": {
                 "final_distance": self.rollouts.distance.tolist(),
                 "steps": self.rollouts.steps.tolist(),
@@ -185,7 +187,7 @@ def _summary(name: str, trials: TrialSet, success: Estimate) -> str:
 
 
 def evaluate(
-    policy: str | Path | Policy | Entrant | PolicyFunction,
+    policy: str | Path | Policy | Entrant | PolicyFunction | Predictor,
     problem: ProblemLike | None = None,
     trials: int = 200,
     seed: int = 0,
@@ -198,9 +200,10 @@ def evaluate(
 
     Parameters
     ----------
-    policy : str, Path, Policy, Entrant or function
-        A shipped policy, a baseline or the oracle by name (a group's first seed), a file, a
-        policy, or a function from observations (n, n_observations) to actions (n, n_actions).
+    policy : str, Path, Policy, Entrant, function or predictor
+        What `find_entrants` finds by a name or file (a group's first seed); a policy; a function
+        from observations (n, n_observations) to actions (n, n_actions); or something with a
+        method ``predict`` as models of Stable-Baselines3 have it.
     problem : ReachProblem, str or Path, optional
         What it faces; by default the problem that the policy was trained for.
     trials : int
@@ -221,7 +224,7 @@ def evaluate(
     PolicyFileError
         If the policy cannot be read, was trained for another arm, or does not fit this one.
     """
-    entrant = _entrant_of(policy)
+    entrant = _entrant_of(policy, problem)
     faced = problem if problem is not None else entrant.problem
     if faced is None:
         raise InvalidInputError(f"{entrant.name!r} was not trained for a problem: name one")
@@ -229,15 +232,18 @@ def evaluate(
     return run_trials(entrant, trial_set, allow_other_arm, oracle=oracle)
 
 
-def _entrant_of(policy: str | Path | Policy | Entrant | PolicyFunction) -> Entrant:
+def _entrant_of(
+    policy: str | Path | Policy | Entrant | PolicyFunction | Predictor, problem: ProblemLike | None
+) -> Entrant:
     if isinstance(policy, Entrant):
         return policy
     if isinstance(policy, Policy):
         made = policy.provenance
         return Entrant.from_policy(f"{made.algorithm}-{made.recipe}-{policy.problem.name}", policy)
     if isinstance(policy, str | Path):
-        return find_entrants(policy)[0]
-    return Entrant.from_function(getattr(policy, "__name__", "function"), policy)
+        return find_entrants(policy, problem)[0]
+    name = getattr(policy, "__name__", None) or type(policy).__name__
+    return Entrant.from_function(name, policy_function(policy, name))
 
 
 def run_trials(

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+import gymnasium
 import numpy as np
 
 from kinarm._parallel import available_threads
@@ -24,6 +25,7 @@ from kinarm.policies.oracle import Oracle
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.policies.recipes import recipe
+from kinarm.policies.sb3.environment import sb3_vec_env
 from kinarm.problem import ReachProblem
 from kinarm.reference import ReferenceSimulator
 from kinarm.simulator import Simulator
@@ -33,6 +35,7 @@ HEADLINE_BATCH = 512
 """Batch whose trained rollouts on all threads are compared with the reference path."""
 VECTOR_ENVS = 64
 VECTOR_STEPS, SINGLE_STEPS = 200, 2000
+DUMMY_STEPS = 20
 PICTURES = 40
 ORACLE_TRIALS = 200
 REFERENCE_TRIALS = 24
@@ -69,6 +72,7 @@ def measure(policy_name: str, repetitions: int, *, ppo: bool = False) -> dict[st
         "speed_up_over_reference": fast["steps_per_second"]["median"] / reference.median,
         "vector_environment": measure_vector_env(problem, repetitions)._asdict(),
         "single_environment": measure_single_env(problem, repetitions)._asdict(),
+        "stable_baselines3": measure_sb3(problem, repetitions),
         "pictures": measure_pictures(simulator, policy, repetitions)._asdict(),
         "table_1_training": measure_training(problem, few),
         "oracle": measure_oracle(problem, few),
@@ -156,6 +160,41 @@ def measure_single_env(problem: ReachProblem, repetitions: int) -> Timing:
         return SINGLE_STEPS
 
     return timed(run, repetitions)
+
+
+def measure_sb3(problem: ReachProblem, repetitions: int) -> dict[str, Any]:
+    """Steps per second of `sb3_vec_env`, and of single environments in their ``DummyVecEnv``.
+
+    Where Stable-Baselines3 is missing, ``skipped`` says so.
+    """
+    try:
+        native = sb3_vec_env(problem, VECTOR_ENVS, seed=0)
+    except MissingExtraError as error:
+        return {"skipped": str(error)}
+    from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
+
+    def make() -> gymnasium.Env[Any, Any]:
+        return gymnasium.make("kinarm/ReachRight-v0", problem=problem, observation_dtype=np.float32)
+
+    def rate(env: VecEnv, steps: int) -> Timing:
+        env.reset()
+        shape = (steps, VECTOR_ENVS, native.simulator.n_actions)
+        actions = np.random.default_rng(0).uniform(-1, 1, shape).astype(np.float32)
+
+        def run() -> int:
+            for action in actions:
+                env.step(action)
+            return steps * VECTOR_ENVS
+
+        return timed(run, repetitions)
+
+    batch = rate(native, VECTOR_STEPS)
+    dummy = rate(DummyVecEnv([make] * VECTOR_ENVS), DUMMY_STEPS)
+    return {
+        "native": batch._asdict(),
+        "dummy": dummy._asdict(),
+        "speed_up": batch.median / dummy.median,
+    }
 
 
 def measure_pictures(simulator: Simulator, policy: Policy, repetitions: int) -> Timing:

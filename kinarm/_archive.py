@@ -89,7 +89,9 @@ def load_archive(path: str | Path, kind: str, version: int, error: type[KinarmEr
 
 
 @contextmanager
-def reading(name: str, kind: str, error: type[KinarmError]) -> Iterator[None]:
+def reading(
+    name: str, kind: str, error: type[KinarmError], *, of: str = "kinarm"
+) -> Iterator[None]:
     """Turn what reading a damaged file raises, or making something of it, into one line.
 
     The name of the file comes quoted; errors of the given type pass as they are.
@@ -101,4 +103,4 @@ def reading(name: str, kind: str, error: type[KinarmError]) -> Iterator[None]:
     except OSError as problem:
         raise error(f"cannot read {kind} {name}: {problem.strerror}") from problem
     except Exception as problem:  # a damaged file can raise anything
-        raise error(f"{name} is not a complete kinarm {kind}: {first_line(problem)}") from problem
+        raise error(f"{name} is not a complete {of} {kind}: {first_line(problem)}") from problem

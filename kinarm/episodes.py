@@ -12,7 +12,7 @@ RUNNING, PAUSED, SUCCESS, COLLISION, TRUNCATED = range(5)
 """States of an episode."""
 
 
-LINEAR, TANH, RELU = range(3)
+LINEAR, TANH, RELU, HARDTANH, ELU, LEAKY_RELU, SILU = range(7)
 """Activation functions of networks."""
 
 
@@ -51,8 +51,8 @@ class Control(NamedTuple):
         Layer after layer, the weights (inputs x outputs) and then the bias.
     policy : ndarray of int, shape (n_episodes,)
         Which row of ``weights`` an episode uses.
-    activation, output : int
-        Function between layers and after the last one, whose values are then clipped.
+    activations : ndarray of int, shape (n_layers,)
+        Function after each layer; the last one's values are then clipped.
     observation_signs, action_signs : ndarray, shape (n_observations,) and (n_actuated,), or (0,)
         The reflection by which the networks see goals on the left, if they do.
     side : int
@@ -64,8 +64,7 @@ class Control(NamedTuple):
     layers: NDArray[np.int64]
     weights: NDArray[np.float64]
     policy: NDArray[np.int64]
-    activation: int
-    output: int
+    activations: NDArray[np.int64]
     observation_signs: NDArray[np.float64]
     action_signs: NDArray[np.float64]
     side: int

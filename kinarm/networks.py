@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._validation import finite_array
-from kinarm.episodes import LINEAR, RELU, TANH, Control
+from kinarm.episodes import ELU, HARDTANH, LEAKY_RELU, LINEAR, RELU, SILU, TANH, Control
 from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.kernels.network import LEAK
 from kinarm.observation import GOAL_SIDE
 
 
@@ -27,11 +28,23 @@ ACTIVATIONS: dict[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
     "linear": lambda values: values,
     "tanh": np.tanh,
     "relu": lambda values: np.maximum(values, 0.0),
+    "hardtanh": lambda values: np.clip(values, -1.0, 1.0),
+    "elu": lambda values: np.where(values < 0, np.expm1(np.minimum(values, 0.0)), values),
+    "leaky_relu": lambda values: np.where(values < 0, LEAK * values, values),
+    "silu": lambda values: values * (0.5 + 0.5 * np.tanh(0.5 * values)),
 }
 """Activation functions by name, as the kernels apply them."""
 
-Activation = Literal["linear", "tanh", "relu"]
-ACTIVATION_CODES = {"linear": LINEAR, "tanh": TANH, "relu": RELU}
+Activation = Literal["linear", "tanh", "relu", "hardtanh", "elu", "leaky_relu", "silu"]
+ACTIVATION_CODES = {
+    "linear": LINEAR,
+    "tanh": TANH,
+    "relu": RELU,
+    "hardtanh": HARDTANH,
+    "elu": ELU,
+    "leaky_relu": LEAKY_RELU,
+    "silu": SILU,
+}
 
 
 class Mirror(NamedTuple):
@@ -69,8 +82,10 @@ class Networks:
         Widths, from the observation to the action.
     weights : ndarray, shape (n_networks, n_parameters)
         Per network, layer after layer: weights (inputs x outputs, row by row), then the bias.
-    activation, output : {"linear", "tanh", "relu"}
-        Function between the layers, and after the last one before the clip.
+    activations : tuple of str
+        Function after each layer, the last one before the clip: ``"linear"``, ``"tanh"``,
+        ``"relu"``, ``"hardtanh"``, ``"elu"``, ``"leaky_relu"`` or ``"silu"``; by default tanh
+        between the layers and none after the last.
     mirror : Mirror or None
         Reflection in which the networks see goals on the left, and act; None if they see all
         goals as they are.
@@ -78,13 +93,13 @@ class Networks:
     Raises
     ------
     InvalidInputError
-        If the number of parameters does not fit the widths, or one is not finite.
+        If the number of parameters or of functions does not fit the widths, or a parameter is not
+        finite.
     """
 
     layers: NDArray[np.int64]
     weights: NDArray[np.float64]
-    activation: Activation = "tanh"
-    output: Activation = "linear"
+    activations: tuple[Activation, ...] = ()
     mirror: Mirror | None = None
 
     def __post_init__(self) -> None:
@@ -95,7 +110,8 @@ class Networks:
         object.__setattr__(self, "layers", widths.astype(np.int64))
         weights = finite_array("weights", self.weights, (None, n_parameters))
         object.__setattr__(self, "weights", weights)
-        check_activations(self.activation, self.output)
+        activations = checked_activations(self.activations, len(widths) - 1)
+        object.__setattr__(self, "activations", activations)
 
     def __repr__(self) -> str:
         widths = "-".join(map(str, self.layers.tolist()))
@@ -148,7 +164,7 @@ class Networks:
     def form(self) -> tuple[object, ...]:
         """Everything but the weights, to compare."""
         signs = () if self.mirror is None else (tuple(part.tolist()) for part in self.mirror)
-        return tuple(self.layers.tolist()), self.activation, self.output, tuple(signs)
+        return tuple(self.layers.tolist()), self.activations, tuple(signs)
 
 
 def network_control(
@@ -188,8 +204,7 @@ def network_control(
         layers=networks.layers,
         weights=networks.weights,
         policy=index.astype(np.int64),
-        activation=ACTIVATION_CODES[networks.activation],
-        output=ACTIVATION_CODES[networks.output],
+        activations=np.array([ACTIVATION_CODES[name] for name in networks.activations]),
     )
     if networks.mirror is None:
         return control
@@ -204,8 +219,7 @@ def table_control(actions: NDArray[np.float64]) -> Control:
         layers=np.zeros(0, dtype=np.int64),
         weights=np.zeros((0, 0)),
         policy=np.zeros(0, dtype=np.int64),
-        activation=LINEAR,
-        output=LINEAR,
+        activations=np.zeros(0, dtype=np.int64),
         observation_signs=np.zeros(0),
         action_signs=np.zeros(0),
         side=GOAL_SIDE,
@@ -213,14 +227,24 @@ def table_control(actions: NDArray[np.float64]) -> Control:
     )
 
 
-def check_activations(*names: str) -> None:
-    """Refuse unknown activation functions.
+def checked_activations(given: Sequence[Activation], n_layers: int) -> tuple[Activation, ...]:
+    """The functions after some layers: those given, or the usual ones if none are.
 
     Raises
     ------
     UnknownNameError
         If there is no such function.
+    InvalidInputError
+        If there is not one for each layer.
     """
-    for name in names:
+    for name in given:
         if name not in ACTIVATION_CODES:
-            raise UnknownNameError("activation function", name, get_args(Activation))
+            raise UnknownNameError("activation function", str(name), get_args(Activation))
+    if not given:
+        between: tuple[Activation, ...] = ("tanh",)
+        return (*between * (n_layers - 1), "linear")
+    if len(given) != n_layers:
+        raise InvalidInputError(
+            f"expected an activation function for each of {n_layers} layers, got {len(given)}"
+        )
+    return tuple(given)

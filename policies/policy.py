@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,13 +15,14 @@ from kinarm._archive import load_archive, reading, save_archive
 from kinarm._validation import finite_array
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError
-from kinarm.networks import ACTIVATIONS, Activation, Mirror, Networks, check_activations
+from kinarm.networks import ACTIVATIONS, Activation, Mirror, Networks, checked_activations
 from kinarm.observation import observation_layout
+from kinarm.policies.goal_observation import flat_observation
 from kinarm.policies.normalizer import fold_normalizer, input_scale
 from kinarm.policies.provenance import Provenance
-from kinarm.problem import ReachProblem
+from kinarm.problem import ProblemLike, ReachProblem
 
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 
 
 class Layer(NamedTuple):
@@ -50,8 +52,10 @@ class Policy:
         From the observation to the action.
     provenance : Provenance
         Where it comes from, and the problem that it was made for.
-    activation, output : {"linear", "tanh", "relu"}
-        Function between the layers, and after the last one before the clip.
+    activations : tuple of str
+        Function after each layer, the last one before the clip: ``"linear"``, ``"tanh"``,
+        ``"relu"``, ``"hardtanh"``, ``"elu"``, ``"leaky_relu"`` or ``"silu"``; by default tanh
+        between the layers and none after the last.
     mirror : Mirror, optional
         Reflection in which it sees goals on the left, and acts.
 
@@ -65,14 +69,13 @@ class Policy:
     std: NDArray[np.float64]
     layers: tuple[Layer, ...]
     provenance: Provenance
-    activation: Activation = "tanh"
-    output: Activation = "linear"
+    activations: tuple[Activation, ...] = ()
     mirror: Mirror | None = None
 
     def __post_init__(self) -> None:
-        check_activations(self.activation, self.output)
         if not self.layers:
             raise InvalidInputError("a policy needs at least one layer")
+        activations = checked_activations(self.activations, len(self.layers))
         mean = finite_array("mean", self.mean, (None,))
         std = finite_array("std", self.std, mean.shape)
         if (std < 0).any():
@@ -95,13 +98,15 @@ class Policy:
         object.__setattr__(self, "mean", mean)
         object.__setattr__(self, "std", std)
         object.__setattr__(self, "layers", tuple(layers))
+        object.__setattr__(self, "activations", activations)
         object.__setattr__(self, "mirror", mirror)
 
     def __repr__(self) -> str:
         made, widths = self.provenance, "-".join(str(len(layer.bias)) for layer in self.layers)
+        seed = "" if made.seed is None else f"seed {made.seed}, "
         return (
-            f"Policy({made.algorithm} {made.recipe}, problem {self.problem.name!r}, seed "
-            f"{made.seed}, layers {self.n_observations}-{widths})"
+            f"Policy({made.algorithm} {made.recipe}, problem {self.problem.name!r}, {seed}layers "
+            f"{self.n_observations}-{widths})"
         )
 
     @property
@@ -139,12 +144,47 @@ class Policy:
         if self.mirror is not None:
             left, x = self.mirror.on_the_left(x), self.mirror.from_the_right(x)
         x = (x - self.mean) * input_scale(self.std)
-        for number, layer in enumerate(self.layers):
-            x = (ACTIVATIONS[self.activation](x) if number else x) @ layer.weights.T + layer.bias
-        actions = np.clip(ACTIVATIONS[self.output](x), -1.0, 1.0)
+        for layer, activation in zip(self.layers, self.activations, strict=True):
+            x = ACTIVATIONS[activation](x @ layer.weights.T + layer.bias)
+        actions = np.clip(x, -1.0, 1.0)
         if self.mirror is not None:
             actions = np.where(left[:, None], actions * self.mirror.actions, actions)
         return actions[0] if given.ndim == 1 else actions
+
+    def predict(
+        self,
+        observation: ArrayLike | Mapping[str, ArrayLike],
+        state: Any = None,
+        episode_start: Any = None,  # noqa: ARG002
+        deterministic: bool = True,  # noqa: ARG002
+    ) -> tuple[NDArray[np.float64], Any]:
+        """Choose actions, as models of Stable-Baselines3 do.
+
+        Parameters
+        ----------
+        observation : array_like or mapping
+            One observation or several, as for a call; or, of the goal-conditioned environments,
+            a dictionary of ``observation``, ``achieved_goal`` and ``desired_goal``.
+        state : object
+            Given back as it is: policies have no memory.
+        episode_start, deterministic
+            Of no effect: policies neither remember nor draw.
+
+        Returns
+        -------
+        actions : ndarray, shape (n_actions,) or (n, n_actions)
+            Fractions of the velocity limits in [-1, 1].
+        state : object
+            The state that was given.
+
+        Raises
+        ------
+        InvalidInputError
+            If the observation has another shape or other keys, or an entry is not finite.
+        """
+        if isinstance(observation, Mapping):
+            observation = flat_observation(observation, self.n_observations)
+        return self(observation), state
 
     @cached_property
     def _networks(self) -> Networks:
@@ -152,12 +192,96 @@ class Policy:
         layers = (first, *self.layers[1:])
         flat = [part for weights, bias in layers for part in (weights.T.reshape(-1), bias)]
         widths = [self.n_observations, *(len(layer.bias) for layer in layers)]
-        form = (self.activation, self.output, self.mirror)
-        return Networks(np.array(widths, dtype=np.int64), np.concatenate(flat)[None], *form)
+        weights = np.concatenate(flat)[None]
+        return Networks(np.array(widths), weights, self.activations, self.mirror)
 
     def networks(self) -> Networks:
         """The policy in the form that the compiled simulator runs, normaliser folded in."""
         return self._networks
+
+    @classmethod
+    def from_sb3(
+        cls,
+        model: Any,
+        problem: ProblemLike | None = None,
+        vec_normalize: Any = None,
+    ) -> Policy:
+        """Convert a model of Stable-Baselines3 or sb3-contrib: its deterministic actions.
+
+        The model computes in float32, the policy with the same numbers in float64; their actions
+        agree to about 1e-6.
+
+        Parameters
+        ----------
+        model : BaseAlgorithm, str or Path
+            PPO, A2C, SAC, TD3, DDPG or TQC with ``MlpPolicy`` or ``MultiInputPolicy``, or the file
+            that its ``save`` wrote. Loading a file runs code in it: open only files that you
+            trust.
+        problem : ReachProblem, str or Path, optional
+            The problem that it is for; by default that of the model's environment.
+        vec_normalize : VecNormalize, str or Path, optional
+            What normalises its observations, or the file of it; by default what the model's
+            environment is wrapped in.
+
+        Raises
+        ------
+        InvalidInputError
+            If it cannot be converted, with the reason: it is recurrent, computes features, has
+            other activation functions, or other observations or actions than the arm; or if
+            nothing tells the problem.
+        PolicyFileError
+            If a file cannot be read, or is something else.
+        MissingExtraError
+            If Stable-Baselines3 is not installed.
+        """
+        from kinarm.policies.conversion.sb3 import policy_from_sb3
+
+        return policy_from_sb3(model, problem, vec_normalize)
+
+    @classmethod
+    def from_torch(
+        cls,
+        module: Any,
+        problem: ProblemLike,
+        *,
+        mean: ArrayLike | None = None,
+        std: ArrayLike | None = None,
+        name: str = "torch",
+        environment_steps: int = 0,
+        seed: int | None = None,
+    ) -> Policy:
+        """Convert a feed-forward network of PyTorch, which maps observations to actions.
+
+        Parameters
+        ----------
+        module : nn.Module
+            A ``Sequential`` of ``Linear`` and activation functions; it can be nested.
+        problem : ReachProblem, str or Path
+            The problem that it is for.
+        mean, std : array_like, shape (n_observations,), optional
+            Statistics by which its inputs are normalised; without them they are not.
+        name : str
+            Name of the algorithm that trained it, for tables.
+        environment_steps, seed
+            Steps and seed of the training, for the record.
+
+        Raises
+        ------
+        InvalidInputError
+            If it holds a module that cannot be converted, or does not fit the problem's arm.
+        MissingExtraError
+            If PyTorch is not installed.
+        """
+        from kinarm.policies.conversion.torch_modules import policy_from_torch
+
+        return policy_from_torch(
+            *(module, problem),
+            mean=mean,
+            std=std,
+            name=name,
+            environment_steps=environment_steps,
+            seed=seed,
+        )
 
     def check_arm(self, arm: Arm) -> None:
         """Refuse an arm other than the one that the policy was trained for.
@@ -185,8 +309,7 @@ class Policy:
         header = {
             "provenance": self.provenance.to_json(),
             "observation": observation_layout(),
-            "activation": self.activation,
-            "output": self.output,
+            "activations": list(self.activations),
         }
         arrays = {"mean": self.mean, "std": self.std}
         for number, layer in enumerate(self.layers):
@@ -223,7 +346,6 @@ class Policy:
                     for number in range(n_layers)
                 ),
                 provenance=Provenance.from_json(header["provenance"]),
-                activation=header["activation"],
-                output=header["output"],
+                activations=tuple(header["activations"]),
                 mirror=Mirror(*(arrays[name] for name in signs)) if mirrored else None,
             )

@@ -15,7 +15,7 @@ from kinarm.problem import ReachProblem
 
 RECORDED_PACKAGES = (
     *("kinarm", "numpy", "numba", "pin", "coal", "gymnasium", "scipy"),
-    *("torch", "stable-baselines3"),
+    *("torch", "stable-baselines3", "sb3-contrib"),
 )
 
 
@@ -31,8 +31,8 @@ class Provenance:
         Name of the settings that it was trained with.
     problem : ReachProblem
         The problem that it is for, with the hash of its arm.
-    seed : int
-        Seed of the training.
+    seed : int, optional
+        Seed of the training, if it had one.
     environment_steps : int
         Steps that the training took.
     config : dict
@@ -46,7 +46,7 @@ class Provenance:
     algorithm: str
     recipe: str
     problem: ReachProblem
-    seed: int
+    seed: int | None = None
     environment_steps: int
     config: dict[str, Any] = field(default_factory=dict)
     versions: dict[str, str] = field(default_factory=dict)

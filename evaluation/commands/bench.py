@@ -92,6 +92,7 @@ def _rows(document: dict[str, Any]) -> Iterator[tuple[str, ...]]:
     yield ()
     yield f"batch environment, {VECTOR_ENVS} arms", *_rates(document["vector_environment"])
     yield "single environment", *_rates(document["single_environment"])
+    yield from _sb3_rows(document["stable_baselines3"])
     yield "reference path (Pinocchio + Coal)", *_rates(document["reference"])
     pictures = (f"{document['pictures'][name]:,.0f} pictures/s" for name in RATES)
     yield "pictures, 480 x 360, one thread", *pictures
@@ -110,6 +111,19 @@ def _rows(document: dict[str, Any]) -> Iterator[tuple[str, ...]]:
     for known, name in (("unknown", "seconds_without_bounds"), ("known", "seconds")):
         what = f"kinarm-eval --trials 200, bounds {known}"
         yield what, f"{evaluation[name]:.1f} s", memory
+
+
+def _sb3_rows(rates: dict[str, Any]) -> list[tuple[str, ...]]:
+    """Rows of the environments for Stable-Baselines3."""
+    from kinarm.evaluation.measurements import VECTOR_ENVS
+
+    if "skipped" in rates:
+        return [("for Stable-Baselines3", "skipped"), (rates["skipped"],)]
+    return [
+        (f"for Stable-Baselines3, {VECTOR_ENVS} arms", *_rates(rates["native"])),
+        (f"its DummyVecEnv, {VECTOR_ENVS} single environments", *_rates(rates["dummy"])),
+        ("speed-up over its DummyVecEnv", f"{rates['speed_up']:.0f} x"),
+    ]
 
 
 def _ppo_rows(training: dict[str, Any] | None) -> list[tuple[str, ...]]:

@@ -24,6 +24,9 @@ examples:
   kinarm-eval --trials 200                               all shipped policies and baselines
   kinarm-eval --policy ars-tuned-right --problem right   one recipe, all its training seeds
   kinarm-eval --policy my_policy.npz --out results       your own, with figures and every trial
+  kinarm-eval --policy model.zip --problem right         a model of Stable-Baselines3
+  kinarm-eval --policy my_module:my_policy --problem left   a function of your own
+  kinarm-eval --policy my_policy.npz --card share/mine.md   what to publish beside a policy
   kinarm-eval --trials 200 --report results              a page to look at: results/index.html
 """
 
@@ -46,8 +49,9 @@ class EvaluationRequest(ProblemOptions):
     Parameters
     ----------
     policies : tuple of str
-        Shipped policy, recipe (all its seeds), random, zero, oracle, or .npz file; repeatable;
-        by default all shipped ones, random and zero.
+        Shipped policy, recipe (all its seeds), random, zero, oracle, .npz file,
+        Stable-Baselines3's model.zip (runs its code: only if you trust it), or module:function;
+        repeatable; by default all shipped ones, random and zero.
     problems : tuple of str
         Left, right, both, or a problem file; repeatable. ``problem`` is for a single one.
     trials : int
@@ -64,6 +68,8 @@ class EvaluationRequest(ProblemOptions):
         Folder for evaluation.json and histograms.
     report : Path
         Folder for the report: index.html, one page.
+    card : Path
+        Card of the one policy that is named (.md), with the policy (.npz) and a replay (.html).
     overwrite : bool
         Replace earlier results.
     json : bool
@@ -90,6 +96,7 @@ class EvaluationRequest(ProblemOptions):
     oracle: bool = True
     out: Path | None = field(default=None, metadata={"metavar": "FOLDER"})
     report: Path | None = field(default=None, metadata={"metavar": "FOLDER"})
+    card: Path | None = None
     overwrite: bool = False
     json: bool = False
     markdown: bool = False
@@ -122,6 +129,7 @@ class EvaluationRequest(ProblemOptions):
         """
         from kinarm.evaluation.document import evaluation_document
         from kinarm.evaluation.figures import distance_histograms, save_figure
+        from kinarm.evaluation.report.card import write_card
         from kinarm.evaluation.report.page import write_report
 
         evaluations = self.evaluate(tell)
@@ -129,6 +137,9 @@ class EvaluationRequest(ProblemOptions):
         if self.report is not None:
             tell("writing the report")
             write_report(self.report, document, evaluations)
+        if self.card is not None:
+            tell("writing the card")
+            write_card(self.card, document, evaluations)
         if self.out is not None:
             write_text(self.out / DOCUMENT, json.dumps(document, indent=1))
             shown = [e for e in evaluations if e.entrant.algorithm != "oracle"] or evaluations
@@ -158,7 +169,7 @@ class EvaluationRequest(ProblemOptions):
         arms = {name: Arm.load(problem.arm) for name, problem in problems.items()}
         for entrant, problem in pairs:
             entrant.check(arms[problem.name], allow_other_arm=self.allow_other_arm)
-        self._check_outputs()
+        self._check_outputs(pairs)
         for name, problem in problems.items():
             trials = TrialSet.draw(problem, self.trials, self.seed)
             if self.oracle:
@@ -202,7 +213,9 @@ class EvaluationRequest(ProblemOptions):
         from kinarm.evaluation.entrants import find_entrants, shipped_entrants
 
         if self.policies:
-            named = (entrant for name in self.policies for entrant in find_entrants(name))
+            problems = self._named_problems()
+            only = problems[0] if len(problems) == 1 else None
+            named = (entrant for name in self.policies for entrant in find_entrants(name, only))
             return list({(entrant.name, entrant.source): entrant for entrant in named}.values())
         return [
             entrant
@@ -238,8 +251,12 @@ class EvaluationRequest(ProblemOptions):
         """A problem with the changes that the options make of any."""
         return replace(self, problem=None, task=None).resolve(problem)
 
-    def _check_outputs(self) -> None:
-        """See that the files can be written."""
+    def _check_outputs(self, pairs: Sequence[Pair]) -> None:
+        """See that the files can be written, and that there is one policy for a card."""
+        from kinarm.evaluation.report.card import check_card
+
+        if self.card is not None:
+            check_card(self.card, pairs, overwrite=self.overwrite)
         if self.report is not None:
             check_output(self.report / REPORT, overwrite=self.overwrite)
         if self.out is not None:
@@ -279,6 +296,9 @@ def _report(request: EvaluationRequest, command: str) -> None:
         console.print(f"written: {request.out / DOCUMENT} and histograms", style="dim")
     if request.report is not None:
         console.print(f"written: {request.report / REPORT}", style="dim")
+    if request.card is not None:
+        beside = f"{request.card.stem}.npz and {request.card.stem}.html"
+        console.print(f"written: {request.card}, {beside}", style="dim")
 
 
 def _footnote(document: dict[str, Any]) -> str:
@@ -299,6 +319,7 @@ def _footnote(document: dict[str, Any]) -> str:
         )
     hashes = (f"{problem} {entry['trial_set_hash']}" for problem, entry in problems)
     lines.append(f"trial sets: {', '.join(hashes)}")
+    lines += dict.fromkeys(row["note"] for row in document["results"] if row["note"])
     return "\n".join(lines)
 
 

@@ -8,6 +8,7 @@ from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.document import EvaluationDocument
 from kinarm.evaluation.entrants import Entrant, find_entrants
+from kinarm.evaluation.imported import is_import_path
 from kinarm.evaluation.replays.recorder import record
 from kinarm.evaluation.replays.request import ReplayRequest
 from kinarm.evaluation.trials import TrialSet
@@ -38,8 +39,10 @@ class Candidates:
     played: int
 
 
-def first_entrant(name: str | None) -> Entrant:
+def first_entrant(name: str | None, problem: ReachProblem | None = None) -> Entrant:
     """The entrant of a name; of a group, its first seed.
+
+    Where the entrant does not say which problem it is for, it is this one.
 
     Raises
     ------
@@ -48,7 +51,7 @@ def first_entrant(name: str | None) -> Entrant:
     """
     if name is None:
         raise InvalidInputError("name a --policy, or a file of recordings or of an evaluation")
-    return find_entrants(name)[0]
+    return find_entrants(name, problem)[0]
 
 
 def faced_problem(entrants: Sequence[Entrant], options: ProblemOptions) -> ReachProblem:
@@ -65,6 +68,12 @@ def faced_problem(entrants: Sequence[Entrant], options: ProblemOptions) -> Reach
     return options.resolve(trained[0] if trained else "right")
 
 
+def stated_problem(options: ProblemOptions) -> ReachProblem | None:
+    """The problem that options name, if they name one."""
+    named = options.problem is not None or options.task is not None
+    return options.resolve() if named else None
+
+
 def find_candidates(request: ReplayRequest) -> Candidates:
     """Make or read the recordings to choose from."""
     names = request.compare or (request.policy,)
@@ -77,7 +86,7 @@ def find_candidates(request: ReplayRequest) -> Candidates:
 
 def _fresh_candidates(request: ReplayRequest, names: Sequence[str | None]) -> Candidates:
     """Let policies face trials that are drawn now."""
-    entrants = [first_entrant(name) for name in names]
+    entrants = [first_entrant(name, stated_problem(request)) for name in names]
     searched = request.trial or request.worst or request.collisions
     count = request.trials or (SEARCHED if searched else PLAYED)
     trials = TrialSet.draw(faced_problem(entrants, request), count, request.seed or 0)
@@ -93,8 +102,9 @@ def _evaluated_candidates(
     runs: Runs = []
     for name in names:
         entrant = None
-        if name is not None and Path(name).suffix == ".npz":
-            entrant = first_entrant(name)
+        if name is not None and (Path(name).suffix in (".npz", ".zip") or is_import_path(name)):
+            faced = problem or next(iter(document.protocol["problems"]))
+            entrant = first_entrant(name, document.problem(faced))
         row = document.result(entrant.name if entrant else name, problem)
         problem, trials = row["problem"], document.trials(row["problem"])
         recordings = record(entrant or first_entrant(row["policy"]), trials, allow_other_arm=True)

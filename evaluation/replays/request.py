@@ -36,7 +36,8 @@ class ReplayRequest(ProblemOptions):
     source : Path
         File to take trials from: evaluation.json of kinarm-eval, or recordings (.npz).
     policy : str
-        Shipped policy or recipe (its first seed), random, zero, oracle, or .npz file.
+        Shipped policy or recipe (its first seed), random, zero, oracle, .npz file,
+        Stable-Baselines3's model.zip (runs its code: only if you trust it), or module:function.
     compare : tuple of str
         Two policies on the same trials, the second as a ghost.
     trial : tuple of int
@@ -168,6 +169,9 @@ class ReplayRequest(ProblemOptions):
         if self.record is not None:
             save_recordings(self.record, [recording for run in runs for recording in run])
         page.save(out)
+        for note in dict.fromkeys(normalization_note(run[0]) for run in runs):
+            if note:
+                report(note)
         for trial in zip(*runs, strict=True):
             for recording in trial:
                 report(described(recording))
@@ -176,12 +180,16 @@ class ReplayRequest(ProblemOptions):
 
     def _serve(self, report: Callable[[str], object]) -> None:
         """Serve fresh trials until this is interrupted."""
-        from kinarm.evaluation.replays.candidates import faced_problem, first_entrant
+        from kinarm.evaluation.replays.candidates import (
+            faced_problem,
+            first_entrant,
+            stated_problem,
+        )
         from kinarm.evaluation.replays.following import follow, fresh_recordings
         from kinarm.simulator import Simulator
         from kinarm.viewer.live_server import PORT, LiveServer
 
-        entrant = first_entrant(self.policy)
+        entrant = first_entrant(self.policy, stated_problem(self))
         simulator = Simulator(faced_problem([entrant], self))
         entrant.check(simulator.arm, allow_other_arm=self.allow_other_arm)
         fresh = fresh_recordings(entrant, simulator, self.seed or 0)
@@ -196,6 +204,13 @@ class ReplayRequest(ProblemOptions):
                 webbrowser.open(server.address)
             for recording in follow(server, simulator, recordings):
                 report(described(recording))
+
+
+def normalization_note(recording: "Recording") -> str:
+    """Which file normalised what a policy saw, in a line; empty if none did."""
+    policy = recording.provenance.get("policy") or {}
+    statistics = policy.get("config", {}).get("vec_normalize")
+    return f"{recording.policy}: observations normalised by {statistics}" if statistics else ""
 
 
 def described(recording: "Recording") -> str:

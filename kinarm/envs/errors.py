@@ -11,3 +11,10 @@ class ResetNeededError(InvalidInputError, gymnasium.error.ResetNeeded):
 
 class ClosedEnvironmentError(InvalidInputError, gymnasium.error.ClosedEnvironmentError):
     """An environment was used after it was closed."""
+
+
+class UnexpectedArgumentError(InvalidInputError, TypeError):
+    """An environment cannot be made with an argument of this name.
+
+    As everywhere in Python it is a TypeError, by which libraries that try arguments go.
+    """

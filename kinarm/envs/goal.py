@@ -23,7 +23,7 @@ class ReachGoalEnv(ReachEnv):
         -1 for every step that does not reach the goal and 0 for the one that does, or minus the
         distance [m].
     **settings
-        As for `ReachEnv`; the problem's own reward has no effect.
+        As for `ReachEnv`; of the problem's own reward, ``collision`` alone has an effect.
 
     Notes
     -----
@@ -31,9 +31,10 @@ class ReachGoalEnv(ReachEnv):
     depend on the goal (orientations and positions of the joint frames, 42 numbers for the shipped
     arms); ``achieved_goal``, the tool point x, y, z [m]; ``desired_goal``, the goal x, y, z [m].
 
-    **Reward**: follows from the goals alone: ``compute_reward(achieved_goal, desired_goal, info)``
-    gives it for one pair of goals or for many, as hindsight replay asks for. So do
-    ``compute_terminated`` and ``compute_truncated``.
+    **Reward**: that of the reward type, and the problem's ``collision`` (-1 by default) where a
+    move was refused. ``compute_reward(achieved_goal, desired_goal, info)`` gives it for one pair of
+    goals or for many, as hindsight replay asks for; it follows from the goals, and from
+    ``info["collision"]``. ``compute_terminated`` and ``compute_truncated`` follow from the goals.
 
     **End**: terminated when the tool is within the tolerance of the goal; truncated at the
     horizon. A move that would touch something is refused and the arm stays where it is, but the

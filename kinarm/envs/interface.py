@@ -3,6 +3,7 @@
 The single environment, the native batch and the one for Stable-Baselines3 share an interface.
 """
 
+from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple, Protocol, cast, get_args
 
 import numpy as np
@@ -87,10 +88,10 @@ class FlatInterface:
 
 
 class GoalInterface:
-    """Goals as a dictionary, and rewards that follow from goals alone.
+    """Goals as a dictionary, and rewards that can be computed for other goals than the one pursued.
 
-    A move that would touch something is refused, and the episode goes on: so rewards can be
-    computed for other goals than the one pursued, and giving up is never worth while.
+    A move that would touch something is refused, at the price of the problem's reward for a
+    collision, and the episode goes on: so giving up is never worth while.
 
     Parameters
     ----------
@@ -122,7 +123,7 @@ class GoalInterface:
             )
         self._dtype = checked_dtype(dtype)
         self._sparse, self._tolerance = reward_type == "sparse", simulator.task.tolerance
-        self._horizon = simulator.task.horizon
+        self._horizon, self._collision = simulator.task.horizon, simulator.task.reward.collision
         n_joints = simulator.arm.n_joints
         self._places = part_slices(n_joints)
         parts = [self._places[part.name] for part in OBSERVATION if not part.of_goal]
@@ -158,14 +159,15 @@ class GoalInterface:
             episodes.slack[rows] = 0.0  # what it was spent on did not happen
             truncated = truncated | (episodes.status == TRUNCATED) & result.collision
         shown = self.observe(episodes.observation)
-        reward = self.compute_reward(shown["achieved_goal"], shown["desired_goal"], {})
+        goals, info = (
+            (shown["achieved_goal"], shown["desired_goal"]),
+            {"collision": result.collision},
+        )
+        reward = self.compute_reward(*goals, info)
         return Verdict(reward, result.success, truncated)
 
     def compute_reward(
-        self,
-        achieved_goal: ArrayLike,
-        desired_goal: ArrayLike,
-        info: object,  # noqa: ARG002
+        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
     ) -> Array:
         """Reward of having achieved one goal while another was desired.
 
@@ -173,17 +175,16 @@ class GoalInterface:
         ----------
         achieved_goal, desired_goal : array_like, shape (..., 3)
             Tool point and goal [m].
-        info : object
-            Not needed.
+        info : mapping or sequence of mapping
+            That of the step, or one for each: whether there was a ``collision``.
 
         Returns
         -------
         ndarray, shape (...)
         """
         distance = _distances(achieved_goal, desired_goal)
-        if not self._sparse:
-            return -distance
-        return np.where(distance <= self._tolerance, 0.0, -1.0)
+        reached = np.where(distance <= self._tolerance, 0.0, -1.0) if self._sparse else -distance
+        return reached + self._collision * _collisions(info)
 
     def compute_terminated(
         self,
@@ -219,6 +220,13 @@ def checked_dtype(dtype: DTypeLike) -> np.dtype[Any]:
     if name not in DTYPES:
         raise InvalidInputError(f"observation_dtype must be one of {list(DTYPES)}, got {dtype!r}")
     return np.dtype(name)
+
+
+def _collisions(info: Any) -> NDArray[np.bool_]:
+    """Whether infos tell of a collision; one of a step, of a batch, or a sequence of them."""
+    if isinstance(info, Mapping):
+        return np.asarray(info.get("collision", False))
+    return np.array([each.get("collision", False) for each in info], dtype=bool)
 
 
 def _distances(first: ArrayLike, second: ArrayLike) -> Array:

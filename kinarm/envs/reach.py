@@ -10,12 +10,16 @@ from gymnasium.spaces import Box, Space
 from numpy.typing import DTypeLike, NDArray
 
 from kinarm._validation import finite_array
-from kinarm.envs.errors import ClosedEnvironmentError, ResetNeededError
+from kinarm.envs.errors import (
+    ClosedEnvironmentError,
+    ResetNeededError,
+    UnexpectedArgumentError,
+)
 from kinarm.envs.interface import FlatInterface, Interface, Observations
 from kinarm.envs.portable import portable_spec
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
 from kinarm.episodes import COLLISION, RUNNING, SUCCESS, TRUNCATED, Episodes
-from kinarm.errors import InvalidInputError
+from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.observation import observation_table
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.rollouts import StepResult
@@ -30,7 +34,14 @@ def make_simulator(
     problem: ProblemLike, threads: int | None, overrides: Mapping[str, Any]
 ) -> Simulator:
     """Build the simulator of an environment from the environment's arguments."""
-    return Simulator(ReachProblem.load(problem).replace(**overrides), threads=threads)
+    try:
+        return Simulator(ReachProblem.load(problem).replace(**overrides), threads=threads)
+    except UnknownNameError as error:
+        if error.given not in overrides:
+            raise
+        raise UnexpectedArgumentError(
+            f"unexpected keyword argument {error.given!r}; available: {', '.join(error.available)}"
+        ) from error
 
 
 def action_space(simulator: Simulator) -> Space[Any]:

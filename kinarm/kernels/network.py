@@ -2,11 +2,14 @@
 
 import math
 
-from kinarm.episodes import RELU, TANH, Control
-from kinarm.kernels.compiling import Array, inlined
+from kinarm.episodes import ELU, HARDTANH, LEAKY_RELU, LINEAR, RELU, SILU, TANH, Control
+from kinarm.kernels.compiling import Array, helper, inlined
 
 NARROW = 16
 """Layers of fewer outputs keep their sums in registers."""
+
+LEAK = 0.01
+"""Slope of the leaky rectifier below zero."""
 
 
 @inlined
@@ -76,6 +79,27 @@ def activate(kind: int, values: Array, row: int, n: int) -> None:
     elif kind == RELU:
         for j in range(n):
             values[row, j] = max(values[row, j], 0.0)
+    elif kind != LINEAR:
+        activate_unusual(kind, values, row, n)
+
+
+@helper
+def activate_unusual(kind: int, values: Array, row: int, n: int) -> None:
+    """Apply one of the functions that few policies have; called, it keeps `activate` short."""
+    if kind == HARDTANH:
+        for j in range(n):
+            values[row, j] = min(max(values[row, j], -1.0), 1.0)
+    elif kind == ELU:
+        for j in range(n):
+            if values[row, j] < 0.0:
+                values[row, j] = math.expm1(values[row, j])
+    elif kind == LEAKY_RELU:
+        for j in range(n):
+            if values[row, j] < 0.0:
+                values[row, j] *= LEAK
+    elif kind == SILU:
+        for j in range(n):
+            values[row, j] *= 0.5 + 0.5 * math.tanh(0.5 * values[row, j])
 
 
 @inlined
@@ -87,7 +111,7 @@ def act(control: Control, observations: Array, e: int, work: Array, action: Arra
     (3, widest layer), holds two layers by turns, and a reflected observation.
     """
     layers, weights, policy = control.layers, control.weights, control.policy[e]
-    n_layers, offset = layers.shape[0] - 1, 0
+    activations, n_layers, offset = control.activations, layers.shape[0] - 1, 0
     signs = control.observation_signs
     reflected = signs.shape[0] > 0 and observations[e, control.side] > 0.0
     inputs, source = observations, e
@@ -102,8 +126,7 @@ def act(control: Control, observations: Array, e: int, work: Array, action: Arra
             narrow_layer(weights, policy, offset, n_in, n_out, inputs, source, work, sink)
         else:
             wide_layer(weights, policy, offset, n_in, n_out, inputs, source, work, sink)
-        last = layer == n_layers - 1
-        activate(control.output if last else control.activation, work, sink, n_out)
+        activate(activations[layer], work, sink, n_out)
         inputs, source = work, sink
         offset += (n_in + 1) * n_out
     for j in range(action.shape[0]):

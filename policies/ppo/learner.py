@@ -19,7 +19,7 @@ from kinarm.policies.mirror import task_mirror
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.ppo.config import PPOConfig
 from kinarm.policies.ppo.state import PPOState
-from kinarm.policies.ppo.vec_env import SB3VecEnv
+from kinarm.policies.ppo.training_env import TrainingVecEnv
 
 NORMALIZED_OVER = 10_000
 """Random starts whose observations are the statistics of the normaliser."""
@@ -68,7 +68,7 @@ class PPOTraining:
         simulator = config.simulator(threads=1)
         mirror = task_mirror(config.symmetric, simulator.world)
         self.config = config
-        self.env = SB3VecEnv(simulator, config.n_envs, rng=rng, mirror=mirror)
+        self.env = TrainingVecEnv(simulator, config.n_envs, rng=rng, mirror=mirror)
         self._learning_rate = config.learning_rate
         self.model = PPO(
             "MlpPolicy",

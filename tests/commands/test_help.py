@@ -52,7 +52,7 @@ def test_learners_have_help_of_their_own(run, learner):
         (
             "kinarm-eval",
             "--problem --task --policy --trials --seed --arm --scene --tolerance --horizon "
-            "--start-spread --out --report --overwrite --json --matrix --allow-other-arm "
+            "--start-spread --out --report --card --overwrite --json --matrix --allow-other-arm "
             "--no-oracle --markdown",
         ),
         (

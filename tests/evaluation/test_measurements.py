@@ -153,6 +153,39 @@ def test_environments_are_measured_with_all_their_arms(monkeypatch):
     assert counted[0] == 64 * 200
 
 
+class TestStableBaselines3:
+    def test_speed_up_is_the_ratio_of_both(self, document):
+        pytest.importorskip("stable_baselines3")
+        rates = document["stable_baselines3"]
+        for name in ("native", "dummy"):
+            assert 0 < rates[name]["median"] <= rates[name]["best"]
+        assert rates["speed_up"] == rates["native"]["median"] / rates["dummy"]["median"]
+
+    def test_both_are_of_the_problem_with_all_arms(self, monkeypatch):
+        pytest.importorskip("stable_baselines3")
+        made, counted = [], []
+        make, vec_env = measurements.gymnasium.make, measurements.sb3_vec_env
+        monkeypatch.setattr(
+            measurements.gymnasium, "make", lambda *a, **k: made.append(make(*a, **k)) or made[-1]
+        )
+        monkeypatch.setattr(
+            measurements, "sb3_vec_env", lambda *a, **k: made.append(vec_env(*a, **k)) or made[-1]
+        )
+        monkeypatch.setattr(
+            measurements, "timed", lambda run, _: counted.append(run()) or measurements.Timing(1, 1)
+        )
+        problem = PROBLEMS["left"].replace(horizon=9)
+        measurements.measure_sb3(problem, 1)
+        assert counted == [64 * 200, 64 * 20]
+        assert len(made) == 65
+        assert {env.get_wrapper_attr("simulator").problem for env in made[1:]} == {problem}
+        assert made[0].simulator.problem == problem
+
+    def test_skipped_without_it(self, monkeypatch):
+        monkeypatch.setattr("kinarm.policies.learners.find_spec", lambda name: None)
+        assert "kinarm[ppo]" in measurements.measure_sb3(PROBLEMS["left"], 1)["skipped"]
+
+
 class TestPPO:
     @pytest.fixture
     def training(self, monkeypatch):

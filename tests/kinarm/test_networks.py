@@ -82,10 +82,19 @@ def test_weights_have_to_fit_the_layers(layers, weights, message):
         Networks(np.array(layers), weights)
 
 
-@pytest.mark.parametrize("name", ["activation", "output"])
-def test_unknown_function_lists_those_that_are(name):
+def test_unknown_function_lists_those_that_are():
     with pytest.raises(UnknownNameError, match="function 'sine'; available: linear, tanh, relu"):
-        Networks(np.array([3, 2]), np.zeros((1, 8)), **{name: "sine"})
+        Networks(np.array([3, 2]), np.zeros((1, 8)), activations=("sine",))
+
+
+def test_every_layer_needs_a_function():
+    with pytest.raises(InvalidInputError, match="function for each of 1 layers, got 2"):
+        Networks(np.array([3, 2]), np.zeros((1, 8)), activations=("tanh", "linear"))
+
+
+def test_usual_functions_are_tanh_between_the_layers():
+    networks = Networks(np.array([3, 2, 4, 1]), np.zeros((1, 25)))
+    assert networks.activations == ("tanh", "tanh", "linear")
 
 
 class TestForm:
@@ -93,7 +102,7 @@ class TestForm:
 
     @pytest.fixture
     def settings(self):
-        return {"activation": "relu", "output": "tanh", "mirror": Mirror(-np.ones(3), np.ones(2))}
+        return {"activations": ("tanh",), "mirror": Mirror(-np.ones(3), np.ones(2))}
 
     def make(self, seed, **settings):
         weights = np.random.default_rng(seed).normal(size=(1, 8))
@@ -107,8 +116,7 @@ class TestForm:
     @pytest.mark.parametrize(
         "change",
         [
-            {"activation": "tanh"},
-            {"output": "linear"},
+            {"activations": ("linear",)},
             {"mirror": None},
             {"mirror": Mirror(-np.ones(3), -np.ones(2))},
         ],

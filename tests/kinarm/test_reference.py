@@ -59,16 +59,13 @@ def evaluate(networks, index, observation):
     x, offset, widths, mirror = observation, 0, networks.layers, networks.mirror
     left = mirror is not None and observation[1] > 0
     x = mirror.observations * x if left else x
-    for n_in, n_out in itertools.pairwise(widths):
-        x = ACTIVATIONS[networks.activation](x) if offset else x
+    for (n_in, n_out), name in zip(itertools.pairwise(widths), networks.activations, strict=True):
         size = n_in * n_out
         weights = networks.weights[index, offset : offset + size].reshape(n_in, n_out)
-        x = (
-            np.einsum("i,ij->j", x, weights)
-            + networks.weights[index, offset + size : offset + size + n_out]
-        )
+        bias = networks.weights[index, offset + size : offset + size + n_out]
+        x = ACTIVATIONS[name](np.einsum("i,ij->j", x, weights) + bias)
         offset += size + n_out
-    action = np.clip(ACTIVATIONS[networks.output](x), -1, 1)
+    action = np.clip(x, -1, 1)
     return mirror.actions * action if left else action
 
 
@@ -232,12 +229,17 @@ def test_obstacles_and_thick_goal_regions_of_ones_own():
     assert collision > 5
 
 
-@pytest.mark.parametrize("output", ["linear", "tanh", "relu"])
-@pytest.mark.parametrize("activation", ["linear", "tanh", "relu"])
-def test_activation_and_output_functions(simulator, activation, output):
-    networks = random_networks(
-        simulator, 10, 15, hidden=(18, 7), activation=activation, output=output
-    )
+@pytest.mark.parametrize(
+    "activations",
+    [
+        ("linear", "tanh", "relu"),
+        ("relu", "linear", "tanh"),
+        ("hardtanh", "elu", "linear"),
+        ("silu", "leaky_relu", "hardtanh"),
+    ],
+)
+def test_activation_functions(simulator, activations):
+    networks = random_networks(simulator, 10, 15, hidden=(18, 7), activations=activations)
     ends = compare_networks(simulator, networks, 16, 30)
     assert ends[1] > 5
 

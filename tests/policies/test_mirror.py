@@ -124,11 +124,12 @@ class TestMirroredPolicy:
 
     @pytest.mark.parametrize("hidden", [(), (6,), (6, 7), (9, 8, 7)])
     @pytest.mark.parametrize("gain", [1, 30])
-    @pytest.mark.parametrize("functions", [{}, {"activation": "relu", "output": "tanh"}])
+    @pytest.mark.parametrize("function", ["linear", "tanh"])
     def test_acts_as_given_on_the_right_and_as_its_image_on_the_left(
-        self, make_policy, mirror, situations, hidden, gain, functions
+        self, make_policy, mirror, situations, hidden, gain, function
     ):
-        policy = lively(make_policy(*hidden, constant=1, **functions), gain)
+        functions = (*["relu"] * len(hidden), function)
+        policy = lively(make_policy(*hidden, constant=1, activations=functions), gain)
         mirrored = replace(policy, mirror=mirror)
         left = situations[:, 1] > 0
         assert 100 < left.sum() < 300

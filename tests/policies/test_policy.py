@@ -30,7 +30,7 @@ def assert_bitwise_equal(first, second):
     for a, b in zip(first.layers, second.layers, strict=True):
         assert a.weights.tobytes() == b.weights.tobytes()
         assert a.bias.tobytes() == b.bias.tobytes()
-    assert (first.activation, first.output) == (second.activation, second.output)
+    assert first.activations == second.activations
     assert (first.mirror is None) == (second.mirror is None)
     if first.mirror is not None:
         for a, b in zip(first.mirror, second.mirror, strict=True):
@@ -73,13 +73,13 @@ class TestCall:
     @pytest.mark.parametrize("output", FUNCTIONS)
     @pytest.mark.parametrize("activation", FUNCTIONS)
     def test_functions_between_and_after_the_layers(self, make_policy, activation, output):
-        policy = make_policy(9, 7, activation=activation, output=output)
+        policy = make_policy(9, 7, activations=(activation, activation, output))
         seen = np.random.default_rng(0).normal(size=(20, 48))
         x = (seen - policy.mean) / policy.std
         between, after = FUNCTIONS[activation], FUNCTIONS[output]
         for number, (weights, bias) in enumerate(policy.layers):
-            x = (between(x) if number else x) @ weights.T + bias
-        np.testing.assert_allclose(policy(seen), np.clip(after(x), -1, 1), rtol=0, atol=1e-12)
+            x = (after if number == 2 else between)(x @ weights.T + bias)
+        np.testing.assert_allclose(policy(seen), np.clip(x, -1, 1), rtol=0, atol=1e-12)
 
     def test_batch_equals_single(self, make_policy):
         policy = make_policy(8, mirror=MIRROR)
@@ -103,9 +103,13 @@ class TestCall:
 
 
 class TestNetworks:
-    @pytest.mark.parametrize("hidden", [(), (16,), (12, 9)])
     @pytest.mark.parametrize(
-        "settings", [{}, {"activation": "relu", "output": "tanh"}, {"mirror": MIRROR}]
+        ("hidden", "settings"),
+        [
+            *(((), {}), ((), {"activations": ("tanh",)}), ((), {"mirror": MIRROR})),
+            *(((16,), {}), ((16,), {"activations": ("relu", "tanh"), "mirror": MIRROR})),
+            ((12, 9), {"activations": ("hardtanh", "silu", "linear")}),
+        ],
     )
     def test_compiled_equals_python(self, make_policy, simulator, hidden, settings):
         policy = make_policy(*hidden, constant=3, **settings)
@@ -173,8 +177,8 @@ class TestInvariants:
             ({"layers": (Layer(np.ones((1, 3)), np.zeros(1)),)}, "weights of layer 0"),
             ({"layers": (Layer(np.ones((1, 2)), np.zeros(2)),)}, "bias of layer 0"),
             ({"layers": (Layer(np.full((1, 2), np.inf), np.zeros(1)),)}, "must be finite"),
-            ({"activation": "sine"}, "activation function 'sine'; available: linear, tanh, relu"),
-            ({"output": "sine"}, "activation function 'sine'"),
+            ({"activations": ("sine",)}, "function 'sine'; available: linear, tanh, relu"),
+            ({"activations": ("tanh", "tanh")}, "function for each of 1 layers, got 2"),
             ({"mirror": Mirror([1.0], [1.0])}, "mirror of observations must have shape"),
             ({"mirror": Mirror([1.0, 1.0], [1.0, 1.0])}, "mirror of actions must have shape"),
             (
@@ -213,11 +217,10 @@ class TestCheckArm:
 
 class TestFile:
     @pytest.mark.parametrize("hidden", [(), (6,), (6, 4)])
-    @pytest.mark.parametrize(
-        "settings", [{}, {"activation": "relu", "output": "tanh", "mirror": MIRROR}]
-    )
-    def test_round_trip_is_bitwise(self, make_policy, tmp_path, hidden, settings):
-        policy = make_policy(*hidden, **settings)
+    @pytest.mark.parametrize("mirror", [None, MIRROR])
+    def test_round_trip_is_bitwise(self, make_policy, tmp_path, hidden, mirror):
+        activations = ("hardtanh", "relu", "tanh")[-len(hidden) - 1 :]
+        policy = make_policy(*hidden, activations=activations, mirror=mirror)
         policy.save(tmp_path / "policy.npz")
         assert_bitwise_equal(policy, Policy.load(tmp_path / "policy.npz"))
 
@@ -314,10 +317,10 @@ class TestBadFile:
         np.savez(saved, **{**contents(saved), "mean": np.array([{}], dtype=object)})
         self.refused(saved, "policy")
 
-    @pytest.mark.parametrize(("version", "age"), [(1, "an earlier"), (3, "a later")])
+    @pytest.mark.parametrize(("version", "age"), [(2, "an earlier"), (4, "a later")])
     def test_other_version(self, saved, version, age):
         np.savez(saved, **{**contents(saved), "version": version})
-        self.refused(saved, f"format version {version}, of {age} kinarm; this one reads 2")
+        self.refused(saved, f"format version {version}, of {age} kinarm; this one reads 3")
 
     @pytest.mark.parametrize("key", ["version", "header", "mean", "std", "weights_0", "bias_0"])
     def test_missing_entry(self, saved, key):
@@ -358,15 +361,17 @@ class TestBadFile:
         [
             ("provenance", {}, "provenance: 'algorithm' is missing"),
             ("provenance", 3, "provenance: it must be a table, got 3"),
-            ("activation", "sine", "activation function 'sine'"),
-            ("output", None, "activation function None"),
+            ("activations", ["sine"], "activation function 'sine'"),
+            ("activations", [None], "activation function 'None'"),
+            ("activations", ["tanh", "tanh"], "for each of 1 layers"),
+            ("activations", None, "is not a complete kinarm policy"),
         ],
     )
     def test_bad_entry_of_the_header(self, saved, entry, value, message):
         self.rewrite_header(saved, **{entry: value})
         self.refused(saved, message)
 
-    @pytest.mark.parametrize("entry", ["provenance", "observation", "activation", "output"])
+    @pytest.mark.parametrize("entry", ["provenance", "observation", "activations"])
     def test_missing_entry_of_the_header(self, saved, entry):
         self.rewrite_header(saved, without=entry)
         self.refused(saved, f"is not a complete kinarm policy: '{entry}'")

@@ -234,7 +234,7 @@ class TestResult:
 def predicted(training, observations):
     """What Stable-Baselines3 itself would do, given raw observations."""
     env = training.env
-    actions, _ = training.model.predict(env._normalized(observations), deterministic=True)
+    actions, _ = training.model.predict(env.interface.observe(observations), deterministic=True)
     if env.mirror is None:
         return actions
     left = observations[:, 1] > 0

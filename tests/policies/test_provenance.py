@@ -2,7 +2,7 @@
 
 import json
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import metadata
 
 import pytest
@@ -17,7 +17,7 @@ def test_round_trip_through_json(provenance):
     assert Provenance.from_json(json.loads(text)) == provenance
 
 
-@pytest.mark.parametrize("entry", ["algorithm", "recipe", "problem", "seed", "environment_steps"])
+@pytest.mark.parametrize("entry", ["algorithm", "recipe", "problem", "environment_steps"])
 def test_missing_entry_is_named(provenance, entry):
     entries = provenance.to_json()
     del entries[entry]
@@ -65,3 +65,9 @@ def test_versions_of_what_matters():
 
 def test_commit_looks_like_one():
     assert re.fullmatch(r"([0-9a-f]{7,40}|.+-g[0-9a-f]{7,40})?(-dirty)?", source_commit())
+
+
+def test_a_seed_may_be_unknown(provenance):
+    unknown = replace(provenance, seed=None)
+    assert "seed" not in unknown.to_json()
+    assert Provenance.from_json(unknown.to_json()) == unknown

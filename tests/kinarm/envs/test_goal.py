@@ -79,11 +79,28 @@ def test_contact_refuses_the_move_and_the_episode_goes_on():
         if info["collision"]:
             break
     assert info["contact"] == ("hand", "ground")
-    assert (reward, terminated, truncated, info["is_success"]) == (-1.0, False, False, False)
+    assert (reward, terminated, truncated, info["is_success"]) == (-2.0, False, False, False)
     np.testing.assert_allclose(observation["achieved_goal"], before, atol=1e-15)
     lifted, _, _, _, info = env.step([0, -1, 0, 0, 0])
     assert not info["collision"]
     assert lifted["achieved_goal"][2] > before[2] + 0.05
+
+
+@pytest.mark.parametrize("reward_type", ["sparse", "dense"])
+def test_a_refused_move_costs_what_the_problem_says(reward_type):
+    free, dear = (
+        ReachGoalEnv(reward_type=reward_type, reward={"collision": weight}) for weight in (0, -3)
+    )
+    refused = 0
+    for (_, first, *_), (seen, second, _, _, info) in zip(
+        episodes(free), episodes(dear), strict=True
+    ):
+        assert second == first - 3 * info["collision"]
+        goals = seen["achieved_goal"], seen["desired_goal"]
+        assert dear.compute_reward(*goals, info) == second
+        assert dear.compute_reward(*([g] for g in goals), [info]) == [second]
+        refused += info["collision"]
+    assert refused > 3
 
 
 def test_after_a_refused_move_contact_is_still_found():

@@ -13,6 +13,7 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env, data_equivalence
 
 import kinarm
+from kinarm.envs.errors import UnexpectedArgumentError
 from kinarm.envs.reach import ReachEnv
 from kinarm.envs.registration import ENVIRONMENTS
 from kinarm.errors import InvalidInputError, ProblemError, StartInContactError, UnknownNameError
@@ -317,7 +318,7 @@ class TestSettings:
         [
             ({"problem": "up"}, UnknownNameError, "'up'"),
             ({"task": "up"}, UnknownNameError, "'up'"),
-            ({"horizons": 3}, UnknownNameError, "setting of a problem 'horizons'"),
+            ({"horizons": 3}, UnexpectedArgumentError, "keyword argument 'horizons'; available"),
             ({"reward": {"collision": 1}}, ProblemError, "rewards contact"),
             ({"arm": "nope"}, UnknownNameError, "'nope'"),
             ({"horizon": 0}, InvalidInputError, "horizon"),

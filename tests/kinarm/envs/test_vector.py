@@ -224,7 +224,7 @@ class TestErrors:
             ({"render_mode": "film"}, "render_mode must be .*rgb_array_list.*'film'"),
             ({"observation_dtype": "int8"}, "observation_dtype must be one of.*'int8'"),
             ({"problem": "up"}, "unknown problem 'up'"),
-            ({"horizons": 3}, "unknown setting of a problem 'horizons'"),
+            ({"horizons": 3}, "unexpected keyword argument 'horizons'; available"),
         ],
     )
     def test_bad_settings(self, settings, message):

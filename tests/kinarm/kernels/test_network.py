@@ -7,9 +7,17 @@ import pytest
 from numba import njit
 
 from kinarm.kernels.network import NARROW, act
-from kinarm.networks import Mirror, Networks, network_control
+from kinarm.networks import ACTIVATIONS, Mirror, Networks, network_control
 
-FUNCTIONS = {"linear": lambda x: x, "tanh": np.tanh, "relu": lambda x: np.where(x > 0, x, 0.0)}
+FUNCTIONS = {
+    "linear": lambda x: x,
+    "tanh": np.tanh,
+    "relu": lambda x: np.where(x > 0, x, 0.0),
+    "hardtanh": lambda x: np.minimum(np.maximum(x, -1.0), 1.0),
+    "elu": lambda x: np.where(x > 0, x, np.exp(np.minimum(x, 0.0)) - 1.0),
+    "leaky_relu": lambda x: np.where(x > 0, x, 0.01 * x),
+    "silu": lambda x: x / (1.0 + np.exp(-x)),
+}
 
 
 @njit
@@ -36,11 +44,11 @@ def random_networks(widths, count=1, seed=0, **settings):
 def in_numpy(networks, x, index=0):
     """What a network answers, clipped, without a mirror."""
     start = 0
-    for n_in, n_out in pairwise(networks.layers):
+    for (n_in, n_out), name in zip(pairwise(networks.layers), networks.activations, strict=True):
         part = networks.weights[index, start : start + (n_in + 1) * n_out].reshape(n_in + 1, n_out)
-        x = (FUNCTIONS[networks.activation](x) if start else x) @ part[:-1] + part[-1]
+        x = FUNCTIONS[name](x @ part[:-1] + part[-1])
         start += part.size
-    return np.clip(FUNCTIONS[networks.output](x), -1, 1)
+    return np.clip(x, -1, 1)
 
 
 @pytest.mark.parametrize("n_actions", [1, 4, 6])
@@ -58,11 +66,42 @@ def test_layers_of_any_width(n_actions, width):
 @pytest.mark.parametrize("activation", FUNCTIONS)
 @pytest.mark.parametrize("hidden", [(), (7,), (20, 6)])
 def test_functions_between_and_after_the_layers(hidden, activation, output):
-    networks = random_networks([8, *hidden, 5], activation=activation, output=output)
+    networks = random_networks([8, *hidden, 5], activations=(activation,) * len(hidden) + (output,))
     x = np.random.default_rng(1).normal(size=(50, 8))
     expected = in_numpy(networks, x)
     np.testing.assert_allclose(compiled(networks, x), expected, rtol=0, atol=1e-12)
     assert expected.std() > 0.1
+
+
+def test_every_layer_has_a_function_of_its_own():
+    names = ("hardtanh", "silu", "elu", "leaky_relu", "tanh", "relu", "linear")
+    networks = random_networks([8, 20, 17, 18, 9, 16, 21, 5], activations=names)
+    x = np.random.default_rng(6).normal(size=(50, 8)) * 2
+    expected = in_numpy(networks, x)
+    np.testing.assert_allclose(compiled(networks, x), expected, rtol=0, atol=1e-12)
+    assert expected.std() > 0.05
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_functions_are_those_of_torch(name):
+    torch = pytest.importorskip("torch")
+    modules = {
+        "linear": torch.nn.Identity(),
+        "tanh": torch.nn.Tanh(),
+        "relu": torch.nn.ReLU(),
+        "hardtanh": torch.nn.Hardtanh(),
+        "elu": torch.nn.ELU(),
+        "leaky_relu": torch.nn.LeakyReLU(),
+        "silu": torch.nn.SiLU(),
+    }
+    x = np.concatenate([np.linspace(-40, 40, 4001), [-1e3, -1e-9, -0.0, 0.0, 1e-9, 1e3]])[:, None]
+    ones = np.array([[0.001, 0.0]])
+    networks = Networks(
+        np.array([1, 1, 1]), np.array([[1.0, 0.0, *ones[0]]]), activations=(name, "linear")
+    )
+    expected = 0.001 * modules[name](torch.tensor(x)).numpy()
+    np.testing.assert_allclose(compiled(networks, x), expected.clip(-1, 1), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(0.001 * ACTIVATIONS[name](x), expected, rtol=0, atol=1e-15)
 
 
 def test_each_observation_has_its_own_network():
@@ -82,7 +121,7 @@ class TestMirror:
     @pytest.mark.parametrize("hidden", [(), (6,), (20, 5)])
     @pytest.mark.parametrize(("activation", "output"), [("tanh", "linear"), ("relu", "tanh")])
     def test_goals_on_the_left_are_seen_in_it(self, mirror, hidden, activation, output):
-        settings = {"activation": activation, "output": output}
+        settings = {"activations": (activation,) * len(hidden) + (output,)}
         plain = random_networks([7, *hidden, 3], **settings)
         mirrored = random_networks([7, *hidden, 3], **settings, mirror=mirror)
         x = np.random.default_rng(3).normal(size=(60, 7))

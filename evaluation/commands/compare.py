@@ -1,0 +1,183 @@
+"""``kinarm-compare``: learners on the same problems, judged on the same trials."""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from kinarm._command_line import run_request
+from kinarm._files import check_folder
+from kinarm._parallel import available_threads
+from kinarm._validation import whole_number
+from kinarm.errors import InvalidInputError, UnknownNameError
+
+if TYPE_CHECKING:
+    from kinarm.evaluation.comparison.results import Comparison
+    from kinarm.evaluation.comparison.runs import PlannedRun
+    from kinarm.evaluation.reproduction.executor import Executor
+
+EPILOG = """
+needs the extra sb3 for learners of Stable-Baselines3: pip install 'kinarm[sb3]'
+
+An interrupted comparison goes on where it stopped, by the same command; a finished training is
+repeated only with other settings.
+
+examples:
+  kinarm-compare                                          everything, into the folder comparison
+  kinarm-compare --learners ars-tuned sb3-sac-her --problems right --seeds 1
+  kinarm-compare --settings mine.toml --out mine          a table of learners of your own
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ComparisonRequest:
+    """Train learners on the same problems, and compare their success, steps and time.
+
+    Parameters
+    ----------
+    learners : tuple of str
+        Names of learners; all of the table.
+    problems : tuple of str
+        Names or files of problems.
+    seeds : int
+        Trainings of each learner on each problem.
+    steps : int
+        Environment steps after which a training is broken off.
+    trials : int
+        Trials that policies face.
+    settings : Path
+        Table of learners with their settings instead of the shipped one.
+    out : Path
+        Output folder.
+    jobs : int
+        Trainings at a time; one a processor.
+
+    Raises
+    ------
+    InvalidInputError
+        If a number is out of range, a name is unknown or nothing is left to compare.
+    """
+
+    learners: tuple[str, ...] = ()
+    problems: tuple[str, ...] = ("right", "both")
+    seeds: int = 3
+    steps: int | None = None
+    trials: int = 1000
+    settings: Path | None = field(default=None, metadata={"metavar": "FILE.toml"})
+    out: Path = field(default=Path("comparison"), metadata={"metavar": "DIR"})
+    jobs: int | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("seeds", "trials"):
+            whole_number(name, getattr(self, name), 1)
+        for name in ("steps", "jobs"):
+            if getattr(self, name) is not None:
+                whole_number(name, getattr(self, name), 1)
+        if not self.problems:
+            raise InvalidInputError("there is no problem to compare learners on")
+
+    @property
+    def runs(self) -> "list[PlannedRun]":
+        """All trainings, whether finished or not.
+
+        Raises
+        ------
+        KinarmError
+            If a name is unknown, or a file cannot be used.
+        """
+        from kinarm.evaluation.comparison.learners import read_learners
+        from kinarm.evaluation.comparison.runs import Protocol, planned_runs
+        from kinarm.problem import ReachProblem
+
+        table = read_learners(self.settings)
+        for name in self.learners:
+            if name not in table:
+                raise UnknownNameError("learner", name, table)
+        chosen = [table[name] for name in dict.fromkeys(self.learners or table)]
+        problems = [ReachProblem.load(problem) for problem in self.problems]
+        names = [problem.name for problem in problems]
+        for name in names:
+            if names.count(name) > 1:
+                raise InvalidInputError(f"two problems are called {name!r}")
+        return planned_runs(chosen, problems, self.seeds, self.steps, Protocol(trials=self.trials))
+
+    def run(self, executor: "Executor | None" = None, command: str | None = None) -> "Comparison":
+        """Train what is missing, and write what it came to.
+
+        Parameters
+        ----------
+        executor : Executor, optional
+            Where trainings are carried out; the processors of this machine if it is left out.
+        command : str, optional
+            What to record as the command that made the files; this request if it is left out.
+
+        Raises
+        ------
+        KinarmError
+            If a name is unknown, a file cannot be used, a package is missing, or a worker ends
+            unexpectedly.
+        """
+        from rich.console import Console
+
+        from kinarm.evaluation.comparison.document import write_all
+        from kinarm.evaluation.comparison.results import Comparison
+        from kinarm.evaluation.comparison.runs import load_run
+
+        runs, folder = self.runs, self.out / "runs"
+        for learner in {run.learner.name: run.learner for run in runs}.values():
+            learner.check_installed()
+        check_folder(folder)
+        missing = [run for run in runs if load_run(folder, run) is None]
+        try:
+            if missing:
+                self._train(missing, folder, executor)
+            found = {run: load_run(folder, run) for run in runs}
+            comparison = Comparison({run: curve for run, curve in found.items() if curve})
+            with Console(stderr=True).status("bounding what could be reached, drawing figures"):
+                write_all(comparison, self.out, command or repr(self))
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(
+                "interrupted; what is finished is kept, and the same command goes on"
+            ) from None
+        return comparison
+
+    def _train(
+        self, missing: "list[PlannedRun]", folder: Path, executor: "Executor | None"
+    ) -> None:
+        """Carry out what is missing, and tell of every training that is finished."""
+        from rich.console import Console
+
+        from kinarm.evaluation.comparison.training import carry_out
+        from kinarm.evaluation.reproduction.executor import LocalExecutor
+
+        jobs = min(self.jobs or available_threads(), len(missing))
+        console = Console(stderr=True, highlight=False)
+        work = partial(carry_out, folder=folder)
+        finished = (executor or LocalExecutor(jobs)).carry_out(work, missing)
+        for number, run in enumerate(finished, start=1):
+            console.print(f"{number} of {len(missing)} trainings: {run.name}")
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line."""
+    run_request("kinarm-compare", ComparisonRequest, _report, arguments, epilog=EPILOG)
+
+
+def _report(request: ComparisonRequest, command: str) -> None:
+    """Run a request, and print its table."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from kinarm.evaluation.comparison.document import HEADER, result_rows
+
+    table = Table(*HEADER, header_style="bold")
+    for row in result_rows(request.run(command=command)):
+        table.add_row(*row)
+    Console(width=None if sys.stdout.isatty() else 160, highlight=False).print(table)
+    print(f"written: {request.out / 'LEARNERS.md'}, with tables and figures beside it")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,65 @@
+"""Learning curves of a comparison."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kinarm.evaluation.comparison.results import Comparison, Series
+from kinarm.evaluation.figures import COLOURS, DASHES
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+ACROSS = {"environment_steps": ("environment steps", 1.0), "seconds": ("training time [min]", 60.0)}
+"""What curves are drawn against: its name on the axis, and how many make one of its unit."""
+
+PLACES = 200
+"""Points of a curve."""
+
+
+def learning_curves(comparison: Comparison) -> "Figure":
+    """Success in the course of the training, a row per problem.
+
+    On the left against environment steps, on the right against wall time; both axes are
+    logarithmic. Lines are means over the training seeds, bands reach from the worst of them to
+    the best. The dotted line is the share of trials in which any policy could succeed.
+    """
+    from matplotlib.figure import Figure
+
+    problems = list(comparison.reachable)
+    names = list(dict.fromkeys(series.learner.name for series in comparison.series))
+    figure = Figure(figsize=(10.0, 1.0 + 3.2 * len(problems)), layout="constrained")
+    panels = figure.subplots(len(problems), 2, squeeze=False, sharex="col", sharey=True)
+    for problem, row in zip(problems, panels, strict=True):
+        for (quantity, (label, _)), axes in zip(ACROSS.items(), row, strict=True):
+            for series in comparison.series:
+                if series.problem.name == problem:
+                    _draw(axes, series, quantity, names.index(series.learner.name))
+            axes.axhline(comparison.reachable[problem], color="#444444", linestyle=":", lw=1)
+            axes.set(xscale="log", ylim=(0, 1.02), title=problem)
+            axes.spines[["top", "right"]].set_visible(False)
+            if row is panels[-1]:
+                axes.set_xlabel(label)
+        row[0].set_ylabel("share of trials with success")
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False, fontsize=8)
+    return figure
+
+
+def _draw(axes: "Axes", series: Series, quantity: str, number: int) -> None:
+    """Draw the mean over the training seeds, and the band between the worst and the best."""
+    ends = [(getattr(c[0], quantity), getattr(c[-1], quantity)) for c in series.curves]
+    first, last = max(min(first for first, _ in ends), 1e-3), min(last for _, last in ends)
+    places = np.geomspace(first, max(first, last), PLACES)
+    success = np.nan_to_num(series.success_at(quantity, places))
+    colour, dash = COLOURS[number % len(COLOURS)], DASHES[number // len(COLOURS) % len(DASHES)]
+    x = places / ACROSS[quantity][1]
+    axes.fill_between(x, success.min(axis=0), success.max(axis=0), color=colour, alpha=0.15, lw=0)
+    axes.plot(
+        *(x, success.mean(axis=0)),
+        color=colour,
+        linestyle=dash,
+        lw=2,
+        label=series.learner.title,
+    )

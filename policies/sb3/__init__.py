@@ -1,0 +1,1 @@
+"""kinarm for users of Stable-Baselines3 and rl-zoo3."""

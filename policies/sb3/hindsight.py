@@ -1,0 +1,50 @@
+"""Hindsight replay for goals whose reaching ends an episode."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from stable_baselines3 import HerReplayBuffer
+
+if TYPE_CHECKING:
+    from stable_baselines3.common.type_aliases import DictReplayBufferSamples
+    from stable_baselines3.common.vec_env import VecNormalize
+
+Indices = NDArray[np.int64]
+Goals = NDArray[np.floating[Any]]
+
+
+class HindsightReplayBuffer(HerReplayBuffer):
+    """`HerReplayBuffer` that asks anew whether an episode is over when it substitutes a goal.
+
+    The one of Stable-Baselines3 computes the reward for the substituted goal, but keeps from the
+    original one whether the episode ended. Where reaching ends it, as in `ReachGoalEnv`, a learner
+    would look for what comes after the goal, of which it never learns anything. What of a reward
+    does not depend on the goal, such as that for a collision, is kept without ``copy_info_dict``.
+    """
+
+    def _sample_goals(self, batch_indices: Indices, env_indices: Indices) -> Goals:
+        """Goals to substitute, shape (n, 3) [m]; takes note of what else has to change."""
+        goals: Goals = super()._sample_goals(batch_indices, env_indices)
+        where = batch_indices, env_indices
+        achieved = self.next_observations["achieved_goal"][where]
+        desired = self.next_observations["desired_goal"][where]
+        self._reached = self._ask("compute_terminated", achieved, goals)
+        self._besides = self.rewards[where] - self._ask("compute_reward", achieved, desired)
+        return goals
+
+    def _ask(self, method: str, achieved: Goals, desired: Goals) -> NDArray[Any]:
+        """Ask the environment about pairs of goals."""
+        (answer,) = self.env.env_method(method, achieved, desired, {}, indices=[0])
+        return np.asarray(answer, dtype=np.float32)
+
+    def _get_virtual_samples(
+        self, batch_indices: Indices, env_indices: Indices, env: "VecNormalize | None" = None
+    ) -> "DictReplayBufferSamples":
+        """Transitions with substituted goals, which end where these are reached."""
+        samples = super()._get_virtual_samples(batch_indices, env_indices, env)
+        besides = self._normalize_reward(self._besides.reshape(-1, 1), env)
+        reached = self.to_torch(self._reached).reshape(-1, 1)
+        return samples._replace(
+            dones=samples.dones.maximum(reached), rewards=samples.rewards + self.to_torch(besides)
+        )

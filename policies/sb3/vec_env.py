@@ -1,0 +1,281 @@
+"""The native batch as a vectorised environment of Stable-Baselines3."""
+
+import time
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from gymnasium.envs.registration import EnvSpec
+from numpy.typing import NDArray
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.vec_env import VecEnv
+
+from kinarm.envs.errors import ClosedEnvironmentError, ResetNeededError
+from kinarm.envs.interface import Interface, Observations
+from kinarm.envs.reach import action_space, environment_metadata, pick_scenario
+from kinarm.envs.rendering import EnvPictures
+from kinarm.episodes import Episodes
+from kinarm.errors import InvalidInputError
+from kinarm.scenarios import ScenarioStream
+from kinarm.simulator import Simulator
+
+StepReturn = tuple[Observations, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]
+Indices = int | Iterable[int] | None
+"""Arms by number; None stands for all."""
+
+
+class SB3VecEnv(VecEnv):
+    """Many arms, stepped by one call of the compiled simulator; made by `sb3_vec_env`.
+
+    Arm i goes through the same episodes as a single environment that is reset with the seed + i, as
+    in the ``DummyVecEnv`` of Stable-Baselines3. An episode that ends is replaced at once.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        What is stepped.
+    num_envs : int
+        Number of arms.
+    interface : Interface
+        What is shown of it.
+    pictures : EnvPictures
+        Draws it.
+    spec : EnvSpec, optional
+        Of the single environment, if it is registered.
+
+    Notes
+    -----
+    The info of an episode that ended holds what Stable-Baselines3 and its wrappers look for:
+    ``terminal_observation``, ``TimeLimit.truncated``, ``is_success`` and what ``Monitor`` adds,
+    ``episode`` (return ``r``, length ``l``, time ``t`` since the environment was made [s]); besides
+    ``collision`` and ``distance`` [m]. That of a move that was refused holds ``collision``. All
+    other infos are empty, which saves time.
+
+    The arms share this object and its interface: ``get_attr`` reads from them, ``env_method`` calls
+    methods of the interface such as ``compute_reward``, and ``set_attr`` sets for all arms.
+    """
+
+    def __init__(
+        self,
+        simulator: Simulator,
+        num_envs: int,
+        interface: Interface,
+        pictures: EnvPictures,
+        spec: EnvSpec | None = None,
+    ) -> None:
+        self.simulator, self.interface, self.spec = simulator, interface, spec
+        self.render_mode = pictures.mode
+        super().__init__(num_envs, interface.observation_space, action_space(simulator))
+        self.metadata = environment_metadata(simulator)
+        self._pictures = pictures
+        self._streams: dict[int, ScenarioStream] = {}
+        self._episodes: Episodes | None = None
+        self._actions = np.zeros((num_envs, simulator.n_actions))
+        self._returns = np.zeros(num_envs)
+        self._closed = False
+        self._made = time.time()
+
+    def reset(self) -> Observations:
+        """Begin all episodes anew, with the seeds and options that were set for it.
+
+        Returns
+        -------
+        ndarray, shape (num_envs, n_observations), or dict of ndarray
+
+        Raises
+        ------
+        InvalidInputError
+            If the environment is closed, or an option is unknown, has the wrong shape or an entry
+            that is not finite.
+        StartInContactError
+            If a start touches something.
+        """
+        self._check_open()
+        for row, seed in enumerate(self._seeds):
+            if seed is not None:
+                self._streams[row] = self._stream(seed)
+        starts, goals = self._draw(np.arange(self.num_envs))
+        for row, options in enumerate(self._options):
+            starts[row], goals[row] = pick_scenario(options, starts[row], goals[row])
+        self._reset_seeds()
+        self._reset_options()
+        return self._begin(self.simulator.reset(starts, goals))
+
+    def _begin(self, episodes: Episodes) -> Observations:
+        """Go on with these episodes, of all arms."""
+        self._episodes = episodes
+        self._returns[:] = 0.0
+        self._announce(episodes, np.arange(self.num_envs))
+        return self.interface.observe(episodes.observation)
+
+    def _draw(self, rows: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Starts and goals of the next episodes of some arms, each from its own stream."""
+        scenarios = []
+        for row in rows.tolist():
+            if row not in self._streams:
+                self._streams[row] = self._stream(None)
+            scenarios.append(self._streams[row].next())
+        starts, goals = (np.array(part) for part in zip(*scenarios, strict=True))
+        return starts, goals
+
+    def _stream(self, seed: int | None) -> ScenarioStream:
+        """Scenarios of one arm, other ones every time without a seed."""
+        return ScenarioStream(self.simulator.world, np.random.default_rng(seed))
+
+    def _announce(self, episodes: Episodes, rows: NDArray[np.int64]) -> None:
+        """Tell pictures and infos which episodes begin."""
+        for row, distance in zip(rows.tolist(), episodes.distance[rows].tolist(), strict=True):
+            self.reset_infos[row] = {"distance": distance}
+        self._pictures.begin(rows, episodes)
+
+    def step_async(self, actions: NDArray[Any]) -> None:
+        """Take note of the actions, shape (num_envs, n_actions), for `step_wait`."""
+        self._actions = actions
+
+    def step_wait(self) -> StepReturn:
+        """Move every arm for one time step.
+
+        Returns
+        -------
+        observations : ndarray or dict of ndarray
+            Those of new episodes where one ended.
+        rewards : ndarray of float32, shape (num_envs,)
+        dones : ndarray of bool, shape (num_envs,)
+        infos : list of dict
+
+        Raises
+        ------
+        InvalidInputError
+            If the environment is closed or was never reset, or the actions have another shape or
+            an entry that is not finite.
+        """
+        episodes = self._begun_episodes()
+        result = self.simulator.step(episodes, self._actions)
+        verdict = self.interface.judge(episodes, result)
+        self._returns += verdict.reward
+        self._pictures.step(episodes)
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        for row in np.flatnonzero(result.collision).tolist():
+            infos[row]["collision"] = True
+        dones = verdict.terminated | verdict.truncated
+        ended = np.flatnonzero(dones)
+        if ended.size:
+            reasons = (verdict.truncated & ~verdict.terminated, result.success, result.collision)
+            finals = self._final_infos(episodes, ended, *reasons)
+            for row, info in zip(ended.tolist(), finals, strict=True):
+                infos[row] = info
+            self._renew(episodes, ended)
+        observations = self.interface.observe(episodes.observation)
+        return observations, verdict.reward.astype(np.float32), dones, infos
+
+    def _final_infos(
+        self, episodes: Episodes, rows: NDArray[np.int64], *reasons: NDArray[np.bool_]
+    ) -> list[dict[str, Any]]:
+        """Infos of episodes that ended: truncated, reached or touching."""
+        finals = _one_by_one(self.interface.observe(episodes.observation[rows]), rows.size)
+        elapsed = round(time.time() - self._made, 6)
+        columns = (*reasons, episodes.distance, self._returns, episodes.steps)
+        return [
+            {
+                "terminal_observation": final,
+                "TimeLimit.truncated": truncated,
+                "is_success": reached,
+                "collision": touching,
+                "distance": distance,
+                "episode": {"r": total, "l": length, "t": elapsed},
+            }
+            for final, truncated, reached, touching, distance, total, length in zip(
+                finals, *(column[rows].tolist() for column in columns), strict=True
+            )
+        ]
+
+    def _renew(self, episodes: Episodes, rows: NDArray[np.int64]) -> None:
+        """Replace episodes that ended."""
+        episodes.q[rows], episodes.goal[rows] = self._draw(rows)
+        self.simulator.begin(episodes, rows)
+        self._returns[rows] = 0.0
+        self._announce(episodes, rows)
+
+    def _begun_episodes(self) -> Episodes:
+        """The episodes under way, if there are any."""
+        self._check_open()
+        if self._episodes is None:
+            raise ResetNeededError("the environment was never begun: call reset()")
+        return self._episodes
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise ClosedEnvironmentError("the environment is closed: make another one")
+
+    def render(self, mode: str | None = None) -> Any:
+        """Draw the arms, as the render mode says; see `ReachVectorEnv`.
+
+        A picture shows all arms side by side, as in every environment of Stable-Baselines3.
+
+        Raises
+        ------
+        InvalidInputError
+            If the environment is closed or was never reset.
+        """
+        self._begun_episodes()
+        if self.render_mode in ("human", "rgb_array_list") and mode in (None, self.render_mode):
+            return self._pictures.render()
+        return super().render(mode)
+
+    def get_images(self) -> list[NDArray[np.uint8]]:
+        """One picture of each arm, shape (height, width, 3), where the mode is ``rgb_array``."""
+        return list(self._pictures.render())
+
+    def close(self) -> None:
+        """Let go of what draws the arms; nothing can be done afterwards."""
+        self._pictures.close()
+        self._closed = True
+
+    def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
+        """Value of an attribute of the environment or of its interface, repeated for every arm.
+
+        Raises
+        ------
+        AttributeError
+            If neither has it.
+        """
+        owner = self if hasattr(self, attr_name) else self.interface
+        return [getattr(owner, attr_name) for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
+        """Set an attribute of the environment, which all arms share.
+
+        Raises
+        ------
+        InvalidInputError
+            If it is to be set for some arms only.
+        """
+        if set(self._get_indices(indices)) != set(range(self.num_envs)):
+            raise InvalidInputError(
+                f"cannot set {attr_name!r} for some arms: they share one environment"
+            )
+        setattr(self, attr_name, value)
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: Indices = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """What a method of the interface returns, repeated for every arm.
+
+        Raises
+        ------
+        AttributeError
+            If there is no such method.
+        """
+        result = getattr(self.interface, method_name)(*method_args, **method_kwargs)
+        return [result for _ in self._get_indices(indices)]
+
+    def env_is_wrapped(self, wrapper_class: type, indices: Indices = None) -> list[bool]:
+        """Whether the infos are those of ``Monitor``, as if it were wrapped by one; else no."""
+        return [issubclass(Monitor, wrapper_class) for _ in self._get_indices(indices)]
+
+
+def _one_by_one(observations: Observations, count: int) -> list[Any]:
+    """Split a batch of observations."""
+    if isinstance(observations, dict):
+        return [{key: part[k] for key, part in observations.items()} for k in range(count)]
+    return list(observations)

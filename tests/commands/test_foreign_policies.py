@@ -1,0 +1,163 @@
+"""Command lines on policies that are not kinarm's own, and cards."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+
+from kinarm.policies import Policy, load_policy
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """An empty current directory."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    return tmp_path
+
+
+@pytest.fixture
+def saved(here):
+    """A model of Stable-Baselines3, with the statistics of its observations beside it."""
+    sb3 = pytest.importorskip("stable_baselines3")
+    from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+
+    from kinarm.envs import ReachEnv
+
+    env = VecNormalize(DummyVecEnv([lambda: ReachEnv("right")]))
+    env.reset()
+    for _ in range(20):
+        env.step(np.ones((1, 5)))
+    sb3.PPO("MlpPolicy", env, seed=1, device="cpu").save(here / "model.zip")
+    env.save(here / "vecnormalize.pkl")
+    return here / "model.zip"
+
+
+@pytest.fixture
+def module(here):
+    """A module in the current directory."""
+    source = "import numpy as np\n\ndef still(seen):\n    return np.zeros((len(seen), 5))\n"
+    (here / "still_for_tests.py").write_text(source)
+    yield "still_for_tests:still"
+    sys.modules.pop("still_for_tests", None)
+
+
+def check_refused(answer, *words):
+    assert (answer.status, answer.out) == (2, ""), answer
+    assert len(answer.err.splitlines()) == 1, answer.err
+    for word in words:
+        assert word in answer.err, answer.err
+
+
+class TestModel:
+    def test_is_evaluated_beside_the_oracle(self, run, saved):
+        arguments = ("--policy", saved, "--problem", "right", "--trials", 5)
+        answer = run("kinarm-eval", *arguments)
+        assert answer.status == 0, answer.err
+        assert "model" in answer.out
+        assert "oracle" in answer.out
+        note = f"model: observations normalised by {saved.with_name('vecnormalize.pkl')}"
+        assert note in "".join(answer.out.splitlines())
+        rows = json.loads(run("kinarm-eval", *arguments, "--json").out)["results"]
+        assert [(row["policy"], row["trained_on"]) for row in rows] == [
+            ("model", "right"),
+            ("oracle", None),
+        ]
+        assert rows[0]["note"] == note
+
+    def test_is_replayed_alone_and_from_an_evaluation(self, run, saved):
+        evaluated = run(
+            *("kinarm-eval", "--policy", saved, "--problem", "right", "--trials", 4),
+            *("--no-oracle", "--out", "results"),
+        )
+        assert evaluated.status == 0, evaluated.err
+        alone = run("kinarm-replay", "--policy", saved, "--problem", "right", "--trials", 4)
+        assert alone.status == 0, alone.err
+        assert "normalised by" in alone.out
+        again = run(
+            *("kinarm-replay", "results/evaluation.json", "--policy", saved, "--out", "b.html")
+        )
+        assert again.status == 0, again.err
+
+    @pytest.mark.parametrize("command", ["kinarm-eval", "kinarm-replay"])
+    def test_needs_one_problem(self, run, saved, command):
+        words = ("model.zip", "which problem it is for", "--problem")
+        check_refused(run(command, "--policy", saved), *words)
+
+    def test_several_problems_do_not_say_which_it_is_for(self, run, saved):
+        problems = ("--problem", "right", "--problem", "left")
+        check_refused(run("kinarm-eval", "--policy", saved, *problems), "which problem")
+
+    @pytest.mark.parametrize("command", ["kinarm-eval", "kinarm-replay"])
+    def test_bad_files(self, run, here, command):
+        pytest.importorskip("stable_baselines3")
+        (here / "broken.zip").write_bytes(b"PK")
+        for name, word in (("broken.zip", "not a complete"), ("gone.zip", "No such file")):
+            check_refused(run(command, "--policy", name, "--problem", "right"), name, word)
+
+
+class TestModule:
+    @pytest.mark.parametrize("command", ["kinarm-eval", "kinarm-replay"])
+    def test_takes_part(self, run, module, command):
+        answer = run(command, "--policy", module, "--problem", "left", "--trials", 3)
+        assert answer.status == 0, answer.err
+        assert module in answer.out
+
+    @pytest.mark.parametrize("command", ["kinarm-eval", "kinarm-replay"])
+    def test_what_is_not_there(self, run, module, command):
+        options = ("--problem", "left", "--trials", 2)
+        name = module.replace(":still", ":moving")
+        check_refused(run(command, "--policy", name, *options), "'moving'", "still")
+        check_refused(run(command, "--policy", "nowhere_at_all:f", *options), "nowhere_at_all")
+
+    def test_needs_a_problem_to_replay(self, run, module):
+        check_refused(run("kinarm-replay", "--policy", module), "--problem")
+
+    def test_actions_of_another_shape(self, run, here):
+        (here / "wrong_for_tests.py").write_text("def wrong(seen):\n    return seen\n")
+        arguments = ("--policy", "wrong_for_tests:wrong", "--problem", "left", "--no-oracle")
+        check_refused(run("kinarm-eval", *arguments), "actions must have shape")
+
+
+class TestCard:
+    def test_of_a_file(self, run, here, policy):
+        policy.save("mine.npz")
+        arguments = ("--policy", "mine.npz", "--trials", 4, "--card", "mine.md")
+        answer = run("kinarm-eval", *arguments)
+        assert answer.status == 0, answer.err
+        assert "written: mine.md, mine.npz and mine.html" in answer.out
+        text = (here / "mine.md").read_text()
+        assert "kinarm-eval --policy mine.npz --trials 4 --card mine.md" in text
+        assert (here / "mine.html").is_file()
+        check_refused(run("kinarm-eval", *arguments), "mine.md' exists", "--overwrite")
+        assert run("kinarm-eval", *arguments, "--overwrite").status == 0
+        assert (here / "mine.md").read_text() == text.replace(
+            "--card mine.md", "--card mine.md --overwrite"
+        )
+
+    def test_of_a_model(self, run, saved):
+        answer = run(
+            *("kinarm-eval", "--policy", saved, "--problem", "right", "--trials", 4),
+            *("--no-oracle", "--card", "share/mine.md"),
+        )
+        assert answer.status == 0, answer.err
+        beside = load_policy("share/mine.npz")
+        own = Policy.from_sb3(saved, "right", saved.with_name("vecnormalize.pkl"))
+        seen = np.random.default_rng(0).normal(size=(10, 48))
+        np.testing.assert_array_equal(beside(seen), own(seen))
+        assert "| algorithm | ppo |" in saved.with_name("share").joinpath("mine.md").read_text()
+
+    @pytest.mark.parametrize(
+        ("arguments", "word"),
+        [
+            ((), "and 51 more"),
+            (("--policy", "ars-tuned-right"), "ars-tuned-right-seed0 on right"),
+            (("--policy", "zero", "--problem", "right"), "zero on right"),
+            (("--policy", "oracle", "--problem", "right"), "got oracle"),
+        ],
+    )
+    def test_is_of_one_policy(self, run, here, arguments, word):
+        answer = run("kinarm-eval", *arguments, "--trials", 2, "--card", "card.md")
+        check_refused(answer, "a card is of one trained policy", word)
+        assert list(here.iterdir()) == []

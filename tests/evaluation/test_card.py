@@ -1,0 +1,150 @@
+"""The card of a policy."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinarm.errors import InvalidInputError, OutputError
+from kinarm.evaluation.bounds import oracle_bounds
+from kinarm.evaluation.document import evaluation_document
+from kinarm.evaluation.entrants import BASELINES, ORACLE, Entrant
+from kinarm.evaluation.evaluation import run_trials
+from kinarm.evaluation.report.card import check_card, policy_card, shown_trials, write_card
+from kinarm.policies import load_policy
+from kinarm.problem import PROBLEMS
+
+
+@pytest.fixture(scope="module")
+def faced(skilled, trials):
+    """A policy and the oracle on the same trials."""
+    oracle_bounds(trials)
+    mine = run_trials(Entrant.from_policy("mine", skilled), trials, oracle=True)
+    return [mine, run_trials(ORACLE, trials, oracle=True)]
+
+
+@pytest.fixture(scope="module")
+def document(faced):
+    return evaluation_document(faced, "kinarm-eval --policy mine.npz --card mine.md")
+
+
+@pytest.fixture(scope="module")
+def card(document, faced):
+    return policy_card("mine", document, faced[0])
+
+
+def test_states_figures_with_intervals_beside_the_oracle(card, document):
+    rows = {row["policy"]: row for row in document["results"]}
+    for name in ("mine", "oracle"):
+        success = rows[name]["metrics"]["success"]
+        low, high = (100 * end for end in success["ci95"])
+        assert f" {100 * success['value']:.1f} % ({low:.1f}..{high:.1f}) |" in card
+    ratio = rows["mine"]["metrics"]["step_ratio"]["value"]
+    assert re.search(rf"steps over the number proven necessary.*\| {ratio:.2f} \| 1\.00 \|", card)
+
+
+def test_states_where_the_policy_comes_from(card, skilled, document):
+    made = skilled.provenance
+    for line in (
+        f"| seed | {made.seed} |",
+        f"| environment steps | {made.environment_steps:,} |",
+        "| `reward.success` | 0.5 |",
+        "| network | layers 48-5, functions linear |",
+        f"| digest of the problem | `{skilled.problem.digest}` |",
+        "kinarm-eval --policy mine.npz --card mine.md",
+        document["protocol"]["versions"]["numpy"],
+        skilled.problem.to_toml().strip(),
+    ):
+        assert line in card
+
+
+def test_is_well_formed_markdown(card):
+    assert card.startswith("# mine\n\n")
+    assert card.endswith(".\n")
+    assert not re.search(r"\n\n\n|[ \t]\n|None|\{", card)
+    assert card.count("```") % 2 == 0
+    for table in re.findall(r"(?:^\|.*\n)+", card, re.MULTILINE):
+        lines = table.strip().splitlines()
+        assert len({line.count("|") for line in lines}) == 1, lines
+        assert re.fullmatch(r"\|( --- \|)+", lines[1])
+
+
+def test_equal_input_gives_equal_text(card, document, faced):
+    assert policy_card("mine", document, faced[0]) == card
+
+
+def test_how_to_use_it_runs(card, document, faced, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "mine.md"
+    write_card(path, document, faced)
+    assert path.read_text() == card
+    scope = {}
+    exec(re.search(r"```python\n(.*?)```", card, re.DOTALL).group(1), scope)
+    assert scope["info"]["distance"] > 0
+    own = load_policy("mine.npz")
+    np.testing.assert_array_equal(own.layers[0].weights, faced[0].entrant.policy.layers[0].weights)
+    assert "mine.html" in card
+    assert (tmp_path / "mine.html").stat().st_size > 1e5
+
+
+def test_the_replay_shows_the_first_trials_and_the_worst(faced):
+    rollouts = faced[0].rollouts
+    shown = shown_trials(faced[0])
+    assert shown[:3] == [0, 1, 2]
+    assert len(set(shown)) == 6
+    left = sorted(set(range(60)) - set(shown))
+    assert not rollouts.success[shown[3:]].any() or rollouts.success[left].all()
+
+
+def test_without_the_oracle(faced, document):
+    alone = replace(faced[0], bounds=None)
+    text = policy_card("mine", evaluation_document([alone], "made"), alone)
+    assert "oracle" not in text
+    assert "| | this policy |\n| --- | --- |\n" in text
+
+
+def test_says_it_if_the_problem_is_another_one(skilled, trials):
+    harder = PROBLEMS["right"].replace(tolerance=0.03, name="harder")
+    other = trials.draw(harder, 4, 0)
+    evaluation = run_trials(Entrant.from_policy("mine", skilled), other)
+    text = policy_card("mine", evaluation_document([evaluation], "made"), evaluation)
+    assert "it was trained for another one, `right`" in text
+    assert "within 0.03 m" in text
+
+
+class TestCheck:
+    @pytest.fixture
+    def mine(self, skilled):
+        return Entrant.from_policy("mine", skilled), PROBLEMS["right"]
+
+    def test_one_policy_beside_the_oracle(self, mine, tmp_path):
+        check_card(tmp_path / "mine.md", [mine, (ORACLE, PROBLEMS["right"])])
+
+    @pytest.mark.parametrize("count", [2, 5])
+    def test_several_policies_are_refused(self, mine, tmp_path, count):
+        with pytest.raises(InvalidInputError, match="one trained policy.*got mine on right, mine"):
+            check_card(tmp_path / "mine.md", [mine] * count)
+
+    def test_baselines_and_the_oracle_are_refused(self, tmp_path):
+        for entrant, name in ((BASELINES["zero"], "zero on right"), (ORACLE, "oracle")):
+            with pytest.raises(InvalidInputError, match=f"one trained policy.*got {name}"):
+                check_card(tmp_path / "mine.md", [(entrant, PROBLEMS["right"])])
+
+    def test_what_exists_is_kept(self, mine, tmp_path):
+        for name in ("mine.md", "mine.html", "mine.npz"):
+            (tmp_path / name).write_text("old")
+            with pytest.raises(OutputError, match=f"{name}' exists: --overwrite"):
+                check_card(tmp_path / "mine.md", [mine])
+            check_card(tmp_path / "mine.md", [mine], overwrite=True)
+            (tmp_path / name).unlink()
+
+    def test_the_policy_s_own_file_may_lie_there(self, mine, tmp_path):
+        entrant, problem = mine
+        entrant.policy.save(tmp_path / "mine.npz")
+        there = replace(entrant, source=(tmp_path / "mine.npz").resolve())
+        check_card(tmp_path / "mine.md", [(there, problem)])
+
+    def test_its_name_ends_in_md(self, mine, tmp_path):
+        with pytest.raises(OutputError, match="ends in .md"):
+            check_card(tmp_path / "mine.txt", [mine])

@@ -1,0 +1,172 @@
+"""Policies that are not kinarm's own: models of Stable-Baselines3, and modules of a user's."""
+
+import sys
+
+import numpy as np
+import pytest
+
+from kinarm.envs import ReachEnv
+from kinarm.errors import InvalidInputError, PolicyFileError, UnknownNameError
+from kinarm.evaluation import evaluate, find_entrants
+from kinarm.policies import Policy
+from kinarm.policies.conversion.vec_normalize import find_vec_normalize
+from kinarm.problem import PROBLEMS
+
+MODULE = """
+import numpy as np
+from kinarm.policies import load_policy
+
+def towards(observations):
+    return np.tanh(observations[:, 3:8])
+
+class Remembering:
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        assert deterministic
+        return np.tanh(observation[:, 3:8]), state
+
+class Plain:
+    def predict(self, observation):
+        return np.tanh(observation[:, 3:8])
+
+remembering, plain = Remembering(), Plain()
+shipped = load_policy("ars-tuned-right")
+number = 3
+_hidden = towards
+"""
+
+
+@pytest.fixture
+def module(tmp_path, monkeypatch):
+    """The name of a module in the current directory."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    (tmp_path / "mine_for_tests.py").write_text(MODULE)
+    yield "mine_for_tests"
+    sys.modules.pop("mine_for_tests", None)
+
+
+class TestModule:
+    @pytest.mark.parametrize("name", ["towards", "remembering", "plain"])
+    def test_whatever_chooses_actions(self, module, name):
+        (entrant,) = find_entrants(f"{module}:{name}")
+        assert (entrant.name, entrant.algorithm) == (f"{module}:{name}", "function")
+        found = evaluate(entrant, "right", trials=20)
+        expected = evaluate(lambda seen: np.tanh(seen[:, 3:8]), "right", trials=20)
+        np.testing.assert_array_equal(found.rollouts.distance, expected.rollouts.distance)
+        again = evaluate(f"{module}:{name}", "right", trials=20)
+        np.testing.assert_array_equal(again.rollouts.distance, expected.rollouts.distance)
+
+    def test_a_policy_keeps_what_it_says_of_itself(self, module):
+        (entrant,) = find_entrants(f"{module}:shipped")
+        assert isinstance(entrant.policy, Policy)
+        assert entrant.problem.name == "right"
+
+    def test_an_object_that_predicts(self):
+        class Still:
+            def predict(self, observation, deterministic=True):
+                return np.zeros((len(observation), 5)), None
+
+        evaluation = evaluate(Still(), "right", trials=5)
+        assert evaluation.entrant.name == "Still"
+        assert evaluation.success.value == evaluate("zero", "right", trials=5).success.value
+
+    def test_missing_names_are_listed(self, module):
+        with pytest.raises(UnknownNameError, match="'nothing'; available: .*towards") as caught:
+            find_entrants(f"{module}:nothing")
+        assert {"towards", "remembering", "plain", "shipped"} <= set(caught.value.available)
+        assert "_hidden" not in caught.value.available
+
+    @pytest.mark.parametrize(
+        ("name", "message"),
+        [
+            ("no_such_module_here:f", "cannot import 'no_such_module_here'.*No module named"),
+            ("broken_for_tests:f", "cannot import 'broken_for_tests'.*oh no"),
+        ],
+    )
+    def test_modules_that_cannot_be_imported(self, module, tmp_path, name, message):
+        (tmp_path / "broken_for_tests.py").write_text("raise RuntimeError('oh no')")
+        with pytest.raises(InvalidInputError, match=message):
+            find_entrants(name)
+
+    @pytest.mark.parametrize("name", ["number", "Plain"])
+    def test_what_chooses_no_actions(self, module, name):
+        with pytest.raises(InvalidInputError, match="neither a function of observations nor"):
+            find_entrants(f"{module}:{name}")
+
+
+@pytest.fixture(scope="module")
+def model():
+    sb3 = pytest.importorskip("stable_baselines3")
+    from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+
+    env = VecNormalize(DummyVecEnv([lambda: ReachEnv("right")]))
+    env.reset()
+    for _ in range(30):
+        env.step(np.ones((1, 5)))
+    return sb3.PPO("MlpPolicy", env, seed=1, device="cpu")
+
+
+class TestModel:
+    def test_takes_part_on_the_problem_that_is_given(self, model, tmp_path):
+        model.save(tmp_path / "model.zip")
+        (entrant,) = find_entrants(tmp_path / "model.zip", "right")
+        assert (entrant.name, entrant.algorithm, entrant.recipe) == ("model", "ppo", "sb3")
+        assert (entrant.seed, entrant.note) == (1, "")
+        assert entrant.problem.digest == PROBLEMS["right"].digest
+        evaluation = evaluate(tmp_path / "model.zip", "right", trials=10)
+        expected = evaluate(Policy.from_sb3(tmp_path / "model.zip", "right"), trials=10)
+        np.testing.assert_array_equal(evaluation.rollouts.distance, expected.rollouts.distance)
+
+    @pytest.mark.parametrize(
+        ("model_file", "statistics"),
+        [
+            ("model.zip", "vecnormalize.pkl"),
+            ("best_model.zip", "vec_normalize.pkl"),
+            ("rl_model_500_steps.zip", "rl_model_vecnormalize_500_steps.pkl"),
+            ("kinarm-ReachRight-v0_1/model.zip", "kinarm-ReachRight-v0_1/kinarm-ReachRight-v0/"),
+        ],
+    )
+    def test_statistics_beside_it_are_used_and_told(self, model, tmp_path, model_file, statistics):
+        path, beside = tmp_path / model_file, tmp_path / statistics
+        if beside.suffix != ".pkl":
+            beside = beside / "vecnormalize.pkl"
+        beside.parent.mkdir(parents=True, exist_ok=True)
+        model.save(path)
+        model.get_vec_normalize_env().save(beside)
+        (entrant,) = find_entrants(path, "right")
+        assert entrant.note == f"{path.stem}: observations normalised by {beside}"
+        own = Policy.from_sb3(model)
+        seen = np.random.default_rng(0).normal(size=(20, 48))
+        np.testing.assert_array_equal(entrant.policy(seen), own(seen))
+
+    def test_statistics_of_other_models_are_left_alone(self, tmp_path):
+        for name in ("rl_model_vecnormalize_400_steps.pkl", "other/vecnormalize.pkl"):
+            (tmp_path / name).parent.mkdir(exist_ok=True)
+            (tmp_path / name).write_bytes(b"")
+        for name in ("rl_model_500_steps.zip", "model.zip"):
+            assert find_vec_normalize(tmp_path / name) is None
+
+    def test_needs_a_problem(self, model, tmp_path):
+        model.save(tmp_path / "model.zip")
+        with pytest.raises(InvalidInputError, match="model.zip': the model does not say which"):
+            find_entrants(tmp_path / "model.zip")
+
+    def test_a_missing_file(self, model, tmp_path):
+        with pytest.raises(PolicyFileError, match="cannot read model"):
+            find_entrants(tmp_path / "gone.zip", "right")
+
+
+@pytest.mark.parametrize("policy", ["ppo-tuned-right", "ars-tuned-right"])
+@pytest.mark.parametrize("name", ["kinarm/ReachRight-v0", "kinarm/ReachGoalRight-v0"])
+def test_stable_baselines3_evaluates_every_policy(policy, name):
+    evaluation = pytest.importorskip("stable_baselines3.common.evaluation")
+    from stable_baselines3.common.env_util import make_vec_env
+
+    from kinarm.policies import load_policy
+
+    env = make_vec_env(name, n_envs=2, seed=0)
+    returns, lengths = evaluation.evaluate_policy(
+        load_policy(policy), env, n_eval_episodes=8, return_episode_rewards=True
+    )
+    assert len(returns) == 8
+    assert np.mean(lengths) < 50

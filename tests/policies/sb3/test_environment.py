@@ -1,0 +1,91 @@
+"""What `sb3_vec_env` makes of problems, ids and settings, and what it refuses."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+from kinarm import PROBLEMS
+from kinarm.envs import ReachEnv
+from kinarm.errors import InvalidInputError, MissingExtraError, UnknownNameError
+from kinarm.policies import sb3_vec_env
+
+
+class TestWithoutTheExtra:
+    def test_it_is_named_in_one_line(self, monkeypatch):
+        monkeypatch.setattr("kinarm.policies.learners.find_spec", lambda name: None)
+        with pytest.raises(MissingExtraError, match=r"pip install 'kinarm\[ppo\]'$"):
+            sb3_vec_env("right", 2)
+
+
+@pytest.fixture(autouse=True)
+def _sb3(request):
+    if request.cls is not TestWithoutTheExtra:
+        pytest.importorskip("stable_baselines3")
+
+
+class TestProblems:
+    def test_names_files_and_objects(self, tmp_path):
+        problem = PROBLEMS["left"].replace(horizon=9)
+        path = tmp_path / "mine.toml"
+        path.write_text(problem.to_toml())
+        made = sb3_vec_env("left", horizon=9), sb3_vec_env(problem), sb3_vec_env(path)
+        assert {env.simulator.problem.digest for env in made} == {problem.digest}
+        assert {env.num_envs for env in made} == {1}
+
+    @pytest.mark.parametrize("problem", ["left", "right", "both"])
+    @pytest.mark.parametrize("prefix", ["", "kinarm:"])
+    def test_ids(self, problem, prefix):
+        for kind, space in (("Reach", "Box"), ("ReachGoal", "Dict")):
+            env_id = f"kinarm/{kind}{problem.capitalize()}-v0"
+            env = sb3_vec_env(prefix + env_id, 3)
+            assert env.simulator.problem == PROBLEMS[problem]
+            assert type(env.observation_space).__name__ == space
+            assert (env.num_envs, env.spec.id) == (3, env_id)
+
+    def test_ids_of_their_own(self):
+        name = "Test/Wide-v0"
+        gymnasium.register(name, entry_point=ReachEnv, kwargs={"tolerance": 0.2, "horizon": 5})
+        try:
+            env = sb3_vec_env(name, horizon=7)
+        finally:
+            del gymnasium.registry[name]
+        assert env.simulator.problem == PROBLEMS["right"].replace(tolerance=0.2, horizon=7)
+
+    def test_a_reward_type_makes_goals(self):
+        env = sb3_vec_env("both", 2, reward_type="dense", horizon=4)
+        assert set(env.reset()) == {"observation", "achieved_goal", "desired_goal"}
+        assert (env.step(np.zeros((2, 5)))[1] < -0.05).all()
+
+    def test_settings_reach_what_they_are_for(self):
+        env = sb3_vec_env("right", 2, threads=1, observation_dtype="float64", render_mode="human")
+        assert env.simulator.threads == 1
+        assert env.observation_space.dtype == np.float64
+        assert env.render_mode == "human"
+
+
+@pytest.mark.parametrize("n_envs", [0, -1, 1.5, True, "2", None])
+def test_number_of_arms(n_envs):
+    with pytest.raises(InvalidInputError, match="n_envs must be a whole number of at least 1"):
+        sb3_vec_env("right", n_envs)
+
+
+@pytest.mark.parametrize("env_id", ["kinarm/ReachUp-v0", "CartPole-v1", "kinarm/ReachRight-v9"])
+def test_unknown_environment(env_id):
+    with pytest.raises(UnknownNameError, match=f"{env_id}.*available: kinarm/ReachLeft-v0"):
+        sb3_vec_env(env_id)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"seed": -1}, "seed must be a whole number of at least 0"),
+        ({"render_mode": "ansi"}, "render_mode must be one of"),
+        ({"observation_dtype": "int8"}, "observation_dtype must be one of"),
+        ({"reward_type": "rare"}, "reward_type must be one of"),
+        ({"speed": 2}, "speed"),
+        ({"problem": "up"}, "unknown problem 'up'"),
+    ],
+)
+def test_bad_settings(settings, message):
+    with pytest.raises(InvalidInputError, match=message):
+        sb3_vec_env(**settings)

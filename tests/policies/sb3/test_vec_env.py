@@ -1,0 +1,254 @@
+"""The environment for Stable-Baselines3 held against their own way of stepping many arms."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3")
+
+from stable_baselines3 import PPO
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.utils import set_random_seed
+from stable_baselines3.common.vec_env import DummyVecEnv, VecFrameStack
+
+from kinarm.envs import ClosedEnvironmentError, ResetNeededError
+from kinarm.errors import InvalidInputError, StartInContactError
+from kinarm.policies import sb3_vec_env
+
+NUMBER = 6
+FLAT, GOALS = "kinarm/ReachRight-v0", "kinarm/ReachGoalRight-v0"
+SETTINGS = {"tolerance": 0.5, "observation_dtype": "float32"}
+FINAL_KEYS = {
+    "terminal_observation": ...,
+    "TimeLimit.truncated": bool,
+    "is_success": bool,
+    "collision": bool,
+    "distance": float,
+    "episode": dict,
+}
+
+
+def dummy_vec_env(env_id, **settings):
+    """Single environments, stepped one after the other by Stable-Baselines3."""
+    return DummyVecEnv([lambda: Monitor(gymnasium.make(env_id, **settings))] * NUMBER)
+
+
+def assert_same(first, second):
+    if isinstance(first, dict):
+        assert first.keys() == second.keys()
+        for key in first:
+            assert_same(first[key], second[key])
+    else:
+        assert first.dtype == second.dtype
+        np.testing.assert_array_equal(first, second)
+
+
+@pytest.mark.parametrize("horizon", [64, 3])
+@pytest.mark.parametrize("env_id", [FLAT, GOALS])
+def test_equals_single_environments_of_theirs(env_id, horizon):
+    ours = sb3_vec_env(env_id, NUMBER, horizon=horizon, **SETTINGS)
+    theirs = dummy_vec_env(env_id, horizon=horizon, **SETTINGS)
+    assert ours.observation_space == theirs.observation_space
+    assert ours.action_space == theirs.action_space
+    for env in (ours, theirs):
+        env.seed(11)
+    assert_same(ours.reset(), theirs.reset())
+    rng = np.random.default_rng(0)
+    ends = {"is_success": 0, "collision": 0, "TimeLimit.truncated": 0}
+    for _ in range(150):
+        assert ours.reset_infos == theirs.reset_infos
+        actions = rng.uniform(-1, 1, (NUMBER, 5)).astype(np.float32)
+        observations, rewards, dones, infos = ours.step(actions)
+        expected = theirs.step(actions)
+        for found, wanted in zip((observations, rewards, dones), expected[:3], strict=True):
+            assert_same(found, wanted)
+        for done, info, wanted in zip(dones, infos, expected[3], strict=True):
+            if not done:
+                assert info == ({"collision": True} if wanted["collision"] else {})
+            else:
+                assert set(info) == set(FINAL_KEYS)
+                final = info.pop("terminal_observation"), wanted.pop("terminal_observation")
+                assert_same(*final)
+                episode, monitored = info.pop("episode"), wanted.pop("episode")
+                assert episode["l"] == monitored["l"]
+                assert episode["r"] == pytest.approx(monitored["r"], abs=1e-6)  # which is rounded
+                assert episode["t"] > 0
+                assert info == {key: wanted[key] for key in info}
+                for key in ends:
+                    ends[key] += info[key]
+    assert ends["is_success"] > 0
+    assert ends["TimeLimit.truncated"] > 2 or (env_id == FLAT and horizon == 64)
+    assert ends["collision"] > 0
+
+
+def test_types_of_infos_are_plain():
+    env = sb3_vec_env(FLAT, NUMBER, horizon=2)
+    env.reset()
+    for _ in range(2):
+        infos = env.step(np.zeros((NUMBER, 5)))[3]
+    for info in infos:
+        kinds = {key: type(info[key]) for key, kind in FINAL_KEYS.items() if kind is not ...}
+        assert kinds == {key: kind for key, kind in FINAL_KEYS.items() if kind is not ...}
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+@pytest.mark.parametrize("env_id", [FLAT, GOALS])
+def test_results_are_of_the_spaces(env_id, dtype):
+    env = sb3_vec_env(env_id, NUMBER, observation_dtype=dtype)
+    for observations in (env.reset(), env.step(np.ones((NUMBER, 5)))[0]):
+        parts = observations if isinstance(observations, dict) else {"": observations}
+        assert {part.dtype for part in parts.values()} == {np.dtype(dtype)}
+        for row in range(NUMBER):
+            one = {key: part[row] for key, part in parts.items()}
+            assert env.observation_space.contains(one if env_id == GOALS else one[""])
+
+
+def test_observations_are_copies():
+    env = sb3_vec_env(FLAT, NUMBER)
+    before = env.reset()
+    kept = before.copy()
+    env.step(np.ones((NUMBER, 5)))
+    np.testing.assert_array_equal(before, kept)
+
+
+class TestSeeds:
+    def test_same_seed_same_run(self):
+        def run(env):
+            env.seed(4)
+            rng = np.random.default_rng(1)
+            return [env.reset(), *(env.step(rng.uniform(-1, 1, (3, 5)))[0] for _ in range(80))]
+
+        env = sb3_vec_env("both", 3)
+        first = run(env)
+        for other in (env, sb3_vec_env("both", 3)):
+            assert_same(np.array(first), np.array(run(other)))
+
+    def test_seed_of_the_maker_is_that_of_the_first_reset(self):
+        env, other = sb3_vec_env("both", 3, seed=4), sb3_vec_env("both", 3)
+        other.seed(4)
+        assert_same(env.reset(), other.reset())
+        assert_same(env.reset(), other.reset())
+
+    def test_arms_and_resets_differ(self):
+        env = sb3_vec_env("both", 3, seed=4)
+        first, second = env.reset(), env.reset()
+        assert len(np.unique(np.vstack([first, second]), axis=0)) == 6
+
+    def test_without_a_seed_environments_differ(self):
+        assert (sb3_vec_env("both", 2).reset() != sb3_vec_env("both", 2).reset()).any()
+
+    def test_seed_of_a_learner(self):
+        def trained():
+            env = sb3_vec_env("both", 4, horizon=8)
+            model = PPO("MlpPolicy", env, n_steps=16, batch_size=64, n_epochs=1, seed=7)
+            model.learn(64)
+            return model.policy.state_dict()
+
+        first, second = trained(), trained()
+        assert all((first[name] == second[name]).all() for name in first)
+
+    def test_no_seed_means_the_global_one_of_numpy(self):
+        """As their environments do it, so that `set_random_seed` is enough."""
+        env, other = sb3_vec_env("both", 2), sb3_vec_env("both", 2)
+        for each in (env, other):
+            set_random_seed(3)
+            each.seed()
+        assert_same(env.reset(), other.reset())
+
+
+class TestOptions:
+    def test_starts_and_goals_can_be_set_once(self):
+        env = sb3_vec_env(GOALS, 3, seed=0)
+        goal = np.array([0.1, -0.7, 0.5])
+        env.set_options([{"goal": goal}, {}, {"goal": -goal}])
+        goals = env.reset()["desired_goal"]
+        np.testing.assert_allclose(goals[[0, 2]], [goal, -goal], rtol=1e-6)
+        assert not np.isin(env.reset()["desired_goal"], [goal, -goal]).any()
+
+    def test_bad_options(self):
+        env = sb3_vec_env(FLAT, 2)
+        env.set_options({"speed": 1})
+        with pytest.raises(InvalidInputError, match=r"unknown reset options \['speed'\]"):
+            env.reset()
+
+    def test_start_in_contact(self):
+        env = sb3_vec_env(FLAT, 2)
+        env.set_options([{}, {"start": [0.0, 2.4, 0.0, 0.0, 0.0, 0.0]}])
+        with pytest.raises(StartInContactError, match="start 1"):
+            env.reset()
+
+
+class TestMisuse:
+    def test_step_and_render_before_reset(self):
+        env = sb3_vec_env(FLAT, 2)
+        for use in (lambda: env.step(np.zeros((2, 5))), env.render):
+            with pytest.raises(ResetNeededError, match="never begun"):
+                use()
+
+    def test_use_after_close(self):
+        env = sb3_vec_env(FLAT, 2)
+        env.reset()
+        env.close()
+        env.close()
+        for use in (env.reset, lambda: env.step(np.zeros((2, 5))), env.render):
+            with pytest.raises(ClosedEnvironmentError, match="is closed"):
+                use()
+
+    @pytest.mark.parametrize(
+        ("actions", "message"),
+        [
+            (np.zeros((3, 5)), r"actions must have shape \(2, 5\), got \(3, 5\)"),
+            (np.full((2, 5), np.nan), "actions must be finite"),
+        ],
+    )
+    def test_bad_actions(self, actions, message):
+        env = sb3_vec_env(FLAT, 2)
+        env.reset()
+        with pytest.raises(InvalidInputError, match=message):
+            env.step(actions)
+
+
+class TestAttributes:
+    def test_arms_share_everything(self):
+        env = sb3_vec_env(GOALS, NUMBER)
+        assert env.get_attr("render_mode") == [None] * NUMBER
+        assert env.get_attr("simulator", indices=[0, 3]) == [env.simulator] * 2
+        assert env.get_attr("tells_terms", indices=2) == [False]
+        assert env.get_attr("spec")[0].id == GOALS
+        assert env.get_attr("metadata")[0]["render_fps"] == 50
+
+    def test_has_attr(self):
+        env = VecFrameStack(sb3_vec_env(FLAT, 2), 2)
+        assert env.has_attr("simulator")
+        assert not env.has_attr("action_masks")
+
+    def test_set_attr_is_for_all_arms(self):
+        env = sb3_vec_env(FLAT, 3)
+        env.set_attr("note", "mine")
+        assert env.get_attr("note") == ["mine"] * 3
+        env.set_attr("note", "yours", indices=[2, 0, 1])
+        with pytest.raises(InvalidInputError, match="cannot set 'note' for some arms"):
+            env.set_attr("note", "others", indices=[1])
+        assert env.get_attr("note") == ["yours"] * 3
+
+    def test_rewards_are_computed_as_by_the_single_environment(self):
+        env, single = sb3_vec_env(GOALS, 4), gymnasium.make(GOALS).unwrapped
+        rng = np.random.default_rng(0)
+        achieved = rng.uniform(-1, 1, (50, 3))
+        desired = achieved + rng.uniform(-0.05, 0.05, (50, 3))
+        pairs = list(zip(achieved, desired, strict=True))
+        for method in ("compute_reward", "compute_terminated", "compute_truncated"):
+            (found,) = env.env_method(method, achieved, desired, [{}] * 50, indices=[0])
+            wanted = [getattr(single, method)(*pair, {}) for pair in pairs]
+            np.testing.assert_array_equal(found, wanted)
+        assert len(env.env_method("compute_reward", achieved, desired, {})) == 4
+
+    def test_no_such_method(self):
+        env = sb3_vec_env(FLAT, 2)
+        with pytest.raises(AttributeError, match="compute_reward"):
+            env.env_method("compute_reward", np.zeros(3), np.zeros(3), {})
+
+    def test_infos_are_as_if_monitored(self):
+        env = sb3_vec_env(FLAT, 2)
+        assert env.env_is_wrapped(Monitor) == [True, True]
+        assert env.env_is_wrapped(gymnasium.wrappers.TimeLimit, indices=0) == [False]

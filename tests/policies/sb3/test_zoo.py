@@ -1,0 +1,44 @@
+"""The hyperparameters for rl-zoo3: files that ship, complete, and made of what exists."""
+
+import inspect
+
+import pytest
+
+from kinarm.envs.registration import ENVIRONMENTS
+from kinarm.errors import UnknownNameError
+from kinarm.policies import zoo_hyperparameters
+
+FLAT = {name for name in ENVIRONMENTS if "Goal" not in name}
+GOALS = set(ENVIRONMENTS) - FLAT
+ALGORITHMS = {
+    "ppo": FLAT,
+    "a2c": FLAT,
+    "sac": FLAT | GOALS,
+    "td3": FLAT | GOALS,
+    "tqc": FLAT | GOALS,
+}
+OF_THE_ZOO = {"n_timesteps", "policy", "normalize", "env_kwargs", "monitor_kwargs", "n_envs"}
+NOISE = {"noise_type", "noise_std"}
+
+
+@pytest.mark.parametrize(("algorithm", "environments"), ALGORITHMS.items())
+def test_every_environment_has_settings(algorithm, environments):
+    yaml = pytest.importorskip("yaml")
+    settings = yaml.safe_load(zoo_hyperparameters(algorithm).read_text(encoding="utf-8"))
+    assert set(settings) == environments
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_settings_are_those_of_the_algorithm(algorithm):
+    yaml = pytest.importorskip("yaml")
+    zoo = pytest.importorskip("rl_zoo3")
+    known = set(inspect.signature(zoo.ALGOS[algorithm]).parameters) | OF_THE_ZOO | NOISE
+    for settings in yaml.safe_load(zoo_hyperparameters(algorithm).read_text("utf-8")).values():
+        assert set(settings) <= known
+
+
+def test_other_algorithms():
+    with pytest.raises(
+        UnknownNameError, match=r"unknown algorithm 'dqn'; available: a2c, ppo, sac"
+    ):
+        zoo_hyperparameters("dqn")

@@ -1,0 +1,75 @@
+"""Dictionary observations as policies take them, against the environments that make them."""
+
+import numpy as np
+import pytest
+
+from kinarm.envs.goal import ReachGoalEnv
+from kinarm.envs.interface import GoalInterface
+from kinarm.errors import InvalidInputError
+from kinarm.policies import load_policy
+from kinarm.policies.goal_observation import flat_observation
+
+
+@pytest.fixture
+def shown(simulator):
+    """Observations of some arms, flat and as a dictionary."""
+    flat = simulator.world.observe(*simulator.sample(np.random.default_rng(0), 30))
+    return flat, GoalInterface(simulator).observe(flat)
+
+
+def test_is_what_the_environment_split(shown):
+    flat, parts = shown
+    np.testing.assert_allclose(flat_observation(parts, 48), flat, rtol=0, atol=1e-15)
+    one = {name: part[3] for name, part in parts.items()}
+    np.testing.assert_allclose(flat_observation(one, 48), flat[3], rtol=0, atol=1e-15)
+
+
+def test_arms_of_other_joints(any_simulator):
+    flat = any_simulator.world.observe(*any_simulator.sample(np.random.default_rng(0), 5))
+    parts = GoalInterface(any_simulator).observe(flat)
+    np.testing.assert_allclose(flat_observation(parts, flat.shape[1]), flat, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"mood": [1.0]}, "has the keys observation, achieved_goal, desired_goal, got .*mood"),
+        ({"desired_goal": None}, "desired_goal must"),
+        ({"achieved_goal": np.zeros((2, 3))}, r"achieved_goal must have shape \(3\)"),
+        ({"observation": np.zeros(48)}, r"observation must have shape \(42\)"),
+        ({"achieved_goal": [np.nan, 0, 0]}, "achieved_goal must be finite"),
+    ],
+)
+def test_others_are_refused(shown, change, message):
+    one = {name: part[0] for name, part in shown[1].items()}
+    with pytest.raises(InvalidInputError, match=message):
+        flat_observation({**one, **change}, 48)
+
+
+class TestPredict:
+    def test_answers_as_a_call_and_gives_the_state_back(self, shown):
+        policy, (flat, parts) = load_policy("ppo-tuned-right"), shown
+        actions, state = policy.predict(flat, "mine", np.zeros(30, dtype=bool), False)
+        np.testing.assert_array_equal(actions, policy(flat))
+        assert state == "mine"
+        of_parts, _ = policy.predict(parts)
+        np.testing.assert_allclose(of_parts, actions, rtol=0, atol=1e-12)
+
+    def test_one_arm_after_the_other(self, shown):
+        policy, (flat, parts) = load_policy("ars-tuned-right"), shown
+        action, state = policy.predict(flat[0])
+        assert (action.shape, state) == ((5,), None)
+        assert policy.predict({name: part[0] for name, part in parts.items()})[0].shape == (5,)
+
+    def test_drives_a_goal_conditioned_environment(self):
+        env, policy = ReachGoalEnv("right"), load_policy("ppo-tuned-right")
+        reached = []
+        for seed in range(8):
+            observation, _ = env.reset(seed=seed)
+            over = False
+            while not over:
+                action, _ = policy.predict(observation)
+                observation, _, terminated, truncated, info = env.step(action)
+                over = terminated or truncated
+            reached.append(info["is_success"])
+        assert sum(reached) >= 6
