@@ -17,6 +17,7 @@ from kinarm.evaluation import METRICS
 from kinarm.evaluation.commands.bench import BenchmarkRequest
 from kinarm.evaluation.commands.evaluate import EvaluationRequest
 from kinarm.evaluation.commands.replay import ReplayRequest
+from kinarm.evaluation.commands.compare import ComparisonRequest
 from kinarm.evaluation.commands.reproduce import ReproductionRequest
 from kinarm.evaluation.reproduction.tables import markdown
 from kinarm.observation import OBSERVATION, part_slices
@@ -203,6 +204,7 @@ TABLES = {
     "evaluation-options": lambda: options_table(EvaluationRequest),
     "replay-options": lambda: options_table(ReplayRequest),
     "reproduction-options": lambda: options_table(ReproductionRequest),
+    "comparison-options": lambda: options_table(ComparisonRequest),
     "benchmark-options": lambda: options_table(BenchmarkRequest),
 }
 
