@@ -15,9 +15,9 @@ from kinarm.collision import enclosing_capsule
 from kinarm.envs.registration import ENVIRONMENTS
 from kinarm.evaluation import METRICS
 from kinarm.evaluation.commands.bench import BenchmarkRequest
+from kinarm.evaluation.commands.compare import ComparisonRequest
 from kinarm.evaluation.commands.evaluate import EvaluationRequest
 from kinarm.evaluation.commands.replay import ReplayRequest
-from kinarm.evaluation.commands.compare import ComparisonRequest
 from kinarm.evaluation.commands.reproduce import ReproductionRequest
 from kinarm.evaluation.reproduction.tables import markdown
 from kinarm.observation import OBSERVATION, part_slices

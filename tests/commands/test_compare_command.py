@@ -74,7 +74,11 @@ def test_without_training(run, folder):
 def test_from_python(folder):
     request = ComparisonRequest(
         learners=("ars-paper",),
-        **{"problems": ("left",), "seeds": 2, "steps": 2000, "trials": 10, "jobs": 1},
+        problems=("left",),
+        seeds=2,
+        steps=2000,
+        trials=10,
+        jobs=1,
         out=folder,
     )
     comparison = request.run()
