@@ -26,12 +26,3 @@ def open_page(path: Path, width: int, height: int, *, scale: float = 1) -> Itera
         page.goto(path.resolve().as_uri())
         yield page
         browser.close()
-
-
-@contextmanager
-def open_stage(path: Path, width: int, height: int, *, scale: float = 1) -> Iterator[Page]:
-    """Open a replay without its panels."""
-    with open_page(path, width, height, scale=scale) as page:
-        page.wait_for_selector("body[data-ready]")
-        page.add_style_tag(content="#card, #dock { display: none !important; }")
-        yield page

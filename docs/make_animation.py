@@ -1,30 +1,26 @@
 """Make ``docs/_static/reach.gif``: a shipped policy reaches one goal after the other.
 
-Run ``python docs/make_animation.py`` from the root of a clone, with Chromium and the extra
-``test`` installed. Each motion starts where the last one ended. Goals are drawn at random; those
+Run ``python docs/make_animation.py`` from the root of a clone. Each motion starts where the last one ended. Goals are drawn at random; those
 that the policy misses, or reaches late, are skipped: the animation shows what a success looks like
 and not how often there is one.
 """
 
-import io
-import tempfile
 from pathlib import Path
 
 import numpy as np
-from browser import open_stage
 from numpy.typing import NDArray
 from PIL import Image
 
-from kinarm import CompiledPolicy, Recording, Simulator
+from kinarm import Arm, CompiledPolicy, Recording, Simulator
 from kinarm.policies import load_policy
 from kinarm.recording import record_rollouts
-from kinarm.viewer import replay_page
+from kinarm.viewer import Camera, Renderer
 
 POLICY = "ppo-tuned-both"
 OUT = Path(__file__).parent / "_static" / "reach.gif"
-WIDTH, HEIGHT = 600, 420
-EYE, TARGET = (-2.35, -1.5, 1.65), (0.04, -0.03, 0.3)
-"""Where the camera stands and what it looks at [m]."""
+WIDTH, HEIGHT, SCALE = 600, 420, 2
+"""Size of the animation, and how much larger pictures are taken, for smoother edges."""
+CAMERA = Camera(position=(-2.35, -1.5, 1.65), target=(0.04, -0.03, 0.3))
 SEED = 2
 SIDES = ("left", "right", "right", "left")
 """Benches of the goals."""
@@ -72,19 +68,17 @@ def record_motion(
 
 def photograph(motions: list[Recording]) -> list[Image.Image]:
     """Pictures of motions, one after the other."""
+    problem = motions[0].problem
+    size = {"width": SCALE * WIDTH, "height": SCALE * HEIGHT}
+    renderer, arm = Renderer(problem, camera=CAMERA, **size), Arm.load(problem.arm)
     pictures = []
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "replay.html"
-        replay_page(motions, path)
-        with open_stage(path, WIDTH, HEIGHT, scale=2) as page:
-            page.evaluate(f"kinarm.lookFrom({list(EYE)}, {list(TARGET)})")
-            for index, motion in enumerate(motions):
-                page.evaluate(f"kinarm.select({index})")
-                for step in range(motion.steps + 1):
-                    page.evaluate(f"kinarm.seek({step})")
-                    picture = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
-                    pictures.append(picture.resize((WIDTH, HEIGHT), Image.Resampling.LANCZOS))
-                pictures += [pictures[-1]] * (HOLD - 1)
+    for motion in motions:
+        way = [arm.tool_position(state) for state in motion.states]
+        for step, state in enumerate(motion.states):
+            outcome = motion.outcome if step == motion.steps else None
+            taken = renderer.render(state, motion.goal, trace=way[: step + 1], outcome=outcome)
+            pictures.append(Image.fromarray(taken).reduce(SCALE))
+        pictures += [pictures[-1]] * (HOLD - 1)
     return pictures
 
 

@@ -1,11 +1,8 @@
 """Make ``docs/_static/world.png``: the arm in its scene, with the axes of the world in metres.
 
-Run ``python docs/make_world_picture.py`` from the root of a clone, with Chromium and the extra
-``test`` installed.
+Run ``python docs/make_world_picture.py`` from the root of a clone.
 """
 
-import io
-import tempfile
 from pathlib import Path
 
 import matplotlib as mpl
@@ -14,44 +11,33 @@ mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
-from browser import open_stage
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
-from kinarm import Simulator
-from kinarm.recording import record_rollouts
-from kinarm.viewer import replay_page
+from kinarm import Arm
+from kinarm.viewer import Camera, Renderer
 
 OUT = Path(__file__).parent / "_static" / "world.png"
 WIDTH, HEIGHT, SCALE = 960, 640, 2
-EYE, TARGET = np.array([-2.35, -1.5, 1.75]), np.array([0.03, -0.04, 0.2])
-"""Where the camera stands and what it looks at [m]."""
-VIEW = np.deg2rad(30.0)
-"""Vertical angle of view of a replay [rad]."""
+CAMERA = Camera(position=(-2.35, -1.5, 1.75), target=(0.03, -0.04, 0.2))
 CONFIGURATION = np.deg2rad([-73.8, 36.6, 22.8, -10.4, -52.4, 0.0])
 GOAL = np.array([0.22, -0.64, 0.325])
 
 
-def photograph(simulator: Simulator) -> Image.Image:
+def photograph() -> Image.Image:
     """The arm beside the cube."""
-    resting = np.zeros((1, simulator.task.horizon, simulator.n_actions))
-    rollouts = simulator.rollout_actions(resting, CONFIGURATION[None], GOAL[None], record=True)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "replay.html"
-        replay_page(record_rollouts(simulator, rollouts, "rest"), path)
-        with open_stage(path, WIDTH, HEIGHT, scale=SCALE) as page:
-            page.evaluate(f"kinarm.lookFrom({EYE.tolist()}, {TARGET.tolist()}); kinarm.seek(0)")
-            return Image.open(io.BytesIO(page.screenshot()))
+    size = {"width": 2 * SCALE * WIDTH, "height": 2 * SCALE * HEIGHT}
+    taken = Renderer("right", camera=CAMERA, **size).render(CONFIGURATION, GOAL)
+    return Image.fromarray(taken).reduce(2)
 
 
 def pixels(points: ArrayLike) -> NDArray[np.float64]:
     """Where points of the world [m] are in the picture, shape (..., 2)."""
-    forward = (TARGET - EYE) / np.linalg.norm(TARGET - EYE)
-    right = np.cross(forward, [0, 0, 1]) / np.linalg.norm(np.cross(forward, [0, 0, 1]))
-    local = (np.asarray(points) - EYE) @ np.array([right, np.cross(forward, right), forward]).T
-    focal = SCALE * HEIGHT / 2 / np.tan(VIEW / 2)
-    return focal * local[..., :2] / local[..., 2:] + SCALE * np.array([WIDTH, HEIGHT]) / 2
+    points = np.asarray(points, dtype=float)
+    seen = np.concatenate([points, np.ones((*points.shape[:-1], 1))], axis=-1)
+    seen = seen @ CAMERA.projection(SCALE * WIDTH, SCALE * HEIGHT).T
+    return seen[..., :2] / seen[..., 2:]
 
 
 def draw_ruler(
@@ -84,16 +70,16 @@ def point_out(axes: Axes, text: str, place: ArrayLike, offset: tuple[float, floa
 
 def main() -> None:
     """Photograph the arm and put rulers and labels on the picture."""
-    simulator = Simulator("right")
+    arm = Arm.load("paper")
     figure = plt.figure(figsize=(9.6, 6.4), dpi=100 * SCALE)
     axes = figure.add_axes((0, 0, 1, 1))
-    axes.imshow(photograph(simulator))
+    axes.imshow(photograph())
     axes.set_axis_off()
     half_metre = np.arange(-0.5, 0.6, 0.25)
     draw_ruler(axes, "x", (0, -0.32, 0), (1, 0, 0), half_metre, (0, 1, 0), "#a8201a")
     draw_ruler(axes, "y", (-0.58, 0, 0), (0, 1, 0), half_metre, (-1, 0, 0), "#1b6e3c")
     draw_ruler(axes, "z", (-0.58, 0.70, 0), (0, 0, 1), half_metre[2:], (0, 1, 0), "#1a4e8a")
-    point_out(axes, "tool point", simulator.arm.tool_position(CONFIGURATION), (65, 40))
+    point_out(axes, "tool point", arm.tool_position(CONFIGURATION), (65, 40))
     point_out(axes, "cube", GOAL - [0.0, 0.025, 0.0], (70, -10))
     point_out(axes, "right bench", (-0.1, -0.75, 0.3), (100, -5))
     point_out(axes, "left bench", (0.35, 0.65, 0.3), (-10, 55))

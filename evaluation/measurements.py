@@ -198,7 +198,7 @@ def measure_sb3(problem: ReachProblem, repetitions: int) -> dict[str, Any]:
 
 
 def measure_pictures(simulator: Simulator, policy: Policy, repetitions: int) -> Timing:
-    """Pictures per second of an environment's usual size, on one core; some show a whole episode."""
+    """Pictures per second of an environment's usual size, on one core, with the tool's ways."""
     from kinarm.viewer import Renderer
 
     renderer = Renderer(simulator.problem)

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm._files import first_line
+from kinarm.errors import InvalidInputError
 from kinarm.evaluation.comparison.learners import ALGORITHMS, ComparedLearner
 from kinarm.evaluation.comparison.runs import CurvePoint, PlannedRun, Protocol, save_run
 from kinarm.evaluation.trials import TrialSet
@@ -138,7 +140,13 @@ def train_sb3(run: PlannedRun, judge: Judge) -> None:
 
 
 def sb3_model(learner: ComparedLearner, problem: ReachProblem, seed: int) -> "BaseAlgorithm":
-    """Build the algorithm of a learner, with its environment."""
+    """Build the algorithm of a learner, with its environment.
+
+    Raises
+    ------
+    InvalidInputError
+        If the algorithm refuses its settings.
+    """
     from stable_baselines3.common.noise import NormalActionNoise
     from stable_baselines3.common.utils import LinearSchedule
     from stable_baselines3.common.vec_env import VecEnv, VecNormalize
@@ -160,5 +168,8 @@ def sb3_model(learner: ComparedLearner, problem: ReachProblem, seed: int) -> "Ba
     if learner.decaying:
         settings["learning_rate"] = LinearSchedule(settings["learning_rate"], 0.0, 1.0)
     algorithm = getattr(import_module(ALGORITHMS[learner.algorithm]), learner.algorithm)
-    model: BaseAlgorithm = algorithm(env=env, seed=seed, device="cpu", **settings)
+    try:
+        model: BaseAlgorithm = algorithm(env=env, seed=seed, device="cpu", **settings)
+    except (AssertionError, KeyError, TypeError, ValueError) as error:
+        raise InvalidInputError(f"settings of {learner.name}: {first_line(error)}") from error
     return model

@@ -2,6 +2,7 @@
 
 import asyncio
 import errno
+import socket
 import threading
 from typing import Any
 
@@ -39,7 +40,10 @@ class _Application(tornado.web.Application):
     """Meshcat's pages, for this machine only."""
 
     def listen(self, port: int, **settings: Any) -> HTTPServer:  # type: ignore[override]
-        self.server = super().listen(port, address=HOST, **settings)
+        listening = socket.create_server((HOST, port))  # closed again if the port is taken
+        listening.setblocking(False)
+        self.server = HTTPServer(self, **settings)
+        self.server.add_socket(listening)
         return self.server
 
 
@@ -61,8 +65,8 @@ class _Bridge(ZMQWebSocketBridge):
     async def close(self) -> None:
         """Let the browsers go, and stop listening."""
         self.app.server.stop()
-        for socket in set(self.websocket_pool):
-            socket.ws_connection.stream.close()
+        for watching in set(self.websocket_pool):
+            watching.ws_connection.stream.close()
         await self.app.server.close_all_connections()
 
 

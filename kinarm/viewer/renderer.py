@@ -32,8 +32,8 @@ SAMPLES = np.array([(0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.87
 """Places in a pixel: no two in a row or column, so that edges of any slope are smooth."""
 
 BACKGROUND, GRID_COLOUR = 0xEEF1F4, 0xB4BDC7
-GRID_WIDTH = 0.8
-"""Width of the lines on the floor [pixels]."""
+GRID_WIDTH = 1 / 450
+"""Width of the lines on the floor, as a share of the picture's height."""
 
 FADING = (0.2, 3.8)
 """The floor fades out between these distances, plus that of the camera from the origin [m]."""
@@ -189,7 +189,7 @@ class Renderer:
             floor_radius=FLOOR_RADIUS if self.problem.scene.ground else 0.0,
             grid_radius=GRID_RADIUS,
             grid_step=GRID_STEP,
-            line_width=GRID_WIDTH,
+            line_width=max(GRID_WIDTH * self.height, 0.8),
             gamma=GAMMA,
         )
 

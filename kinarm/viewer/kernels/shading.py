@@ -256,7 +256,7 @@ def paint_floor(
     backdrop: Backdrop,
     floor: NDArray[np.float32],
 ) -> None:
-    """Colour the floor and what is behind, shape (height, width, 2, 3): in shadow, and in the sun."""
+    """Colour floor and background, shape (height, width, 2, 3): in shadow, and in the sun."""
     back = backdrop.colour
     for row in range(floor.shape[0]):
         for column in range(floor.shape[1]):

@@ -1,0 +1,276 @@
+"""Pictures and the live page of environments."""
+
+import copy
+import pickle
+import urllib.error
+import urllib.request
+import webbrowser
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from kinarm.envs import ReachEnv, ReachGoalEnv, ReachVectorEnv
+from kinarm.envs.rendering import RENDER_MODES, EnvPictures
+from kinarm.errors import InvalidInputError
+from kinarm.viewer import Renderer, live_stage
+
+SMALL = {"width": 64, "height": 48}
+
+
+@pytest.fixture
+def opened(monkeypatch):
+    """Addresses that would be opened in a browser; no time is spent at real pace."""
+    addresses = []
+    monkeypatch.setattr(webbrowser, "open", addresses.append)
+    monkeypatch.setattr(live_stage.time, "sleep", lambda _: None)
+    return addresses
+
+
+def moved(env, steps=5, seed=0):
+    """The environment after some short random steps."""
+    env.reset(seed=seed)
+    actions = np.random.default_rng(seed).uniform(-0.2, 0.2, (steps, *env.action_space.shape))
+    for action in actions:
+        env.step(action)
+    return env
+
+
+class TestPicture:
+    @pytest.mark.parametrize("kind", [ReachEnv, ReachGoalEnv])
+    def test_is_what_the_renderer_draws(self, kind):
+        env = moved(kind("left", render_mode="rgb_array", **SMALL))
+        episode = env._episode
+        expected = Renderer("left", **SMALL).render(
+            episode.q[0], episode.goal[0], trace=env._pictures._traces[0, :6]
+        )
+        np.testing.assert_array_equal(env.render(), expected)
+
+    def test_way_is_that_of_the_tool(self):
+        env = ReachEnv("right", render_mode="rgb_array", **SMALL)
+        env.reset(seed=0)
+        tools = [env.simulator.arm.tool_position(env._episode.q[0])]
+        for action in np.random.default_rng(0).uniform(-0.2, 0.2, (4, 5)):
+            env.step(action)
+            tools.append(env.simulator.arm.tool_position(env._episode.q[0]))
+        np.testing.assert_allclose(env._pictures._traces[0, :5], tools, atol=1e-12)
+
+    def test_contact_is_shown(self, simulator):
+        env = ReachEnv("right", render_mode="rgb_array", **SMALL)
+        env.reset(seed=0)
+        ended = False
+        while not ended:
+            *_, ended, _, info = env.step([0.0, 1.0, -1.0, 0.0, 0.0])
+        assert info["collision"]
+        contact = env._pictures._contacts[0]
+        assert contact.pair == info["contact"]
+        picture = env.render().astype(int)
+        env._pictures._contacts.clear()
+        assert np.abs(env.render() - picture).max() > 50
+
+    def test_size_and_camera(self):
+        cameras = {"position": [0, 0, 4], "target": [0, 0, 0]}, [[0, 0, 4], [0, 0, 0], 30]
+        above, same = (
+            moved(ReachEnv(render_mode="rgb_array", width=50, height=30, camera=camera)).render()
+            for camera in cameras
+        )
+        assert above.shape == (30, 50, 3)
+        np.testing.assert_array_equal(above, same)
+
+    def test_default_size(self):
+        assert moved(ReachEnv(render_mode="rgb_array")).render().shape == (360, 480, 3)
+
+    def test_copies_have_renderers_of_their_own(self):
+        env = moved(ReachEnv(render_mode="rgb_array", **SMALL))
+        picture = env.render()
+        for other in (copy.deepcopy(env), pickle.loads(pickle.dumps(env))):
+            np.testing.assert_array_equal(other.render(), picture)
+
+    def test_passes_the_checker(self):
+        env = gymnasium.make("kinarm/ReachRight-v0", render_mode="rgb_array", **SMALL)
+        check_env(env.unwrapped, skip_close_check=True)
+
+
+class TestFrames:
+    def test_list_holds_all_since_the_last_call(self):
+        env = ReachEnv(render_mode="rgb_array_list", **SMALL)
+        single = ReachEnv(render_mode="rgb_array", **SMALL)
+        for each in (env, single):
+            each.reset(seed=0)
+        expected = [single.render()]
+        for action in np.random.default_rng(0).uniform(-0.2, 0.2, (4, 5)):
+            env.step(action)
+            single.step(action)
+            expected.append(single.render())
+        np.testing.assert_array_equal(env.render(), expected)
+        assert env.render() == []
+        env.step(np.zeros(5))
+        assert len(env.render()) == 1
+
+    def test_a_reset_begins_anew(self):
+        env = moved(ReachEnv(render_mode="rgb_array_list", **SMALL))
+        env.reset(seed=1)
+        assert len(env.render()) == 1
+
+    def test_of_a_batch(self):
+        env = ReachVectorEnv(2, render_mode="rgb_array_list", horizon=3, **SMALL)
+        env.reset(seed=0)
+        for _ in range(3):
+            env.step(np.zeros((2, 5)))
+        frames = env.render()
+        assert len(frames) == 4
+        assert [len(frame) for frame in frames] == [2] * 4
+
+    @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+    def test_last_frame_shows_what_was_begun(self, mode):
+        env = ReachVectorEnv(
+            2, render_mode="rgb_array_list", horizon=2, autoreset_mode=mode, **SMALL
+        )
+        plain = ReachVectorEnv(2, render_mode="rgb_array", horizon=2, autoreset_mode=mode, **SMALL)
+        for each in (env, plain):
+            each.reset(seed=0)
+        for _ in range(7):
+            for each in (env, plain):
+                each.step(np.full((2, 5), 0.3))
+            np.testing.assert_array_equal(env.render()[-1], plain.render())
+
+
+class TestBatch:
+    def test_pictures_are_those_of_single_environments(self):
+        batch = ReachVectorEnv(3, "both", render_mode="rgb_array", **SMALL)
+        batch.reset(seed=4)
+        pictures = batch.render()
+        assert len(pictures) == 3
+        for row, picture in enumerate(pictures):
+            env = ReachEnv("both", render_mode="rgb_array", **SMALL)
+            env.reset(seed=4 + row)
+            np.testing.assert_array_equal(picture, env.render())
+
+    @pytest.mark.parametrize(
+        ("count", "shape", "tiled"),
+        [
+            (1, (48, 64), (48, 64)),
+            (4, (48, 64), (96, 128)),
+            (6, (32, 43), (64, 129)),
+            (64, (12, 16), (96, 128)),
+        ],
+    )
+    def test_many_share_the_area_of_four(self, count, shape, tiled):
+        env = ReachVectorEnv(count, render_mode="rgb_array", **SMALL)
+        env.reset(seed=0)
+        pictures = env.render()
+        assert len(pictures) == count
+        assert {picture.shape for picture in pictures} == {(*shape, 3)}
+        assert pictures.tiled.shape == (*tiled, 3)
+        np.testing.assert_array_equal(pictures.tiled[: shape[0], : shape[1]], pictures[0])
+
+
+class TestNothingToShow:
+    def test_costs_nothing(self, simulator):
+        pictures = EnvPictures(simulator, None, 1000)
+        pictures.begin(None, None)
+        pictures.step(None)
+        assert pictures.render() is None
+        assert pictures._traces.size == 0
+        pictures.close()
+
+    def test_nothing_is_built_before_it_is_needed(self, monkeypatch):
+        monkeypatch.setattr(Renderer, "__init__", None)
+        moved(ReachEnv(render_mode="rgb_array")).close()
+
+
+class TestHuman:
+    def test_page_follows_and_ends_with_the_environment(self, opened):
+        env = ReachEnv(render_mode="human")
+        assert opened == []
+        moved(env)
+        assert env.render() is None
+        (address,) = opened
+        assert address.startswith("http://127.0.0.1:")
+        with urllib.request.urlopen(address, timeout=10) as page:
+            assert page.status == 200
+        server = env._pictures._stage.server
+        assert server._bridge.tree["meshcat"]["arm"]["axis_1"].transform is not None
+        env.close()
+        assert not server._thread.is_alive()
+        with pytest.raises(urllib.error.URLError):
+            urllib.request.urlopen(address, timeout=10)
+
+    def test_two_have_pages_of_their_own(self, opened):
+        first, second = (moved(ReachEnv(render_mode="human"), 1) for _ in range(2))
+        assert len(set(opened)) == 2
+        first.close()
+        second.close()
+
+    def test_of_a_batch_shows_the_first_arm(self, opened):
+        env = ReachVectorEnv(2, render_mode="human", horizon=2)
+        moved(env, 4)
+        assert len(opened) == 1
+        env.close()
+
+    def test_copies_can_be_made(self, opened):
+        env = moved(ReachEnv(render_mode="human"), 1)
+        other = copy.deepcopy(env)
+        other.step(np.zeros(5))
+        assert len(opened) == 2
+        env.close()
+        other.close()
+
+    def test_keeps_the_arms_own_time(self, monkeypatch, opened):
+        waits, now = [], [100.0]
+        monkeypatch.setattr(live_stage.time, "sleep", waits.append)
+        monkeypatch.setattr(live_stage.time, "monotonic", lambda: now[0])
+        env = moved(ReachEnv(render_mode="human"), 0)
+        env.step(np.zeros(5))
+        now[0] += 0.005
+        env.step(np.zeros(5))
+        now[0] += 1.0
+        env.step(np.zeros(5))
+        assert waits == pytest.approx([0.0, 0.015, 0.0])
+        env.close()
+
+
+class TestFilms:
+    def test_single(self, tmp_path):
+        pytest.importorskip("moviepy")
+        reader = pytest.importorskip("imageio_ffmpeg")
+        env = gymnasium.make("kinarm/ReachRight-v0", render_mode="rgb_array", horizon=5, **SMALL)
+        env = gymnasium.wrappers.RecordVideo(
+            env, str(tmp_path / "films"), episode_trigger=lambda _: True
+        )
+        moved(env, 3).close()
+        (film,) = tmp_path.glob("films/*.mp4")
+        frames, _ = reader.count_frames_and_secs(str(film))
+        assert frames == 4
+
+    def test_batch(self, tmp_path):
+        pytest.importorskip("moviepy")
+        env = gymnasium.make_vec(
+            "kinarm/ReachBoth-v0", num_envs=4, vectorization_mode="vector_entry_point",
+            render_mode="rgb_array", horizon=3, **SMALL
+        )  # fmt: skip
+        env = gymnasium.wrappers.vector.RecordVideo(
+            env, str(tmp_path / "films"), step_trigger=lambda _: True
+        )
+        moved(env, 5).close()
+        assert list(tmp_path.glob("films/*.mp4"))
+
+
+class TestBadInput:
+    @pytest.mark.parametrize("kind", [ReachEnv, ReachVectorEnv])
+    @pytest.mark.parametrize(
+        ("settings", "message"),
+        [
+            ({"render_mode": "film"}, "render_mode must be one of .*rgb_array.*human.*'film'"),
+            ({"width": 0}, "width must be a whole number of at least 1, got 0"),
+            ({"render_mode": "rgb_array", "height": -1}, "height must be a whole number"),
+            ({"camera": "above"}, "camera must be a Camera, got 'above'"),
+        ],
+    )
+    def test_is_refused_at_once(self, kind, settings, message):
+        with pytest.raises(InvalidInputError, match=message):
+            kind(**settings)
+
+    def test_modes_are_those_of_the_metadata(self):
+        assert ReachEnv.metadata["render_modes"] == list(RENDER_MODES)
