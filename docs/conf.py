@@ -30,6 +30,7 @@ extensions = [
     "sphinx_autodoc_typehints",
     "sphinx_gallery.gen_gallery",
     "cards",
+    "films",
     "players",
     "tables",
 ]

@@ -32,14 +32,16 @@ SAMPLES = np.array([(0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.87
 """Places in a pixel: no two in a row or column, so that edges of any slope are smooth."""
 
 BACKGROUND, GRID_COLOUR = 0xEEF1F4, 0xB4BDC7
-GRID_WIDTH = 1 / 450
+GRID_WIDTH = 1 / 600
 """Width of the lines on the floor, as a share of the picture's height."""
 
 FADING = (0.2, 3.8)
 """The floor fades out between these distances, plus that of the camera from the origin [m]."""
 
-SHADOW_SIZE, SHADOW_REACH = 1024, 1.75
-"""Texels along the shadow map, and half its extent about the origin [m]."""
+SHADOW_DETAIL, SHADOW_SIZES = 2, (256, 2048)
+"""Texels along the shadow map for each pixel along the picture, and how many there may be."""
+SHADOW_REACH = 1.75
+"""Half the extent of the shadow map, about the origin [m]."""
 
 HALO_OPACITY = 0.16
 FLASH_OPACITY, FLASH_SWELL = 0.55, 1.5
@@ -84,7 +86,8 @@ class Renderer:
         self._eye = self._make_eye()
         self._backdrop = self._make_backdrop()
         self._materials = _materials(self._scene.finishes)
-        self._lights = _lights(self._scene.finishes)
+        texels = SHADOW_DETAIL * max(self.width, self.height)
+        self._lights = _lights(self._scene.finishes, int(np.clip(texels, *SHADOW_SIZES)))
         self._floor = np.empty((self.height, self.width, 2, 3), dtype=np.float32)
         paint_floor(self._eye, self._materials, self._lights, self._backdrop, self._floor)
         self._floor_nearness = self._make_floor_nearness()
@@ -189,7 +192,7 @@ class Renderer:
             floor_radius=FLOOR_RADIUS if self.problem.scene.ground else 0.0,
             grid_radius=GRID_RADIUS,
             grid_step=GRID_STEP,
-            line_width=max(GRID_WIDTH * self.height, 0.8),
+            line_width=max(GRID_WIDTH * self.height, 0.4),
             gamma=GAMMA,
         )
 
@@ -217,7 +220,7 @@ def _materials(finishes: Sequence[Finish]) -> Materials:
     )
 
 
-def _lights(finishes: Sequence[Finish]) -> Lights:
+def _lights(finishes: Sequence[Finish], texels: int) -> Lights:
     """The replay page's light for some finishes, with an empty shadow map."""
     places = np.array([lighting.SUN_PLACE, lighting.FILL_PLACE])
     directions = places / np.linalg.norm(places, axis=1, keepdims=True)
@@ -231,15 +234,15 @@ def _lights(finishes: Sequence[Finish]) -> Lights:
         ground=lighting.SKY_INTENSITY * lighting.channels(lighting.GROUND),
         irradiance=lighting.irradiance_map(),
         reflections=np.array([lighting.reflection_map(roughness) for roughness in known]),
-        sunward=_sunward(directions[0]),
-        shadow=np.empty((SHADOW_SIZE, SHADOW_SIZE), dtype=np.float32),
+        sunward=_sunward(directions[0], texels),
+        shadow=np.empty((texels, texels), dtype=np.float32),
     )
 
 
-def _sunward(sun: Array) -> Array:
+def _sunward(sun: Array, texels: int) -> Array:
     """World to shadow map: column, row, and how near the sun [m]; shape (3, 4)."""
     right = np.cross((0.0, 0.0, 1.0), sun)
     right /= np.linalg.norm(right)
-    scale = SHADOW_SIZE / (2 * SHADOW_REACH)
+    scale = texels / (2 * SHADOW_REACH)
     turn = np.array([scale * right, scale * np.cross(sun, right), sun])
-    return np.column_stack([turn, (SHADOW_SIZE / 2, SHADOW_SIZE / 2, 0.0)])
+    return np.column_stack([turn, (texels / 2, texels / 2, 0.0)])
