@@ -15,7 +15,7 @@ from kinarm.errors import InvalidInputError
 from kinarm.evaluation.comparison.learners import ALGORITHMS, ComparedLearner
 from kinarm.evaluation.comparison.runs import CurvePoint, PlannedRun, Protocol, save_run
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.learners import begin_training, state_policy
+from kinarm.policies.learners import begin_training, learner_of, state_policy
 from kinarm.policies.policy import Policy
 from kinarm.policies.recipes import recipe
 from kinarm.policies.sb3.environment import sb3_vec_env
@@ -106,10 +106,11 @@ def clocks() -> NDArray[np.float64]:
 
 
 def train_recipe(run: PlannedRun, judge: Judge) -> None:
-    """Train by a recipe of kinarm, to its end or to the number of steps that is given."""
+    """Train by a recipe of kinarm on one thread, to its end or the number of steps given."""
     learner = run.learner
     config = recipe(learner.algorithm, learner.recipe, problem=run.problem, seed=run.seed)
-    training = begin_training(config)
+    takes_threads = "threads" in learner_of(config).options
+    training = begin_training(config, **({"threads": 1} if takes_threads else {}))
     state = training.initial_state()
     over = False
     judge.start()
