@@ -25,7 +25,7 @@ Indices = int | Iterable[int] | None
 
 
 class SB3VecEnv(VecEnv):
-    """Many arms, stepped by one call of the compiled simulator; made by `kinarm.policies.sb3_vec_env`.
+    """Many arms, stepped by one call of the simulator; made by `kinarm.policies.sb3_vec_env`.
 
     Arm i goes through the same episodes as a single environment that is reset with the seed + i, as
     in the ``DummyVecEnv`` of Stable-Baselines3. An episode that ends is replaced at once.

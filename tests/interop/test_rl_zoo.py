@@ -1,4 +1,4 @@
-"""The scripts of rl-zoo3 run on the ids as they are: the commands that the page shows, shortened."""
+"""The scripts of rl-zoo3 run on the ids as they are: what the page shows, shortened."""
 
 import os
 import re
