@@ -86,9 +86,7 @@ class TrainingVecEnv(SB3VecEnv):
         self.start_spread = simulator.task.start_spread
         self._shown = NormalizedInterface(simulator.n_observations, mirror)
         self._record = EndedEpisodes([], [], 0.0)
-        size = {"width": 480, "height": 360, "camera": None}
-        pictures = EnvPictures(simulator, None, num_envs, **size)
-        super().__init__(simulator, num_envs, self._shown, pictures)
+        super().__init__(simulator, num_envs, self._shown, EnvPictures(simulator, None, num_envs))
 
     def normalize_by(self, normalizer: Normalizer) -> None:
         """From now on, normalise observations by these statistics, of what the learner sees."""
