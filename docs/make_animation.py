@@ -1,8 +1,8 @@
 """Make ``docs/_static/reach.gif``: a shipped policy reaches one goal after the other.
 
 Run ``python docs/make_animation.py`` from the root of a clone. Each motion starts where the last
-one ended. Goals are drawn at random; those that the policy misses, or reaches late, are skipped: the
-animation shows what a success looks like and not how often there is one.
+one ended. Goals are drawn at random; those that the policy misses, or reaches late, are skipped:
+the animation shows what a success looks like and not how often there is one.
 """
 
 from pathlib import Path

@@ -63,6 +63,11 @@ class EnvPictures:
     camera : Camera, optional
         Where pictures are taken from; as the replay page does by default.
 
+    Attributes
+    ----------
+    mode : str or None
+        As given.
+
     Raises
     ------
     InvalidInputError
@@ -85,7 +90,8 @@ class EnvPictures:
             )
         self._size = _tile_size(num_envs, *picture_size(width, height))
         self._camera = None if camera is None else Camera.checked(camera)
-        self._simulator, self._mode, self._num_envs = simulator, mode, num_envs
+        self.mode = mode
+        self._simulator, self._num_envs = simulator, num_envs
         horizon = 0 if mode is None else simulator.task.horizon
         self._traces = np.empty((num_envs, horizon + 1, 3) if mode else (0, 0, 3))
         self._contacts: dict[int, Contact | None] = {}
@@ -96,22 +102,22 @@ class EnvPictures:
 
     def begin(self, rows: NDArray[np.int64], episodes: Episodes) -> None:
         """Take note that the episodes of some arms were begun."""
-        if self._mode is None:
+        if self.mode is None:
             return
         self._begun = episodes
         self._traces[rows, 0] = self._tools(episodes)[rows]
         for row in rows.tolist():
             self._contacts.pop(row, None)
-        if self._mode == "rgb_array_list":
+        if self.mode == "rgb_array_list":
             anew = len(rows) == self._num_envs
             del self._frames[0 if anew else -1 :]
             self._frames.append(self._take())
-        elif self._mode == "human" and 0 in rows:
+        elif self.mode == "human" and 0 in rows:
             self._live_stage().begin(episodes.q[0], episodes.goal[0])
 
     def step(self, episodes: Episodes) -> None:
         """Take note that all arms moved, or rested because their episode is over."""
-        if self._mode is None:
+        if self.mode is None:
             return
         self._begun = episodes
         self._traces[np.arange(self._num_envs), episodes.steps] = self._tools(episodes)
@@ -120,9 +126,9 @@ class EnvPictures:
                 self._contacts[row] = self._simulator.world.contact(
                     episodes.q[row], episodes.target[row]
                 )
-        if self._mode == "rgb_array_list":
+        if self.mode == "rgb_array_list":
             self._frames.append(self._take())
-        elif self._mode == "human":
+        elif self.mode == "human":
             stage = self._live_stage()
             stage.show(episodes.q[0])
             stage.draw_trace(*self._way(0))
@@ -137,9 +143,9 @@ class EnvPictures:
             ``"rgb_array"``: a picture of each arm. ``"rgb_array_list"``: such pictures of all
             steps since the last call, or since all arms began anew. ``"human"`` or no mode: None.
         """
-        if self._mode == "rgb_array":
+        if self.mode == "rgb_array":
             return self._take()
-        if self._mode == "rgb_array_list":
+        if self.mode == "rgb_array_list":
             frames, self._frames = self._frames, []
             return frames
         return None

@@ -15,7 +15,8 @@ from kinarm.viewer import lighting
 from kinarm.viewer.camera import Camera, CameraLike, picture_size
 from kinarm.viewer.kernels.lighting import Lights, Materials
 from kinarm.viewer.kernels.rasterising import draw_shadow, draw_view, project
-from kinarm.viewer.kernels.shading import Backdrop, Balls, Eye, paint_floor, shade
+from kinarm.viewer.kernels.shading import paint_floor, shade
+from kinarm.viewer.kernels.views import Backdrop, Balls, Eye, Surfaces
 from kinarm.viewer.parts import Finish
 from kinarm.viewer.surroundings import (
     FLASH_RADIUS,
@@ -140,10 +141,7 @@ class Renderer:
         if outcome is not None and outcome not in OUTCOMES:
             raise UnknownNameError("outcome", outcome, OUTCOMES)
         surfaces = self._scene.surfaces(configuration, goal, way, outcome)
-        project(surfaces.places, self._projection, surfaces.corners)
-        np.copyto(self._nearness, self._floor_nearness)
-        self._index.fill(-1)
-        draw_view(surfaces.corners, surfaces.faces, SAMPLES, self._nearness, self._index)
+        self._draw_view(surfaces)
         self._draw_shadow(surfaces.places, surfaces.faces)
         emission = self._scene.emission(outcome, contact.pair if contact else ())
         picture = np.empty((self.height, self.width, 3), dtype=np.uint8)
@@ -160,6 +158,13 @@ class Renderer:
             picture,
         )
         return picture
+
+    def _draw_view(self, surfaces: Surfaces) -> None:
+        """Find what is seen."""
+        project(surfaces.places, self._projection, surfaces.corners)
+        np.copyto(self._nearness, self._floor_nearness)
+        self._index.fill(-1)
+        draw_view(surfaces.corners, surfaces.faces, SAMPLES, self._nearness, self._index)
 
     def _draw_shadow(self, places: Array, faces: NDArray[np.int64]) -> None:
         """Renew the shadow map."""

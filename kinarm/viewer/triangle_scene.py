@@ -11,7 +11,7 @@ from kinarm.collision import body_names
 from kinarm.problem import ReachProblem
 from kinarm.viewer.arm_shapes import arm_parts
 from kinarm.viewer.kernels.rasterising import place
-from kinarm.viewer.kernels.shading import Surfaces
+from kinarm.viewer.kernels.views import Surfaces
 from kinarm.viewer.lighting import channels
 from kinarm.viewer.meshes import Mesh, tube
 from kinarm.viewer.parts import Finish
@@ -44,6 +44,11 @@ class TriangleScene:
         The problem.
     arm : Arm
         Its arm.
+
+    Attributes
+    ----------
+    n_joints : int
+        Length of a configuration.
     """
 
     def __init__(self, problem: ReachProblem, arm: Arm) -> None:

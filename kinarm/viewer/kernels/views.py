@@ -1,0 +1,101 @@
+"""What is seen, and from where, as the kernels need it."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.kernels.compiling import Array
+
+
+class Eye(NamedTuple):
+    """From where a picture is seen.
+
+    Attributes
+    ----------
+    position : ndarray, shape (3,)
+        Place of the camera in the world [m].
+    rays : ndarray, shape (3, 3)
+        Line of sight of the picture's upper left corner, as long as it gets ahead by 1, and what
+        is added to it per column and per row.
+    offsets : ndarray, shape (n_samples, 2)
+        Where in a pixel its samples lie, from its upper left corner.
+    """
+
+    position: Array
+    rays: Array
+    offsets: Array
+
+
+class Surfaces(NamedTuple):
+    """Triangles.
+
+    Attributes
+    ----------
+    places, normals : ndarray, shape (n_vertices, 3)
+        In the world [m].
+    corners : ndarray, shape (n_vertices, 3)
+        As the camera sees them: column and row of the picture times the distance ahead, and that
+        distance [m].
+    faces : ndarray of int, shape (n_faces, 3)
+        Vertices of each triangle.
+    materials : ndarray of int, shape (n_vertices,)
+        What each vertex is made of.
+    """
+
+    places: Array
+    normals: Array
+    corners: Array
+    faces: NDArray[np.int64]
+    materials: NDArray[np.int64]
+
+
+class Backdrop(NamedTuple):
+    """What is around the scene; colours are encoded as sRGB.
+
+    Attributes
+    ----------
+    colour, grid : ndarray, shape (3,)
+        Of the background, into which all fades, and of the lines on the floor.
+    fog : ndarray, shape (2,)
+        Distances at which fading begins and ends [m].
+    floor_radius, grid_radius, grid_step : float
+        Of the floor and of the lines on it [m]; a floor of radius 0 is none.
+    line_width : float
+        Of a line [pixels].
+    gamma : ndarray, shape (n,)
+        Encoding of linear values from 0 to 1.
+    """
+
+    colour: Array
+    grid: Array
+    fog: Array
+    floor_radius: float
+    grid_radius: float
+    grid_step: float
+    line_width: float
+    gamma: Array
+
+
+class Balls(NamedTuple):
+    """Translucent balls that glow.
+
+    Attributes
+    ----------
+    centres : ndarray, shape (n, 3)
+        In the world [m].
+    radii : ndarray, shape (n,)
+        Their radii [m].
+    colours : ndarray, shape (n, 3)
+        Encoded as sRGB.
+    opacities : ndarray, shape (n,)
+        How much of what is behind they hide.
+    on_top : ndarray of bool, shape (n,)
+        Whether they are seen through everything.
+    """
+
+    centres: Array
+    radii: Array
+    colours: Array
+    opacities: Array
+    on_top: NDArray[np.bool_]
