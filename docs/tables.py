@@ -15,6 +15,7 @@ from kinarm.collision import enclosing_capsule
 from kinarm.envs.registration import ENVIRONMENTS
 from kinarm.evaluation import METRICS
 from kinarm.evaluation.commands.bench import BenchmarkRequest
+from kinarm.evaluation.commands.compare import ComparisonRequest
 from kinarm.evaluation.commands.evaluate import EvaluationRequest
 from kinarm.evaluation.commands.replay import ReplayRequest
 from kinarm.evaluation.commands.reproduce import ReproductionRequest
@@ -203,6 +204,7 @@ TABLES = {
     "evaluation-options": lambda: options_table(EvaluationRequest),
     "replay-options": lambda: options_table(ReplayRequest),
     "reproduction-options": lambda: options_table(ReproductionRequest),
+    "comparison-options": lambda: options_table(ComparisonRequest),
     "benchmark-options": lambda: options_table(BenchmarkRequest),
 }
 

@@ -15,6 +15,8 @@ from .metrics import Metric as Metric
 from .metrics import Outcomes as Outcomes
 from .replays.recorder import record as record
 from .replays.request import ReplayRequest as ReplayRequest
+from .report.card import policy_card as policy_card
+from .report.card import write_card as write_card
 from .report.page import report_page as report_page
 from .report.page import write_report as write_report
 from .statistics import Estimate as Estimate

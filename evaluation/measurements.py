@@ -163,7 +163,7 @@ def measure_single_env(problem: ReachProblem, repetitions: int) -> Timing:
 
 
 def measure_sb3(problem: ReachProblem, repetitions: int) -> dict[str, Any]:
-    """Steps per second of `sb3_vec_env`, and of single environments in their ``DummyVecEnv``.
+    """Steps per second of `sb3_vec_env`, and of single arms in their ``DummyVecEnv``.
 
     Where Stable-Baselines3 is missing, ``skipped`` says so.
     """

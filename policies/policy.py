@@ -274,14 +274,8 @@ class Policy:
         """
         from kinarm.policies.conversion.torch_modules import policy_from_torch
 
-        return policy_from_torch(
-            *(module, problem),
-            mean=mean,
-            std=std,
-            name=name,
-            environment_steps=environment_steps,
-            seed=seed,
-        )
+        training: dict[str, Any] = {"environment_steps": environment_steps, "seed": seed}
+        return policy_from_torch(module, problem, mean=mean, std=std, name=name, **training)
 
     def check_arm(self, arm: Arm) -> None:
         """Refuse an arm other than the one that the policy was trained for.

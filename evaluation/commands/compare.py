@@ -26,7 +26,8 @@ repeated only with other settings.
 
 examples:
   kinarm-compare                                          everything, into the folder comparison
-  kinarm-compare --learners ars-tuned sb3-sac-her --problems right --seeds 1
+  kinarm-compare --learners ars-tuned sb3-tqc-her --problems right --seeds 1
+  kinarm-compare --no-train                               write what is finished so far
   kinarm-compare --settings mine.toml --out mine          a table of learners of your own
 """
 
@@ -53,6 +54,8 @@ class ComparisonRequest:
         Output folder.
     jobs : int
         Trainings at a time; one a processor.
+    train : bool
+        Train what is missing; else write what the finished trainings came to.
 
     Raises
     ------
@@ -68,6 +71,7 @@ class ComparisonRequest:
     settings: Path | None = field(default=None, metadata={"metavar": "FILE.toml"})
     out: Path = field(default=Path("comparison"), metadata={"metavar": "DIR"})
     jobs: int | None = None
+    train: bool = True
 
     def __post_init__(self) -> None:
         for name in ("seeds", "trials"):
@@ -117,7 +121,7 @@ class ComparisonRequest:
         ------
         KinarmError
             If a name is unknown, a file cannot be used, a package is missing, or a worker ends
-            unexpectedly.
+            unexpectedly, or nothing is finished and nothing is to be trained.
         """
         from rich.console import Console
 
@@ -131,10 +135,12 @@ class ComparisonRequest:
         check_folder(folder)
         missing = [run for run in runs if load_run(folder, run) is None]
         try:
-            if missing:
+            if missing and self.train:
                 self._train(missing, folder, executor)
             found = {run: load_run(folder, run) for run in runs}
             comparison = Comparison({run: curve for run, curve in found.items() if curve})
+            if not comparison.curves:
+                raise InvalidInputError(f"no training is finished in {str(folder)!r}")
             with Console(stderr=True).status("bounding what could be reached, drawing figures"):
                 write_all(comparison, self.out, command or repr(self))
         except KeyboardInterrupt:

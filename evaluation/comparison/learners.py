@@ -79,6 +79,8 @@ class ComparedLearner:
             raise InvalidInputError("kinarm's learners have a recipe, and others have none")
         if not self.is_recipe:
             whole_number("environment_steps", self.environment_steps, 1)
+        if self.decaying and "learning_rate" not in self.settings:
+            raise InvalidInputError("decaying needs settings.learning_rate to start from")
 
     @property
     def is_recipe(self) -> bool:

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm._files import first_line
+from kinarm.errors import InvalidInputError
 from kinarm.evaluation.comparison.learners import ALGORITHMS, ComparedLearner
 from kinarm.evaluation.comparison.runs import CurvePoint, PlannedRun, Protocol, save_run
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.learners import begin_training, state_policy
+from kinarm.policies.learners import begin_training, learner_of, state_policy
 from kinarm.policies.policy import Policy
 from kinarm.policies.recipes import recipe
 from kinarm.policies.sb3.environment import sb3_vec_env
@@ -104,10 +106,11 @@ def clocks() -> NDArray[np.float64]:
 
 
 def train_recipe(run: PlannedRun, judge: Judge) -> None:
-    """Train by a recipe of kinarm, to its end or to the number of steps that is given."""
+    """Train by a recipe of kinarm on one thread, to its end or the number of steps given."""
     learner = run.learner
     config = recipe(learner.algorithm, learner.recipe, problem=run.problem, seed=run.seed)
-    training = begin_training(config)
+    takes_threads = "threads" in learner_of(config).options
+    training = begin_training(config, **({"threads": 1} if takes_threads else {}))
     state = training.initial_state()
     over = False
     judge.start()
@@ -138,7 +141,13 @@ def train_sb3(run: PlannedRun, judge: Judge) -> None:
 
 
 def sb3_model(learner: ComparedLearner, problem: ReachProblem, seed: int) -> "BaseAlgorithm":
-    """Build the algorithm of a learner, with its environment."""
+    """Build the algorithm of a learner, with its environment.
+
+    Raises
+    ------
+    InvalidInputError
+        If the algorithm refuses its settings.
+    """
     from stable_baselines3.common.noise import NormalActionNoise
     from stable_baselines3.common.utils import LinearSchedule
     from stable_baselines3.common.vec_env import VecEnv, VecNormalize
@@ -160,5 +169,8 @@ def sb3_model(learner: ComparedLearner, problem: ReachProblem, seed: int) -> "Ba
     if learner.decaying:
         settings["learning_rate"] = LinearSchedule(settings["learning_rate"], 0.0, 1.0)
     algorithm = getattr(import_module(ALGORITHMS[learner.algorithm]), learner.algorithm)
-    model: BaseAlgorithm = algorithm(env=env, seed=seed, device="cpu", **settings)
+    try:
+        model: BaseAlgorithm = algorithm(env=env, seed=seed, device="cpu", **settings)
+    except (AssertionError, KeyError, TypeError, ValueError) as error:
+        raise InvalidInputError(f"settings of {learner.name}: {first_line(error)}") from error
     return model

@@ -8,7 +8,6 @@ from gymnasium.spaces import Box, Space
 from numpy.typing import NDArray
 
 from kinarm.envs.interface import Verdict
-from kinarm.envs.rendering import EnvPictures
 from kinarm.episodes import Episodes
 from kinarm.networks import Mirror
 from kinarm.policies.normalizer import Normalizer, input_scale
@@ -86,7 +85,7 @@ class TrainingVecEnv(SB3VecEnv):
         self.start_spread = simulator.task.start_spread
         self._shown = NormalizedInterface(simulator.n_observations, mirror)
         self._record = EndedEpisodes([], [], 0.0)
-        super().__init__(simulator, num_envs, self._shown, EnvPictures(simulator, None, num_envs))
+        super().__init__(simulator, num_envs, self._shown)
 
     def normalize_by(self, normalizer: Normalizer) -> None:
         """From now on, normalise observations by these statistics, of what the learner sees."""

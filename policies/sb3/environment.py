@@ -67,7 +67,6 @@ def sb3_vec_env(
         If there are no arms, or an argument cannot have its value.
     """
     find_learner("ppo").check_installed()
-    from kinarm.envs.rendering import EnvPictures
     from kinarm.policies.sb3.vec_env import SB3VecEnv
     from kinarm.simulator import Simulator
 
@@ -79,8 +78,14 @@ def sb3_vec_env(
     single = _single_environment(problem, settings)
     simulator = Simulator(single.simulator.problem, threads=threads)
     picture = {"width": width, "height": height, "camera": camera}
-    pictures = EnvPictures(simulator, render_mode, n_envs, **picture)
-    env = SB3VecEnv(simulator, n_envs, single.interface, pictures, single.spec)
+    env = SB3VecEnv(
+        simulator,
+        n_envs,
+        single.interface,
+        spec=single.spec,
+        render_mode=render_mode,
+        **picture,
+    )
     if seed is not None:
         env.seed(seed)
     return env

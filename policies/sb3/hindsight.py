@@ -35,7 +35,8 @@ class HindsightReplayBuffer(HerReplayBuffer):
 
     def _ask(self, method: str, achieved: Goals, desired: Goals) -> NDArray[Any]:
         """Ask the environment about pairs of goals."""
-        (answer,) = self.env.env_method(method, achieved, desired, {}, indices=[0])
+        environment: Any = self.env  # which every learner gives to its buffer
+        (answer,) = environment.env_method(method, achieved, desired, {}, indices=[0])
         return np.asarray(answer, dtype=np.float32)
 
     def _get_virtual_samples(

@@ -25,7 +25,7 @@ Indices = int | Iterable[int] | None
 
 
 class SB3VecEnv(VecEnv):
-    """Many arms, stepped by one call of the compiled simulator; made by `sb3_vec_env`.
+    """Many arms, stepped by one call of the simulator; made by `kinarm.policies.sb3_vec_env`.
 
     Arm i goes through the same episodes as a single environment that is reset with the seed + i, as
     in the ``DummyVecEnv`` of Stable-Baselines3. An episode that ends is replaced at once.
@@ -38,10 +38,10 @@ class SB3VecEnv(VecEnv):
         Number of arms.
     interface : Interface
         What is shown of it.
-    pictures : EnvPictures
-        Draws it.
     spec : EnvSpec, optional
         Of the single environment, if it is registered.
+    render_mode, **picture
+        As for `kinarm.ReachEnv`: mode, ``width``, ``height`` and ``camera`` of pictures.
 
     Notes
     -----
@@ -60,14 +60,16 @@ class SB3VecEnv(VecEnv):
         simulator: Simulator,
         num_envs: int,
         interface: Interface,
-        pictures: EnvPictures,
+        *,
         spec: EnvSpec | None = None,
+        render_mode: str | None = None,
+        **picture: Any,
     ) -> None:
+        self._pictures = EnvPictures(simulator, render_mode, num_envs, **picture)
         self.simulator, self.interface, self.spec = simulator, interface, spec
-        self.render_mode = pictures.mode
+        self.render_mode = render_mode
         super().__init__(num_envs, interface.observation_space, action_space(simulator))
         self.metadata = environment_metadata(simulator)
-        self._pictures = pictures
         self._streams: dict[int, ScenarioStream] = {}
         self._episodes: Episodes | None = None
         self._actions = np.zeros((num_envs, simulator.n_actions))
@@ -208,7 +210,7 @@ class SB3VecEnv(VecEnv):
             raise ClosedEnvironmentError("the environment is closed: make another one")
 
     def render(self, mode: str | None = None) -> Any:
-        """Draw the arms, as the render mode says; see `ReachVectorEnv`.
+        """Draw the arms, as the render mode says; see `kinarm.ReachVectorEnv`.
 
         A picture shows all arms side by side, as in every environment of Stable-Baselines3.
 
@@ -218,12 +220,18 @@ class SB3VecEnv(VecEnv):
             If the environment is closed or was never reset.
         """
         self._begun_episodes()
-        if self.render_mode in ("human", "rgb_array_list") and mode in (None, self.render_mode):
-            return self._pictures.render()
-        return super().render(mode)
+        if self.render_mode is None or mode not in (None, self.render_mode):
+            return super().render(mode)
+        shown = self._pictures.render()
+        if self.render_mode == "rgb_array_list":
+            return [pictures.tiled for pictures in shown]
+        return shown.tiled if self.render_mode == "rgb_array" else None
 
-    def get_images(self) -> list[NDArray[np.uint8]]:
-        """One picture of each arm, shape (height, width, 3), where the mode is ``rgb_array``."""
+    def get_images(self) -> list[NDArray[np.uint8] | None]:
+        """One picture of each arm, shape (height, width, 3), if the mode is ``rgb_array``."""
+        if self.render_mode != "rgb_array":
+            return [None] * self.num_envs
+        self._begun_episodes()
         return list(self._pictures.render())
 
     def close(self) -> None:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import pytest
 
-from kinarm.evaluation.commands import bench, evaluate, replay, reproduce
+from kinarm.evaluation.commands import bench, compare, evaluate, replay, reproduce
 from kinarm.policies import Policy, recipe, train, train_policy
 from kinarm.problem import PROBLEMS
 
@@ -19,6 +19,7 @@ MODULES = {
     "kinarm-replay": "kinarm.evaluation.commands.replay",
     "kinarm-train": "kinarm.policies.train",
     "kinarm-bench": "kinarm.evaluation.commands.bench",
+    "kinarm-compare": "kinarm.evaluation.commands.compare",
     "kinarm-reproduce": "kinarm.evaluation.commands.reproduce",
 }
 MAINS = {
@@ -26,6 +27,7 @@ MAINS = {
     "kinarm-train": train.main,
     "kinarm-bench": bench.main,
     "kinarm-replay": replay.main,
+    "kinarm-compare": compare.main,
     "kinarm-reproduce": reproduce.main,
 }
 

@@ -14,6 +14,7 @@ PROGRAMS = {
     "kinarm-replay": "kinarm.evaluation.commands.replay",
     "kinarm-train": "kinarm.policies.train",
     "kinarm-bench": "kinarm.evaluation.commands.bench",
+    "kinarm-compare": "kinarm.evaluation.commands.compare",
     "kinarm-reproduce": "kinarm.evaluation.commands.reproduce",
 }
 HEAVY = ("torch", "numba", "matplotlib", "pinocchio", "coal", "scipy", "stable_baselines3")
@@ -60,6 +61,10 @@ def test_learners_have_help_of_their_own(run, learner):
             "--policy --compare --problem --task --arm --trial --worst --collisions --trials "
             "--seed --allow-other-arm --no-oracle --out --record --overwrite --live --port "
             "--no-browser",
+        ),
+        (
+            "kinarm-compare",
+            "--learners --problems --seeds --steps --trials --settings --out --jobs --no-train",
         ),
         ("kinarm-bench", "--repetitions --policy --ppo --json"),
     ],

@@ -1,8 +1,11 @@
-"""The scripts of rl-zoo3 run on kinarm's ids as they are, with the hyperparameters that ship."""
+"""The scripts of rl-zoo3 run on the ids as they are: what the page shows, shortened."""
 
 import os
+import re
+import shlex
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +16,8 @@ from kinarm.policies import zoo_hyperparameters
 
 pytestmark = pytest.mark.slow
 
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "rl_zoo.md").read_text(encoding="utf-8")
+BLOCKS = dict(re.findall(r"```\{code-block\} sh\n:name: (\S+)\n\n(.*?)```", PAGE, re.DOTALL))
 FLAT, GOALS = "kinarm/ReachRight-v0", "kinarm/ReachGoalRight-v0"
 SMALL = {
     "ppo": ["n_envs:4", "batch_size:64"],
@@ -24,18 +29,13 @@ SMALL = {
 """What makes the trainings short."""
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """A folder to work in, with the file by which rl-zoo3 learns of other environments."""
-    path = tmp_path_factory.mktemp("zoo")
-    (path / "custom_envs.py").write_text("import kinarm\n")
-    return path
-
-
-def zoo(folder, script, *arguments):
-    """Run a script of rl-zoo3 in a process of its own; returns what it printed."""
+def run(line, folder, *others):
+    """Run a command line in a process of its own, with further arguments; returns its output."""
+    program, *words = shlex.split(line)
+    if program == "kinarm-eval":
+        words = ["-m", "kinarm.evaluation.commands.evaluate", *words]
     done = subprocess.run(
-        [sys.executable, "-m", f"rl_zoo3.{script}", *map(str, arguments)],
+        [sys.executable, *words, *map(str, others)],
         cwd=folder,
         env={**os.environ, "MPLBACKEND": "Agg", "OMP_NUM_THREADS": "1"},
         capture_output=True,
@@ -48,17 +48,39 @@ def zoo(folder, script, *arguments):
 
 
 def train(folder, algorithm, env_id, *others):
-    settings = ["--conf-file", zoo_hyperparameters(algorithm), "-params", *SMALL[algorithm]]
+    """Train as the page does, with another algorithm on another environment, for a moment."""
+    line = BLOCKS["zoo-train"].replace("$CONF", str(zoo_hyperparameters(algorithm)))
+    line = line.replace("--algo ppo", f"--algo {algorithm}").replace(FLAT, env_id)
     budget = ["-n", 800, "--eval-freq", 400, "--eval-episodes", 4]
-    return zoo(folder, "train", "--algo", algorithm, "--env", env_id, *settings, *budget, *others)
+    return run(line, folder, "-params", *SMALL[algorithm], *budget, *others)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder to work in, with the file by which rl-zoo3 learns of other environments."""
+    path = tmp_path_factory.mktemp("zoo")
+    content, name = re.search(r'^echo "(.*)" > (\S+)$', PAGE, re.MULTILINE).groups()
+    (path / name).write_text(f"{content}\n")
+    return path
 
 
 @pytest.fixture(scope="module")
 def trained(folder):
     """The logs of a training with PPO."""
-    printed = train(folder, "ppo", FLAT)
-    assert "Success rate" in printed
+    assert "Success rate" in train(folder, "ppo", FLAT)
     return folder / "logs" / "ppo" / "kinarm-ReachRight-v0_1"
+
+
+def test_every_command_is_run():
+    source = Path(__file__).read_text(encoding="utf-8")
+    assert len(BLOCKS) == 5
+    assert all(f'"{name}"' in source for name in BLOCKS)
+
+
+def test_the_shown_line_finds_the_hyperparameters(tmp_path):
+    code = re.search(r'python -c "(.*)"', PAGE).group(1)
+    found = run(f"python -c {shlex.quote(code)}", tmp_path).strip()
+    assert Path(found).read_text() == zoo_hyperparameters("ppo").read_text()
 
 
 def test_train(trained):
@@ -83,29 +105,25 @@ def test_packages_can_be_named_instead(tmp_path):
 
 
 def test_enjoy_evaluates(folder, trained):
-    printed = zoo(
-        folder, "enjoy", "--algo", "ppo", "--env", FLAT, "-f", "logs", "--no-render", "-n", 200
-    )
+    printed = run(BLOCKS["zoo-enjoy"], folder, "-n", 200)
     assert "Success rate" in printed
     assert "Mean reward" in printed
 
 
 def test_record_video(folder, trained):
     pytest.importorskip("moviepy")
-    size = ["--env-kwargs", "width:64", "height:48"]
-    zoo(folder, "record_video", "--algo", "ppo", "--env", FLAT, "-f", "logs", "-n", 20, *size)
+    small = ["-n", 20, "--env-kwargs", "width:64", "height:48"]
+    run(BLOCKS["zoo-film"], folder, *small)
     (film,) = (trained / "videos").glob("*.mp4")
     assert film.stat().st_size > 500
 
 
-def test_plot_train(folder, trained):
+def test_plots(folder, trained):
     pytest.importorskip("seaborn")
-    names = ["-a", "ppo", "-e", "kinarm-ReachRight-v0", "-f", "logs", "-y", "success", "-w", 2]
-    assert "No data available" not in zoo(folder, "cli", "plot_train", *names)
+    curve, table = BLOCKS["zoo-plot"].strip().splitlines()
+    assert "No data available" not in run(curve, folder, "-w", 2)
+    assert "kinarm-ReachRight-v0" in run(table, folder)
 
 
-def test_all_plots_tabulates(folder, trained):
-    pytest.importorskip("seaborn")
-    names = ["-a", "ppo", "-e", "kinarm-ReachRight-v0", "-f", "logs", "-k", "successes"]
-    printed = zoo(folder, "cli", "all_plots", *names, "--no-display")
-    assert "kinarm-ReachRight-v0" in printed
+def test_kinarm_evaluates_the_model(folder, trained):
+    assert "kinarm-ReachRight-v0" in run(BLOCKS["zoo-judge"], folder, "--trials", 10)

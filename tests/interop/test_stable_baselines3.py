@@ -137,7 +137,7 @@ class TestWrappers:
         assert env.get_original_obs().shape == (4, 48)
 
     def test_normalisation_of_goals(self):
-        env = VecNormalize(sb3_vec_env(GOALS, 4, horizon=12))
+        env = VecNormalize(sb3_vec_env(GOALS, 4, horizon=12), norm_obs_keys=["observation"])
         settings = replays(replay_buffer_class=HerReplayBuffer)
         assert SAC("MultiInputPolicy", env, **settings).learn(200).num_timesteps == 200
 

@@ -136,6 +136,7 @@ def test_metadata_name_the_commands_the_licence_and_no_torch(wheel):
         "kinarm-replay = kinarm.evaluation.commands.replay:main",
         "kinarm-train = kinarm.policies.train:main",
         "kinarm-bench = kinarm.evaluation.commands.bench:main",
+        "kinarm-compare = kinarm.evaluation.commands.compare:main",
         "kinarm-reproduce = kinarm.evaluation.commands.reproduce:main",
     ):
         assert line in commands

@@ -18,6 +18,7 @@ from kinarm.policies import sb3_vec_env
 NUMBER = 6
 FLAT, GOALS = "kinarm/ReachRight-v0", "kinarm/ReachGoalRight-v0"
 SETTINGS = {"tolerance": 0.5, "observation_dtype": "float32"}
+SIZE = {"width": 64, "height": 48}
 FINAL_KEYS = {
     "terminal_observation": ...,
     "TimeLimit.truncated": bool,
@@ -252,3 +253,43 @@ class TestAttributes:
         env = sb3_vec_env(FLAT, 2)
         assert env.env_is_wrapped(Monitor) == [True, True]
         assert env.env_is_wrapped(gymnasium.wrappers.TimeLimit, indices=0) == [False]
+
+
+class TestPictures:
+    def test_a_picture_shows_all_arms(self):
+        env = sb3_vec_env(FLAT, 3, seed=0, render_mode="rgb_array", **SIZE)
+        env.reset()
+        picture, images = env.render(), env.get_images()
+        assert (picture.shape, picture.dtype) == ((96, 128, 3), np.uint8)
+        np.testing.assert_array_equal(picture[:48, 64:], images[1])
+        assert len(np.unique(np.array(images), axis=0)) == 3
+
+    def test_pictures_are_those_of_single_environments(self):
+        env = sb3_vec_env(FLAT, 1, seed=5, render_mode="rgb_array", **SIZE)
+        single = gymnasium.make(FLAT, render_mode="rgb_array", **SIZE)
+        env.reset()
+        single.reset(seed=5)
+        env.step(np.ones((1, 5)))
+        single.step(np.ones(5))
+        np.testing.assert_array_equal(env.render(), single.render())
+
+    def test_a_list_holds_every_step(self):
+        env = sb3_vec_env(FLAT, 2, render_mode="rgb_array_list", **SIZE)
+        env.reset()
+        for _ in range(3):
+            env.step(np.zeros((2, 5)))
+        assert [picture.shape for picture in env.render()] == [(48, 128, 3)] * 4
+        assert env.render() == []
+
+    def test_no_mode_no_picture(self):
+        env = sb3_vec_env(FLAT, 2)
+        env.reset()
+        with pytest.warns(UserWarning, match="no `render_mode` was passed"):
+            assert env.render() is None
+        assert env.get_images() == [None, None]
+
+    def test_another_mode_than_the_one_chosen(self):
+        env = sb3_vec_env(FLAT, 2, render_mode="rgb_array_list", **SIZE)
+        env.reset()
+        with pytest.warns(UserWarning, match="has to be the same"):
+            assert env.render("rgb_array") is None
