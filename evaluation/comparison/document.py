@@ -106,7 +106,7 @@ def _result_cells(series: Series) -> list[str]:
     """What the table of results says of a learner on a problem."""
     low, high = series.success.ci95 or (math.nan, math.nan)
     each = " ".join(f"{100 * curve[-1].successes / series.trials:.0f}" for curve in series.curves)
-    steps, seconds = series.last("environment_steps"), series.last("seconds")
+    steps, seconds = series.last("environment_steps"), series.last("processor_seconds")
     return [
         series.learner.title,
         f"{100 * (series.success.value or 0):.1f} ({100 * low:.1f}..{100 * high:.1f})",
@@ -119,10 +119,14 @@ def _result_cells(series: Series) -> list[str]:
     ]
 
 
+SPEEDS = ("environment_steps", "processor_seconds")
+"""What is told of how fast a learner is."""
+
+
 def _speed_cell(series: Series, level: float) -> str:
     """Environment steps [thousands] and time [min] until a share of trials succeeds."""
-    steps, seconds = (series.until(level, name) for name in ("environment_steps", "seconds"))
-    return "never" if math.isinf(steps) else f"{steps / 1e3:.0f}, {seconds / 60:.2f}"
+    steps, seconds = (series.until(level, name) for name in SPEEDS)
+    return "never" if math.isinf(steps) else f"{steps / 1e3:,.0f}, {seconds / 60:.2f}"
 
 
 def settings_table(learners: Iterable[ComparedLearner]) -> str:

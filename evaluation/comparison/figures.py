@@ -1,6 +1,6 @@
 """Learning curves of a comparison."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -11,8 +11,19 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-ACROSS = {"environment_steps": ("environment steps", 1.0), "seconds": ("training time [min]", 60.0)}
-"""What curves are drawn against: its name on the axis, and how many make one of its unit."""
+
+class Across(NamedTuple):
+    """What curves are drawn against: name on the axis, one of its unit, where it begins."""
+
+    label: str
+    unit: float
+    begin: float
+
+
+ACROSS = {
+    "environment_steps": Across("environment steps", 1.0, 5e3),
+    "processor_seconds": Across("processor time [min]", 60.0, 0.01),
+}
 
 PLACES = 200
 """Points of a curve."""
@@ -21,7 +32,7 @@ PLACES = 200
 def learning_curves(comparison: Comparison) -> "Figure":
     """Success in the course of the training, a row per problem.
 
-    On the left against environment steps, on the right against wall time; both axes are
+    On the left against environment steps, on the right against processor time; both axes are
     logarithmic. Lines are means over the training seeds, bands reach from the worst of them to
     the best. The dotted line is the share of trials in which any policy could succeed.
     """
@@ -32,16 +43,17 @@ def learning_curves(comparison: Comparison) -> "Figure":
     figure = Figure(figsize=(10.0, 1.0 + 3.2 * len(problems)), layout="constrained")
     panels = figure.subplots(len(problems), 2, squeeze=False, sharex="col", sharey=True)
     for problem, row in zip(problems, panels, strict=True):
-        for (quantity, (label, _)), axes in zip(ACROSS.items(), row, strict=True):
+        for (quantity, across), axes in zip(ACROSS.items(), row, strict=True):
             for series in comparison.series:
                 if series.problem.name == problem:
                     _draw(axes, series, quantity, names.index(series.learner.name))
             axes.axhline(comparison.reachable[problem], color="#444444", linestyle=":", lw=1)
             axes.set(xscale="log", ylim=(0, 1.02), title=problem)
+            axes.set_xlim(left=across.begin)
             axes.spines[["top", "right"]].set_visible(False)
-            if row is panels[-1]:
-                axes.set_xlabel(label)
         row[0].set_ylabel("share of trials with success")
+    for across, axes in zip(ACROSS.values(), panels[-1], strict=True):
+        axes.set_xlabel(across.label)
     handles, labels = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False, fontsize=8)
     return figure
@@ -54,7 +66,7 @@ def _draw(axes: "Axes", series: Series, quantity: str, number: int) -> None:
     places = np.geomspace(first, max(first, last), PLACES)
     success = np.nan_to_num(series.success_at(quantity, places))
     colour, dash = COLOURS[number % len(COLOURS)], DASHES[number // len(COLOURS) % len(DASHES)]
-    x = places / ACROSS[quantity][1]
+    x = places / ACROSS[quantity].unit
     axes.fill_between(x, success.min(axis=0), success.max(axis=0), color=colour, alpha=0.15, lw=0)
     axes.plot(
         *(x, success.mean(axis=0)),

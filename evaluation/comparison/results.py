@@ -150,7 +150,7 @@ class Comparison:
                         "success": level,
                         **{
                             quantity: _finite(series.until(level, quantity))
-                            for quantity in ("environment_steps", "seconds")
+                            for quantity in ("environment_steps", "seconds", "processor_seconds")
                         },
                     }
                     for level in LEVELS

@@ -134,7 +134,7 @@ def save_run(folder: Path, run: PlannedRun, curve: Iterable[CurvePoint]) -> None
         If the file cannot be written.
     """
     entries = {"settings": run.settings, "curve": [point._asdict() for point in curve]}
-    write_text(folder / f"{run.name}.json", json.dumps(entries, indent=1) + "\n")
+    write_text(folder / f"{run.name}.json", json.dumps(entries) + "\n")
 
 
 def load_run(folder: Path, run: PlannedRun) -> tuple[CurvePoint, ...] | None:

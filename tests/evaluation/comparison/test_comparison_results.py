@@ -84,6 +84,7 @@ def test_files(comparison, tmp_path):
         "success": 0.8,
         "environment_steps": 3000.0,
         "seconds": 180.0,
+        "processor_seconds": 90.0,
     }
     assert set(document["reachable"]) == {"right", "both"}
     page = (tmp_path / "LEARNERS.md").read_text()
