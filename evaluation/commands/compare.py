@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from kinarm.evaluation.reproduction.executor import Executor
 
 EPILOG = """
-needs the extra sb3 for learners of Stable-Baselines3: pip install 'kinarm[sb3]'
+needs the extra zoo for learners of Stable-Baselines3 and sb3-contrib: pip install 'kinarm[zoo]'
 
 An interrupted comparison goes on where it stopped, by the same command; a finished training is
 repeated only with other settings.

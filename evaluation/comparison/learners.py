@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass, field
 from importlib.resources import as_file, files
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from kinarm._fields import check_fields, from_plain, read_toml
 from kinarm._validation import whole_number
-from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.errors import InvalidInputError, MissingExtraError, UnknownNameError
 from kinarm.policies.learners import find_learner, learner_names
 
 ALGORITHMS = {
@@ -98,7 +99,9 @@ class ComparedLearner:
         if self.is_recipe:
             find_learner(self.algorithm).check_installed()
         else:
-            find_learner("ppo").check_installed(ALGORITHMS[self.algorithm])
+            find_learner("ppo").check_installed()
+            if find_spec(ALGORITHMS[self.algorithm]) is None:
+                raise MissingExtraError(ALGORITHMS[self.algorithm], "zoo")
 
 
 def read_learners(path: Path | None = None) -> dict[str, ComparedLearner]:

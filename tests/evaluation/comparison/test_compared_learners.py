@@ -68,3 +68,14 @@ def test_missing_package(monkeypatch):
     with pytest.raises(MissingExtraError, match="pip install"):
         read_learners()["sb3-tqc-her"].check_installed()
     read_learners()["ars-paper"].check_installed()
+
+
+def test_missing_package_of_one_algorithm(monkeypatch):
+    monkeypatch.setattr(
+        "kinarm.evaluation.comparison.learners.find_spec",
+        lambda name: None if name == "sb3_contrib" else name,
+    )
+    with pytest.raises(MissingExtraError, match=r"sb3_contrib .*kinarm\[zoo\]"):
+        read_learners()["sb3-tqc-her"].check_installed()
+    pytest.importorskip("stable_baselines3")
+    read_learners()["sb3-sac"].check_installed()
