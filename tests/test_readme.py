@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from kinarm.policies import Policy
+
 ROOT = Path(__file__).parent.parent
 README, RESULTS, REPRODUCTION = (
     (ROOT / page).read_text(encoding="utf-8")
@@ -28,11 +30,17 @@ def run(code, folder):
 
 
 def test_python_examples_run(tmp_path):
-    one, many = blocks_after("Ten lines of Python", "python")
+    one, many, _ = blocks_after("Ten lines of Python", "python")
     answer = run(one, tmp_path)
     assert float(re.match(r"(\d\.\d+) m", answer).group(1)) <= 0.05
     assert "reached: True" in answer
     assert float(re.match(r"share reached: (.*)", run(many, tmp_path)).group(1)) > 0.85
+
+
+def test_example_with_stable_baselines3_runs(tmp_path):
+    pytest.importorskip("stable_baselines3")
+    run(blocks_after("Ten lines of Python", "python")[2], tmp_path)
+    assert Policy.load(tmp_path / "mine.npz").provenance.environment_steps >= 20_000
 
 
 @pytest.mark.slow
