@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from copy import deepcopy
 from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
@@ -158,7 +159,7 @@ def sb3_model(learner: ComparedLearner, problem: ReachProblem, seed: int) -> "Ba
     )
     if learner.normalize:
         env = VecNormalize(env, norm_reward=False)
-    settings: dict[str, Any] = dict(learner.settings)
+    settings: dict[str, Any] = deepcopy(learner.settings)  # which the algorithm changes
     if learner.hindsight:
         from kinarm.policies.sb3.hindsight import HindsightReplayBuffer
 

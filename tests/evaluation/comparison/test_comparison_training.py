@@ -95,6 +95,12 @@ class TestStableBaselines:
         train_sb3(run, judge)
         assert judge.curve[-1].environment_steps == 1280  # whole rollouts
 
+    def test_the_settings_stay_as_they_are(self):
+        settings = {"policy": "MlpPolicy", "policy_kwargs": {"net_arch": [8]}}
+        learner = sb3_learner(hindsight=False, settings=settings)
+        sb3_model(learner, EASY, seed=0)
+        assert learner.settings == {"policy": "MlpPolicy", "policy_kwargs": {"net_arch": [8]}}
+
     def test_settings_that_the_algorithm_refuses(self):
         learner = sb3_learner(settings={"policy": "MultiInputPolicy", "colour": 1})
         with pytest.raises(InvalidInputError, match=r"settings of mine: .*'colour'"):
