@@ -30,8 +30,8 @@ extensions = [
     "sphinx_autodoc_typehints",
     "sphinx_gallery.gen_gallery",
     "cards",
-    "films",
     "players",
+    "runs",
     "tables",
 ]
 # examples: read by sphinx-gallery, which writes its pages to gallery.

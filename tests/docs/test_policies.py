@@ -1,4 +1,4 @@
-"""*Your own policy* and *Share a policy*: what the pages show is run as it stands."""
+"""*Your own policy*: what the page shows is run as it stands."""
 
 import re
 import runpy
@@ -13,15 +13,8 @@ from kinarm.evaluation.commands import evaluate, replay
 from kinarm.policies import load_policy, train
 
 ROOT = Path(__file__).resolve().parents[2]
-BLOCKS = {
-    name: code
-    for page in ("policies.md", "share.md")
-    for name, code in re.findall(
-        r"```\{code-block\} \w+\n:name: (\S+)\n\n(.*?)```",
-        (ROOT / "docs" / page).read_text(encoding="utf-8"),
-        re.DOTALL,
-    )
-}
+PAGE = (ROOT / "docs" / "policies.md").read_text(encoding="utf-8")
+BLOCKS = dict(re.findall(r"```\{code-block\} \w+\n:name: (\S+)\n\n(.*?)```", PAGE, re.DOTALL))
 MAINS = {"kinarm-train": train.main, "kinarm-eval": evaluate.main, "kinarm-replay": replay.main}
 
 
@@ -50,7 +43,7 @@ def run_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., d
 def test_every_block_is_run() -> None:
     source = Path(__file__).read_text(encoding="utf-8")
     assert all(f'"{name}"' in source for name in BLOCKS)
-    assert len(BLOCKS) == 9
+    assert len(BLOCKS) == 6
 
 
 def test_a_model_of_stable_baselines3(run_code: Callable[..., dict[str, object]]) -> None:
@@ -72,11 +65,3 @@ def test_a_function(run_code: Callable[..., dict[str, object]]) -> None:
     Path("steering.py").write_text(BLOCKS["own-function"])
     run_commands("own-function-commands")
     sys.modules.pop("steering")
-
-
-def test_sharing(run_code: Callable[..., dict[str, object]]) -> None:
-    run_code()
-    run_commands("share-make")
-    assert {path.name for path in Path("share").iterdir()} == {"mine.md", "mine.npz", "mine.html"}
-    assert run_code("share-use")["info"]["distance"] > 0
-    run_commands("share-check")

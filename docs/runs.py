@@ -1,0 +1,126 @@
+"""Sphinx directive ``kinarm-run``: code that runs when the page is built, and what came of it.
+
+The blocks of a page run one after the other, in a folder that is empty before the first of them.
+Python shares one namespace, and a block that fails fails the build.
+"""
+
+import base64
+import contextlib
+import io
+import os
+import subprocess
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+from unittest import mock
+
+from docutils import nodes
+from docutils.parsers.rst import directives
+from sphinx.application import Sphinx
+from sphinx.errors import ExtensionError
+from sphinx.util.docutils import SphinxDirective
+
+KINDS = {".mp4": "video/mp4", ".png": "image/png", ".gif": "image/gif"}
+"""Files that can be shown, by their ending."""
+
+
+class Page:
+    """Where the blocks of a page run.
+
+    Parameters
+    ----------
+    source : str
+        File of the page, for tracebacks.
+    """
+
+    def __init__(self, source: str) -> None:
+        self._source = source
+        self._folder = TemporaryDirectory()
+        self._names: dict[str, Any] = {"__name__": "__main__"}
+
+    def run_python(self, code: str, line: int = 1) -> str:
+        """Run code that begins at a line of the page, without a browser; what it printed."""
+        printed = io.StringIO()
+        with (
+            contextlib.chdir(self._folder.name),
+            contextlib.redirect_stdout(printed),
+            mock.patch.dict(os.environ, {"BROWSER": "true"}),
+        ):
+            exec(compile("\n" * (line - 1) + code, self._source, "exec"), self._names)
+        return printed.getvalue()
+
+    def run_commands(self, commands: str, line: int = 1) -> str:
+        """Run command lines, with the commands of this Python first; what they printed."""
+        path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+        ended = subprocess.run(
+            ["sh", "-e", "-c", commands],
+            cwd=self._folder.name,
+            env={**os.environ, "PATH": path},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if ended.returncode:
+            raise ExtensionError(f"{self._source}:{line}: commands failed: {ended.stderr}")
+        return ended.stdout
+
+    def read(self, name: str) -> bytes:
+        """Read a file that a block made."""
+        return Path(self._folder.name, name).read_bytes()
+
+    def close(self) -> None:
+        """Delete the folder."""
+        self._folder.cleanup()
+
+
+def shown(name: str, content: bytes) -> str:
+    """A film or picture as HTML that refers to nothing outside."""
+    kind = KINDS[Path(name).suffix]
+    source = f"data:{kind};base64,{base64.b64encode(content).decode()}"
+    if kind.startswith("video"):
+        return f'<video src="{source}" autoplay loop muted playsinline controls></video>'
+    return f'<img src="{source}" alt="What the code above made">'
+
+
+class KinarmRun(SphinxDirective):
+    """Show Python or command lines (``sh``), run them, and show what they printed and made."""
+
+    has_content = True
+    required_arguments = 1
+    option_spec = {"shows": directives.unchanged}  # noqa: RUF012
+
+    def run(self) -> list[nodes.Node]:
+        language, code = self.arguments[0], "\n".join(self.content)
+        page = self._page()
+        run = {"python": page.run_python, "sh": page.run_commands}[language]
+        printed = run(code, self.lineno + self.content_offset + 1)
+        found: list[nodes.Node] = [nodes.literal_block(code, code, language=language)]
+        if printed.strip():
+            found.append(
+                nodes.literal_block(printed, printed, language="text", classes=["printed"])
+            )
+        if made := self.options.get("shows"):
+            found.append(nodes.raw("", shown(made, page.read(made)), format="html"))
+        return found
+
+    def _page(self) -> Page:
+        """Where the blocks of this page run; made for the first of them."""
+        data = self.env.temp_data
+        if "kinarm-run" not in data:
+            data["kinarm-run"] = Page(str(self.env.doc2path(self.env.docname)))
+        return data["kinarm-run"]
+
+
+def close_page(app: Sphinx, _doctree: nodes.document) -> None:
+    """Delete what the blocks of a page made, once it is read."""
+    page = app.env.temp_data.pop("kinarm-run", None)
+    if page is not None:
+        page.close()
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Register the directive."""
+    app.add_directive("kinarm-run", KinarmRun)
+    app.connect("doctree-read", close_page)
+    return {"parallel_read_safe": False, "parallel_write_safe": True}

@@ -1,0 +1,64 @@
+"""Pages whose code runs in the build: the directive that runs it, and that the pages use it."""
+
+import re
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+PAGES = ("stable_baselines3", "her", "pytorch", "films", "share")
+
+
+@pytest.fixture
+def runs(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """The directive's module."""
+    pytest.importorskip("sphinx")
+    monkeypatch.syspath_prepend(str(DOCS))
+    yield __import__("runs")
+    sys.modules.pop("runs")
+
+
+@pytest.fixture
+def page(runs):
+    """Where the blocks of a page run."""
+    page = runs.Page("some.md")
+    yield page
+    page.close()
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_all_code_of_a_page_runs(name):
+    text = (DOCS / f"{name}.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```(\S.*)\n((?:.*\n)*?)```$", text, re.MULTILINE)
+    ran = [kind for kind, _ in blocks if kind.startswith("{kinarm-run}")]
+    others = [code for kind, code in blocks if kind in ("python", "sh") or "code-block" in kind]
+    assert ran
+    assert all(code.startswith("pip install") for code in others)
+
+
+def test_blocks_share_names_and_a_folder_and_their_prints_are_kept(page):
+    assert page.run_python("from pathlib import Path\nmade = Path('made.txt')") == ""
+    assert page.run_python("made.write_text('made')\nprint(made)") == "made.txt\n"
+    assert page.run_commands("cat made.txt") == "made"
+    assert page.read("made.txt") == b"made"
+
+
+def test_commands_are_those_of_this_python(page):
+    code = "import sys; print(sys.prefix)"
+    assert page.run_commands(f'python -c "{code}"').strip() == sys.prefix
+
+
+def test_a_block_that_fails_says_where(page, runs):
+    with pytest.raises(NameError) as caught:
+        page.run_python("x = 1\nunknown", line=30)
+    end = caught.traceback[-1]
+    assert (str(end.path), end.lineno + 1) == ("some.md", 31)
+    with pytest.raises(runs.ExtensionError, match=r"some\.md:7: .*no-such-file"):
+        page.run_commands("cat no-such-file\necho done", line=7)
+
+
+def test_films_and_pictures_refer_to_nothing_outside(runs):
+    assert runs.shown("a/film.mp4", b"film").startswith('<video src="data:video/mp4;base64,Zmls')
+    assert runs.shown("picture.png", b"film").startswith('<img src="data:image/png;base64,Zmls')
