@@ -39,7 +39,7 @@ class ReachGoalEnv(ReachEnv):
     **End**: terminated when the tool is within the tolerance of the goal; truncated at the
     horizon. A move that would touch something is refused and the arm stays where it is, but the
     episode goes on: it would not follow from the goals that it is over, and giving up would be
-    worth while. `kinarm-eval` judges by the rules of `ReachEnv`, where contact ends.
+    worth while. ``kinarm-eval`` judges by the rules of `ReachEnv`, where contact ends.
 
     **Info**: that of `ReachEnv`, without reward terms; ``collision`` and ``contact`` are about
     the last step.

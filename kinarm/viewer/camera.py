@@ -13,8 +13,6 @@ from kinarm._validation import finite_array, whole_number
 from kinarm.errors import InvalidInputError
 from kinarm.problem import ReachProblem
 
-Point = tuple[float, float, float]
-
 FIELD_OF_VIEW = 30.0
 TARGET, EYE = (0.05, 0.1, 0.38), (-2.42, 1.9, 1.5)
 """Middle of the picture, and the camera relative to it, if goals lie on the left [m]: as on the
@@ -32,8 +30,8 @@ class Camera(NamedTuple):
         Angle between the picture's upper and lower edges [degrees].
     """
 
-    position: Point
-    target: Point
+    position: tuple[float, float, float]
+    target: tuple[float, float, float]
     field_of_view: float = FIELD_OF_VIEW
 
     @classmethod
@@ -109,6 +107,6 @@ def picture_size(width: object, height: object) -> tuple[int, int]:
     return whole_number("width", width, 1), whole_number("height", height, 1)
 
 
-def _point(numbers: NDArray[np.float64]) -> Point:
+def _point(numbers: NDArray[np.float64]) -> tuple[float, float, float]:
     x, y, z = (float(number) for number in numbers)
     return x, y, z

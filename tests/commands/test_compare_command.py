@@ -98,7 +98,7 @@ def test_from_python(folder):
         (("--problems", "up"), ("unknown problem 'up'", "both")),
         (("--problems", "left", "left"), ("two problems are called 'left'",)),
         (("--settings", "none.toml"), ("cannot read table of learners 'none.toml'",)),
-        (("--no-train",), ("no training is finished in",)),
+        (("--learners", "ars-paper", "--no-train"), ("no training is finished in",)),
     ],
 )
 def test_bad_input_is_one_line(run, folder, arguments, words):

@@ -71,11 +71,11 @@ def test_missing_package(monkeypatch):
 
 
 def test_missing_package_of_one_algorithm(monkeypatch):
+    pytest.importorskip("stable_baselines3")
     monkeypatch.setattr(
         "kinarm.evaluation.comparison.learners.find_spec",
         lambda name: None if name == "sb3_contrib" else name,
     )
     with pytest.raises(MissingExtraError, match=r"sb3_contrib .*kinarm\[zoo\]"):
         read_learners()["sb3-tqc-her"].check_installed()
-    pytest.importorskip("stable_baselines3")
     read_learners()["sb3-sac"].check_installed()
