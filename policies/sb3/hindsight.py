@@ -15,12 +15,13 @@ Goals = NDArray[np.floating[Any]]
 
 
 class HindsightReplayBuffer(HerReplayBuffer):
-    """`HerReplayBuffer` that asks anew whether an episode is over when it substitutes a goal.
+    """A ``HerReplayBuffer`` that asks anew whether an episode is over when it substitutes a goal.
 
     The one of Stable-Baselines3 computes the reward for the substituted goal, but keeps from the
-    original one whether the episode ended. Where reaching ends it, as in `ReachGoalEnv`, a learner
-    would look for what comes after the goal, of which it never learns anything. What of a reward
-    does not depend on the goal, such as that for a collision, is kept without ``copy_info_dict``.
+    original one whether the episode ended. Where reaching ends it, as in `kinarm.ReachGoalEnv`, a
+    learner would look for what comes after the goal, of which it never learns anything. What of a
+    reward does not depend on the goal, such as that for a collision, is kept without
+    ``copy_info_dict``.
     """
 
     def _sample_goals(self, batch_indices: Indices, env_indices: Indices) -> Goals:
