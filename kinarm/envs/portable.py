@@ -54,3 +54,19 @@ def _plain(value: Any) -> Any:
     if isinstance(value, type | np.dtype):
         return np.dtype(value).name
     return value
+
+
+class PortableSpec:
+    """An environment whose specification JSON can hold; see `portable_spec`."""
+
+    simulator: Simulator
+    _spec: EnvSpec | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """What makes this environment again; it can be written as JSON."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = None if spec is None else portable_spec(spec, self.simulator)

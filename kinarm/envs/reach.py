@@ -5,7 +5,6 @@ from typing import Any, cast
 
 import gymnasium
 import numpy as np
-from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Box, Space
 from numpy.typing import DTypeLike, NDArray
 
@@ -16,7 +15,7 @@ from kinarm.envs.errors import (
     UnexpectedArgumentError,
 )
 from kinarm.envs.interface import FlatInterface, Interface, Observations
-from kinarm.envs.portable import portable_spec
+from kinarm.envs.portable import PortableSpec
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
 from kinarm.episodes import COLLISION, RUNNING, SUCCESS, TRUNCATED, Episodes
 from kinarm.errors import InvalidInputError, UnknownNameError
@@ -55,7 +54,7 @@ def environment_metadata(simulator: Simulator, **others: Any) -> dict[str, Any]:
     return {"render_modes": list(RENDER_MODES), "render_fps": max(rate, 1), **others}
 
 
-class ReachEnv(gymnasium.Env[Any, Array]):
+class ReachEnv(PortableSpec, gymnasium.Env[Any, Array]):
     """Reach a cube on a bench with a six-axis arm (paper, section 3).
 
     Parameters
@@ -136,17 +135,6 @@ class ReachEnv(gymnasium.Env[Any, Array]):
     def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> Interface:
         """What the environment shows of its simulator."""
         return FlatInterface(simulator, dtype)
-
-    @property
-    def spec(self) -> EnvSpec | None:
-        """What makes this environment again; it can be written as JSON."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = None if spec is None else portable_spec(spec, self.simulator)
-
-    _spec: EnvSpec | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import DTypeLike, NDArray
@@ -12,7 +11,7 @@ from numpy.typing import DTypeLike, NDArray
 from kinarm._validation import whole_number
 from kinarm.envs.errors import ClosedEnvironmentError, ResetNeededError
 from kinarm.envs.interface import FlatInterface, Interface, Observations
-from kinarm.envs.portable import portable_spec
+from kinarm.envs.portable import PortableSpec
 from kinarm.envs.reach import (
     Array,
     action_space,
@@ -30,7 +29,7 @@ from kinarm.simulator import Simulator
 from kinarm.task import REWARD_TERMS
 
 
-class ReachVectorEnv(VectorEnv[Any, Array, NDArray[Any]]):
+class ReachVectorEnv(PortableSpec, VectorEnv[Any, Array, NDArray[Any]]):
     """A native batch of `ReachEnv`: all arms are stepped by one call of the compiled simulator.
 
     Sub-environment i behaves like a `ReachEnv` reset with ``seed + i``. Spaces, rewards, endings
@@ -102,17 +101,6 @@ class ReachVectorEnv(VectorEnv[Any, Array, NDArray[Any]]):
     def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> Interface:
         """What the environment shows of its simulator."""
         return FlatInterface(simulator, dtype)
-
-    @property
-    def spec(self) -> EnvSpec | None:
-        """What makes this environment again; it can be written as JSON."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = None if spec is None else portable_spec(spec, self.simulator)
-
-    _spec: EnvSpec | None = None
 
     def reset(
         self,
