@@ -5,9 +5,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.collision import BETWEEN_CAPSULES, WITH_BOX, WITH_GROUND
-from kinarm.kernels.compiling import Array, Vector, inlined
+from kinarm.collision import WITH_BOX, WITH_GROUND
+from kinarm.kernels.compiling import Array, Vector, helper, inlined
 from kinarm.kernels.kinematics import to_world
+from kinarm.kernels.lanes import any_lane, select
 
 
 @inlined
@@ -22,14 +23,10 @@ def between_segments(a: Vector, b: Vector, c: Vector, d: Vector) -> Vector:
     ur = ux * rx + uy * ry + uz * rz
     vr = vx * rx + vy * ry + vz * rz
     determinant = uu * vv - uv * uv
-    s = 0.0
-    if determinant > 1e-12 * uu * vv:
-        s = min(max((uv * vr - vv * ur) / determinant, 0.0), 1.0)
-    t = 0.0
-    if vv > 0.0:
-        t = min(max((uv * s + vr) / vv, 0.0), 1.0)
-    if uu > 0.0:
-        s = min(max((uv * t - ur) / uu, 0.0), 1.0)
+    crossing = determinant > 1e-12 * uu * vv
+    s = select(crossing, min(max((uv * vr - vv * ur) / determinant, 0.0), 1.0), 0.0)
+    t = select(vv > 0.0, min(max((uv * s + vr) / vv, 0.0), 1.0), 0.0)
+    s = select(uu > 0.0, min(max((uv * t - ur) / uu, 0.0), 1.0), s)
     return rx + s * ux - t * vx, ry + s * uy - t * vy, rz + s * uz - t * vz
 
 
@@ -42,12 +39,11 @@ def segment_gap(a: Vector, b: Vector, c: Vector, d: Vector) -> float:
     """
     nx, ny, nz = between_segments(a, b, c, d)
     norm = math.sqrt(nx * nx + ny * ny + nz * nz)
-    if norm < 1e-12:
-        return 0.0
     along_u = nx * (b[0] - a[0]) + ny * (b[1] - a[1]) + nz * (b[2] - a[2])
     along_v = nx * (d[0] - c[0]) + ny * (d[1] - c[1]) + nz * (d[2] - c[2])
     along_r = nx * (a[0] - c[0]) + ny * (a[1] - c[1]) + nz * (a[2] - c[2])
-    return (along_r + min(along_u, 0.0) - max(along_v, 0.0)) / norm
+    gap = (along_r + min(along_u, 0.0) - max(along_v, 0.0)) / norm
+    return select(norm < 1e-12, 0.0, gap)
 
 
 @inlined
@@ -59,34 +55,29 @@ def closest_to_box(a: Vector, b: Vector, lower: Vector, upper: Vector) -> float:
     lx, ly, lz = lower
     hx, hy, hz = upper
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    low, high, t = 0.0, 1.0, 0.5
+    t = 0.0 * ux + 0.5
+    low, high = 0.0 * t, 0.0 * t + 1.0
     for _ in range(16):
         x, y, z = a[0] + t * ux, a[1] + t * uy, a[2] + t * uz
         nx = x - min(max(x, lx), hx)
         ny = y - min(max(y, ly), hy)
         nz = z - min(max(z, lz), hz)
         slope = nx * ux + ny * uy + nz * uz
-        curvature = 0.0
-        if nx != 0.0:
-            curvature += ux * ux
-        if ny != 0.0:
-            curvature += uy * uy
-        if nz != 0.0:
-            curvature += uz * uz
-        if slope == 0.0 or (slope > 0.0 and t == 0.0) or (slope < 0.0 and t == 1.0):
-            break
-        if slope > 0.0:
-            high = t
-        else:
-            low = t
+        curvature = (
+            select(nx != 0.0, ux * ux, 0.0)
+            + select(ny != 0.0, uy * uy, 0.0)
+            + select(nz != 0.0, uz * uz, 0.0)
+        )
+        goes_on = (slope > 0.0) & (t > 0.0) | (slope < 0.0) & (t < 1.0)
+        high, low = select(slope > 0.0, t, high), select(slope > 0.0, low, t)
         step = t - slope / curvature
-        if abs(step - t) < 1e-12:
+        goes_on = goes_on & (abs(step - t) >= 1e-12)
+        if not any_lane(goes_on):
             break
-        if step <= low:
-            step = 0.0 if low == 0.0 else 0.5 * (low + high)
-        elif step >= high:
-            step = 1.0 if high == 1.0 else 0.5 * (low + high)
-        t = step
+        middle = 0.5 * (low + high)
+        step = select(step <= low, select(low == 0.0, 0.0, middle), step)
+        step = select(step >= high, select(high == 1.0, 1.0, middle), step)
+        t = select(goes_on, step, t)
     return t
 
 
@@ -102,8 +93,6 @@ def box_gap(a: Vector, b: Vector, lower: Vector, upper: Vector) -> float:
     ny = y - min(max(y, lower[1]), upper[1])
     nz = z - min(max(z, lower[2]), upper[2])
     norm = math.sqrt(nx * nx + ny * ny + nz * nz)
-    if norm < 1e-12:
-        return 0.0
     first = nx * a[0] + ny * a[1] + nz * a[2]
     second = nx * b[0] + ny * b[1] + nz * b[2]
     support = (
@@ -111,10 +100,10 @@ def box_gap(a: Vector, b: Vector, lower: Vector, upper: Vector) -> float:
         + max(ny * lower[1], ny * upper[1])
         + max(nz * lower[2], nz * upper[2])
     )
-    return (min(first, second) - support) / norm
+    return select(norm < 1e-12, 0.0, (min(first, second) - support) / norm)
 
 
-@inlined
+@helper
 def clearance(
     pair: int,
     pairs: NDArray[np.int64],
@@ -128,18 +117,12 @@ def clearance(
     radius = capsules[i, 6]
     a = to_world(poses, link[i], capsules[i, 0], capsules[i, 1], capsules[i, 2])
     b = to_world(poses, link[i], capsules[i, 3], capsules[i, 4], capsules[i, 5])
-    c = d = (0.0, 0.0, 0.0)
-    if kind == WITH_BOX:
-        c = (boxes[j, 0, 0], boxes[j, 0, 1], boxes[j, 0, 2])
-        d = (boxes[j, 1, 0], boxes[j, 1, 1], boxes[j, 1, 2])
-    elif kind == BETWEEN_CAPSULES:
-        radius += capsules[j, 6]
-        c = to_world(poses, link[j], capsules[j, 0], capsules[j, 1], capsules[j, 2])
-        d = to_world(poses, link[j], capsules[j, 3], capsules[j, 4], capsules[j, 5])
     if kind == WITH_GROUND:
-        gap = min(a[2], b[2])
-    elif kind == WITH_BOX:
-        gap = box_gap(a, b, c, d)
-    else:
-        gap = segment_gap(a, b, c, d)
-    return float(gap - radius)
+        return min(a[2], b[2]) - radius
+    if kind == WITH_BOX:
+        lower = (boxes[j, 0, 0], boxes[j, 0, 1], boxes[j, 0, 2])
+        upper = (boxes[j, 1, 0], boxes[j, 1, 1], boxes[j, 1, 2])
+        return box_gap(a, b, lower, upper) - radius
+    c = to_world(poses, link[j], capsules[j, 0], capsules[j, 1], capsules[j, 2])
+    d = to_world(poses, link[j], capsules[j, 3], capsules[j, 4], capsules[j, 5])
+    return segment_gap(a, b, c, d) - (radius + capsules[j, 6])

@@ -1,17 +1,16 @@
 """Forward kinematics and Jacobian."""
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.kernels.compiling import Array, Vector, inlined
+from kinarm.kernels.compiling import Array, Vector, helper, inlined
+from kinarm.kernels.elementary import sine_cosine
 
 POSE = 16
 """Entries of a frame's pose: quaternion w x y z, rotation matrix by rows, position."""
 
 
-@inlined
+@helper
 def forward_kinematics(
     prismatic: NDArray[np.bool_],
     translation: Array,
@@ -36,9 +35,8 @@ def forward_kinematics(
         fw, fx, fy, fz = rotation[k, 0], rotation[k, 1], rotation[k, 2], rotation[k, 3]
         ax, ay, az = axis[k, 0], axis[k, 1], axis[k, 2]
         sine, cosine = 0.0, 1.0
-        if not prismatic[k] and configurations[row, k] != 0.0:
-            half = 0.5 * configurations[row, k]
-            sine, cosine = math.sin(half), math.cos(half)
+        if not prismatic[k]:
+            sine, cosine = sine_cosine(0.5 * configurations[row, k])
         ux, uy, uz = sine * ax, sine * ay, sine * az
         if fw == 1.0:
             jw, jx, jy, jz = cosine, ux, uy, uz

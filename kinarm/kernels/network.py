@@ -1,21 +1,20 @@
-"""Dense networks."""
+"""Dense networks, for an episode or a block of them."""
 
-import math
+import numpy as np
+from numpy.typing import NDArray
 
-from kinarm.episodes import ELU, HARDTANH, LEAKY_RELU, LINEAR, RELU, SILU, TANH, Control
+from kinarm.episodes import ELU, HARDTANH, LEAKY_RELU, LINEAR, RELU, SILU, TANH
 from kinarm.kernels.compiling import Array, helper, inlined
-
-NARROW = 16
-"""Layers of fewer outputs keep their sums in registers."""
+from kinarm.kernels.elementary import hyperbolic_tangent
+from kinarm.kernels.lanes import select
 
 LEAK = 0.01
 """Slope of the leaky rectifier below zero."""
 
 
-@inlined
-def narrow_layer(
+@helper
+def affine_layer(
     weights: Array,
-    policy: int,
     offset: int,
     n_in: int,
     n_out: int,
@@ -24,58 +23,39 @@ def narrow_layer(
     outputs: Array,
     sink: int,
 ) -> None:
-    """Apply an affine layer of few outputs: sums stay in registers, five at a time."""
+    """Apply an affine layer: sums stay in registers, five at a time."""
     bias = offset + n_in * n_out
     blocked = n_out - n_out % 5
     for j in range(0, blocked, 5):
-        s0, s1 = weights[policy, bias + j], weights[policy, bias + j + 1]
-        s2, s3 = weights[policy, bias + j + 2], weights[policy, bias + j + 3]
-        s4 = weights[policy, bias + j + 4]
+        s0 = weights[bias + j]
+        s1 = weights[bias + j + 1]
+        s2 = weights[bias + j + 2]
+        s3 = weights[bias + j + 3]
+        s4 = weights[bias + j + 4]
         entry = offset + j
         for i in range(n_in):
             value = inputs[source, i]
-            s0 += value * weights[policy, entry]
-            s1 += value * weights[policy, entry + 1]
-            s2 += value * weights[policy, entry + 2]
-            s3 += value * weights[policy, entry + 3]
-            s4 += value * weights[policy, entry + 4]
+            s0 += value * weights[entry]
+            s1 += value * weights[entry + 1]
+            s2 += value * weights[entry + 2]
+            s3 += value * weights[entry + 3]
+            s4 += value * weights[entry + 4]
             entry += n_out
         outputs[sink, j], outputs[sink, j + 1], outputs[sink, j + 2] = s0, s1, s2
         outputs[sink, j + 3], outputs[sink, j + 4] = s3, s4
     for j in range(blocked, n_out):
-        s0 = weights[policy, bias + j]
+        s0 = weights[bias + j]
         for i in range(n_in):
-            s0 += inputs[source, i] * weights[policy, offset + i * n_out + j]
+            s0 += inputs[source, i] * weights[offset + i * n_out + j]
         outputs[sink, j] = s0
 
 
-@inlined
-def wide_layer(
-    weights: Array,
-    policy: int,
-    offset: int,
-    n_in: int,
-    n_out: int,
-    inputs: Array,
-    source: int,
-    outputs: Array,
-    sink: int,
-) -> None:
-    """Apply an affine layer of many outputs: the loop over outputs fills vector registers."""
-    for j in range(n_out):
-        outputs[sink, j] = weights[policy, offset + n_in * n_out + j]
-    for i in range(n_in):
-        value = inputs[source, i]
-        for j in range(n_out):
-            outputs[sink, j] += value * weights[policy, offset + i * n_out + j]
-
-
-@inlined
+@helper
 def activate(kind: int, values: Array, row: int, n: int) -> None:
     """Apply an activation function to the first n entries of a row."""
     if kind == TANH:
         for j in range(n):
-            values[row, j] = math.tanh(values[row, j])
+            values[row, j] = hyperbolic_tangent(values[row, j])
     elif kind == RELU:
         for j in range(n):
             values[row, j] = max(values[row, j], 0.0)
@@ -86,50 +66,51 @@ def activate(kind: int, values: Array, row: int, n: int) -> None:
 @helper
 def activate_unusual(kind: int, values: Array, row: int, n: int) -> None:
     """Apply one of the functions that few policies have; called, it keeps `activate` short."""
-    if kind == HARDTANH:
-        for j in range(n):
-            values[row, j] = min(max(values[row, j], -1.0), 1.0)
-    elif kind == ELU:
-        for j in range(n):
-            if values[row, j] < 0.0:
-                values[row, j] = math.expm1(values[row, j])
-    elif kind == LEAKY_RELU:
-        for j in range(n):
-            if values[row, j] < 0.0:
-                values[row, j] *= LEAK
-    elif kind == SILU:
-        for j in range(n):
-            values[row, j] *= 0.5 + 0.5 * math.tanh(0.5 * values[row, j])
+    for j in range(n):
+        x = values[row, j]
+        if kind == HARDTANH:
+            values[row, j] = min(max(x, -1.0), 1.0)
+        elif kind == ELU:
+            t = hyperbolic_tangent(0.5 * min(x, 0.0))
+            values[row, j] = select(x < 0.0, 2.0 * t / (1.0 - t), x)
+        elif kind == LEAKY_RELU:
+            values[row, j] = select(x < 0.0, LEAK * x, x)
+        elif kind == SILU:
+            values[row, j] = x * (0.5 + 0.5 * hyperbolic_tangent(0.5 * x))
 
 
-@inlined
-def act(control: Control, observations: Array, e: int, work: Array, action: Array) -> None:
-    """Let an episode's network choose its action.
+@helper
+def act(
+    layers: NDArray[np.int64],
+    activations: NDArray[np.int64],
+    weights: Array,
+    inputs: Array,
+    hidden: Array,
+    action: Array,
+) -> None:
+    """Let a network choose an action, clipped to [-1, 1].
 
-    A network with a mirror has learnt goals on the right alone: for a goal on the left it is
-    given the reflected observation, and its action is reflected in turn. The work space, shape
-    (3, widest layer), holds two layers by turns, and a reflected observation.
+    Parameters
+    ----------
+    layers, activations : ndarray of int, shape (n_layers + 1,) and (n_layers,)
+        Widths, and the function after each layer.
+    weights : ndarray, shape (n_parameters,)
+        As `kinarm.episodes.Control` describes them: numbers, or lanes if each episode has its own.
+    inputs : ndarray, shape (1, n_observations)
+        The observation.
+    hidden : ndarray, shape (2, widest layer)
+        Work space for two layers by turns.
+    action : ndarray, shape (1, n_actions)
+        Where the action goes.
     """
-    layers, weights, policy = control.layers, control.weights, control.policy[e]
-    activations, n_layers, offset = control.activations, layers.shape[0] - 1, 0
-    signs = control.observation_signs
-    reflected = signs.shape[0] > 0 and observations[e, control.side] > 0.0
-    inputs, source = observations, e
-    if reflected:
-        inputs, source = work, 2
-        for i in range(signs.shape[0]):
-            work[2, i] = signs[i] * observations[e, i]
+    n_layers, offset = layers.shape[0] - 1, 0
     for layer in range(n_layers):
-        n_in, n_out = layers[layer], layers[layer + 1]
-        sink = (layer + 1) % 2
-        if n_out < NARROW:
-            narrow_layer(weights, policy, offset, n_in, n_out, inputs, source, work, sink)
+        n_in, n_out, sink = layers[layer], layers[layer + 1], layer % 2
+        if layer == 0:
+            affine_layer(weights, offset, n_in, n_out, inputs, 0, hidden, sink)
         else:
-            wide_layer(weights, policy, offset, n_in, n_out, inputs, source, work, sink)
-        activate(activations[layer], work, sink, n_out)
-        inputs, source = work, sink
+            affine_layer(weights, offset, n_in, n_out, hidden, 1 - sink, hidden, sink)
+        activate(activations[layer], hidden, sink, n_out)
         offset += (n_in + 1) * n_out
-    for j in range(action.shape[0]):
-        action[j] = min(max(work[n_layers % 2, j], -1.0), 1.0)
-        if reflected:
-            action[j] *= control.action_signs[j]
+    for j in range(action.shape[1]):
+        action[0, j] = min(max(hidden[(n_layers - 1) % 2, j], -1.0), 1.0)

@@ -4,6 +4,7 @@ A new term is a field of `kinarm.task.RewardWeights` and its formula here, in th
 """
 
 from kinarm.kernels.compiling import Array, inlined
+from kinarm.kernels.lanes import select
 
 PROGRESS, CLOSER, STEP, COLLISION, SUCCESS = range(5)
 """Columns of the terms; from `COLLISION` on, they are paid when an episode ends."""
@@ -24,13 +25,14 @@ def add_reward(
 
     ``before`` and ``after`` are the distances from the tool to the goal about the step [m].
     """
+    sign = select(after < before, 1.0, select(after > before, -1.0, 0.0))
     terms[e, PROGRESS] = weights[PROGRESS] * (before - after)
-    terms[e, CLOSER] = weights[CLOSER] * ((after < before) - (after > before))
+    terms[e, CLOSER] = weights[CLOSER] * sign
     terms[e, STEP] = weights[STEP]
-    terms[e, COLLISION] = weights[COLLISION] if collided else 0.0
-    terms[e, SUCCESS] = weights[SUCCESS] if reached else 0.0
-    of_every_step = 0.0
-    for term in range(COLLISION):
+    terms[e, COLLISION] = select(collided, weights[COLLISION], 0.0)
+    terms[e, SUCCESS] = select(reached, weights[SUCCESS], 0.0)
+    of_every_step = terms[e, PROGRESS]
+    for term in range(PROGRESS + 1, COLLISION):
         of_every_step += terms[e, term]
     total[e] += of_every_step
     for term in range(COLLISION, weights.shape[0]):

@@ -1,0 +1,77 @@
+"""Elementary functions of our own, for a number or lanes: the same bits on every machine.
+
+Polynomials and constants are the classic ones of the Cephes and FreeBSD mathematical libraries.
+"""
+
+from kinarm.kernels.compiling import inlined
+from kinarm.kernels.lanes import nearest_whole, power_of_two, select
+
+HALF_PI = 1.57079632673412561417
+"""Half of pi, rounded to 33 bits: its products with small whole numbers are exact."""
+HALF_PI_REST = 6.07710050650619224932e-11
+"""What is missing to half of pi."""
+QUARTERS = 0.63661977236758134308
+"""2 / pi."""
+
+LOG_2 = 6.93145751953125e-1
+LOG_2_REST = 1.42860682030941723212e-6
+LOG_2_INVERSE = 1.4426950408889634074
+
+
+@inlined
+def sine_cosine(angle: float) -> tuple[float, float]:
+    """Sine and cosine of an angle of at most a million radians, to within 1e-15."""
+    quarter = nearest_whole(angle * QUARTERS)
+    x = (angle - quarter * HALF_PI) - quarter * HALF_PI_REST
+    z = x * x
+    odd = -2.50507602534068634195e-8 + z * 1.58969099521155010221e-10
+    odd = -1.98412698298579493134e-4 + z * (2.75573137070700676789e-6 + z * odd)
+    odd = -1.66666666666666324348e-1 + z * (8.33333333332248946124e-3 + z * odd)
+    sine = x + x * z * odd
+    even = 2.08757232129817482790e-9 + z * -1.13596475577881948265e-11
+    even = 2.48015872894767294178e-5 + z * (-2.75573143513906633035e-7 + z * even)
+    even = 4.16666666666666019037e-2 + z * (-1.38888888888741095749e-3 + z * even)
+    cosine = 1.0 - (0.5 * z - z * z * even)
+    # Which quarter turn it is, as -1/2, -1/4, 0, 1/4 or 1/2 of a whole one.
+    turn = 0.25 * quarter
+    turn -= nearest_whole(turn)
+    swapped = abs(abs(turn) - 0.25) < 0.125
+    sine, cosine = select(swapped, cosine, sine), select(swapped, sine, cosine)
+    halved = abs(turn) > 0.375
+    return (
+        select((turn < -0.125) | halved, -sine, sine),
+        select((turn > 0.125) | halved, -cosine, cosine),
+    )
+
+
+@inlined
+def exponential(x: float) -> float:
+    """e to the power of a number between -700 and 700, to within 2e-16 of itself."""
+    doublings = nearest_whole(x * LOG_2_INVERSE)
+    x = (x - doublings * LOG_2) - doublings * LOG_2_REST
+    z = x * x
+    p = x * (
+        9.99999999999999999910e-1
+        + z * (3.02994407707441961300e-2 + z * 1.26177193074810590878e-4)
+    )
+    q = 2.27265548208155028766e-1 + z * (
+        2.52448340349684104192e-3 + z * 3.00198505138664455042e-6
+    )
+    q = 2.0 + z * q
+    return (1.0 + 2.0 * (p / (q - p))) * power_of_two(doublings)
+
+
+@inlined
+def hyperbolic_tangent(x: float) -> float:
+    """Hyperbolic tangent, to within 4e-16 of itself."""
+    size = abs(x)
+    z = x * x
+    p = -1.61468768441708447952e3 + z * (
+        -9.92877231001918586564e1 + z * -9.64399179425052238628e-1
+    )
+    q = 4.84406305325125486048e3 + z * (
+        2.23548839060100448583e3 + z * (1.12811678491632931402e2 + z)
+    )
+    small = x + x * z * (p / q)
+    large = 1.0 - 2.0 / (exponential(2.0 * min(size, 20.0)) + 1.0)
+    return select(size < 0.625, small, select(x < 0.0, -large, large))

@@ -1,0 +1,248 @@
+"""Several episodes in one SIMD value: a type for kernels, and functions for lanes and numbers alike.
+
+A value of type ``lanes`` holds one number for each of `LANES` episodes. Arithmetic, comparisons,
+``min``, ``max``, ``abs`` and ``math.sqrt`` act on all of them at once, and numbers mix with
+lanes. Elements of an array that `as_lanes` viewed are such values. So a formula that is written
+once, without branches on values, serves a single episode and a block of them, with the same bits:
+nothing is reordered, and products and sums are not contracted.
+"""
+
+import math
+import operator
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core.typeconv import Conversion
+from numba.core.typing.templates import AbstractTemplate, Signature, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
+
+LANES = 8
+"""Episodes in a value: as many doubles as the widest vector registers hold."""
+
+NUMBERS = ir.VectorType(ir.DoubleType(), LANES)
+BITS = ir.VectorType(ir.IntType(1), LANES)
+WHOLE = ir.VectorType(ir.IntType(64), LANES)
+
+
+class LanesType(types.Type):
+    """Type of a number for each episode."""
+
+    def __init__(self) -> None:
+        super().__init__(name=f"lanes{LANES}")
+
+    def can_convert_from(self, _: Any, other: types.Type) -> Conversion | None:
+        """Numbers become the same number for each episode."""
+        return Conversion.safe if isinstance(other, types.Float | types.Integer) else None
+
+    def unify(self, _: Any, other: types.Type) -> types.Type | None:
+        """What is a number on one path and lanes on another is lanes."""
+        return self if isinstance(other, types.Float | types.Integer) else None
+
+
+class MaskType(types.Type):
+    """Type of a truth value for each episode."""
+
+    def __init__(self) -> None:
+        super().__init__(name=f"mask{LANES}")
+
+
+lanes, mask = LanesType(), MaskType()
+
+
+@register_model(LanesType)
+class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, manager: Any, kind: types.Type) -> None:
+        super().__init__(manager, kind, NUMBERS)
+
+
+@register_model(MaskType)
+class _MaskModel(models.PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, manager: Any, kind: types.Type) -> None:
+        super().__init__(manager, kind, BITS)
+
+
+@lower_cast(types.Float, lanes)
+@lower_cast(types.Integer, lanes)
+def _spread(_: Any, builder: Any, given: types.Type, __: types.Type, value: Any) -> Any:
+    """Repeat a number for each episode."""
+    if isinstance(given, types.Integer):
+        value = builder.sitofp(value, ir.DoubleType())
+    elif given == types.float32:
+        value = builder.fpext(value, ir.DoubleType())
+    nothing = ir.Constant(NUMBERS, ir.Undefined)
+    first = builder.insert_element(nothing, value, ir.Constant(ir.IntType(32), 0))
+    places = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+    return builder.shuffle_vector(first, nothing, places)
+
+
+def _is_number(kind: types.Type) -> bool:
+    return kind == lanes or isinstance(kind, types.Float | types.Integer)
+
+
+def _teach(
+    function: Callable[..., Any],
+    given: types.Type,
+    result: types.Type,
+    arity: int,
+    instruction: Callable[..., Any],
+) -> None:
+    """Let a Python function or operator act on lanes, or on masks, by an instruction."""
+
+    class Template(AbstractTemplate):  # type: ignore[misc]
+        def generic(self, arguments: tuple[types.Type, ...], _: Any) -> Signature | None:
+            fits = all(kind == given or (given == lanes and _is_number(kind)) for kind in arguments)
+            if len(arguments) == arity and given in arguments and fits:
+                return signature(result, *[given] * arity)
+            return None
+
+    infer_global(function)(Template)
+    lower_builtin(function, *[given] * arity)(
+        lambda _context, builder, _signature, arguments: instruction(builder, *arguments)
+    )
+
+
+def _compare(symbol: str) -> Callable[..., Any]:
+    """Comparison that is false if either number is NaN, but for ``!=``."""
+    if symbol == "!=":
+        return lambda builder, x, y: builder.fcmp_unordered(symbol, x, y)
+    return lambda builder, x, y: builder.fcmp_ordered(symbol, x, y)
+
+
+def _choose(symbol: str) -> Callable[..., Any]:
+    """The first argument where the comparison holds, else the second."""
+    return lambda builder, x, y: builder.select(builder.fcmp_ordered(symbol, x, y), x, y)
+
+
+def _call(name: str) -> Callable[..., Any]:
+    """One of LLVM's functions of a number, for each episode."""
+
+    def instruction(builder: Any, value: Any) -> Any:
+        suffix = f"v{LANES}f64" if isinstance(value.type, ir.VectorType) else "f64"
+        form = ir.FunctionType(value.type, [value.type])
+        function = builder.module.declare_intrinsic(f"llvm.{name}.{suffix}", (), form)
+        return builder.call(function, [value])
+
+    return instruction
+
+
+for _operator, _name in (
+    *((operator.add, "fadd"), (operator.iadd, "fadd")),
+    *((operator.sub, "fsub"), (operator.isub, "fsub")),
+    *((operator.mul, "fmul"), (operator.imul, "fmul")),
+    *((operator.truediv, "fdiv"), (operator.itruediv, "fdiv")),
+):
+    _teach(_operator, lanes, lanes, 2, lambda builder, x, y, n=_name: getattr(builder, n)(x, y))
+for _operator, _symbol in (
+    *((operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">=")),
+    *((operator.eq, "=="), (operator.ne, "!=")),
+):
+    _teach(_operator, lanes, mask, 2, _compare(_symbol))
+_teach(operator.neg, lanes, lanes, 1, lambda builder, x: builder.fneg(x))
+_teach(operator.and_, mask, mask, 2, lambda builder, x, y: builder.and_(x, y))
+_teach(operator.or_, mask, mask, 2, lambda builder, x, y: builder.or_(x, y))
+_teach(operator.invert, mask, mask, 1, lambda builder, x: builder.not_(x))
+_teach(min, lanes, lanes, 2, _choose("<"))
+_teach(max, lanes, lanes, 2, _choose(">"))
+_teach(abs, lanes, lanes, 1, _call("fabs"))
+_teach(math.sqrt, lanes, lanes, 1, _call("sqrt"))
+
+
+@intrinsic  # type: ignore[misc]
+def nearest_whole(_: Any, value: types.Type) -> Any:
+    """Nearest whole number, for a number or lanes; half-way ones go to the even one."""
+
+    def code(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        return _call("rint")(builder, arguments[0])
+
+    return value(value), code
+
+
+@intrinsic  # type: ignore[misc]
+def power_of_two(_: Any, exponent: types.Type) -> Any:
+    """2 to the power of a whole number between -1022 and 1023, for a number or lanes."""
+
+    def code(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        (value,) = arguments
+        whole = WHOLE if isinstance(value.type, ir.VectorType) else ir.IntType(64)
+        many = isinstance(whole, ir.VectorType)
+        bias, shift = (ir.Constant(whole, [n] * LANES if many else n) for n in (1023, 52))
+        biased = builder.add(builder.fptosi(value, whole), bias)
+        return builder.bitcast(builder.shl(biased, shift), value.type)
+
+    return exponent(exponent), code
+
+
+@intrinsic  # type: ignore[misc]
+def select(_: Any, condition: types.Type, first: types.Type, second: types.Type) -> Any:
+    """``first`` where a condition holds, else ``second``: without a branch, for each episode."""
+    many = condition == mask
+    if not many and condition != types.boolean:
+        return None
+    result = lanes if many or lanes in (first, second) else types.float64
+    if condition == mask and first == mask:
+        result = mask
+
+    def code(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        return builder.select(*arguments)
+
+    return result(condition, result, result), code
+
+
+@intrinsic  # type: ignore[misc]
+def any_lane(_: Any, condition: types.Type) -> Any:
+    """Whether a condition holds for some episode."""
+
+    def code(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        (value,) = arguments
+        if not isinstance(value.type, ir.VectorType):
+            return value
+        bits = builder.bitcast(value, ir.IntType(LANES))
+        return builder.icmp_unsigned("!=", bits, ir.Constant(ir.IntType(LANES), 0))
+
+    return types.boolean(condition), code
+
+
+@intrinsic  # type: ignore[misc]
+def lane_bits(_: Any, condition: types.Type) -> Any:
+    """The truth values of a mask as the bits of a whole number."""
+
+    def code(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        bits = builder.bitcast(arguments[0], ir.IntType(LANES))
+        return builder.zext(bits, ir.IntType(64))
+
+    return types.int64(condition), code
+
+
+@intrinsic  # type: ignore[misc]
+def as_lanes(_: Any, array: types.Type) -> Any:
+    """View a C-contiguous array of float64 whose last axis has `LANES` entries as one of lanes."""
+    view = types.Array(lanes, array.ndim - 1, "C", aligned=False)
+
+    def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        from numba.core import cgutils
+        from numba.np.arrayobj import impl_ret_borrowed, make_array, populate_array
+
+        given = make_array(array)(context, builder, arguments[0])
+        made = make_array(view)(context, builder)
+        shape = cgutils.unpack_tuple(builder, given.shape, array.ndim)[:-1]
+        strides = cgutils.unpack_tuple(builder, given.strides, array.ndim)[:-1]
+        populate_array(
+            made,
+            data=builder.bitcast(given.data, NUMBERS.as_pointer()),
+            shape=shape,
+            strides=strides,
+            itemsize=context.get_constant(types.intp, 8 * LANES),
+            meminfo=given.meminfo,
+            parent=given.parent,
+        )
+        return impl_ret_borrowed(context, builder, view, made._getvalue())
+
+    return view(array), code
+
+
+def work_space(*shape: int) -> np.ndarray[Any, Any]:
+    """Memory for lanes: an array of the shape, and one entry for each episode."""
+    return np.zeros((*shape, LANES))
