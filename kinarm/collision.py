@@ -1,7 +1,7 @@
-"""Contact between the arm, the scene and itself: Coal decides, capsules prove freedom.
+"""Contact between the arm, the scene and itself: Coal decides, enclosing shapes prove freedom.
 
 `ContactModel` holds one list of pairs twice: as a Pinocchio/Coal geometry model, which judges a
-configuration, and as flat arrays of capsules, boxes and motion bounds (`ContactShapes`), from
+configuration, and as flat arrays of enclosing shapes and motion bounds (`ContactShapes`), from
 which the compiled simulator proves that most configurations need no judge.
 """
 
@@ -17,45 +17,11 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from kinarm.arm import Arm
-from kinarm.capsules import enclosing_capsule, is_capsule
-from kinarm.chain import Chain
-from kinarm.motion_bounds import point_speed
+from kinarm.contact_shapes import BETWEEN_CAPSULES, WITH_BOX, WITH_GROUND, ContactShapes
 from kinarm.scene import Scene
-
-BETWEEN_CAPSULES, WITH_BOX, WITH_GROUND = range(3)
-"""Kinds of pairs in `ContactShapes.pairs`."""
 
 MOUNT_SAMPLES = 721
 """Positions of the first joint at which the mounting is tested."""
-
-
-class ContactShapes(NamedTuple):
-    """What the compiled kernels know of the shapes that may touch.
-
-    Attributes
-    ----------
-    link : ndarray of int, shape (n_shapes,)
-        Joint frame that carries a shape: 0 is the world, k the k-th joint.
-    capsules : ndarray, shape (n_shapes, 7)
-        The capsule that is or encloses the shape: its end points (3 + 3) in the joint frame and
-        its radius [m].
-    boxes : ndarray, shape (n_boxes, 2, 3)
-        Lower and upper corners of the obstacles [m].
-    pairs : ndarray of int, shape (n_pairs, 3)
-        Kind of the pair, index of a shape, and index of the other shape or box.
-    travel : ndarray, shape (n_actuated, n_pairs)
-        Bound on how far a joint moves the two bodies of a pair relative to each other
-        [m/rad, or m/m].
-    exact : ndarray of bool, shape (n_shapes,)
-        Whether the capsule is the shape, rather than encloses it.
-    """
-
-    link: NDArray[np.int64]
-    capsules: NDArray[np.float64]
-    boxes: NDArray[np.float64]
-    pairs: NDArray[np.int64]
-    travel: NDArray[np.float64]
-    exact: NDArray[np.bool_]
 
 
 class Contact(NamedTuple):
@@ -122,7 +88,7 @@ class ContactModel:
             arm=arm,
             geometry=geometry,
             body_names=(*body_names(arm), *surroundings),
-            shapes=_contact_shapes(arm, scene, kept, n_shapes),
+            shapes=ContactShapes.build(arm, scene, kept, n_shapes),
         )
 
     @cached_property
@@ -290,41 +256,3 @@ def _uninformative_pairs(arm: Arm, geometry: pin.GeometryModel, n_shapes: int) -
         always &= now
         never -= now
     return always | never | resting
-
-
-def _contact_shapes(
-    arm: Arm, scene: Scene, pairs: list[tuple[int, int, int]], n_shapes: int
-) -> ContactShapes:
-    """Flatten shapes, pairs and motion bounds for the kernels."""
-    objects = list(arm.geometry.geometryObjects)
-    capsules = [enclosing_capsule(shape) for shape in objects]
-    rows = [
-        (kind, first, second if kind == BETWEEN_CAPSULES else second - n_shapes)
-        for first, second, kind in pairs
-    ]
-    link = np.array([shape.parentJoint for shape in objects], dtype=np.int64)
-    travel = np.zeros((arm.n_actuated, len(rows)))
-    for column, (kind, first, second) in enumerate(rows):
-        mover, base = (second, int(link[first])) if kind == BETWEEN_CAPSULES else (first, 0)
-        for axis in range(base, min(int(link[mover]), arm.n_actuated)):
-            if kind == WITH_GROUND and _keeps_height(arm.chain, axis):
-                continue
-            ends = np.array([capsules[mover].start, capsules[mover].end])
-            travel[axis, column] = point_speed(arm.chain, axis, int(link[mover]), ends)
-    return ContactShapes(
-        link=link,
-        capsules=np.array([np.hstack(capsule) for capsule in capsules]).reshape(-1, 7),
-        boxes=np.array([(each.lower, each.upper) for each in scene.obstacles]).reshape(-1, 2, 3),
-        pairs=np.array(rows, dtype=np.int64).reshape(-1, 3),
-        travel=travel,
-        exact=np.array([is_capsule(shape) for shape in objects], dtype=bool),
-    )
-
-
-def _keeps_height(chain: Chain, axis: int) -> bool:
-    """Whether a joint is a vertical revolute one at the base, which leaves heights unchanged."""
-    if axis != 0 or chain.prismatic[0]:
-        return False
-    w, x, y, z = chain.rotation[0]
-    world_axis = pin.Quaternion(w, x, y, z).matrix() @ chain.axis[0]
-    return bool(np.hypot(world_axis[0], world_axis[1]) < 1e-12)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm.contact_shapes import PLANE
 from kinarm.observation import observation_size
 from kinarm.task import REWARD_TERMS
 
@@ -90,8 +91,9 @@ class Episodes(NamedTuple):
         Bit k - 1 set: configuration k of the step under way is not proven free.
     cleared : ndarray of bool, shape (n,)
         The step under way was judged free.
-    slack : ndarray, shape (n, n_pairs)
-        Lower bound of each pair's distance at ``q`` [m].
+    planes : ndarray, shape (n, n_pairs, PLANE)
+        Separating plane of each pair and the height above it at ``q``; see
+        `kinarm.kernels.planes`.
     goal : ndarray, shape (n, 3)
         Goal position [m].
     observation : ndarray, shape (n, n_observations)
@@ -117,7 +119,7 @@ class Episodes(NamedTuple):
     target: NDArray[np.float64]
     doubt: NDArray[np.int64]
     cleared: NDArray[np.bool_]
-    slack: NDArray[np.float64]
+    planes: NDArray[np.float64]
     goal: NDArray[np.float64]
     observation: NDArray[np.float64]
     distance: NDArray[np.float64]
@@ -155,7 +157,7 @@ class Episodes(NamedTuple):
             target=np.array(starts),
             doubt=np.zeros(n, dtype=np.int64),
             cleared=np.zeros(n, dtype=bool),
-            slack=np.zeros((n, n_pairs)),
+            planes=np.zeros((n, n_pairs, PLANE)),
             goal=np.array(goals),
             observation=np.zeros((n, n_observations)),
             distance=np.zeros(n),

@@ -5,8 +5,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm.contact_shapes import PLANE
 from kinarm.episodes import Control, Episodes
-from kinarm.kernels.compiling import Array, inlined
+from kinarm.kernels.compiling import Array, inlined, unit
+from kinarm.kernels.kinematics import POSE
+from kinarm.kernels.lanes import LANES, as_lanes
 
 
 class Block(NamedTuple):
@@ -17,16 +20,20 @@ class Block(NamedTuple):
 
     Attributes
     ----------
-    q, target, middle : (1, n_joints)
-        Configuration, where the step leads, and one between [rad or m].
+    q, target : (1, n_joints)
+        Configuration, and where the step leads [rad or m].
     goal : (1, 3)
         Goal position [m].
     observation, seen : (1, n_observations)
         Observation, and as a mirrored network sees it.
-    slack, motion : (n_pairs,)
-        Lower bound of each pair's distance, and of how far the step moves it [m].
-    poses, between : (n_joints + 1, POSE)
-        Forward kinematics at the target, and between.
+    poses : (n_joints + 1, POSE)
+        Forward kinematics at the target.
+    planes : (n_pairs, PLANE)
+        Separating plane of each pair, and the height above it; see `kinarm.kernels.planes`.
+    before, bend, bound : (n_pairs,)
+        Height before the step, its bend, and the bound that follows [m].
+    turned : (n_actuated + 1,)
+        How far the first axes move in all in the step [rad or m].
     action : (1, n_actuated)
         Fractions of the step limits.
     hidden : (2, widest layer)
@@ -41,24 +48,19 @@ class Block(NamedTuple):
         Weighted terms of the last reward.
     first, second : (n_observations,) or (0,)
         Sums of the observations acted upon, less the shift, and of their squares.
-    open : ndarray of int, shape (n_pairs, tested)
-        Pairs with configurations in question, and the bits of the episodes for each.
-    doubt : ndarray of int, shape (LANES,)
-        Bit k set: configuration k + 1 of the step under way is not proven free.
-    episode : ndarray of int, shape (LANES,)
-        Rows of the episodes; -1 where there is none.
     """
 
     q: Array
     target: Array
-    middle: Array
     goal: Array
     observation: Array
     seen: Array
-    slack: Array
-    motion: Array
     poses: Array
-    between: Array
+    planes: Array
+    before: Array
+    bend: Array
+    bound: Array
+    turned: Array
     action: Array
     hidden: Array
     weights: Array
@@ -71,9 +73,108 @@ class Block(NamedTuple):
     terms: Array
     first: Array
     second: Array
-    open: NDArray[np.int64]
-    doubt: NDArray[np.int64]
-    episode: NDArray[np.int64]
+
+
+class Alone(NamedTuple):
+    """Work space for a single episode of a block.
+
+    Attributes
+    ----------
+    q : (1, n_joints)
+        A configuration [rad or m].
+    before, after : (n_joints + 1, POSE)
+        Forward kinematics before the step or between, and after it.
+    plane : (1, PLANE)
+        Separating plane of a pair.
+    relative, simplex : (4, 3)
+        See `kinarm.kernels.separation.separate`.
+    listed : ndarray of int, shape (n_pairs + 1, 2)
+        Pairs that are in question, and at which configurations.
+    seen, hidden, action
+        As in a block, for a network too large to be laid out in lanes.
+    """
+
+    q: Array
+    before: Array
+    after: Array
+    plane: Array
+    relative: Array
+    simplex: Array
+    listed: NDArray[np.int64]
+    seen: Array
+    hidden: Array
+    action: Array
+
+
+@unit
+def work_space(
+    n_joints: int, n_actuated: int, n_observations: int, n_pairs: int, n_terms: int,
+    widest: int, own: int, summed: int,
+) -> tuple[Block, Block, Alone]:
+    """Allocate a block as numbers and as lanes, and the space for a single episode."""
+    numbers = Block(
+        q=np.zeros((1, n_joints, LANES)),
+        target=np.zeros((1, n_joints, LANES)),
+        goal=np.zeros((1, 3, LANES)),
+        observation=np.zeros((1, n_observations, LANES)),
+        seen=np.zeros((1, n_observations, LANES)),
+        poses=np.zeros((n_joints + 1, POSE, LANES)),
+        planes=np.zeros((n_pairs, PLANE, LANES)),
+        before=np.zeros((n_pairs, LANES)),
+        bend=np.zeros((n_pairs, LANES)),
+        bound=np.zeros((n_pairs, LANES)),
+        turned=np.zeros((n_actuated + 1, LANES)),
+        action=np.zeros((1, n_actuated, LANES)),
+        hidden=np.zeros((2, widest, LANES)),
+        weights=np.zeros((own, LANES)),
+        distance=np.zeros((1, LANES)),
+        total=np.zeros((1, LANES)),
+        steps=np.zeros((1, LANES)),
+        stop=np.zeros((1, LANES)),
+        alive=np.zeros((1, LANES)),
+        judged=np.zeros((1, LANES)),
+        terms=np.zeros((1, n_terms, LANES)),
+        first=np.zeros((summed, LANES)),
+        second=np.zeros((summed, LANES)),
+    )
+    block = Block(
+        q=as_lanes(numbers.q),
+        target=as_lanes(numbers.target),
+        goal=as_lanes(numbers.goal),
+        observation=as_lanes(numbers.observation),
+        seen=as_lanes(numbers.seen),
+        poses=as_lanes(numbers.poses),
+        planes=as_lanes(numbers.planes),
+        before=as_lanes(numbers.before),
+        bend=as_lanes(numbers.bend),
+        bound=as_lanes(numbers.bound),
+        turned=as_lanes(numbers.turned),
+        action=as_lanes(numbers.action),
+        hidden=as_lanes(numbers.hidden),
+        weights=as_lanes(numbers.weights),
+        distance=as_lanes(numbers.distance),
+        total=as_lanes(numbers.total),
+        steps=as_lanes(numbers.steps),
+        stop=as_lanes(numbers.stop),
+        alive=as_lanes(numbers.alive),
+        judged=as_lanes(numbers.judged),
+        terms=as_lanes(numbers.terms),
+        first=as_lanes(numbers.first),
+        second=as_lanes(numbers.second),
+    )
+    alone = Alone(
+        q=np.zeros((1, n_joints)),
+        before=np.zeros((n_joints + 1, POSE)),
+        after=np.zeros((n_joints + 1, POSE)),
+        plane=np.zeros((1, PLANE)),
+        relative=np.zeros((4, 3)),
+        simplex=np.zeros((4, 3)),
+        listed=np.zeros((n_pairs + 1, 2), dtype=np.int64),
+        seen=np.zeros((1, n_observations)),
+        hidden=np.zeros((2, widest)),
+        action=np.zeros((1, n_actuated)),
+    )
+    return numbers, block, alone
 
 
 @inlined
@@ -86,8 +187,9 @@ def take_in(e: int, lane: int, control: Control, episodes: Episodes, numbers: Bl
         numbers.goal[0, i, lane] = episodes.goal[e, i]
     for i in range(numbers.observation.shape[1]):
         numbers.observation[0, i, lane] = episodes.observation[e, i]
-    for pair in range(numbers.slack.shape[0]):
-        numbers.slack[pair, lane] = episodes.slack[e, pair]
+    for pair in range(numbers.planes.shape[0]):
+        for i in range(PLANE):
+            numbers.planes[pair, i, lane] = episodes.planes[e, pair, i]
     for i in range(numbers.weights.shape[0]):
         numbers.weights[i, lane] = control.weights[control.policy[e], i]
     for i in range(numbers.first.shape[0]):
@@ -99,20 +201,19 @@ def take_in(e: int, lane: int, control: Control, episodes: Episodes, numbers: Bl
     numbers.stop[0, lane] = episodes.stop[e]
     numbers.judged[0, lane] = 1.0 if episodes.cleared[e] else 0.0
     numbers.alive[0, lane] = 1.0
-    numbers.episode[lane] = e
 
 
 @inlined
-def put_back(lane: int, episodes: Episodes, numbers: Block) -> int:
-    """Hand an episode back from a lane, which is then free; returns its row."""
-    e = numbers.episode[lane]
+def put_back(lane: int, e: int, episodes: Episodes, numbers: Block) -> None:
+    """Hand an episode back from a lane, which is then free."""
     for joint in range(numbers.q.shape[1]):
         episodes.q[e, joint] = numbers.q[0, joint, lane]
         episodes.target[e, joint] = numbers.target[0, joint, lane]
     for i in range(numbers.observation.shape[1]):
         episodes.observation[e, i] = numbers.observation[0, i, lane]
-    for pair in range(numbers.slack.shape[0]):
-        episodes.slack[e, pair] = numbers.slack[pair, lane]
+    for pair in range(numbers.planes.shape[0]):
+        for i in range(PLANE):
+            episodes.planes[e, pair, i] = numbers.planes[pair, i, lane]
     for i in range(numbers.first.shape[0]):
         episodes.moments[e, 0, i] = numbers.first[i, lane]
         episodes.moments[e, 1, i] = numbers.second[i, lane]
@@ -122,6 +223,4 @@ def put_back(lane: int, episodes: Episodes, numbers: Block) -> int:
     episodes.total[e] = numbers.total[0, lane]
     episodes.steps[e] = int(numbers.steps[0, lane])
     episodes.cleared[e] = False
-    numbers.episode[lane] = -1
     numbers.alive[0, lane] = 0.0
-    return e

@@ -31,3 +31,8 @@ def helper(function: Function) -> Function:
     """Compile a long helper that allocates nothing: called, it is compiled only once."""
     options: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
     return cast("Function", njit(**options)(function))
+
+
+def unit(function: Function) -> Function:
+    """Compile a function that allocates what it returns, for kernels."""
+    return cast("Function", njit(error_model="numpy", no_cpython_wrapper=True)(function))

@@ -1,18 +1,20 @@
 """Proof that steps are free of contact, for a block of episodes.
 
-A step moves the arm from q to q' and is tested at n configurations q + k/n (q' - q). Each tested
-pair of bodies carries a *slack*: a certified lower bound of its distance at q. Slack that
-outlasts the largest possible motion of a step proves it; else the pair's distance at q' is bounded
-anew, and only if that is not enough, at the configurations between.
+A step moves the arm from q to q' and is tested at n configurations q + k/n (q' - q). Of every pair
+of bodies, the height of the second above the plane of the first (`kinarm.kernels.planes`) is known
+at q. Along the step it is the least of the heights of some corners, whose second derivative is
+bounded by a *bend* c: at the share s of the step it is at least (1 - s) h + s h' - s (1 - s) c / 2.
+Where that does not prove the step, the plane is replaced by a better one, and only if that is not
+enough, the configurations between are looked at one by one.
 """
 
 from kinarm.chain import Chain
-from kinarm.collision import ContactShapes
-from kinarm.kernels.block import Block
-from kinarm.kernels.compiling import Array, inlined
-from kinarm.kernels.distance import clearance
-from kinarm.kernels.kinematics import forward_kinematics
-from kinarm.kernels.lanes import any_lane, lane_bits, select
+from kinarm.contact_shapes import GROUND, PLANE, ContactShapes
+from kinarm.kernels.block import Alone, Block
+from kinarm.kernels.compiling import Array, helper, inlined
+from kinarm.kernels.kinematics import POSE, forward_kinematics
+from kinarm.kernels.planes import GAP, height_above, propose
+from kinarm.kernels.separation import separate
 
 MARGIN = 1e-6
 """Distance below which freedom is not claimed [m]: the tolerance of Coal's iterations."""
@@ -25,74 +27,162 @@ def is_apart(bound: float) -> bool:
 
 
 @inlined
-def spend_slack(travel: Array, block: Block) -> bool:
-    """Reduce slack by the motion of a step; return where some pair has none left.
+def bend_step(shapes: ContactShapes, block: Block) -> None:
+    """Fill in the bends of a block's step [m].
 
-    Fills in bounds of the relative ``motion`` of the pairs [m].
+    The second derivative of a point by two axes is no larger than how fast the later one moves
+    it, since the earlier one only turns that motion.
     """
-    n_pairs = travel.shape[1]
-    least = 0.0 * block.distance[0] + 1.0
-    for pair in range(n_pairs):
-        moved = abs(block.target[0, 0] - block.q[0, 0]) * travel[0, pair]
-        for axis in range(1, travel.shape[0]):
-            moved += abs(block.target[0, axis] - block.q[0, axis]) * travel[axis, pair]
-        block.motion[pair] = moved
-        left = block.slack[pair] - moved
-        block.slack[pair] = left
-        least = min(least, left)
-    return ~is_apart(least)
+    travel = shapes.travel
+    n_axes = travel.shape[0]
+    moved = 0.0 * block.q[0, 0]
+    for axis in range(n_axes):
+        # How far the axes before this one turn in all.
+        block.turned[axis] = moved
+        moved += abs(block.target[0, axis] - block.q[0, axis])
+    block.turned[n_axes] = moved
+    for pair in range(shapes.planes.shape[0]):
+        first, last = shapes.planes[pair, 2], shapes.planes[pair, 3]
+        bend = 0.0 * moved
+        for axis in range(first, last):
+            before, after = block.turned[axis], block.turned[axis + 1]
+            both = (before - block.turned[first]) + (after - block.turned[first])
+            bend += (after - before) * both * travel[axis, pair]
+        block.bend[pair] = bend
 
 
 @inlined
-def prove_step(chain: Chain, shapes: ContactShapes, tested: int, needed: bool, block: Block) -> int:
-    """Prove the tested configurations of a step free where the slack ran out, and renew it.
+def prove_step(shapes: ContactShapes, tested: int, block: Block) -> float:
+    """Renew the heights of all pairs, and return a bound that shows which steps are free.
 
-    Takes slack and motion as `spend_slack` left them and the poses at the target; ``needed`` says
-    for which episodes. Returns the bits of the episodes that are in doubt; for them, bit k of
-    ``block.doubt[e]`` is set if configuration k + 1 could not be proven free.
+    Takes the poses at the target.
     """
-    prismatic, translation, rotation, axes = chain[:4]
-    link, capsules, boxes, pairs = shapes[:4]
-    n_open, open_between, doubtful = 0, 0, 0
-    for pair in range(pairs.shape[0]):
-        spent = needed & ~is_apart(block.slack[pair])
-        if not any_lane(spent):
+    bend_step(shapes, block)
+    least = 0.0 * block.bend[0] + 1.0
+    share = 1.0 / tested
+    for pair in range(shapes.planes.shape[0]):
+        before = block.planes[pair, GAP]
+        after = height_above(shapes, pair, block.poses, block.planes, pair)
+        early = before + share * (after - before)
+        bound = min(after, early) - 0.125 * block.bend[pair]
+        block.before[pair], block.bound[pair], block.planes[pair, GAP] = before, bound, after
+        least = min(least, bound)
+    return least
+
+
+@inlined
+def open_configurations(before: float, after: float, bend: float, tested: int) -> int:
+    """Bit k - 1 is set if configuration k is not proven free by heights before and after."""
+    unproven = 0
+    for k in range(1, tested + 1):
+        share = k / tested
+        height = (1.0 - share) * before + share * after - 0.5 * share * (1.0 - share) * bend
+        unproven |= 0 if is_apart(height) else 1 << (k - 1)
+    return unproven
+
+
+@helper
+def prove_alone(
+    lane: int, chain: Chain, shapes: ContactShapes, tested: int, numbers: Block, alone: Alone
+) -> int:
+    """Prove the step of a single episode as far as `prove_step` has not, and better its planes.
+
+    Returns a number whose bit k - 1 is set if configuration k could not be proven free.
+    """
+    n_joints, plane = numbers.q.shape[1], alone.plane
+    take_poses(lane, numbers, alone.after)
+    at_start, n_open, all_open, target_bit = False, 0, 0, 1 << (tested - 1)
+    for pair in range(shapes.planes.shape[0]):
+        if is_apart(numbers.bound[pair, lane]):
             continue
-        before = block.slack[pair] + block.motion[pair]
-        after = clearance(pair, pairs, capsules, link, boxes, block.poses)
-        block.slack[pair] = select(needed, max(block.slack[pair], after), block.slack[pair])
-        doubtful |= note_doubt(lane_bits(spent & ~is_apart(after)), tested - 1, block)
-        opened = 0
-        for k in range(1, tested):
-            share = k / tested
-            left = before - share * block.motion[pair]
-            right = after - (1.0 - share) * block.motion[pair]
-            bits = lane_bits(spent & ~is_apart(max(left, right)))
-            block.open[n_open, k] = bits
-            opened |= bits
-            open_between |= (bits != 0) << k
-        block.open[n_open, 0] = pair
-        n_open += 1 if opened != 0 else 0
+        bend = numbers.bend[pair, lane]
+        before, after = numbers.before[pair, lane], numbers.planes[pair, GAP, lane]
+        unproven = open_configurations(before, after, bend, tested)
+        if unproven != 0 and shapes.planes[pair, 0] != GROUND:
+            if not at_start:
+                for joint in range(n_joints):
+                    alone.q[0, joint] = numbers.q[0, joint, lane]
+                place(chain, alone.q, alone.before)
+                at_start = True
+            for i in range(PLANE):
+                plane[0, i] = numbers.planes[pair, i, lane]
+            after = separate(shapes, pair, alone.after, alone.relative, alone.simplex, plane)
+            before = height_above(shapes, pair, alone.before, plane, 0)
+            unproven = open_configurations(before, after, bend, tested)
+            for i in range(PLANE):
+                numbers.planes[pair, i, lane] = plane[0, i]
+        alone.listed[n_open, 0], alone.listed[n_open, 1] = pair, unproven
+        n_open += 0 if unproven == 0 else 1
+        all_open |= unproven
+    doubt = all_open & target_bit
     for k in range(1, tested):
-        if open_between >> k & 1 == 0:
+        bit = 1 << (k - 1)
+        if all_open & bit == 0:
             continue
-        for axis in range(block.q.shape[1]):
-            way = block.target[0, axis] - block.q[0, axis]
-            block.middle[0, axis] = block.q[0, axis] + k / tested * way
-        forward_kinematics(prismatic, translation, rotation, axes, block.middle, 0, block.between)
+        for joint in range(n_joints):
+            start, end = numbers.q[0, joint, lane], numbers.target[0, joint, lane]
+            alone.q[0, joint] = start + k / tested * (end - start)
+        place(chain, alone.q, alone.before)
         for index in range(n_open):
-            if block.open[index, k] != 0:
-                pair = block.open[index, 0]
-                gap = clearance(pair, pairs, capsules, link, boxes, block.between)
-                bits = block.open[index, k] & lane_bits(~is_apart(gap))
-                doubtful |= note_doubt(bits, k - 1, block)
-    return doubtful
+            pair = alone.listed[index, 0]
+            if alone.listed[index, 1] & bit == 0:
+                continue
+            for i in range(PLANE):
+                plane[0, i] = numbers.planes[pair, i, lane]
+            height = height_above(shapes, pair, alone.before, plane, 0)
+            if not is_apart(height) and shapes.planes[pair, 0] != GROUND:
+                height = separate(shapes, pair, alone.before, alone.relative, alone.simplex, plane)
+            if not is_apart(height):
+                doubt |= bit
+                break
+    return doubt
 
 
 @inlined
-def note_doubt(bits: int, bit: int, block: Block) -> int:
-    """Set a bit in the doubts of the episodes with these bits, which are returned."""
-    if bits != 0:
-        for lane in range(block.doubt.shape[0]):
-            block.doubt[lane] |= (bits >> lane & 1) << bit
-    return bits
+def propose_planes(shapes: ContactShapes, block: Block) -> float:
+    """Give all pairs a first plane, and return the least height above one.
+
+    Takes the poses of the configurations.
+    """
+    least = 0.0 * block.q[0, 0] + 1.0
+    for pair in range(shapes.planes.shape[0]):
+        propose(shapes, pair, block.poses, block.planes)
+        height = height_above(shapes, pair, block.poses, block.planes, pair)
+        block.planes[pair, GAP] = height
+        least = min(least, height)
+    return least
+
+
+@helper
+def stands_free(lane: int, shapes: ContactShapes, numbers: Block, alone: Alone) -> bool:
+    """Prove the configuration of a single episode free as far as first planes have not."""
+    plane, free = alone.plane, True
+    take_poses(lane, numbers, alone.after)
+    for pair in range(shapes.planes.shape[0]):
+        if is_apart(numbers.planes[pair, GAP, lane]):
+            continue
+        if shapes.planes[pair, 0] == GROUND:
+            free = False
+            continue
+        for i in range(PLANE):
+            plane[0, i] = numbers.planes[pair, i, lane]
+        height = separate(shapes, pair, alone.after, alone.relative, alone.simplex, plane)
+        for i in range(PLANE):
+            numbers.planes[pair, i, lane] = plane[0, i]
+        free = free and is_apart(height)
+    return free
+
+
+@inlined
+def take_poses(lane: int, numbers: Block, poses: Array) -> None:
+    """Copy the poses of a lane."""
+    for frame in range(poses.shape[0]):
+        for i in range(POSE):
+            poses[frame, i] = numbers.poses[frame, i, lane]
+
+
+@helper
+def place(chain: Chain, q: Array, poses: Array) -> None:
+    """Fill in the poses of a single configuration, shape (1, n_joints)."""
+    prismatic, translation, rotation, axes = chain[:4]
+    forward_kinematics(prismatic, translation, rotation, axes, q, 0, poses)

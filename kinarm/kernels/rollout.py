@@ -8,16 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.chain import Chain
-from kinarm.collision import ContactShapes
+from kinarm.contact_shapes import PLANE, ContactShapes
 from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Control, Episodes, Rules
-from kinarm.kernels.block import Block, put_back, take_in
+from kinarm.kernels.block import Alone, Block, put_back, take_in, work_space
 from kinarm.kernels.compiling import Array, inlined, kernel
-from kinarm.kernels.distance import clearance
-from kinarm.kernels.kinematics import POSE, forward_kinematics, to_world
-from kinarm.kernels.lanes import LANES, any_lane, as_lanes, lane_bits, select
+from kinarm.kernels.kinematics import forward_kinematics, to_world
+from kinarm.kernels.lanes import LANES, lane_bits, select
 from kinarm.kernels.network import act
 from kinarm.kernels.observing import observe
-from kinarm.kernels.proof import is_apart, prove_step, spend_slack
+from kinarm.kernels.proof import is_apart, propose_planes, prove_alone, prove_step, stands_free
 from kinarm.kernels.reward import add_reward
 
 LAYOUT = "a4"
@@ -39,18 +38,21 @@ def screen(
     proven: NDArray[np.bool_],
 ) -> None:
     """Find the tool points of configurations, shape (n, 3) [m], and which are proven free."""
-    prismatic, translation, rotation, axes, tool = chain[:5]
-    link, capsules, boxes, pairs = shapes[:4]
-    n_joints = configurations.shape[1]
-    poses = np.empty((n_joints + 1, POSE))
-    for i in range(first, last):
-        forward_kinematics(prismatic, translation, rotation, axes, configurations, i, poses)
-        tools[i, 0], tools[i, 1], tools[i, 2] = to_world(poses, n_joints, tool[0], tool[1], tool[2])
-        proven[i] = True
-        for pair in range(pairs.shape[0]):
-            if not is_apart(clearance(pair, pairs, capsules, link, boxes, poses)):
-                proven[i] = False
-                break
+    n_joints, tool = configurations.shape[1], chain.tool
+    numbers, block, alone = work_space(n_joints, 0, 0, shapes.planes.shape[0], 0, 0, 0, 0)
+    for start in range(first, last, LANES):
+        filled = min(last - start, LANES)
+        for lane in range(LANES):
+            row = start + min(lane, filled - 1)
+            for joint in range(n_joints):
+                numbers.q[0, joint, lane] = configurations[row, joint]
+        free = stand(chain, shapes, filled, numbers, block, alone)
+        x, y, z = to_world(block.poses, n_joints, tool[0], tool[1], tool[2])
+        block.goal[0, 0], block.goal[0, 1], block.goal[0, 2] = x, y, z
+        for lane in range(filled):
+            proven[start + lane] = free >> lane & 1 != 0
+            for axis in range(3):
+                tools[start + lane, axis] = numbers.goal[0, axis, lane]
 
 
 @kernel
@@ -66,28 +68,51 @@ def begin(
 
     An episode whose start is not proven contact-free is left paused.
     """
-    prismatic, translation, rotation, axes, tool = chain[:5]
-    link, capsules, boxes, pairs = shapes[:4]
-    q, slack, path = episodes.q, episodes.slack, episodes.path
-    poses = np.empty((q.shape[1] + 1, POSE))
-    for index in range(first, last):
-        e = rows[index]
-        forward_kinematics(prismatic, translation, rotation, axes, q, e, poses)
-        distance = observe(tool, poses, episodes.goal, e, episodes.observation)
-        episodes.distance[e] = distance
-        episodes.steps[e] = 0
-        episodes.total[e] = 0.0
-        for term in range(episodes.terms.shape[1]):
-            episodes.terms[e, term] = 0.0
-        episodes.cleared[e] = False
-        episodes.status[e] = RUNNING
-        for pair in range(pairs.shape[0]):
-            slack[e, pair] = clearance(pair, pairs, capsules, link, boxes, poses)
-            if not is_apart(slack[e, pair]):
-                episodes.status[e] = PAUSED
-        for axis in range(q.shape[1]):
+    q, planes, path = episodes.q, episodes.planes, episodes.path
+    n_joints, n_observations = q.shape[1], episodes.observation.shape[1]
+    n_pairs = shapes.planes.shape[0]
+    numbers, block, alone = work_space(n_joints, 0, n_observations, n_pairs, 0, 0, 0, 0)
+    for start in range(first, last, LANES):
+        filled = min(last - start, LANES)
+        for lane in range(LANES):
+            e = rows[start + min(lane, filled - 1)]
+            for joint in range(n_joints):
+                numbers.q[0, joint, lane] = q[e, joint]
+            for axis in range(3):
+                numbers.goal[0, axis, lane] = episodes.goal[e, axis]
+        free = stand(chain, shapes, filled, numbers, block, alone)
+        block.distance[0] = observe(chain.tool, block.poses, block.goal, 0, block.observation)
+        for lane in range(filled):
+            e = rows[start + lane]
+            episodes.status[e] = RUNNING if free >> lane & 1 else PAUSED
+            episodes.steps[e] = 0
+            episodes.total[e] = 0.0
+            episodes.cleared[e] = False
+            episodes.distance[e] = numbers.distance[0, lane]
+            for term in range(episodes.terms.shape[1]):
+                episodes.terms[e, term] = 0.0
+            for i in range(n_observations):
+                episodes.observation[e, i] = numbers.observation[0, i, lane]
+            for pair in range(n_pairs):
+                for i in range(PLANE):
+                    planes[e, pair, i] = numbers.planes[pair, i, lane]
             if path.shape[0] > 0:
-                path[e, 0, axis] = q[e, axis]
+                for joint in range(n_joints):
+                    path[e, 0, joint] = q[e, joint]
+
+
+@inlined
+def stand(
+    chain: Chain, shapes: ContactShapes, filled: int, numbers: Block, block: Block, alone: Alone
+) -> int:
+    """Place the arms of a block, and return the bits of those that are proven free of contact."""
+    prismatic, translation, rotation, axes = chain[:4]
+    forward_kinematics(prismatic, translation, rotation, axes, block.q, 0, block.poses)
+    free = lane_bits(is_apart(propose_planes(shapes, block)))
+    for lane in range(filled):
+        if free >> lane & 1 == 0 and stands_free(lane, shapes, numbers, alone):
+            free |= 1 << lane
+    return free
 
 
 OWN_WEIGHTS = 4096
@@ -112,81 +137,38 @@ def advance(
     Each goes on until it ends, reaches its ``stop`` or pauses before a step that is not proven
     free of contact; then the next one takes its place in the block.
     """
-    way = way_to_act(first, last, control)
+    prismatic, translation, rotation, axes, tool, lower, upper = chain[:7]
+    layers, activations = control.layers, control.activations
     n_joints, n_actuated = episodes.q.shape[1], rules.step_limit.shape[0]
-    n_observations, n_pairs = episodes.observation.shape[1], episodes.slack.shape[1]
-    widest = 1
-    for layer in range(1, control.layers.shape[0]):
-        widest = max(widest, control.layers[layer])
+    n_observations, n_pairs = episodes.observation.shape[1], shapes.planes.shape[0]
+    way = way_to_act(first, last, control)
     own = control.weights.shape[1] if way == OWN else 0
     summed = n_observations if episodes.moments.shape[0] > 0 else 0
-    numbers = Block(
-        q=np.zeros((1, n_joints, LANES)),
-        target=np.zeros((1, n_joints, LANES)),
-        middle=np.zeros((1, n_joints, LANES)),
-        goal=np.zeros((1, 3, LANES)),
-        observation=np.zeros((1, n_observations, LANES)),
-        seen=np.zeros((1, n_observations, LANES)),
-        slack=np.zeros((n_pairs, LANES)),
-        motion=np.zeros((n_pairs, LANES)),
-        poses=np.zeros((n_joints + 1, POSE, LANES)),
-        between=np.zeros((n_joints + 1, POSE, LANES)),
-        action=np.zeros((1, n_actuated, LANES)),
-        hidden=np.zeros((2, widest, LANES)),
-        weights=np.zeros((own, LANES)),
-        distance=np.zeros((1, LANES)),
-        total=np.zeros((1, LANES)),
-        steps=np.zeros((1, LANES)),
-        stop=np.zeros((1, LANES)),
-        alive=np.zeros((1, LANES)),
-        judged=np.zeros((1, LANES)),
-        terms=np.zeros((1, rules.reward.shape[0], LANES)),
-        first=np.zeros((summed, LANES)),
-        second=np.zeros((summed, LANES)),
-        open=np.zeros((n_pairs + 1, rules.tested), dtype=np.int64),
-        doubt=np.zeros(LANES, dtype=np.int64),
-        episode=np.full(LANES, -1),
+    widest = 1
+    for layer in range(1, layers.shape[0]):
+        widest = max(widest, layers[layer])
+    numbers, block, alone = work_space(
+        n_joints,
+        n_actuated,
+        n_observations,
+        n_pairs,
+        rules.reward.shape[0],
+        widest,
+        own,
+        summed,
     )
-    block = Block(
-        q=as_lanes(numbers.q),
-        target=as_lanes(numbers.target),
-        middle=as_lanes(numbers.middle),
-        goal=as_lanes(numbers.goal),
-        observation=as_lanes(numbers.observation),
-        seen=as_lanes(numbers.seen),
-        slack=as_lanes(numbers.slack),
-        motion=as_lanes(numbers.motion),
-        poses=as_lanes(numbers.poses),
-        between=as_lanes(numbers.between),
-        action=as_lanes(numbers.action),
-        hidden=as_lanes(numbers.hidden),
-        weights=as_lanes(numbers.weights),
-        distance=as_lanes(numbers.distance),
-        total=as_lanes(numbers.total),
-        steps=as_lanes(numbers.steps),
-        stop=as_lanes(numbers.stop),
-        alive=as_lanes(numbers.alive),
-        judged=as_lanes(numbers.judged),
-        terms=as_lanes(numbers.terms),
-        first=as_lanes(numbers.first),
-        second=as_lanes(numbers.second),
-        open=numbers.open,
-        doubt=numbers.doubt,
-        episode=numbers.episode,
-    )
-    alone, alone_hidden = np.zeros((1, n_observations)), np.zeros((2, widest))
-    alone_action = np.zeros((1, n_actuated))
-    prismatic, translation, rotation, axes, tool, lower, upper = chain[:7]
-    waiting, n_alive, n_lanes = first, 0, numbers.episode.shape[0]
+    row = np.full(LANES, -1)
+    waiting, n_alive = first, 0
     while True:
-        for lane in range(n_lanes):
-            if numbers.episode[lane] < 0:
+        for lane in range(row.shape[0]):
+            if row[lane] < 0 and waiting < last:
                 while waiting < last and not (
                     episodes.status[waiting] == RUNNING
                     and episodes.steps[waiting] < episodes.stop[waiting]
                 ):
                     waiting += 1
                 if waiting < last:
+                    row[lane] = waiting
                     take_in(waiting, lane, control, episodes, numbers)
                     waiting += 1
                     n_alive += 1
@@ -194,46 +176,14 @@ def advance(
             return
         reflected = see(control, block)
         if way == SHARED:
-            weights = control.weights[control.policy[numbers.episode.max()]]
-            act(
-                control.layers,
-                control.activations,
-                weights,
-                block.seen,
-                block.hidden,
-                block.action,
-            )
+            weights = control.weights[control.policy[first]]
+            act(layers, activations, weights, block.seen, block.hidden, block.action)
         elif way == OWN:
-            act(
-                control.layers,
-                control.activations,
-                block.weights,
-                block.seen,
-                block.hidden,
-                block.action,
-            )
+            act(layers, activations, block.weights, block.seen, block.hidden, block.action)
         else:
-            for lane in range(n_lanes):
-                e = numbers.episode[lane]
-                if e < 0:
-                    continue
-                if way == ONE_BY_ONE:
-                    for i in range(n_observations):
-                        alone[0, i] = numbers.seen[0, i, lane]
-                    act(
-                        control.layers,
-                        control.activations,
-                        control.weights[control.policy[e]],
-                        alone,
-                        alone_hidden,
-                        alone_action,
-                    )
-                    for axis in range(n_actuated):
-                        numbers.action[0, axis, lane] = alone_action[0, axis]
-                else:
-                    column = int(numbers.steps[0, lane]) if control.actions.shape[1] > 1 else 0
-                    for axis in range(n_actuated):
-                        numbers.action[0, axis, lane] = control.actions[e, column, axis]
+            for lane in range(row.shape[0]):
+                if row[lane] >= 0:
+                    act_alone(lane, row[lane], control, numbers, alone)
         fresh = (block.alive[0] > 0.0) & ~(block.judged[0] > 0.0)
         for i in range(summed):
             centred = select(fresh, block.observation[0, i] - episodes.shift[i], 0.0)
@@ -247,49 +197,64 @@ def advance(
             moved = min(max(moved, lower[axis]), upper[axis])
             block.target[0, axis] = select(fresh, moved, block.target[0, axis])
         forward_kinematics(prismatic, translation, rotation, axes, block.target, 0, block.poses)
-        spent = spend_slack(shapes.travel, block) & fresh
-        if any_lane(spent):
-            doubtful = prove_step(chain, shapes, rules.tested, spent, block)
-            if doubtful != 0:
-                for lane in range(n_lanes):
-                    if doubtful >> lane & 1:
-                        e = put_back(lane, episodes, numbers)
-                        episodes.doubt[e] = numbers.doubt[lane]
-                        episodes.status[e] = PAUSED
-                        numbers.doubt[lane] = 0
-                        n_alive -= 1
-                if n_alive == 0:
+        unproven = lane_bits(~is_apart(prove_step(shapes, rules.tested, block)) & fresh)
+        if unproven != 0:
+            for lane in range(row.shape[0]):
+                if unproven >> lane & 1 == 0:
                     continue
+                doubt = prove_alone(lane, chain, shapes, rules.tested, numbers, alone)
+                if doubt != 0:
+                    e, row[lane] = row[lane], -1
+                    put_back(lane, e, episodes, numbers)
+                    episodes.doubt[e] = doubt
+                    episodes.status[e] = PAUSED
+                    n_alive -= 1
+            if n_alive == 0:
+                continue
         block.judged[0] = 0.0
         before = block.distance[0]
         after = observe(tool, block.poses, block.goal, 0, block.observation)
         block.distance[0] = after
         block.steps[0] += 1.0
-        reached = after <= rules.tolerance
-        never = after < 0.0
+        reached, never = after <= rules.tolerance, after < 0.0
         add_reward(rules.reward, before, after, never, reached, block.terms, block.total, 0)
         for joint in range(n_joints):
             block.q[0, joint] = block.target[0, joint]
         if episodes.path.shape[0] > 0:
-            for lane in range(n_lanes):
-                e = numbers.episode[lane]
-                if e >= 0:
+            for lane in range(row.shape[0]):
+                if row[lane] >= 0:
                     step = int(numbers.steps[0, lane])
                     for joint in range(n_joints):
-                        episodes.path[e, step, joint] = numbers.q[0, joint, lane]
+                        episodes.path[row[lane], step, joint] = numbers.q[0, joint, lane]
         late = block.steps[0] >= rules.horizon
-        stopped = (block.steps[0] >= block.stop[0]) | reached | late
-        finished = lane_bits(stopped & (block.alive[0] > 0.0))
+        finished = lane_bits((block.steps[0] >= block.stop[0]) | reached | late)
         if finished != 0:
             successes, ends = lane_bits(reached), lane_bits(late)
-            for lane in range(n_lanes):
-                if finished >> lane & 1:
-                    e = put_back(lane, episodes, numbers)
+            for lane in range(row.shape[0]):
+                if finished >> lane & 1 and row[lane] >= 0:
+                    e, row[lane] = row[lane], -1
+                    put_back(lane, e, episodes, numbers)
                     n_alive -= 1
                     if successes >> lane & 1:
                         episodes.status[e] = SUCCESS
                     elif ends >> lane & 1:
                         episodes.status[e] = TRUNCATED
+
+
+@inlined
+def act_alone(lane: int, e: int, control: Control, numbers: Block, alone: Alone) -> None:
+    """Choose the action of a single episode, from a table or by a large network."""
+    if control.layers.shape[0] == 0:
+        column = int(numbers.steps[0, lane]) if control.actions.shape[1] > 1 else 0
+        for axis in range(numbers.action.shape[1]):
+            numbers.action[0, axis, lane] = control.actions[e, column, axis]
+        return
+    for i in range(alone.seen.shape[1]):
+        alone.seen[0, i] = numbers.seen[0, i, lane]
+    weights = control.weights[control.policy[e]]
+    act(control.layers, control.activations, weights, alone.seen, alone.hidden, alone.action)
+    for axis in range(alone.action.shape[1]):
+        numbers.action[0, axis, lane] = alone.action[0, axis]
 
 
 @inlined

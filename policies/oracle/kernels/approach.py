@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.chain import Chain
-from kinarm.collision import ContactShapes
+from kinarm.contact_shapes import ContactShapes
 from kinarm.kernels.compiling import inlined, kernel
 from kinarm.kernels.kinematics import POSE, point_jacobian
 from kinarm.motion_bounds import MotionBounds

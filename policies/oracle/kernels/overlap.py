@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.chain import Chain
-from kinarm.collision import BETWEEN_CAPSULES, WITH_BOX, ContactShapes
+from kinarm.contact_shapes import BETWEEN_CAPSULES, WITH_BOX, ContactShapes
 from kinarm.kernels.compiling import helper, inlined
 from kinarm.kernels.distance import between_segments, closest_to_box
 from kinarm.kernels.kinematics import point_jacobian, to_world

@@ -1,0 +1,142 @@
+"""What the compiled kernels know of the shapes that may touch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from kinarm.capsules import enclosing_capsule, is_capsule
+from kinarm.chain import Chain
+from kinarm.enclosures import Enclosure, enclosing_polytope
+from kinarm.motion_bounds import point_speed
+
+if TYPE_CHECKING:
+    from kinarm.arm import Arm
+    from kinarm.scene import Scene
+
+BETWEEN_CAPSULES, WITH_BOX, WITH_GROUND = range(3)
+"""Kinds of pairs in `ContactShapes.pairs`."""
+
+GROUND = -1
+"""Carrier, in `ContactShapes.planes`, of the plane that is the ground."""
+
+PLANE = 5
+"""Entries of a separating plane; see `kinarm.kernels.planes`."""
+
+
+class ContactShapes(NamedTuple):
+    """Shapes, pairs and motion bounds as flat arrays.
+
+    A *body* is a shape of the arm or, after those, an obstacle, enclosed by a rounded polytope.
+
+    Attributes
+    ----------
+    link : ndarray of int, shape (n_shapes,)
+        Joint frame that carries a shape of the arm: 0 is the world, k the k-th joint.
+    capsules : ndarray, shape (n_shapes, 7)
+        The capsule that is or encloses the shape: its end points (3 + 3) in the joint frame and
+        its radius [m].
+    boxes : ndarray, shape (n_boxes, 2, 3)
+        Lower and upper corners of the obstacles [m].
+    pairs : ndarray of int, shape (n_pairs, 3)
+        Kind of the pair, index of a shape, and index of the other shape or box.
+    travel : ndarray, shape (n_actuated, n_pairs)
+        Bound on how far a joint moves the two bodies of a pair relative to each other
+        [m/rad, or m/m].
+    exact : ndarray of bool, shape (n_shapes,)
+        Whether the capsule is the shape, rather than encloses it.
+    bodies : ndarray of int, shape (n_bodies, 3)
+        First corner of a body, the one after its last, and the joint frame that carries it.
+    corners : ndarray, shape (n_corners, 3)
+        Corners in that frame [m].
+    rounding : ndarray, shape (n_bodies,)
+        Radius by which the hull of the corners is widened [m].
+    extents : ndarray, shape (n_bodies, 2, 3)
+        Lower and upper ends of the corners [m].
+    planes : ndarray of int, shape (n_pairs, 4)
+        Per pair: the body that carries the separating plane, or `GROUND`; the body that moves
+        against it; the first axis that moves it, and the one after the last.
+    """
+
+    link: NDArray[np.int64]
+    capsules: NDArray[np.float64]
+    boxes: NDArray[np.float64]
+    pairs: NDArray[np.int64]
+    travel: NDArray[np.float64]
+    exact: NDArray[np.bool_]
+    bodies: NDArray[np.int64]
+    corners: NDArray[np.float64]
+    rounding: NDArray[np.float64]
+    extents: NDArray[np.float64]
+    planes: NDArray[np.int64]
+
+    @classmethod
+    def build(
+        cls, arm: Arm, scene: Scene, pairs: list[tuple[int, int, int]], n_shapes: int
+    ) -> ContactShapes:
+        """Flatten the shapes of an arm in a scene.
+
+        Parameters
+        ----------
+        arm, scene
+            What may touch.
+        pairs : list of tuple
+            First and second shape of the pairs and their kind; obstacles count from ``n_shapes``.
+        n_shapes : int
+            Number of the arm's shapes.
+        """
+        objects = list(arm.geometry.geometryObjects)
+        link = np.array([shape.parentJoint for shape in objects], dtype=np.int64)
+        capsules = [enclosing_capsule(shape) for shape in objects]
+        enclosures = [enclosing_polytope(shape) for shape in objects]
+        enclosures += [Enclosure(_corners(each.lower, each.upper), 0.0) for each in scene.obstacles]
+        ends = np.cumsum([0, *(len(body.corners) for body in enclosures)])
+        links = np.append(link, np.zeros(len(scene.obstacles), dtype=np.int64))
+        rows, planes = [], []
+        travel = np.zeros((arm.n_actuated, len(pairs)))
+        for column, (first, second, kind) in enumerate(pairs):
+            between = kind == BETWEEN_CAPSULES
+            rows.append((kind, first, second if between else second - n_shapes))
+            carrier, mover = (first, second) if between else (second, first)
+            base = int(links[carrier]) if kind != WITH_GROUND else int(_keeps_height(arm.chain))
+            last = min(int(link[mover]), arm.n_actuated)
+            planes.append((GROUND if kind == WITH_GROUND else carrier, mover, base, last))
+            for axis in range(base, last):
+                corners = enclosures[mover].corners
+                travel[axis, column] = point_speed(arm.chain, axis, int(link[mover]), corners)
+        return cls(
+            link=link,
+            capsules=np.array([np.hstack(capsule) for capsule in capsules]).reshape(-1, 7),
+            boxes=np.array([(each.lower, each.upper) for each in scene.obstacles]).reshape(
+                -1, 2, 3
+            ),
+            pairs=np.array(rows, dtype=np.int64).reshape(-1, 3),
+            travel=travel,
+            exact=np.array([is_capsule(shape) for shape in objects], dtype=bool),
+            bodies=np.stack([ends[:-1], ends[1:], links], axis=1),
+            corners=np.concatenate([body.corners for body in enclosures] or [np.zeros((0, 3))]),
+            rounding=np.array([body.rounding for body in enclosures], dtype=np.float64),
+            extents=np.array(
+                [(body.corners.min(axis=0), body.corners.max(axis=0)) for body in enclosures]
+            ).reshape(-1, 2, 3),
+            planes=np.array(planes, dtype=np.int64).reshape(-1, 4),
+        )
+
+
+def _corners(lower: Sequence[float], upper: Sequence[float]) -> NDArray[np.float64]:
+    """Corners of a box, shape (8, 3)."""
+    return np.array(list(product(*zip(lower, upper, strict=True))))
+
+
+def _keeps_height(chain: Chain) -> bool:
+    """Whether the first joint is a vertical revolute one, which leaves heights unchanged."""
+    if chain.prismatic[0]:
+        return False
+    w, x, y, z = chain.rotation[0]
+    world_axis = pin.Quaternion(w, x, y, z).matrix() @ chain.axis[0]
+    return bool(np.hypot(world_axis[0], world_axis[1]) < 1e-12)

@@ -1,0 +1,77 @@
+"""Rounded polytopes around collision shapes, from which the kernels prove freedom from contact."""
+
+from typing import NamedTuple
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from kinarm.errors import ArmError
+
+MOST_CORNERS = 24
+"""Corners of a polytope about a mesh: what more of them save is less than they cost."""
+
+CLOSE_ENOUGH = 1e-4
+"""Widening below which no more corners are taken [m]."""
+
+SIDES = 32
+"""Sides of the prism about a cylinder."""
+
+
+class Enclosure(NamedTuple):
+    """The hull of some corners, shape (n, 3), widened by a radius [m], in the frame of a joint."""
+
+    corners: NDArray[np.float64]
+    rounding: float
+
+
+def enclosing_polytope(shape: pin.GeometryObject) -> Enclosure:
+    """Rounded polytope around a shape, in the frame of its joint.
+
+    It equals a capsule, sphere or box. Of a mesh, it is the hull of a few of its vertices, each the
+    farthest one from the hull of those before, widened by the distance of the farthest one left.
+
+    Raises
+    ------
+    ArmError
+        If the shape is no capsule, sphere, cylinder, box or convex hull.
+    """
+    body = shape.geometry
+    if isinstance(body, coal.Sphere):
+        local = Enclosure(np.zeros((1, 3)), float(body.radius))
+    elif isinstance(body, coal.Capsule):
+        half = np.array([0.0, 0.0, float(body.halfLength)])
+        local = Enclosure(np.array([-half, half]), float(body.radius))
+    elif isinstance(body, coal.Box):
+        local = Enclosure(np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T * body.halfSide, 0)
+    elif isinstance(body, coal.Cylinder):
+        local = _around(_prism(float(body.radius), float(body.halfLength)))
+    elif isinstance(body, coal.ConvexBase):
+        local = _around(np.array(body.points()))
+    else:
+        raise ArmError(f"collision shape {shape.name!r} is a {type(body).__name__}: not supported")
+    return Enclosure(np.array([shape.placement.act(each) for each in local.corners]), local.rounding)
+
+
+def _prism(radius: float, half_length: float) -> NDArray[np.float64]:
+    """Corners of a prism about a cylinder, shape (n, 3)."""
+    angles = np.arange(SIDES) * (2 * np.pi / SIDES)
+    ring = radius / np.cos(np.pi / SIDES) * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    ends = (np.full((SIDES, 1), end) for end in (-half_length, half_length))
+    return np.concatenate([np.concatenate([ring, end], axis=1) for end in ends])
+
+
+def _around(points: NDArray[np.float64]) -> Enclosure:
+    """Enclose the hull of points, shape (n, 3)."""
+    from kinarm.kernels.enclosing import distances_from_hull
+
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    chosen = [int(np.square(points - middle).sum(axis=1).argmax())]
+    distances = np.empty(len(points))
+    while True:
+        distances_from_hull(points[chosen], points, distances)
+        farthest = int(distances.argmax())
+        if distances[farthest] <= CLOSE_ENOUGH or len(chosen) == MOST_CORNERS:
+            return Enclosure(points[chosen], float(distances[farthest]) * (1 + 1e-9) + 1e-9)
+        chosen.append(farthest)

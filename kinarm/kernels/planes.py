@@ -1,0 +1,111 @@
+"""Separating planes between two bodies, for a number or lanes.
+
+A body is enclosed by a rounded polytope: the hull of a few corners, widened by a radius. A pair of
+bodies keeps a plane that moves with the first of them, the carrier, which lies below it; the least
+height of the second, the mover, above the plane is a lower bound of their distance. Of the ground,
+the plane is its surface.
+
+A plane has five entries: unit normal x, y, z in the joint frame that carries it, offset along
+the normal, and the least height of the mover above it, when that was last asked for [m].
+"""
+
+import math
+
+from kinarm.contact_shapes import GROUND, ContactShapes
+from kinarm.kernels.compiling import Array, Vector, helper, inlined
+from kinarm.kernels.kinematics import to_world
+from kinarm.kernels.lanes import select
+
+OFFSET, GAP = 3, 4
+"""Entries of a plane after its normal."""
+
+ALTERNATIONS = 2
+"""Projections between box and segment by which a first plane is proposed."""
+
+
+@inlined
+def rotated(poses: Array, frame: int, x: float, y: float, z: float) -> Vector:
+    """Turn a vector of a joint frame into the world's."""
+    if frame == 0:
+        return x, y, z
+    return (
+        poses[frame, 4] * x + poses[frame, 5] * y + poses[frame, 6] * z,
+        poses[frame, 7] * x + poses[frame, 8] * y + poses[frame, 9] * z,
+        poses[frame, 10] * x + poses[frame, 11] * y + poses[frame, 12] * z,
+    )
+
+
+@inlined
+def rotated_back(poses: Array, frame: int, x: float, y: float, z: float) -> Vector:
+    """Turn a vector of the world into a joint frame's."""
+    return (
+        poses[frame, 4] * x + poses[frame, 7] * y + poses[frame, 10] * z,
+        poses[frame, 5] * x + poses[frame, 8] * y + poses[frame, 11] * z,
+        poses[frame, 6] * x + poses[frame, 9] * y + poses[frame, 12] * z,
+    )
+
+
+@inlined
+def lowest(shapes: ContactShapes, body: int, x: float, y: float, z: float) -> float:
+    """Smallest coordinate of a body along a vector of its joint frame, its radius apart."""
+    corners, first, last = shapes.corners, shapes.bodies[body, 0], shapes.bodies[body, 1]
+    least = x * corners[first, 0] + y * corners[first, 1] + z * corners[first, 2]
+    for i in range(first + 1, last):
+        least = min(least, x * corners[i, 0] + y * corners[i, 1] + z * corners[i, 2])
+    return least
+
+
+@inlined
+def height_above(shapes: ContactShapes, pair: int, poses: Array, plane: Array, row: int) -> float:
+    """Least height of a pair's mover above a row of the planes [m]."""
+    carrier, mover = shapes.planes[pair, 0], shapes.planes[pair, 1]
+    base = 0 if carrier == GROUND else shapes.bodies[carrier, 2]
+    link = shapes.bodies[mover, 2]
+    x, y, z = rotated(poses, base, plane[row, 0], plane[row, 1], plane[row, 2])
+    along = (
+        x * (poses[link, 13] - poses[base, 13])
+        + y * (poses[link, 14] - poses[base, 14])
+        + z * (poses[link, 15] - poses[base, 15])
+    )
+    x, y, z = rotated_back(poses, link, x, y, z)
+    return along + lowest(shapes, mover, x, y, z) - plane[row, OFFSET] - shapes.rounding[mover]
+
+
+@helper
+def propose(shapes: ContactShapes, pair: int, poses: Array, plane: Array) -> None:
+    """Fill in a pair's row of the planes with a first guess, its height apart.
+
+    Its normal leads from the box about the carrier to the mover's axis. Whether such a plane
+    separates the two is for its height to tell.
+    """
+    carrier, mover = shapes.planes[pair, 0], shapes.planes[pair, 1]
+    if carrier == GROUND:
+        plane[pair, 0], plane[pair, 1], plane[pair, 2], plane[pair, OFFSET] = 0.0, 0.0, 1.0, 0.0
+        return
+    base, link, axes, boxes = (
+        shapes.bodies[carrier, 2],
+        shapes.bodies[mover, 2],
+        shapes.capsules,
+        shapes.extents,
+    )
+    ax, ay, az = to_world(poses, link, axes[mover, 0], axes[mover, 1], axes[mover, 2])
+    bx, by, bz = to_world(poses, link, axes[mover, 3], axes[mover, 4], axes[mover, 5])
+    x, y, z = poses[base, 13], poses[base, 14], poses[base, 15]
+    ax, ay, az = rotated_back(poses, base, ax - x, ay - y, az - z)
+    bx, by, bz = rotated_back(poses, base, bx - x, by - y, bz - z)
+    ux, uy, uz = bx - ax, by - ay, bz - az
+    length = ux * ux + uy * uy + uz * uz + 1e-12
+    t = 0.0 * length + 0.5
+    for _ in range(ALTERNATIONS):
+        x, y, z = ax + t * ux, ay + t * uy, az + t * uz
+        cx = min(max(x, boxes[carrier, 0, 0]), boxes[carrier, 1, 0])
+        cy = min(max(y, boxes[carrier, 0, 1]), boxes[carrier, 1, 1])
+        cz = min(max(z, boxes[carrier, 0, 2]), boxes[carrier, 1, 2])
+        t = ((cx - ax) * ux + (cy - ay) * uy + (cz - az) * uz) / length
+        t = min(max(t, 0.0), 1.0)
+    x, y, z = ax + t * ux - cx, ay + t * uy - cy, az + t * uz - cz
+    norm = math.sqrt(x * x + y * y + z * z)
+    inside = norm < 1e-9
+    x, y, z = select(inside, 0.0, x / norm), select(inside, 0.0, y / norm), select(inside, 1.0, z / norm)
+    plane[pair, 0], plane[pair, 1], plane[pair, 2] = x, y, z
+    plane[pair, OFFSET] = shapes.rounding[carrier] - lowest(shapes, carrier, -x, -y, -z)

@@ -1,0 +1,104 @@
+"""The best separating plane of two bodies: the distance algorithm of Gilbert, Johnson and Keerthi.
+
+It looks for the point closest to the origin of all differences of a point of the mover and one of
+the carrier, in the frame that carries the latter: in a simplex of at most four of their corners'
+differences, which is renewed by the corners that lie lowest along the way found so far.
+"""
+
+import math
+
+from kinarm.contact_shapes import ContactShapes
+from kinarm.kernels.compiling import Array, Vector, helper, inlined
+from kinarm.kernels.planes import GAP, OFFSET, rotated_back
+from kinarm.kernels.simplex import shrink
+
+CORNERS_TRIED = 24
+"""Corners after which the search ends."""
+
+CLOSE = 1e-7
+"""Precision of the distance [m]."""
+
+COARSE = 0.02
+"""Precision of the distance, where bodies are far apart, as a share of it."""
+
+
+@inlined
+def lowest_corner(shapes: ContactShapes, body: int, x: float, y: float, z: float) -> int:
+    """Row of the corner of a body that lies lowest along a vector of its joint frame."""
+    corners, found, least = shapes.corners, shapes.bodies[body, 0], math.inf
+    for i in range(shapes.bodies[body, 0], shapes.bodies[body, 1]):
+        height = x * corners[i, 0] + y * corners[i, 1] + z * corners[i, 2]
+        if height < least:
+            found, least = i, height
+    return found
+
+
+@inlined
+def turned_back(relative: Array, x: float, y: float, z: float) -> Vector:
+    """Turn a vector of the carrier's frame into the mover's."""
+    return (
+        relative[0, 0] * x + relative[0, 1] * y + relative[0, 2] * z,
+        relative[1, 0] * x + relative[1, 1] * y + relative[1, 2] * z,
+        relative[2, 0] * x + relative[2, 1] * y + relative[2, 2] * z,
+    )
+
+
+@helper
+def separate(
+    shapes: ContactShapes,
+    pair: int,
+    poses: Array,
+    relative: Array,
+    simplex: Array,
+    plane: Array,
+) -> float:
+    """Find a plane that separates a pair well, and return the height of its mover above it [m].
+
+    Takes poses of numbers. The plane, shape (1, PLANE), is where the search begins, and is
+    replaced by a better one. ``relative``, shape (4, 3), and ``simplex``, shape (4, 3), are work
+    space.
+    """
+    carrier, mover = shapes.planes[pair, 0], shapes.planes[pair, 1]
+    base, link = shapes.bodies[carrier, 2], shapes.bodies[mover, 2]
+    for column in range(3):
+        x, y, z = rotated_back(
+            poses, base, poses[link, 4 + column], poses[link, 7 + column], poses[link, 10 + column]
+        )
+        relative[column, 0], relative[column, 1], relative[column, 2] = x, y, z
+    relative[3, 0], relative[3, 1], relative[3, 2] = rotated_back(
+        poses,
+        base,
+        poses[link, 13] - poses[base, 13],
+        poses[link, 14] - poses[base, 14],
+        poses[link, 15] - poses[base, 15],
+    )
+    corners, rounding = shapes.corners, shapes.rounding[carrier] + shapes.rounding[mover]
+    nx, ny, nz = plane[0, 0], plane[0, 1], plane[0, 2]
+    best, size, norm = -math.inf, 0, math.inf
+    for _ in range(CORNERS_TRIED):
+        # The mover's corner that lies lowest, and the carrier's that lies highest.
+        x, y, z = turned_back(relative, nx, ny, nz)
+        low = lowest_corner(shapes, mover, x, y, z)
+        high = lowest_corner(shapes, carrier, -nx, -ny, -nz)
+        x, y, z = corners[low, 0], corners[low, 1], corners[low, 2]
+        wx = relative[3, 0] + relative[0, 0] * x + relative[1, 0] * y + relative[2, 0] * z
+        wy = relative[3, 1] + relative[0, 1] * x + relative[1, 1] * y + relative[2, 1] * z
+        wz = relative[3, 2] + relative[0, 2] * x + relative[1, 2] * y + relative[2, 2] * z
+        above = nx * corners[high, 0] + ny * corners[high, 1] + nz * corners[high, 2]
+        gap = nx * wx + ny * wy + nz * wz - above
+        wx, wy, wz = wx - corners[high, 0], wy - corners[high, 1], wz - corners[high, 2]
+        if gap > best:
+            best = gap
+            plane[0, 0], plane[0, 1], plane[0, 2] = nx, ny, nz
+            plane[0, OFFSET] = above + shapes.rounding[carrier]
+        missing = norm - max(best, 0.0)
+        if missing <= CLOSE or missing <= COARSE * (best - rounding) or norm <= rounding:
+            break
+        simplex[size, 0], simplex[size, 1], simplex[size, 2] = wx, wy, wz
+        size, x, y, z = shrink(simplex, size + 1)
+        norm = math.sqrt(x * x + y * y + z * z)
+        if norm < CLOSE:
+            break
+        nx, ny, nz = x / norm, y / norm, z / norm
+    plane[0, GAP] = best - rounding
+    return best - rounding
