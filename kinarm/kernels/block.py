@@ -26,10 +26,11 @@ class Block(NamedTuple):
         Goal position [m].
     observation, seen : (1, n_observations)
         Observation, and as a mirrored network sees it.
-    poses : (n_joints + 1, POSE)
-        Forward kinematics at the target.
-    planes : (n_pairs, PLANE)
-        Separating plane of each pair, and the height above it; see `kinarm.kernels.planes`.
+    poses, spare : (n_joints + 1, POSE)
+        Forward kinematics at the target, and before the step.
+    planes : (n_pairs + 1, PLANE)
+        Separating plane of each pair, and the height above it; see `kinarm.kernels.planes`. The
+        last row is work space.
     before, bend, bound : (n_pairs,)
         Height before the step, its bend, and the bound that follows [m].
     turned : (n_actuated + 1,)
@@ -56,6 +57,7 @@ class Block(NamedTuple):
     observation: Array
     seen: Array
     poses: Array
+    spare: Array
     planes: Array
     before: Array
     bend: Array
@@ -119,7 +121,8 @@ def work_space(
         observation=np.zeros((1, n_observations, LANES)),
         seen=np.zeros((1, n_observations, LANES)),
         poses=np.zeros((n_joints + 1, POSE, LANES)),
-        planes=np.zeros((n_pairs, PLANE, LANES)),
+        spare=np.zeros((n_joints + 1, POSE, LANES)),
+        planes=np.zeros((n_pairs + 1, PLANE, LANES)),
         before=np.zeros((n_pairs, LANES)),
         bend=np.zeros((n_pairs, LANES)),
         bound=np.zeros((n_pairs, LANES)),
@@ -144,6 +147,7 @@ def work_space(
         observation=as_lanes(numbers.observation),
         seen=as_lanes(numbers.seen),
         poses=as_lanes(numbers.poses),
+        spare=as_lanes(numbers.spare),
         planes=as_lanes(numbers.planes),
         before=as_lanes(numbers.before),
         bend=as_lanes(numbers.bend),
@@ -187,7 +191,7 @@ def take_in(e: int, lane: int, control: Control, episodes: Episodes, numbers: Bl
         numbers.goal[0, i, lane] = episodes.goal[e, i]
     for i in range(numbers.observation.shape[1]):
         numbers.observation[0, i, lane] = episodes.observation[e, i]
-    for pair in range(numbers.planes.shape[0]):
+    for pair in range(episodes.planes.shape[1]):
         for i in range(PLANE):
             numbers.planes[pair, i, lane] = episodes.planes[e, pair, i]
     for i in range(numbers.weights.shape[0]):
@@ -211,7 +215,7 @@ def put_back(lane: int, e: int, episodes: Episodes, numbers: Block) -> None:
         episodes.target[e, joint] = numbers.target[0, joint, lane]
     for i in range(numbers.observation.shape[1]):
         episodes.observation[e, i] = numbers.observation[0, i, lane]
-    for pair in range(numbers.planes.shape[0]):
+    for pair in range(episodes.planes.shape[1]):
         for i in range(PLANE):
             episodes.planes[e, pair, i] = numbers.planes[pair, i, lane]
     for i in range(numbers.first.shape[0]):

@@ -13,13 +13,14 @@ import math
 
 from kinarm.contact_shapes import GROUND, ContactShapes
 from kinarm.kernels.compiling import Array, Vector, helper, inlined
+from kinarm.kernels.distance import between_segments
 from kinarm.kernels.kinematics import to_world
 from kinarm.kernels.lanes import select
 
 OFFSET, GAP = 3, 4
 """Entries of a plane after its normal."""
 
-ALTERNATIONS = 2
+ALTERNATIONS = 3
 """Projections between box and segment by which a first plane is proposed."""
 
 
@@ -72,40 +73,46 @@ def height_above(shapes: ContactShapes, pair: int, poses: Array, plane: Array, r
 
 
 @helper
-def propose(shapes: ContactShapes, pair: int, poses: Array, plane: Array) -> None:
-    """Fill in a pair's row of the planes with a first guess, its height apart.
+def propose(shapes: ContactShapes, pair: int, poses: Array, plane: Array, row: int) -> None:
+    """Fill in a row of the planes with a likely plane for a pair; its height is left as it is.
 
-    Its normal leads from the box about the carrier to the mover's axis. Whether such a plane
-    separates the two is for its height to tell.
+    Its normal leads from the carrier's axis, or the box about an obstacle, to the mover's axis.
+    Whether such a plane separates the two is for its height to tell.
     """
     carrier, mover = shapes.planes[pair, 0], shapes.planes[pair, 1]
     if carrier == GROUND:
-        plane[pair, 0], plane[pair, 1], plane[pair, 2], plane[pair, OFFSET] = 0.0, 0.0, 1.0, 0.0
+        plane[row, 0], plane[row, 1], plane[row, 2], plane[row, OFFSET] = 0.0, 0.0, 1.0, 0.0
         return
-    base, link, axes, boxes = (
-        shapes.bodies[carrier, 2],
-        shapes.bodies[mover, 2],
-        shapes.capsules,
-        shapes.extents,
-    )
-    ax, ay, az = to_world(poses, link, axes[mover, 0], axes[mover, 1], axes[mover, 2])
-    bx, by, bz = to_world(poses, link, axes[mover, 3], axes[mover, 4], axes[mover, 5])
-    x, y, z = poses[base, 13], poses[base, 14], poses[base, 15]
-    ax, ay, az = rotated_back(poses, base, ax - x, ay - y, az - z)
-    bx, by, bz = rotated_back(poses, base, bx - x, by - y, bz - z)
-    ux, uy, uz = bx - ax, by - ay, bz - az
-    length = ux * ux + uy * uy + uz * uz + 1e-12
-    t = 0.0 * length + 0.5
-    for _ in range(ALTERNATIONS):
-        x, y, z = ax + t * ux, ay + t * uy, az + t * uz
-        cx = min(max(x, boxes[carrier, 0, 0]), boxes[carrier, 1, 0])
-        cy = min(max(y, boxes[carrier, 0, 1]), boxes[carrier, 1, 1])
-        cz = min(max(z, boxes[carrier, 0, 2]), boxes[carrier, 1, 2])
-        t = ((cx - ax) * ux + (cy - ay) * uy + (cz - az) * uz) / length
-        t = min(max(t, 0.0), 1.0)
-    x, y, z = ax + t * ux - cx, ay + t * uy - cy, az + t * uz - cz
+    base, link, axes = shapes.bodies[carrier, 2], shapes.bodies[mover, 2], shapes.capsules
+    a = to_world(poses, link, axes[mover, 0], axes[mover, 1], axes[mover, 2])
+    b = to_world(poses, link, axes[mover, 3], axes[mover, 4], axes[mover, 5])
+    if carrier < axes.shape[0]:
+        c = to_world(poses, base, axes[carrier, 0], axes[carrier, 1], axes[carrier, 2])
+        d = to_world(poses, base, axes[carrier, 3], axes[carrier, 4], axes[carrier, 5])
+        x, y, z = between_segments(a, b, c, d)
+        x, y, z = rotated_back(poses, base, x, y, z)
+    else:
+        lower, upper = shapes.extents[carrier, 0], shapes.extents[carrier, 1]
+        x, y, z = from_box(a, b, (lower[0], lower[1], lower[2]), (upper[0], upper[1], upper[2]))
     norm = math.sqrt(x * x + y * y + z * z)
     inside = norm < 1e-9
-    x, y, z = select(inside, 0.0, x / norm), select(inside, 0.0, y / norm), select(inside, 1.0, z / norm)
-    plane[pair, 0], plane[pair, 1], plane[pair, 2] = x, y, z
-    plane[pair, OFFSET] = shapes.rounding[carrier] - lowest(shapes, carrier, -x, -y, -z)
+    x, y, z = x / norm, y / norm, z / norm
+    x, y, z = select(inside, 0.0, x), select(inside, 0.0, y), select(inside, 1.0, z)
+    plane[row, 0], plane[row, 1], plane[row, 2] = x, y, z
+    plane[row, OFFSET] = shapes.rounding[carrier] - lowest(shapes, carrier, -x, -y, -z)
+
+
+@inlined
+def from_box(a: Vector, b: Vector, lower: Vector, upper: Vector) -> Vector:
+    """Vector from a point of a box to one of the segment ab, close to the shortest one."""
+    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    length = ux * ux + uy * uy + uz * uz + 1e-12
+    x, y, z = a[0] + 0.5 * ux, a[1] + 0.5 * uy, a[2] + 0.5 * uz
+    for _ in range(ALTERNATIONS):
+        cx = min(max(x, lower[0]), upper[0])
+        cy = min(max(y, lower[1]), upper[1])
+        cz = min(max(z, lower[2]), upper[2])
+        t = ((cx - a[0]) * ux + (cy - a[1]) * uy + (cz - a[2]) * uz) / length
+        t = min(max(t, 0.0), 1.0)
+        x, y, z = a[0] + t * ux, a[1] + t * uy, a[2] + t * uz
+    return x - cx, y - cy, z - cz

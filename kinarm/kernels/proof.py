@@ -13,6 +13,7 @@ from kinarm.contact_shapes import GROUND, PLANE, ContactShapes
 from kinarm.kernels.block import Alone, Block
 from kinarm.kernels.compiling import Array, helper, inlined
 from kinarm.kernels.kinematics import POSE, forward_kinematics
+from kinarm.kernels.lanes import any_lane, select
 from kinarm.kernels.planes import GAP, height_above, propose
 from kinarm.kernels.separation import separate
 
@@ -66,6 +67,35 @@ def prove_step(shapes: ContactShapes, tested: int, block: Block) -> float:
         early = before + share * (after - before)
         bound = min(after, early) - 0.125 * block.bend[pair]
         block.before[pair], block.bound[pair], block.planes[pair, GAP] = before, bound, after
+        least = min(least, bound)
+    return least
+
+
+@inlined
+def renew_planes(shapes: ContactShapes, tested: int, stale: bool, before: Array, block: Block) -> float:
+    """Give pairs new planes where the step is not proven by those they have; return the bound.
+
+    ``stale`` says of which episodes the step is to be proven. Takes the poses ``before`` the step
+    and at the target.
+    """
+    least = 0.0 * block.bend[0] + 1.0
+    n_pairs, share = shapes.planes.shape[0], 1.0 / tested
+    for pair in range(n_pairs):
+        bound = block.bound[pair]
+        open_here = stale & ~is_apart(bound)
+        if shapes.planes[pair, 0] != GROUND and any_lane(open_here):
+            propose(shapes, pair, block.poses, block.planes, n_pairs)
+            at_start = height_above(shapes, pair, before, block.planes, n_pairs)
+            at_end = height_above(shapes, pair, block.poses, block.planes, n_pairs)
+            early = at_start + share * (at_end - at_start)
+            renewed = min(at_end, early) - 0.125 * block.bend[pair]
+            better = open_here & (renewed > bound)
+            bound = select(better, renewed, bound)
+            block.bound[pair] = bound
+            block.before[pair] = select(better, at_start, block.before[pair])
+            block.planes[n_pairs, GAP] = at_end
+            for i in range(PLANE):
+                block.planes[pair, i] = select(better, block.planes[n_pairs, i], block.planes[pair, i])
         least = min(least, bound)
     return least
 
@@ -146,7 +176,7 @@ def propose_planes(shapes: ContactShapes, block: Block) -> float:
     """
     least = 0.0 * block.q[0, 0] + 1.0
     for pair in range(shapes.planes.shape[0]):
-        propose(shapes, pair, block.poses, block.planes)
+        propose(shapes, pair, block.poses, block.planes, pair)
         height = height_above(shapes, pair, block.poses, block.planes, pair)
         block.planes[pair, GAP] = height
         least = min(least, height)

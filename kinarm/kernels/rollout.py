@@ -13,10 +13,10 @@ from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Cont
 from kinarm.kernels.block import Alone, Block, put_back, take_in, work_space
 from kinarm.kernels.compiling import Array, inlined, kernel
 from kinarm.kernels.kinematics import forward_kinematics, to_world
-from kinarm.kernels.lanes import LANES, lane_bits, select
+from kinarm.kernels.lanes import LANES, any_lane, lane_bits, select
 from kinarm.kernels.network import act
 from kinarm.kernels.observing import observe
-from kinarm.kernels.proof import is_apart, propose_planes, prove_alone, prove_step, stands_free
+from kinarm.kernels.proof import is_apart, propose_planes, prove_alone, prove_step, renew_planes, stands_free
 from kinarm.kernels.reward import add_reward
 
 LAYOUT = "a4"
@@ -197,10 +197,15 @@ def advance(
             moved = min(max(moved, lower[axis]), upper[axis])
             block.target[0, axis] = select(fresh, moved, block.target[0, axis])
         forward_kinematics(prismatic, translation, rotation, axes, block.target, 0, block.poses)
-        unproven = lane_bits(~is_apart(prove_step(shapes, rules.tested, block)) & fresh)
-        if unproven != 0:
+        unproven = ~is_apart(prove_step(shapes, rules.tested, block)) & fresh
+        if any_lane(unproven):
+            forward_kinematics(prismatic, translation, rotation, axes, block.q, 0, block.spare)
+            least = renew_planes(shapes, rules.tested, unproven, block.spare, block)
+            unproven = unproven & ~is_apart(least)
+        if any_lane(unproven):
+            still = lane_bits(unproven)
             for lane in range(row.shape[0]):
-                if unproven >> lane & 1 == 0:
+                if still >> lane & 1 == 0:
                     continue
                 doubt = prove_alone(lane, chain, shapes, rules.tested, numbers, alone)
                 if doubt != 0:
