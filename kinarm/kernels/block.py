@@ -9,14 +9,14 @@ from kinarm.contact_shapes import PLANE
 from kinarm.episodes import Control, Episodes
 from kinarm.kernels.compiling import Array, inlined, unit
 from kinarm.kernels.kinematics import POSE
-from kinarm.kernels.lanes import LANES, as_lanes
+from kinarm.kernels.lanes import LANES, as_lanes, as_numbers
 
 
 class Block(NamedTuple):
     """Work space of a block of episodes.
 
-    Kernels have it twice: as arrays of lanes of the shapes below, and as the numbers behind them,
-    whose arrays have one axis more, that of the episodes.
+    Its arrays are of lanes; `kinarm.kernels.lanes.as_numbers` views them with one axis more, that of
+    the episodes.
 
     Attributes
     ----------
@@ -26,15 +26,16 @@ class Block(NamedTuple):
         Goal position [m].
     observation, seen : (1, n_observations)
         Observation, and as a mirrored network sees it.
-    poses, spare : (n_joints + 1, POSE)
-        Forward kinematics at the target, and before the step.
+    before, after : (n_joints + 1, POSE)
+        Forward kinematics before and after the step; which is which changes from step to step.
     planes : (n_pairs + 1, PLANE)
         Separating plane of each pair, and the height above it; see `kinarm.kernels.planes`. The
         last row is work space.
-    before, bend, bound : (n_pairs,)
+    height, bend, bound : (n_pairs,)
         Height before the step, its bend, and the bound that follows [m].
-    turned : (n_actuated + 1,)
-        How far the first axes move in all in the step [rad or m].
+    twist : (n_actuated, n_actuated)
+        How far an axis (column) moves in the step, times itself and twice those before it, from
+        the first one (row) that counts [rad^2].
     action : (1, n_actuated)
         Fractions of the step limits.
     hidden : (2, widest layer)
@@ -56,13 +57,13 @@ class Block(NamedTuple):
     goal: Array
     observation: Array
     seen: Array
-    poses: Array
-    spare: Array
-    planes: Array
     before: Array
+    after: Array
+    planes: Array
+    height: Array
     bend: Array
     bound: Array
-    turned: Array
+    twist: Array
     action: Array
     hidden: Array
     weights: Array
@@ -112,59 +113,33 @@ class Alone(NamedTuple):
 def work_space(
     n_joints: int, n_actuated: int, n_observations: int, n_pairs: int, n_terms: int,
     widest: int, own: int, summed: int,
-) -> tuple[Block, Block, Alone]:
-    """Allocate a block as numbers and as lanes, and the space for a single episode."""
-    numbers = Block(
-        q=np.zeros((1, n_joints, LANES)),
-        target=np.zeros((1, n_joints, LANES)),
-        goal=np.zeros((1, 3, LANES)),
-        observation=np.zeros((1, n_observations, LANES)),
-        seen=np.zeros((1, n_observations, LANES)),
-        poses=np.zeros((n_joints + 1, POSE, LANES)),
-        spare=np.zeros((n_joints + 1, POSE, LANES)),
-        planes=np.zeros((n_pairs + 1, PLANE, LANES)),
-        before=np.zeros((n_pairs, LANES)),
-        bend=np.zeros((n_pairs, LANES)),
-        bound=np.zeros((n_pairs, LANES)),
-        turned=np.zeros((n_actuated + 1, LANES)),
-        action=np.zeros((1, n_actuated, LANES)),
-        hidden=np.zeros((2, widest, LANES)),
-        weights=np.zeros((own, LANES)),
-        distance=np.zeros((1, LANES)),
-        total=np.zeros((1, LANES)),
-        steps=np.zeros((1, LANES)),
-        stop=np.zeros((1, LANES)),
-        alive=np.zeros((1, LANES)),
-        judged=np.zeros((1, LANES)),
-        terms=np.zeros((1, n_terms, LANES)),
-        first=np.zeros((summed, LANES)),
-        second=np.zeros((summed, LANES)),
-    )
+) -> tuple[Block, Alone]:
+    """Allocate a block, and the space for a single episode."""
     block = Block(
-        q=as_lanes(numbers.q),
-        target=as_lanes(numbers.target),
-        goal=as_lanes(numbers.goal),
-        observation=as_lanes(numbers.observation),
-        seen=as_lanes(numbers.seen),
-        poses=as_lanes(numbers.poses),
-        spare=as_lanes(numbers.spare),
-        planes=as_lanes(numbers.planes),
-        before=as_lanes(numbers.before),
-        bend=as_lanes(numbers.bend),
-        bound=as_lanes(numbers.bound),
-        turned=as_lanes(numbers.turned),
-        action=as_lanes(numbers.action),
-        hidden=as_lanes(numbers.hidden),
-        weights=as_lanes(numbers.weights),
-        distance=as_lanes(numbers.distance),
-        total=as_lanes(numbers.total),
-        steps=as_lanes(numbers.steps),
-        stop=as_lanes(numbers.stop),
-        alive=as_lanes(numbers.alive),
-        judged=as_lanes(numbers.judged),
-        terms=as_lanes(numbers.terms),
-        first=as_lanes(numbers.first),
-        second=as_lanes(numbers.second),
+        q=as_lanes(np.zeros((1, n_joints, LANES))),
+        target=as_lanes(np.zeros((1, n_joints, LANES))),
+        goal=as_lanes(np.zeros((1, 3, LANES))),
+        observation=as_lanes(np.zeros((1, n_observations, LANES))),
+        seen=as_lanes(np.zeros((1, n_observations, LANES))),
+        before=as_lanes(np.zeros((n_joints + 1, POSE, LANES))),
+        after=as_lanes(np.zeros((n_joints + 1, POSE, LANES))),
+        planes=as_lanes(np.zeros((n_pairs + 1, PLANE, LANES))),
+        height=as_lanes(np.zeros((n_pairs, LANES))),
+        bend=as_lanes(np.zeros((n_pairs, LANES))),
+        bound=as_lanes(np.zeros((n_pairs, LANES))),
+        twist=as_lanes(np.zeros((n_actuated, n_actuated, LANES))),
+        action=as_lanes(np.zeros((1, n_actuated, LANES))),
+        hidden=as_lanes(np.zeros((2, widest, LANES))),
+        weights=as_lanes(np.zeros((own, LANES))),
+        distance=as_lanes(np.zeros((1, LANES))),
+        total=as_lanes(np.zeros((1, LANES))),
+        steps=as_lanes(np.zeros((1, LANES))),
+        stop=as_lanes(np.zeros((1, LANES))),
+        alive=as_lanes(np.zeros((1, LANES))),
+        judged=as_lanes(np.zeros((1, LANES))),
+        terms=as_lanes(np.zeros((1, n_terms, LANES))),
+        first=as_lanes(np.zeros((summed, LANES))),
+        second=as_lanes(np.zeros((summed, LANES))),
     )
     alone = Alone(
         q=np.zeros((1, n_joints)),
@@ -178,53 +153,78 @@ def work_space(
         hidden=np.zeros((2, widest)),
         action=np.zeros((1, n_actuated)),
     )
-    return numbers, block, alone
+    return block, alone
 
 
 @inlined
-def take_in(e: int, lane: int, control: Control, episodes: Episodes, numbers: Block) -> None:
+def take_in(e: int, lane: int, control: Control, episodes: Episodes, block: Block) -> None:
     """Put an episode into a lane."""
-    for joint in range(numbers.q.shape[1]):
-        numbers.q[0, joint, lane] = episodes.q[e, joint]
-        numbers.target[0, joint, lane] = episodes.target[e, joint]
+    q = as_numbers(block.q)
+    target = as_numbers(block.target)
+    goal = as_numbers(block.goal)
+    observation = as_numbers(block.observation)
+    planes = as_numbers(block.planes)
+    weights = as_numbers(block.weights)
+    first = as_numbers(block.first)
+    second = as_numbers(block.second)
+    distance = as_numbers(block.distance)
+    total = as_numbers(block.total)
+    steps = as_numbers(block.steps)
+    stop = as_numbers(block.stop)
+    judged = as_numbers(block.judged)
+    alive = as_numbers(block.alive)
+    for joint in range(block.q.shape[1]):
+        q[0, joint, lane] = episodes.q[e, joint]
+        target[0, joint, lane] = episodes.target[e, joint]
     for i in range(3):
-        numbers.goal[0, i, lane] = episodes.goal[e, i]
-    for i in range(numbers.observation.shape[1]):
-        numbers.observation[0, i, lane] = episodes.observation[e, i]
+        goal[0, i, lane] = episodes.goal[e, i]
+    for i in range(block.observation.shape[1]):
+        observation[0, i, lane] = episodes.observation[e, i]
     for pair in range(episodes.planes.shape[1]):
         for i in range(PLANE):
-            numbers.planes[pair, i, lane] = episodes.planes[e, pair, i]
-    for i in range(numbers.weights.shape[0]):
-        numbers.weights[i, lane] = control.weights[control.policy[e], i]
-    for i in range(numbers.first.shape[0]):
-        numbers.first[i, lane] = episodes.moments[e, 0, i]
-        numbers.second[i, lane] = episodes.moments[e, 1, i]
-    numbers.distance[0, lane] = episodes.distance[e]
-    numbers.total[0, lane] = episodes.total[e]
-    numbers.steps[0, lane] = episodes.steps[e]
-    numbers.stop[0, lane] = episodes.stop[e]
-    numbers.judged[0, lane] = 1.0 if episodes.cleared[e] else 0.0
-    numbers.alive[0, lane] = 1.0
+            planes[pair, i, lane] = episodes.planes[e, pair, i]
+    for i in range(block.weights.shape[0]):
+        weights[i, lane] = control.weights[control.policy[e], i]
+    for i in range(block.first.shape[0]):
+        first[i, lane] = episodes.moments[e, 0, i]
+        second[i, lane] = episodes.moments[e, 1, i]
+    distance[0, lane] = episodes.distance[e]
+    total[0, lane] = episodes.total[e]
+    steps[0, lane] = episodes.steps[e]
+    stop[0, lane] = episodes.stop[e]
+    judged[0, lane] = 1.0 if episodes.cleared[e] else 0.0
+    alive[0, lane] = 1.0
 
 
 @inlined
-def put_back(lane: int, e: int, episodes: Episodes, numbers: Block) -> None:
+def put_back(lane: int, e: int, episodes: Episodes, block: Block) -> None:
     """Hand an episode back from a lane, which is then free."""
-    for joint in range(numbers.q.shape[1]):
-        episodes.q[e, joint] = numbers.q[0, joint, lane]
-        episodes.target[e, joint] = numbers.target[0, joint, lane]
-    for i in range(numbers.observation.shape[1]):
-        episodes.observation[e, i] = numbers.observation[0, i, lane]
+    q = as_numbers(block.q)
+    target = as_numbers(block.target)
+    observation = as_numbers(block.observation)
+    planes = as_numbers(block.planes)
+    first = as_numbers(block.first)
+    second = as_numbers(block.second)
+    terms = as_numbers(block.terms)
+    distance = as_numbers(block.distance)
+    total = as_numbers(block.total)
+    steps = as_numbers(block.steps)
+    alive = as_numbers(block.alive)
+    for joint in range(block.q.shape[1]):
+        episodes.q[e, joint] = q[0, joint, lane]
+        episodes.target[e, joint] = target[0, joint, lane]
+    for i in range(block.observation.shape[1]):
+        episodes.observation[e, i] = observation[0, i, lane]
     for pair in range(episodes.planes.shape[1]):
         for i in range(PLANE):
-            episodes.planes[e, pair, i] = numbers.planes[pair, i, lane]
-    for i in range(numbers.first.shape[0]):
-        episodes.moments[e, 0, i] = numbers.first[i, lane]
-        episodes.moments[e, 1, i] = numbers.second[i, lane]
-    for term in range(numbers.terms.shape[1]):
-        episodes.terms[e, term] = numbers.terms[0, term, lane]
-    episodes.distance[e] = numbers.distance[0, lane]
-    episodes.total[e] = numbers.total[0, lane]
-    episodes.steps[e] = int(numbers.steps[0, lane])
+            episodes.planes[e, pair, i] = planes[pair, i, lane]
+    for i in range(block.first.shape[0]):
+        episodes.moments[e, 0, i] = first[i, lane]
+        episodes.moments[e, 1, i] = second[i, lane]
+    for term in range(block.terms.shape[1]):
+        episodes.terms[e, term] = terms[0, term, lane]
+    episodes.distance[e] = distance[0, lane]
+    episodes.total[e] = total[0, lane]
+    episodes.steps[e] = int(steps[0, lane])
     episodes.cleared[e] = False
-    numbers.alive[0, lane] = 0.0
+    alive[0, lane] = 0.0

@@ -4,7 +4,7 @@ Polynomials and constants are the classic ones of the Cephes and FreeBSD mathema
 """
 
 from kinarm.kernels.compiling import inlined
-from kinarm.kernels.lanes import nearest_whole, power_of_two, select
+from kinarm.kernels.lanes import power_of_two, select
 
 HALF_PI = 1.57079632673412561417
 """Half of pi, rounded to 33 bits: its products with small whole numbers are exact."""
@@ -13,9 +13,18 @@ HALF_PI_REST = 6.07710050650619224932e-11
 QUARTERS = 0.63661977236758134308
 """2 / pi."""
 
+ROUNDING = 1.5 * 2.0**52
+"""Added to a number and taken away again, it leaves the nearest whole number."""
+
 LOG_2 = 6.93145751953125e-1
 LOG_2_REST = 1.42860682030941723212e-6
 LOG_2_INVERSE = 1.4426950408889634074
+
+
+@inlined
+def nearest_whole(x: float) -> float:
+    """Nearest whole number to one below 2^51; half-way ones go to the even one."""
+    return (x + ROUNDING) - ROUNDING
 
 
 @inlined

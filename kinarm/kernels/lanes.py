@@ -151,26 +151,19 @@ _teach(math.sqrt, lanes, lanes, 1, _call("sqrt"))
 
 
 @intrinsic  # type: ignore[misc]
-def nearest_whole(_: Any, value: types.Type) -> Any:
-    """Nearest whole number, for a number or lanes; half-way ones go to the even one."""
-
-    def code(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        return _call("rint")(builder, arguments[0])
-
-    return value(value), code
-
-
-@intrinsic  # type: ignore[misc]
 def power_of_two(_: Any, exponent: types.Type) -> Any:
     """2 to the power of a whole number between -1022 and 1023, for a number or lanes."""
 
     def code(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         (value,) = arguments
-        whole = WHOLE if isinstance(value.type, ir.VectorType) else ir.IntType(64)
-        many = isinstance(whole, ir.VectorType)
-        bias, shift = (ir.Constant(whole, [n] * LANES if many else n) for n in (1023, 52))
-        biased = builder.add(builder.fptosi(value, whole), bias)
-        return builder.bitcast(builder.shl(biased, shift), value.type)
+        many = isinstance(value.type, ir.VectorType)
+        whole, number = (WHOLE, NUMBERS) if many else (ir.IntType(64), ir.DoubleType())
+        magic = 1.5 * 2.0**52 + 1023.0
+        # In the sum, the lowest bits of the significand are the biased exponent.
+        biased = builder.fadd(value, ir.Constant(number, [magic] * LANES if many else magic))
+        places = ir.Constant(whole, [52] * LANES if many else 52)
+        bits = builder.shl(builder.bitcast(biased, whole), places)
+        return builder.bitcast(bits, number)
 
     return exponent(exponent), code
 
@@ -222,27 +215,49 @@ def as_lanes(_: Any, array: types.Type) -> Any:
     view = types.Array(lanes, array.ndim - 1, "C", aligned=False)
 
     def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        from numba.core import cgutils
-        from numba.np.arrayobj import impl_ret_borrowed, make_array, populate_array
-
-        given = make_array(array)(context, builder, arguments[0])
-        made = make_array(view)(context, builder)
-        shape = cgutils.unpack_tuple(builder, given.shape, array.ndim)[:-1]
-        strides = cgutils.unpack_tuple(builder, given.strides, array.ndim)[:-1]
-        populate_array(
-            made,
-            data=builder.bitcast(given.data, NUMBERS.as_pointer()),
-            shape=shape,
-            strides=strides,
-            itemsize=context.get_constant(types.intp, 8 * LANES),
-            meminfo=given.meminfo,
-            parent=given.parent,
-        )
-        return impl_ret_borrowed(context, builder, view, made._getvalue())
+        return _viewed(context, builder, (array, view), arguments[0], lambda shape: shape[:-1])
 
     return view(array), code
 
 
-def work_space(*shape: int) -> np.ndarray[Any, Any]:
-    """Memory for lanes: an array of the shape, and one entry for each episode."""
-    return np.zeros((*shape, LANES))
+@intrinsic  # type: ignore[misc]
+def as_numbers(_: Any, array: types.Type) -> Any:
+    """View a C-contiguous array of lanes as one of float64, which has one axis more."""
+    view = types.Array(types.float64, array.ndim + 1, "C")
+
+    def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        many = context.get_constant(types.intp, LANES)
+        return _viewed(context, builder, (array, view), arguments[0], lambda shape: [*shape, many])
+
+    return view(array), code
+
+
+def _viewed(
+    context: Any,
+    builder: Any,
+    kinds: tuple[types.Type, types.Type],
+    value: Any,
+    reshaped: Callable[[list[Any]], list[Any]],
+) -> Any:
+    """View an array as one of another type and shape."""
+    from numba.core import cgutils
+    from numba.np.arrayobj import impl_ret_borrowed, make_array, populate_array
+
+    given = make_array(kinds[0])(context, builder, value)
+    made = make_array(kinds[1])(context, builder)
+    shape = reshaped(list(cgutils.unpack_tuple(builder, given.shape, kinds[0].ndim)))
+    size = context.get_constant(types.intp, 8 * (LANES if kinds[1].dtype == lanes else 1))
+    strides = [size]
+    for length in shape[:0:-1]:
+        strides.insert(0, builder.mul(strides[0], length))
+    pointer = (NUMBERS if kinds[1].dtype == lanes else ir.DoubleType()).as_pointer()
+    populate_array(
+        made,
+        data=builder.bitcast(given.data, pointer),
+        shape=shape,
+        strides=strides,
+        itemsize=size,
+        meminfo=given.meminfo,
+        parent=given.parent,
+    )
+    return impl_ret_borrowed(context, builder, kinds[1], made._getvalue())

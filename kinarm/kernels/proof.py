@@ -13,7 +13,7 @@ from kinarm.contact_shapes import GROUND, PLANE, ContactShapes
 from kinarm.kernels.block import Alone, Block
 from kinarm.kernels.compiling import Array, helper, inlined
 from kinarm.kernels.kinematics import POSE, forward_kinematics
-from kinarm.kernels.lanes import any_lane, select
+from kinarm.kernels.lanes import any_lane, as_numbers, select
 from kinarm.kernels.planes import GAP, height_above, propose
 from kinarm.kernels.separation import separate
 
@@ -34,26 +34,23 @@ def bend_step(shapes: ContactShapes, block: Block) -> None:
     The second derivative of a point by two axes is no larger than how fast the later one moves
     it, since the earlier one only turns that motion.
     """
-    travel = shapes.travel
-    n_axes = travel.shape[0]
-    moved = 0.0 * block.q[0, 0]
-    for axis in range(n_axes):
-        # How far the axes before this one turn in all.
-        block.turned[axis] = moved
-        moved += abs(block.target[0, axis] - block.q[0, axis])
-    block.turned[n_axes] = moved
+    travel, twist = shapes.travel, block.twist
+    for first in range(travel.shape[0]):
+        before = 0.0 * block.q[0, 0]
+        for axis in range(first, travel.shape[0]):
+            turn = abs(block.target[0, axis] - block.q[0, axis])
+            twist[first, axis] = turn * (turn + 2.0 * before)
+            before += turn
     for pair in range(shapes.planes.shape[0]):
         first, last = shapes.planes[pair, 2], shapes.planes[pair, 3]
-        bend = 0.0 * moved
+        bend = 0.0 * block.q[0, 0]
         for axis in range(first, last):
-            before, after = block.turned[axis], block.turned[axis + 1]
-            both = (before - block.turned[first]) + (after - block.turned[first])
-            bend += (after - before) * both * travel[axis, pair]
+            bend += twist[first, axis] * travel[axis, pair]
         block.bend[pair] = bend
 
 
 @inlined
-def prove_step(shapes: ContactShapes, tested: int, block: Block) -> float:
+def prove_step(shapes: ContactShapes, tested: int, poses: Array, block: Block) -> float:
     """Renew the heights of all pairs, and return a bound that shows which steps are free.
 
     Takes the poses at the target.
@@ -63,16 +60,18 @@ def prove_step(shapes: ContactShapes, tested: int, block: Block) -> float:
     share = 1.0 / tested
     for pair in range(shapes.planes.shape[0]):
         before = block.planes[pair, GAP]
-        after = height_above(shapes, pair, block.poses, block.planes, pair)
+        after = height_above(shapes, pair, poses, block.planes, pair)
         early = before + share * (after - before)
         bound = min(after, early) - 0.125 * block.bend[pair]
-        block.before[pair], block.bound[pair], block.planes[pair, GAP] = before, bound, after
+        block.height[pair], block.bound[pair], block.planes[pair, GAP] = before, bound, after
         least = min(least, bound)
     return least
 
 
 @inlined
-def renew_planes(shapes: ContactShapes, tested: int, stale: bool, before: Array, block: Block) -> float:
+def renew_planes(
+    shapes: ContactShapes, tested: int, stale: bool, before: Array, poses: Array, block: Block
+) -> float:
     """Give pairs new planes where the step is not proven by those they have; return the bound.
 
     ``stale`` says of which episodes the step is to be proven. Takes the poses ``before`` the step
@@ -84,15 +83,15 @@ def renew_planes(shapes: ContactShapes, tested: int, stale: bool, before: Array,
         bound = block.bound[pair]
         open_here = stale & ~is_apart(bound)
         if shapes.planes[pair, 0] != GROUND and any_lane(open_here):
-            propose(shapes, pair, block.poses, block.planes, n_pairs)
+            propose(shapes, pair, poses, block.planes, n_pairs)
             at_start = height_above(shapes, pair, before, block.planes, n_pairs)
-            at_end = height_above(shapes, pair, block.poses, block.planes, n_pairs)
+            at_end = height_above(shapes, pair, poses, block.planes, n_pairs)
             early = at_start + share * (at_end - at_start)
             renewed = min(at_end, early) - 0.125 * block.bend[pair]
             better = open_here & (renewed > bound)
             bound = select(better, renewed, bound)
             block.bound[pair] = bound
-            block.before[pair] = select(better, at_start, block.before[pair])
+            block.height[pair] = select(better, at_start, block.height[pair])
             block.planes[n_pairs, GAP] = at_end
             for i in range(PLANE):
                 block.planes[pair, i] = select(better, block.planes[n_pairs, i], block.planes[pair, i])
@@ -113,34 +112,46 @@ def open_configurations(before: float, after: float, bend: float, tested: int) -
 
 @helper
 def prove_alone(
-    lane: int, chain: Chain, shapes: ContactShapes, tested: int, numbers: Block, alone: Alone
+    lane: int,
+    chain: Chain,
+    shapes: ContactShapes,
+    tested: int,
+    poses: Array,
+    block: Block,
+    alone: Alone,
 ) -> int:
     """Prove the step of a single episode as far as `prove_step` has not, and better its planes.
 
     Returns a number whose bit k - 1 is set if configuration k could not be proven free.
     """
-    n_joints, plane = numbers.q.shape[1], alone.plane
-    take_poses(lane, numbers, alone.after)
+    n_joints, plane = block.q.shape[1], alone.plane
+    q, target, planes = as_numbers(block.q), as_numbers(block.target), as_numbers(block.planes)
+    heights, bends, bounds = (
+        as_numbers(block.height),
+        as_numbers(block.bend),
+        as_numbers(block.bound),
+    )
+    take_poses(lane, poses, alone.after)
     at_start, n_open, all_open, target_bit = False, 0, 0, 1 << (tested - 1)
     for pair in range(shapes.planes.shape[0]):
-        if is_apart(numbers.bound[pair, lane]):
+        if is_apart(bounds[pair, lane]):
             continue
-        bend = numbers.bend[pair, lane]
-        before, after = numbers.before[pair, lane], numbers.planes[pair, GAP, lane]
+        bend = bends[pair, lane]
+        before, after = heights[pair, lane], planes[pair, GAP, lane]
         unproven = open_configurations(before, after, bend, tested)
         if unproven != 0 and shapes.planes[pair, 0] != GROUND:
             if not at_start:
                 for joint in range(n_joints):
-                    alone.q[0, joint] = numbers.q[0, joint, lane]
+                    alone.q[0, joint] = q[0, joint, lane]
                 place(chain, alone.q, alone.before)
                 at_start = True
             for i in range(PLANE):
-                plane[0, i] = numbers.planes[pair, i, lane]
+                plane[0, i] = planes[pair, i, lane]
             after = separate(shapes, pair, alone.after, alone.relative, alone.simplex, plane)
             before = height_above(shapes, pair, alone.before, plane, 0)
             unproven = open_configurations(before, after, bend, tested)
             for i in range(PLANE):
-                numbers.planes[pair, i, lane] = plane[0, i]
+                planes[pair, i, lane] = plane[0, i]
         alone.listed[n_open, 0], alone.listed[n_open, 1] = pair, unproven
         n_open += 0 if unproven == 0 else 1
         all_open |= unproven
@@ -150,7 +161,7 @@ def prove_alone(
         if all_open & bit == 0:
             continue
         for joint in range(n_joints):
-            start, end = numbers.q[0, joint, lane], numbers.target[0, joint, lane]
+            start, end = q[0, joint, lane], target[0, joint, lane]
             alone.q[0, joint] = start + k / tested * (end - start)
         place(chain, alone.q, alone.before)
         for index in range(n_open):
@@ -158,7 +169,7 @@ def prove_alone(
             if alone.listed[index, 1] & bit == 0:
                 continue
             for i in range(PLANE):
-                plane[0, i] = numbers.planes[pair, i, lane]
+                plane[0, i] = planes[pair, i, lane]
             height = height_above(shapes, pair, alone.before, plane, 0)
             if not is_apart(height) and shapes.planes[pair, 0] != GROUND:
                 height = separate(shapes, pair, alone.before, alone.relative, alone.simplex, plane)
@@ -169,46 +180,49 @@ def prove_alone(
 
 
 @inlined
-def propose_planes(shapes: ContactShapes, block: Block) -> float:
+def propose_planes(shapes: ContactShapes, poses: Array, block: Block) -> float:
     """Give all pairs a first plane, and return the least height above one.
 
     Takes the poses of the configurations.
     """
     least = 0.0 * block.q[0, 0] + 1.0
     for pair in range(shapes.planes.shape[0]):
-        propose(shapes, pair, block.poses, block.planes, pair)
-        height = height_above(shapes, pair, block.poses, block.planes, pair)
+        propose(shapes, pair, poses, block.planes, pair)
+        height = height_above(shapes, pair, poses, block.planes, pair)
         block.planes[pair, GAP] = height
         least = min(least, height)
     return least
 
 
 @helper
-def stands_free(lane: int, shapes: ContactShapes, numbers: Block, alone: Alone) -> bool:
+def stands_free(
+    lane: int, shapes: ContactShapes, poses: Array, block: Block, alone: Alone
+) -> bool:
     """Prove the configuration of a single episode free as far as first planes have not."""
-    plane, free = alone.plane, True
-    take_poses(lane, numbers, alone.after)
+    plane, planes, free = alone.plane, as_numbers(block.planes), True
+    take_poses(lane, poses, alone.after)
     for pair in range(shapes.planes.shape[0]):
-        if is_apart(numbers.planes[pair, GAP, lane]):
+        if is_apart(planes[pair, GAP, lane]):
             continue
         if shapes.planes[pair, 0] == GROUND:
             free = False
             continue
         for i in range(PLANE):
-            plane[0, i] = numbers.planes[pair, i, lane]
+            plane[0, i] = planes[pair, i, lane]
         height = separate(shapes, pair, alone.after, alone.relative, alone.simplex, plane)
         for i in range(PLANE):
-            numbers.planes[pair, i, lane] = plane[0, i]
+            planes[pair, i, lane] = plane[0, i]
         free = free and is_apart(height)
     return free
 
 
 @inlined
-def take_poses(lane: int, numbers: Block, poses: Array) -> None:
+def take_poses(lane: int, poses: Array, single: Array) -> None:
     """Copy the poses of a lane."""
-    for frame in range(poses.shape[0]):
+    numbers = as_numbers(poses)
+    for frame in range(single.shape[0]):
         for i in range(POSE):
-            poses[frame, i] = numbers.poses[frame, i, lane]
+            single[frame, i] = numbers[frame, i, lane]
 
 
 @helper

@@ -13,7 +13,7 @@ from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Cont
 from kinarm.kernels.block import Alone, Block, put_back, take_in, work_space
 from kinarm.kernels.compiling import Array, inlined, kernel
 from kinarm.kernels.kinematics import forward_kinematics, to_world
-from kinarm.kernels.lanes import LANES, any_lane, lane_bits, select
+from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.network import act
 from kinarm.kernels.observing import observe
 from kinarm.kernels.proof import is_apart, propose_planes, prove_alone, prove_step, renew_planes, stands_free
@@ -39,20 +39,21 @@ def screen(
 ) -> None:
     """Find the tool points of configurations, shape (n, 3) [m], and which are proven free."""
     n_joints, tool = configurations.shape[1], chain.tool
-    numbers, block, alone = work_space(n_joints, 0, 0, shapes.planes.shape[0], 0, 0, 0, 0)
+    block, alone = work_space(n_joints, 0, 0, shapes.planes.shape[0], 0, 0, 0, 0)
+    q, points = as_numbers(block.q), as_numbers(block.goal)
     for start in range(first, last, LANES):
         filled = min(last - start, LANES)
         for lane in range(LANES):
             row = start + min(lane, filled - 1)
             for joint in range(n_joints):
-                numbers.q[0, joint, lane] = configurations[row, joint]
-        free = stand(chain, shapes, filled, numbers, block, alone)
-        x, y, z = to_world(block.poses, n_joints, tool[0], tool[1], tool[2])
+                q[0, joint, lane] = configurations[row, joint]
+        free = stand(chain, shapes, filled, block, alone)
+        x, y, z = to_world(block.after, n_joints, tool[0], tool[1], tool[2])
         block.goal[0, 0], block.goal[0, 1], block.goal[0, 2] = x, y, z
         for lane in range(filled):
             proven[start + lane] = free >> lane & 1 != 0
             for axis in range(3):
-                tools[start + lane, axis] = numbers.goal[0, axis, lane]
+                tools[start + lane, axis] = points[0, axis, lane]
 
 
 @kernel
@@ -71,31 +72,34 @@ def begin(
     q, planes, path = episodes.q, episodes.planes, episodes.path
     n_joints, n_observations = q.shape[1], episodes.observation.shape[1]
     n_pairs = shapes.planes.shape[0]
-    numbers, block, alone = work_space(n_joints, 0, n_observations, n_pairs, 0, 0, 0, 0)
+    block, alone = work_space(n_joints, 0, n_observations, n_pairs, 0, 0, 0, 0)
+    starts, goals = as_numbers(block.q), as_numbers(block.goal)
+    distances, observations = as_numbers(block.distance), as_numbers(block.observation)
+    proposed = as_numbers(block.planes)
     for start in range(first, last, LANES):
         filled = min(last - start, LANES)
         for lane in range(LANES):
             e = rows[start + min(lane, filled - 1)]
             for joint in range(n_joints):
-                numbers.q[0, joint, lane] = q[e, joint]
+                starts[0, joint, lane] = q[e, joint]
             for axis in range(3):
-                numbers.goal[0, axis, lane] = episodes.goal[e, axis]
-        free = stand(chain, shapes, filled, numbers, block, alone)
-        block.distance[0] = observe(chain.tool, block.poses, block.goal, 0, block.observation)
+                goals[0, axis, lane] = episodes.goal[e, axis]
+        free = stand(chain, shapes, filled, block, alone)
+        block.distance[0] = observe(chain.tool, block.after, block.goal, 0, block.observation)
         for lane in range(filled):
             e = rows[start + lane]
             episodes.status[e] = RUNNING if free >> lane & 1 else PAUSED
             episodes.steps[e] = 0
             episodes.total[e] = 0.0
             episodes.cleared[e] = False
-            episodes.distance[e] = numbers.distance[0, lane]
+            episodes.distance[e] = distances[0, lane]
             for term in range(episodes.terms.shape[1]):
                 episodes.terms[e, term] = 0.0
             for i in range(n_observations):
-                episodes.observation[e, i] = numbers.observation[0, i, lane]
+                episodes.observation[e, i] = observations[0, i, lane]
             for pair in range(n_pairs):
                 for i in range(PLANE):
-                    planes[e, pair, i] = numbers.planes[pair, i, lane]
+                    planes[e, pair, i] = proposed[pair, i, lane]
             if path.shape[0] > 0:
                 for joint in range(n_joints):
                     path[e, 0, joint] = q[e, joint]
@@ -103,14 +107,14 @@ def begin(
 
 @inlined
 def stand(
-    chain: Chain, shapes: ContactShapes, filled: int, numbers: Block, block: Block, alone: Alone
+    chain: Chain, shapes: ContactShapes, filled: int, block: Block, alone: Alone
 ) -> int:
     """Place the arms of a block, and return the bits of those that are proven free of contact."""
     prismatic, translation, rotation, axes = chain[:4]
-    forward_kinematics(prismatic, translation, rotation, axes, block.q, 0, block.poses)
-    free = lane_bits(is_apart(propose_planes(shapes, block)))
+    forward_kinematics(prismatic, translation, rotation, axes, block.q, 0, block.after)
+    free = lane_bits(is_apart(propose_planes(shapes, block.after, block)))
     for lane in range(filled):
-        if free >> lane & 1 == 0 and stands_free(lane, shapes, numbers, alone):
+        if free >> lane & 1 == 0 and stands_free(lane, shapes, block.after, block, alone):
             free |= 1 << lane
     return free
 
@@ -147,7 +151,7 @@ def advance(
     widest = 1
     for layer in range(1, layers.shape[0]):
         widest = max(widest, layers[layer])
-    numbers, block, alone = work_space(
+    block, alone = work_space(
         n_joints,
         n_actuated,
         n_observations,
@@ -158,7 +162,8 @@ def advance(
         summed,
     )
     row = np.full(LANES, -1)
-    waiting, n_alive = first, 0
+    before, poses = block.before, block.after
+    waiting, n_alive, changed = first, 0, True
     while True:
         for lane in range(row.shape[0]):
             if row[lane] < 0 and waiting < last:
@@ -169,9 +174,10 @@ def advance(
                     waiting += 1
                 if waiting < last:
                     row[lane] = waiting
-                    take_in(waiting, lane, control, episodes, numbers)
+                    take_in(waiting, lane, control, episodes, block)
                     waiting += 1
                     n_alive += 1
+                    changed = True
         if n_alive == 0:
             return
         reflected = see(control, block)
@@ -183,7 +189,7 @@ def advance(
         else:
             for lane in range(row.shape[0]):
                 if row[lane] >= 0:
-                    act_alone(lane, row[lane], control, numbers, alone)
+                    act_alone(lane, row[lane], control, block, alone)
         fresh = (block.alive[0] > 0.0) & ~(block.judged[0] > 0.0)
         for i in range(summed):
             centred = select(fresh, block.observation[0, i] - episodes.shift[i], 0.0)
@@ -196,41 +202,44 @@ def advance(
             moved = block.q[0, axis] + action * rules.step_limit[axis]
             moved = min(max(moved, lower[axis]), upper[axis])
             block.target[0, axis] = select(fresh, moved, block.target[0, axis])
-        forward_kinematics(prismatic, translation, rotation, axes, block.target, 0, block.poses)
-        unproven = ~is_apart(prove_step(shapes, rules.tested, block)) & fresh
+        before, poses = poses, before
+        forward_kinematics(prismatic, translation, rotation, axes, block.target, 0, poses)
+        unproven = ~is_apart(prove_step(shapes, rules.tested, poses, block)) & fresh
         if any_lane(unproven):
-            forward_kinematics(prismatic, translation, rotation, axes, block.q, 0, block.spare)
-            least = renew_planes(shapes, rules.tested, unproven, block.spare, block)
+            if changed:
+                forward_kinematics(prismatic, translation, rotation, axes, block.q, 0, before)
+            least = renew_planes(shapes, rules.tested, unproven, before, poses, block)
             unproven = unproven & ~is_apart(least)
         if any_lane(unproven):
             still = lane_bits(unproven)
             for lane in range(row.shape[0]):
                 if still >> lane & 1 == 0:
                     continue
-                doubt = prove_alone(lane, chain, shapes, rules.tested, numbers, alone)
+                doubt = prove_alone(lane, chain, shapes, rules.tested, poses, block, alone)
                 if doubt != 0:
                     e, row[lane] = row[lane], -1
-                    put_back(lane, e, episodes, numbers)
+                    put_back(lane, e, episodes, block)
                     episodes.doubt[e] = doubt
                     episodes.status[e] = PAUSED
                     n_alive -= 1
             if n_alive == 0:
                 continue
+        changed = False
         block.judged[0] = 0.0
-        before = block.distance[0]
-        after = observe(tool, block.poses, block.goal, 0, block.observation)
+        nearer = block.distance[0]
+        after = observe(tool, poses, block.goal, 0, block.observation)
         block.distance[0] = after
         block.steps[0] += 1.0
         reached, never = after <= rules.tolerance, after < 0.0
-        add_reward(rules.reward, before, after, never, reached, block.terms, block.total, 0)
+        add_reward(rules.reward, nearer, after, never, reached, block.terms, block.total, 0)
         for joint in range(n_joints):
             block.q[0, joint] = block.target[0, joint]
         if episodes.path.shape[0] > 0:
             for lane in range(row.shape[0]):
                 if row[lane] >= 0:
-                    step = int(numbers.steps[0, lane])
+                    step = int(as_numbers(block.steps)[0, lane])
                     for joint in range(n_joints):
-                        episodes.path[row[lane], step, joint] = numbers.q[0, joint, lane]
+                        episodes.path[row[lane], step, joint] = as_numbers(block.q)[0, joint, lane]
         late = block.steps[0] >= rules.horizon
         finished = lane_bits((block.steps[0] >= block.stop[0]) | reached | late)
         if finished != 0:
@@ -238,7 +247,7 @@ def advance(
             for lane in range(row.shape[0]):
                 if finished >> lane & 1 and row[lane] >= 0:
                     e, row[lane] = row[lane], -1
-                    put_back(lane, e, episodes, numbers)
+                    put_back(lane, e, episodes, block)
                     n_alive -= 1
                     if successes >> lane & 1:
                         episodes.status[e] = SUCCESS
@@ -247,19 +256,20 @@ def advance(
 
 
 @inlined
-def act_alone(lane: int, e: int, control: Control, numbers: Block, alone: Alone) -> None:
+def act_alone(lane: int, e: int, control: Control, block: Block, alone: Alone) -> None:
     """Choose the action of a single episode, from a table or by a large network."""
+    action = as_numbers(block.action)
     if control.layers.shape[0] == 0:
-        column = int(numbers.steps[0, lane]) if control.actions.shape[1] > 1 else 0
-        for axis in range(numbers.action.shape[1]):
-            numbers.action[0, axis, lane] = control.actions[e, column, axis]
+        column = int(as_numbers(block.steps)[0, lane]) if control.actions.shape[1] > 1 else 0
+        for axis in range(action.shape[1]):
+            action[0, axis, lane] = control.actions[e, column, axis]
         return
     for i in range(alone.seen.shape[1]):
-        alone.seen[0, i] = numbers.seen[0, i, lane]
+        alone.seen[0, i] = as_numbers(block.seen)[0, i, lane]
     weights = control.weights[control.policy[e]]
     act(control.layers, control.activations, weights, alone.seen, alone.hidden, alone.action)
     for axis in range(alone.action.shape[1]):
-        numbers.action[0, axis, lane] = alone.action[0, axis]
+        action[0, axis, lane] = alone.action[0, axis]
 
 
 @inlined
