@@ -93,8 +93,6 @@ class Alone(NamedTuple):
         See `kinarm.kernels.separation.separate`.
     listed : ndarray of int, shape (n_pairs + 1, 2)
         Pairs that are in question, and at which configurations.
-    seen, hidden, action
-        As in a block, for a network too large to be laid out in lanes.
     """
 
     q: Array
@@ -104,9 +102,6 @@ class Alone(NamedTuple):
     relative: Array
     simplex: Array
     listed: NDArray[np.int64]
-    seen: Array
-    hidden: Array
-    action: Array
 
 
 @unit
@@ -149,9 +144,6 @@ def work_space(
         relative=np.zeros((4, 3)),
         simplex=np.zeros((4, 3)),
         listed=np.zeros((n_pairs + 1, 2), dtype=np.int64),
-        seen=np.zeros((1, n_observations)),
-        hidden=np.zeros((2, widest)),
-        action=np.zeros((1, n_actuated)),
     )
     return block, alone
 

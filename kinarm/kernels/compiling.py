@@ -23,13 +23,13 @@ def kernel(function: Function) -> Function:
 
 def inlined(function: Function) -> Function:
     """Compile a helper that allocates nothing: several times faster without reference counts."""
-    options: dict[str, Any] = {"error_model": "numpy", "forceinline": True, "_nrt": False}
+    options: dict[str, Any] = {"error_model": "numpy", "forceinline": True, "_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     return cast("Function", njit(**options)(function))
 
 
 def helper(function: Function) -> Function:
     """Compile a long helper that allocates nothing: called, it is compiled only once."""
-    options: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
+    options: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     return cast("Function", njit(**options)(function))
 
 

@@ -119,13 +119,6 @@ def stand(
     return free
 
 
-OWN_WEIGHTS = 4096
-"""Networks with more parameters are not laid out in lanes, if episodes have different ones."""
-
-SHARED, OWN, ONE_BY_ONE, TABLE = range(4)
-"""Ways to choose the actions of a block."""
-
-
 @kernel
 def advance(
     first: int,
@@ -145,8 +138,8 @@ def advance(
     layers, activations = control.layers, control.activations
     n_joints, n_actuated = episodes.q.shape[1], rules.step_limit.shape[0]
     n_observations, n_pairs = episodes.observation.shape[1], shapes.planes.shape[0]
-    way = way_to_act(first, last, control)
-    own = control.weights.shape[1] if way == OWN else 0
+    from_table, shared = layers.shape[0] == 0, have_one_policy(first, last, control)
+    own = 0 if from_table or shared else control.weights.shape[1]
     summed = n_observations if episodes.moments.shape[0] > 0 else 0
     widest = 1
     for layer in range(1, layers.shape[0]):
@@ -161,6 +154,8 @@ def advance(
         own,
         summed,
     )
+    mirrored = control.observation_signs.shape[0] > 0
+    seen = block.seen if mirrored else block.observation
     row = np.full(LANES, -1)
     before, poses = block.before, block.after
     waiting, n_alive, changed = first, 0, True
@@ -180,16 +175,16 @@ def advance(
                     changed = True
         if n_alive == 0:
             return
-        reflected = see(control, block)
-        if way == SHARED:
-            weights = control.weights[control.policy[first]]
-            act(layers, activations, weights, block.seen, block.hidden, block.action)
-        elif way == OWN:
-            act(layers, activations, block.weights, block.seen, block.hidden, block.action)
+        reflected = block.observation[0, control.side] > 0.0
+        if from_table:
+            look_up(row, control, block)
         else:
-            for lane in range(row.shape[0]):
-                if row[lane] >= 0:
-                    act_alone(lane, row[lane], control, block, alone)
+            see(reflected, control, block)
+            if shared:
+                weights = control.weights[control.policy[first]]
+                act(layers, activations, weights, seen, block.hidden, block.action)
+            else:
+                act(layers, activations, block.weights, seen, block.hidden, block.action)
         fresh = (block.alive[0] > 0.0) & ~(block.judged[0] > 0.0)
         for i in range(summed):
             centred = select(fresh, block.observation[0, i] - episodes.shift[i], 0.0)
@@ -197,7 +192,7 @@ def advance(
             block.second[i] += centred * centred
         for axis in range(n_actuated):
             action = min(max(block.action[0, axis], -1.0), 1.0)
-            if control.action_signs.shape[0] > 0:
+            if mirrored:
                 action = select(reflected, action * control.action_signs[axis], action)
             moved = block.q[0, axis] + action * rules.step_limit[axis]
             moved = min(max(moved, lower[axis]), upper[axis])
@@ -256,49 +251,36 @@ def advance(
 
 
 @inlined
-def act_alone(lane: int, e: int, control: Control, block: Block, alone: Alone) -> None:
-    """Choose the action of a single episode, from a table or by a large network."""
-    action = as_numbers(block.action)
-    if control.layers.shape[0] == 0:
-        column = int(as_numbers(block.steps)[0, lane]) if control.actions.shape[1] > 1 else 0
-        for axis in range(action.shape[1]):
-            action[0, axis, lane] = control.actions[e, column, axis]
-        return
-    for i in range(alone.seen.shape[1]):
-        alone.seen[0, i] = as_numbers(block.seen)[0, i, lane]
-    weights = control.weights[control.policy[e]]
-    act(control.layers, control.activations, weights, alone.seen, alone.hidden, alone.action)
-    for axis in range(alone.action.shape[1]):
-        action[0, axis, lane] = alone.action[0, axis]
-
-
-@inlined
-def way_to_act(first: int, last: int, control: Control) -> int:
-    """How the episodes of a range get their actions."""
-    if control.layers.shape[0] == 0:
-        return TABLE
+def have_one_policy(first: int, last: int, control: Control) -> bool:
+    """Whether all episodes of a range are driven by the same network."""
     for e in range(first + 1, last):
         if control.policy[e] != control.policy[first]:
-            return OWN if control.weights.shape[1] <= OWN_WEIGHTS else ONE_BY_ONE
-    return SHARED
+            return False
+    return True
 
 
 @inlined
-def see(control: Control, block: Block) -> bool:
-    """Fill in what the networks see; returns where they see it in the mirror.
+def look_up(row: NDArray[np.int64], control: Control, block: Block) -> None:
+    """Take the actions of a block, whose episodes are given, from the table."""
+    action, steps = as_numbers(block.action), as_numbers(block.steps)
+    for lane in range(row.shape[0]):
+        if row[lane] >= 0:
+            column = int(steps[0, lane]) if control.actions.shape[1] > 1 else 0
+            for axis in range(action.shape[1]):
+                action[0, axis, lane] = control.actions[row[lane], column, axis]
 
-    A network with a mirror has learnt goals on the right alone: for a goal on the left it is
-    given the reflected observation, and its action is reflected in turn.
+
+@inlined
+def see(reflected: bool, control: Control, block: Block) -> None:
+    """Fill in what networks with a mirror see, given where they see it in there.
+
+    Such a network has learnt goals on the right alone: for a goal on the left it is given the
+    reflected observation, and its action is reflected in turn.
     """
     signs = control.observation_signs
-    reflected = block.observation[0, control.side] > 0.0
-    for i in range(block.observation.shape[1]):
+    for i in range(signs.shape[0]):
         given = block.observation[0, i]
-        if signs.shape[0] > 0:
-            block.seen[0, i] = select(reflected, signs[i] * given, given)
-        else:
-            block.seen[0, i] = given
-    return reflected
+        block.seen[0, i] = select(reflected, signs[i] * given, given)
 
 
 @kernel
