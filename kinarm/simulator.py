@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +14,7 @@ from kinarm.arm import Arm
 from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Control, Episodes, Rules
 from kinarm.errors import InvalidInputError, StartInContactError
 from kinarm.kernels.rollout import advance, begin, refuse
+from kinarm.kernels.session import Session, bind
 from kinarm.networks import CompiledPolicy, Networks, network_control, table_control
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.rollouts import Rollouts, StepResult
@@ -23,6 +25,14 @@ from kinarm.world import World
 
 PolicyFunction = Callable[[NDArray[np.float64]], ArrayLike]
 """Maps observations, shape (n, n_observations), to actions, shape (n, n_actuated)."""
+
+
+class _Stepped(NamedTuple):
+    """Episodes that are stepped, the table of their actions, and the session of both."""
+
+    episodes: Episodes
+    actions: NDArray[np.float64]
+    session: Session
 
 
 class Simulator:
@@ -58,6 +68,7 @@ class Simulator:
         self.world = World(problem, threads=threads)
         self.threads = self.world.threads
         self.judged = 0
+        self._last: _Stepped | None = None
         task, stepping, arm = self.task, self.problem.stepping, self.arm
         self._rules = Rules(
             step_limit=arm.velocity_limits[: arm.n_actuated] * stepping.time_step,
@@ -66,6 +77,9 @@ class Simulator:
             horizon=int(task.horizon),
             reward=task.reward.vector,
         )
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"_last": None}
 
     def __repr__(self) -> str:
         return f"Simulator({self.problem!r})"
@@ -150,7 +164,7 @@ class Simulator:
         table = finite_array("actions", actions, (len(episodes.status), self.n_actions))
         running = episodes.status == RUNNING
         np.copyto(episodes.stop, episodes.steps + 1)
-        self._advance(table_control(table[:, None, :]), episodes, len(table))
+        self._advance(self._stepped(episodes, table), episodes, len(table))
         terms = np.where(running[:, None], episodes.terms, 0.0)
         return StepResult(
             reward=terms.sum(axis=1),
@@ -207,7 +221,7 @@ class Simulator:
         else:
             widths = (self.n_observations, self.n_actions)
             control = network_control(policies, policy_index, len(q), widths)
-            self._advance(control, episodes, len(q) * self.task.horizon)
+            self._advance(self._session(control, episodes), episodes, len(q) * self.task.horizon)
         return Rollouts.from_episodes(q, episodes)
 
     def rollout_actions(
@@ -225,7 +239,9 @@ class Simulator:
         q, goal = self.check_scenarios(starts, goals)
         table = finite_array("actions", actions, (len(q), self.task.horizon, self.n_actions))
         episodes = self._begin(q, goal, record, None)
-        self._advance(table_control(table), episodes, len(q) * self.task.horizon)
+        self._advance(
+            self._session(table_control(table), episodes), episodes, len(q) * self.task.horizon
+        )
         return Rollouts.from_episodes(q, episodes)
 
     def contact_pairs(self, rollouts: Rollouts) -> tuple[tuple[str, str] | None, ...]:
@@ -290,22 +306,34 @@ class Simulator:
         self.begin(episodes, np.arange(len(starts)))
         return episodes
 
-    def _advance(self, control: Control, episodes: Episodes, work: int) -> None:
-        """Advance episodes to their stop, asking Coal about every step that is in doubt."""
+    def _session(self, control: Control, episodes: Episodes) -> Session:
+        """Bind episodes and where their actions come from."""
         shapes = self.world.contact_model.shapes
-        arrays = (self.arm.chain, shapes, self._rules, control, episodes)
+        return bind(self.arm.chain, shapes, self._rules, control, episodes)
+
+    def _stepped(self, episodes: Episodes, actions: NDArray[np.float64]) -> Session:
+        """A session for one step of episodes, which is bound anew only for others than before."""
+        if self._last is None or self._last.episodes is not episodes:
+            table = np.zeros((len(actions), 1, self.n_actions))
+            session = self._session(table_control(table), episodes)
+            self._last = _Stepped(episodes, table, session)
+        self._last.actions[:, 0] = actions
+        return self._last.session
+
+    def _advance(self, session: Session, episodes: Episodes, work: int) -> None:
+        """Advance episodes to their stop, asking Coal about every step that is in doubt."""
         while True:
-            run_rows(advance, len(episodes.status), work, self.threads, *arrays)
+            run_rows(advance, len(episodes.status), work, self.threads, session)
             paused = np.flatnonzero(episodes.status == PAUSED)
             if paused.size == 0:
                 return
-            self._judge(episodes, paused)
+            self._judge(session, episodes, paused)
             resumed = paused[episodes.cleared[paused]]
             if resumed.size == 0:
                 return
             work = int((episodes.stop - episodes.steps)[resumed].sum())
 
-    def _judge(self, episodes: Episodes, paused: NDArray[np.int64]) -> None:
+    def _judge(self, session: Session, episodes: Episodes, paused: NDArray[np.int64]) -> None:
         """Let Coal decide the steps in doubt: refuse those that touch, clear the others.
 
         Configurations are judged in the order of the motion, and not beyond the first contact.
@@ -321,7 +349,7 @@ class Simulator:
         episodes.status[paused[~refused]] = RUNNING
         episodes.cleared[paused] = ~refused
         if refused.any():
-            refuse(paused[refused], self._rules, episodes)
+            refuse(paused[refused], session)
 
     def _follow(self, policy: PolicyFunction, episodes: Episodes) -> None:
         """Drive episodes to their end with a Python function."""
@@ -332,4 +360,4 @@ class Simulator:
             )
             actions[running] = chosen
             np.copyto(episodes.stop, episodes.steps + 1)
-            self._advance(table_control(actions[:, None, :]), episodes, len(actions))
+            self._advance(self._stepped(episodes, actions), episodes, len(actions))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.contact_shapes import PLANE, ContactShapes
-from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Control, Episodes, Rules
+from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Control, Episodes
 from kinarm.kernels.block import Alone, Block, put_back, take_in, work_space
 from kinarm.kernels.compiling import Array, inlined, kernel
 from kinarm.kernels.kinematics import forward_kinematics, to_world
@@ -18,6 +18,7 @@ from kinarm.kernels.network import act
 from kinarm.kernels.observing import observe
 from kinarm.kernels.proof import is_apart, propose_planes, prove_alone, prove_step, renew_planes, stands_free
 from kinarm.kernels.reward import add_reward
+from kinarm.kernels.session import Session
 
 LAYOUT = "a4"
 """Hash of what is compiled in from other files; a test tells when to renew it.
@@ -120,20 +121,14 @@ def stand(
 
 
 @kernel
-def advance(
-    first: int,
-    last: int,
-    chain: Chain,
-    shapes: ContactShapes,
-    rules: Rules,
-    control: Control,
-    episodes: Episodes,
-) -> None:
+def advance(first: int, last: int, session: Session) -> None:
     """Advance the running episodes among ``first`` to ``last - 1``, a block at a time.
 
     Each goes on until it ends, reaches its ``stop`` or pauses before a step that is not proven
     free of contact; then the next one takes its place in the block.
     """
+    chain, shapes, rules = session.chain, session.shapes, session.rules
+    control, episodes = session.control, session.episodes
     prismatic, translation, rotation, axes, tool, lower, upper = chain[:7]
     layers, activations = control.layers, control.activations
     n_joints, n_actuated = episodes.q.shape[1], rules.step_limit.shape[0]
@@ -284,8 +279,9 @@ def see(reflected: bool, control: Control, block: Block) -> None:
 
 
 @kernel
-def refuse(rows: NDArray[np.int64], rules: Rules, episodes: Episodes) -> None:
+def refuse(rows: NDArray[np.int64], session: Session) -> None:
     """End episodes whose step touches something: the arm stays where it is."""
+    rules, episodes = session.rules, session.episodes
     for index in range(rows.shape[0]):
         e = rows[index]
         episodes.status[e] = COLLISION
