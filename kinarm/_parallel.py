@@ -17,24 +17,24 @@ def available_threads() -> int:
     return os.cpu_count() or 1
 
 
-def run_rows(kernel: Callable[..., None], n: int, work: int, threads: int, *arrays: Any) -> None:
-    """Call ``kernel(first, last, *arrays)`` for ranges that cover n rows.
+def run_rows(
+    kernel: Callable[..., int | None], n: int, work: int, threads: int, *arrays: Any
+) -> int:
+    """Call ``kernel(first, last, *arrays)`` for ranges that cover n rows; add up what it returns.
 
     Kernels release the GIL and treat rows independently, so the result depends neither on the
     number of threads nor on the ranges. Little ``work``, estimated in episode steps, is done by
     the calling thread.
     """
     if threads == 1 or n == 0 or work < PARALLEL_STEPS:
-        kernel(0, n, *arrays)
-        return
+        return kernel(0, n, *arrays) or 0
     ranges_each = 1 if work < BALANCED_STEPS else 4
     size = -(-n // (ranges_each * threads))
     pool = _thread_pool(os.getpid(), threads)
     ranges = [
         pool.submit(kernel, first, min(first + size, n), *arrays) for first in range(0, n, size)
     ]
-    for done in ranges:
-        done.result()
+    return sum(done.result() or 0 for done in ranges)
 
 
 @cache

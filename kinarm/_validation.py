@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -21,16 +23,21 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> 
         array = np.array(value, dtype=np.float64, order="C")
     except (TypeError, ValueError) as error:
         raise InvalidInputError(f"{name} must be numbers: {error}") from error
-    matches = array.ndim == len(shape) and all(
-        expected in (None, actual) for actual, expected in zip(array.shape, shape, strict=True)
-    )
-    if not matches:
+    if array.shape != shape and not _matches(array.shape, shape):
         wanted = ", ".join("n" if length is None else str(length) for length in shape)
         raise InvalidInputError(f"{name} must have shape ({wanted}), got {array.shape}")
-    if not np.isfinite(array).all():
+    # A sum is finite only if all its terms are, and is found faster.
+    if not math.isfinite(array.sum()) and not np.isfinite(array).all():
         where = np.argwhere(~np.isfinite(array))[0].tolist()
         raise InvalidInputError(f"{name} must be finite, got {array[tuple(where)]} at {where}")
     return array
+
+
+def _matches(actual: tuple[int, ...], expected: tuple[int | None, ...]) -> bool:
+    """Whether a shape is the expected one, in which None stands for any length."""
+    return len(actual) == len(expected) and all(
+        wanted in (None, length) for length, wanted in zip(actual, expected, strict=True)
+    )
 
 
 def whole_number(name: str, value: object, at_least: int) -> int:

@@ -13,7 +13,7 @@ from kinarm._validation import finite_array
 from kinarm.arm import Arm
 from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Control, Episodes, Rules
 from kinarm.errors import InvalidInputError, StartInContactError
-from kinarm.kernels.rollout import advance, begin, refuse
+from kinarm.kernels.rollout import advance, allow_one_step, begin, refuse, results_of_step
 from kinarm.kernels.session import Session, bind
 from kinarm.networks import CompiledPolicy, Networks, network_control, table_control
 from kinarm.problem import ProblemLike, ReachProblem
@@ -162,17 +162,11 @@ class Simulator:
             If the shape is wrong or an entry is NaN.
         """
         table = finite_array("actions", actions, (len(episodes.status), self.n_actions))
-        running = episodes.status == RUNNING
-        np.copyto(episodes.stop, episodes.steps + 1)
-        self._advance(self._stepped(episodes, table), episodes, len(table))
-        terms = np.where(running[:, None], episodes.terms, 0.0)
-        return StepResult(
-            reward=terms.sum(axis=1),
-            terms=terms,
-            success=running & (episodes.status == SUCCESS),
-            collision=running & (episodes.status == COLLISION),
-            truncated=running & (episodes.status == TRUNCATED),
-        )
+        session = self._step(episodes, table)
+        n, n_terms = episodes.terms.shape
+        reward, terms, ended = np.empty(n), np.empty((n, n_terms)), np.empty((n, 3), dtype=bool)
+        results_of_step(session, reward, terms, ended)
+        return StepResult(reward, terms, ended[:, 0], ended[:, 1], ended[:, 2])
 
     def rollout(
         self,
@@ -311,22 +305,20 @@ class Simulator:
         shapes = self.world.contact_model.shapes
         return bind(self.arm.chain, shapes, self._rules, control, episodes)
 
-    def _stepped(self, episodes: Episodes, actions: NDArray[np.float64]) -> Session:
-        """A session for one step of episodes, which is bound anew only for others than before."""
+    def _step(self, episodes: Episodes, actions: NDArray[np.float64]) -> Session:
+        """Advance running episodes by one step; the session is bound anew for others only."""
         if self._last is None or self._last.episodes is not episodes:
             table = np.zeros((len(actions), 1, self.n_actions))
-            session = self._session(table_control(table), episodes)
-            self._last = _Stepped(episodes, table, session)
+            self._last = _Stepped(episodes, table, self._session(table_control(table), episodes))
         self._last.actions[:, 0] = actions
+        allow_one_step(self._last.session)
+        self._advance(self._last.session, episodes, len(actions))
         return self._last.session
 
     def _advance(self, session: Session, episodes: Episodes, work: int) -> None:
         """Advance episodes to their stop, asking Coal about every step that is in doubt."""
-        while True:
-            run_rows(advance, len(episodes.status), work, self.threads, session)
+        while run_rows(advance, len(episodes.status), work, self.threads, session):
             paused = np.flatnonzero(episodes.status == PAUSED)
-            if paused.size == 0:
-                return
             self._judge(session, episodes, paused)
             resumed = paused[episodes.cleared[paused]]
             if resumed.size == 0:
@@ -359,5 +351,4 @@ class Simulator:
                 "actions", policy(episodes.observation[running]), (running.sum(), self.n_actions)
             )
             actions[running] = chosen
-            np.copyto(episodes.stop, episodes.steps + 1)
-            self._advance(self._stepped(episodes, actions), episodes, len(actions))
+            self._step(episodes, actions)

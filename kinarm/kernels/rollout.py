@@ -121,11 +121,11 @@ def stand(
 
 
 @kernel
-def advance(first: int, last: int, session: Session) -> None:
+def advance(first: int, last: int, session: Session) -> int:
     """Advance the running episodes among ``first`` to ``last - 1``, a block at a time.
 
     Each goes on until it ends, reaches its ``stop`` or pauses before a step that is not proven
-    free of contact; then the next one takes its place in the block.
+    free of contact; then the next one takes its place in the block. Returns how many paused.
     """
     chain, shapes, rules = session.chain, session.shapes, session.rules
     control, episodes = session.control, session.episodes
@@ -153,7 +153,7 @@ def advance(first: int, last: int, session: Session) -> None:
     seen = block.seen if mirrored else block.observation
     row = np.full(LANES, -1)
     before, poses = block.before, block.after
-    waiting, n_alive, changed = first, 0, True
+    waiting, n_alive, n_paused, changed = first, 0, 0, True
     while True:
         for lane in range(row.shape[0]):
             if row[lane] < 0 and waiting < last:
@@ -169,7 +169,7 @@ def advance(first: int, last: int, session: Session) -> None:
                     n_alive += 1
                     changed = True
         if n_alive == 0:
-            return
+            return n_paused
         reflected = block.observation[0, control.side] > 0.0
         if from_table:
             look_up(row, control, block)
@@ -212,6 +212,7 @@ def advance(first: int, last: int, session: Session) -> None:
                     episodes.doubt[e] = doubt
                     episodes.status[e] = PAUSED
                     n_alive -= 1
+                    n_paused += 1
             if n_alive == 0:
                 continue
         changed = False
@@ -276,6 +277,35 @@ def see(reflected: bool, control: Control, block: Block) -> None:
     for i in range(signs.shape[0]):
         given = block.observation[0, i]
         block.seen[0, i] = select(reflected, signs[i] * given, given)
+
+
+@kernel
+def allow_one_step(session: Session) -> None:
+    """Let every episode go on by one step."""
+    steps, stop = session.episodes.steps, session.episodes.stop
+    for e in range(steps.shape[0]):
+        stop[e] = steps[e] + 1
+
+
+@kernel
+def results_of_step(
+    session: Session, reward: Array, terms: Array, ended: NDArray[np.bool_]
+) -> None:
+    """Read off the one step that was allowed: rewards, their terms, and how episodes ended.
+
+    ``ended``, shape (n, 3), tells of success, contact and truncation. Of episodes that had ended
+    before the step, all is zero.
+    """
+    episodes = session.episodes
+    for e in range(reward.shape[0]):
+        stepped = episodes.steps[e] == episodes.stop[e]
+        reward[e] = 0.0
+        for term in range(terms.shape[1]):
+            terms[e, term] = episodes.terms[e, term] if stepped else 0.0
+            reward[e] += terms[e, term]
+        ended[e, 0] = stepped and episodes.status[e] == SUCCESS
+        ended[e, 1] = stepped and episodes.status[e] == COLLISION
+        ended[e, 2] = stepped and episodes.status[e] == TRUNCATED
 
 
 @kernel
