@@ -20,6 +20,9 @@ from kinarm.arm import Arm
 from kinarm.contact_shapes import BETWEEN_CAPSULES, WITH_BOX, WITH_GROUND, ContactShapes
 from kinarm.scene import Scene
 
+CLOSE, OFTEN, CLOSENESS_SAMPLES = 0.025, 0.05, 200
+"""A pair is close if it is nearer than this [m] at more than this share of random configurations."""
+
 MOUNT_SAMPLES = 721
 """Positions of the first joint at which the mounting is tested."""
 
@@ -88,7 +91,7 @@ class ContactModel:
             arm=arm,
             geometry=geometry,
             body_names=(*body_names(arm), *surroundings),
-            shapes=ContactShapes.build(arm, scene, kept, n_shapes),
+            shapes=ContactShapes.build(arm, scene, kept, n_shapes, _close_pairs(arm, geometry)),
         )
 
     @cached_property
@@ -256,3 +259,27 @@ def _uninformative_pairs(arm: Arm, geometry: pin.GeometryModel, n_shapes: int) -
         always &= now
         never -= now
     return always | never | resting
+
+
+def _close_pairs(arm: Arm, geometry: pin.GeometryModel) -> set[int]:
+    """Pairs of bodies of which one is a mesh, and that often are less than `CLOSE` apart."""
+    objects = geometry.geometryObjects
+    meshes = [isinstance(shape.geometry, coal.ConvexBase) for shape in objects]
+    pairs = [
+        index
+        for index, pair in enumerate(geometry.collisionPairs)
+        if meshes[pair.first] or meshes[pair.second]
+    ]
+    if not pairs:
+        return set()
+    data, distances = arm.model.createData(), geometry.createData()
+    rng, often = np.random.default_rng(0), dict.fromkeys(pairs, 0)
+    for _ in range(CLOSENESS_SAMPLES):
+        q = arm.home.copy()
+        moved = slice(arm.n_actuated)
+        q[moved] = rng.uniform(arm.lower[moved], arm.upper[moved])
+        pin.updateGeometryPlacements(arm.model, data, geometry, distances, q)
+        for index in pairs:
+            result = pin.computeDistance(geometry, distances, index)
+            often[index] += result.min_distance < CLOSE
+    return {index for index in pairs if often[index] > OFTEN * CLOSENESS_SAMPLES}

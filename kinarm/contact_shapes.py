@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from kinarm.capsules import enclosing_capsule, is_capsule
 from kinarm.chain import Chain
-from kinarm.enclosures import Enclosure, enclosing_polytope
+from kinarm.enclosures import FEW, MANY, Enclosure, enclosing_polytope
 from kinarm.motion_bounds import point_speed
 
 if TYPE_CHECKING:
@@ -32,7 +32,8 @@ PLANE = 5
 class ContactShapes(NamedTuple):
     """Shapes, pairs and motion bounds as flat arrays.
 
-    A *body* is a shape of the arm or, after those, an obstacle, enclosed by a rounded polytope.
+    A *body* is a shape of the arm or, after those, an obstacle, enclosed by a rounded polytope;
+    after those come finer polytopes about shapes whose first one is coarse.
 
     Attributes
     ----------
@@ -61,6 +62,8 @@ class ContactShapes(NamedTuple):
     planes : ndarray of int, shape (n_pairs, 4)
         Per pair: the body that carries the separating plane, or `GROUND`; the body that moves
         against it; the first axis that moves it, and the one after the last.
+    proxies : ndarray of int, shape (n_pairs, 2, 2)
+        Per pair, the bodies that stand for these two: in every step, and where it is close.
     """
 
     link: NDArray[np.int64]
@@ -74,10 +77,16 @@ class ContactShapes(NamedTuple):
     rounding: NDArray[np.float64]
     extents: NDArray[np.float64]
     planes: NDArray[np.int64]
+    proxies: NDArray[np.int64]
 
     @classmethod
     def build(
-        cls, arm: Arm, scene: Scene, pairs: list[tuple[int, int, int]], n_shapes: int
+        cls,
+        arm: Arm,
+        scene: Scene,
+        pairs: list[tuple[int, int, int]],
+        n_shapes: int,
+        close: Collection[int],
     ) -> ContactShapes:
         """Flatten the shapes of an arm in a scene.
 
@@ -89,26 +98,37 @@ class ContactShapes(NamedTuple):
             First and second shape of the pairs and their kind; obstacles count from ``n_shapes``.
         n_shapes : int
             Number of the arm's shapes.
+        close : collection of int
+            Pairs that are mostly so close to each other that coarse polytopes tell nothing.
         """
         objects = list(arm.geometry.geometryObjects)
         link = np.array([shape.parentJoint for shape in objects], dtype=np.int64)
         capsules = [enclosing_capsule(shape) for shape in objects]
-        enclosures = [enclosing_polytope(shape) for shape in objects]
-        enclosures += [Enclosure(_corners(each.lower, each.upper), 0.0) for each in scene.obstacles]
-        ends = np.cumsum([0, *(len(body.corners) for body in enclosures)])
-        links = np.append(link, np.zeros(len(scene.obstacles), dtype=np.int64))
-        rows, planes = [], []
+        bodies = [enclosing_polytope(shape, FEW) for shape in objects]
+        bodies += [Enclosure(_corners(each.lower, each.upper), 0.0) for each in scene.obstacles]
+        links = [*link.tolist(), *(0 for _ in scene.obstacles)]
+        finer = list(range(len(bodies)))
+        for index, shape in enumerate(objects):
+            if len(bodies[index].corners) == FEW:
+                finer[index] = len(bodies)
+                bodies.append(enclosing_polytope(shape, MANY))
+                links.append(links[index])
+        ends = np.cumsum([0, *(len(body.corners) for body in bodies)])
+        rows, planes, proxies = [], [], []
         travel = np.zeros((arm.n_actuated, len(pairs)))
         for column, (first, second, kind) in enumerate(pairs):
             between = kind == BETWEEN_CAPSULES
             rows.append((kind, first, second if between else second - n_shapes))
             carrier, mover = (first, second) if between else (second, first)
-            base = int(links[carrier]) if kind != WITH_GROUND else int(_keeps_height(arm.chain))
-            last = min(int(link[mover]), arm.n_actuated)
+            base = links[carrier] if kind != WITH_GROUND else int(_keeps_height(arm.chain))
+            last = min(links[mover], arm.n_actuated)
+            fine = (carrier if kind == WITH_GROUND else finer[carrier], finer[mover])
+            proxies.append((fine if column in close else (carrier, mover), fine))
             planes.append((GROUND if kind == WITH_GROUND else carrier, mover, base, last))
             for axis in range(base, last):
-                corners = enclosures[mover].corners
-                travel[axis, column] = point_speed(arm.chain, axis, int(link[mover]), corners)
+                # Corners of the coarse polytope are among those of the fine one.
+                corners = bodies[finer[mover]].corners
+                travel[axis, column] = point_speed(arm.chain, axis, links[mover], corners)
         return cls(
             link=link,
             capsules=np.array([np.hstack(capsule) for capsule in capsules]).reshape(-1, 7),
@@ -118,13 +138,14 @@ class ContactShapes(NamedTuple):
             pairs=np.array(rows, dtype=np.int64).reshape(-1, 3),
             travel=travel,
             exact=np.array([is_capsule(shape) for shape in objects], dtype=bool),
-            bodies=np.stack([ends[:-1], ends[1:], links], axis=1),
-            corners=np.concatenate([body.corners for body in enclosures] or [np.zeros((0, 3))]),
-            rounding=np.array([body.rounding for body in enclosures], dtype=np.float64),
+            bodies=np.stack([ends[:-1], ends[1:], np.array(links, dtype=np.int64)], axis=1),
+            corners=np.concatenate([body.corners for body in bodies] or [np.zeros((0, 3))]),
+            rounding=np.array([body.rounding for body in bodies], dtype=np.float64),
             extents=np.array(
-                [(body.corners.min(axis=0), body.corners.max(axis=0)) for body in enclosures]
+                [(body.corners.min(axis=0), body.corners.max(axis=0)) for body in bodies]
             ).reshape(-1, 2, 3),
             planes=np.array(planes, dtype=np.int64).reshape(-1, 4),
+            proxies=np.array(proxies, dtype=np.int64).reshape(-1, 2, 2),
         )
 
 

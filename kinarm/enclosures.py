@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from kinarm.errors import ArmError
 
-MOST_CORNERS = 24
-"""Corners of a polytope about a mesh: what more of them save is less than they cost."""
+FEW, MANY = 16, 128
+"""Corners of a coarse and of a fine polytope about a mesh."""
 
 CLOSE_ENOUGH = 1e-4
 """Widening below which no more corners are taken [m]."""
@@ -26,8 +26,8 @@ class Enclosure(NamedTuple):
     rounding: float
 
 
-def enclosing_polytope(shape: pin.GeometryObject) -> Enclosure:
-    """Rounded polytope around a shape, in the frame of its joint.
+def enclosing_polytope(shape: pin.GeometryObject, most: int = MANY) -> Enclosure:
+    """Rounded polytope of at most so many corners around a shape, in the frame of its joint.
 
     It equals a capsule, sphere or box. Of a mesh, it is the hull of a few of its vertices, each the
     farthest one from the hull of those before, widened by the distance of the farthest one left.
@@ -46,9 +46,9 @@ def enclosing_polytope(shape: pin.GeometryObject) -> Enclosure:
     elif isinstance(body, coal.Box):
         local = Enclosure(np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T * body.halfSide, 0)
     elif isinstance(body, coal.Cylinder):
-        local = _around(_prism(float(body.radius), float(body.halfLength)))
+        local = _around(_prism(float(body.radius), float(body.halfLength)), most)
     elif isinstance(body, coal.ConvexBase):
-        local = _around(np.array(body.points()))
+        local = _around(np.array(body.points()), most)
     else:
         raise ArmError(f"collision shape {shape.name!r} is a {type(body).__name__}: not supported")
     return Enclosure(np.array([shape.placement.act(each) for each in local.corners]), local.rounding)
@@ -62,7 +62,7 @@ def _prism(radius: float, half_length: float) -> NDArray[np.float64]:
     return np.concatenate([np.concatenate([ring, end], axis=1) for end in ends])
 
 
-def _around(points: NDArray[np.float64]) -> Enclosure:
+def _around(points: NDArray[np.float64], most: int) -> Enclosure:
     """Enclose the hull of points, shape (n, 3)."""
     from kinarm.kernels.enclosing import distances_from_hull
 
@@ -72,6 +72,6 @@ def _around(points: NDArray[np.float64]) -> Enclosure:
     while True:
         distances_from_hull(points[chosen], points, distances)
         farthest = int(distances.argmax())
-        if distances[farthest] <= CLOSE_ENOUGH or len(chosen) == MOST_CORNERS:
+        if distances[farthest] <= CLOSE_ENOUGH or len(chosen) == most:
             return Enclosure(points[chosen], float(distances[farthest]) * (1 + 1e-9) + 1e-9)
         chosen.append(farthest)

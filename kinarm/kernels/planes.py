@@ -17,6 +17,9 @@ from kinarm.kernels.distance import between_segments
 from kinarm.kernels.kinematics import to_world
 from kinarm.kernels.lanes import select
 
+EVERYDAY, FINE = 0, 1
+"""Levels of `ContactShapes.proxies`."""
+
 OFFSET, GAP = 3, 4
 """Entries of a plane after its normal."""
 
@@ -57,9 +60,14 @@ def lowest(shapes: ContactShapes, body: int, x: float, y: float, z: float) -> fl
 
 
 @inlined
-def height_above(shapes: ContactShapes, pair: int, poses: Array, plane: Array, row: int) -> float:
-    """Least height of a pair's mover above a row of the planes [m]."""
-    carrier, mover = shapes.planes[pair, 0], shapes.planes[pair, 1]
+def height_above(
+    shapes: ContactShapes, pair: int, level: int, poses: Array, plane: Array, row: int
+) -> float:
+    """Least height of a pair's mover above a row of the planes [m].
+
+    The level is `EVERYDAY` or `FINE`: which polytope stands for the mover.
+    """
+    carrier, mover = shapes.planes[pair, 0], shapes.proxies[pair, level, 1]
     base = 0 if carrier == GROUND else shapes.bodies[carrier, 2]
     link = shapes.bodies[mover, 2]
     x, y, z = rotated(poses, base, plane[row, 0], plane[row, 1], plane[row, 2])
@@ -99,7 +107,8 @@ def propose(shapes: ContactShapes, pair: int, poses: Array, plane: Array, row: i
     x, y, z = x / norm, y / norm, z / norm
     x, y, z = select(inside, 0.0, x), select(inside, 0.0, y), select(inside, 1.0, z)
     plane[row, 0], plane[row, 1], plane[row, 2] = x, y, z
-    plane[row, OFFSET] = shapes.rounding[carrier] - lowest(shapes, carrier, -x, -y, -z)
+    proxy = shapes.proxies[pair, EVERYDAY, 0]
+    plane[row, OFFSET] = shapes.rounding[proxy] - lowest(shapes, proxy, -x, -y, -z)
 
 
 @inlined

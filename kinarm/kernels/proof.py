@@ -14,7 +14,7 @@ from kinarm.kernels.block import Alone, Block
 from kinarm.kernels.compiling import Array, helper, inlined
 from kinarm.kernels.kinematics import POSE, forward_kinematics
 from kinarm.kernels.lanes import any_lane, as_numbers, select
-from kinarm.kernels.planes import GAP, height_above, propose
+from kinarm.kernels.planes import EVERYDAY, FINE, GAP, height_above, propose
 from kinarm.kernels.separation import separate
 
 MARGIN = 1e-6
@@ -60,7 +60,7 @@ def prove_step(shapes: ContactShapes, tested: int, poses: Array, block: Block) -
     share = 1.0 / tested
     for pair in range(shapes.planes.shape[0]):
         before = block.planes[pair, GAP]
-        after = height_above(shapes, pair, poses, block.planes, pair)
+        after = height_above(shapes, pair, EVERYDAY, poses, block.planes, pair)
         early = before + share * (after - before)
         bound = min(after, early) - 0.125 * block.bend[pair]
         block.height[pair], block.bound[pair], block.planes[pair, GAP] = before, bound, after
@@ -84,8 +84,8 @@ def renew_planes(
         open_here = stale & ~is_apart(bound)
         if shapes.planes[pair, 0] != GROUND and any_lane(open_here):
             propose(shapes, pair, poses, block.planes, n_pairs)
-            at_start = height_above(shapes, pair, before, block.planes, n_pairs)
-            at_end = height_above(shapes, pair, poses, block.planes, n_pairs)
+            at_start = height_above(shapes, pair, EVERYDAY, before, block.planes, n_pairs)
+            at_end = height_above(shapes, pair, EVERYDAY, poses, block.planes, n_pairs)
             early = at_start + share * (at_end - at_start)
             renewed = min(at_end, early) - 0.125 * block.bend[pair]
             better = open_here & (renewed > bound)
@@ -148,7 +148,7 @@ def prove_alone(
             for i in range(PLANE):
                 plane[0, i] = planes[pair, i, lane]
             after = separate(shapes, pair, alone.after, alone.relative, alone.simplex, plane)
-            before = height_above(shapes, pair, alone.before, plane, 0)
+            before = height_above(shapes, pair, FINE, alone.before, plane, 0)
             unproven = open_configurations(before, after, bend, tested)
             for i in range(PLANE):
                 planes[pair, i, lane] = plane[0, i]
@@ -170,7 +170,7 @@ def prove_alone(
                 continue
             for i in range(PLANE):
                 plane[0, i] = planes[pair, i, lane]
-            height = height_above(shapes, pair, alone.before, plane, 0)
+            height = height_above(shapes, pair, FINE, alone.before, plane, 0)
             if not is_apart(height) and shapes.planes[pair, 0] != GROUND:
                 height = separate(shapes, pair, alone.before, alone.relative, alone.simplex, plane)
             if not is_apart(height):
@@ -188,7 +188,7 @@ def propose_planes(shapes: ContactShapes, poses: Array, block: Block) -> float:
     least = 0.0 * block.q[0, 0] + 1.0
     for pair in range(shapes.planes.shape[0]):
         propose(shapes, pair, poses, block.planes, pair)
-        height = height_above(shapes, pair, poses, block.planes, pair)
+        height = height_above(shapes, pair, EVERYDAY, poses, block.planes, pair)
         block.planes[pair, GAP] = height
         least = min(least, height)
     return least

@@ -9,7 +9,7 @@ import math
 
 from kinarm.contact_shapes import ContactShapes
 from kinarm.kernels.compiling import Array, Vector, helper, inlined
-from kinarm.kernels.planes import GAP, OFFSET, rotated_back
+from kinarm.kernels.planes import FINE, GAP, OFFSET, rotated_back
 from kinarm.kernels.simplex import shrink
 
 CORNERS_TRIED = 24
@@ -58,7 +58,7 @@ def separate(
     replaced by a better one. ``relative``, shape (4, 3), and ``simplex``, shape (4, 3), are work
     space.
     """
-    carrier, mover = shapes.planes[pair, 0], shapes.planes[pair, 1]
+    carrier, mover = shapes.proxies[pair, FINE, 0], shapes.proxies[pair, FINE, 1]
     base, link = shapes.bodies[carrier, 2], shapes.bodies[mover, 2]
     for column in range(3):
         x, y, z = rotated_back(
