@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from kinarm.errors import ArmError
 
-FEW, MANY = 16, 128
+FEW, MANY = 16, 256
 """Corners of a coarse and of a fine polytope about a mesh."""
 
 CLOSE_ENOUGH = 1e-4
