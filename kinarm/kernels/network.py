@@ -88,7 +88,7 @@ def act(
     hidden: Array,
     action: Array,
 ) -> None:
-    """Let a network choose an action, clipped to [-1, 1].
+    """Let a network choose an action.
 
     Parameters
     ----------
@@ -113,4 +113,4 @@ def act(
         activate(activations[layer], hidden, sink, n_out)
         offset += (n_in + 1) * n_out
     for j in range(action.shape[1]):
-        action[0, j] = min(max(hidden[(n_layers - 1) % 2, j], -1.0), 1.0)
+        action[0, j] = hidden[(n_layers - 1) % 2, j]

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from kinarm.chain import Chain
 from kinarm.contact_shapes import PLANE, ContactShapes
 from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Control, Episodes
+from kinarm.kernels.acting import choose_actions, shared_policy
 from kinarm.kernels.block import Alone, Block, put_back, take_in, work_space
 from kinarm.kernels.compiling import Array, inlined, kernel
 from kinarm.kernels.kinematics import forward_kinematics, to_world
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, select
-from kinarm.kernels.network import act
 from kinarm.kernels.observing import observe
 from kinarm.kernels.proof import is_apart, propose_planes, prove_alone, prove_step, renew_planes, stands_free
 from kinarm.kernels.reward import add_reward
@@ -130,15 +130,14 @@ def advance(first: int, last: int, session: Session) -> int:
     chain, shapes, rules = session.chain, session.shapes, session.rules
     control, episodes = session.control, session.episodes
     prismatic, translation, rotation, axes, tool, lower, upper = chain[:7]
-    layers, activations = control.layers, control.activations
     n_joints, n_actuated = episodes.q.shape[1], rules.step_limit.shape[0]
     n_observations, n_pairs = episodes.observation.shape[1], shapes.planes.shape[0]
-    from_table, shared = layers.shape[0] == 0, have_one_policy(first, last, control)
-    own = 0 if from_table or shared else control.weights.shape[1]
+    shared = shared_policy(first, last, control)
+    own = control.weights.shape[1] if shared < 0 else 0
     summed = n_observations if episodes.moments.shape[0] > 0 else 0
     widest = 1
-    for layer in range(1, layers.shape[0]):
-        widest = max(widest, layers[layer])
+    for layer in range(1, control.layers.shape[0]):
+        widest = max(widest, control.layers[layer])
     block, alone = work_space(
         n_joints,
         n_actuated,
@@ -149,8 +148,6 @@ def advance(first: int, last: int, session: Session) -> int:
         own,
         summed,
     )
-    mirrored = control.observation_signs.shape[0] > 0
-    seen = block.seen if mirrored else block.observation
     row = np.full(LANES, -1)
     before, poses = block.before, block.after
     waiting, n_alive, n_paused, changed = first, 0, 0, True
@@ -170,26 +167,14 @@ def advance(first: int, last: int, session: Session) -> int:
                     changed = True
         if n_alive == 0:
             return n_paused
-        reflected = block.observation[0, control.side] > 0.0
-        if from_table:
-            look_up(row, control, block)
-        else:
-            see(reflected, control, block)
-            if shared:
-                weights = control.weights[control.policy[first]]
-                act(layers, activations, weights, seen, block.hidden, block.action)
-            else:
-                act(layers, activations, block.weights, seen, block.hidden, block.action)
+        choose_actions(control, shared, row, block)
         fresh = (block.alive[0] > 0.0) & ~(block.judged[0] > 0.0)
         for i in range(summed):
             centred = select(fresh, block.observation[0, i] - episodes.shift[i], 0.0)
             block.first[i] += centred
             block.second[i] += centred * centred
         for axis in range(n_actuated):
-            action = min(max(block.action[0, axis], -1.0), 1.0)
-            if mirrored:
-                action = select(reflected, action * control.action_signs[axis], action)
-            moved = block.q[0, axis] + action * rules.step_limit[axis]
+            moved = block.q[0, axis] + block.action[0, axis] * rules.step_limit[axis]
             moved = min(max(moved, lower[axis]), upper[axis])
             block.target[0, axis] = select(fresh, moved, block.target[0, axis])
         before, poses = poses, before
@@ -244,39 +229,6 @@ def advance(first: int, last: int, session: Session) -> int:
                         episodes.status[e] = SUCCESS
                     elif ends >> lane & 1:
                         episodes.status[e] = TRUNCATED
-
-
-@inlined
-def have_one_policy(first: int, last: int, control: Control) -> bool:
-    """Whether all episodes of a range are driven by the same network."""
-    for e in range(first + 1, last):
-        if control.policy[e] != control.policy[first]:
-            return False
-    return True
-
-
-@inlined
-def look_up(row: NDArray[np.int64], control: Control, block: Block) -> None:
-    """Take the actions of a block, whose episodes are given, from the table."""
-    action, steps = as_numbers(block.action), as_numbers(block.steps)
-    for lane in range(row.shape[0]):
-        if row[lane] >= 0:
-            column = int(steps[0, lane]) if control.actions.shape[1] > 1 else 0
-            for axis in range(action.shape[1]):
-                action[0, axis, lane] = control.actions[row[lane], column, axis]
-
-
-@inlined
-def see(reflected: bool, control: Control, block: Block) -> None:
-    """Fill in what networks with a mirror see, given where they see it in there.
-
-    Such a network has learnt goals on the right alone: for a goal on the left it is given the
-    reflected observation, and its action is reflected in turn.
-    """
-    signs = control.observation_signs
-    for i in range(signs.shape[0]):
-        given = block.observation[0, i]
-        block.seen[0, i] = select(reflected, signs[i] * given, given)
 
 
 @kernel

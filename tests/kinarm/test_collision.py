@@ -253,10 +253,10 @@ def doubted_steps(simulator, starts, actions):
     episodes = simulator.reset(starts, np.tile([0.0, 0.0, 5.0], (len(starts), 1)))
     np.copyto(episodes.stop, 1)
     control = table_control(actions[:, None])
-    shapes, rules = simulator.world.contact_model.shapes, simulator._rules
-    advance(0, len(starts), simulator.arm.chain, shapes, rules, control, episodes)
+    advance(0, len(starts), simulator._session(control, episodes))
     paused = episodes.status == PAUSED
-    bits = episodes.doubt[:, None] >> np.arange(rules.tested) & 1
+    tested = simulator.problem.stepping.tested_configurations
+    bits = episodes.doubt[:, None] >> np.arange(tested) & 1
     return episodes, paused[:, None] & bits.astype(bool)
 
 

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from numba import njit
 
-from kinarm.kernels.network import NARROW, act
+from kinarm.kernels.acting import choose_actions, shared_policy
+from kinarm.kernels.block import work_space
+from kinarm.kernels.lanes import LANES, as_numbers
 from kinarm.networks import ACTIVATIONS, Mirror, Networks, network_control
 
 FUNCTIONS = {
@@ -21,9 +23,21 @@ FUNCTIONS = {
 
 
 @njit
-def act_all(control, observations, work, actions):
-    for e in range(len(observations)):
-        act(control, observations, e, work, actions[e])
+def act_all(control, observations, actions):
+    n, n_observations = observations.shape
+    shared, widest = shared_policy(0, n, control), control.layers.max()
+    own = control.weights.shape[1] if shared < 0 else 0
+    block, _ = work_space(0, actions.shape[1], n_observations, 0, 0, widest, own, 0)
+    given, weights = as_numbers(block.observation), as_numbers(block.weights)
+    chosen, row = as_numbers(block.action), np.full(LANES, -1)
+    for start in range(0, n, LANES):
+        for lane in range(min(LANES, n - start)):
+            row[lane] = start + lane
+            given[0, :, lane] = observations[start + lane]
+            weights[:, lane] = control.weights[control.policy[start + lane], :own]
+        choose_actions(control, shared, row, block)
+        for lane in range(min(LANES, n - start)):
+            actions[start + lane] = chosen[0, :, lane]
 
 
 def compiled(networks, observations):
@@ -31,7 +45,7 @@ def compiled(networks, observations):
     count, widths = len(observations), (networks.layers[0], networks.layers[-1])
     control = network_control(networks, None, count, widths)
     actions = np.full((count, widths[1]), np.nan)
-    act_all(control, observations, np.full((3, max(networks.layers)), np.nan), actions)
+    act_all(control, observations, actions)
     return actions
 
 
@@ -52,9 +66,9 @@ def in_numpy(networks, x, index=0):
 
 
 @pytest.mark.parametrize("n_actions", [1, 4, 6])
-@pytest.mark.parametrize("width", [3, NARROW - 1, NARROW, 40])
+@pytest.mark.parametrize("width", [3, 4, 5, 16, 41])
 def test_layers_of_any_width(n_actions, width):
-    """Narrow and wide layers take different ways through the kernel."""
+    """Sums are taken five at a time."""
     networks = random_networks([9, width, width + 1, n_actions])
     x = np.random.default_rng(width).normal(size=(20, 9))
     actions = compiled(networks, x)
