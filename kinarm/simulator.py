@@ -13,8 +13,15 @@ from kinarm._validation import finite_array
 from kinarm.arm import Arm
 from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Control, Episodes, Rules
 from kinarm.errors import InvalidInputError, StartInContactError
-from kinarm.kernels.rollout import advance, allow_one_step, begin, refuse, results_of_step
-from kinarm.kernels.session import Session, bind
+from kinarm.kernels.rollout import (
+    advance,
+    allow_one_step,
+    begin,
+    bind,
+    refuse,
+    results_of_step,
+)
+from kinarm.kernels.session import Session
 from kinarm.networks import CompiledPolicy, Networks, network_control, table_control
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.rollouts import Rollouts, StepResult

@@ -156,7 +156,6 @@ class GoalInterface:
             rows = np.flatnonzero(result.collision)
             over = episodes.steps[rows] >= self._horizon
             episodes.status[rows] = np.where(over, TRUNCATED, RUNNING)
-            episodes.slack[rows] = 0.0  # what it was spent on did not happen
             truncated = truncated | (episodes.status == TRUNCATED) & result.collision
         shown = self.observe(episodes.observation)
         goals, info = (

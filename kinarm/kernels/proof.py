@@ -150,6 +150,7 @@ def prove_alone(
             after = separate(shapes, pair, alone.after, alone.relative, alone.simplex, plane)
             before = height_above(shapes, pair, FINE, alone.before, plane, 0)
             unproven = open_configurations(before, after, bend, tested)
+            heights[pair, lane] = before
             for i in range(PLANE):
                 planes[pair, i, lane] = plane[0, i]
         alone.listed[n_open, 0], alone.listed[n_open, 1] = pair, unproven

@@ -9,18 +9,19 @@ from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.contact_shapes import PLANE, ContactShapes
-from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Control, Episodes
+from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Control, Episodes, Rules
 from kinarm.kernels.acting import choose_actions, shared_policy
 from kinarm.kernels.block import Alone, Block, put_back, take_in, work_space
 from kinarm.kernels.compiling import Array, inlined, kernel
 from kinarm.kernels.kinematics import forward_kinematics, to_world
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.observing import observe
+from kinarm.kernels.planes import GAP
 from kinarm.kernels.proof import is_apart, propose_planes, prove_alone, prove_step, renew_planes, stands_free
 from kinarm.kernels.reward import add_reward
 from kinarm.kernels.session import Session
 
-LAYOUT = "a4"
+LAYOUT = "b40aae2f5cc7"
 """Hash of what is compiled in from other files; a test tells when to renew it.
 
 Numba's disk cache notices changes only in this file, so changing this line is what makes it
@@ -121,6 +122,14 @@ def stand(
 
 
 @kernel
+def bind(
+    chain: Chain, shapes: ContactShapes, rules: Rules, control: Control, episodes: Episodes
+) -> Session:
+    """Bind a session, whose arrays stay those given."""
+    return Session(chain, shapes, rules, control, episodes)
+
+
+@kernel
 def advance(first: int, last: int, session: Session) -> int:
     """Advance the running episodes among ``first`` to ``last - 1``, a block at a time.
 
@@ -194,6 +203,9 @@ def advance(first: int, last: int, session: Session) -> int:
                 if doubt != 0:
                     e, row[lane] = row[lane], -1
                     put_back(lane, e, episodes, block)
+                    for pair in range(n_pairs):
+                        # It has not moved yet.
+                        episodes.planes[e, pair, GAP] = as_numbers(block.height)[pair, lane]
                     episodes.doubt[e] = doubt
                     episodes.status[e] = PAUSED
                     n_alive -= 1

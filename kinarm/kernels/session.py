@@ -7,11 +7,6 @@ the call. A session is taken apart once.
 from numba import types
 from numba.experimental import structref
 
-from kinarm.chain import Chain
-from kinarm.contact_shapes import ContactShapes
-from kinarm.episodes import Control, Episodes, Rules
-from kinarm.kernels.compiling import kernel
-
 
 @structref.register
 class SessionType(types.StructRef):  # type: ignore[misc]
@@ -23,11 +18,3 @@ class Session(structref.StructRefProxy):  # type: ignore[misc]
 
 
 structref.define_proxy(Session, SessionType, ["chain", "shapes", "rules", "control", "episodes"])
-
-
-@kernel
-def bind(
-    chain: Chain, shapes: ContactShapes, rules: Rules, control: Control, episodes: Episodes
-) -> Session:
-    """Bind a session, whose arrays stay those given."""
-    return Session(chain, shapes, rules, control, episodes)

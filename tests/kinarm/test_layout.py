@@ -41,6 +41,7 @@ def compiled_in(source):
 def test_what_is_compiled_in_has_no_cache_of_its_own():
     assert {name.rpartition(".")[2] for name in CACHED} == {
         "approach",
+        "enclosing",
         "projection",
         "rasterising",
         "rollout",
