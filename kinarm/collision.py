@@ -21,7 +21,7 @@ from kinarm.contact_shapes import BETWEEN_CAPSULES, WITH_BOX, WITH_GROUND, Conta
 from kinarm.scene import Scene
 
 CLOSE, OFTEN, CLOSENESS_SAMPLES = 0.025, 0.05, 200
-"""A pair is close if it is nearer than this [m] at more than this share of random configurations."""
+"""A pair is close if it is nearer than this [m] at more than this share of so many samples."""
 
 MOUNT_SAMPLES = 721
 """Positions of the first joint at which the mounting is tested."""

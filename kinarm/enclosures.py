@@ -51,7 +51,9 @@ def enclosing_polytope(shape: pin.GeometryObject, most: int = MANY) -> Enclosure
         local = _around(np.array(body.points()), most)
     else:
         raise ArmError(f"collision shape {shape.name!r} is a {type(body).__name__}: not supported")
-    return Enclosure(np.array([shape.placement.act(each) for each in local.corners]), local.rounding)
+    return Enclosure(
+        np.array([shape.placement.act(each) for each in local.corners]), local.rounding
+    )
 
 
 def _prism(radius: float, half_length: float) -> NDArray[np.float64]:

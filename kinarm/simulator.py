@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm._parallel import run_rows
 from kinarm._validation import finite_array
 from kinarm.arm import Arm
-from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Control, Episodes, Rules
+from kinarm.episodes import PAUSED, RUNNING, Control, Episodes, Rules
 from kinarm.errors import InvalidInputError, StartInContactError
 from kinarm.kernels.rollout import (
     advance,

@@ -22,9 +22,7 @@ def shared_policy(first: int, last: int, control: Control) -> int:
 
 
 @inlined
-def choose_actions(
-    control: Control, shared: int, row: NDArray[np.int64], block: Block
-) -> None:
+def choose_actions(control: Control, shared: int, row: NDArray[np.int64], block: Block) -> None:
     """Fill in the actions of a block.
 
     ``shared`` is what `shared_policy` returned, and ``row`` tells which episodes are in the block,

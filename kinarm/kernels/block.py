@@ -15,8 +15,8 @@ from kinarm.kernels.lanes import LANES, as_lanes, as_numbers
 class Block(NamedTuple):
     """Work space of a block of episodes.
 
-    Its arrays are of lanes; `kinarm.kernels.lanes.as_numbers` views them with one axis more, that of
-    the episodes.
+    Its arrays are of lanes; `kinarm.kernels.lanes.as_numbers` views them with one axis more, that
+    of the episodes.
 
     Attributes
     ----------
@@ -106,8 +106,14 @@ class Alone(NamedTuple):
 
 @unit
 def work_space(
-    n_joints: int, n_actuated: int, n_observations: int, n_pairs: int, n_terms: int,
-    widest: int, own: int, summed: int,
+    n_joints: int,
+    n_actuated: int,
+    n_observations: int,
+    n_pairs: int,
+    n_terms: int,
+    widest: int,
+    own: int,
+    summed: int,
 ) -> tuple[Block, Alone]:
     """Allocate a block, and the space for a single episode."""
     block = Block(

@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
+UNCALLED: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""Options of what only kernels call: the way there from Python or C is not compiled."""
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -23,16 +26,21 @@ def kernel(function: Function) -> Function:
 
 def inlined(function: Function) -> Function:
     """Compile a helper that allocates nothing: several times faster without reference counts."""
-    options: dict[str, Any] = {"error_model": "numpy", "forceinline": True, "_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    options: dict[str, Any] = {
+        "error_model": "numpy",
+        "forceinline": True,
+        "_nrt": False,
+        **UNCALLED,
+    }
     return cast("Function", njit(**options)(function))
 
 
 def helper(function: Function) -> Function:
     """Compile a long helper that allocates nothing: called, it is compiled only once."""
-    options: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    options: dict[str, Any] = {"error_model": "numpy", "_nrt": False, **UNCALLED}
     return cast("Function", njit(**options)(function))
 
 
 def unit(function: Function) -> Function:
     """Compile a function that allocates what it returns, for kernels."""
-    return cast("Function", njit(error_model="numpy", no_cpython_wrapper=True)(function))
+    return cast("Function", njit(error_model="numpy", **UNCALLED)(function))

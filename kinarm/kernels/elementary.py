@@ -55,17 +55,14 @@ def sine_cosine(angle: float) -> tuple[float, float]:
 
 @inlined
 def exponential(x: float) -> float:
-    """e to the power of a number between -700 and 700, to within 2e-16 of itself."""
+    """E to the power of a number between -700 and 700, to within 2e-16 of itself."""
     doublings = nearest_whole(x * LOG_2_INVERSE)
     x = (x - doublings * LOG_2) - doublings * LOG_2_REST
     z = x * x
     p = x * (
-        9.99999999999999999910e-1
-        + z * (3.02994407707441961300e-2 + z * 1.26177193074810590878e-4)
+        9.99999999999999999910e-1 + z * (3.02994407707441961300e-2 + z * 1.26177193074810590878e-4)
     )
-    q = 2.27265548208155028766e-1 + z * (
-        2.52448340349684104192e-3 + z * 3.00198505138664455042e-6
-    )
+    q = 2.27265548208155028766e-1 + z * (2.52448340349684104192e-3 + z * 3.00198505138664455042e-6)
     q = 2.0 + z * q
     return (1.0 + 2.0 * (p / (q - p))) * power_of_two(doublings)
 
@@ -75,9 +72,7 @@ def hyperbolic_tangent(x: float) -> float:
     """Hyperbolic tangent, to within 4e-16 of itself."""
     size = abs(x)
     z = x * x
-    p = -1.61468768441708447952e3 + z * (
-        -9.92877231001918586564e1 + z * -9.64399179425052238628e-1
-    )
+    p = -1.61468768441708447952e3 + z * (-9.92877231001918586564e1 + z * -9.64399179425052238628e-1)
     q = 4.84406305325125486048e3 + z * (
         2.23548839060100448583e3 + z * (1.12811678491632931402e2 + z)
     )

@@ -1,4 +1,4 @@
-"""Several episodes in one SIMD value: a type for kernels, and functions for lanes and numbers alike.
+"""Several episodes in one SIMD value: a type for kernels, with functions for numbers, too.
 
 A value of type ``lanes`` holds one number for each of `LANES` episodes. Arithmetic, comparisons,
 ``min``, ``max``, ``abs`` and ``math.sqrt`` act on all of them at once, and numbers mix with
@@ -12,10 +12,9 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core.typeconv import Conversion
+from numba.core.typeconv.castgraph import Conversion
 from numba.core.typing.templates import AbstractTemplate, Signature, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
 
@@ -53,13 +52,13 @@ lanes, mask = LanesType(), MaskType()
 
 
 @register_model(LanesType)
-class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
+class _LanesModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: types.Type) -> None:
         super().__init__(manager, kind, NUMBERS)
 
 
 @register_model(MaskType)
-class _MaskModel(models.PrimitiveModel):  # type: ignore[misc]
+class _MaskModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: types.Type) -> None:
         super().__init__(manager, kind, BITS)
 
@@ -91,7 +90,7 @@ def _teach(
 ) -> None:
     """Let a Python function or operator act on lanes, or on masks, by an instruction."""
 
-    class Template(AbstractTemplate):  # type: ignore[misc]
+    class Template(AbstractTemplate):
         def generic(self, arguments: tuple[types.Type, ...], _: Any) -> Signature | None:
             fits = all(kind == given or (given == lanes and _is_number(kind)) for kind in arguments)
             if len(arguments) == arity and given in arguments and fits:
@@ -150,7 +149,12 @@ _teach(abs, lanes, lanes, 1, _call("fabs"))
 _teach(math.sqrt, lanes, lanes, 1, _call("sqrt"))
 
 
-@intrinsic  # type: ignore[misc]
+def _instruction(function: Callable[..., Any]) -> Any:
+    """Let kernels call what a function of the types of its arguments describes."""
+    return intrinsic(function)
+
+
+@_instruction
 def power_of_two(_: Any, exponent: types.Type) -> Any:
     """2 to the power of a whole number between -1022 and 1023, for a number or lanes."""
 
@@ -168,13 +172,13 @@ def power_of_two(_: Any, exponent: types.Type) -> Any:
     return exponent(exponent), code
 
 
-@intrinsic  # type: ignore[misc]
+@_instruction
 def select(_: Any, condition: types.Type, first: types.Type, second: types.Type) -> Any:
     """``first`` where a condition holds, else ``second``: without a branch, for each episode."""
     many = condition == mask
     if not many and condition != types.boolean:
         return None
-    result = lanes if many or lanes in (first, second) else types.float64
+    result: types.Type = lanes if many or lanes in (first, second) else types.float64
     if condition == mask and first == mask:
         result = mask
 
@@ -184,7 +188,7 @@ def select(_: Any, condition: types.Type, first: types.Type, second: types.Type)
     return result(condition, result, result), code
 
 
-@intrinsic  # type: ignore[misc]
+@_instruction
 def any_lane(_: Any, condition: types.Type) -> Any:
     """Whether a condition holds for some episode."""
 
@@ -198,7 +202,7 @@ def any_lane(_: Any, condition: types.Type) -> Any:
     return types.boolean(condition), code
 
 
-@intrinsic  # type: ignore[misc]
+@_instruction
 def lane_bits(_: Any, condition: types.Type) -> Any:
     """The truth values of a mask as the bits of a whole number."""
 
@@ -209,8 +213,8 @@ def lane_bits(_: Any, condition: types.Type) -> Any:
     return types.int64(condition), code
 
 
-@intrinsic  # type: ignore[misc]
-def as_lanes(_: Any, array: types.Type) -> Any:
+@_instruction
+def as_lanes(_: Any, array: types.Array) -> Any:
     """View a C-contiguous array of float64 whose last axis has `LANES` entries as one of lanes."""
     view = types.Array(lanes, array.ndim - 1, "C", aligned=False)
 
@@ -220,8 +224,8 @@ def as_lanes(_: Any, array: types.Type) -> Any:
     return view(array), code
 
 
-@intrinsic  # type: ignore[misc]
-def as_numbers(_: Any, array: types.Type) -> Any:
+@_instruction
+def as_numbers(_: Any, array: types.Array) -> Any:
     """View a C-contiguous array of lanes as one of float64, which has one axis more."""
     view = types.Array(types.float64, array.ndim + 1, "C")
 
@@ -235,13 +239,14 @@ def as_numbers(_: Any, array: types.Type) -> Any:
 def _viewed(
     context: Any,
     builder: Any,
-    kinds: tuple[types.Type, types.Type],
+    kinds: tuple[types.Array, types.Array],
     value: Any,
     reshaped: Callable[[list[Any]], list[Any]],
 ) -> Any:
     """View an array as one of another type and shape."""
     from numba.core import cgutils
-    from numba.np.arrayobj import impl_ret_borrowed, make_array, populate_array
+    from numba.core.imputils import impl_ret_borrowed
+    from numba.np.arrayobj import make_array, populate_array
 
     given = make_array(kinds[0])(context, builder, value)
     made = make_array(kinds[1])(context, builder)

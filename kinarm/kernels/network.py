@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.episodes import ELU, HARDTANH, LEAKY_RELU, LINEAR, RELU, SILU, TANH
-from kinarm.kernels.compiling import Array, helper, inlined
+from kinarm.kernels.compiling import Array, helper
 from kinarm.kernels.elementary import hyperbolic_tangent
 from kinarm.kernels.lanes import select
 

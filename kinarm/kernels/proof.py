@@ -94,7 +94,9 @@ def renew_planes(
             block.height[pair] = select(better, at_start, block.height[pair])
             block.planes[n_pairs, GAP] = at_end
             for i in range(PLANE):
-                block.planes[pair, i] = select(better, block.planes[n_pairs, i], block.planes[pair, i])
+                block.planes[pair, i] = select(
+                    better, block.planes[n_pairs, i], block.planes[pair, i]
+                )
         least = min(least, bound)
     return least
 
@@ -196,9 +198,7 @@ def propose_planes(shapes: ContactShapes, poses: Array, block: Block) -> float:
 
 
 @helper
-def stands_free(
-    lane: int, shapes: ContactShapes, poses: Array, block: Block, alone: Alone
-) -> bool:
+def stands_free(lane: int, shapes: ContactShapes, poses: Array, block: Block, alone: Alone) -> bool:
     """Prove the configuration of a single episode free as far as first planes have not."""
     plane, planes, free = alone.plane, as_numbers(block.planes), True
     take_poses(lane, poses, alone.after)

@@ -17,7 +17,14 @@ from kinarm.kernels.kinematics import forward_kinematics, to_world
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.observing import observe
 from kinarm.kernels.planes import GAP
-from kinarm.kernels.proof import is_apart, propose_planes, prove_alone, prove_step, renew_planes, stands_free
+from kinarm.kernels.proof import (
+    is_apart,
+    propose_planes,
+    prove_alone,
+    prove_step,
+    renew_planes,
+    stands_free,
+)
 from kinarm.kernels.reward import add_reward
 from kinarm.kernels.session import Session
 
@@ -108,9 +115,7 @@ def begin(
 
 
 @inlined
-def stand(
-    chain: Chain, shapes: ContactShapes, filled: int, block: Block, alone: Alone
-) -> int:
+def stand(chain: Chain, shapes: ContactShapes, filled: int, block: Block, alone: Alone) -> int:
     """Place the arms of a block, and return the bits of those that are proven free of contact."""
     prismatic, translation, rotation, axes = chain[:4]
     forward_kinematics(prismatic, translation, rotation, axes, block.q, 0, block.after)

@@ -7,14 +7,24 @@ the call. A session is taken apart once.
 from numba import types
 from numba.experimental import structref
 
+from kinarm.chain import Chain
+from kinarm.contact_shapes import ContactShapes
+from kinarm.episodes import Control, Episodes, Rules
+
 
 @structref.register
-class SessionType(types.StructRef):  # type: ignore[misc]
+class SessionType(types.StructRef):
     """Numba's type of a `Session`."""
 
 
-class Session(structref.StructRefProxy):  # type: ignore[misc]
+class Session(structref.StructRefProxy):
     """Arm, scene, rules, source of actions and episodes; kernels see them as its attributes."""
+
+    chain: Chain
+    shapes: ContactShapes
+    rules: Rules
+    control: Control
+    episodes: Episodes
 
 
 structref.define_proxy(Session, SessionType, ["chain", "shapes", "rules", "control", "episodes"])
