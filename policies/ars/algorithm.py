@@ -1,16 +1,19 @@
 """Augmented Random Search (paper, Algorithm 1 and Table 1; Mania, Guy and Recht 2018)."""
 
+import math
 import time
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm.kernels.lanes import LANES
 from kinarm.networks import Mirror, Networks
 from kinarm.policies.ars.config import ARSConfig
+from kinarm.policies.ars.kernels import normal_pairs, perturbed_weights
 from kinarm.policies.ars.state import ARSState
 from kinarm.policies.curve import CurvePoint
 from kinarm.policies.mirror import commuting_weights, task_mirror
-from kinarm.policies.normalizer import Normalizer, fold_normalizer
+from kinarm.policies.normalizer import Normalizer, input_scale
 from kinarm.policies.policy import Layer, Policy
 from kinarm.policies.provenance import Provenance
 from kinarm.simulator import Simulator
@@ -54,13 +57,14 @@ def ars_iteration(
     """
     began, rng = time.perf_counter(), state.random_generator()
     N, theta, normalizer = config.directions, state.theta, state.normalizer
-    delta = rng.standard_normal((N, *theta.shape))
+    delta = perturbations(rng, (N, *theta.shape))
     if mirror is not None:
         delta *= commuting_weights(mirror)
-    candidates = np.concatenate([theta + config.noise * delta, theta - config.noise * delta])
     starts, goals = shared_scenarios(config, simulator, rng)
     rollouts = simulator.rollout(
-        linear_networks(candidates, policy_normalizer(config, normalizer, mirror)),
+        perturbed_policies(
+            theta, config.noise * delta, policy_normalizer(config, normalizer, mirror)
+        ),
         starts,
         goals,
         policy_index=np.repeat(np.arange(2 * N), config.episodes),
@@ -73,7 +77,7 @@ def ars_iteration(
         mean_return=float(rollouts.returns.mean()),
         std_return=float(rollouts.returns.std()),
         success=float(rollouts.success.mean()),
-        environment_steps=state.environment_steps + int(rollouts.steps.sum()),
+        environment_steps=normalizer.count,
         wall_time=state.wall_time + time.perf_counter() - began,
     )
     return ARSState(
@@ -82,6 +86,19 @@ def ars_iteration(
         generator=dict(rng.bit_generator.state),
         curve=(*state.curve, point),
     )
+
+
+def perturbations(rng: np.random.Generator, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Draw independent standard normal numbers, the same bits on every machine.
+
+    Those of NumPy's generator depend on the C library's logarithm.
+    """
+    count = math.prod(shape)
+    half = -(-count // 2)
+    numbers = np.zeros((2, -(-half // LANES) * LANES))
+    numbers[:, :half] = rng.random((2, half))
+    normal_pairs(numbers.reshape(2, -1, LANES))
+    return numbers[:, :half].reshape(-1)[:count].reshape(shape)
 
 
 def shared_scenarios(
@@ -103,13 +120,17 @@ def policy_normalizer(config: ARSConfig, seen: Normalizer, mirror: Mirror | None
     return seen if mirror is None else seen.mirrored(mirror.observations)
 
 
-def linear_networks(theta: NDArray[np.float64], normalizer: Normalizer) -> Networks:
-    """Policies theta diag(Sigma)^(-1/2) (x - mu) with the normaliser folded in.
+def perturbed_policies(
+    theta: NDArray[np.float64], step: NDArray[np.float64], normalizer: Normalizer
+) -> Networks:
+    """Policies (theta + step) diag(Sigma)^(-1/2) (x - mu), then those of theta - step.
 
-    Parameters have the shape (n, n_actions, n_observations).
+    Steps have the shape (N, n_actions, n_observations). The normaliser is folded in.
     """
-    bias = np.zeros(theta.shape[:2])
-    return Networks.linear(*fold_normalizer(theta, bias, normalizer.mean, normalizer.std))
+    n_actions, n_observations = theta.shape
+    weights = np.empty((2, len(step), (n_observations + 1) * n_actions))
+    perturbed_weights(theta, step, input_scale(normalizer.std), normalizer.mean, weights)
+    return Networks(np.array([n_observations, n_actions]), weights.reshape(2 * len(step), -1))
 
 
 def top_directions(returns: NDArray[np.float64], b: int) -> NDArray[np.int64]:

@@ -10,7 +10,12 @@ import pytest
 
 KERNELS = {
     f"{package}.{path.stem}": path
-    for package in ("kinarm.kernels", "kinarm.policies.oracle.kernels", "kinarm.viewer.kernels")
+    for package in (
+        "kinarm.kernels",
+        "kinarm.policies.ars",
+        "kinarm.policies.oracle.kernels",
+        "kinarm.viewer.kernels",
+    )
     for path in sorted(Path(import_module(package).__file__).parent.glob("*.py"))
 }
 SOURCES = {name: path.read_text(encoding="utf-8") for name, path in KERNELS.items()}
@@ -41,6 +46,7 @@ def compiled_in(source):
 def test_what_is_compiled_in_has_no_cache_of_its_own():
     assert {name.rpartition(".")[2] for name in CACHED} == {
         "approach",
+        "kernels",
         "projection",
         "rasterising",
         "rollout",
