@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -48,6 +48,11 @@ class Outcomes:
     def distance(self) -> NDArray[np.float64]:
         """Final distances [m]."""
         return self._joined(rollouts.distance for rollouts in self.rollouts)
+
+    @cached_property
+    def ordered_distance(self) -> NDArray[np.float64]:
+        """Final distances along the last axis, the smallest first [m]."""
+        return np.sort(self.distance, axis=-1)
 
     @cached_property
     def steps(self) -> NDArray[np.int64]:
@@ -155,12 +160,12 @@ def share_within(limit: float) -> Metric:
 
 
 def distance_metric(
-    meaning: str, statistic: Callable[..., Any], heading: str = "", **shown: Any
+    meaning: str, formula: Callable[[Outcomes], Any], heading: str = "", **shown: Any
 ) -> Metric:
-    """A statistic of the final distance, such as ``np.mean``."""
+    """A statistic of the final distance."""
     return Metric(
         meaning=f"{meaning} of the final distance",
-        formula=lambda trials: statistic(trials.distance, axis=-1),
+        formula=formula,
         unit="m",
         interval="bootstrap",
         heading=heading,
@@ -168,11 +173,10 @@ def distance_metric(
     )
 
 
-def interquartile_mean(values: NDArray[np.float64], axis: int) -> Any:
-    """Mean of the middle half of some values."""
-    from scipy.stats import trim_mean
-
-    return trim_mean(values, 0.25, axis=axis)
+def middle_half(ordered: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Ordered values without the smallest and the largest quarter, along the last axis."""
+    n = ordered.shape[-1]
+    return ordered[..., n // 4 : n - n // 4]
 
 
 METRICS: dict[str, Metric] = {
@@ -200,12 +204,24 @@ METRICS: dict[str, Metric] = {
     ),
     **{f"within_{limit:g}": share_within(limit) for limit in LIMITS},
     "median_distance": distance_metric(
-        "median", np.median, "median m", shows_interval=True, priority=ALWAYS
+        "median",
+        lambda trials: np.median(trials.ordered_distance, axis=-1),
+        "median m",
+        shows_interval=True,
+        priority=ALWAYS,
     ),
-    "mean_distance": distance_metric("mean", np.mean, "mean m", priority=2),
-    "iqm_distance": distance_metric("interquartile mean (of the middle half)", interquartile_mean),
+    "mean_distance": distance_metric(
+        "mean", lambda trials: trials.distance.mean(axis=-1), "mean m", priority=2
+    ),
+    "iqm_distance": distance_metric(
+        "interquartile mean (of the middle half)",
+        lambda trials: middle_half(trials.ordered_distance).mean(axis=-1),
+    ),
     "p95_distance": distance_metric(
-        "95th percentile", partial(np.quantile, q=0.95), "p95 m", priority=2
+        "95th percentile",
+        lambda trials: np.quantile(trials.ordered_distance, 0.95, axis=-1),
+        "p95 m",
+        priority=2,
     ),
     "max_distance": Metric(
         meaning="largest final distance",
