@@ -173,6 +173,13 @@ def distance_metric(
     )
 
 
+def middle(ordered: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Median of ordered values along the last axis."""
+    n = ordered.shape[-1]
+    median: NDArray[np.float64] = (ordered[..., (n - 1) // 2] + ordered[..., n // 2]) / 2
+    return median
+
+
 def middle_half(ordered: NDArray[np.float64]) -> NDArray[np.float64]:
     """Ordered values without the smallest and the largest quarter, along the last axis."""
     n = ordered.shape[-1]
@@ -205,7 +212,7 @@ METRICS: dict[str, Metric] = {
     **{f"within_{limit:g}": share_within(limit) for limit in LIMITS},
     "median_distance": distance_metric(
         "median",
-        lambda trials: np.median(trials.ordered_distance, axis=-1),
+        lambda trials: middle(trials.ordered_distance),
         "median m",
         shows_interval=True,
         priority=ALWAYS,
