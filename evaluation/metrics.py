@@ -1,5 +1,6 @@
 """The figures of merit in one table, which documents, tables, reports and the docs read."""
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -173,11 +174,20 @@ def distance_metric(
     )
 
 
-def middle(ordered: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Median of ordered values along the last axis."""
+def median(ordered: NDArray[np.float64]) -> Any:
+    """Median along the last axis of values that are ordered."""
     n = ordered.shape[-1]
-    median: NDArray[np.float64] = (ordered[..., (n - 1) // 2] + ordered[..., n // 2]) / 2
-    return median
+    return (ordered[..., (n - 1) // 2] + ordered[..., n // 2]) / 2
+
+
+def quantile(ordered: NDArray[np.float64], share: float) -> Any:
+    """Quantile along the last axis, as NumPy interpolates it, of values that are ordered."""
+    position = share * (ordered.shape[-1] - 1)
+    low, beyond = ordered[..., math.floor(position)], position % 1
+    high = ordered[..., math.ceil(position)]
+    if beyond < 0.5:
+        return low + (high - low) * beyond
+    return high - (high - low) * (1 - beyond)
 
 
 def middle_half(ordered: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -212,7 +222,7 @@ METRICS: dict[str, Metric] = {
     **{f"within_{limit:g}": share_within(limit) for limit in LIMITS},
     "median_distance": distance_metric(
         "median",
-        lambda trials: middle(trials.ordered_distance),
+        lambda trials: median(trials.ordered_distance),
         "median m",
         shows_interval=True,
         priority=ALWAYS,
@@ -226,7 +236,7 @@ METRICS: dict[str, Metric] = {
     ),
     "p95_distance": distance_metric(
         "95th percentile",
-        lambda trials: np.quantile(trials.ordered_distance, 0.95, axis=-1),
+        lambda trials: quantile(trials.ordered_distance, 0.95),
         "p95 m",
         priority=2,
     ),
