@@ -9,7 +9,12 @@ from numpy.typing import NDArray
 from kinarm.kernels.lanes import LANES
 from kinarm.networks import Mirror, Networks
 from kinarm.policies.ars.config import ARSConfig
-from kinarm.policies.ars.kernels import normal_pairs, perturbed_weights
+from kinarm.policies.ars.kernels import (
+    mean_and_deviation,
+    normal_pairs,
+    perturbed_weights,
+    weighted_sum,
+)
 from kinarm.policies.ars.state import ARSState
 from kinarm.policies.curve import CurvePoint
 from kinarm.policies.mirror import commuting_weights, task_mirror
@@ -29,6 +34,7 @@ class ARSTraining:
     def __init__(self, config: ARSConfig, threads: int | None = None) -> None:
         self.config, self.simulator = config, config.simulator(threads)
         self.mirror = task_mirror(config.symmetric, self.simulator.world)
+        self._rng = np.random.default_rng(config.seed)
 
     def initial_state(self) -> ARSState:
         """State before the first iteration: theta = 0, mu = 0, Sigma = I."""
@@ -41,7 +47,7 @@ class ARSTraining:
 
     def iterate(self, state: ARSState) -> ARSState:
         """One pass through the loop of Algorithm 1."""
-        return ars_iteration(self.config, self.simulator, state, self.mirror)
+        return ars_iteration(self.config, self.simulator, state, self.mirror, self._rng)
 
 
 def ars_iteration(
@@ -49,13 +55,14 @@ def ars_iteration(
     simulator: Simulator,
     state: ARSState,
     mirror: Mirror | None = None,
+    rng: np.random.Generator | None = None,
 ) -> ARSState:
     """One pass through the loop of Algorithm 1.
 
     With a mirror, the policy commutes with it. The statistics are frozen within an iteration: they
-    are updated at its end with all observations of its episodes.
+    are updated at its end with all observations of its episodes. A generator can be lent.
     """
-    began, rng = time.perf_counter(), state.random_generator()
+    began, rng = time.perf_counter(), state.random_generator(rng)
     N, theta, normalizer = config.directions, state.theta, state.normalizer
     delta = perturbations(rng, (N, *theta.shape))
     if mirror is not None:
@@ -73,10 +80,11 @@ def ars_iteration(
     returns = rollouts.returns.reshape(2, N, config.episodes).mean(axis=2)
     theta = theta + ars_step(config, delta, returns, config.step_size_at(state.iteration))
     normalizer = normalizer.updated(rollouts.moments, rollouts.steps)
+    mean_return, std_return = mean_and_deviation(rollouts.returns)
     point = CurvePoint(
-        mean_return=float(rollouts.returns.mean()),
-        std_return=float(rollouts.returns.std()),
-        success=float(rollouts.success.mean()),
+        mean_return=mean_return,
+        std_return=std_return,
+        success=int(np.count_nonzero(rollouts.success)) / len(rollouts),
         environment_steps=normalizer.count,
         wall_time=state.wall_time + time.perf_counter() - began,
     )
@@ -110,6 +118,8 @@ def shared_scenarios(
     """
     copies = {"none": 1, "pair": 2, "iteration": 2 * config.directions}[config.sharing]
     starts, goals = simulator.sample(rng, 2 * config.directions * config.episodes // copies)
+    if copies == 1:
+        return starts, goals
     return np.tile(starts, (copies, 1)), np.tile(goals, (copies, 1))
 
 
@@ -155,13 +165,12 @@ def ars_step(
     """
     b = config.top_directions
     top = top_directions(returns, b)
-    sigma = float(returns.std()) if config.scale_by_deviation else 1.0
-    if sigma < 1e-12:
-        return np.zeros(delta.shape[1:])
-    difference = returns[0, top] - returns[1, top]
-    # Summed in order, not by BLAS: the same bits on every processor.
-    step: NDArray[np.float64] = (difference[:, None, None] * delta[top]).sum(axis=0)
-    return step_size / (b * sigma) * step
+    sigma = mean_and_deviation(returns.reshape(-1))[1] if config.scale_by_deviation else 1.0
+    step = np.zeros(delta.shape[1:])
+    if sigma >= 1e-12:
+        difference = returns[0, top] - returns[1, top]
+        weighted_sum(step_size / (b * sigma) * difference, top, delta, step)
+    return step
 
 
 def linear_policy(config: ARSConfig, state: ARSState) -> Policy:

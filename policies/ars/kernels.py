@@ -2,6 +2,9 @@
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from kinarm.kernels.compiling import Array, inlined, kernel
 from kinarm.kernels.elementary import LOG_2, LOG_2_REST, sine_cosine
 from kinarm.kernels.lanes import as_lanes, power_of_two, select
@@ -74,3 +77,25 @@ def perturbed_weights(theta: Array, step: Array, scale: Array, mean: Array, weig
                 less -= minus * mean[j]
             weights[0, k, n_observations * n_actions + i] = more
             weights[1, k, n_observations * n_actions + i] = less
+
+
+@kernel
+def mean_and_deviation(values: Array) -> tuple[float, float]:
+    """Mean and population standard deviation of some numbers, shape (n,)."""
+    mean, squares = 0.0, 0.0
+    for value in values:
+        mean += value
+    mean /= len(values)
+    for value in values:
+        squares += (value - mean) * (value - mean)
+    return mean, math.sqrt(squares / len(values))
+
+
+@kernel
+def weighted_sum(weights: Array, chosen: NDArray[np.int64], delta: Array, total: Array) -> None:
+    """Add up chosen perturbations, each with its weight, onto a total of the same shape."""
+    n_actions, n_observations = total.shape
+    for k in range(chosen.shape[0]):
+        for i in range(n_actions):
+            for j in range(n_observations):
+                total[i, j] += weights[k] * delta[chosen[k], i, j]

@@ -48,8 +48,11 @@ class ARSState(TrainingState):
             )
         _PROBE.state = self.generator
 
-    def random_generator(self) -> np.random.Generator:
-        """A generator in the state that the next iteration begins with."""
-        rng = np.random.default_rng(0)
+    def random_generator(self, reused: np.random.Generator | None = None) -> np.random.Generator:
+        """A generator in the state that the next iteration begins with.
+
+        One that is given is set to it: making one takes longer than all that it draws.
+        """
+        rng = np.random.default_rng(0) if reused is None else reused
         rng.bit_generator.state = self.generator
         return rng
