@@ -384,18 +384,24 @@ class TestTraining:
         [{}, {"step_size_schedule": "linear", "reward": RewardWeights(success=0.5)}],
     )
     def test_short_training_beats_standing_still_by_far(self, settings):
-        config = ARSConfig(
-            sharing="iteration", episodes=2, iterations=300, step_size=0.05, **settings
-        )
-        result = train_policy(config)
+        """In two of three seeds at least: about one in eight does not get off the ground."""
         simulator = ARSConfig().simulator()
         starts, goals = simulator.sample(np.random.default_rng(14), 1000)
-        trained = simulator.rollout(result.policy, starts, goals)
         idle = simulator.rollout(lambda seen: np.zeros((len(seen), 5)), starts, goals)
-        assert np.median(trained.distance) < 0.4 * np.median(idle.distance)
-        assert trained.returns.mean() > idle.returns.mean() + 0.2
-        assert trained.success.mean() > 0.04
         assert not idle.success.any()
+        good = 0
+        for seed in range(3):
+            config = ARSConfig(
+                sharing="iteration", episodes=2, iterations=300, step_size=0.05, seed=seed
+            )
+            policy = train_policy(replace(config, **settings)).policy
+            trained = simulator.rollout(policy, starts, goals)
+            good += (
+                np.median(trained.distance) < 0.4 * np.median(idle.distance)
+                and trained.returns.mean() > idle.returns.mean() + 0.2
+                and trained.success.mean() > 0.04
+            )
+        assert good >= 2
 
 
 class TestResume:
