@@ -1,8 +1,9 @@
 """The figures of merit in one table, which documents, tables, reports and the docs read."""
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -48,6 +49,11 @@ class Outcomes:
     def distance(self) -> NDArray[np.float64]:
         """Final distances [m]."""
         return self._joined(rollouts.distance for rollouts in self.rollouts)
+
+    @cached_property
+    def ordered_distance(self) -> NDArray[np.float64]:
+        """Final distances along the last axis, the smallest first [m]."""
+        return np.sort(self.distance, axis=-1)
 
     @cached_property
     def steps(self) -> NDArray[np.int64]:
@@ -155,12 +161,12 @@ def share_within(limit: float) -> Metric:
 
 
 def distance_metric(
-    meaning: str, statistic: Callable[..., Any], heading: str = "", **shown: Any
+    meaning: str, formula: Callable[[Outcomes], Any], heading: str = "", **shown: Any
 ) -> Metric:
-    """A statistic of the final distance, such as ``np.mean``."""
+    """A statistic of the final distance."""
     return Metric(
         meaning=f"{meaning} of the final distance",
-        formula=lambda trials: statistic(trials.distance, axis=-1),
+        formula=formula,
         unit="m",
         interval="bootstrap",
         heading=heading,
@@ -168,11 +174,26 @@ def distance_metric(
     )
 
 
-def interquartile_mean(values: NDArray[np.float64], axis: int) -> Any:
-    """Mean of the middle half of some values."""
-    from scipy.stats import trim_mean
+def median(ordered: NDArray[np.float64]) -> Any:
+    """Median along the last axis of values that are ordered."""
+    n = ordered.shape[-1]
+    return (ordered[..., (n - 1) // 2] + ordered[..., n // 2]) / 2
 
-    return trim_mean(values, 0.25, axis=axis)
+
+def quantile(ordered: NDArray[np.float64], share: float) -> Any:
+    """Quantile along the last axis, as NumPy interpolates it, of values that are ordered."""
+    position = share * (ordered.shape[-1] - 1)
+    low, beyond = ordered[..., math.floor(position)], position % 1
+    high = ordered[..., math.ceil(position)]
+    if beyond < 0.5:
+        return low + (high - low) * beyond
+    return high - (high - low) * (1 - beyond)
+
+
+def middle_half(ordered: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Ordered values without the smallest and the largest quarter, along the last axis."""
+    n = ordered.shape[-1]
+    return ordered[..., n // 4 : n - n // 4]
 
 
 METRICS: dict[str, Metric] = {
@@ -200,12 +221,24 @@ METRICS: dict[str, Metric] = {
     ),
     **{f"within_{limit:g}": share_within(limit) for limit in LIMITS},
     "median_distance": distance_metric(
-        "median", np.median, "median m", shows_interval=True, priority=ALWAYS
+        "median",
+        lambda trials: median(trials.ordered_distance),
+        "median m",
+        shows_interval=True,
+        priority=ALWAYS,
     ),
-    "mean_distance": distance_metric("mean", np.mean, "mean m", priority=2),
-    "iqm_distance": distance_metric("interquartile mean (of the middle half)", interquartile_mean),
+    "mean_distance": distance_metric(
+        "mean", lambda trials: trials.distance.mean(axis=-1), "mean m", priority=2
+    ),
+    "iqm_distance": distance_metric(
+        "interquartile mean (of the middle half)",
+        lambda trials: middle_half(trials.ordered_distance).mean(axis=-1),
+    ),
     "p95_distance": distance_metric(
-        "95th percentile", partial(np.quantile, q=0.95), "p95 m", priority=2
+        "95th percentile",
+        lambda trials: quantile(trials.ordered_distance, 0.95),
+        "p95 m",
+        priority=2,
     ),
     "max_distance": Metric(
         meaning="largest final distance",

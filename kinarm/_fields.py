@@ -7,7 +7,7 @@ Parameters of its docstring, what they mean; files, messages and options follow 
 import re
 import tomllib
 import types
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import cache
@@ -23,6 +23,9 @@ T = TypeVar("T")
 
 PARAMETER = re.compile(r"^(\w+(?:, \w+)*) :", re.MULTILINE)
 UNIT = re.compile(r"\[([^\]]+)\]$")
+field_types: Callable[[type], dict[str, Any]] = cache(get_type_hints)
+"""Types of the fields of a dataclass, by name."""
+
 SCALARS = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
 
 
@@ -92,7 +95,7 @@ def from_plain(kind: type[T], entries: object, where: str, path: str = "") -> T:
     for name, item in known.items():
         if name not in entries and item.default is MISSING and item.default_factory is MISSING:
             raise InvalidInputError(f"{where}: '{path}{name}' is missing: {summary_of(kind, name)}")
-    hints = get_type_hints(kind)
+    hints = field_types(kind)
     values = {
         name: _value(hints[name], entry, where, f"{path}{name}", kind)
         for name, entry in entries.items()
@@ -117,7 +120,7 @@ def check_fields(given: Any) -> None:
         If a value has the wrong type; names the field and what is expected.
     """
     kind = type(given)
-    hints = get_type_hints(kind)
+    hints = field_types(kind)
     for name in init_fields(kind):
         value = _value(hints[name], getattr(given, name), "", name, kind)
         object.__setattr__(given, name, value)

@@ -148,6 +148,8 @@ class ReachProblem:
             If a value cannot be used.
         """
         given = {name: value for name, value in overrides.items() if value is not None}
+        if not given:
+            return self
         changes = _taken(given, ReachProblem)
         for name, convert in PARTS.items():
             if name in changes:
@@ -193,6 +195,8 @@ class ReachProblem:
         str or None
             Such as ``"task.tolerance is 0.03, not 0.05"``, with the own value last.
         """
+        if other is self:
+            return None
         if self.arm_digest != other.arm_digest:
             version = "another version of " if self.arm.name == other.arm.name else ""
             return f"arm is {version}{other.arm.name!r}, not {self.arm.name!r}"

@@ -1,10 +1,11 @@
 """Where a policy comes from."""
 
+import json
 import platform
 import subprocess
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -81,7 +82,16 @@ class Provenance:
         InvalidInputError
             If an entry is missing, unknown or wrong.
         """
+        if isinstance(entries, Mapping) and isinstance(entries.get("problem"), Mapping):
+            problem = _problem(json.dumps(entries["problem"], sort_keys=True))
+            entries = {**entries, "problem": problem}
         return from_plain(cls, entries, "provenance")
+
+
+@lru_cache
+def _problem(text: str) -> ReachProblem:
+    """Rebuild a problem once for all policies that are for it."""
+    return from_plain(ReachProblem, json.loads(text), "provenance", "problem.")
 
 
 def package_versions() -> dict[str, str]:

@@ -128,19 +128,22 @@ class EvaluationRequest(ProblemOptions):
             If a name, file or number cannot be used, or a file cannot be written.
         """
         from kinarm.evaluation.document import evaluation_document
-        from kinarm.evaluation.figures import distance_histograms, save_figure
-        from kinarm.evaluation.report.card import write_card
-        from kinarm.evaluation.report.page import write_report
 
         evaluations = self.evaluate(tell)
         document = evaluation_document(evaluations, repr(self) if command is None else command)
         if self.report is not None:
+            from kinarm.evaluation.report.page import write_report
+
             tell("writing the report")
             write_report(self.report, document, evaluations)
         if self.card is not None:
+            from kinarm.evaluation.report.card import write_card
+
             tell("writing the card")
             write_card(self.card, document, evaluations)
         if self.out is not None:
+            from kinarm.evaluation.figures import distance_histograms, save_figure
+
             write_text(self.out / DOCUMENT, json.dumps(document, indent=1))
             shown = [e for e in evaluations if e.entrant.algorithm != "oracle"] or evaluations
             save_figure(distance_histograms(shown), self.out, HISTOGRAMS)
@@ -253,9 +256,9 @@ class EvaluationRequest(ProblemOptions):
 
     def _check_outputs(self, pairs: Sequence[Pair]) -> None:
         """See that the files can be written, and that there is one policy for a card."""
-        from kinarm.evaluation.report.card import check_card
-
         if self.card is not None:
+            from kinarm.evaluation.report.card import check_card
+
             check_card(self.card, pairs, overwrite=self.overwrite)
         if self.report is not None:
             check_output(self.report / REPORT, overwrite=self.overwrite)

@@ -1,16 +1,24 @@
 """Augmented Random Search (paper, Algorithm 1 and Table 1; Mania, Guy and Recht 2018)."""
 
+import math
 import time
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm.kernels.lanes import LANES
 from kinarm.networks import Mirror, Networks
 from kinarm.policies.ars.config import ARSConfig
+from kinarm.policies.ars.kernels import (
+    mean_and_deviation,
+    normal_pairs,
+    perturbed_weights,
+    weighted_sum,
+)
 from kinarm.policies.ars.state import ARSState
 from kinarm.policies.curve import CurvePoint
 from kinarm.policies.mirror import commuting_weights, task_mirror
-from kinarm.policies.normalizer import Normalizer, fold_normalizer
+from kinarm.policies.normalizer import Normalizer, input_scale
 from kinarm.policies.policy import Layer, Policy
 from kinarm.policies.provenance import Provenance
 from kinarm.simulator import Simulator
@@ -26,6 +34,7 @@ class ARSTraining:
     def __init__(self, config: ARSConfig, threads: int | None = None) -> None:
         self.config, self.simulator = config, config.simulator(threads)
         self.mirror = task_mirror(config.symmetric, self.simulator.world)
+        self._rng = np.random.default_rng(config.seed)
 
     def initial_state(self) -> ARSState:
         """State before the first iteration: theta = 0, mu = 0, Sigma = I."""
@@ -38,7 +47,7 @@ class ARSTraining:
 
     def iterate(self, state: ARSState) -> ARSState:
         """One pass through the loop of Algorithm 1."""
-        return ars_iteration(self.config, self.simulator, state, self.mirror)
+        return ars_iteration(self.config, self.simulator, state, self.mirror, self._rng)
 
 
 def ars_iteration(
@@ -46,21 +55,23 @@ def ars_iteration(
     simulator: Simulator,
     state: ARSState,
     mirror: Mirror | None = None,
+    rng: np.random.Generator | None = None,
 ) -> ARSState:
     """One pass through the loop of Algorithm 1.
 
     With a mirror, the policy commutes with it. The statistics are frozen within an iteration: they
-    are updated at its end with all observations of its episodes.
+    are updated at its end with all observations of its episodes. A generator can be lent.
     """
-    began, rng = time.perf_counter(), state.random_generator()
+    began, rng = time.perf_counter(), state.random_generator(rng)
     N, theta, normalizer = config.directions, state.theta, state.normalizer
-    delta = rng.standard_normal((N, *theta.shape))
+    delta = perturbations(rng, (N, *theta.shape))
     if mirror is not None:
         delta *= commuting_weights(mirror)
-    candidates = np.concatenate([theta + config.noise * delta, theta - config.noise * delta])
     starts, goals = shared_scenarios(config, simulator, rng)
     rollouts = simulator.rollout(
-        linear_networks(candidates, policy_normalizer(config, normalizer, mirror)),
+        perturbed_policies(
+            theta, config.noise * delta, policy_normalizer(config, normalizer, mirror)
+        ),
         starts,
         goals,
         policy_index=np.repeat(np.arange(2 * N), config.episodes),
@@ -69,11 +80,12 @@ def ars_iteration(
     returns = rollouts.returns.reshape(2, N, config.episodes).mean(axis=2)
     theta = theta + ars_step(config, delta, returns, config.step_size_at(state.iteration))
     normalizer = normalizer.updated(rollouts.moments, rollouts.steps)
+    mean_return, std_return = mean_and_deviation(rollouts.returns)
     point = CurvePoint(
-        mean_return=float(rollouts.returns.mean()),
-        std_return=float(rollouts.returns.std()),
-        success=float(rollouts.success.mean()),
-        environment_steps=state.environment_steps + int(rollouts.steps.sum()),
+        mean_return=mean_return,
+        std_return=std_return,
+        success=int(np.count_nonzero(rollouts.success)) / len(rollouts),
+        environment_steps=normalizer.count,
         wall_time=state.wall_time + time.perf_counter() - began,
     )
     return ARSState(
@@ -82,6 +94,19 @@ def ars_iteration(
         generator=dict(rng.bit_generator.state),
         curve=(*state.curve, point),
     )
+
+
+def perturbations(rng: np.random.Generator, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Draw independent standard normal numbers, the same bits on every machine.
+
+    Those of NumPy's generator depend on the C library's logarithm.
+    """
+    count = math.prod(shape)
+    half = -(-count // 2)
+    numbers = np.zeros((2, -(-half // LANES) * LANES))
+    numbers[:, :half] = rng.random((2, half))
+    normal_pairs(numbers.reshape(2, -1, LANES))
+    return numbers[:, :half].reshape(-1)[:count].reshape(shape)
 
 
 def shared_scenarios(
@@ -93,6 +118,8 @@ def shared_scenarios(
     """
     copies = {"none": 1, "pair": 2, "iteration": 2 * config.directions}[config.sharing]
     starts, goals = simulator.sample(rng, 2 * config.directions * config.episodes // copies)
+    if copies == 1:
+        return starts, goals
     return np.tile(starts, (copies, 1)), np.tile(goals, (copies, 1))
 
 
@@ -103,13 +130,17 @@ def policy_normalizer(config: ARSConfig, seen: Normalizer, mirror: Mirror | None
     return seen if mirror is None else seen.mirrored(mirror.observations)
 
 
-def linear_networks(theta: NDArray[np.float64], normalizer: Normalizer) -> Networks:
-    """Policies theta diag(Sigma)^(-1/2) (x - mu) with the normaliser folded in.
+def perturbed_policies(
+    theta: NDArray[np.float64], step: NDArray[np.float64], normalizer: Normalizer
+) -> Networks:
+    """Policies (theta + step) diag(Sigma)^(-1/2) (x - mu), then those of theta - step.
 
-    Parameters have the shape (n, n_actions, n_observations).
+    Steps have the shape (N, n_actions, n_observations). The normaliser is folded in.
     """
-    bias = np.zeros(theta.shape[:2])
-    return Networks.linear(*fold_normalizer(theta, bias, normalizer.mean, normalizer.std))
+    n_actions, n_observations = theta.shape
+    weights = np.empty((2, len(step), (n_observations + 1) * n_actions))
+    perturbed_weights(theta, step, input_scale(normalizer.std), normalizer.mean, weights)
+    return Networks(np.array([n_observations, n_actions]), weights.reshape(2 * len(step), -1))
 
 
 def top_directions(returns: NDArray[np.float64], b: int) -> NDArray[np.int64]:
@@ -134,13 +165,12 @@ def ars_step(
     """
     b = config.top_directions
     top = top_directions(returns, b)
-    sigma = float(returns.std()) if config.scale_by_deviation else 1.0
-    if sigma < 1e-12:
-        return np.zeros(delta.shape[1:])
-    difference = returns[0, top] - returns[1, top]
-    # Summed in order, not by BLAS: the same bits on every processor.
-    step: NDArray[np.float64] = (difference[:, None, None] * delta[top]).sum(axis=0)
-    return step_size / (b * sigma) * step
+    sigma = mean_and_deviation(returns.reshape(-1))[1] if config.scale_by_deviation else 1.0
+    step = np.zeros(delta.shape[1:])
+    if sigma >= 1e-12:
+        difference = returns[0, top] - returns[1, top]
+        weighted_sum(step_size / (b * sigma) * difference, top, delta, step)
+    return step
 
 
 def linear_policy(config: ARSConfig, state: ARSState) -> Policy:

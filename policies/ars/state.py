@@ -10,6 +10,9 @@ from kinarm.errors import InvalidInputError
 from kinarm.policies.learners import TrainingState
 from kinarm.policies.normalizer import Normalizer
 
+_PROBE: np.random.BitGenerator = np.random.PCG64(0)
+"""Takes no state but one that a generator can be in; quicker to ask than a new one."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ARSState(TrainingState):
@@ -43,10 +46,13 @@ class ARSState(TrainingState):
                 f"theta of shape {self.theta.shape} needs as many statistics, "
                 f"got {self.normalizer.mean.shape} and {self.normalizer.squares.shape}"
             )
-        self.random_generator()
+        _PROBE.state = self.generator
 
-    def random_generator(self) -> np.random.Generator:
-        """A generator in the state that the next iteration begins with."""
-        rng = np.random.default_rng(0)
+    def random_generator(self, reused: np.random.Generator | None = None) -> np.random.Generator:
+        """A generator in the state that the next iteration begins with.
+
+        One that is given is set to it: making one takes longer than all that it draws.
+        """
+        rng = np.random.default_rng(0) if reused is None else reused
         rng.bit_generator.state = self.generator
         return rng

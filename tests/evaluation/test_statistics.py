@@ -7,9 +7,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import stats
 
 from kinarm.evaluation import statistics
 from kinarm.evaluation.statistics import (
+    BOOTSTRAP_SEED,
+    LEVEL,
+    NUMBERS_AT_ONCE,
     RESAMPLES,
     Estimate,
     bootstrap_intervals,
@@ -134,3 +138,25 @@ def test_many_trials_are_resampled_piece_by_piece(monkeypatch):
     monkeypatch.setattr(statistics, "NUMBERS_AT_ONCE", 700)
     assert bootstrap_intervals(50, means) == whole
     assert max(sizes) == 700
+
+
+@pytest.mark.parametrize("trials", [2, 7, 401])
+def test_intervals_are_those_of_scipy(trials):
+    values = np.random.default_rng(trials).gamma(1.5, 0.1, trials)
+
+    def figures(numbers):
+        return np.stack([values[numbers].mean(axis=-1), np.median(values[numbers], axis=-1)])
+
+    expected = stats.bootstrap(
+        (np.arange(trials),),
+        lambda resampled, axis: figures(resampled),
+        n_resamples=RESAMPLES,
+        confidence_level=LEVEL,
+        method="percentile",
+        rng=np.random.default_rng(BOOTSTRAP_SEED),
+        batch=NUMBERS_AT_ONCE // trials,
+    ).confidence_interval
+    assert bootstrap_intervals(trials, figures) == list(zip(*map(tuple, expected), strict=True))
+    for hits in range(trials + 1):
+        wilson_of_scipy = stats.binomtest(hits, trials).proportion_ci(LEVEL, "wilson")
+        assert share(hits, trials).ci95 == tuple(wilson_of_scipy)

@@ -10,7 +10,12 @@ import pytest
 
 KERNELS = {
     f"{package}.{path.stem}": path
-    for package in ("kinarm.kernels", "kinarm.policies.oracle.kernels", "kinarm.viewer.kernels")
+    for package in (
+        "kinarm.kernels",
+        "kinarm.policies.ars",
+        "kinarm.policies.oracle.kernels",
+        "kinarm.viewer.kernels",
+    )
     for path in sorted(Path(import_module(package).__file__).parent.glob("*.py"))
 }
 SOURCES = {name: path.read_text(encoding="utf-8") for name, path in KERNELS.items()}
@@ -42,6 +47,7 @@ def test_what_is_compiled_in_has_no_cache_of_its_own():
     assert {name.rpartition(".")[2] for name in CACHED} == {
         "approach",
         "enclosing",
+        "kernels",
         "projection",
         "rasterising",
         "rollout",

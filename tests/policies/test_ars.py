@@ -4,17 +4,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numba import njit
+from scipy import stats
 
 from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.kernels.lanes import LANES
 from kinarm.policies import ARSConfig, Policy, state_policy, train_policy
 from kinarm.policies.ars.algorithm import (
     ARSTraining,
     ars_iteration,
     ars_step,
-    linear_networks,
+    perturbations,
+    perturbed_policies,
     shared_scenarios,
     top_directions,
 )
+from kinarm.policies.ars.kernels import logarithm, normal_pairs
 from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
 from kinarm.policies.mirror import commuting_weights, task_mirror
 from kinarm.policies.normalizer import Normalizer
@@ -121,26 +126,67 @@ class TestTopDirections:
             np.testing.assert_array_equal(top_directions(np.ones((2, 30)), b), np.arange(b))
 
 
-class TestNetworks:
+class TestPerturbations:
+    def test_are_those_of_box_and_muller(self):
+        drawn = perturbations(np.random.default_rng(1), (3, 5, 48))
+        radius, angle = np.random.default_rng(1).random((2, 360))
+        radius, angle = np.sqrt(-2 * np.log1p(-radius)), 2 * np.pi * angle
+        expected = [radius * np.cos(angle), radius * np.sin(angle)]
+        np.testing.assert_allclose(drawn, np.reshape(expected, (3, 5, 48)), rtol=0, atol=1e-14)
+
+    @pytest.mark.parametrize("shape", [(1, 1, 1), (2, 3, 3), (1, 2, 8), (4, 1, 7)])
+    def test_any_number_of_them(self, shape):
+        drawn = perturbations(np.random.default_rng(2), shape)
+        assert drawn.shape == shape
+        assert (drawn != 0).all()
+        assert len(np.unique(drawn)) == drawn.size
+
+    def test_are_normal_and_independent(self):
+        drawn = perturbations(np.random.default_rng(3), (200_000,))
+        assert stats.kstest(drawn, "norm").pvalue > 0.01
+        assert stats.kstest(drawn[:-1] * drawn[1:], drawn[::-1][:-2] * drawn[2:]).pvalue > 0.01
+        assert abs(np.corrcoef(drawn[:100_000], drawn[100_000:])[0, 1]) < 0.01
+        assert abs(np.corrcoef(drawn[:100_000] ** 2, drawn[100_000:] ** 2)[0, 1]) < 0.01
+
+    def test_the_least_likely_are_finite(self):
+        numbers = np.zeros((2, 1, LANES))
+        numbers[0, 0, :3] = (0.0, 1 - 2.0**-53, 0.5)
+        normal_pairs(numbers)
+        expected = [0, np.sqrt(2 * 53 * np.log(2)), np.sqrt(2 * np.log(2))]
+        np.testing.assert_allclose(numbers[0, 0, :3], expected, rtol=1e-15)
+
+
+@njit
+def logarithms(numbers):
+    return np.array([logarithm(number) for number in numbers])
+
+
+def test_logarithm():
+    rng = np.random.default_rng(4)
+    x = np.concatenate([1 - rng.random(10_000), 2.0 ** -np.arange(54), rng.random(1000) * 1e-9])
+    np.testing.assert_allclose(logarithms(x), np.log(x), rtol=4e-16)
+
+
+class TestPolicies:
     def test_are_theta_times_the_normalised_observation(self):
         rng = np.random.default_rng(10)
-        theta = rng.normal(size=(3, 5, 48))
+        theta, step = rng.normal(size=(5, 48)), rng.normal(size=(3, 5, 48))
         data = rng.normal(size=(1000, 48)) * rng.uniform(0.1, 2, 48) + rng.normal(size=48)
         data[:, :2] = 0.325
         normalizer = Normalizer(1000, data.mean(axis=0), 1000 * data.var(axis=0))
-        networks = linear_networks(theta, normalizer)
+        networks = perturbed_policies(theta, step, normalizer)
         seen = rng.normal(size=48)
-        for k in range(3):
+        scaled = (seen - data.mean(axis=0))[2:] / data.std(axis=0)[2:]
+        for k, perturbed in enumerate([*(theta + step), *(theta - step)]):
             weights = networks.weights[k, :240].reshape(48, 5)
             action = seen @ weights + networks.weights[k, 240:]
-            scaled = (seen - data.mean(axis=0))[2:] / data.std(axis=0)[2:]
-            np.testing.assert_allclose(action, theta[k, :, 2:] @ scaled, rtol=1e-10)
+            np.testing.assert_allclose(action, perturbed[:, 2:] @ scaled, rtol=1e-10)
 
     def test_without_normaliser_are_theta_itself(self):
-        theta = np.random.default_rng(11).normal(size=(2, 5, 48))
-        networks = linear_networks(theta, Normalizer.empty(48))
+        theta, step = np.random.default_rng(11).normal(size=(2, 5, 48))
+        networks = perturbed_policies(theta, step[None], Normalizer.empty(48))
         np.testing.assert_array_equal(networks.weights[:, 240:], 0)
-        np.testing.assert_array_equal(networks.weights[1, :240].reshape(48, 5), theta[1].T)
+        np.testing.assert_array_equal(networks.weights[1, :240].reshape(48, 5), (theta - step).T)
 
 
 class TestIteration:
@@ -155,7 +201,7 @@ class TestIteration:
 
         rng = np.random.default_rng()
         rng.bit_generator.state = state.generator
-        delta = rng.standard_normal((4, 5, 48))
+        delta = perturbations(rng, (4, 5, 48))
         starts, goals = shared_scenarios(config, simulator, rng)
         mean, std = state.normalizer.mean, state.normalizer.std
         scale = np.where(std < 1e-6, 0, 1 / np.where(std < 1e-6, 1, std))
@@ -205,9 +251,8 @@ class TestIteration:
         networks, _ = used[0]
         rng = np.random.default_rng()
         rng.bit_generator.state = state.generator
-        delta = rng.standard_normal((4, 5, 48))
-        candidates = np.concatenate([state.theta + 0.03 * delta, state.theta - 0.03 * delta])
-        expected = linear_networks(candidates, state.normalizer)
+        delta = perturbations(rng, (4, 5, 48))
+        expected = perturbed_policies(state.theta, 0.03 * delta, state.normalizer)
         np.testing.assert_array_equal(networks.weights, expected.weights)
 
     def test_does_not_change_the_old_state(self, tiny_simulator):
@@ -282,9 +327,10 @@ class TestTraining:
     def test_policy_behaves_like_the_last_parameters(self, tiny_simulator):
         state = run(TINY, tiny_simulator, 3)[-1]
         policy = state_policy(TINY, state)
-        trained = linear_networks(state.theta[None], state.normalizer)
+        still = np.zeros((1, *state.theta.shape))
+        trained = perturbed_policies(state.theta, still, state.normalizer)
         np.testing.assert_allclose(
-            policy.networks().weights, trained.weights, rtol=1e-12, atol=1e-15
+            policy.networks().weights, trained.weights[:1], rtol=1e-12, atol=1e-15
         )
 
     def test_policy_without_normaliser(self):
@@ -338,18 +384,24 @@ class TestTraining:
         [{}, {"step_size_schedule": "linear", "reward": RewardWeights(success=0.5)}],
     )
     def test_short_training_beats_standing_still_by_far(self, settings):
-        config = ARSConfig(
-            sharing="iteration", episodes=2, iterations=300, step_size=0.05, **settings
-        )
-        result = train_policy(config)
+        """In two of three seeds at least: about one in eight does not get off the ground."""
         simulator = ARSConfig().simulator()
         starts, goals = simulator.sample(np.random.default_rng(14), 1000)
-        trained = simulator.rollout(result.policy, starts, goals)
         idle = simulator.rollout(lambda seen: np.zeros((len(seen), 5)), starts, goals)
-        assert np.median(trained.distance) < 0.4 * np.median(idle.distance)
-        assert trained.returns.mean() > idle.returns.mean() + 0.2
-        assert trained.success.mean() > 0.04
         assert not idle.success.any()
+        good = 0
+        for seed in range(3):
+            config = ARSConfig(
+                sharing="iteration", episodes=2, iterations=300, step_size=0.05, seed=seed
+            )
+            policy = train_policy(replace(config, **settings)).policy
+            trained = simulator.rollout(policy, starts, goals)
+            good += (
+                np.median(trained.distance) < 0.4 * np.median(idle.distance)
+                and trained.returns.mean() > idle.returns.mean() + 0.2
+                and trained.success.mean() > 0.04
+            )
+        assert good >= 2
 
 
 class TestResume:

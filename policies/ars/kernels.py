@@ -1,0 +1,101 @@
+"""Kernels of Augmented Random Search: normal numbers, and the policies of an iteration."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.kernels.compiling import Array, inlined, kernel
+from kinarm.kernels.elementary import LOG_2, LOG_2_REST, sine_cosine
+from kinarm.kernels.lanes import as_lanes, power_of_two, select
+
+LAYOUT = "3dd9d9b32190"
+"""Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
+
+TURN = 6.283185307179586
+
+
+@inlined
+def logarithm(x: float) -> float:
+    """Natural logarithm of a number between 2^-63 and 1, to within 3e-16 of itself.
+
+    The polynomial is that of FreeBSD's mathematical library.
+    """
+    halvings = 0.0 * x
+    for doublings in (32.0, 16.0, 8.0, 4.0, 2.0, 1.0):
+        small = x < power_of_two(-doublings)
+        x = select(small, x * power_of_two(doublings), x)
+        halvings = select(small, halvings + doublings, halvings)
+    small = x < 0.7071067811865476
+    x = select(small, 2.0 * x, x)
+    halvings = select(small, halvings + 1.0, halvings)
+    f = x - 1.0
+    s = f / (2.0 + f)
+    z = s * s
+    w = z * z
+    even = w * (
+        3.999999999940941908e-1 + w * (2.222219843214978396e-1 + w * 1.531383769920937332e-1)
+    )
+    odd = 2.857142874366239149e-1 + w * (1.818357216161805012e-1 + w * 1.479819860511658591e-1)
+    half = 0.5 * f * f
+    rest = s * (half + even + z * (6.666666666666735130e-1 + w * odd))
+    return f - (half - (rest - halvings * LOG_2_REST)) - halvings * LOG_2
+
+
+@kernel
+def normal_pairs(numbers: Array) -> None:
+    """Make normal numbers of uniform ones in [0, 1), in place (Box and Muller).
+
+    The array has the shape (2, n, LANES); each number of the first half and its partner in the
+    second make a pair of independent ones.
+    """
+    pairs = as_lanes(numbers)
+    for i in range(pairs.shape[1]):
+        radius = math.sqrt(-2.0 * logarithm(1.0 - pairs[0, i]))
+        sine, cosine = sine_cosine(TURN * pairs[1, i])
+        pairs[0, i] = radius * cosine
+        pairs[1, i] = radius * sine
+
+
+@kernel
+def perturbed_weights(theta: Array, step: Array, scale: Array, mean: Array, weights: Array) -> None:
+    """Fill in the networks of the policies (theta +- step) diag(scale) (x - mean).
+
+    Steps have the shape (n, n_actions, n_observations). Weights have the shape (2, n,
+    n_parameters): those with plus, then those with minus, each as `kinarm.Networks` keeps it.
+    """
+    n_actions, n_observations = theta.shape
+    for k in range(step.shape[0]):
+        for i in range(n_actions):
+            more, less = 0.0, 0.0
+            for j in range(n_observations):
+                plus = (theta[i, j] + step[k, i, j]) * scale[j]
+                minus = (theta[i, j] - step[k, i, j]) * scale[j]
+                weights[0, k, j * n_actions + i] = plus
+                weights[1, k, j * n_actions + i] = minus
+                more -= plus * mean[j]
+                less -= minus * mean[j]
+            weights[0, k, n_observations * n_actions + i] = more
+            weights[1, k, n_observations * n_actions + i] = less
+
+
+@kernel
+def mean_and_deviation(values: Array) -> tuple[float, float]:
+    """Mean and population standard deviation of some numbers, shape (n,)."""
+    mean, squares = 0.0, 0.0
+    for value in values:
+        mean += value
+    mean /= len(values)
+    for value in values:
+        squares += (value - mean) * (value - mean)
+    return mean, math.sqrt(squares / len(values))
+
+
+@kernel
+def weighted_sum(weights: Array, chosen: NDArray[np.int64], delta: Array, total: Array) -> None:
+    """Add up chosen perturbations, each with its weight, onto a total of the same shape."""
+    n_actions, n_observations = total.shape
+    for k in range(chosen.shape[0]):
+        for i in range(n_actions):
+            for j in range(n_observations):
+                total[i, j] += weights[k] * delta[chosen[k], i, j]
