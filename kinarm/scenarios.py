@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.errors import ProblemError
+from kinarm.kernels.starting import propose_starts, rejected_rows
 from kinarm.world import World
 
 START_ATTEMPTS = 2000
@@ -42,7 +43,7 @@ def draw_scenarios(
     ProblemError
         If no acceptable start is found for some goal in 2000 attempts.
     """
-    arm, task, moved = world.arm, world.problem.task, slice(world.n_actions)
+    arm, task, n_actions = world.arm, world.problem.task, world.n_actions
     spread = task.start_spread if start_spread is None else start_spread
     lower = arm.home + spread * (arm.lower - arm.home)
     extent = spread * (arm.upper - arm.lower)
@@ -50,17 +51,12 @@ def draw_scenarios(
     starts = np.tile(arm.home, (count, 1))
     pending = np.arange(count)
     for _ in range(START_ATTEMPTS):
-        candidates = starts[pending]
-        uniforms = rng.random((pending.size, world.n_actions))
-        candidates[:, moved] = lower[moved] + uniforms * extent[moved]
-        tools, touching = world.screen(candidates)
-        far = np.linalg.norm(tools - goals[pending], axis=1) > task.tolerance
-        accepted = far & ~touching
-        starts[pending[accepted]] = candidates[accepted]
-        pending = pending[~accepted]
+        uniforms = rng.random((len(pending), n_actions))
+        tools, touching = world.screen(propose_starts(pending, uniforms, lower, extent, starts))
+        pending = rejected_rows(pending, goals, tools, touching, task.tolerance)
         if pending.size == 0:
             return starts, goals
-    pair = world.contact_model.contact_pair(candidates[~accepted][0])
+    pair = world.contact_model.contact_pair(starts[pending[0]])
     reason = f"{pair[0]} touches {pair[1]}" if pair else "the tool already is at the goal"
     raise ProblemError(
         f"no contact-free start away from the goal found in {START_ATTEMPTS} attempts for arm "
