@@ -9,12 +9,9 @@ from gymnasium.spaces import Box, Space
 from numpy.typing import DTypeLike, NDArray
 
 from kinarm._validation import finite_array
-from kinarm.envs.errors import (
-    ClosedEnvironmentError,
-    ResetNeededError,
-    UnexpectedArgumentError,
-)
+from kinarm.envs.errors import UnexpectedArgumentError
 from kinarm.envs.interface import FlatInterface, Interface, Observations
+from kinarm.envs.lifecycle import Lifecycle
 from kinarm.envs.portable import PortableSpec
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
 from kinarm.episodes import COLLISION, RUNNING, SUCCESS, TRUNCATED, Episodes
@@ -54,7 +51,7 @@ def environment_metadata(simulator: Simulator, **others: Any) -> dict[str, Any]:
     return {"render_modes": list(RENDER_MODES), "render_fps": max(rate, 1), **others}
 
 
-class ReachEnv(PortableSpec, gymnasium.Env[Any, Array]):
+class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
     """Reach a cube on a bench with a six-axis arm (paper, section 3).
 
     Parameters
@@ -129,8 +126,6 @@ class ReachEnv(PortableSpec, gymnasium.Env[Any, Array]):
         picture = {"width": width, "height": height, "camera": camera}
         self._pictures = EnvPictures(self.simulator, render_mode, 1, **picture)
         self._stream: ScenarioStream | None = None
-        self._episode: Episodes | None = None
-        self._closed = False
 
     def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> Interface:
         """What the environment shows of its simulator."""
@@ -145,13 +140,13 @@ class ReachEnv(PortableSpec, gymnasium.Env[Any, Array]):
         if self._stream is None or seed is not None:
             self._stream = ScenarioStream(self.simulator.world, self.np_random)
         start, goal = pick_scenario(options, *self._stream.next())
-        self._episode = episode = self.simulator.reset([start], [goal])
+        self._episodes = episode = self.simulator.reset([start], [goal])
         self._pictures.begin(np.zeros(1, dtype=np.int64), episode)
         return self._observation(episode), {"distance": float(episode.distance[0])}
 
     def step(self, action: Array) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
         """Move for one time step."""
-        episode = self._begun_episode()
+        episode = self._begun_episodes()
         chosen = finite_array("action", action, (self.simulator.n_actions,))
         if episode.status[0] != RUNNING:
             return self._rest(episode)
@@ -168,7 +163,7 @@ class ReachEnv(PortableSpec, gymnasium.Env[Any, Array]):
 
     def render(self) -> Any:
         """Take a picture of the arm; see ``render_mode``."""
-        self._begun_episode()
+        self._begun_episodes()
         pictures = self._pictures.render()
         if self.render_mode == "rgb_array_list":
             return [picture for (picture,) in pictures]
@@ -176,7 +171,7 @@ class ReachEnv(PortableSpec, gymnasium.Env[Any, Array]):
 
     def close(self) -> None:
         """Close the live page, if there is one; the environment cannot be used any more."""
-        self._closed = True
+        self.closed = True
         self._pictures.close()
 
     def _rest(self, episode: Episodes) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
@@ -213,16 +208,6 @@ class ReachEnv(PortableSpec, gymnasium.Env[Any, Array]):
             "contact": contact,
             **{f"reward_{name}": term for name, term in terms if self.interface.tells_terms},
         }
-
-    def _begun_episode(self) -> Episodes:
-        self._check_open()
-        if self._episode is None:
-            raise ResetNeededError("the environment was never begun: call reset()")
-        return self._episode
-
-    def _check_open(self) -> None:
-        if self._closed:
-            raise ClosedEnvironmentError("the environment is closed: make another one")
 
 
 def _rst_table(rows: "list[tuple[str, ...]]") -> str:

@@ -9,8 +9,8 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import DTypeLike, NDArray
 
 from kinarm._validation import whole_number
-from kinarm.envs.errors import ClosedEnvironmentError, ResetNeededError
 from kinarm.envs.interface import FlatInterface, Interface, Observations
+from kinarm.envs.lifecycle import Lifecycle
 from kinarm.envs.portable import PortableSpec
 from kinarm.envs.reach import (
     Array,
@@ -29,7 +29,7 @@ from kinarm.simulator import Simulator
 from kinarm.task import REWARD_TERMS
 
 
-class ReachVectorEnv(PortableSpec, VectorEnv[Any, Array, NDArray[Any]]):
+class ReachVectorEnv(Lifecycle, PortableSpec, VectorEnv[Any, Array, NDArray[Any]]):
     """A native batch of `ReachEnv`: all arms are stepped by one call of the compiled simulator.
 
     Sub-environment i behaves like a `ReachEnv` reset with ``seed + i``. Spaces, rewards, endings
@@ -96,7 +96,6 @@ class ReachVectorEnv(PortableSpec, VectorEnv[Any, Array, NDArray[Any]]):
         picture = {"width": width, "height": height, "camera": camera}
         self._pictures = EnvPictures(self.simulator, render_mode, num_envs, **picture)
         self._streams: list[ScenarioStream] = []
-        self._episodes: Episodes | None = None
 
     def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> Interface:
         """What the environment shows of its simulator."""
@@ -170,16 +169,6 @@ class ReachVectorEnv(PortableSpec, VectorEnv[Any, Array, NDArray[Any]]):
     def close_extras(self, **_: Any) -> None:
         """Close the live page, if there is one; the environment cannot be used any more."""
         self._pictures.close()
-
-    def _begun_episodes(self) -> Episodes:
-        self._check_open()
-        if self._episodes is None:
-            raise ResetNeededError("the environment was never begun: call reset()")
-        return self._episodes
-
-    def _check_open(self) -> None:
-        if self.closed:
-            raise ClosedEnvironmentError("the environment is closed: make another one")
 
     def _step_infos(
         self, episodes: Episodes, result: StepResult, stepped: NDArray[np.bool_]
