@@ -60,7 +60,8 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
         ``"left"``, ``"right"``, ``"both"``, a problem file, or a problem.
     render_mode : {"rgb_array", "rgb_array_list", "human"}, optional
         What `render` returns: a picture, all pictures since it was last called, or nothing, while
-        a page in the browser follows the arm. Pictures need the extra ``render``.
+        a page in the browser follows the arm. Only films, by Gymnasium's ``RecordVideo``, need the
+        extra ``render``.
     width, height : int
         Size of pictures [pixels].
     camera : kinarm.viewer.Camera, optional
