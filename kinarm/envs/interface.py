@@ -205,6 +205,13 @@ class GoalInterface:
         return np.zeros(_distances(achieved_goal, desired_goal).shape, dtype=bool)
 
 
+def one_by_one(observations: Observations, count: int) -> list[Any]:
+    """Split a batch of observations, as an interface shows them, into those of single arms."""
+    if isinstance(observations, dict):
+        return [{key: part[k] for key, part in observations.items()} for k in range(count)]
+    return list(observations)
+
+
 def checked_dtype(dtype: DTypeLike) -> np.dtype[Any]:
     """Return a type that observations can have.
 

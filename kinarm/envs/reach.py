@@ -9,7 +9,9 @@ from gymnasium.spaces import Box, Space
 from numpy.typing import DTypeLike, NDArray
 
 from kinarm._validation import finite_array
+from kinarm.envs.contacts import Contacts
 from kinarm.envs.errors import UnexpectedArgumentError
+from kinarm.envs.infos import TERM_KEYS
 from kinarm.envs.interface import FlatInterface, Interface, Observations
 from kinarm.envs.lifecycle import Lifecycle
 from kinarm.envs.portable import PortableSpec
@@ -24,6 +26,9 @@ from kinarm.simulator import Simulator
 from kinarm.task import REWARD_TERMS
 
 Array = NDArray[np.float64]
+
+FIRST_ROW = np.zeros(1, dtype=np.int64)
+"""The only row of a batch of one."""
 
 
 def make_simulator(
@@ -99,8 +104,8 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
     that nothing moves until `reset`: steps have the reward 0, and Gymnasium warns.
 
     **Info**: ``distance`` [m]; and after a step ``success`` and, the same, ``is_success``;
-    ``collision``, ``contact`` (names of the two bodies that would have touched, or None) and the
-    five reward terms.
+    ``collision``; ``contact``, the number of the two bodies that would have touched, whose names
+    are ``contact_names[contact]``, or 0; and the five reward terms.
 
     **Versions**: v0, the first.
     """
@@ -126,6 +131,7 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
         self.render_mode = render_mode
         picture = {"width": width, "height": height, "camera": camera}
         self._pictures = EnvPictures(self.simulator, render_mode, 1, **picture)
+        self._contacts = Contacts(self.simulator.world)
         self._stream: ScenarioStream | None = None
 
     def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> Interface:
@@ -140,25 +146,35 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
         super().reset(seed=seed)
         if self._stream is None or seed is not None:
             self._stream = ScenarioStream(self.simulator.world, self.np_random)
-        start, goal = pick_scenario(options, *self._stream.next())
-        self._episodes = episode = self.simulator.reset([start], [goal])
-        self._pictures.begin(np.zeros(1, dtype=np.int64), episode)
-        return self._observation(episode), {"distance": float(episode.distance[0])}
+        start, goal = self._stream.next()
+        if self._episodes is None or options:
+            start, goal = pick_scenario(options, start, goal)
+            self._episodes = self.simulator.reset([start], [goal])
+        else:
+            self._episodes.q[0], self._episodes.goal[0] = start, goal
+            self.simulator.begin(self._episodes, FIRST_ROW)
+        self._pictures.begin(FIRST_ROW, self._episodes)
+        distance = self._episodes.distance.item()
+        return self._observation(self._episodes), {"distance": distance}
 
     def step(self, action: Array) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
         """Move for one time step."""
         episode = self._begun_episodes()
-        chosen = finite_array("action", action, (self.simulator.n_actions,))
-        if episode.status[0] != RUNNING:
+        if episode.status.item() != RUNNING:
+            self._check_action(action)
             return self._rest(episode)
-        result = self.simulator.step(episode, chosen[None])
+        try:
+            result = self.simulator.step(episode, np.asarray(action)[None])
+        except InvalidInputError:
+            self._check_action(action)
+            raise
         reward, terminated, truncated = self.interface.judge(episode, result)
         self._pictures.step(episode)
         return (
             self._observation(episode),
-            float(reward[0]),
-            bool(terminated[0]),
-            bool(truncated[0]),
+            reward.item(),
+            terminated.item(),
+            truncated.item(),
             self._info(episode, result),
         )
 
@@ -195,20 +211,26 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
 
     def _info(self, episode: Episodes, result: StepResult) -> dict[str, Any]:
         """What there is to tell about a step."""
-        collision = bool(result.collision[0])
-        contact = None
-        if collision:
-            contact = self.simulator.world.contact_pair(episode.q[0], episode.target[0])
-        success = bool(result.success[0])
-        terms = zip(REWARD_TERMS, result.terms[0].tolist(), strict=True)
-        return {
-            "distance": float(episode.distance[0]),
+        success, collision = result.success.item(), result.collision.item()
+        info = {
+            "distance": episode.distance.item(),
             "success": success,
             "is_success": success,
             "collision": collision,
-            "contact": contact,
-            **{f"reward_{name}": term for name, term in terms if self.interface.tells_terms},
+            "contact": self._contacts.of(episode, result.collision).item() if collision else 0,
         }
+        if self.interface.tells_terms:
+            info.update(zip(TERM_KEYS, result.terms[0].tolist(), strict=True))
+        return info
+
+    def _check_action(self, action: Array) -> None:
+        """Refuse an action that is not one number for each actuated joint."""
+        finite_array("action", action, (self.simulator.n_actions,))
+
+    @property
+    def contact_names(self) -> tuple[tuple[str, str] | None, ...]:
+        """Names of the two bodies of a contact, by the number that the info tells."""
+        return self._contacts.names
 
 
 def _rst_table(rows: "list[tuple[str, ...]]") -> str:

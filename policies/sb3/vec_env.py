@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 
-from kinarm.envs.interface import Interface, Observations
+from kinarm.envs.interface import Interface, Observations, one_by_one
 from kinarm.envs.lifecycle import Lifecycle
 from kinarm.envs.reach import action_space, environment_metadata, pick_scenario
 from kinarm.envs.rendering import EnvPictures
@@ -172,7 +172,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
         self, episodes: Episodes, rows: NDArray[np.int64], *reasons: NDArray[np.bool_]
     ) -> list[dict[str, Any]]:
         """Infos of episodes that ended: truncated, reached or touching."""
-        finals = _one_by_one(self.interface.observe(episodes.observation[rows]), rows.size)
+        finals = one_by_one(self.interface.observe(episodes.observation[rows]), rows.size)
         elapsed = round(time.time() - self._made, 6)
         columns = (*reasons, episodes.distance, self._returns, episodes.steps)
         return [
@@ -267,10 +267,3 @@ class SB3VecEnv(Lifecycle, VecEnv):
     def env_is_wrapped(self, wrapper_class: type, indices: Indices = None) -> list[bool]:
         """Whether the infos are those of ``Monitor``, as if it were wrapped by one; else no."""
         return [issubclass(Monitor, wrapper_class) for _ in self._get_indices(indices)]
-
-
-def _one_by_one(observations: Observations, count: int) -> list[Any]:
-    """Split a batch of observations."""
-    if isinstance(observations, dict):
-        return [{key: part[k] for key, part in observations.items()} for k in range(count)]
-    return list(observations)

@@ -78,7 +78,7 @@ def test_contact_refuses_the_move_and_the_episode_goes_on():
         observation, reward, terminated, truncated, info = env.step([0, 1, 0, 0, 0])
         if info["collision"]:
             break
-    assert info["contact"] == ("hand", "ground")
+    assert env.contact_names[info["contact"]] == ("hand", "ground")
     assert (reward, terminated, truncated, info["is_success"]) == (-2.0, False, False, False)
     np.testing.assert_allclose(observation["achieved_goal"], before, atol=1e-15)
     lifted, _, _, _, info = env.step([0, -1, 0, 0, 0])

@@ -64,7 +64,7 @@ class TestPicture:
             *_, ended, _, info = env.step([0.0, 1.0, -1.0, 0.0, 0.0])
         assert info["collision"]
         contact = env._pictures._contacts[0]
-        assert contact.pair == info["contact"]
+        assert contact.pair == env.contact_names[info["contact"]]
         picture = env.render().astype(int)
         env._pictures._contacts.clear()
         assert np.abs(env.render() - picture).max() > 50

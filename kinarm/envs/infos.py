@@ -1,0 +1,68 @@
+"""What an environment tells about the steps of many arms."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.rollouts import StepResult
+from kinarm.task import REWARD_TERMS
+
+TERM_KEYS = tuple(f"reward_{name}" for name in REWARD_TERMS)
+
+
+class StepInfos:
+    """Infos of steps of n arms, batched as Gymnasium batches them.
+
+    Kept together in a few tables, of which each entry of the infos is a row.
+
+    Parameters
+    ----------
+    tells_terms : bool
+        Whether they hold the reward terms.
+    """
+
+    def __init__(self, *, tells_terms: bool) -> None:
+        self._n_terms = len(TERM_KEYS) if tells_terms else 0
+        terms = TERM_KEYS[: self._n_terms]
+        self._keys = ("distance", *terms, "success", "is_success", "collision", "contact")
+        self._masks = tuple(f"_{key}" for key in self._keys)
+
+    def tables(
+        self, distance: NDArray[np.float64], result: StepResult, contact: NDArray[np.int64]
+    ) -> tuple[NDArray[Any], ...]:
+        """Arrays of shape (n_entries, n) for the infos of a step.
+
+        Parameters
+        ----------
+        distance : ndarray, shape (n,)
+            From the tool to the goal [m].
+        result : StepResult
+            Outcome of the step.
+        contact : ndarray of int, shape (n,)
+            Numbers of the contacts; see `kinarm.envs.contacts.Contacts`.
+        """
+        numbers = np.empty((1 + self._n_terms, len(distance)))
+        numbers[0] = distance
+        numbers[1:] = result.terms.T[: self._n_terms]
+        flags = np.empty((3, len(distance)), dtype=bool)
+        flags[:2] = result.success
+        flags[2] = result.collision
+        return numbers, flags, contact[None]
+
+    def named(
+        self, tables: tuple[NDArray[Any], ...], told: NDArray[np.bool_]
+    ) -> dict[str, NDArray[Any]]:
+        """Name the rows of the tables, and add the mask of the arms of which they tell."""
+        rows = [row for table in tables for row in table]
+        infos = dict(zip(self._keys, rows, strict=True))
+        infos.update(dict.fromkeys(self._masks, told))
+        return infos
+
+
+def taken_out(table: NDArray[Any], rows: NDArray[np.int64]) -> NDArray[Any]:
+    """Move what a table holds of some arms to a table of their own; where it was is zero."""
+    taken = np.zeros_like(table)
+    taken[:, rows] = table[:, rows]
+    table[:, rows] = 0
+    return taken
