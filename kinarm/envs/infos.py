@@ -1,5 +1,6 @@
 """What an environment tells about the steps of many arms."""
 
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -54,15 +55,13 @@ class StepInfos:
         self, tables: tuple[NDArray[Any], ...], told: NDArray[np.bool_]
     ) -> dict[str, NDArray[Any]]:
         """Name the rows of the tables, and add the mask of the arms of which they tell."""
-        rows = [row for table in tables for row in table]
-        infos = dict(zip(self._keys, rows, strict=True))
+        infos = dict(zip(self._keys, chain.from_iterable(tables), strict=True))
         infos.update(dict.fromkeys(self._masks, told))
         return infos
 
 
-def taken_out(table: NDArray[Any], rows: NDArray[np.int64]) -> NDArray[Any]:
-    """Move what a table holds of some arms to a table of their own; where it was is zero."""
-    taken = np.zeros_like(table)
-    taken[:, rows] = table[:, rows]
-    table[:, rows] = 0
+def taken_out(table: NDArray[Any], arms: NDArray[np.bool_]) -> NDArray[Any]:
+    """Move what a table holds of some arms to a table of their own; all else of it is zero."""
+    taken = np.where(arms, table, False)  # which is a zero of every type
+    np.copyto(table, False, where=arms)
     return taken

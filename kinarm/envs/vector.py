@@ -187,8 +187,8 @@ class ReachVectorEnv(Lifecycle, PortableSpec, VectorEnv[Any, Array, NDArray[Any]
         rows = over.nonzero()[0]
         if not rows.size:
             return self._infos.named(tables, ~over)
-        finals = self._infos.named(tuple(taken_out(table, rows) for table in tables), over)
-        final_obs = np.full(self.num_envs, None, dtype=object)
+        finals = self._infos.named(tuple(taken_out(table, over) for table in tables), over)
+        final_obs = np.empty(self.num_envs, dtype=object)
         shown = one_by_one(self.interface.observe(episodes.observation[rows]), rows.size)
         for row, observation in zip(rows.tolist(), shown, strict=True):
             final_obs[row] = observation
