@@ -1,6 +1,6 @@
 """What an environment tells about the steps of many arms."""
 
-from itertools import chain
+from itertools import chain, repeat
 from typing import Any
 
 import numpy as np
@@ -26,8 +26,8 @@ class StepInfos:
     def __init__(self, *, tells_terms: bool) -> None:
         self._n_terms = len(TERM_KEYS) if tells_terms else 0
         terms = TERM_KEYS[: self._n_terms]
-        self._keys = ("distance", *terms, "success", "is_success", "collision", "contact")
-        self._masks = tuple(f"_{key}" for key in self._keys)
+        entries = ("distance", *terms, "success", "is_success", "collision", "contact")
+        self._keys = (*entries, *(f"_{key}" for key in entries))
 
     def tables(
         self, distance: NDArray[np.float64], result: StepResult, contact: NDArray[np.int64]
@@ -55,9 +55,8 @@ class StepInfos:
         self, tables: tuple[NDArray[Any], ...], told: NDArray[np.bool_]
     ) -> dict[str, NDArray[Any]]:
         """Name the rows of the tables, and add the mask of the arms of which they tell."""
-        infos = dict(zip(self._keys, chain.from_iterable(tables), strict=True))
-        infos.update(dict.fromkeys(self._masks, told))
-        return infos
+        values = chain(*tables, repeat(told))
+        return dict(zip(self._keys, values, strict=False))
 
 
 def taken_out(table: NDArray[Any], arms: NDArray[np.bool_]) -> NDArray[Any]:

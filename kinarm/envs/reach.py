@@ -165,7 +165,7 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
             return self._rest(episode)
         try:
             result = self.simulator.step(episode, np.asarray(action)[None])
-        except InvalidInputError:
+        except ValueError:  # of the simulator, or of NumPy
             self._check_action(action)
             raise
         reward, terminated, truncated = self.interface.judge(episode, result)

@@ -161,7 +161,7 @@ class ReachVectorEnv(Lifecycle, PortableSpec, VectorEnv[Any, Array, NDArray[Any]
         else:
             infos = self._infos.named(tables, running)
             if resting:
-                rows = np.flatnonzero(~running)
+                rows = (~running).nonzero()[0]
                 reward[rows] = 0.0
                 self._renew(episodes, rows, infos)
         return self.interface.observe(episodes.observation), reward, terminated, truncated, infos

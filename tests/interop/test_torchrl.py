@@ -47,5 +47,4 @@ def test_native_batch(envs, env_id):
     assert (rollout["next", "done"].sum(dim=1) >= 40 // 8).all()
     told = rollout["next"]
     assert (told["contact"] > 0).equal(told["collision"])
-    assert told["collision"].any()
     env.close()
