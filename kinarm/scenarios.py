@@ -1,5 +1,7 @@
 """Scenarios: where an episode starts and what it has to reach."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,24 +44,56 @@ def draw_scenarios(
     ProblemError
         If no acceptable start is found for some goal in 2000 attempts.
     """
+    starts, goals = draw_for_each(world, [rng], count, start_spread=start_spread)
+    return starts[0], goals[0]
+
+
+def draw_for_each(
+    world: World,
+    rngs: Sequence[np.random.Generator],
+    count: int,
+    *,
+    start_spread: float | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Draw starts and goals from several generators, which are screened together.
+
+    Each generator is asked for the same numbers as by `draw_scenarios`.
+
+    Parameters
+    ----------
+    world, count, start_spread
+        As for `draw_scenarios`.
+    rngs : sequence of numpy.random.Generator
+        Sources of randomness.
+
+    Returns
+    -------
+    starts : ndarray, shape (n_rngs, count, n_joints)
+        Configurations [rad or m].
+    goals : ndarray, shape (n_rngs, count, 3)
+        Goal positions [m].
+    """
     arm, task, moved = world.arm, world.problem.task, slice(world.n_actions)
     spread = task.start_spread if start_spread is None else start_spread
     lower = arm.home + spread * (arm.lower - arm.home)
     extent = spread * (arm.upper - arm.lower)
-    goals = task.draw_goals(world.problem.scene, rng, count)
-    starts = np.tile(arm.home, (count, 1))
-    pending = np.arange(count)
+    goals = np.concatenate([task.draw_goals(world.problem.scene, rng, count) for rng in rngs])
+    starts = np.tile(arm.home, (len(goals), 1))
+    pending = np.arange(len(goals))
     for _ in range(START_ATTEMPTS):
         candidates = starts[pending]
-        uniforms = rng.random((pending.size, world.n_actions))
-        candidates[:, moved] = lower[moved] + uniforms * extent[moved]
+        wanted = np.bincount(pending // max(count, 1), minlength=len(rngs)).tolist()
+        uniforms = [rng.random((n, world.n_actions)) for rng, n in zip(rngs, wanted, strict=True)]
+        candidates[:, moved] = lower[moved] + np.concatenate(uniforms) * extent[moved]
         tools, touching = world.screen(candidates)
         far = np.linalg.norm(tools - goals[pending], axis=1) > task.tolerance
         accepted = far & ~touching
         starts[pending[accepted]] = candidates[accepted]
         pending = pending[~accepted]
         if pending.size == 0:
-            return starts, goals
+            return starts.reshape(len(rngs), count, arm.n_joints), goals.reshape(
+                len(rngs), count, 3
+            )
     pair = world.contact_model.contact_pair(candidates[~accepted][0])
     reason = f"{pair[0]} touches {pair[1]}" if pair else "the tool already is at the goal"
     raise ProblemError(
