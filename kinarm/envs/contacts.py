@@ -24,7 +24,6 @@ class Contacts:
     def __init__(self, world: World) -> None:
         self._world = world
         self.names: tuple[tuple[str, str] | None, ...] = (None, *world.contact_model.pair_names)
-        self._numbers = {pair: number for number, pair in enumerate(self.names)}
 
     def of(self, episodes: Episodes, refused: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Numbers of the first contacts of the last step, shape (n,); 0 where it went on.
@@ -52,7 +51,7 @@ class Contacts:
         for k, configuration in enumerate(way):
             if not doubt >> k & 1:
                 continue
-            pair = self._world.contact_model.contact_pair(configuration)
-            if pair is not None:
-                return self._numbers[pair]
+            index = self._world.contact_model.first_in_contact(configuration)
+            if index is not None:
+                return index + 1
         return 0
