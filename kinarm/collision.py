@@ -103,8 +103,10 @@ class ContactModel:
         return pool
 
     @cached_property
-    def _workspace(self) -> tuple[pin.Data, pin.GeometryData]:
-        return self.arm.model.createData(), make_verdicts_reliable(self.geometry.createData())
+    def _workspace(self) -> tuple[pin.Data, pin.GeometryData, list[coal.CollisionResult]]:
+        data = make_verdicts_reliable(self.geometry.createData())
+        # Results are looked at in a list, since wrapping them takes longer than the test itself.
+        return self.arm.model.createData(), data, list(data.collisionResults)
 
     @cached_property
     def pair_names(self) -> tuple[tuple[str, str], ...]:
@@ -140,8 +142,8 @@ class ContactModel:
         configuration : ndarray, shape (n_joints,)
             Joint positions [rad or m].
         """
-        contact = self.contact(configuration)
-        return contact.pair if contact else None
+        index = self.first_in_contact(configuration)
+        return None if index is None else self.pair_names[index]
 
     def contact(self, configuration: NDArray[np.float64]) -> Contact | None:
         """Describe the first tested pair that is in contact, or return None.
@@ -151,19 +153,27 @@ class ContactModel:
         configuration : ndarray, shape (n_joints,)
             Joint positions [rad or m].
         """
-        data, results = self._workspace
+        index = self.first_in_contact(configuration)
+        if index is None:
+            return None
+        point = np.array(self._workspace[2][index].getContact(0).pos)
+        return Contact(configuration, self.pair_names[index], point)
+
+    def first_in_contact(self, configuration: NDArray[np.float64]) -> int | None:
+        """Index of the first tested pair that is in contact, or None.
+
+        Parameters
+        ----------
+        configuration : ndarray, shape (n_joints,)
+            Joint positions [rad or m].
+        """
+        data, geometry_data, results = self._workspace
         if not pin.computeCollisions(
-            self.arm.model, data, self.geometry, results, configuration, True
+            self.arm.model, data, self.geometry, geometry_data, configuration, True
         ):
             return None
         # Pairs are tested in order up to the first in contact; later results are of other calls.
-        index, found = next(
-            (index, result)
-            for index, result in enumerate(results.collisionResults)
-            if result.isCollision()
-        )
-        point = np.array(found.getContact(0).pos)
-        return Contact(configuration, self.pair_names[index], point)
+        return next(index for index, result in enumerate(results) if result.isCollision())
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
         return type(self), (self.arm, self.geometry, self.body_names, self.shapes)

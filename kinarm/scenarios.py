@@ -1,5 +1,7 @@
 """Scenarios: where an episode starts and what it has to reach."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -43,19 +45,52 @@ def draw_scenarios(
     ProblemError
         If no acceptable start is found for some goal in 2000 attempts.
     """
+    starts, goals = draw_for_each(world, [rng], count, start_spread=start_spread)
+    return starts[0], goals[0]
+
+
+def draw_for_each(
+    world: World,
+    rngs: Sequence[np.random.Generator],
+    count: int,
+    *,
+    start_spread: float | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Draw starts and goals from several generators, which are screened together.
+
+    Each generator is asked for the same numbers as by `draw_scenarios`.
+
+    Parameters
+    ----------
+    world, count, start_spread
+        As for `draw_scenarios`.
+    rngs : sequence of numpy.random.Generator
+        Sources of randomness.
+
+    Returns
+    -------
+    starts : ndarray, shape (n_rngs, count, n_joints)
+        Configurations [rad or m].
+    goals : ndarray, shape (n_rngs, count, 3)
+        Goal positions [m].
+    """
     arm, task, n_actions = world.arm, world.problem.task, world.n_actions
     spread = task.start_spread if start_spread is None else start_spread
     lower = arm.home + spread * (arm.lower - arm.home)
     extent = spread * (arm.upper - arm.lower)
-    goals = task.draw_goals(world.problem.scene, rng, count)
-    starts = np.tile(arm.home, (count, 1))
-    pending = np.arange(count)
+    goals = np.concatenate([task.draw_goals(world.problem.scene, rng, count) for rng in rngs])
+    starts = np.tile(arm.home, (len(goals), 1))
+    pending = np.arange(len(goals))
     for _ in range(START_ATTEMPTS):
-        uniforms = rng.random((len(pending), n_actions))
+        wanted = np.bincount(pending // max(count, 1), minlength=len(rngs)).tolist()
+        drawn = [rng.random((n, n_actions)) for rng, n in zip(rngs, wanted, strict=True)]
+        uniforms = np.concatenate(drawn)
         tools, touching = world.screen(propose_starts(pending, uniforms, lower, extent, starts))
         pending = rejected_rows(pending, goals, tools, touching, task.tolerance)
         if pending.size == 0:
-            return starts, goals
+            return starts.reshape(len(rngs), count, arm.n_joints), goals.reshape(
+                len(rngs), count, 3
+            )
     pair = world.contact_model.contact_pair(starts[pending[0]])
     reason = f"{pair[0]} touches {pair[1]}" if pair else "the tool already is at the goal"
     raise ProblemError(

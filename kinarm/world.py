@@ -42,6 +42,8 @@ class World:
         )
         self.arm = Arm.load(self.problem.arm)
         self.contact_model = ContactModel.build(self.arm, self.problem.scene)
+        n_tested = self.problem.stepping.tested_configurations
+        self._shares = np.arange(1, n_tested + 1)[:, None] / n_tested
 
     def __repr__(self) -> str:
         return f"World({self.problem!r})"
@@ -145,10 +147,9 @@ class World:
         ndarray, shape (n, n_tested, n_joints)
             Evenly spaced; the last one is the target.
         """
-        n_tested = self.problem.stepping.tested_configurations
-        shares = np.arange(1, n_tested) / n_tested
-        inner = configurations[:, None] + shares[:, None] * (targets - configurations)[:, None]
-        return np.concatenate([inner, targets[:, None]], axis=1)
+        ways = configurations[:, None] + self._shares * (targets - configurations)[:, None]
+        ways[:, -1] = targets
+        return ways
 
     def _begun_at(self, configurations: ArrayLike, goals: ArrayLike) -> Episodes:
         """Episodes that begin at configurations, whether or not those touch something."""

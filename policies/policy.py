@@ -274,8 +274,8 @@ class Policy:
         """
         from kinarm.policies.conversion.torch_modules import policy_from_torch
 
-        training: dict[str, Any] = {"environment_steps": environment_steps, "seed": seed}
-        return policy_from_torch(module, problem, mean=mean, std=std, name=name, **training)
+        origin = {"algorithm": name, "environment_steps": environment_steps, "seed": seed}
+        return policy_from_torch(module, ReachProblem.load(problem), (mean, std), **origin)
 
     def check_arm(self, arm: Arm) -> None:
         """Refuse an arm other than the one that the policy was trained for.

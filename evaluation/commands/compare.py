@@ -112,10 +112,8 @@ class ComparisonRequest:
 
         Parameters
         ----------
-        executor : Executor, optional
-            Where trainings are carried out; the processors of this machine if it is left out.
-        command : str, optional
-            What to record as the command that made the files; this request if it is left out.
+        executor, command
+            As for `ReproductionRequest.run`.
 
         Raises
         ------

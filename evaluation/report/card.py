@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from kinarm._files import check_output, write_text
 from kinarm.errors import InvalidInputError
@@ -10,13 +10,11 @@ from kinarm.evaluation.entrants import ORACLE, Entrant
 from kinarm.evaluation.evaluation import Evaluation
 from kinarm.evaluation.metrics import METRICS, Metric
 from kinarm.evaluation.replays.recorder import record
+from kinarm.evaluation.report.templating import template_environment
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import Provenance
 from kinarm.problem import ReachProblem
 from kinarm.viewer import replay_page
-
-if TYPE_CHECKING:
-    from jinja2 import Template
 
 FIRST, WORST = 3, 3
 """Trials of the replay: the first ones, and those that ended worst."""
@@ -97,7 +95,8 @@ def policy_card(name: str, document: Mapping[str, Any], evaluation: Evaluation) 
     policy = _policy_of(evaluation)
     rows = {row["policy"]: row for row in document["results"]}
     oracle = rows.get(ORACLE.name)
-    return card_template().render(
+    template = template_environment(keep_trailing_newline=True).get_template("card.md")
+    return template.render(
         name=name,
         policy=policy,
         origin=_origin(policy.provenance),
@@ -111,20 +110,6 @@ def policy_card(name: str, document: Mapping[str, Any], evaluation: Evaluation) 
         shown=shown_trials(evaluation),
         first=min(FIRST, len(evaluation.trials)),
     )
-
-
-def card_template() -> "Template":
-    """The template of the card."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader(__package__),
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        undefined=StrictUndefined,
-    )
-    return environment.get_template("card.md")
 
 
 def figure_rows(row: Mapping[str, Any], oracle: Mapping[str, Any] | None) -> list[Row]:

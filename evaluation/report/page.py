@@ -10,6 +10,7 @@ from kinarm.evaluation.evaluation import Evaluation
 from kinarm.evaluation.report import maps
 from kinarm.evaluation.report.charts import histogram_chart, profile_chart
 from kinarm.evaluation.report.groups import ProblemResults, group_results
+from kinarm.evaluation.report.templating import template_environment
 from kinarm.evaluation.report.worst import record_worst, worst_row, worst_trials
 from kinarm.evaluation.table import SPREAD_PRIORITY, Column, metric_cell, metric_columns
 from kinarm.viewer import replay_page
@@ -83,15 +84,7 @@ def report_page(document: dict[str, Any], evaluations: Sequence[Evaluation]) -> 
 
 def page_template() -> "Template":
     """The template of the page, with what it calls."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader(__package__),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-    )
+    environment = template_environment(autoescape=True)
     environment.filters.update(
         tenth=lambda length: f"{length:.1f}".removesuffix(".0"),
         percent=lambda share: f"{100 * share:.1f} %",

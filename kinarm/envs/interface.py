@@ -126,14 +126,16 @@ class GoalInterface:
         self._horizon, self._collision = simulator.task.horizon, simulator.task.reward.collision
         n_joints = simulator.arm.n_joints
         self._places = part_slices(n_joints)
-        parts = [self._places[part.name] for part in OBSERVATION if not part.of_goal]
-        self._own = np.concatenate([np.arange(place.start, place.stop) for place in parts])
-        lower, upper = _bounds(simulator)
+        self._own = [self._places[part.name] for part in OBSERVATION if not part.of_goal]
+        lower, upper = bounds = _bounds(simulator)
+        own_lower, own_upper = (
+            np.concatenate([bound[place] for place in self._own]) for bound in bounds
+        )
         goals = self._places["goal"]
         reach = np.full(3, simulator.arm.reach)
         self.observation_space: Space[Any] = Dict(
             {
-                "observation": _box(lower[self._own], upper[self._own], self._dtype),
+                "observation": _box(own_lower, own_upper, self._dtype),
                 "achieved_goal": _box(-reach, reach, self._dtype),
                 "desired_goal": _box(lower[goals], upper[goals], self._dtype),
             }
@@ -141,28 +143,30 @@ class GoalInterface:
 
     def observe(self, observations: Array) -> Observations:
         """Split observations into ``observation``, ``achieved_goal`` and ``desired_goal``."""
+        own = [observations[:, place] for place in self._own]
+        achieved, desired = self._goals(observations)
+        return {
+            "observation": np.concatenate(own, axis=1, dtype=self._dtype),
+            "achieved_goal": achieved,
+            "desired_goal": desired,
+        }
+
+    def _goals(self, observations: Array) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Copy tool points and goals, shape (n, 3) each [m]."""
         goals = observations[:, self._places["goal"]]
         tools = goals - observations[:, self._places["goal_minus_tool"]]
-        return {
-            "observation": observations[:, self._own].astype(self._dtype),
-            "achieved_goal": tools.astype(self._dtype),
-            "desired_goal": goals.astype(self._dtype),
-        }
+        return tools.astype(self._dtype, copy=False), goals.astype(self._dtype)
 
     def judge(self, episodes: Episodes, result: StepResult) -> Verdict:
         """Reward by the goals, and let episodes go on whose move was refused."""
         truncated = result.truncated
-        if result.collision.any():
-            rows = np.flatnonzero(result.collision)
+        if np.count_nonzero(result.collision):
+            rows = result.collision.nonzero()[0]
             over = episodes.steps[rows] >= self._horizon
             episodes.status[rows] = np.where(over, TRUNCATED, RUNNING)
             truncated = truncated | (episodes.status == TRUNCATED) & result.collision
-        shown = self.observe(episodes.observation)
-        goals, info = (
-            (shown["achieved_goal"], shown["desired_goal"]),
-            {"collision": result.collision},
-        )
-        reward = self.compute_reward(*goals, info)
+        info = {"collision": result.collision}
+        reward = self.compute_reward(*self._goals(episodes.observation), info)
         return Verdict(reward, result.success, truncated)
 
     def compute_reward(
@@ -202,6 +206,13 @@ class GoalInterface:
     ) -> NDArray[np.bool_]:
         """False: only the number of the step decides; arguments as for `compute_reward`."""
         return np.zeros(_distances(achieved_goal, desired_goal).shape, dtype=bool)
+
+
+def one_by_one(observations: Observations, count: int) -> list[Any]:
+    """Split a batch of observations, as an interface shows them, into those of single arms."""
+    if isinstance(observations, dict):
+        return [{key: part[k] for key, part in observations.items()} for k in range(count)]
+    return list(observations)
 
 
 def checked_dtype(dtype: DTypeLike) -> np.dtype[Any]:

@@ -9,12 +9,11 @@ from gymnasium.spaces import Box, Space
 from numpy.typing import DTypeLike, NDArray
 
 from kinarm._validation import finite_array
-from kinarm.envs.errors import (
-    ClosedEnvironmentError,
-    ResetNeededError,
-    UnexpectedArgumentError,
-)
+from kinarm.envs.contacts import Contacts
+from kinarm.envs.errors import UnexpectedArgumentError
+from kinarm.envs.infos import TERM_KEYS
 from kinarm.envs.interface import FlatInterface, Interface, Observations
+from kinarm.envs.lifecycle import Lifecycle
 from kinarm.envs.portable import PortableSpec
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
 from kinarm.episodes import COLLISION, RUNNING, SUCCESS, TRUNCATED, Episodes
@@ -27,6 +26,9 @@ from kinarm.simulator import Simulator
 from kinarm.task import REWARD_TERMS
 
 Array = NDArray[np.float64]
+
+FIRST_ROW = np.zeros(1, dtype=np.int64)
+"""The only row of a batch of one."""
 
 
 def make_simulator(
@@ -54,7 +56,7 @@ def environment_metadata(simulator: Simulator, **others: Any) -> dict[str, Any]:
     return {"render_modes": list(RENDER_MODES), "render_fps": max(rate, 1), **others}
 
 
-class ReachEnv(PortableSpec, gymnasium.Env[Any, Array]):
+class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
     """Reach a cube on a bench with a six-axis arm (paper, section 3).
 
     Parameters
@@ -63,7 +65,8 @@ class ReachEnv(PortableSpec, gymnasium.Env[Any, Array]):
         ``"left"``, ``"right"``, ``"both"``, a problem file, or a problem.
     render_mode : {"rgb_array", "rgb_array_list", "human"}, optional
         What `render` returns: a picture, all pictures since it was last called, or nothing, while
-        a page in the browser follows the arm. Pictures need the extra ``render``.
+        a page in the browser follows the arm. Only films, by Gymnasium's ``RecordVideo``, need the
+        extra ``render``.
     width, height : int
         Size of pictures [pixels].
     camera : kinarm.viewer.Camera, optional
@@ -101,8 +104,8 @@ class ReachEnv(PortableSpec, gymnasium.Env[Any, Array]):
     that nothing moves until `reset`: steps have the reward 0, and Gymnasium warns.
 
     **Info**: ``distance`` [m]; and after a step ``success`` and, the same, ``is_success``;
-    ``collision``, ``contact`` (names of the two bodies that would have touched, or None) and the
-    five reward terms.
+    ``collision``; ``contact``, the number of the two bodies that would have touched, whose names
+    are ``contact_names[contact]``, or 0; and the five reward terms.
 
     **Versions**: v0, the first.
     """
@@ -128,9 +131,8 @@ class ReachEnv(PortableSpec, gymnasium.Env[Any, Array]):
         self.render_mode = render_mode
         picture = {"width": width, "height": height, "camera": camera}
         self._pictures = EnvPictures(self.simulator, render_mode, 1, **picture)
+        self._contacts = Contacts(self.simulator.world)
         self._stream: ScenarioStream | None = None
-        self._episode: Episodes | None = None
-        self._closed = False
 
     def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> Interface:
         """What the environment shows of its simulator."""
@@ -144,31 +146,41 @@ class ReachEnv(PortableSpec, gymnasium.Env[Any, Array]):
         super().reset(seed=seed)
         if self._stream is None or seed is not None:
             self._stream = ScenarioStream(self.simulator.world, self.np_random)
-        start, goal = pick_scenario(options, *self._stream.next())
-        self._episode = episode = self.simulator.reset([start], [goal])
-        self._pictures.begin(np.zeros(1, dtype=np.int64), episode)
-        return self._observation(episode), {"distance": float(episode.distance[0])}
+        start, goal = self._stream.next()
+        if self._episodes is None or options:
+            start, goal = pick_scenario(options, start, goal)
+            self._episodes = self.simulator.reset([start], [goal])
+        else:
+            self._episodes.q[0], self._episodes.goal[0] = start, goal
+            self.simulator.begin(self._episodes, FIRST_ROW)
+        self._pictures.begin(FIRST_ROW, self._episodes)
+        distance = self._episodes.distance.item()
+        return self._observation(self._episodes), {"distance": distance}
 
     def step(self, action: Array) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
         """Move for one time step."""
-        episode = self._begun_episode()
-        chosen = finite_array("action", action, (self.simulator.n_actions,))
-        if episode.status[0] != RUNNING:
+        episode = self._begun_episodes()
+        if episode.status.item() != RUNNING:
+            self._check_action(action)
             return self._rest(episode)
-        result = self.simulator.step(episode, chosen[None])
+        try:
+            result = self.simulator.step(episode, np.asarray(action)[None])
+        except ValueError:  # of the simulator, or of NumPy
+            self._check_action(action)
+            raise
         reward, terminated, truncated = self.interface.judge(episode, result)
         self._pictures.step(episode)
         return (
             self._observation(episode),
-            float(reward[0]),
-            bool(terminated[0]),
-            bool(truncated[0]),
+            reward.item(),
+            terminated.item(),
+            truncated.item(),
             self._info(episode, result),
         )
 
     def render(self) -> Any:
         """Take a picture of the arm; see ``render_mode``."""
-        self._begun_episode()
+        self._begun_episodes()
         pictures = self._pictures.render()
         if self.render_mode == "rgb_array_list":
             return [picture for (picture,) in pictures]
@@ -176,7 +188,7 @@ class ReachEnv(PortableSpec, gymnasium.Env[Any, Array]):
 
     def close(self) -> None:
         """Close the live page, if there is one; the environment cannot be used any more."""
-        self._closed = True
+        self.closed = True
         self._pictures.close()
 
     def _rest(self, episode: Episodes) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
@@ -199,30 +211,26 @@ class ReachEnv(PortableSpec, gymnasium.Env[Any, Array]):
 
     def _info(self, episode: Episodes, result: StepResult) -> dict[str, Any]:
         """What there is to tell about a step."""
-        collision = bool(result.collision[0])
-        contact = None
-        if collision:
-            contact = self.simulator.world.contact_pair(episode.q[0], episode.target[0])
-        success = bool(result.success[0])
-        terms = zip(REWARD_TERMS, result.terms[0].tolist(), strict=True)
-        return {
-            "distance": float(episode.distance[0]),
+        success, collision = result.success.item(), result.collision.item()
+        info = {
+            "distance": episode.distance.item(),
             "success": success,
             "is_success": success,
             "collision": collision,
-            "contact": contact,
-            **{f"reward_{name}": term for name, term in terms if self.interface.tells_terms},
+            "contact": self._contacts.of(episode, result.collision).item() if collision else 0,
         }
+        if self.interface.tells_terms:
+            info.update(zip(TERM_KEYS, result.terms[0].tolist(), strict=True))
+        return info
 
-    def _begun_episode(self) -> Episodes:
-        self._check_open()
-        if self._episode is None:
-            raise ResetNeededError("the environment was never begun: call reset()")
-        return self._episode
+    def _check_action(self, action: Array) -> None:
+        """Refuse an action that is not one number for each actuated joint."""
+        finite_array("action", action, (self.simulator.n_actions,))
 
-    def _check_open(self) -> None:
-        if self._closed:
-            raise ClosedEnvironmentError("the environment is closed: make another one")
+    @property
+    def contact_names(self) -> tuple[tuple[str, str] | None, ...]:
+        """Names of the two bodies of a contact, by the number that the info tells."""
+        return self._contacts.names
 
 
 def _rst_table(rows: "list[tuple[str, ...]]") -> str:

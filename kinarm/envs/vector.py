@@ -9,8 +9,10 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import DTypeLike, NDArray
 
 from kinarm._validation import whole_number
-from kinarm.envs.errors import ClosedEnvironmentError, ResetNeededError
-from kinarm.envs.interface import FlatInterface, Interface, Observations
+from kinarm.envs.contacts import Contacts
+from kinarm.envs.infos import StepInfos, taken_out
+from kinarm.envs.interface import FlatInterface, Interface, Observations, one_by_one
+from kinarm.envs.lifecycle import Lifecycle
 from kinarm.envs.portable import PortableSpec
 from kinarm.envs.reach import (
     Array,
@@ -20,16 +22,14 @@ from kinarm.envs.reach import (
     pick_scenario,
 )
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
+from kinarm.envs.scenario_queues import ScenarioQueues
 from kinarm.episodes import RUNNING, Episodes
 from kinarm.errors import InvalidInputError
 from kinarm.problem import ProblemLike
-from kinarm.rollouts import StepResult
-from kinarm.scenarios import ScenarioStream
 from kinarm.simulator import Simulator
-from kinarm.task import REWARD_TERMS
 
 
-class ReachVectorEnv(PortableSpec, VectorEnv[Any, Array, NDArray[Any]]):
+class ReachVectorEnv(Lifecycle, PortableSpec, VectorEnv[Any, Array, NDArray[Any]]):
     """A native batch of `ReachEnv`: all arms are stepped by one call of the compiled simulator.
 
     Sub-environment i behaves like a `ReachEnv` reset with ``seed + i``. Spaces, rewards, endings
@@ -95,8 +95,9 @@ class ReachVectorEnv(PortableSpec, VectorEnv[Any, Array, NDArray[Any]]):
         self.action_space = batch_space(self.single_action_space, num_envs)
         picture = {"width": width, "height": height, "camera": camera}
         self._pictures = EnvPictures(self.simulator, render_mode, num_envs, **picture)
-        self._streams: list[ScenarioStream] = []
-        self._episodes: Episodes | None = None
+        self._contacts = Contacts(self.simulator.world)
+        self._infos = StepInfos(tells_terms=self.interface.tells_terms)
+        self._queues: ScenarioQueues
 
     def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> Interface:
         """What the environment shows of its simulator."""
@@ -117,20 +118,21 @@ class ReachVectorEnv(PortableSpec, VectorEnv[Any, Array, NDArray[Any]]):
         chosen = dict(options or {})
         rows = self._masked_rows(chosen.pop("reset_mask", None))
         seeds = self._seeds(seed)
-        self._check_choice(chosen)
-        if not self._streams:
-            first = [np.random.SeedSequence().entropy if s is None else s for s in seeds]
-            self._streams = [self._stream(s) for s in first]
-        else:
-            for row in rows:
-                if seeds[row] is not None:
-                    self._streams[row] = self._stream(seeds[row])
-        scenarios = [pick_scenario(chosen, *self._streams[row].next()) for row in rows]
-        starts, goals = (np.array(part) for part in zip(*scenarios, strict=True))
+        start, goal = self._checked_choice(chosen)
+        self._seed_queues(seeds, rows)
         if self._episodes is None:
-            self._episodes = self.simulator.reset(starts, goals)
+            places = np.empty((self.num_envs, len(start))), np.empty((self.num_envs, 3))
         else:
-            self._restart(self._episodes, rows, starts, goals)
+            places = self._episodes.q, self._episodes.goal
+        self._queues.put(rows, *places)
+        if "start" in chosen:
+            places[0][rows] = start
+        if "goal" in chosen:
+            places[1][rows] = goal
+        if self._episodes is None:
+            self._episodes = self.simulator.reset(*places)
+        else:
+            self.simulator.begin(self._episodes, rows)
         self._pictures.begin(rows, self._episodes)
         distance = np.zeros(self.num_envs)
         distance[rows] = self._episodes.distance[rows]
@@ -144,22 +146,24 @@ class ReachVectorEnv(PortableSpec, VectorEnv[Any, Array, NDArray[Any]]):
     ) -> tuple[Observations, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
         """Move every arm for one time step."""
         episodes = self._begun_episodes()
-        before = episodes.status == RUNNING
-        if self.autoreset_mode is AutoresetMode.DISABLED and not before.all():
-            over = np.flatnonzero(~before).tolist()
+        running = episodes.status == RUNNING
+        resting = np.count_nonzero(running) < self.num_envs
+        if resting and self.autoreset_mode is AutoresetMode.DISABLED:
+            over = np.flatnonzero(~running).tolist()
             raise InvalidInputError(f"episodes {over} are over: reset them with reset_mask")
         result = self.simulator.step(episodes, actions)
         reward, terminated, truncated = self.interface.judge(episodes, result)
         self._pictures.step(episodes)
-        infos = self._step_infos(episodes, result, before)
-        if self.autoreset_mode is AutoresetMode.NEXT_STEP and not before.all():
-            reward[~before] = 0.0
-            self._renew(episodes, np.flatnonzero(~before), infos)
+        contact = self._contacts.of(episodes, result.collision)
+        tables = self._infos.tables(episodes.distance, result, contact)
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
-            ended = np.flatnonzero(terminated | truncated)
-            if ended.size:
-                self._keep_final(episodes, ended, infos)
-                self._renew(episodes, ended, infos)
+            infos = self._with_finals(episodes, tables, terminated | truncated)
+        else:
+            infos = self._infos.named(tables, running)
+            if resting:
+                rows = (~running).nonzero()[0]
+                reward[rows] = 0.0
+                self._renew(episodes, rows, infos)
         return self.interface.observe(episodes.observation), reward, terminated, truncated, infos
 
     def render(self) -> Any:
@@ -167,86 +171,57 @@ class ReachVectorEnv(PortableSpec, VectorEnv[Any, Array, NDArray[Any]]):
         self._begun_episodes()
         return self._pictures.render()
 
+    @property
+    def contact_names(self) -> tuple[tuple[str, str] | None, ...]:
+        """Names of the two bodies of a contact, by the numbers that infos tell; see `ReachEnv`."""
+        return self._contacts.names
+
     def close_extras(self, **_: Any) -> None:
         """Close the live page, if there is one; the environment cannot be used any more."""
         self._pictures.close()
 
-    def _begun_episodes(self) -> Episodes:
-        self._check_open()
-        if self._episodes is None:
-            raise ResetNeededError("the environment was never begun: call reset()")
-        return self._episodes
-
-    def _check_open(self) -> None:
-        if self.closed:
-            raise ClosedEnvironmentError("the environment is closed: make another one")
-
-    def _step_infos(
-        self, episodes: Episodes, result: StepResult, stepped: NDArray[np.bool_]
+    def _with_finals(
+        self, episodes: Episodes, tables: tuple[NDArray[Any], ...], over: NDArray[np.bool_]
     ) -> dict[str, Any]:
-        """Infos of the arms that moved, with their masks; takes over the arrays of the result."""
-        contact = np.full(self.num_envs, None, dtype=object)
-        for row in np.flatnonzero(result.collision):
-            contact[row] = self.simulator.world.contact_pair(episodes.q[row], episodes.target[row])
-        infos: dict[str, Any] = {
-            "distance": episodes.distance.copy(),
-            "success": result.success,
-            "is_success": result.success.copy(),
-            "collision": result.collision,
-            "contact": contact,
-        }
-        if self.interface.tells_terms:
-            terms = zip(REWARD_TERMS, result.terms.T, strict=True)
-            infos |= {f"reward_{name}": values for name, values in terms}
-        mask = stepped.copy()
-        infos.update({f"_{key}": mask for key in infos if key != "distance"})
-        infos["_distance"] = stepped.copy()
+        """Infos of a step, after which episodes that are over were replaced."""
+        rows = over.nonzero()[0]
+        if not rows.size:
+            return self._infos.named(tables, ~over)
+        finals = self._infos.named(tuple(taken_out(table, over) for table in tables), over)
+        final_obs = np.empty(self.num_envs, dtype=object)
+        shown = one_by_one(self.interface.observe(episodes.observation[rows]), rows.size)
+        for row, observation in zip(rows.tolist(), shown, strict=True):
+            final_obs[row] = observation
+        infos: dict[str, Any] = self._infos.named(tables, ~over)
+        infos.update(final_obs=final_obs, _final_obs=over, final_info=finals, _final_info=over)
+        self._renew(episodes, rows, infos)
         return infos
 
-    def _keep_final(
-        self, episodes: Episodes, ended: NDArray[np.int64], infos: dict[str, Any]
-    ) -> None:
-        """Move the infos of ended episodes to ``final_obs`` and ``final_info``."""
-        mask = np.zeros(self.num_envs, dtype=bool)
-        mask[ended] = True
-        final_obs = np.full(self.num_envs, None, dtype=object)
-        shown = self.interface.observe(episodes.observation[ended])
-        for index, row in enumerate(ended):
-            if isinstance(shown, dict):
-                final_obs[row] = {name: part[index] for name, part in shown.items()}
-            else:
-                final_obs[row] = shown[index]
-        final_info: dict[str, Any] = {}
-        for key in [key for key in infos if not key.startswith("_")]:
-            blank = None if infos[key].dtype == object else 0
-            kept = infos[key].copy()
-            kept[~mask], infos[key][mask] = blank, blank
-            final_info[key], final_info[f"_{key}"] = kept, mask
-        infos["_success"][ended] = False  # the mask of all but the distance, which is renewed
-        infos.update(final_obs=final_obs, _final_obs=mask, final_info=final_info, _final_info=mask)
-
     def _renew(self, episodes: Episodes, rows: NDArray[np.int64], infos: dict[str, Any]) -> None:
-        """Begin new episodes from the streams and report their distance."""
-        scenarios = [self._streams[row].next() for row in rows]
-        starts, goals = (np.array(part) for part in zip(*scenarios, strict=True))
-        self._restart(episodes, rows, starts, goals)
+        """Begin new episodes and report their distance."""
+        self._queues.put(rows, episodes.q, episodes.goal)
+        self.simulator.begin(episodes, rows)
         self._pictures.begin(rows, episodes)
         infos["distance"][rows] = episodes.distance[rows]
+        infos["_distance"] = infos["_distance"].copy()  # which is no longer that of the others
         infos["_distance"][rows] = True
 
-    def _restart(
-        self, episodes: Episodes, rows: NDArray[np.int64], starts: Array, goals: Array
-    ) -> None:
-        """Put new starts and goals into some rows of the batch."""
-        episodes.q[rows], episodes.goal[rows] = starts, goals
-        self.simulator.begin(episodes, rows)
-
-    def _check_choice(self, chosen: dict[str, Any]) -> None:
-        """Refuse a bad start or goal before anything changes."""
-        arm = self.simulator.arm
-        start, goal = pick_scenario(chosen, arm.home, np.zeros(3))
+    def _checked_choice(self, chosen: dict[str, Any]) -> tuple[Array, Array]:
+        """A start and a goal for all, of which those chosen count; refused if they are bad."""
+        start, goal = pick_scenario(chosen, self.simulator.arm.home, np.zeros(3))
         if "start" in chosen:
             self.simulator.reset(start[None], goal[None])
+        return start, goal
+
+    def _seed_queues(self, seeds: list[int | None], rows: NDArray[np.int64]) -> None:
+        """Draw the scenarios to come of some arms with these seeds; all arms need a first one."""
+        if self._episodes is None:
+            rngs = [np.random.default_rng(seed) for seed in seeds]
+            self._queues = ScenarioQueues(self.simulator.world, rngs)
+            return
+        for row in rows.tolist():
+            if seeds[row] is not None:
+                self._queues.seed(row, np.random.default_rng(seeds[row]))
 
     def _masked_rows(self, mask: object) -> NDArray[np.int64]:
         """Rows to reset."""
@@ -270,6 +245,3 @@ class ReachVectorEnv(PortableSpec, VectorEnv[Any, Array, NDArray[Any]]):
         if len(seed) != self.num_envs:
             raise InvalidInputError(f"seed must hold {self.num_envs} numbers, got {len(seed)}")
         return [None if one is None else whole_number("seed", one, 0) for one in seed]
-
-    def _stream(self, seed: Any) -> ScenarioStream:
-        return ScenarioStream(self.simulator.world, np.random.default_rng(seed))

@@ -16,7 +16,7 @@ from kinarm.viewer.camera import Camera, CameraLike, picture_size
 from kinarm.viewer.kernels.lighting import Lights, Materials
 from kinarm.viewer.kernels.rasterising import draw_shadow, draw_view, project
 from kinarm.viewer.kernels.shading import paint_floor, shade
-from kinarm.viewer.kernels.views import Backdrop, Balls, Eye, Surfaces
+from kinarm.viewer.kernels.views import Backdrop, Balls, Eye, Surfaces, View
 from kinarm.viewer.parts import Finish
 from kinarm.viewer.surroundings import (
     FLASH_RADIUS,
@@ -145,18 +145,18 @@ class Renderer:
         self._draw_shadow(surfaces.places, surfaces.faces)
         emission = self._scene.emission(outcome, contact.pair if contact else ())
         picture = np.empty((self.height, self.width, 3), dtype=np.uint8)
-        shade(
-            self._eye,
-            surfaces,
-            self._materials._replace(emission=emission),
-            self._lights,
-            self._backdrop,
-            self._balls(goal, contact),
-            self._floor,
-            self._nearness,
-            self._index,
-            picture,
+        view = View(
+            eye=self._eye,
+            surfaces=surfaces,
+            materials=self._materials._replace(emission=emission),
+            lights=self._lights,
+            backdrop=self._backdrop,
+            balls=self._balls(goal, contact),
+            floor=self._floor,
+            nearness=self._nearness,
+            seen=self._index,
         )
+        shade(view, picture)
         return picture
 
     def _draw_view(self, surfaces: Surfaces) -> None:

@@ -12,7 +12,7 @@ from kinarm.observation import observation_size
 from kinarm.policies.conversion.pieces import Clip, Piece, chained
 from kinarm.policies.policy import Layer, Policy
 from kinarm.policies.provenance import Provenance, package_versions
-from kinarm.problem import ProblemLike, ReachProblem
+from kinarm.problem import ReachProblem
 
 CONVERTED = (
     "Sequential, Linear, Tanh, ReLU, ELU (alpha 1), LeakyReLU (slope 0.01), SiLU, Hardtanh, "
@@ -23,35 +23,26 @@ CONVERTED = (
 
 def policy_from_torch(
     module: Any,
-    problem: ProblemLike,
-    *,
-    mean: ArrayLike | None = None,
-    std: ArrayLike | None = None,
-    name: str = "torch",
-    environment_steps: int = 0,
-    seed: int | None = None,
+    problem: ReachProblem,
+    statistics: tuple[ArrayLike | None, ArrayLike | None],
+    **origin: Any,
 ) -> Policy:
-    """Convert a module; see `Policy.from_torch`."""
-    faced = ReachProblem.load(problem)
-    arm = Arm.load(faced.arm)
+    """Convert a module; see `Policy.from_torch`. The origin is that of `Provenance`."""
+    arm = Arm.load(problem.arm)
     n_observations, n_actions = observation_size(arm.n_joints), arm.n_actuated
     layers, activations = chained(module_pieces(module), n_observations)
     if len(layers[-1].bias) != n_actions:
         raise InvalidInputError(
             f"the module gives {len(layers[-1].bias)} numbers; arm {arm.name!r} takes {n_actions}"
         )
+    mean, std = statistics
     return Policy(
         mean=np.zeros(n_observations) if mean is None else np.asarray(mean),
         std=np.ones(n_observations) if std is None else np.asarray(std),
         layers=layers,
         activations=activations,
         provenance=Provenance(
-            algorithm=name,
-            recipe="torch",
-            problem=faced.pinned,
-            seed=seed,
-            environment_steps=environment_steps,
-            versions=package_versions(),
+            recipe="torch", problem=problem.pinned, versions=package_versions(), **origin
         ),
     )
 

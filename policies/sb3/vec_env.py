@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 
-from kinarm.envs.errors import ClosedEnvironmentError, ResetNeededError
-from kinarm.envs.interface import Interface, Observations
+from kinarm.envs.interface import Interface, Observations, one_by_one
+from kinarm.envs.lifecycle import Lifecycle
 from kinarm.envs.reach import action_space, environment_metadata, pick_scenario
 from kinarm.envs.rendering import EnvPictures
 from kinarm.episodes import Episodes
@@ -24,7 +24,7 @@ Indices = int | Iterable[int] | None
 """Arms by number; None stands for all."""
 
 
-class SB3VecEnv(VecEnv):
+class SB3VecEnv(Lifecycle, VecEnv):
     """Many arms, stepped by one call of the simulator; made by `kinarm.policies.sb3_vec_env`.
 
     Arm i goes through the same episodes as a single environment that is reset with the seed + i, as
@@ -71,10 +71,8 @@ class SB3VecEnv(VecEnv):
         super().__init__(num_envs, interface.observation_space, action_space(simulator))
         self.metadata = environment_metadata(simulator)
         self._streams: dict[int, ScenarioStream] = {}
-        self._episodes: Episodes | None = None
         self._actions = np.zeros((num_envs, simulator.n_actions))
         self._returns = np.zeros(num_envs)
-        self._closed = False
         self._made = time.time()
 
     def reset(self) -> Observations:
@@ -174,7 +172,7 @@ class SB3VecEnv(VecEnv):
         self, episodes: Episodes, rows: NDArray[np.int64], *reasons: NDArray[np.bool_]
     ) -> list[dict[str, Any]]:
         """Infos of episodes that ended: truncated, reached or touching."""
-        finals = _one_by_one(self.interface.observe(episodes.observation[rows]), rows.size)
+        finals = one_by_one(self.interface.observe(episodes.observation[rows]), rows.size)
         elapsed = round(time.time() - self._made, 6)
         columns = (*reasons, episodes.distance, self._returns, episodes.steps)
         return [
@@ -197,17 +195,6 @@ class SB3VecEnv(VecEnv):
         self.simulator.begin(episodes, rows)
         self._returns[rows] = 0.0
         self._announce(episodes, rows)
-
-    def _begun_episodes(self) -> Episodes:
-        """The episodes under way, if there are any."""
-        self._check_open()
-        if self._episodes is None:
-            raise ResetNeededError("the environment was never begun: call reset()")
-        return self._episodes
-
-    def _check_open(self) -> None:
-        if self._closed:
-            raise ClosedEnvironmentError("the environment is closed: make another one")
 
     def render(self, mode: str | None = None) -> Any:
         """Draw the arms, as the render mode says; see `kinarm.ReachVectorEnv`.
@@ -237,7 +224,7 @@ class SB3VecEnv(VecEnv):
     def close(self) -> None:
         """Let go of what draws the arms; nothing can be done afterwards."""
         self._pictures.close()
-        self._closed = True
+        self.closed = True
 
     def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
         """Value of an attribute of the environment or of its interface, repeated for every arm.
@@ -280,10 +267,3 @@ class SB3VecEnv(VecEnv):
     def env_is_wrapped(self, wrapper_class: type, indices: Indices = None) -> list[bool]:
         """Whether the infos are those of ``Monitor``, as if it were wrapped by one; else no."""
         return [issubclass(Monitor, wrapper_class) for _ in self._get_indices(indices)]
-
-
-def _one_by_one(observations: Observations, count: int) -> list[Any]:
-    """Split a batch of observations."""
-    if isinstance(observations, dict):
-        return [{key: part[k] for key, part in observations.items()} for k in range(count)]
-    return list(observations)

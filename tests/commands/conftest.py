@@ -1,5 +1,6 @@
 """Running the command lines, in this process and in others."""
 
+import json
 import os
 import subprocess
 import sys
@@ -8,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from oracle_calls import count_calls
 
 from kinarm.evaluation.commands import bench, compare, evaluate, replay, reproduce
 from kinarm.policies import Policy, recipe, train, train_policy
@@ -106,3 +108,27 @@ def policy_folder(policy: Policy, tmp_path_factory: pytest.TempPathFactory) -> P
         config = recipe("ars", "paper", iterations=2, **settings)
         train_policy(config).policy.save(folder / f"{name}.npz")
     return folder
+
+
+@pytest.fixture
+def evaluated(run):
+    """Run ``kinarm-eval --json`` and return the document."""
+
+    def call(*arguments):
+        answer = run("kinarm-eval", "--json", *arguments)
+        assert (answer.status, answer.err) == (0, "")
+        return json.loads(answer.out)
+
+    return call
+
+
+@pytest.fixture
+def solved(monkeypatch) -> list[int]:
+    """How many trials the oracle is asked to solve, call by call."""
+    return count_calls(monkeypatch)
+
+
+@pytest.fixture
+def empty_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("KINARM_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"

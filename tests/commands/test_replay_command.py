@@ -1,17 +1,12 @@
 """``kinarm-replay``: pages from policies, evaluations and recordings, and a live one."""
 
 import json
-import os
-import signal
-import socket
-import subprocess
-import time
-import urllib.request
 from dataclasses import replace as changed_to
 from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import check_refused
 
 from kinarm.arm import Arm
 from kinarm.evaluation import ReplayRequest
@@ -53,14 +48,6 @@ def recordings(run_outside, policy_folder, tmp_path_factory) -> Path:
 def outcomes(evaluation, policy):
     rows = json.loads(evaluation.read_text())["results"]
     return next(row["outcomes"] for row in rows if row["policy"] == policy)
-
-
-def refused(answer, *words):
-    """One line that names what is wrong, and status 2."""
-    assert (answer.status, answer.out) == (2, ""), answer
-    assert len(answer.err.splitlines()) == 1, answer.err
-    for word in words:
-        assert word in answer.err, answer.err
 
 
 def played(answer):
@@ -171,15 +158,15 @@ def test_another_arm(replay):
     ],
 )
 def test_bad_input(replay, tmp_path, arguments, words):
-    refused(replay(*arguments), *words)
+    check_refused(replay(*arguments), *words)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_the_page_cannot_be_written(run, tmp_path):
     options = ("--policy", "zero", "--problem", "left", "--trials", 1, *QUICK)
-    refused(run("kinarm-replay", *options, "--out", tmp_path), str(tmp_path))
+    check_refused(run("kinarm-replay", *options, "--out", tmp_path), str(tmp_path))
     bad = ("--out", tmp_path / "made.html", "--record", tmp_path / "made.txt")
-    refused(run("kinarm-replay", *options, *bad), ".npz")
+    check_refused(run("kinarm-replay", *options, *bad), ".npz")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -188,14 +175,14 @@ def test_folders_are_made_and_files_kept(run, tmp_path):
     options = ("--policy", "zero", "--problem", "left", "--trials", 1, *QUICK)
     files = ("--out", page, "--record", kept)
     assert run("kinarm-replay", *options, *files).status == 0
-    refused(run("kinarm-replay", *options, "--out", page), "--overwrite")
+    check_refused(run("kinarm-replay", *options, "--out", page), "--overwrite")
     fresh = ("--out", tmp_path / "fresh.html")
-    refused(run("kinarm-replay", *options, *fresh, "--record", kept), "--overwrite")
+    check_refused(run("kinarm-replay", *options, *fresh, "--record", kept), "--overwrite")
     assert run("kinarm-replay", *options, *files, "--overwrite").status == 0
 
 
 def test_recordings_of_another_arm(replay, recordings):
-    refused(replay(recordings, "--arm", "paper_flange"), "'paper_flange' is another version")
+    check_refused(replay(recordings, "--arm", "paper_flange"), "'paper_flange' is another version")
 
 
 def test_an_arm_that_was_moved(replay, recordings, tmp_path):
@@ -205,16 +192,16 @@ def test_an_arm_that_was_moved(replay, recordings, tmp_path):
 
 
 def test_recordings_do_not_hold_it(replay, recordings):
-    refused(replay(recordings, "--policy", "nobody"), "'nobody'", "mine-seed0")
-    refused(replay(recordings, "--problem", "left"), "holds no recording")
-    refused(replay(recordings, "--trial", 9), "no trial 9", "0 to 3")
+    check_refused(replay(recordings, "--policy", "nobody"), "'nobody'", "mine-seed0")
+    check_refused(replay(recordings, "--problem", "left"), "holds no recording")
+    check_refused(replay(recordings, "--trial", 9), "no trial 9", "0 to 3")
 
 
 def test_recordings_are_compared_in_the_same_trials_only(replay, recordings, tmp_path):
     first, second, *_ = load_recordings(recordings)
     mixed = tmp_path / "mixed.npz"
     save_recordings(mixed, [first, changed_to(second, policy="other")])
-    refused(replay(mixed, "--compare", "mine-seed0", "other"), "cannot be compared")
+    check_refused(replay(mixed, "--compare", "mine-seed0", "other"), "cannot be compared")
     save_recordings(mixed, [first, changed_to(first, policy="other")])
     assert played(replay(mixed, "--compare", "mine-seed0", "other")) == [0, 0]
 
@@ -224,18 +211,18 @@ def test_truncated_recordings(replay, recordings, tmp_path, share):
     content = recordings.read_bytes()
     path = tmp_path / "cut.npz"
     path.write_bytes(content[: int(share * len(content))])
-    refused(replay(path), "cut.npz", "not a complete kinarm recording")
+    check_refused(replay(path), "cut.npz", "not a complete kinarm recording")
 
 
 def test_policies_are_no_recordings(replay, policy_folder):
-    refused(replay(policy_folder / "lefty.npz"), "'kinarm-policy'", "'kinarm-recording'")
+    check_refused(replay(policy_folder / "lefty.npz"), "'kinarm-policy'", "'kinarm-recording'")
 
 
 @pytest.mark.parametrize("content", ["", "{}", "[1]", '{"protocol": {}}', "\x00"])
 def test_damaged_evaluations(replay, tmp_path, content):
     path = tmp_path / "evaluation.json"
     path.write_text(content)
-    refused(replay(path), "evaluation.json", "not an evaluation")
+    check_refused(replay(path), "evaluation.json", "not an evaluation")
 
 
 def test_an_evaluation_that_no_longer_holds(replay, evaluation, tmp_path):
@@ -249,16 +236,20 @@ def test_an_evaluation_that_no_longer_holds(replay, evaluation, tmp_path):
         return replay(path, "--policy", "random", *QUICK)
 
     assert document["protocol"]["format_version"] == 2
-    refused(changed(lambda d: d["protocol"].update(format_version=9)), "format version 9")
+    check_refused(changed(lambda d: d["protocol"].update(format_version=9)), "format version 9")
 
     def right(document):
         return document["protocol"]["problems"]["right"]
 
-    refused(changed(lambda d: right(d)["problem"]["arm"].update(digest="0")), "another version")
-    refused(changed(lambda d: right(d)["problem"]["task"].update(tolerance=0.1)), "hash")
-    refused(changed(lambda d: right(d)["goals"].reverse()), "hash")
+    check_refused(
+        changed(lambda d: right(d)["problem"]["arm"].update(digest="0")), "another version"
+    )
+    check_refused(changed(lambda d: right(d)["problem"]["task"].update(tolerance=0.1)), "hash")
+    check_refused(changed(lambda d: right(d)["goals"].reverse()), "hash")
     row = document["results"].index(next(r for r in document["results"] if r["policy"] == "random"))
-    refused(changed(lambda d: d["results"][row]["outcomes"]["steps"].reverse()), "ends otherwise")
+    check_refused(
+        changed(lambda d: d["results"][row]["outcomes"]["steps"].reverse()), "ends otherwise"
+    )
 
 
 @pytest.mark.parametrize(
@@ -282,103 +273,12 @@ def test_an_evaluation_with_something_missing(replay, evaluation, tmp_path, path
         part = part[step]
     del part[last]
     (tmp_path / "evaluation.json").write_text(json.dumps(document))
-    refused(replay(tmp_path / "evaluation.json"), "evaluation.json", "not an evaluation")
+    check_refused(replay(tmp_path / "evaluation.json"), "evaluation.json", "not an evaluation")
 
 
 def test_an_evaluation_of_several_policies(replay, evaluation):
-    refused(replay(evaluation, "--policy", "nobody"), "'nobody'", "random")
-    refused(replay(evaluation, "--policy", "random", "--problem", "left"), "'random'")
+    check_refused(replay(evaluation, "--policy", "nobody"), "'nobody'", "random")
+    check_refused(replay(evaluation, "--policy", "random", "--problem", "left"), "'random'")
 
 
 # The live page
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
-@pytest.fixture
-def live(command):
-    """Start the live page; whatever happens, it does not outlast the test."""
-    started = []
-
-    def start(port):
-        options = (
-            "--policy",
-            "zero",
-            "--problem",
-            "left",
-            "--live",
-            "--no-browser",
-            "--port",
-            port,
-        )
-        process = subprocess.Popen(
-            command("kinarm-replay", *options, "--no-browser", "--port", port),
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            # A background job inherits that Ctrl-C is ignored.
-            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-        )
-        started.append(process)
-        return process, process.stdout.readline()
-
-    yield start
-    for process in started:
-        process.kill()
-        process.communicate()
-
-
-def children(pid: int) -> list[str]:
-    tasks = Path(f"/proc/{pid}/task").glob("*/children")
-    return [child for task in tasks for child in task.read_text().split()]
-
-
-def listens(port: int, host: str = "127.0.0.1") -> bool:
-    with socket.socket() as probe:
-        return probe.connect_ex((host, port)) == 0
-
-
-@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-def test_nothing_is_left_behind(live, sent):
-    port = free_port()
-    process, line = live(port)
-    assert f"http://127.0.0.1:{port}/static/" in line
-    assert children(process.pid) == []
-    with urllib.request.urlopen(f"http://127.0.0.1:{port}/static/") as page:
-        assert b"MeshCat" in page.read()
-    process.send_signal(sent)
-    status = process.wait(10)
-    assert status == (130 if sent == signal.SIGINT else -sent)
-    assert not listens(port)
-    if sent == signal.SIGINT:
-        assert process.stderr.read() == "kinarm-replay: interrupted\n"
-
-
-def test_only_this_machine_is_served(live):
-    """127.0.0.2 is this machine too, and would answer if every interface were bound."""
-    port = free_port()
-    live(port)
-    assert listens(port)
-    assert not listens(port, "127.0.0.2")
-
-
-def test_a_port_in_use(live):
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = taken.getsockname()[1]
-        process, line = live(port)
-        assert line == f"port {port} is in use: taking {port + 1}\n"
-        assert f":{port + 1}/static/" in process.stdout.readline()
-
-
-def test_trials_are_reported_as_they_end(live):
-    process, _ = live(free_port())
-    os.set_blocking(process.stdout.fileno(), True)
-    began = time.monotonic()
-    assert "left 0, zero: out of time after 64 steps" in process.stdout.readline()
-    assert time.monotonic() - began < 30

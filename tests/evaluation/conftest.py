@@ -1,17 +1,20 @@
-"""Trained policies and evaluations of them."""
+"""Trained policies, evaluations of them, and bounds of trials."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
+from trial_bounds import draw
 
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.entrants import BASELINES, Entrant
 from kinarm.evaluation.evaluation import Evaluation, run_trials
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies import Policy, recipe, train_policy
+from kinarm.policies.oracle import Oracle, OracleSolutions
 
 
 @pytest.fixture(scope="session")
@@ -80,3 +83,17 @@ def made_up(skilled_evaluation: Evaluation) -> Callable[[Sequence[float]], Evalu
         return Evaluation(skilled_evaluation.entrant, skilled_evaluation.trials, rollouts)
 
     return make
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch) -> Path:
+    """An empty cache folder, yet to be made."""
+    monkeypatch.setenv("KINARM_CACHE", str(tmp_path / "deep" / "cache"))
+    return tmp_path / "deep" / "cache"
+
+
+@pytest.fixture(scope="module")
+def solutions() -> OracleSolutions:
+    """What the oracle says of the trials that ``draw`` draws."""
+    trials = draw()
+    return Oracle("right").solve_batch(trials.starts, trials.goals)

@@ -1,27 +1,24 @@
 """Bounds of trials: those of the oracle, found once, kept on disk, whatever happens there."""
 
 import gc
-import io
 import json
 import os
 import subprocess
 import sys
-import time
 import weakref
-from copy import copy
 from pathlib import Path
 
 import numpy as np
 import pytest
 from oracle_calls import count_calls
+from trial_bounds import draw, same
 
 import kinarm
 from kinarm.arm import Arm
 from kinarm.evaluation import bounds
 from kinarm.evaluation.bounds import bounds_document, cache_folder, oracle_bounds
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.oracle import Oracle, OracleSolutions
-from kinarm.policies.provenance import package_versions
+from kinarm.policies.oracle import Oracle
 from kinarm.problem import PROBLEMS
 from kinarm.scene import PAPER_BENCHES, Obstacle, Scene
 from kinarm.task import RewardWeights
@@ -54,34 +51,10 @@ with context.Pool({PROCESSES}) as pool:
 """
 
 
-@pytest.fixture
-def folder(tmp_path, monkeypatch) -> Path:
-    """An empty cache folder, yet to be made."""
-    monkeypatch.setenv("KINARM_CACHE", str(tmp_path / "deep" / "cache"))
-    return tmp_path / "deep" / "cache"
-
-
-@pytest.fixture(scope="module")
-def solutions() -> OracleSolutions:
-    """What the oracle says of the trials that ``draw`` draws."""
-    trials = draw()
-    return Oracle("right").solve_batch(trials.starts, trials.goals)
-
-
 @pytest.fixture(scope="module")
 def hard() -> TrialSet:
     """Twelve trials, of which some are out of reach."""
     return draw("right", 12, 2, arm="paper_flange")
-
-
-def draw(problem="right", trials=3, seed=5, **overrides) -> TrialSet:
-    return TrialSet.draw(PROBLEMS[problem].replace(**overrides), trials, seed)
-
-
-def same(one: OracleSolutions, other: OracleSolutions) -> bool:
-    """Whether every array is equal, in kind and content."""
-    pairs = zip(one.arrays().values(), other.arrays().values(), strict=True)
-    return all(a.dtype == b.dtype and a.tobytes() == b.tobytes() for a, b in pairs)
 
 
 def run_outside(code: str, folder: Path, **variables: str) -> str:
@@ -203,192 +176,6 @@ def test_another_version_of_the_oracle_solves_again(folder, monkeypatch):
     oracle_bounds(draw())
     assert calls == [3]
     assert len(list(folder.glob("*-later.npz"))) == 1
-
-
-def archive(arrays: dict[str, np.ndarray]) -> bytes:
-    file = io.BytesIO()
-    np.savez_compressed(file, **arrays)
-    return file.getvalue()
-
-
-def single_array(_, arrays) -> bytes:
-    file = io.BytesIO()
-    np.save(file, arrays["steps"])
-    return file.getvalue()
-
-
-DAMAGES = {
-    "empty": lambda *_: b"",
-    "text": lambda *_: b"hello",
-    "bytes": lambda *_: bytes(range(256)) * 4,
-    "first half": lambda whole, _: whole[: len(whole) // 2],
-    "all but the end": lambda whole, _: whole[:-1],
-    "second half": lambda whole, _: whole[len(whole) // 2 :],
-    "single array": single_array,
-    "no array": lambda *_: archive({}),
-    "foreign": lambda *_: archive({"weights": np.zeros(3)}),
-    "one missing": lambda _, arrays: archive({k: v for k, v in arrays.items() if k != "tight"}),
-    "one too many": lambda _, arrays: archive({**arrays, "more": arrays["steps"]}),
-    "one short": lambda _, arrays: archive({**arrays, "steps": arrays["steps"][:-1]}),
-    "all short": lambda _, arrays: archive({name: array[:-1] for name, array in arrays.items()}),
-    "objects": lambda _, arrays: archive({**arrays, "reasons": np.array([None] * 3)}),
-}
-
-
-@pytest.mark.parametrize("damage", DAMAGES)
-def test_a_file_that_cannot_be_used_is_replaced(folder, solutions, monkeypatch, damage):
-    oracle_bounds(draw())
-    (path,) = folder.iterdir()
-    path.write_bytes(DAMAGES[damage](path.read_bytes(), solutions.arrays()))
-    calls = count_calls(monkeypatch)
-    assert same(oracle_bounds(draw()), solutions)
-    assert same(oracle_bounds(draw()), solutions)
-    assert calls == [3]
-    assert list(folder.iterdir()) == [path]
-
-
-def test_a_file_with_a_number_for_an_array_is_replaced(folder, solutions):
-    oracle_bounds(draw())
-    (path,) = folder.iterdir()
-    path.write_bytes(archive({**solutions.arrays(), "steps": np.array(3)}))
-    assert same(oracle_bounds(draw()), solutions)
-
-
-def test_whichever_byte_of_a_file_is_wrong_the_bounds_are_right(folder, solutions, monkeypatch):
-    oracle_bounds(draw())
-    (path,) = folder.iterdir()
-    whole = path.read_bytes()
-    monkeypatch.setattr(Oracle, "solve_batch", lambda *_, **__: solutions)
-    monkeypatch.setattr(bounds, "_save", lambda *_: None)
-    drawn = draw()
-    for place in range(0, len(whole), 13):
-        content = bytearray(whole)
-        content[place] ^= 0xFF
-        path.write_bytes(content)
-        assert same(oracle_bounds(copy(drawn)), solutions), place
-
-
-@pytest.mark.parametrize("inside", ["", "deep"])
-def test_a_file_in_place_of_the_folder_does_no_harm(tmp_path, monkeypatch, solutions, inside):
-    (tmp_path / "file").write_text("mine")
-    monkeypatch.setenv("KINARM_CACHE", str(tmp_path / "file" / inside))
-    assert same(oracle_bounds(draw()), solutions)
-    assert [path.name for path in tmp_path.iterdir()] == ["file"]
-    assert (tmp_path / "file").read_text() == "mine"
-
-
-def test_a_folder_in_place_of_the_file_does_no_harm(folder, solutions):
-    path = folder / f"oracle-{draw().digest}-{bounds.oracle_version()}.npz"
-    path.mkdir(parents=True)
-    assert same(oracle_bounds(draw()), solutions)
-    assert list(folder.iterdir()) == [path]
-
-
-@pytest.mark.parametrize(
-    ("variables", "expected"),
-    [
-        ({"KINARM_CACHE": "/mine", "XDG_CACHE_HOME": "/theirs"}, "/mine"),
-        ({"KINARM_CACHE": "", "XDG_CACHE_HOME": "/theirs"}, "/theirs/kinarm"),
-        ({"XDG_CACHE_HOME": "/theirs"}, "/theirs/kinarm"),
-        ({"XDG_CACHE_HOME": ""}, "/home/me/.cache/kinarm"),
-        ({}, "/home/me/.cache/kinarm"),
-    ],
-)
-def test_the_folder_is_the_chosen_or_the_users(monkeypatch, variables, expected):
-    for name in ("KINARM_CACHE", "XDG_CACHE_HOME"):
-        monkeypatch.delenv(name, raising=False)
-    for name, value in {"HOME": "/home/me", **variables}.items():
-        monkeypatch.setenv(name, value)
-    assert cache_folder() == Path(expected)
-
-
-@pytest.mark.parametrize("constant", ["ORACLE_SEMANTICS", "SEMANTICS"])
-def test_the_version_changes_with_what_oracle_and_simulator_mean(monkeypatch, constant):
-    before = bounds.oracle_version.__wrapped__()
-    assert before == bounds.oracle_version()
-    monkeypatch.setattr(bounds, constant, "another")
-    assert bounds.oracle_version.__wrapped__() != before
-
-
-@pytest.mark.parametrize("package", bounds.COMPUTING_PACKAGES)
-def test_the_version_changes_with_the_packages_that_compute(monkeypatch, package):
-    before, installed = bounds.oracle_version.__wrapped__(), package_versions()
-    monkeypatch.setattr(bounds, "package_versions", lambda: {**installed, package: "99"})
-    assert bounds.oracle_version.__wrapped__() != before
-    monkeypatch.setattr(bounds, "package_versions", lambda: {**installed, "torch": "99"})
-    assert bounds.oracle_version.__wrapped__() == before
-
-
-def fill(folder: Path, *names: str, size: int = 1000) -> None:
-    """Write files of which each was used an hour before the next, the last one an hour ago."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for age, name in enumerate(reversed(names), start=1):
-        (folder / name).write_bytes(bytes(size))
-        used = time.time() - 3600 * age
-        os.utime(folder / name, (used, used))
-
-
-def names_in(folder: Path) -> set[str]:
-    return {path.name for path in folder.iterdir()}
-
-
-class TestRoom:
-    """What the cache keeps when it gets full."""
-
-    def test_the_least_recently_used_files_go_beyond_a_number(self, folder, monkeypatch):
-        monkeypatch.setattr(bounds, "KEPT_FILES", 3)
-        fill(folder, *(f"oracle-{name}-1.npz" for name in "abcd"))
-        oracle_bounds(draw())
-        assert {f"oracle-{name}-1.npz" for name in "cd"} < names_in(folder)
-        assert len(names_in(folder)) == 3
-
-    def test_the_least_recently_used_files_go_beyond_a_size(self, folder, monkeypatch):
-        fill(folder, *(f"oracle-{name}-1.npz" for name in "abcd"), size=100_000)
-        monkeypatch.setattr(bounds, "KEPT_BYTES", 250_000)
-        oracle_bounds(draw())
-        assert {f"oracle-{name}-1.npz" for name in "cd"} < names_in(folder)
-        assert len(names_in(folder)) == 3
-
-    def test_looking_up_is_use(self, folder, monkeypatch):
-        monkeypatch.setattr(bounds, "KEPT_FILES", 2)
-        oracle_bounds(draw())
-        (first,) = names_in(folder)
-        os.utime(folder / first, (0, 0))
-        fill(folder, "oracle-old-1.npz")
-        oracle_bounds(draw())
-        oracle_bounds(draw(seed=6))
-        assert first in names_in(folder)
-        assert "oracle-old-1.npz" not in names_in(folder)
-
-    def test_bounds_larger_than_the_cache_are_kept_alone(self, folder, monkeypatch):
-        monkeypatch.setattr(bounds, "KEPT_BYTES", 1)
-        fill(folder, "oracle-old-1.npz")
-        oracle_bounds(draw())
-        (kept,) = names_in(folder)
-        assert kept != "oracle-old-1.npz"
-
-    def test_only_what_belongs_to_the_cache_goes(self, folder, monkeypatch):
-        monkeypatch.setattr(bounds, "KEPT_FILES", 1)
-        abandoned = ".oracle-a-1.npz.x2f9k"
-        fill(folder, abandoned, "notes.txt", "oracle.npz", "policy.npz", "oracle-mine.txt")
-        oracle_bounds(draw())
-        assert {"notes.txt", "oracle.npz", "policy.npz", "oracle-mine.txt"} < names_in(folder)
-        assert abandoned not in names_in(folder)
-
-    def test_files_that_vanish_or_cannot_be_deleted_do_no_harm(self, folder, monkeypatch):
-        fill(folder, *(f"oracle-{name}-1.npz" for name in "abc"))
-        (folder / "oracle-folder-1.npz" / "inside").mkdir(parents=True)
-        (folder / "oracle-link-1.npz").symlink_to(folder / "nothing")
-        monkeypatch.setattr(bounds, "KEPT_FILES", 0)
-        unlink = Path.unlink
-
-        def race(path, **settings):
-            unlink(path)
-            unlink(path)
-
-        monkeypatch.setattr(Path, "unlink", race)
-        oracle_bounds(draw())
-        assert not {f"oracle-{name}-1.npz" for name in "abc"} & names_in(folder)
 
 
 def test_progress_is_told_while_trials_are_solved(folder, monkeypatch):

@@ -9,7 +9,7 @@ import pytest
 
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError, UnknownNameError
-from kinarm.evaluation.entrants import BASELINES, ORACLE, Entrant, find_entrants
+from kinarm.evaluation.entrants import BASELINES, Entrant
 from kinarm.evaluation.evaluation import evaluate, pool, run_trials
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle import Oracle
@@ -24,14 +24,6 @@ from kinarm.evaluation import *
 modules = [n for n in kinarm.evaluation.__all__ if isinstance(globals()[n], types.ModuleType)]
 assert not modules, f"these names are modules: {modules}"
 """
-
-
-COMPARED = ("relative_success", "step_ratio", "step_ratio_p95")
-
-
-def oracle_figures(evaluation):
-    """Figures that compare with the oracle, in documents."""
-    return [evaluation.to_json()["metrics"][name]["value"] for name in COMPARED]
 
 
 def test_public_names_are_what_they_say():
@@ -295,145 +287,6 @@ def test_pooled_interval_is_no_narrower_than_its_trials_allow(evaluations):
 
 def test_pooled_training_seeds_are_told(evaluations):
     assert pool(evaluations)[0].to_json()["training_seeds"] == [0, 1, 2]
-
-
-def test_step_ratio_is_that_of_the_trials_that_succeeded(bounded):
-    rollouts, starts, goals = bounded.rollouts, bounded.trials.starts, bounded.trials.goals
-    solutions = Oracle("right").solve_batch(starts, goals)
-    expected = [
-        rollouts.steps[trial] / solution.steps_lower_bound
-        for trial, solution in enumerate(solutions)
-        if rollouts.success[trial]
-    ]
-    assert 0 < len(expected) < 60
-    assert bounded.step_ratio.tolist() == expected
-    assert bounded.metrics["step_ratio"].value == np.median(expected)
-    assert bounded.metrics["step_ratio_p95"].value == np.percentile(expected, 95)
-
-
-@pytest.mark.parametrize("reached", [range(60), range(0, 60, 3), [7]])
-def test_relative_success_is_the_ratio_of_two_rates(bounded, reached):
-    reachable = np.isin(np.arange(60), list(reached))
-    made = replace(bounded, bounds=replace(bounded.bounds, reachable=reachable))
-    successes, possible = bounded.outcomes.count("success"), len(reached)
-    relative = made.metrics["relative_success"].value
-    assert relative == pytest.approx((successes / 60) / (possible / 60))
-
-
-def test_a_policy_that_never_succeeds_has_no_step_ratio():
-    evaluation = evaluate("zero", "right", trials=4, oracle=True)
-    assert evaluation.step_ratio.shape == (0,)
-    assert oracle_figures(evaluation) == [0, None, None]
-
-
-@pytest.mark.parametrize("name", ["oracle", "zero"])
-def test_where_the_oracle_reaches_nothing_there_is_nothing_to_compare_with(name):
-    evaluation = evaluate(name, "right", horizon=1, trials=4, oracle=True)
-    assert not evaluation.bounds.reachable.any()
-    assert oracle_figures(evaluation) == [None, None, None]
-
-
-def test_without_the_oracle_there_are_no_bounds(skilled_evaluation):
-    assert skilled_evaluation.bounds is None
-    assert oracle_figures(skilled_evaluation) == [None, None, None]
-    with pytest.raises(InvalidInputError, match="there are no bounds"):
-        _ = skilled_evaluation.step_ratio
-
-
-def test_evaluations_are_made_without_the_oracle_unless_asked_for(skilled, monkeypatch):
-    monkeypatch.setattr(Oracle, "solve_batch", None)
-    assert evaluate(skilled, trials=3, seed=99).bounds is None
-
-
-def test_the_oracle_changes_nothing_but_the_bounds(skilled_evaluation, bounded):
-    alone, beside = skilled_evaluation.to_json(), bounded.to_json()
-    for name in COMPARED:
-        assert alone["metrics"].pop(name) == {"value": None, "ci95": None}
-        assert beside["metrics"].pop(name)["value"] is not None
-    assert alone == beside
-
-
-def test_the_oracle_evaluated_by_name():
-    evaluation = evaluate("oracle", "right", trials=5, seed=5, oracle=True)
-    expected = Oracle("right").solve_batch(evaluation.trials.starts, evaluation.trials.goals)
-    np.testing.assert_array_equal(evaluation.bounds.paths, expected.paths)
-    np.testing.assert_array_equal(evaluation.rollouts.steps, expected.steps)
-    np.testing.assert_array_equal(evaluation.rollouts.distance, expected.final_distance)
-    assert set(evaluation.outcomes) == {"success"}
-    np.testing.assert_array_equal(
-        evaluation.step_ratio, expected.steps / expected.steps_lower_bound
-    )
-
-
-def test_the_oracle_evaluated_without_bounds():
-    evaluation = evaluate("oracle", "right", trials=5, seed=5)
-    assert evaluation.success.value == 1
-    assert evaluation.bounds is None
-
-
-def test_the_oracle_has_no_problem_of_its_own():
-    with pytest.raises(InvalidInputError, match="'oracle' was not trained for a problem"):
-        evaluate("oracle", trials=1)
-
-
-def test_the_oracle_is_all_that_is_possible_where_not_everything_is():
-    evaluation = evaluate("oracle", "right", trials=12, seed=2, arm="paper_flange", oracle=True)
-    solved = int(evaluation.bounds.reachable.sum())
-    assert 0 < evaluation.success.value == solved / 12 < 1
-    assert (evaluation.metrics["relative_success"].value, evaluation.step_ratio.size) == (1, solved)
-
-
-@pytest.mark.parametrize(
-    ("arm", "name", "task"),
-    [
-        ("paper", "ars-tuned-both-seed0", "both"),
-        ("paper", "random", "left"),
-        ("paper", "oracle", "both"),
-        ("paper_flange", "oracle", "right"),
-        ("lrmate200ic_5l", "oracle", "right"),
-    ],
-)
-def test_nobody_is_better_than_proven_possible(arm, name, task):
-    evaluation = evaluate(name, task, trials=25, seed=2, arm=arm, oracle=True)
-    assert (evaluation.step_ratio >= 1).all()
-    rollouts, bounds = evaluation.rollouts, evaluation.bounds
-    assert (rollouts.distance >= bounds.distance_lower_bound).all()
-    assert not rollouts.success[bounds.steps_lower_bound > 64].any()
-
-
-def test_trials_are_solved_once_for_all_who_face_them(skilled, monkeypatch):
-    solve, calls = Oracle.solve_batch, []
-    monkeypatch.setattr(
-        Oracle, "solve_batch", lambda *args, **kw: calls.append(1) or solve(*args, **kw)
-    )
-    trials = TrialSet.draw("right", 3, seed=77)
-    for entrant in (Entrant.from_policy("mine", skilled), ORACLE, BASELINES["zero"]):
-        run_trials(entrant, trials, oracle=True)
-    assert len(calls) == 1
-
-
-def test_a_policy_for_another_arm_is_refused_before_the_oracle_is_asked(skilled, monkeypatch):
-    monkeypatch.setattr(Oracle, "solve_batch", None)
-    with pytest.raises(PolicyFileError, match="trained for arm"):
-        evaluate(skilled, arm="lrmate200ic_5l", trials=2, oracle=True)
-
-
-def test_pooled_step_ratio_is_over_all_seeds(trials):
-    members = [run_trials(e, trials, oracle=True) for e in find_entrants("ars-tuned-right")]
-    relative, median, p95 = oracle_figures(pool(members)[0])
-    ratios = [
-        member.rollouts.steps[trial] / member.bounds.steps_lower_bound[trial]
-        for member in members
-        for trial in np.flatnonzero(member.rollouts.success)
-    ]
-    assert 60 < len(ratios) < 240
-    assert median == pytest.approx(np.median(ratios))
-    assert p95 == pytest.approx(np.percentile(ratios, 95))
-    assert relative == pytest.approx(len(ratios) / 240)
-
-
-def test_pooled_figures_without_bounds_have_none(evaluations):
-    assert oracle_figures(pool(evaluations)[0]) == [None, None, None]
 
 
 def test_texts_of_evaluations_are_one_readable_line(evaluations, trials):

@@ -34,3 +34,17 @@ def test_single_environments(envs, env_id):
         assert rollout["action"].shape == (10, 5)
         assert rollout["next", "reward"].shape == (10, 1)
         env.close()
+
+
+@pytest.mark.parametrize("env_id", ENVIRONMENTS)
+def test_native_batch(envs, env_id):
+    """In the autoreset mode that it prefers; the infos come along."""
+    batch = gymnasium.make_vec(env_id, num_envs=3, autoreset_mode="Disabled", horizon=8)
+    env = envs.GymWrapper(batch).auto_register_info_dict()
+    envs.utils.check_env_specs(env, seed=0)
+    rollout = env.rollout(40, break_when_any_done=False)
+    assert rollout["next", "reward"].shape == (3, 40, 1)
+    assert (rollout["next", "done"].sum(dim=1) >= 40 // 8).all()
+    told = rollout["next"]
+    assert (told["contact"] > 0).equal(told["collision"])
+    env.close()

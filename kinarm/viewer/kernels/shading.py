@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from kinarm.kernels.compiling import Array, Vector, helper, inlined, kernel
 from kinarm.viewer.kernels.edges import edge
 from kinarm.viewer.kernels.lighting import Lights, Materials, light_up, sunlit, unit
-from kinarm.viewer.kernels.views import Backdrop, Balls, Eye, Surfaces
+from kinarm.viewer.kernels.views import Backdrop, Balls, Eye, Surfaces, View
 
-LAYOUT = "e88cd1e26d3d"
+LAYOUT = "38834202683d"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 FLOOR = 0
@@ -236,20 +236,9 @@ def ball_cover(
 
 
 @helper
-def shade_row(
-    row: int,
-    eye: Eye,
-    surfaces: Surfaces,
-    materials: Materials,
-    lights: Lights,
-    backdrop: Backdrop,
-    balls: Balls,
-    floor: NDArray[np.float32],
-    nearness: NDArray[np.float32],
-    index: NDArray[np.int32],
-    picture: NDArray[np.uint8],
-) -> None:
+def shade_row(row: int, view: View, picture: NDArray[np.uint8]) -> None:
     """Colour a row of pixels."""
+    eye, surfaces, materials, lights, backdrop, balls, floor, nearness, index = view
     offsets = eye.offsets
     n_samples = offsets.shape[0]
     for column in range(index.shape[1]):
@@ -289,23 +278,10 @@ def shade_row(
 
 
 @kernel
-def shade(
-    eye: Eye,
-    surfaces: Surfaces,
-    materials: Materials,
-    lights: Lights,
-    backdrop: Backdrop,
-    balls: Balls,
-    floor: NDArray[np.float32],
-    nearness: NDArray[np.float32],
-    index: NDArray[np.int32],
-    picture: NDArray[np.uint8],
-) -> None:
+def shade(view: View, picture: NDArray[np.uint8]) -> None:
     """Colour all pixels.
 
     What is seen at several samples of a pixel is lit once, in their middle.
     """
-    for row in range(index.shape[0]):
-        shade_row(
-            row, eye, surfaces, materials, lights, backdrop, balls, floor, nearness, index, picture
-        )
+    for row in range(picture.shape[0]):
+        shade_row(row, view, picture)

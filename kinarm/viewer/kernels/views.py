@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import Array
+from kinarm.viewer.kernels.lighting import Lights, Materials
 
 
 class Eye(NamedTuple):
@@ -99,3 +100,29 @@ class Balls(NamedTuple):
     colours: Array
     opacities: Array
     on_top: NDArray[np.bool_]
+
+
+class View(NamedTuple):
+    """What a picture shows, for its pixels to be coloured.
+
+    Attributes
+    ----------
+    eye, surfaces, materials, lights, backdrop, balls
+        The scene.
+    floor : ndarray of float32, shape (height, width, 2, 3)
+        Colours of floor and background: in shadow, and in the sun.
+    nearness : ndarray of float32, shape (height, width, n_samples)
+        One over the distance ahead of what is seen at each sample [1/m].
+    seen : ndarray of int32, shape (height, width, n_samples)
+        Triangle that is seen there; negative for floor and background.
+    """
+
+    eye: Eye
+    surfaces: Surfaces
+    materials: Materials
+    lights: Lights
+    backdrop: Backdrop
+    balls: Balls
+    floor: NDArray[np.float32]
+    nearness: NDArray[np.float32]
+    seen: NDArray[np.int32]

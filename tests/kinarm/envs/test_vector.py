@@ -111,6 +111,21 @@ class TestSameStep:
         np.testing.assert_allclose(infos["distance"], np.linalg.norm(observations[:, 3:6], axis=1))
 
 
+def test_contacts_are_those_that_the_judge_finds():
+    batch = native("NextStep", 64)
+    batch.reset(seed=0)
+    rng, world, refused = np.random.default_rng(0), batch.simulator.world, 0
+    for _ in range(100):
+        infos = batch.step(np.sign(rng.uniform(-1, 1, (64, 5))))[-1]
+        q, target = batch._episodes.q, batch._episodes.target
+        pairs = [batch.contact_names[number] for number in infos["contact"]]
+        for row in np.flatnonzero(infos["collision"]):
+            assert pairs[row] == world.contact_pair(q[row], target[row]) is not None
+            refused += 1
+        assert all(pairs[row] is None for row in np.flatnonzero(~infos["collision"]))
+    assert refused > 30
+
+
 class TestDisabled:
     def test_reset_mask_equals_a_loop_of_single_environments(self):
         batch, loop = native("Disabled", horizon=12), looped("Disabled", horizon=12)

@@ -1,0 +1,175 @@
+"""``kinarm-eval`` beside the oracle: what it solves, when, and what is told of it."""
+
+import json
+
+import pytest
+from documents import faced, relative_success
+
+from kinarm.evaluation.commands.evaluate import EvaluationRequest
+from kinarm.evaluation.evaluation import evaluate
+
+
+def test_the_oracle_alone(evaluated):
+    document = evaluated("--policy", "oracle", "--task", "right", "--trials", 5)
+    (row,) = document["results"]
+    assert (row["policy"], row["algorithm"], row["problem"]) == ("oracle", "oracle", "right")
+    assert (row["trained_on"], row["training_seed"]) == (None, None)
+    figures = {name: entry["value"] for name, entry in row["metrics"].items()}
+    assert (figures["success"], figures["collision"]) == (1, 0)
+    assert relative_success(row) == 1
+    bounds = document["protocol"]["problems"]["right"]["oracle"]
+    assert row["outcomes"]["steps"] == bounds["trials"]["steps"]
+    assert row["outcomes"]["final_distance"] == bounds["trials"]["final_distance"]
+
+
+def test_the_oracle_lists_what_it_cannot_solve(evaluated):
+    arguments = ("--policy", "oracle", "--task", "right", "--arm", "paper_flange", "--seed", 2)
+    document = evaluated(*arguments, "--trials", 12)
+    (row,) = document["results"]
+    bounds = document["protocol"]["problems"]["right"]["oracle"]
+    solved = row["outcomes"]["outcome"].count("success")
+    success = row["metrics"]["success"]["value"]
+    assert 0 < success == bounds["success"]["value"] == solved / 12 < 1
+    assert relative_success(row) == 1
+    unsolved = [i for i, reachable in enumerate(bounds["trials"]["reachable"]) if not reachable]
+    assert [entry["trial"] for entry in bounds["unsolved"]] == unsolved
+    assert len(unsolved) == 12 - solved
+    assert any("proven" in entry["reason"] for entry in bounds["unsolved"])
+    assert all(row["outcomes"]["final_distance"][trial] > 0.05 for trial in unsolved)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "tasks"),
+    [
+        (["zero"], ["left", "right", "both"]),
+        (["zero", "oracle"], ["left", "right", "both"]),
+        (["oracle"], ["left", "right", "both"]),
+        (["oracle", "oracle", "--problem", "left", "--problem", "left"], ["left"]),
+        (["zero", "oracle", "--problem", "both", "--problem", "left"], ["both", "left"]),
+        (["oracle", "zero", "--matrix"], ["left", "right", "both"]),
+    ],
+)
+def test_the_oracle_faces_every_task_in_play_once(evaluated, arguments, tasks):
+    words = (
+        word for name in arguments if name in ("zero", "oracle") for word in ("--policy", name)
+    )
+    others = [word for word in arguments if word not in ("zero", "oracle")]
+    document = evaluated(*words, *others, "--trials", 2)
+    assert [task for name, task in faced(document) if name == "oracle"] == tasks
+    assert list(document["protocol"]["problems"]) == tasks
+
+
+def test_the_oracle_joins_those_who_are_entered_by_default(evaluated):
+    document = evaluated("--task", "left", "--trials", 2)
+    assert faced(document).count(("oracle", "left")) == 1
+    assert {task for _, task in faced(document)} == {"left"}
+    for row in (*document["results"], *document["pooled"]):
+        assert relative_success(row) is not None
+
+
+def test_without_the_oracle_nothing_is_solved(evaluated, solved, empty_cache):
+    document = evaluated("--policy", "zero", "--trials", 2, "--no-oracle")
+    assert faced(document) == [("zero", task) for task in ("left", "right", "both")]
+    assert all(entry["oracle"] is None for entry in document["protocol"]["problems"].values())
+    assert all(relative_success(row) is None for row in document["results"])
+    assert solved == []
+    assert not empty_cache.exists()
+
+
+def test_the_oracle_may_be_named_and_its_bounds_left_out(evaluated):
+    document = evaluated("--policy", "oracle", "--task", "left", "--trials", 2, "--no-oracle")
+    (row,) = document["results"]
+    assert (row["metrics"]["success"]["value"], relative_success(row)) == (1, None)
+    assert document["protocol"]["problems"]["left"]["oracle"] is None
+
+
+def test_trials_are_solved_once_and_then_looked_up(evaluated, solved, empty_cache):
+    arguments = ("--policy", "zero", "--policy", "random", "--task", "right", "--trials", 3)
+    first, second = evaluated(*arguments), evaluated(*arguments)
+    assert solved == [3]
+    assert len(list(empty_cache.iterdir())) == 1
+    assert first == second
+
+
+def test_an_empty_cache_is_filled_without_a_word(run_outside, empty_cache):
+    arguments = ("--policy", "zero", "--task", "right", "--trials", 2)
+    answer = run_outside("kinarm-eval", *arguments)
+    assert (answer.status, answer.err) == (0, "")
+    assert len(list(empty_cache.iterdir())) == 1
+
+
+def test_a_cache_that_cannot_be_used_is_done_without(evaluated, tmp_path, monkeypatch):
+    arguments = ("--policy", "zero", "--task", "right", "--trials", 2)
+    expected = evaluated(*arguments)
+    (tmp_path / "file").write_text("mine")
+    monkeypatch.setenv("KINARM_CACHE", str(tmp_path / "file"))
+    assert evaluated(*arguments) == expected
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (
+            ["--policy", "lefty.npz", "--policy", "flange.npz", "--matrix"],
+            ["called 'right'", "arm"],
+        ),
+        (["--policy", "flange.npz", "--problem", "right"], ["'paper_flange'", "'paper'"]),
+        (["--policy", "flange.npz", "--problem", "left"], ["'paper_flange'", "'paper'"]),
+        (["--policy", "lefty.npz", "--arm", "paper_flange"], ["'paper_flange'", "'paper'"]),
+        (["--policy", "zero", "--task", "left", "--out", "lefty.npz"], ["lefty.npz"]),
+        (["--policy", "zero", "--task", "left", "--report", "lefty.npz"], ["lefty.npz"]),
+        (["--policy", "zero", "--policy", "nobody"], ["'nobody'", "random, zero, oracle"]),
+    ],
+)
+def test_what_is_refused_is_refused_before_trials_are_solved(
+    run, policy_folder, solved, empty_cache, arguments, words
+):
+    paths = [policy_folder / word if word.endswith(".npz") else word for word in arguments]
+    answer = run("kinarm-eval", "--trials", 2, *paths)
+    assert (answer.status, answer.out, len(answer.err.splitlines())) == (2, "", 1)
+    for word in words:
+        assert word in answer.err
+    assert solved == []
+    assert not empty_cache.exists()
+
+
+def test_a_file_called_oracle_is_not_mixed_up_with_the_oracle(run, policy, tmp_path):
+    """Either the clash is refused or one can tell the rows apart."""
+    policy.save(tmp_path / "oracle.npz")
+    answer = run("kinarm-eval", "--json", "--policy", tmp_path / "oracle.npz", "--trials", 2)
+    if answer.status == 0:
+        rows = json.loads(answer.out)["results"]
+        assert len({row["policy"] for row in rows}) == len(rows)
+    else:
+        assert "two policies are called 'oracle'" in answer.err
+
+
+def test_table_tells_how_far_the_proofs_got(run):
+    arguments = ("--policy", "zero", "--task", "right", "--trials", 5)
+    share = evaluate("zero", "right", trials=5, oracle=True).bounds.tight.mean()
+    beside, alone = (run("kinarm-eval", *arguments, *more).out for more in ([], ["--no-oracle"]))
+    assert f"proofs complete: right {100 * share:.1f} %" in beside
+    assert "proofs complete" not in alone
+
+
+def test_histograms_leave_out_the_oracle_unless_it_is_alone(run, policy_folder, tmp_path):
+    for folder, more in (("beside", []), ("alone", ["--no-oracle"])):
+        arguments = ("--policy", policy_folder / "lefty.npz", "--trials", 4, *more)
+        assert run("kinarm-eval", *arguments, "--out", tmp_path / folder).status == 0
+    name = "final_distance.svg"
+    assert (tmp_path / "beside" / name).read_bytes() == (tmp_path / "alone" / name).read_bytes()
+    arguments = ("--policy", "oracle", "--task", "left", "--trials", 4, "--out", tmp_path / "only")
+    assert run("kinarm-eval", *arguments).status == 0
+    assert "oracle" in (tmp_path / "only" / name).read_text()
+
+
+def test_what_is_being_done_is_told(empty_cache):
+    told = []
+    request = EvaluationRequest(policies=("zero",), problem="right", trials=3)
+    request.evaluate(told.append)
+    request.evaluate(told.append)
+    solving, *evaluating = told
+    assert "right" in solving
+    assert "3 of 3 trials solved" in solving
+    assert evaluating == ["evaluating on right"] * 2

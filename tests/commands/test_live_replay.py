@@ -1,0 +1,102 @@
+"""``kinarm-replay --live``: a page of its own server, and what is left when it ends."""
+
+import os
+import signal
+import socket
+import subprocess
+import time
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@pytest.fixture
+def live(command):
+    """Start the live page; whatever happens, it does not outlast the test."""
+    started = []
+
+    def start(port):
+        options = (
+            "--policy",
+            "zero",
+            "--problem",
+            "left",
+            "--live",
+            "--no-browser",
+            "--port",
+            port,
+        )
+        process = subprocess.Popen(
+            command("kinarm-replay", *options, "--no-browser", "--port", port),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            # A background job inherits that Ctrl-C is ignored.
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+        )
+        started.append(process)
+        return process, process.stdout.readline()
+
+    yield start
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+def children(pid: int) -> list[str]:
+    tasks = Path(f"/proc/{pid}/task").glob("*/children")
+    return [child for task in tasks for child in task.read_text().split()]
+
+
+def listens(port: int, host: str = "127.0.0.1") -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex((host, port)) == 0
+
+
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_nothing_is_left_behind(live, sent):
+    port = free_port()
+    process, line = live(port)
+    assert f"http://127.0.0.1:{port}/static/" in line
+    assert children(process.pid) == []
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/static/") as page:
+        assert b"MeshCat" in page.read()
+    process.send_signal(sent)
+    status = process.wait(10)
+    assert status == (130 if sent == signal.SIGINT else -sent)
+    assert not listens(port)
+    if sent == signal.SIGINT:
+        assert process.stderr.read() == "kinarm-replay: interrupted\n"
+
+
+def test_only_this_machine_is_served(live):
+    """127.0.0.2 is this machine too, and would answer if every interface were bound."""
+    port = free_port()
+    live(port)
+    assert listens(port)
+    assert not listens(port, "127.0.0.2")
+
+
+def test_a_port_in_use(live):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        process, line = live(port)
+        assert line == f"port {port} is in use: taking {port + 1}\n"
+        assert f":{port + 1}/static/" in process.stdout.readline()
+
+
+def test_trials_are_reported_as_they_end(live):
+    process, _ = live(free_port())
+    os.set_blocking(process.stdout.fileno(), True)
+    began = time.monotonic()
+    assert "left 0, zero: out of time after 64 steps" in process.stdout.readline()
+    assert time.monotonic() - began < 30

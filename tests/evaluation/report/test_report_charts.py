@@ -1,0 +1,232 @@
+"""Charts and maps of reports: drawn to scale, from the figures of the trials."""
+
+import re
+from math import log, sqrt
+from statistics import NormalDist
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from drawings import PIXEL
+
+from kinarm.evaluation.document import evaluation_document
+from kinarm.evaluation.evaluation import evaluate
+from kinarm.evaluation.report import charts, maps
+from kinarm.evaluation.report.groups import group_results
+from kinarm.evaluation.report.maps import fates, level
+from kinarm.evaluation.report.page import page_template, report_page
+from kinarm.problem import ReachProblem
+from kinarm.scene import GoalRegion, Obstacle, Scene
+from kinarm.task import ReachTask
+
+
+def shapes(drawing, name: str, classes: str):
+    """Shapes of a chart that belong to a policy."""
+    return [s for s in drawing.shapes if s.series == name and s.classes == classes]
+
+
+def drawn_map(task, group) -> ElementTree.Element:
+    """The map of a group."""
+    template = page_template().environment.get_template("map.html")
+    return ElementTree.fromstring(template.module.bench_map(task, group))
+
+
+def coordinates(path: str) -> np.ndarray:
+    return np.array(re.findall(r"(-?[\d.]+)[ ,](-?[\d.]+)", path), dtype=float)
+
+
+def wilson(hits: int, trials: int) -> tuple[float, float]:
+    """Wilson's interval from its formula."""
+    z, share = NormalDist().inv_cdf(0.975), hits / trials
+    centre = share + z**2 / (2 * trials)
+    half = z * sqrt(share * (1 - share) / trials + z**2 / (4 * trials**2))
+    return (centre - half) / (1 + z**2 / trials), (centre + half) / (1 + z**2 / trials)
+
+
+def places(limits):
+    """Where distances lie across a profile chart."""
+    low, high = log(limits[0]), log(limits[-1])
+    inside = charts.WIDTH - charts.LEFT - charts.RIGHT
+    return charts.LEFT + (np.log(limits) - low) / (high - low) * inside
+
+
+class TestProfile:
+    BOTTOM = charts.PROFILE_HEIGHT - charts.BELOW
+    SPAN = BOTTOM - 14
+
+    @pytest.mark.parametrize("name", ["made-right", "zero", "oracle"])
+    def test_line_is_the_share_within_each_distance(self, right, name):
+        group = next(group for group in right.groups if group.name == name)
+        (line,) = shapes(charts.profile_chart(right), name, "line")
+        limits = charts.profile_limits(right)
+        share = [np.mean(group.distances <= limit) for limit in limits]
+        xs, ys = coordinates(line.path).T
+        # Points that lie on a straight line may be left out.
+        np.testing.assert_allclose(
+            (self.BOTTOM - ys) / self.SPAN, np.interp(xs, places(limits), share), atol=0.01
+        )
+        for edge in (0, -1):
+            assert xs[edge] == pytest.approx(places(limits)[edge], abs=PIXEL)
+
+    def test_band_is_wilsons_interval_widened_to_whole_hits(self, right):
+        group = next(group for group in right.groups if group.name == "made-right")
+        (band,) = shapes(charts.profile_chart(right), "made-right", "band")
+        limits, trials = charts.profile_limits(right), group.distances.shape[1]
+        there, back = np.split(coordinates(band.path)[: 2 * len(limits)], 2)
+        tolerance = PIXEL / self.SPAN
+        for place, limit in enumerate(limits):
+            hits = (group.distances <= limit).sum() / len(group.members)
+            low, high = wilson(int(hits), trials)[0], wilson(int(np.ceil(hits)), trials)[1]
+            drawn = [(self.BOTTOM - y) / self.SPAN for y in (back[-1 - place, 1], there[place, 1])]
+            assert drawn == pytest.approx([low, high], abs=tolerance)
+
+    def test_tolerance_and_the_distances_of_the_table_are_exact(self, right):
+        assert {0.05, 0.1, 0.2} <= set(charts.profile_limits(right))
+
+    def test_everything_ends_at_the_top(self, right):
+        for group in right.groups:
+            (line,) = shapes(charts.profile_chart(right), group.name, "line")
+            assert coordinates(line.path)[-1, 1] == 14
+
+    def test_ticks(self):
+        assert charts.log_ticks(0.01, 1.6) == [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0]
+        assert charts.log_ticks(0.003, 0.011) == [0.005, 0.01]
+
+    def test_the_style_sheet_has_the_last_word(self, right):
+        """Charts bring no colours or fonts of their own."""
+        drawing = charts.profile_chart(right)
+        chart = page_template().environment.get_template("parts.html").module.chart(drawing)
+        assert not re.search(r"#[0-9a-f]{6}|font|style=", chart)
+        assert drawing.description in chart
+
+
+class TestHistogram:
+    def test_shares_are_those_of_the_bins(self, right):
+        group = next(group for group in right.groups if group.name == "made-right")
+        edges = np.array([0, 0.05, 0.1, 5.0])
+        distances = group.distances.ravel()
+        expected = [
+            np.mean((low <= distances) & (distances < high))
+            for low, high in ((0, 0.05), (0.05, 0.1), (0.1, 5.0))
+        ]
+        assert charts.bin_shares(group, edges) == pytest.approx(expected)
+
+    def test_bars_show_every_trial(self, right):
+        drawing = charts.histogram_chart(right)
+        for group in right.groups:
+            bars = shapes(drawing, group.name, "bars")
+            shares = [float(bar.title.split(": ")[1].split()[0]) for bar in bars]
+            assert sum(shares) == pytest.approx(100, abs=0.005 * len(shares))
+
+    def test_bars_are_as_high_as_the_root_of_their_share(self, right):
+        drawing = charts.histogram_chart(right)
+        row = (drawing.height - charts.BELOW) / len(right.groups)
+        for group in right.groups:
+            for bar in shapes(drawing, group.name, "bars"):
+                heights = coordinates(bar.path)[:, 1]
+                share = float(bar.title.split(": ")[1].split()[0]) / 100
+                expected = row * charts.ROW_HEIGHT * sqrt(share)
+                assert np.ptp(heights) == pytest.approx(expected, abs=0.3)
+
+
+class TestMap:
+    def test_markers_lie_at_the_goals(self, right):
+        group = right.contenders[0]
+        drawn = drawn_map(right, group)
+        view = maps.View.of(right.goal_regions)
+        goals = group.members[0].trials.goals
+        markers = {}
+        for marker in drawn.findall("path"):
+            title = marker.find("title")
+            if title is not None and title.text.startswith("trial"):
+                trial = int(re.match(r"trial (\d+)", title.text)[1])
+                markers[trial] = coordinates(marker.get("d"))[0]
+        assert sorted(markers) == list(range(len(goals)))
+        for trial, (across, down) in markers.items():
+            x, y = view.x[1] - down / maps.SCALE, view.y[1] - across / maps.SCALE
+            assert (x, y) == pytest.approx(goals[trial, :2], abs=PIXEL / maps.SCALE)
+
+    def test_markers_have_the_colour_and_shape_of_what_happened(self, right):
+        group = right.contenders[0]
+        drawn = drawn_map(right, group)
+        results = fates(group)
+        seen = set()
+        for marker in drawn.findall("path"):
+            title = marker.find("title")
+            if title is None or not title.text.startswith("trial"):
+                continue
+            fate = results[int(re.match(r"trial (\d+)", title.text)[1])]
+            assert marker.get("class") == f"d{level(fate.distance, right.tolerance)}"
+            assert marker.get("d").endswith(maps.SYMBOLS[fate.outcome])
+            seen.add(fate.outcome)
+        assert len(seen) > 1
+
+    def test_many_trials_leave_a_map_light(self, right, monkeypatch):
+        monkeypatch.setattr(maps, "MARKERS", 7)
+        markers = maps.markers(right, right.contenders[0])
+        assert sorted(marker.title.split(",")[0] for marker in markers) == [
+            f"trial {number}" for number in range(7)
+        ]
+
+    def test_fate_is_the_worst_over_the_seeds(self, right):
+        group = right.contenders[0]
+        for trial, fate in enumerate(fates(group)):
+            outcomes = [member.outcomes[trial] for member in group.members]
+            assert fate.reached == outcomes.count("success")
+            assert fate.distance == pytest.approx(group.distances[:, trial].mean())
+            worst = next(o for o in ("collision", "truncated", "success") if o in outcomes)
+            assert fate.outcome == worst
+
+    def test_regions_obstacles_and_base_are_to_scale(self, right):
+        drawn = drawn_map(right, right.contenders[0])
+        (region,), view = right.goal_regions, maps.View.of(right.goal_regions)
+        rects, base = drawn.findall("rect"), drawn.find("circle")
+        assert [rect.find("title").text for rect in rects] == [
+            "obstacle: right bench",
+            "region: right",
+        ]
+        rect = rects[1]
+        assert float(rect.get("width")) == pytest.approx(
+            (region.upper[1] - region.lower[1]) * maps.SCALE
+        )
+        assert float(rect.get("height")) == pytest.approx(
+            (region.upper[0] - region.lower[0]) * maps.SCALE
+        )
+        assert float(rect.get("x")) == pytest.approx((view.y[1] - region.upper[1]) * maps.SCALE)
+        # The right bench lies to the right of the base.
+        assert float(rect.get("x")) > float(base.get("cx"))
+        assert float(base.get("cx")) == pytest.approx(view.y[1] * maps.SCALE)
+        assert float(base.get("cy")) == pytest.approx(view.x[1] * maps.SCALE)
+
+    def test_a_world_of_ones_own(self):
+        """A region in front of the arm, and a post before it."""
+        region = GoalRegion(name="front", lower=(0.4, -0.3, 0.2), upper=(0.7, 0.3, 0.5))
+        post = Obstacle(name="post", lower=(0.3, -0.4, 0), upper=(0.36, -0.34, 0.8))
+        far = Obstacle(name="far", lower=(5, 5, 0), upper=(6, 6, 1))
+        scene = Scene(obstacles=(post, far), goal_regions=(region,))
+        task = ReachTask(goal_regions=("front",))
+        made = evaluate("zero", ReachProblem(name="own", scene=scene, task=task), trials=20)
+        (results,) = group_results(evaluation_document([made], ""), [made])
+        (group,) = results.groups
+        rects = drawn_map(results, group).findall("rect")
+        assert [rect.find("title").text for rect in rects] == ["obstacle: post", "region: front"]
+        shares = [share for _, share in maps.failure_shares(group, region) if share is not None]
+        assert shares == [1.0] * len(shares)
+        assert "own" in report_page(evaluation_document([made], ""), [made])
+
+    def test_failures_are_counted_where_they_happen(self, right):
+        group, (region,) = right.contenders[0], right.goal_regions
+        goals = group.members[0].trials.goals
+        width = (region.upper[0] - region.lower[0]) / maps.SLICES
+        for place, ((low, high), share) in enumerate(maps.failure_shares(group, region)):
+            assert (low, high) == pytest.approx((region.lower[0] + place * width, low + width))
+            inside = (low <= goals[:, 0]) & (goals[:, 0] < low + width)
+            failed = [not o for m in group.members for o in m.rollouts.success[inside]]
+            assert share == (pytest.approx(np.mean(failed)) if failed else None)
+
+    @pytest.mark.parametrize(
+        ("distance", "expected"),
+        [(0.0, 0), (0.05, 0), (0.0501, 1), (0.1, 1), (0.2, 2), (0.21, 3), (0.8, 4), (9.0, 5)],
+    )
+    def test_colours_double_in_distance(self, distance, expected):
+        assert level(distance, 0.05) == expected
