@@ -37,9 +37,7 @@ def alone_in_torch() -> Iterator[None]:
             np.random.set_state(numpy_state)  # noqa: NPY002
 
 
-def seed_iteration(
-    seed: int, iteration: int
-) -> tuple[np.random.Generator, np.random.Generator]:
+def seed_iteration(seed: int, iteration: int) -> tuple[np.random.Generator, np.random.Generator]:
     """Give an iteration random numbers of its own, wherever the training began.
 
     The first generator is for the learner, the second one for scenarios.

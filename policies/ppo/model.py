@@ -1,6 +1,5 @@
 """Stable-Baselines3's PPO, its rollouts and updates compiled."""
 
-from typing import Any
 
 import numpy as np
 import torch
@@ -10,27 +9,13 @@ from stable_baselines3.common.buffers import RolloutBuffer
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.utils import explained_variance
 from stable_baselines3.common.vec_env import VecEnv
-from torch.nn.utils import parameters_to_vector, vector_to_parameters
 
-from kinarm._parallel import available_threads, run_rows
+from kinarm._parallel import available_threads
 from kinarm.policies.ppo.config import PPOConfig
 from kinarm.policies.ppo.kernels.tiles import Numbers
-from kinarm.policies.ppo.kernels.update import (
-    HALF_LOG_2_PI,
-    LOSSES,
-    Descent,
-    Experience,
-    Objective,
-    add_gradients,
-    choose,
-    standardisation,
-)
+from kinarm.policies.ppo.kernels.update import HALF_LOG_2_PI, Descent, Experience, Objective, choose
 from kinarm.policies.ppo.networks import ActorCritic
-
-PARTS = 8
-"""Parts of a minibatch whose gradients are found independently of each other."""
-STEPS_A_PART = 1024
-"""Work of finding one, in steps of an episode: enough for a thread of its own."""
+from kinarm.policies.ppo.update import UpdateRecords, update
 
 
 class CompiledPPO(PPO):
@@ -81,20 +66,21 @@ class CompiledPPO(PPO):
             },
             device="cpu",
         )
+        self._weights = list(self.policy.parameters())
         widths = (env.observation_space.shape[0], config.net_arch, env.action_space.shape[0])
         self._networks = ActorCritic(*widths, len(self.parameters()))
 
     def _excluded_save_params(self) -> list[str]:
         """What a plain PPO has no use for."""
-        return [*super()._excluded_save_params(), "rng", "_networks"]
+        return [*super()._excluded_save_params(), "rng", "threads", "_networks", "_weights"]
 
     def parameters(self) -> Numbers:
         """Parameters of actor and critic, shape (n_parameters,)."""
-        return _flat([weight.detach() for weight in self.policy.parameters()])
+        return _flat([weight.detach() for weight in self._weights])
 
     def moments(self) -> tuple[Numbers, Numbers]:
         """Adam's means of the gradients and of their squares, shape (n_parameters,) each."""
-        states = [self.policy.optimizer.state[weight] for weight in self.policy.parameters()]
+        states = [self.policy.optimizer.state[weight] for weight in self._weights]
         if not all(states):
             return np.zeros_like(self.parameters()), np.zeros_like(self.parameters())
         return _flat([s["exp_avg"] for s in states]), _flat([s["exp_avg_sq"] for s in states])
@@ -104,16 +90,17 @@ class CompiledPPO(PPO):
     ) -> None:
         """Put parameters and moments, after so many epochs, into policy and optimizer."""
         self._n_updates = epochs
-        weights = list(self.policy.parameters())
-        vector_to_parameters(torch.tensor(parameters), weights)
-        lengths = [weight.numel() for weight in weights]
-        parts = (torch.split(torch.tensor(moment), lengths) for moment in moments)
-        for weight, first, second in zip(weights, *parts, strict=True):
-            self.policy.optimizer.state[weight] = {
-                "step": torch.tensor(float(epochs * self._minibatches)),
-                "exp_avg": first.view_as(weight),
-                "exp_avg_sq": second.view_as(weight),
-            }
+        step = float(epochs * self._minibatches)
+        ends = np.cumsum([weight.numel() for weight in self._weights])[:-1]
+        parts = (np.split(vector.copy(), ends) for vector in (parameters, *moments))
+        with torch.no_grad():
+            for weight, values, first, second in zip(self._weights, *parts, strict=True):
+                weight.copy_(torch.from_numpy(values).view_as(weight))
+                self.policy.optimizer.state[weight] = {
+                    "step": torch.tensor(step),
+                    "exp_avg": torch.from_numpy(first).view_as(weight),
+                    "exp_avg_sq": torch.from_numpy(second).view_as(weight),
+                }
 
     @property
     def _minibatches(self) -> int:
@@ -175,19 +162,32 @@ class CompiledPPO(PPO):
         self._update_learning_rate(self.policy.optimizer)
         networks, experience = self._networks, self._experience()
         networks.load(self.parameters())
-        first_moment, second_moment = map(networks.spread, self.moments())
-        gradients = np.empty((PARTS, len(networks.weights)), dtype=np.float32)
-        done, records = self._n_updates * self._minibatches, []
-        for _ in range(self.n_epochs):
-            order = self.rng.permutation(len(experience.returns))
-            for chosen in order.reshape(self._minibatches, self.batch_size):
-                records.append(self._find_gradient(experience, chosen, gradients))
-                descent = self._descent(done + len(records))
-                networks.descend(gradients, first_moment, second_moment, descent)
-        moments = networks.gathered(first_moment), networks.gathered(second_moment)
+        moments = [networks.spread(moment) for moment in self.moments()]
+        adam = self.policy.optimizer.param_groups[0]
+        records = update(
+            networks,
+            moments,
+            experience,
+            (self._random_minibatches() for _ in range(self.n_epochs)),
+            Objective(self._clip_range, self.ent_coef, self.vf_coef, 1.0 / self.batch_size),
+            Descent(adam["lr"], *adam["betas"], adam["eps"], self.max_grad_norm),
+            steps_before=self._n_updates * self._minibatches,
+            threads=self.threads,
+        )
+        first, second = (networks.gathered(moment) for moment in moments)
         parameters = networks.gathered(networks.weights)
-        self.load_vectors(parameters, moments, self._n_updates + self.n_epochs)
-        self._log(np.array(records))
+        self.load_vectors(parameters, (first, second), self._n_updates + self.n_epochs)
+        self._log(records)
+
+    def _random_minibatches(self) -> NDArray[np.int64]:
+        """Rows of the experience in a random order, shape (n_minibatches, batch_size)."""
+        order = self.rng.permutation(self.n_steps * self.n_envs)
+        return order.reshape(self._minibatches, self.batch_size)
+
+    @property
+    def _clip_range(self) -> float:
+        """How far the probability ratio may leave 1."""
+        return float(self.clip_range(self._current_progress_remaining))
 
     def _experience(self) -> Experience:
         """What is in the buffer, arm after arm."""
@@ -195,46 +195,23 @@ class CompiledPPO(PPO):
         arrays = (buffer.observations, buffer.actions, buffer.log_probs)
         targets = (buffer.advantages, buffer.returns)
         flat = [buffer.swap_and_flatten(array) for array in (*arrays, *targets)]
-        return Experience(*flat[:2], *(array[:, 0] for array in flat[2:]))
+        return Experience(*flat[:2], *(array.ravel() for array in flat[2:]))
 
-    def _find_gradient(
-        self, experience: Experience, chosen: NDArray[np.int64], gradients: Numbers
-    ) -> NDArray[np.float64]:
-        """Gradient of the loss of a minibatch, in parts; returns what is logged of it."""
-        networks, losses = self._networks, np.empty((PARTS, LOSSES))
-        objective = Objective(
-            float(self.clip_range(self._current_progress_remaining)),
-            self.ent_coef,
-            self.vf_coef,
-            1.0 / self.batch_size,
-            *standardisation(chosen, experience.advantages),
-        )
-        arrays = (networks.actor, networks.critic, experience, chosen, objective, gradients, losses)
-        run_rows(add_gradients, PARTS, PARTS * STEPS_A_PART, self.threads, *arrays)
-        return np.append(losses.sum(axis=0) / self.batch_size, networks.log_std.mean())
-
-    def _descent(self, steps: int) -> Descent:
-        """Settings of a step of Adam."""
-        settings = self.policy.optimizer.param_groups[0]
-        decays = settings["betas"]
-        return Descent(settings["lr"], *decays, settings["eps"], steps, self.max_grad_norm)
-
-    def _log(self, records: NDArray[np.float64]) -> None:
-        """Log what PPO logs, given a row for each minibatch."""
-        policy_loss, value_loss, clipped, divergence, log_std = records.T
-        entropy = self.action_space.shape[0] * (log_std + 0.5 + HALF_LOG_2_PI)
-        loss = policy_loss - self.ent_coef * entropy + self.vf_coef * value_loss
+    def _log(self, records: UpdateRecords) -> None:
+        """Log what PPO logs."""
+        entropy = self.action_space.shape[0] * (records.log_std + 0.5 + HALF_LOG_2_PI)
+        losses = records.policy_loss - self.ent_coef * entropy + self.vf_coef * records.value_loss
         values, returns = self.rollout_buffer.values, self.rollout_buffer.returns
         entries = {
-            "entropy_loss": -np.mean(entropy),
-            "policy_gradient_loss": np.mean(policy_loss),
-            "value_loss": np.mean(value_loss),
-            "approx_kl": np.mean(divergence[-self._minibatches :]),
-            "clip_fraction": np.mean(clipped),
-            "loss": loss[-1],
+            "entropy_loss": -entropy.mean(),
+            "policy_gradient_loss": records.policy_loss.mean(),
+            "value_loss": records.value_loss.mean(),
+            "approx_kl": records.divergence[-self._minibatches :].mean(),
+            "clip_fraction": records.clipped.mean(),
+            "loss": losses[-1],
             "explained_variance": explained_variance(values.flatten(), returns.flatten()),
             "std": self.policy.log_std.detach().exp().mean().item(),
-            "clip_range": self.clip_range(self._current_progress_remaining),
+            "clip_range": self._clip_range,
         }
         for name, entry in entries.items():
             self.logger.record(f"train/{name}", entry)
@@ -243,5 +220,4 @@ class CompiledPPO(PPO):
 
 def _flat(tensors: list[torch.Tensor]) -> Numbers:
     """The numbers of tensors in one vector, a copy."""
-    vector: Numbers = parameters_to_vector(tensors).numpy().copy()
-    return vector
+    return np.concatenate([tensor.numpy().ravel() for tensor in tensors])

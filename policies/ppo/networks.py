@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from kinarm._parallel import run_rows
 from kinarm.policies.ppo.kernels.layers import BLOCK, Network, padded
 from kinarm.policies.ppo.kernels.tiles import Numbers
-from kinarm.policies.ppo.kernels.update import Descent, descend, evaluate, transpose
+from kinarm.policies.ppo.kernels.update import evaluate, transpose
 from kinarm.policies.ppo.parameters import Affine, split_parameters
 
 STEPS_A_ROW = 8
@@ -98,10 +98,3 @@ class ActorCritic:
         arrays = (self.critic, observations, outputs)
         run_rows(evaluate, len(observations), STEPS_A_ROW * len(observations), threads, *arrays)
         return outputs[:, 0]
-
-    def descend(
-        self, gradients: Numbers, first_moment: Numbers, second_moment: Numbers, descent: Descent
-    ) -> None:
-        """Take a step of Adam, given the parts of a gradient."""
-        arrays = (first_moment, second_moment, gradients)
-        descend(self.actor, self.critic, *arrays, descent)

@@ -49,18 +49,14 @@ def split_parameters(
     widths = [*hidden, *hidden, (net_arch[-1], n_actions), (net_arch[-1], 1)]
     sizes = [n_actions, *(size for n_in, n_out in widths for size in (n_in * n_out, n_out))]
     if len(vector) != sum(sizes):
-        raise InvalidInputError(
-            f"expected a state of {sum(sizes)} parameters, got {len(vector)}"
-        )
+        raise InvalidInputError(f"expected a state of {sum(sizes)} parameters, got {len(vector)}")
     log_std, *parts = np.split(vector, np.cumsum(sizes)[:-1])
     layers = [
         (weights.reshape(n_out, n_in), bias)
         for (n_in, n_out), weights, bias in zip(widths, parts[::2], parts[1::2], strict=True)
     ]
     count = len(hidden)
-    return Parameters(
-        log_std, [*layers[:count], layers[-2]], [*layers[count:-2], layers[-1]]
-    )
+    return Parameters(log_std, [*layers[:count], layers[-2]], [*layers[count:-2], layers[-1]])
 
 
 def initial_parameters(

@@ -65,27 +65,21 @@ class Objective(NamedTuple):
         As in the settings.
     share : float
         Weight of a sample in the means over the minibatch.
-    centre, scale : float
-        What is subtracted from advantages, and by what they are then multiplied.
     """
 
     clip_range: float
     ent_coef: float
     vf_coef: float
     share: float
-    centre: float
-    scale: float
 
 
 class Descent(NamedTuple):
-    """A step of Adam.
+    """Settings of Adam.
 
     Attributes
     ----------
     learning_rate, first_decay, second_decay, epsilon : float
         Adam's settings.
-    steps : int
-        How many steps there are, this one included.
     max_norm : float
         Gradients are shortened to this norm.
     """
@@ -94,7 +88,6 @@ class Descent(NamedTuple):
     first_decay: float
     second_decay: float
     epsilon: float
-    steps: int
     max_norm: float
 
 
@@ -168,6 +161,7 @@ def add_gradients(
     experience: Experience,
     chosen: NDArray[np.int64],
     objective: Objective,
+    standard: tuple[float, float],
     gradients: Numbers,
     losses: NDArray[np.float64],
 ) -> None:
@@ -184,6 +178,8 @@ def add_gradients(
         See there.
     chosen : ndarray of int, shape (batch_size,)
         Rows of the minibatch.
+    standard : tuple of float
+        What is subtracted from the advantages, and by what they are then multiplied.
     gradients : ndarray of float32, shape (n_parts, n_weights)
         Where the derivatives by the weights go.
     losses : ndarray, shape (n_parts, LOSSES)
@@ -208,7 +204,16 @@ def add_gradients(
                 take_in(experience.observations, rows[s], actor.layers, work, s)
             forward(actor, tiled, work)
             derive_by_means(
-                actor.layers, experience, rows, objective, log_std, precision, work, gradient, loss
+                actor.layers,
+                experience,
+                rows,
+                objective,
+                standard,
+                log_std,
+                precision,
+                work,
+                gradient,
+                loss,
             )
             backward(actor, tiled, samples, work, behind, gradient)
             forward(critic, tiled, work)
@@ -226,6 +231,7 @@ def derive_by_means(
     experience: Experience,
     rows: NDArray[np.int64],
     objective: Objective,
+    standard: tuple[float, float],
     log_std: Numbers,
     precision: NDArray[np.float64],
     work: Numbers,
@@ -245,7 +251,7 @@ def derive_by_means(
             density += log_density(deviation, precision[j], log_std[j])
         difference = min(max(density - experience.densities[i], -MOST), MOST)
         ratio = exponential(difference)
-        advantage = (experience.advantages[i] - objective.centre) * objective.scale
+        advantage = (experience.advantages[i] - standard[0]) * standard[1]
         surrogate = advantage * ratio
         limited = advantage * min(max(ratio, lowest), highest)
         loss[0] -= min(surrogate, limited)
@@ -285,6 +291,7 @@ def descend(
     second_moment: Numbers,
     gradients: Numbers,
     descent: Descent,
+    steps: int,
 ) -> None:
     """Add up a gradient, shorten it, take a step of Adam, and transpose the matrices anew.
 
@@ -298,6 +305,8 @@ def descend(
         Parts of the gradient; the first is overwritten.
     descent : Descent
         Settings.
+    steps : int
+        Which step it is, counted from 1.
     """
     n_parts, n_weights = gradients.shape
     whole, weights = gradients[0], actor.weights
@@ -317,9 +326,9 @@ def descend(
         np.float32(1.0 - descent.first_decay),
         np.float32(1.0 - descent.second_decay),
     )
-    unbias = 1.0 - whole_power(descent.first_decay, descent.steps)
+    unbias = 1.0 - whole_power(descent.first_decay, steps)
     stride = np.float32(descent.learning_rate / unbias)
-    unbias = 1.0 - whole_power(descent.second_decay, descent.steps)
+    unbias = 1.0 - whole_power(descent.second_decay, steps)
     widen = np.float32(1.0 / math.sqrt(unbias))
     epsilon = np.float32(descent.epsilon)
     for k in range(n_weights):
