@@ -77,12 +77,12 @@ class PPOTraining:
     def initial_state(self) -> PPOState:
         """State before the first iteration; the normaliser has seen random starts."""
         config, env = self.config, self.env
-        rng, env.rng = seed_iteration(config.seed, 0)
+        rng, scenarios = seed_iteration(config.seed, 0)
         simulator = env.simulator
-        observations = simulator.world.observe(*simulator.sample(env.rng, NORMALIZED_OVER))
+        observations = simulator.world.observe(*simulator.sample(scenarios, NORMALIZED_OVER))
         if env.mirror is not None:
             observations = env.mirror.from_the_right(observations)
-        env.start_spread = config.start_spread_at(0.0)
+        env.draw_from(scenarios, config.start_spread_at(0.0))
         env.reset()
         widths = (simulator.n_observations, config.net_arch, simulator.n_actions)
         parameters = initial_parameters(rng, *widths, config.log_std_init)
@@ -98,11 +98,11 @@ class PPOTraining:
         """One rollout and one update."""
         began = time.perf_counter()
         config, model, env = self.config, self.model, self.env
-        model.rng, env.rng = seed_iteration(config.seed, state.iteration + 1)
-        self.load(state)
         done = state.iteration / config.iterations
+        self.load(state)
+        model.rng, scenarios = seed_iteration(config.seed, state.iteration + 1)
         model.step_size = config.learning_rate_at(done)
-        env.start_spread = config.start_spread_at(done)
+        env.draw_from(scenarios, config.start_spread_at(done))
         model.learn(config.steps_per_iteration, reset_num_timesteps=False)
         returns, successes, simulator_time = env.take_ended()
         point = CurvePoint(

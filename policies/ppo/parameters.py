@@ -80,13 +80,18 @@ def initial_parameters(
 
 
 def orthogonal(normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Make the rows, or the columns if there are fewer, of a matrix orthonormal one by one.
+    """Make the columns, or the rows if there are fewer, of a matrix orthonormal one by one.
 
     Of a matrix of normal numbers it makes a matrix that is as likely as any of its rotations. The
     sums are taken in a fixed order, not by BLAS, whose order depends on the processor.
     """
-    if len(normal) > normal.shape[1]:
-        return orthogonal(normal.T).T
+    if normal.shape[0] >= normal.shape[1]:
+        return _orthonormal_rows(normal.T).T
+    return _orthonormal_rows(normal)
+
+
+def _orthonormal_rows(normal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Subtract from each row what the earlier ones hold of it (Gram and Schmidt)."""
     found = normal.copy()
     for k, row in enumerate(found):
         for _ in range(2):  # once more, against rounding
