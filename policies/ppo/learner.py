@@ -101,7 +101,8 @@ class PPOTraining:
         done = state.iteration / config.iterations
         self.load(state)
         model.rng, scenarios = seed_iteration(config.seed, state.iteration + 1)
-        model.step_size = config.learning_rate_at(done)
+        learning_rate = config.learning_rate_at(done)
+        model.lr_schedule = lambda _: learning_rate
         env.draw_from(scenarios, config.start_spread_at(done))
         model.learn(config.steps_per_iteration, reset_num_timesteps=False)
         returns, successes, simulator_time = env.take_ended()

@@ -1,21 +1,33 @@
 """Stable-Baselines3's PPO, its rollouts and updates compiled."""
 
+from typing import NamedTuple
 
 import numpy as np
 import torch
+from gymnasium.spaces import Box
 from numpy.typing import NDArray
 from stable_baselines3 import PPO
 from stable_baselines3.common.buffers import RolloutBuffer
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.preprocessing import get_action_dim, get_flattened_obs_dim
 from stable_baselines3.common.utils import explained_variance
 from stable_baselines3.common.vec_env import VecEnv
 
 from kinarm._parallel import available_threads
 from kinarm.policies.ppo.config import PPOConfig
+from kinarm.policies.ppo.kernels.loss import HALF_LOG_2_PI, Experience, Objective
 from kinarm.policies.ppo.kernels.tiles import Numbers
-from kinarm.policies.ppo.kernels.update import HALF_LOG_2_PI, Descent, Experience, Objective, choose
+from kinarm.policies.ppo.kernels.update import Descent, choose
 from kinarm.policies.ppo.networks import ActorCritic
 from kinarm.policies.ppo.update import UpdateRecords, update
+
+
+class CutShort(NamedTuple):
+    """An episode that the time limit ended: when, whose, and its last observation."""
+
+    step: int
+    row: int
+    observation: Numbers
 
 
 class CompiledPPO(PPO):
@@ -39,13 +51,10 @@ class CompiledPPO(PPO):
     ----------
     rng : numpy.random.Generator
         Draws the noise of actions, and minibatches.
-    step_size : float
-        Learning rate of the next update.
     """
 
     def __init__(self, env: VecEnv, config: PPOConfig, threads: int | None = None) -> None:
         self.rng = np.random.default_rng(config.seed)
-        self.step_size = config.learning_rate
         self.threads = available_threads() if threads is None else threads
         super().__init__(
             "MlpPolicy",
@@ -53,7 +62,7 @@ class CompiledPPO(PPO):
             n_steps=config.n_steps,
             batch_size=config.batch_size,
             n_epochs=config.n_epochs,
-            learning_rate=lambda _: self.step_size,
+            learning_rate=config.learning_rate,
             gamma=config.gamma,
             gae_lambda=config.gae_lambda,
             clip_range=config.clip_range,
@@ -67,8 +76,12 @@ class CompiledPPO(PPO):
             device="cpu",
         )
         self._weights = list(self.policy.parameters())
-        widths = (env.observation_space.shape[0], config.net_arch, env.action_space.shape[0])
-        self._networks = ActorCritic(*widths, len(self.parameters()))
+        self._networks = ActorCritic(
+            get_flattened_obs_dim(env.observation_space),
+            config.net_arch,
+            get_action_dim(env.action_space),
+            len(self.parameters()),
+        )
 
     def _excluded_save_params(self) -> list[str]:
         """What a plain PPO has no use for."""
@@ -115,62 +128,72 @@ class CompiledPPO(PPO):
         n_rollout_steps: int,
     ) -> bool:
         """Fill the buffer, as PPO does; values are found at the end, all at once."""
-        networks, buffer = self._networks, rollout_buffer
+        networks, buffer, box = self._networks, rollout_buffer, env.action_space
+        assert isinstance(box, Box)
         networks.load(self.parameters())
         buffer.reset()
         callback.on_rollout_start()
         actions = np.empty((env.num_envs, len(networks.log_std)), dtype=np.float32)
-        late: list[tuple[int, int, Numbers]] = []
+        cut_short: list[CutShort] = []
         for step in range(n_rollout_steps):
-            means = networks.means(self._last_obs)
+            obs = np.asarray(self._last_obs)
             noise = self.rng.standard_normal(actions.shape).astype(np.float32)
-            choose(means, networks.log_std, noise, actions, buffer.log_probs[step])
-            buffer.observations[step], buffer.actions[step] = self._last_obs, actions
+            choose(networks.means(obs), networks.log_std, noise, actions, buffer.log_probs[step])
+            buffer.observations[step], buffer.actions[step] = obs, actions
             buffer.episode_starts[step] = self._last_episode_starts
-            clipped = np.clip(actions, self.action_space.low, self.action_space.high)
-            self._last_obs, rewards, dones, infos = env.step(clipped)
-            buffer.rewards[step], self._last_episode_starts = rewards, dones
+            new_obs, rewards, dones, infos = env.step(np.clip(actions, box.low, box.high))
+            buffer.rewards[step] = rewards
+            self._last_obs, self._last_episode_starts = np.asarray(new_obs), dones
             self.num_timesteps += env.num_envs
             callback.update_locals(locals())
             if not callback.on_step():
                 return False
             ended = np.flatnonzero(dones).tolist()
             self._update_info_buffer([infos[row] for row in ended], np.ones(len(ended), dtype=bool))
-            late += [
-                (step, row, infos[row]["terminal_observation"])
+            cut_short += [
+                CutShort(step, row, infos[row]["terminal_observation"])
                 for row in ended
                 if infos[row].get("TimeLimit.truncated", False)
             ]
-        # An episode cut short at the horizon would have gone on: see issue 633 of theirs.
-        seen = buffer.observations.reshape(-1, buffer.observations.shape[-1])
-        values = networks.values(
-            np.concatenate([seen, self._last_obs, *(final[None] for *_, final in late)]),
-            self.threads,
-        )
-        buffer.values[:] = values[: len(seen)].reshape(buffer.values.shape)
-        last_values, final_values = np.split(values[len(seen) :], [env.num_envs])
-        for (step, row, _), value in zip(late, final_values, strict=True):
-            buffer.rewards[step, row] += np.float32(self.gamma) * value
+        last_values = self._fill_in_values(buffer, cut_short)
         buffer.pos, buffer.full = n_rollout_steps, True
-        buffer.compute_returns_and_advantage(torch.from_numpy(last_values), dones)
+        buffer.compute_returns_and_advantage(last_values, dones)
         callback.update_locals(locals())
         callback.on_rollout_end()
         return True
+
+    def _fill_in_values(self, buffer: RolloutBuffer, cut_short: list[CutShort]) -> torch.Tensor:
+        """Find all values of a rollout; returns those of the observations after it.
+
+        An episode that the time limit ended would have gone on: its last reward gets the value of
+        its last observation.
+        """
+        seen = buffer.observations.reshape(-1, buffer.observations.shape[-1])
+        finals = [end.observation[None] for end in cut_short]
+        every = np.concatenate([seen, np.asarray(self._last_obs), *finals])
+        ends = [len(seen), len(every) - len(finals)]
+        values, after, final = np.split(self._networks.values(every, self.threads), ends)
+        buffer.values[:] = values.reshape(buffer.values.shape)
+        for end, value in zip(cut_short, final, strict=True):
+            buffer.rewards[end.step, end.row] += np.float32(self.gamma) * value
+        return torch.from_numpy(after)
 
     def train(self) -> None:
         """Update actor and critic by what is in the buffer, as PPO does."""
         self._update_learning_rate(self.policy.optimizer)
         networks, experience = self._networks, self._experience()
         networks.load(self.parameters())
-        moments = [networks.spread(moment) for moment in self.moments()]
+        first, second = self.moments()
+        moments = networks.spread(first), networks.spread(second)
         adam = self.policy.optimizer.param_groups[0]
+        first_decay, second_decay = adam["betas"]
         records = update(
             networks,
             moments,
             experience,
             (self._random_minibatches() for _ in range(self.n_epochs)),
             Objective(self._clip_range, self.ent_coef, self.vf_coef, 1.0 / self.batch_size),
-            Descent(adam["lr"], *adam["betas"], adam["eps"], self.max_grad_norm),
+            Descent(adam["lr"], first_decay, second_decay, adam["eps"], self.max_grad_norm),
             steps_before=self._n_updates * self._minibatches,
             threads=self.threads,
         )
@@ -187,7 +210,9 @@ class CompiledPPO(PPO):
     @property
     def _clip_range(self) -> float:
         """How far the probability ratio may leave 1."""
-        return float(self.clip_range(self._current_progress_remaining))
+        clip_range = self.clip_range
+        assert callable(clip_range)
+        return float(clip_range(self._current_progress_remaining))
 
     def _experience(self) -> Experience:
         """What is in the buffer, arm after arm."""
@@ -199,7 +224,7 @@ class CompiledPPO(PPO):
 
     def _log(self, records: UpdateRecords) -> None:
         """Log what PPO logs."""
-        entropy = self.action_space.shape[0] * (records.log_std + 0.5 + HALF_LOG_2_PI)
+        entropy = len(self._networks.log_std) * (records.log_std + 0.5 + HALF_LOG_2_PI)
         losses = records.policy_loss - self.ent_coef * entropy + self.vf_coef * records.value_loss
         values, returns = self.rollout_buffer.values, self.rollout_buffer.returns
         entries = {

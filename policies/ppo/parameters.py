@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,8 @@ from kinarm.errors import InvalidInputError
 HIDDEN_GAIN, ACTOR_GAIN, CRITIC_GAIN = 2.0**0.5, 0.01, 1.0
 """Factors of orthogonal initial weights, as Stable-Baselines3 chooses them."""
 
-Affine = tuple[NDArray, NDArray]
+Vector = NDArray[Any]
+Affine = tuple[Vector, Vector]
 """Weights, shape (n_out, n_in), and bias, shape (n_out,)."""
 
 
@@ -27,13 +28,13 @@ class Parameters(NamedTuple):
         Layer by layer the weights, shape (n_out, n_in), and the bias, shape (n_out,).
     """
 
-    log_std: NDArray
+    log_std: Vector
     actor: list[Affine]
     critic: list[Affine]
 
 
 def split_parameters(
-    vector: NDArray, n_observations: int, net_arch: Sequence[int], n_actions: int
+    vector: Vector, n_observations: int, net_arch: Sequence[int], n_actions: int
 ) -> Parameters:
     """Take a vector apart, whose parts are then views of it.
 

@@ -1,22 +1,15 @@
 """An update of actor and critic: some epochs of steps of Adam, each by a minibatch."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._parallel import run_rows
+from kinarm.policies.ppo.kernels.loss import LOSSES, Experience, Objective
 from kinarm.policies.ppo.kernels.tiles import Numbers
-from kinarm.policies.ppo.kernels.update import (
-    LOSSES,
-    Descent,
-    Experience,
-    Objective,
-    add_gradients,
-    descend,
-    standardisation,
-)
+from kinarm.policies.ppo.kernels.update import Descent, add_gradients, descend, standardisation
 from kinarm.policies.ppo.networks import ActorCritic
 
 PARTS = 8
@@ -49,7 +42,7 @@ class UpdateRecords(NamedTuple):
 
 def update(
     networks: ActorCritic,
-    moments: Sequence[Numbers],
+    moments: tuple[Numbers, Numbers],
     experience: Experience,
     epochs: Iterable[NDArray[np.int64]],
     objective: Objective,
@@ -67,7 +60,7 @@ def update(
     ----------
     networks : ActorCritic
         What is trained.
-    moments : sequence of ndarray of float32
+    moments : tuple of ndarray of float32
         Adam's two moments, laid out like the weights; changed.
     experience : Experience
         What is learnt from.

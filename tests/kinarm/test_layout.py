@@ -10,7 +10,12 @@ import pytest
 
 KERNELS = {
     f"{package}.{path.stem}": path
-    for package in ("kinarm.kernels", "kinarm.policies.oracle.kernels", "kinarm.viewer.kernels")
+    for package in (
+        "kinarm.kernels",
+        "kinarm.policies.oracle.kernels",
+        "kinarm.policies.ppo.kernels",
+        "kinarm.viewer.kernels",
+    )
     for path in sorted(Path(import_module(package).__file__).parent.glob("*.py"))
 }
 SOURCES = {name: path.read_text(encoding="utf-8") for name, path in KERNELS.items()}
@@ -45,6 +50,7 @@ def test_what_is_compiled_in_has_no_cache_of_its_own():
         "rasterising",
         "rollout",
         "shading",
+        "update",
     }
     for name in CACHED:
         assert not set(CACHED) & set(compiled_in(SOURCES[name]))

@@ -1,5 +1,6 @@
 """Products of matrices whose sums stay in vector registers."""
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,16 +44,17 @@ class Matrix(NamedTuple):
 def _tile(columns: int) -> Any:
     """Make a kernels' function for `ROWS` rows and so many columns, counted in vectors."""
 
-    @intrinsic  # type: ignore[misc]
+    @intrinsic
     def product(
         _: Any, left: types.Type, right: types.Type, start: types.Type, sink: types.Type, depth: Any
     ) -> Any:
         def code(context: Any, builder: Any, signature: Any, arguments: Any) -> None:
-            matrices = [
+            *matrices, depth = arguments
+            entries = [
                 _Entries(context, builder, kind, given)
-                for kind, given in zip(signature.args[:4], arguments[:4], strict=True)
+                for kind, given in zip(signature.args, matrices, strict=False)
             ]
-            _multiply(builder, columns, *matrices, arguments[4])
+            _multiply(builder, columns, entries, depth)
 
         return types.void(left, right, start, sink, depth), code
 
@@ -68,7 +70,8 @@ class _Entries:
         numbers, self._first, self._row, self._column = (
             builder.extract_value(given, k) for k in range(4)
         )
-        self._data = make_array(kind.types[0])(context, builder, numbers).data
+        array: Any = make_array(kind.types[0])  # type: ignore[no-untyped-call]
+        self._data = array(context, builder, numbers).data
         self._builder = builder
 
     def number(self, row: Any, column: Any) -> Any:
@@ -83,11 +86,9 @@ class _Entries:
         return self._builder.bitcast(at, VECTOR.as_pointer())
 
 
-def _multiply(
-    builder: Any, columns: int, left: _Entries, right: _Entries, start: _Entries, sink: _Entries,
-    depth: Any,
-) -> None:  # fmt: skip
+def _multiply(builder: Any, columns: int, matrices: Sequence[_Entries], depth: Any) -> None:
     """Emit the loop over the depth: in each round, a column of tiles times a row of vectors."""
+    left, right, start, sink = matrices
     places = [(row, column) for row in range(ROWS) for column in range(columns)]
     whole = [ir.Constant(WORD, row) for row in range(ROWS)]
     begun = [builder.load(start.vector(whole[r], c), align=4) for r, c in places]

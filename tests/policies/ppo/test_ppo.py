@@ -169,7 +169,7 @@ class TestResuming:
         training.iterate(states[0])
         training.model.rng, scenarios = seed_iteration(config.seed, 2 + 1)
         training.env.draw_from(scenarios)
-        training.model.step_size = config.learning_rate_at(2 / config.iterations)
+        training.model.lr_schedule = lambda _: config.learning_rate_at(2 / config.iterations)
         training.model.learn(config.steps_per_iteration, reset_num_timesteps=False)
         assert training.model.parameters().tobytes() == states[2].parameters.tobytes()
         assert training.model.num_timesteps == states[2].environment_steps

@@ -1,16 +1,16 @@
 """Products, networks and gradients of PPO's kernels held against NumPy, all in double precision."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from kinarm.kernels.compiling import kernel
 from kinarm.policies.ppo.kernels.layers import BLOCK, hyperbolic_tangent, padded
+from kinarm.policies.ppo.kernels.loss import LOSSES, Experience, Objective
 from kinarm.policies.ppo.kernels.tiles import Matrix, multiply
 from kinarm.policies.ppo.kernels.update import (
-    LOSSES,
     Descent,
-    Experience,
-    Objective,
     add_gradients,
     choose,
     descend,
@@ -77,7 +77,7 @@ class Reference:
     def __init__(self, arch, seed=0):
         self.rng = np.random.default_rng(seed)
         widths = [N_OBSERVATIONS, *arch]
-        inner = sum((a + 1) * b for a, b in zip(widths, widths[1:], strict=False))
+        inner = sum((a + 1) * b for a, b in pairwise(widths))
         self.count = 2 * inner + (arch[-1] + 1) * (N_ACTIONS + 1) + N_ACTIONS
         self.vector = 0.3 * numbers(self.rng, self.count)
         self.arch = arch

@@ -62,7 +62,7 @@ def plain_twin(training):
         n_steps=config.n_steps,
         batch_size=config.batch_size,
         n_epochs=config.n_epochs,
-        learning_rate=model.step_size,
+        learning_rate=model.lr_schedule(1.0),
         gamma=config.gamma,
         gae_lambda=config.gae_lambda,
         clip_range=config.clip_range,
@@ -223,7 +223,9 @@ class TestParameters:
             split_parameters(vector, 48, AWKWARD.net_arch, 5)
             for vector in (training.model.parameters(), drawn)
         )
-        for first, second in zip(ours.actor + ours.critic, theirs.actor + theirs.critic, strict=True):
+        for first, second in zip(
+            ours.actor + ours.critic, theirs.actor + theirs.critic, strict=True
+        ):
             values = (np.linalg.svd(matrix, compute_uv=False) for matrix in (first[0], second[0]))
             np.testing.assert_allclose(*values, rtol=1e-5)
             assert not first[1].any()
