@@ -6,16 +6,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm._parallel import run_rows
 from kinarm.policies.ppo.kernels.loss import LOSSES, Experience, Objective
 from kinarm.policies.ppo.kernels.tiles import Numbers
 from kinarm.policies.ppo.kernels.update import Descent, add_gradients, descend, standardisation
 from kinarm.policies.ppo.networks import ActorCritic
+from kinarm.policies.ppo.sharing import share
 
 PARTS = 8
 """Parts of a minibatch whose gradients are found independently of each other."""
-STEPS_A_PART = 1024
-"""Work of finding one, in steps of an episode: enough for a thread of its own."""
 
 
 class UpdateRecords(NamedTuple):
@@ -79,9 +77,8 @@ def update(
         for chosen in minibatches:
             standard = standardisation(chosen, experience.advantages)
             arrays = (experience, chosen, objective, standard, gradients, losses)
-            work = PARTS * STEPS_A_PART
             nets = (networks.actor, networks.critic)
-            run_rows(add_gradients, PARTS, work, threads, *nets, *arrays)
+            share(add_gradients, PARTS, threads, *nets, *arrays)
             records.append((*losses.sum(axis=0) * objective.share, networks.log_std.mean()))
             descend(*nets, *moments, gradients, descent, steps_before + len(records))
     return UpdateRecords(*np.array(records).T)
