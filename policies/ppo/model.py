@@ -14,6 +14,7 @@ from stable_baselines3.common.utils import explained_variance
 from stable_baselines3.common.vec_env import VecEnv
 
 from kinarm._parallel import available_threads
+from kinarm._validation import whole_number
 from kinarm.policies.ppo.config import PPOConfig
 from kinarm.policies.ppo.kernels.loss import HALF_LOG_2_PI, Experience, Objective
 from kinarm.policies.ppo.kernels.tiles import Numbers
@@ -55,7 +56,9 @@ class CompiledPPO(PPO):
 
     def __init__(self, env: VecEnv, config: PPOConfig, threads: int | None = None) -> None:
         self.rng = np.random.default_rng(config.seed)
-        self.threads = available_threads() if threads is None else threads
+        self.threads = (
+            available_threads() if threads is None else whole_number("threads", threads, 1)
+        )
         super().__init__(
             "MlpPolicy",
             env,

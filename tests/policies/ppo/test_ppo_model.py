@@ -13,6 +13,7 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.logger import Logger
 
+from kinarm.errors import InvalidInputError
 from kinarm.policies import PPOConfig, recipe, train_policy
 from kinarm.policies.ppo.learner import PPOTraining
 from kinarm.policies.ppo.parameters import initial_parameters, orthogonal, split_parameters
@@ -172,6 +173,12 @@ def test_threads_are_an_option():
     config = replace(AWKWARD, iterations=1)
     first, second = (train_policy(config, threads=threads).state for threads in (1, 2))
     assert first.parameters.tobytes() == second.parameters.tobytes()
+
+
+@pytest.mark.parametrize("threads", [0, 1.5])
+def test_threads_that_cannot_be(threads):
+    with pytest.raises(InvalidInputError, match="threads must be a whole number of at least 1"):
+        train_policy(AWKWARD, threads=threads)
 
 
 class TestModel:
