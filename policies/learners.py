@@ -207,8 +207,8 @@ def train_policy(
     on_iteration : callable, optional
         Called with the state after every iteration.
     **options
-        What does not change the result: ``threads`` of the simulator for ARS, the folder of the
-        ``tensorboard`` logs for PPO.
+        What does not change the result: ``threads``, and the folder of the ``tensorboard`` logs
+        for PPO.
 
     Raises
     ------

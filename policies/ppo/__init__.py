@@ -13,7 +13,7 @@ LEARNER = Learner(
     recipes=RECIPES,
     begin=imported("kinarm.policies.ppo.learner", "PPOTraining"),
     policy=imported("kinarm.policies.ppo.actor", "actor_policy"),
-    options=("tensorboard",),
+    options=("tensorboard", "threads"),
     packages=("torch", "stable_baselines3"),
     extra="ppo",
 )

@@ -1,13 +1,11 @@
 """The actor of a PPO training as a policy, which needs none of the packages of the training."""
 
-from itertools import pairwise
-
 import numpy as np
 
-from kinarm.errors import InvalidInputError
 from kinarm.policies.mirror import task_mirror
 from kinarm.policies.policy import Layer, Policy
 from kinarm.policies.ppo.config import PPOConfig
+from kinarm.policies.ppo.parameters import split_parameters
 from kinarm.policies.ppo.state import PPOState
 from kinarm.policies.provenance import Provenance
 from kinarm.world import World
@@ -34,22 +32,7 @@ def actor_policy(config: PPOConfig, state: PPOState) -> Policy:
 def actor_layers(
     config: PPOConfig, state: PPOState, n_observations: int, n_actions: int
 ) -> tuple[Layer, ...]:
-    """Cut the actor's layers out of the parameters.
-
-    Their order is that of Stable-Baselines3: standard deviations of the actions, hidden layers of
-    actor and critic, last layers of actor and critic; of every layer the weights come first.
-    """
-    hidden = list(pairwise((n_observations, *config.net_arch)))
-    actor_end, critic_end = (config.net_arch[-1], n_actions), (config.net_arch[-1], 1)
-    widths = [*hidden, *hidden, actor_end, critic_end]
-    sizes = [n_actions, *(size for n_in, n_out in widths for size in (n_in * n_out, n_out))]
-    if len(state.parameters) != sum(sizes):
-        raise InvalidInputError(
-            f"expected a state of {sum(sizes)} parameters, got {len(state.parameters)}"
-        )
-    parts = np.split(state.parameters.astype(np.float64), np.cumsum(sizes)[:-1])[1:]
-    layers = [
-        Layer(weights.reshape(n_out, n_in), bias)
-        for (n_in, n_out), weights, bias in zip(widths, parts[::2], parts[1::2], strict=True)
-    ]
-    return (*layers[: len(hidden)], layers[-2])
+    """Cut the actor's layers out of the parameters."""
+    parameters = state.parameters.astype(np.float64)
+    parts = split_parameters(parameters, n_observations, config.net_arch, n_actions)
+    return tuple(Layer(weights, bias) for weights, bias in parts.actor)

@@ -1,4 +1,4 @@
-"""The PPO model of Stable-Baselines3, driven one iteration at a time."""
+"""Training with PPO, one iteration at a time."""
 
 import time
 from collections.abc import Iterator
@@ -7,10 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
-from stable_baselines3 import PPO
 from stable_baselines3.common.logger import KVWriter, Logger, TensorBoardOutputFormat
-from torch.nn.utils import parameters_to_vector, vector_to_parameters
 
 from kinarm.errors import InvalidInputError
 from kinarm.policies.curve import CurvePoint
@@ -18,6 +15,8 @@ from kinarm.policies.learners import learner_of
 from kinarm.policies.mirror import task_mirror
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.ppo.config import PPOConfig
+from kinarm.policies.ppo.model import CompiledPPO
+from kinarm.policies.ppo.parameters import initial_parameters
 from kinarm.policies.ppo.state import PPOState
 from kinarm.policies.ppo.training_env import TrainingVecEnv
 
@@ -38,88 +37,73 @@ def alone_in_torch() -> Iterator[None]:
             np.random.set_state(numpy_state)  # noqa: NPY002
 
 
-def seed_iteration(seed: int, iteration: int) -> np.random.Generator:
+def seed_iteration(seed: int, iteration: int) -> tuple[np.random.Generator, np.random.Generator]:
     """Give an iteration random numbers of its own, wherever the training began.
 
-    Stable-Baselines3 samples actions from torch's global generator and shuffles minibatches with
-    NumPy's; scenarios come from the generator that is returned.
+    The first generator is for the learner, the second one for scenarios.
     """
-    children = np.random.SeedSequence(seed, spawn_key=(iteration,)).spawn(3)
-    torch.manual_seed(int(children[0].generate_state(1)[0]))
-    np.random.seed(int(children[1].generate_state(1)[0]))  # noqa: NPY002
-    return np.random.default_rng(children[2])
+    learner, scenarios = np.random.SeedSequence(seed, spawn_key=(iteration,)).spawn(2)
+    return np.random.default_rng(learner), np.random.default_rng(scenarios)
 
 
 class PPOTraining:
     """Environment and model of a training; all that changes is in the `PPOState`.
 
-    It runs on one thread: its networks and batches are small, and so the result does not depend
-    on the number of processors. Several seeds are best trained by as many processes. On demand,
-    Stable-Baselines3 writes its logs to the folder ``tensorboard``.
+    The model is Stable-Baselines3's, its rollouts and updates compiled; see `CompiledPPO`. The
+    result does not depend on the number of ``threads``. On demand, Stable-Baselines3 writes its
+    logs to the folder ``tensorboard``.
     """
 
     @alone_in_torch()
-    def __init__(self, config: PPOConfig, tensorboard: str | Path | None = None) -> None:
+    def __init__(
+        self,
+        config: PPOConfig,
+        tensorboard: str | Path | None = None,
+        threads: int | None = None,
+    ) -> None:
         outputs: list[KVWriter] = []
         if tensorboard is not None:
             learner_of(config).check_installed("tensorboard")
             outputs.append(TensorBoardOutputFormat(str(tensorboard)))
-        rng = seed_iteration(config.seed, 0)
         simulator = config.simulator(threads=1)
         mirror = task_mirror(config.symmetric, simulator.world)
         self.config = config
-        self.env = TrainingVecEnv(simulator, config.n_envs, rng=rng, mirror=mirror)
-        self._learning_rate = config.learning_rate
-        self.model = PPO(
-            "MlpPolicy",
-            self.env,
-            n_steps=config.n_steps,
-            batch_size=config.batch_size,
-            n_epochs=config.n_epochs,
-            learning_rate=lambda _: self._learning_rate,
-            gamma=config.gamma,
-            gae_lambda=config.gae_lambda,
-            clip_range=config.clip_range,
-            ent_coef=config.ent_coef,
-            vf_coef=config.vf_coef,
-            max_grad_norm=config.max_grad_norm,
-            policy_kwargs={
-                "net_arch": list(config.net_arch),
-                "log_std_init": config.log_std_init,
-            },
-            device="cpu",
+        self.env = TrainingVecEnv(
+            simulator, config.n_envs, rng=np.random.default_rng(config.seed), mirror=mirror
         )
+        self.model = CompiledPPO(self.env, config, threads)
         self.model.set_logger(Logger(folder=None, output_formats=outputs))
-        self._first_parameters = self.parameters()
 
-    @alone_in_torch()
     def initial_state(self) -> PPOState:
         """State before the first iteration; the normaliser has seen random starts."""
-        env, rng = self.env, seed_iteration(self.config.seed, 0)
-        observations = env.simulator.world.observe(*env.simulator.sample(rng, NORMALIZED_OVER))
+        config, env = self.config, self.env
+        rng, scenarios = seed_iteration(config.seed, 0)
+        simulator = env.simulator
+        observations = simulator.world.observe(*simulator.sample(scenarios, NORMALIZED_OVER))
         if env.mirror is not None:
             observations = env.mirror.from_the_right(observations)
-        env.rng = rng
-        env.start_spread = self.config.start_spread_at(0.0)
+        env.draw_from(scenarios, config.start_spread_at(0.0))
         env.reset()
+        widths = (simulator.n_observations, config.net_arch, simulator.n_actions)
+        parameters = initial_parameters(rng, *widths, config.log_std_init)
         return PPOState(
-            parameters=self._first_parameters,
-            first_moment=np.zeros_like(self._first_parameters),
-            second_moment=np.zeros_like(self._first_parameters),
+            parameters=parameters,
+            first_moment=np.zeros_like(parameters),
+            second_moment=np.zeros_like(parameters),
             normalizer=Normalizer.of(observations),
             episodes=env.states(),
         )
 
-    @alone_in_torch()
     def iterate(self, state: PPOState) -> PPOState:
         """One rollout and one update."""
         began = time.perf_counter()
         config, model, env = self.config, self.model, self.env
-        env.rng = seed_iteration(config.seed, state.iteration + 1)
-        self.load(state)
         done = state.iteration / config.iterations
-        self._learning_rate = config.learning_rate_at(done)
-        env.start_spread = config.start_spread_at(done)
+        self.load(state)
+        model.rng, scenarios = seed_iteration(config.seed, state.iteration + 1)
+        learning_rate = config.learning_rate_at(done)
+        model.lr_schedule = lambda _: learning_rate
+        env.draw_from(scenarios, config.start_spread_at(done))
         model.learn(config.steps_per_iteration, reset_num_timesteps=False)
         returns, successes, simulator_time = env.take_ended()
         point = CurvePoint(
@@ -129,9 +113,9 @@ class PPOTraining:
             environment_steps=model.num_timesteps,
             wall_time=state.wall_time + time.perf_counter() - began,
         )
-        first_moment, second_moment = self._moments()
+        first_moment, second_moment = model.moments()
         return PPOState(
-            parameters=self.parameters(),
+            parameters=model.parameters(),
             first_moment=first_moment,
             second_moment=second_moment,
             normalizer=state.normalizer,
@@ -144,40 +128,15 @@ class PPOTraining:
         """Put a state into the model and the environment, if it has as many parameters and arms."""
         config, model = self.config, self.model
         sizes = (len(state.parameters), len(state.episodes.goal))
-        expected = (len(self.parameters()), config.n_envs)
+        expected = (len(model.parameters()), config.n_envs)
         if sizes != expected:
             raise InvalidInputError(
                 f"the state to resume has {sizes[0]} parameters and {sizes[1]} arms, "
                 f"not {expected[0]} and {expected[1]}"
             )
-        epochs = state.iteration * config.n_epochs
-        updates = epochs * config.steps_per_iteration // config.batch_size
-        weights = list(model.policy.parameters())
-        vector_to_parameters(torch.tensor(state.parameters), weights)
         moments = (state.first_moment, state.second_moment)
-        lengths = [weight.numel() for weight in weights]
-        parts = (torch.split(torch.tensor(moment), lengths) for moment in moments)
-        for weight, first, second in zip(weights, *parts, strict=True):
-            model.policy.optimizer.state[weight] = {
-                "step": torch.tensor(float(updates)),
-                "exp_avg": first.view_as(weight),
-                "exp_avg_sq": second.view_as(weight),
-            }
-        model.num_timesteps, model._n_updates = state.environment_steps, epochs
+        model.load_vectors(state.parameters, moments, state.iteration * config.n_epochs)
+        model.num_timesteps = state.environment_steps
         self.env.normalize_by(state.normalizer)
         model._last_obs = self.env.restore(state.episodes)
         model._last_episode_starts = state.episodes.steps == 0
-
-    def parameters(self) -> NDArray[np.float32]:
-        """Parameters of actor and critic, shape (n_parameters,)."""
-        return self._flat([weight.detach() for weight in self.model.policy.parameters()])
-
-    def _moments(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Adam's means of the gradients and of their squares, shape (n_parameters,) each."""
-        adam = [self.model.policy.optimizer.state[w] for w in self.model.policy.parameters()]
-        return self._flat([s["exp_avg"] for s in adam]), self._flat([s["exp_avg_sq"] for s in adam])
-
-    @staticmethod
-    def _flat(tensors: list[torch.Tensor]) -> NDArray[np.float32]:
-        vector: NDArray[np.float32] = parameters_to_vector(tensors).numpy().copy()
-        return vector

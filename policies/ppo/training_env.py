@@ -63,14 +63,9 @@ class EndedEpisodes(NamedTuple):
 class TrainingVecEnv(SB3VecEnv):
     """The environment for Stable-Baselines3 as kinarm's own trainings use it.
 
-    ``rng`` draws starts and goals of all arms. With a mirror, an arm whose goal lies to the left
-    is seen in the mirror, and its actions are reflected likewise, so that a learner only ever
-    meets goals to the right.
-
-    Attributes
-    ----------
-    start_spread : float
-        Scales the range of the start configurations of episodes to come.
+    One generator, given to `draw_from`, draws starts and goals of all arms. With a mirror, an arm
+    whose goal lies to the left is seen in the mirror, and its actions are reflected likewise, so
+    that a learner only ever meets goals to the right.
     """
 
     def __init__(
@@ -81,19 +76,37 @@ class TrainingVecEnv(SB3VecEnv):
         rng: np.random.Generator,
         mirror: Mirror | None = None,
     ) -> None:
-        self.rng, self.mirror = rng, mirror
-        self.start_spread = simulator.task.start_spread
+        self.mirror = mirror
         self._shown = NormalizedInterface(simulator.n_observations, mirror)
         self._record = EndedEpisodes([], [], 0.0)
         super().__init__(simulator, num_envs, self._shown)
+        self.draw_from(rng)
 
     def normalize_by(self, normalizer: Normalizer) -> None:
         """From now on, normalise observations by these statistics, of what the learner sees."""
         self._shown.normalize_by(normalizer)
 
+    def draw_from(self, rng: np.random.Generator, start_spread: float | None = None) -> None:
+        """From now on, draw scenarios from this generator, with the task's start spread or another.
+
+        They are drawn for all arms at once, which is faster, and kept until they are needed.
+        """
+        self._rng, self._start_spread = rng, start_spread
+        self._drawn = self._draw_for_all()
+
+    def _draw_for_all(self) -> list[NDArray[np.float64]]:
+        """As many starts and goals as there are arms."""
+        return [*self.simulator.sample(self._rng, self.num_envs, start_spread=self._start_spread)]
+
     def _draw(self, rows: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Starts and goals from the one generator."""
-        return self.simulator.sample(self.rng, rows.size, start_spread=self.start_spread)
+        """The next starts and goals, in the order in which they were drawn."""
+        count = rows.size
+        if len(self._drawn[0]) < count:
+            parts = zip(self._drawn, self._draw_for_all(), strict=True)
+            self._drawn = [np.concatenate(part) for part in parts]
+        starts, goals = (part[:count] for part in self._drawn)
+        self._drawn = [part[count:] for part in self._drawn]
+        return starts, goals
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Take note of the actions, given what the learner saw, as the simulator needs them."""

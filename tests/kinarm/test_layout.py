@@ -14,6 +14,7 @@ KERNELS = {
         "kinarm.kernels",
         "kinarm.policies.ars",
         "kinarm.policies.oracle.kernels",
+        "kinarm.policies.ppo.kernels",
         "kinarm.viewer.kernels",
     )
     for path in sorted(Path(import_module(package).__file__).parent.glob("*.py"))
@@ -53,6 +54,7 @@ def test_what_is_compiled_in_has_no_cache_of_its_own():
         "rollout",
         "shading",
         "starting",
+        "update",
     }
     for name in CACHED:
         assert not set(CACHED) & set(compiled_in(SOURCES[name]))

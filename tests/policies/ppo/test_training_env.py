@@ -144,7 +144,8 @@ def test_restored_episodes_go_on_as_if_nothing_had_happened(make_env):
         seen = env.step(rng.uniform(-1, 1, (NUMBER, 5)))[0]
     other = make_env(99)
     np.testing.assert_array_equal(other.restore(env.states()), seen)
-    other.rng.bit_generator.state = env.rng.bit_generator.state
+    env.draw_from(np.random.default_rng(5))
+    other.draw_from(np.random.default_rng(5))
     ended = 0
     for _ in range(100):
         actions = rng.uniform(-1, 1, (NUMBER, 5))

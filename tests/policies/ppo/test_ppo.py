@@ -22,7 +22,7 @@ from kinarm.policies import (
     state_policy,
     train_policy,
 )
-from kinarm.policies.ppo.learner import PPOTraining, alone_in_torch, seed_iteration
+from kinarm.policies.ppo.learner import PPOTraining, seed_iteration
 from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
 from kinarm.task import RewardWeights
@@ -165,14 +165,14 @@ class TestResuming:
     def test_loading_a_state_equals_never_having_stopped(self, trained):
         """The model of Stable-Baselines3 that just goes on, without our putting a state into it."""
         config, _, states = trained
-        with alone_in_torch():
-            training = PPOTraining(config)
-            training.iterate(states[0])
-            training.env.rng = seed_iteration(config.seed, 2 + 1)
-            training._learning_rate = config.learning_rate_at(2 / config.iterations)
-            training.model.learn(config.steps_per_iteration, reset_num_timesteps=False)
-            assert training.parameters().tobytes() == states[2].parameters.tobytes()
-            assert training.model.num_timesteps == states[2].environment_steps
+        training = PPOTraining(config)
+        training.iterate(states[0])
+        training.model.rng, scenarios = seed_iteration(config.seed, 2 + 1)
+        training.env.draw_from(scenarios)
+        training.model.lr_schedule = lambda _: config.learning_rate_at(2 / config.iterations)
+        training.model.learn(config.steps_per_iteration, reset_num_timesteps=False)
+        assert training.model.parameters().tobytes() == states[2].parameters.tobytes()
+        assert training.model.num_timesteps == states[2].environment_steps
 
     def test_finished_training_is_left_alone(self, trained):
         config, result, states = trained
@@ -247,7 +247,7 @@ def test_policy_acts_like_the_model(trained):
     training.load(states[-1])
     with torch.no_grad():  # so that some actions are clipped
         training.model.policy.action_net.weight.mul_(100)
-    state = replace(states[-1], parameters=training.parameters())
+    state = replace(states[-1], parameters=training.model.parameters())
     policy = state_policy(config, state)
     simulator = Simulator(config.problem, threads=1)
     observations = simulator.world.observe(*simulator.sample(np.random.default_rng(0), 500))

@@ -1,0 +1,302 @@
+"""The kernels that Python calls: actions and values of a rollout, and the steps of an update."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.kernels.compiling import inlined, kernel
+from kinarm.kernels.elementary import exponential
+from kinarm.policies.ppo.kernels.layers import (
+    BLOCK,
+    N_IN,
+    N_OUT,
+    OUTPUTS,
+    TURNED,
+    WEIGHTS,
+    Network,
+    backward,
+    forward,
+    padded,
+)
+from kinarm.policies.ppo.kernels.loss import (
+    Experience,
+    Objective,
+    derive_by_means,
+    derive_by_values,
+    find_precision,
+    log_density,
+)
+from kinarm.policies.ppo.kernels.tiles import LANES, ROWS, Numbers
+
+LAYOUT = "6315effad57d"
+"""Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
+
+
+class Descent(NamedTuple):
+    """Settings of Adam.
+
+    Attributes
+    ----------
+    learning_rate, first_decay, second_decay, epsilon : float
+        Adam's settings.
+    max_norm : float
+        Gradients are shortened to this norm.
+    """
+
+    learning_rate: float
+    first_decay: float
+    second_decay: float
+    epsilon: float
+    max_norm: float
+
+
+@kernel
+def evaluate(
+    first: int, last: int, network: Network, observations: Numbers, outputs: Numbers
+) -> None:
+    """Fill rows of ``outputs``, shape (n, n_out), with what a network makes of observations."""
+    layers = network.layers
+    work = np.zeros(work_length(layers), dtype=np.float32)
+    end = layers.shape[0] - 1
+    sink, wide_out = layers[end, OUTPUTS], padded(layers[end, N_OUT])
+    for begin in range(first, last, BLOCK):
+        samples = min(BLOCK, last - begin)
+        for s in range(samples):
+            take_in(observations, begin + s, layers, work, s)
+        forward(network, whole_tiles(samples), work)
+        for s in range(samples):
+            for j in range(outputs.shape[1]):
+                outputs[begin + s, j] = work[sink + s * wide_out + j]
+
+
+@kernel
+def choose(
+    means: Numbers, log_std: Numbers, noise: Numbers, actions: Numbers, densities: Numbers
+) -> None:
+    """Turn noise, shape (n, n_actions), into actions about their means, and find their densities.
+
+    Parameters
+    ----------
+    means, actions : ndarray of float32, shape (n, n_actions)
+        What the actor says, and what is done.
+    log_std : ndarray of float32, shape (n_actions,)
+        Logarithms of the standard deviations.
+    noise : ndarray of float32, shape (n, n_actions)
+        Standard normal numbers.
+    densities : ndarray of float32, shape (n,)
+        Logarithms of the probability densities of the actions.
+    """
+    precision = np.zeros(means.shape[1])
+    find_precision(log_std, precision)
+    for i in range(means.shape[0]):
+        for j in range(means.shape[1]):
+            actions[i, j] = means[i, j] + exponential(float(log_std[j])) * noise[i, j]
+        density = 0.0
+        for j in range(means.shape[1]):
+            deviation = float(actions[i, j]) - means[i, j]
+            density += log_density(deviation, precision[j], log_std[j])
+        densities[i] = density
+
+
+@kernel
+def standardisation(chosen: NDArray[np.int64], advantages: Numbers) -> tuple[float, float]:
+    """Mean of the advantages of a minibatch, and what then makes their standard deviation one."""
+    total, squares = 0.0, 0.0
+    for i in chosen:
+        total += advantages[i]
+    mean = total / len(chosen)
+    for i in chosen:
+        deviation = advantages[i] - mean
+        squares += deviation * deviation
+    return mean, 1.0 / (math.sqrt(squares / (len(chosen) - 1)) + 1e-8)
+
+
+@kernel
+def add_gradients(
+    first: int,
+    last: int,
+    actor: Network,
+    critic: Network,
+    experience: Experience,
+    chosen: NDArray[np.int64],
+    objective: Objective,
+    standard: tuple[float, float],
+    gradients: Numbers,
+    losses: NDArray[np.float64],
+) -> None:
+    """Find the gradient of the loss of a minibatch, in parts that do not depend on threads.
+
+    Parameters
+    ----------
+    first, last : int
+        Which parts.
+    actor, critic : Network
+        Networks, whose parameters lie in one array; the logarithms of the standard deviations of
+        the actions are its last entries, padded.
+    experience, objective
+        See there.
+    chosen : ndarray of int, shape (batch_size,)
+        Rows of the minibatch.
+    standard : tuple of float
+        What is subtracted from the advantages, and by what they are then multiplied.
+    gradients : ndarray of float32, shape (n_parts, n_weights)
+        Where the derivatives by the weights go.
+    losses : ndarray, shape (n_parts, LOSSES)
+        Where the sums that are logged go.
+    """
+    n_parts, n_weights = gradients.shape
+    n_actions = experience.actions.shape[1]
+    log_std = actor.weights[n_weights - padded(n_actions) :]
+    precision = np.zeros(n_actions)
+    find_precision(log_std, precision)
+    work = np.zeros(work_length(actor.layers), dtype=np.float32)
+    behind = np.zeros((BLOCK + 1) * widest(actor.layers), dtype=np.float32)
+    for part in range(first, last):
+        gradient, loss = gradients[part], losses[part]
+        gradient[:] = np.float32(0.0)
+        loss[:] = 0.0
+        begin, end = part * len(chosen) // n_parts, (part + 1) * len(chosen) // n_parts
+        for start in range(begin, end, BLOCK):
+            rows = chosen[start : min(start + BLOCK, end)]
+            samples, tiled = len(rows), whole_tiles(len(rows))
+            for s in range(samples):
+                take_in(experience.observations, rows[s], actor.layers, work, s)
+            forward(actor, tiled, work)
+            derive_by_means(
+                actor.layers,
+                experience,
+                rows,
+                objective,
+                standard,
+                log_std,
+                precision,
+                work,
+                gradient,
+                loss,
+            )
+            backward(actor, tiled, samples, work, behind, gradient)
+            forward(critic, tiled, work)
+            derive_by_values(critic.layers, experience, rows, objective, work, loss)
+            backward(critic, tiled, samples, work, behind, gradient)
+        # Every part has its share of what does not depend on samples: the entropy.
+        for j in range(n_actions):
+            share = objective.ent_coef * (end - begin) / len(chosen)
+            gradient[n_weights - padded(n_actions) + j] -= share
+
+
+@kernel
+def descend(
+    actor: Network,
+    critic: Network,
+    first_moment: Numbers,
+    second_moment: Numbers,
+    gradients: Numbers,
+    descent: Descent,
+    steps: int,
+) -> None:
+    """Add up a gradient, shorten it, take a step of Adam, and transpose the matrices anew.
+
+    Parameters
+    ----------
+    actor, critic : Network
+        Networks, whose parameters lie in one array, which is changed.
+    first_moment, second_moment : ndarray of float32, shape (n_weights,)
+        Running means of the gradients and of their squares; changed.
+    gradients : ndarray of float32, shape (n_parts, n_weights)
+        Parts of the gradient; the first is overwritten.
+    descent : Descent
+        Settings.
+    steps : int
+        Which step it is, counted from 1.
+    """
+    n_parts, n_weights = gradients.shape
+    whole, weights = gradients[0], actor.weights
+    for part in range(1, n_parts):
+        for k in range(n_weights):
+            whole[k] += gradients[part, k]
+    squares = np.zeros(LANES)
+    for k in range(0, n_weights, LANES):
+        for lane in range(LANES):
+            squares[lane] += float(whole[k + lane]) * float(whole[k + lane])
+    total = 0.0
+    for lane in range(LANES):
+        total += squares[lane]
+    shrink = np.float32(min(descent.max_norm / (math.sqrt(total) + 1e-6), 1.0))
+    kept, squares_kept = np.float32(descent.first_decay), np.float32(descent.second_decay)
+    taken, squares_taken = (
+        np.float32(1.0 - descent.first_decay),
+        np.float32(1.0 - descent.second_decay),
+    )
+    unbias = 1.0 - whole_power(descent.first_decay, steps)
+    stride = np.float32(descent.learning_rate / unbias)
+    unbias = 1.0 - whole_power(descent.second_decay, steps)
+    widen = np.float32(1.0 / math.sqrt(unbias))
+    epsilon = np.float32(descent.epsilon)
+    for k in range(n_weights):
+        slope = whole[k] * shrink
+        first = kept * first_moment[k] + taken * slope
+        second = squares_kept * second_moment[k] + squares_taken * (slope * slope)
+        first_moment[k], second_moment[k] = first, second
+        weights[k] -= stride * first / (np.sqrt(second) * widen + epsilon)
+    transpose(actor)
+    transpose(critic)
+
+
+@kernel
+def transpose(network: Network) -> None:
+    """Fill in the transposed matrices of a network."""
+    layers = network.layers
+    for layer in range(1, layers.shape[0]):
+        n_in, n_out = layers[layer, N_IN], layers[layer, N_OUT]
+        first, sink = layers[layer, WEIGHTS], layers[layer, TURNED]
+        wide_in, wide_out = padded(n_in), padded(n_out)
+        for j in range(n_out):
+            for i in range(n_in):
+                network.turned[sink + j * wide_in + i] = network.weights[first + i * wide_out + j]
+
+
+@inlined
+def whole_power(base: float, exponent: int) -> float:
+    """Power of a number, by squaring."""
+    power = 1.0
+    while exponent > 0:
+        if exponent % 2 == 1:
+            power *= base
+        base *= base
+        exponent //= 2
+    return power
+
+
+@inlined
+def take_in(
+    observations: Numbers, i: int, layers: NDArray[np.int64], work: Numbers, s: int
+) -> None:
+    """Copy an observation into a work space."""
+    wide = padded(layers[0, N_IN])
+    seen, taken = observations[i], work[s * wide : (s + 1) * wide]
+    for j in range(len(seen)):
+        taken[j] = seen[j]
+
+
+@inlined
+def whole_tiles(samples: int) -> int:
+    """Rows of a block that holds so many samples."""
+    return (samples + ROWS - 1) // ROWS * ROWS
+
+
+@inlined
+def work_length(layers: NDArray[np.int64]) -> int:
+    """Length of the work space of a network."""
+    end = layers.shape[0] - 1
+    return int(layers[end, OUTPUTS]) + BLOCK * padded(layers[end, N_OUT])
+
+
+@inlined
+def widest(layers: NDArray[np.int64]) -> int:
+    """Width of the widest layer, padded."""
+    found = 0
+    for layer in range(layers.shape[0]):
+        found = max(found, padded(layers[layer, N_IN]))
+    return found
