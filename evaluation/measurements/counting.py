@@ -26,8 +26,8 @@ INSTRUCTIONS = {
     **dict.fromkeys(("fcmp_ordered", "fcmp_unordered"), "comparisons"),
 }
 """Instructions by the names of llvmlite's methods."""
-CALLED = {"llvm.sqrt": "roots", "llvm.rint": "sums"}
-"""Functions of LLVM that are instructions on most machines."""
+CALLED = {"llvm.sqrt": "roots", "sqrt": "roots", "llvm.rint": "sums"}
+"""Functions that are instructions on most machines, by how their names begin."""
 
 MOST_FUNCTIONS = 1 << 14
 

@@ -1,6 +1,7 @@
 """MuJoCo's rollouts in C (``mujoco.rollout``) of the same arm, scene and ways."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import mujoco
@@ -17,9 +18,9 @@ from kinarm.simulator import Simulator
 EPISODES = 512
 TERMS = (
     "{episodes} episodes on {threads} threads; same starts, shapes, pairs of bodies and joint "
-    "targets, which position servos follow; {time_step:g} s a step, tested for contact {theirs} "
-    "(kinarm: {ours} configurations a step). MuJoCo solves the dynamics and resolves contact; "
-    "kinarm also observes and runs the policy"
+    "targets, which position servos follow, {time_step:g} s a step; for more tests of contact "
+    "MuJoCo takes smaller steps. It solves the dynamics and resolves contact; kinarm also "
+    "observes and runs the policy"
 )
 
 
@@ -31,43 +32,48 @@ def compare(policy: Policy, repetitions: int) -> Iterator[Comparison]:
     MissingExtraError
         If the package with UR5 is missing.
     """
-    tested = policy.problem.stepping.tested_configurations
-    yield _compare_rollouts("rollouts of the same arm", policy, repetitions, 1)
-    yield _compare_rollouts("as often tested for contact", policy, repetitions, tested)
-    yield _compare_rollouts("rollouts of UR5 with hulls", novice("ur5"), repetitions, 1)
+    yield from _compare_rollouts(f"arm `{policy.problem.arm.name}`", policy, repetitions)
+    yield from _compare_rollouts("UR5 with hulls", novice("ur5"), repetitions)
 
 
-def _compare_rollouts(what: str, policy: Policy, repetitions: int, substeps: int) -> Comparison:
-    """Time rollouts of a policy, and MuJoCo on the ways that they take.
-
-    MuJoCo takes ``substeps`` steps for each of kinarm's, and tests for contact in each.
-    """
+def _compare_rollouts(arm: str, policy: Policy, repetitions: int) -> Iterator[Comparison]:
+    """Time rollouts of a policy beside MuJoCo on their ways, which tests as often, and once."""
     simulator = Simulator(policy.problem)
     stepping, threads = policy.problem.stepping, simulator.threads
-    starts, goals = simulator.sample(np.random.default_rng(EPISODES), EPISODES)
-    targets = joint_targets(simulator, policy, starts, goals)
-    model = mujoco.MjModel.from_xml_string(mjcf(simulator.world, stepping.time_step / substeps))
-    controls = np.repeat(targets, substeps, axis=1)
-    states = initial_states(model, starts)
+    scenarios = simulator.sample(np.random.default_rng(EPISODES), EPISODES)
+    targets = joint_targets(simulator, policy, *scenarios)
+    terms = TERMS.format(episodes=EPISODES, threads=threads, time_step=stepping.time_step)
+
+    def ours() -> int:
+        return int(simulator.rollout(policy, *scenarios).steps.sum())
+
+    for tests in dict.fromkeys((stepping.tested_configurations, 1)):
+        both = tests == stepping.tested_configurations
+        how = f"both test {tests}" if both else f"{tests} tested by MuJoCo"
+        what = f"rollouts, {arm}, {how} a step"
+        with driven(simulator, scenarios[0], targets, tests) as theirs:
+            yield compared(theirs, ours, repetitions, what=what, unit="steps/s", terms=terms)
+
+
+@contextmanager
+def driven(
+    simulator: Simulator, starts: NDArray[np.float64], targets: NDArray[np.float64], tests: int
+) -> Iterator[Callable[[], int]]:
+    """MuJoCo's rollouts to joint targets, in ``tests`` of its steps for each of kinarm's.
+
+    What it gives runs them once and returns how many of kinarm's steps that were.
+    """
+    threads, time_step = simulator.threads, simulator.problem.stepping.time_step
+    model = mujoco.MjModel.from_xml_string(mjcf(simulator.world, time_step / tests))
     workers = [mujoco.MjData(model) for _ in range(threads)]
+    states, controls = initial_states(model, starts), np.repeat(targets, tests, axis=1)
     with Rollout(nthread=threads if threads > 1 else 0) as rollout:
 
-        def theirs() -> int:
+        def run() -> int:
             rollout.rollout(model, workers, states, controls)
-            return int(controls.shape[0] * controls.shape[1]) // substeps
+            return int(np.prod(targets.shape[:2]))
 
-        def ours() -> int:
-            return int(simulator.rollout(policy, starts, goals).steps.sum())
-
-        terms = TERMS.format(
-            episodes=EPISODES,
-            threads=threads,
-            time_step=stepping.time_step,
-            theirs="once" if substeps == 1 else f"{substeps} times, in as many steps of MuJoCo's",
-            ours=stepping.tested_configurations,
-        )
-        what, unit = f"{what}, {policy.problem.arm.name}", "steps/s"
-        return compared(theirs, ours, repetitions, what=what, unit=unit, terms=terms)
+        yield run
 
 
 def joint_targets(
@@ -76,19 +82,21 @@ def joint_targets(
     starts: NDArray[np.float64],
     goals: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Where the actuated joints are after each step, and stay after the last one.
+    """Where the actuated joints are to be after each step: on the ways of a policy's episodes.
+
+    An episode that is over goes back on its way, and forth again, so that no arm rests.
 
     Returns
     -------
     ndarray, shape (n, horizon, n_actuated)
         [rad or m].
     """
-    paths = simulator.rollout(policy, starts, goals, record=True).paths
-    targets = np.array(paths[:, 1:, : simulator.n_actions])
-    for step in range(targets.shape[1]):
-        before = targets[:, step - 1] if step else starts[:, : simulator.n_actions]
-        ended = np.isnan(targets[:, step])
-        targets[:, step][ended] = before[ended]
+    rollouts = simulator.rollout(policy, starts, goals, record=True)
+    horizon, last = simulator.task.horizon, rollouts.steps[:, None]
+    places = np.arange(1, horizon + 1) % (2 * last)
+    places = np.where(places <= last, places, 2 * last - places)
+    rows = np.arange(len(starts))[:, None]
+    targets: NDArray[np.float64] = rollouts.paths[rows, places, : simulator.n_actions]
     return targets
 
 
