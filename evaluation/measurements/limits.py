@@ -22,7 +22,7 @@ from kinarm.policies.recipes import recipe
 from kinarm.problem import ReachProblem
 from kinarm.simulator import Simulator
 
-TURNS = 500_000
+TURNS = 50_000_000
 BATCH = 4096
 PROFILED_ITERATIONS = 20
 
