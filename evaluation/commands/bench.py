@@ -2,12 +2,27 @@
 
 import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from kinarm._command_line import run_request
+from kinarm._files import check_folder
 from kinarm._validation import whole_number
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+EPILOG = """
+--peers needs the extra peers, and the extra vamp for VAMP: pip install 'kinarm[peers]'. What is
+not installed is named and left out; so are arms with meshes without the extra robots.
+
+examples:
+  kinarm-bench                                            a table, in a minute or two
+  kinarm-bench --peers                                    other simulators beside kinarm as well
+  kinarm-bench --ppo --limits --peers --out speed         everything, with files
+"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,6 +37,12 @@ class BenchmarkRequest:
         Trained policy to run, on the problem that it is for.
     ppo : bool
         Time a training with PPO as well, a minute or two.
+    limits : bool
+        Count the operations of a step and say where time goes as well, a minute or two.
+    peers : bool
+        Measure other simulators and learners beside kinarm as well, a few minutes.
+    out : Path
+        Output folder, for a document and a page.
     json : bool
         Print JSON on standard output.
 
@@ -34,13 +55,21 @@ class BenchmarkRequest:
     repetitions: int = 7
     policy: str = field(default="ars-tuned-right", metadata={"metavar": "NAME_OR_FILE"})
     ppo: bool = False
+    limits: bool = False
+    peers: bool = False
+    out: Path | None = field(default=None, metadata={"metavar": "DIR"})
     json: bool = False
 
     def __post_init__(self) -> None:
         whole_number("repetitions", self.repetitions, 1)
 
-    def run(self) -> dict[str, Any]:
+    def run(self, command: str | None = None) -> dict[str, Any]:
         """Measure everything.
+
+        Parameters
+        ----------
+        command : str, optional
+            What to record as the command that made the files; this request if it is left out.
 
         Returns
         -------
@@ -50,100 +79,68 @@ class BenchmarkRequest:
         Raises
         ------
         KinarmError
-            If the policy cannot be used.
+            If the policy cannot be used, or the folder cannot be written to.
         """
-        from kinarm.evaluation.measurements import measure
+        from kinarm.evaluation.measurements import benchmark
+        from kinarm.evaluation.measurements.document import write_all
 
-        return measure(self.policy, self.repetitions, ppo=self.ppo)
+        if self.out is not None:
+            check_folder(self.out)
+        document = benchmark.measure(
+            self.policy,
+            self.repetitions,
+            ppo=self.ppo,
+            limits=self.limits,
+            peers=self.peers,
+        )
+        if self.out is not None:
+            write_all(document, self.out, command or repr(self))
+        return document
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line."""
-    run_request("kinarm-bench", BenchmarkRequest, _report, arguments)
+    run_request("kinarm-bench", BenchmarkRequest, _report, arguments, epilog=EPILOG)
 
 
-def _report(request: BenchmarkRequest, _: str) -> None:
+def _report(request: BenchmarkRequest, command: str) -> None:
     """Run a request, and print its figures."""
     from rich.console import Console
-    from rich.table import Table
 
-    document = request.run()
+    from kinarm.evaluation.measurements import table
+
+    document = request.run(command)
     if request.json:
         print(json.dumps(document))
         return
-    table = Table(title=f"kinarm-bench, policy {document['policy']}", title_justify="left")
-    table.add_column("what")
-    for heading in ("median", "best", "judged by Coal"):
-        table.add_column(heading, justify="right")
-    for row in _rows(document):
+    console = Console(width=None if sys.stdout.isatty() else 110, highlight=False)
+    title = f"kinarm-bench, policy {document['policy']}"
+    _print_table(console, title, table.HEADER, table.rows(document))
+    if "limits" in document:
+        console.print(table.limit_text(document))
+        limits = document["limits"]
+        _print_table(console, "", table.OPERATION_HEADER, table.operation_rows(limits))
+        _print_table(console, "", table.TIME_HEADER, table.time_rows(limits))
+    if "peers" in document:
+        _print_table(console, "peers", table.PEER_HEADER, table.peer_rows(document["peers"]))
+
+
+WORDS = ("what", "peer", "where", "time of", "spent in")
+"""Headings of columns that hold no numbers."""
+
+
+def _print_table(
+    console: "Console", title: str, header: Sequence[str], rows: Iterable[tuple[str, ...]]
+) -> None:
+    """Print a table; an empty row ends a section."""
+    from rich.table import Table
+
+    table = Table(title=title or None, title_justify="left")
+    for heading in header:
+        table.add_column(heading, justify="left" if heading in WORDS else "right")
+    for row in rows:
         table.add_row(*row) if row else table.add_section()
-    Console(width=None if sys.stdout.isatty() else 110, highlight=False).print(table)
-
-
-def _rows(document: dict[str, Any]) -> Iterator[tuple[str, ...]]:
-    """Rows of the table; an empty one ends a section."""
-    from kinarm.evaluation.measurements import VECTOR_ENVS
-
-    for row in document["rollouts"]:
-        plural = "s" if row["threads"] > 1 else ""
-        what = f"{row['batch']} {row['actions']} episodes, {row['threads']} thread{plural}"
-        judged = f"{100 * row['judged_share']:.3f} %"
-        yield f"rollouts, {what}", *_rates(row["steps_per_second"]), judged
-    yield ()
-    yield f"batch environment, {VECTOR_ENVS} arms", *_rates(document["vector_environment"])
-    yield "single environment", *_rates(document["single_environment"])
-    yield from _sb3_rows(document["stable_baselines3"])
-    yield "reference path (Pinocchio + Coal)", *_rates(document["reference"])
-    pictures = (f"{document['pictures'][name]:,.0f} pictures/s" for name in RATES)
-    yield "pictures, 480 x 360, one thread", *pictures
-    speed_up = f"{document['speed_up_over_reference']:.0f} x"
-    yield "speed-up over the reference (512 trained)", speed_up
-    yield ()
-    training, oracle = document["table_1_training"], document["oracle"]
-    steps = f"{training['environment_steps'] / 1e6:.1f} million steps"
-    seconds = (f"{training['seconds'][name]:.2f} s" for name in RATES)
-    yield f"training of Table 1 ({steps})", *seconds
-    yield from _ppo_rows(document.get("ppo_training"))
-    seconds = (f"{oracle['trials'] / oracle['trials_per_second'][name]:.1f} s" for name in RATES)
-    yield f"oracle, {oracle['trials']} trials", *seconds
-    evaluation = document["evaluation"]
-    memory = f"{evaluation['peak_memory_mb']:.0f} MB"
-    for known, name in (("unknown", "seconds_without_bounds"), ("known", "seconds")):
-        what = f"kinarm-eval --trials 200, bounds {known}"
-        yield what, f"{evaluation[name]:.1f} s", memory
-
-
-def _sb3_rows(rates: dict[str, Any]) -> list[tuple[str, ...]]:
-    """Rows of the environments for Stable-Baselines3."""
-    from kinarm.evaluation.measurements import VECTOR_ENVS
-
-    if "skipped" in rates:
-        return [("for Stable-Baselines3", "skipped"), (rates["skipped"],)]
-    return [
-        (f"for Stable-Baselines3, {VECTOR_ENVS} arms", *_rates(rates["native"])),
-        (f"its DummyVecEnv, {VECTOR_ENVS} single environments", *_rates(rates["dummy"])),
-        ("speed-up over its DummyVecEnv", f"{rates['speed_up']:.0f} x"),
-    ]
-
-
-def _ppo_rows(training: dict[str, Any] | None) -> list[tuple[str, ...]]:
-    """Rows of the training with PPO, which is timed once if at all."""
-    if training is None:
-        return []
-    if "skipped" in training:
-        return [("training with PPO", "skipped"), (training["skipped"],)]
-    steps = training["environment_steps"] / 1e6
-    return [
-        (f"training with PPO ({steps:.1f} million steps)", f"{training['seconds']:.1f} s"),
-        ("share of it in the simulator", f"{training['simulator_share']:.1%}"),
-    ]
-
-
-RATES = ("median", "best")
-
-
-def _rates(timing: dict[str, float]) -> list[str]:
-    return [f"{timing[name]:,.0f} steps/s" for name in RATES]
+    console.print(table)
 
 
 if __name__ == "__main__":

@@ -66,7 +66,7 @@ def test_learners_have_help_of_their_own(run, learner):
             "kinarm-compare",
             "--learners --problems --seeds --steps --trials --settings --out --jobs --no-train",
         ),
-        ("kinarm-bench", "--repetitions --policy --ppo --json"),
+        ("kinarm-bench", "--repetitions --policy --ppo --limits --peers --out --json"),
     ],
 )
 def test_help_names_every_option(run, program, options):

@@ -9,7 +9,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinarm.evaluation import measurements
+from kinarm._parallel import available_threads
+from kinarm.evaluation.measurements import (
+    benchmark,
+    environments,
+    limits,
+    oracle,
+    pictures,
+    rollouts,
+    timing,
+    training,
+)
+from kinarm.evaluation.measurements.evaluation import measure_evaluation
 from kinarm.policies import recipe
 from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
@@ -21,7 +32,7 @@ def document(train_novice, tmp_path_factory):
     train_novice("left").save(path)
     with pytest.MonkeyPatch.context() as patch:
         shrink(patch)
-        return measurements.measure(str(path), 1)
+        return benchmark.measure(str(path), 1)
 
 
 def shrink(patch: pytest.MonkeyPatch) -> None:
@@ -32,10 +43,13 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
         fewer = ["1" if word == "200" else word for word in command]
         return run([*fewer, "--policy", "zero"], **settings)
 
-    patch.setattr(measurements, "BATCHES", (6, 512))
-    patch.setattr(measurements, "ORACLE_TRIALS", 4)
-    patch.setattr(measurements, "PICTURES", 2)
-    patch.setattr(measurements, "recipe", partial(recipe, iterations=3))
+    patch.setattr(benchmark, "BATCHES", (6, 512))
+    patch.setattr(benchmark, "measure_robots", lambda _: [{"skipped": "not here"}])
+    patch.setattr(limits, "BATCH", 6)
+    patch.setattr(limits, "TURNS", 1000)
+    patch.setattr(oracle, "ORACLE_TRIALS", 4)
+    patch.setattr(pictures, "PICTURES", 2)
+    patch.setattr(training, "recipe", partial(recipe, iterations=3))
     patch.setattr(subprocess, "run", run_less)
 
 
@@ -46,6 +60,7 @@ def rates(document) -> list[dict[str, float]]:
         document["vector_environment"],
         document["single_environment"],
         document["pictures"],
+        *document["attainable"].values(),
     ]
 
 
@@ -59,7 +74,7 @@ def test_rates_are_positive(document):
 
 
 def test_rollouts_are_measured_in_every_combination(document):
-    threads = {1, measurements.available_threads()}
+    threads = {1, available_threads()}
     seen = {(row["batch"], row["actions"], row["threads"]) for row in document["rollouts"]}
     assert seen == {(b, a, t) for b in (6, 512) for a in ("random", "trained") for t in threads}
     assert len(document["rollouts"]) == len(seen)
@@ -71,9 +86,9 @@ def test_share_of_judged_configurations_is_a_share_of_four_a_step(document):
 
 
 def test_training_of_table_1_is_measured(document):
-    training = document["table_1_training"]
-    assert 0 < training["seconds"]["best"] <= training["seconds"]["median"]
-    assert 3 * 48 <= training["environment_steps"] <= 3 * 48 * 64
+    table_1 = document["table_1_training"]
+    assert 0 < table_1["seconds"]["best"] <= table_1["seconds"]["median"]
+    assert 3 * 48 <= table_1["environment_steps"] <= 3 * 48 * 64
 
 
 def test_the_oracle_is_measured(document):
@@ -97,7 +112,7 @@ def test_the_evaluation_is_measured_before_and_after_its_bounds_are_known(monkey
 
     monkeypatch.setattr(subprocess, "run", run)
     monkeypatch.setattr(time, "perf_counter", lambda: next(clock))
-    figures = measurements.measure_evaluation()
+    figures = measure_evaluation()
     assert (figures["seconds_without_bounds"], figures["seconds"]) == (9, 3)
     ((folder, before), (again, after)) = seen
     assert (folder == again, before, after) == (True, 0, 1)
@@ -116,7 +131,7 @@ def test_speed_up_is_the_ratio_of_two_figures(document):
 
 
 def test_machine_and_versions_are_told(document):
-    assert document["machine"]["threads"] == measurements.available_threads()
+    assert document["machine"]["threads"] == available_threads()
     assert {"python", "numpy", "numba"} <= set(document["versions"])
     assert document["repetitions"] == 1
 
@@ -125,19 +140,30 @@ def test_timing_divides_steps_by_time_and_leaves_out_the_first_run(monkeypatch):
     clock = iter([0.0, 2.0, 10.0, 11.0, 20.0, 24.0])
     runs = []
     monkeypatch.setattr(time, "perf_counter", lambda: next(clock))
-    timing = measurements.timed(lambda: runs.append(1) or 8, 3)
-    assert timing == (4.0, 8.0)
+    found = timing.timed(lambda: runs.append(1) or 8, 3)
+    assert found == (4.0, 8.0)
     assert len(runs) == 4
+
+
+def test_things_are_timed_by_turns_and_their_first_runs_are_not_counted(monkeypatch):
+    clock = iter([0.0, 1.0, 1.0, 3.0, 3.0, 7.0, 7.0, 8.0])
+    ran = []
+    monkeypatch.setattr(time, "perf_counter", lambda: next(clock))
+    found = timing.alternated(
+        {"a": lambda: ran.append("a") or 4, "b": lambda: ran.append("b") or 8}, 2
+    )
+    assert ran == ["a", "b"] * 3
+    assert found == {"a": (2.5, 4.0), "b": (6.0, 8.0)}
 
 
 def test_measured_steps_are_steps_taken(monkeypatch, train_novice):
     """The rate of trained rollouts counts the steps of the episodes, not their horizon."""
     counted = []
     monkeypatch.setattr(
-        measurements, "timed", lambda run, _: counted.append(run()) or measurements.Timing(1, 1)
+        rollouts, "timed", lambda run, _: counted.append(run()) or timing.Timing(1, 1)
     )
     simulator, policy = Simulator("right", threads=1), train_novice("right")
-    measurements.measure_rollouts(simulator, policy, 32, 1)
+    rollouts.measure_rollouts(simulator, policy, 32, 1)
     starts, goals = simulator.sample(np.random.default_rng(32), 32)
     steps = int(simulator.rollout(policy, starts, goals).steps.sum())
     assert steps < 32 * 64
@@ -147,9 +173,9 @@ def test_measured_steps_are_steps_taken(monkeypatch, train_novice):
 def test_environments_are_measured_with_all_their_arms(monkeypatch):
     counted = []
     monkeypatch.setattr(
-        measurements, "timed", lambda run, _: counted.append(run()) or measurements.Timing(1, 1)
+        environments, "timed", lambda run, _: counted.append(run()) or timing.Timing(1, 1)
     )
-    measurements.measure_vector_env(PROBLEMS["right"], 1)
+    environments.measure_vector_env(PROBLEMS["right"], 1)
     assert counted[0] == 64 * 200
 
 
@@ -164,18 +190,18 @@ class TestStableBaselines3:
     def test_both_are_of_the_problem_with_all_arms(self, monkeypatch):
         pytest.importorskip("stable_baselines3")
         made, counted = [], []
-        make, vec_env = measurements.gymnasium.make, measurements.sb3_vec_env
+        make, vec_env = environments.gymnasium.make, environments.sb3_vec_env
         monkeypatch.setattr(
-            measurements.gymnasium, "make", lambda *a, **k: made.append(make(*a, **k)) or made[-1]
+            environments.gymnasium, "make", lambda *a, **k: made.append(make(*a, **k)) or made[-1]
         )
         monkeypatch.setattr(
-            measurements, "sb3_vec_env", lambda *a, **k: made.append(vec_env(*a, **k)) or made[-1]
+            environments, "sb3_vec_env", lambda *a, **k: made.append(vec_env(*a, **k)) or made[-1]
         )
         monkeypatch.setattr(
-            measurements, "timed", lambda run, _: counted.append(run()) or measurements.Timing(1, 1)
+            environments, "timed", lambda run, _: counted.append(run()) or timing.Timing(1, 1)
         )
         problem = PROBLEMS["left"].replace(horizon=9)
-        measurements.measure_sb3(problem, 1)
+        environments.measure_sb3(problem, 1)
         assert counted == [64 * 200, 64 * 20]
         assert len(made) == 65
         assert {env.get_wrapper_attr("simulator").problem for env in made[1:]} == {problem}
@@ -183,24 +209,24 @@ class TestStableBaselines3:
 
     def test_skipped_without_it(self, monkeypatch):
         monkeypatch.setattr("kinarm.policies.learners.find_spec", lambda name: None)
-        assert "kinarm[ppo]" in measurements.measure_sb3(PROBLEMS["left"], 1)["skipped"]
+        assert "kinarm[ppo]" in environments.measure_sb3(PROBLEMS["left"], 1)["skipped"]
 
 
 class TestPPO:
     @pytest.fixture
-    def training(self, monkeypatch):
+    def trained(self, monkeypatch):
         pytest.importorskip("stable_baselines3")
         tiny = {"iterations": 3, "n_envs": 4, "batch_size": 64, "net_arch": (8, 8)}
-        monkeypatch.setattr(measurements, "recipe", partial(recipe, **tiny))
-        return measurements.measure_ppo(PROBLEMS["left"])
+        monkeypatch.setattr(training, "recipe", partial(recipe, **tiny))
+        return training.measure_ppo(PROBLEMS["left"])
 
-    def test_share_of_the_simulator(self, training):
-        assert training["environment_steps"] == 3 * 4 * 16
-        assert training["seconds"] > 0
-        assert 0 < training["simulator_share"] < 1
-        assert json.loads(json.dumps(training)) == training
+    def test_share_of_the_simulator(self, trained):
+        assert trained["environment_steps"] == 3 * 4 * 16
+        assert trained["seconds"] > 0
+        assert 0 < trained["simulator_share"] < 1
+        assert json.loads(json.dumps(trained)) == trained
 
     def test_skipped_without_its_packages(self, monkeypatch):
         monkeypatch.setattr("kinarm.policies.learners.find_spec", lambda name: None)
-        skipped = measurements.measure_ppo(PROBLEMS["left"])["skipped"]
+        skipped = training.measure_ppo(PROBLEMS["left"])["skipped"]
         assert "pip install 'kinarm[ppo]'" in skipped

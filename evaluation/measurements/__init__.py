@@ -1,0 +1,1 @@
+"""What ``kinarm-bench`` measures: one concept a module, put together by `benchmark`."""

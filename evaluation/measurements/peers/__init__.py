@@ -1,0 +1,1 @@
+"""Other people's simulators and learners beside kinarm, in the same run."""
