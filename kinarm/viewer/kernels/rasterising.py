@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from kinarm.kernels.compiling import Array, kernel
 from kinarm.viewer.kernels.edges import edge, within
 
-LAYOUT = "1e9b3fb77115"
+LAYOUT = "30257647a615"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 NEAR = 0.01

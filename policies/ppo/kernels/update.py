@@ -30,7 +30,7 @@ from kinarm.policies.ppo.kernels.loss import (
 )
 from kinarm.policies.ppo.kernels.tiles import LANES, ROWS, Numbers
 
-LAYOUT = "6315effad57d"
+LAYOUT = "62e652fea60a"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 
