@@ -1,0 +1,100 @@
+"""Boxes of configurations: a stack of those that wait, and a block of them side by side in lanes."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.kernels.compiling import Array, inlined
+
+WAITING = 4096
+"""Boxes that can wait at a time; halving eight to the resolution of numbers takes fewer."""
+
+
+class Boxes(NamedTuple):
+    """Work space of a block of boxes of the first n joints.
+
+    Kernels have it twice: as arrays of lanes of the shapes below, and as the numbers behind them,
+    whose arrays have one axis more, that of the boxes.
+
+    Attributes
+    ----------
+    lower, upper, half : (n,)
+        Corners and half-widths [rad or m].
+    q, tried : (1, n_joints)
+        Centre, and a configuration that may be close to the goal [rad or m].
+    poses, between : (n_joints + 1, POSE)
+        Forward kinematics at the centre, and where it is tried.
+    proven, distance, share : (1,)
+        Distance proven of a box, and that of the configuration tried [m]; what is left of it.
+    """
+
+    lower: Array
+    upper: Array
+    half: Array
+    q: Array
+    tried: Array
+    poses: Array
+    between: Array
+    proven: Array
+    distance: Array
+    share: Array
+
+
+@inlined
+def take_in(stack: Array, last: int, count: int, numbers: Boxes) -> None:
+    """Put the boxes at the end of the stack into lanes; the last one repeats where there is none.
+
+    A row of the ``stack`` holds the corners of a box, and the distance proven of it.
+    """
+    n, n_lanes = numbers.lower.shape
+    for lane in range(n_lanes):
+        row = last - min(lane, count - 1)
+        for i in range(n):
+            numbers.lower[i, lane] = stack[row, i]
+            numbers.upper[i, lane] = stack[row, n + i]
+        numbers.proven[0, lane] = stack[row, 2 * n]
+
+
+@inlined
+def put_back(stack: Array, row: int, lane: int, numbers: Boxes) -> None:
+    """Put a box from a lane into the stack."""
+    n = numbers.lower.shape[0]
+    for i in range(n):
+        stack[row, i] = numbers.lower[i, lane]
+        stack[row, n + i] = numbers.upper[i, lane]
+    stack[row, 2 * n] = numbers.proven[0, lane]
+
+
+@inlined
+def halve(stack: Array, row: int, lane: int, lever: Array, numbers: Boxes) -> None:
+    """Put the halves of a box from a lane into the stack, that with the point tried above.
+
+    It is cut across the joint that can move the tool farthest in it.
+    """
+    n = numbers.lower.shape[0]
+    widest, farthest = 0, -1.0
+    for i in range(n):
+        moved = lever[i] * (numbers.upper[i, lane] - numbers.lower[i, lane])
+        if moved > farthest:
+            widest, farthest = i, moved
+    middle = 0.5 * (numbers.lower[widest, lane] + numbers.upper[widest, lane])
+    put_back(stack, row, lane, numbers)
+    put_back(stack, row + 1, lane, numbers)
+    # The last box is examined next.
+    near_lower = numbers.tried[0, widest, lane] <= middle
+    above, below = (row, row + 1) if near_lower else (row + 1, row)
+    stack[above, widest] = middle
+    stack[below, n + widest] = middle
+
+
+@inlined
+def take_out(
+    lane: int, half: Array, poses: Array, alone_half: NDArray[np.float64], alone: Array
+) -> None:
+    """Copy half-widths and poses from a lane."""
+    for i in range(half.shape[0]):
+        alone_half[i] = half[i, lane]
+    for frame in range(poses.shape[0]):
+        for entry in range(poses.shape[1]):
+            alone[frame, entry] = poses[frame, entry, lane]
