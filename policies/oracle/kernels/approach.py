@@ -296,8 +296,8 @@ def bound_steps(
                 best,
                 stack,
             )
-            if steps <= limit:
-                witnesses[row] = best
+            for i in range(best.shape[0] if steps <= limit else 0):
+                witnesses[row, i] = best[i]
             if complete:
                 few = steps
             lower_bounds[row], tight[row] = few, complete
@@ -337,8 +337,8 @@ def bound_distance(
             starts[row],
             (goals[row, 0], goals[row, 1], goals[row, 2]),
             unlimited,
-            0,
-            0,
+            n,
+            n,
             0.0,
             resolution,
             contact,
