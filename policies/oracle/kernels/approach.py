@@ -17,7 +17,7 @@ from kinarm.chain import Chain
 from kinarm.collision import ContactShapes
 from kinarm.kernels.compiling import Array, Vector, inlined, kernel
 from kinarm.kernels.kinematics import POSE, point_jacobian
-from kinarm.kernels.lanes import LANES, as_lanes, lane_bits
+from kinarm.kernels.lanes import LANES, any_lane, as_lanes, lane_bits
 from kinarm.motion_bounds import MotionBounds
 from kinarm.policies.oracle.kernels.box_bound import (
     closest_step,
@@ -32,9 +32,8 @@ from kinarm.policies.oracle.kernels.boxes import (
     halve,
     put_back,
     take_in,
-    take_out,
 )
-from kinarm.policies.oracle.kernels.overlap import overlaps
+from kinarm.policies.oracle.kernels.overlap import ENDS, overlaps
 
 LAYOUT = "b1038fd77f6f"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
@@ -112,7 +111,7 @@ def search(
         poses=np.zeros((n_joints + 1, POSE, LANES)),
         between=np.zeros((n_joints + 1, POSE, LANES)),
         proven=np.zeros((1, LANES)),
-        distance=np.zeros((1, LANES)),
+        distance=np.zeros((2, LANES)),
         share=np.zeros((1, LANES)),
     )
     block = Boxes(
@@ -131,8 +130,9 @@ def search(
     step, scale = as_lanes(np.zeros((n, LANES))), as_lanes(np.zeros((n, LANES)))
     slope, least = as_lanes(np.zeros((n, LANES))), as_lanes(np.zeros((n, LANES)))
     bend = as_lanes(np.zeros((n, LANES)))
-    alone_half, alone = np.zeros(n), np.zeros((n_joints + 1, POSE))
-    alone_jacobian, lever = np.zeros((3, n)), np.zeros(n)
+    ends = as_lanes(np.zeros((shapes.link.shape[0], ENDS, LANES)))
+    turns, lever = as_lanes(np.zeros((3, n, LANES))), np.zeros(n)
+    places, known = (numbers.q, numbers.tried), (chain, shapes)
     for i in range(n_joints):
         block.q[0, i] = start[i]
         block.tried[0, i] = start[i]
@@ -145,7 +145,7 @@ def search(
     # Boxes are excluded beyond the cutoff. It falls with every closer configuration that is found:
     # what is not closer by the resolution is of no interest.
     cutoff = enough + ROUNDING if fewer else np.inf
-    waiting, examined = 1, 0
+    waiting, examined, undecided = 1, 0, False
     # Depth first: a stack of halves stays short, and leads straight to where the model expects the
     # goal. What is found there lowers the cutoff, or the steps, for all boxes that wait.
     while waiting > 0 and examined < budget and waiting + LANES < WAITING:
@@ -164,7 +164,7 @@ def search(
             narrowest = min(narrowest, block.half[i])
         # Nothing is left of a box that takes no fewer steps than what was found.
         empty = narrowest < 0.0
-        offset_from_goal(chain, block.q, goal, block.poses, offset)
+        block.distance[0] = offset_from_goal(chain, block.q, goal, block.poses, offset)
         tool = (goal[0] + offset[0], goal[1] + offset[1], goal[2] + offset[2])
         point_jacobian(chain.prismatic, chain.axis, block.poses, tool, jacobian)
         direction = closest_step(jacobian, offset, block.half, step, scale)
@@ -183,32 +183,36 @@ def search(
         # Where the linear model comes closest to the goal, the arm mostly does, too.
         for i in range(n):
             block.tried[0, i] = block.q[0, i] + step[i]
-        distance = offset_from_goal(chain, block.tried, goal, block.between, offset)
-        block.distance[0] = distance
-        close = lane_bits((distance <= (enough if fewer else closest)) & ~empty)
-        for lane in range(count if close != 0 else 0):
-            if close >> lane & 1 == 0:
+        block.distance[1] = offset_from_goal(chain, block.tried, goal, block.between, offset)
+        far = enough if fewer else closest
+        near = ~empty & (block.distance[0] <= far)
+        nearby = ~empty & (block.distance[1] <= far)
+        if contact and any_lane(near | nearby):
+            near = near & ~overlaps(near, *known, block.poses, block.half, 0.0, ends, turns)
+            nearby = nearby & ~overlaps(nearby, *known, block.between, block.half, 0.0, ends, turns)
+        bits = (lane_bits(near), lane_bits(nearby))
+        for index in range(2 * count if bits[0] | bits[1] != 0 else 0):
+            lane, attempt = index >> 1, index & 1
+            distance = numbers.distance[attempt, lane]
+            tried = places[attempt]
+            if bits[attempt] >> lane & 1 == 0:
                 continue
-            if contact:
-                take_out(lane, numbers.half, numbers.between, alone_half, alone)
-                if overlaps(chain, shapes, alone, alone_half, 0.0, alone_jacobian):
-                    continue
             if fewer:
                 needed = float(fewest)
                 for i in range(n):
-                    moved = abs(numbers.tried[0, i, lane] - start[i]) - 2.0 * ROUNDING
+                    moved = abs(tried[0, i, lane] - start[i]) - 2.0 * ROUNDING
                     needed = max(needed, moved / step_limit[i])
                 if np.ceil(needed) >= steps:
                     continue
                 steps = int(np.ceil(needed))
                 within_steps(chain, start, step_limit, steps - 1, lower, upper)
-            elif numbers.distance[0, lane] >= closest:
+            elif distance >= closest:
                 continue
             else:
-                cutoff = max(enough, numbers.distance[0, lane] - resolution) + ROUNDING
-            closest = numbers.distance[0, lane]
+                cutoff = max(enough, distance - resolution) + ROUNDING
+            closest = distance
             for i in range(n):
-                best[i] = numbers.tried[0, i, lane]
+                best[i] = tried[0, i, lane]
         block.share[0] = trim(
             cutoff, bound, slope, least, bend, block.q, block.half, block.lower, block.upper
         )
@@ -216,29 +220,36 @@ def search(
         bound = max(bound, joint_bound(bounds, block.poses, goal, block.half))
         # What is proven of the whole holds for its parts.
         block.proven[0] = max(block.proven[0], bound)
-        beyond, gone = lane_bits(block.proven[0] > cutoff), lane_bits(empty)
+        beyond = block.proven[0] > cutoff
+        if contact and any_lane(~beyond & ~empty):
+            # Contact comes last, since it asks about every pair. A box that touches something
+            # throughout holds no configuration that counts: nothing is to be proven of it.
+            open_boxes = ~beyond & ~empty
+            empty = empty | overlaps(
+                open_boxes, *known, block.poses, block.half, 1.0, ends, turns
+            )
+        excluded, gone = lane_bits(beyond), lane_bits(empty)
         for lane in range(count - 1, -1, -1):
             if gone >> lane & 1:
                 continue
-            if beyond >> lane & 1:
+            if excluded >> lane & 1:
                 # Nothing in the box comes closer than this.
                 proven = min(proven, numbers.proven[0, lane])
                 continue
-            if contact:
-                # Contact comes last, since it asks about every pair. A box that touches something
-                # throughout holds no configuration that counts: nothing is to be proven of it.
-                take_out(lane, numbers.half, numbers.poses, alone_half, alone)
-                if overlaps(chain, shapes, alone, alone_half, 1.0, alone_jacobian):
-                    continue
             if numbers.share[0, lane] < 1.0:
                 proven = min(proven, cutoff)
             if numbers.share[0, lane] < 0.5:
                 put_back(stack, waiting, lane, numbers)
                 waiting += 1
-            else:
-                halve(stack, waiting, lane, lever, numbers)
+            elif halve(stack, waiting, lane, lever, numbers):
                 waiting += 2
-    complete = waiting == 0 or (steps <= fewest if fewer else closest <= enough)
+            else:
+                # Such boxes are left where bounds meet what is asked for, or proofs of contact end.
+                undecided = True
+                proven = min(proven, numbers.proven[0, lane])
+    complete = (waiting == 0 and not undecided) or (
+        steps <= fewest if fewer else closest <= enough
+    )
     # Of boxes that still wait, no more is known than of those that they are halves of.
     for i in range(waiting):
         proven = min(proven, stack[i, 2 * n])
@@ -275,7 +286,7 @@ def bound_steps(
     stack = np.empty((WAITING, 2 * n + 1))
     for row in range(first, last):
         start, goal = starts[row], (goals[row, 0], goals[row, 1], goals[row, 2])
-        few, many, all_at_once = fewest[row], most[row], True
+        few, many, all_at_once = fewest[row], most[row], not contact
         lower_bounds[row], tight[row] = few, True
         while few <= many:
             limit = many if all_at_once else few

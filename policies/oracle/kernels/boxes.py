@@ -2,13 +2,13 @@
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from kinarm.kernels.compiling import Array, inlined
 
 WAITING = 4096
-"""Boxes that can wait at a time; halving eight to the resolution of numbers takes fewer."""
+"""Boxes that can wait at a time; halving eight until they are too small takes fewer."""
+
+SMALLEST = 1e-6
+"""How far the tool can move in a box that is not halved any more [m]."""
 
 
 class Boxes(NamedTuple):
@@ -25,8 +25,10 @@ class Boxes(NamedTuple):
         Centre, and a configuration that may be close to the goal [rad or m].
     poses, between : (n_joints + 1, POSE)
         Forward kinematics at the centre, and where it is tried.
-    proven, distance, share : (1,)
-        Distance proven of a box, and that of the configuration tried [m]; what is left of it.
+    proven, share : (1,)
+        Distance proven of a box [m], and what is left of it.
+    distance : (2,)
+        Distances from the goal at the centre and where it is tried [m].
     """
 
     lower: Array
@@ -67,10 +69,11 @@ def put_back(stack: Array, row: int, lane: int, numbers: Boxes) -> None:
 
 
 @inlined
-def halve(stack: Array, row: int, lane: int, lever: Array, numbers: Boxes) -> None:
+def halve(stack: Array, row: int, lane: int, lever: Array, numbers: Boxes) -> bool:
     """Put the halves of a box from a lane into the stack, that with the point tried above.
 
-    It is cut across the joint that can move the tool farthest in it.
+    It is cut across the joint that can move the tool farthest in it. Returns whether it is large
+    enough.
     """
     n = numbers.lower.shape[0]
     widest, farthest = 0, -1.0
@@ -78,6 +81,8 @@ def halve(stack: Array, row: int, lane: int, lever: Array, numbers: Boxes) -> No
         moved = lever[i] * (numbers.upper[i, lane] - numbers.lower[i, lane])
         if moved > farthest:
             widest, farthest = i, moved
+    if farthest < SMALLEST:
+        return False
     middle = 0.5 * (numbers.lower[widest, lane] + numbers.upper[widest, lane])
     put_back(stack, row, lane, numbers)
     put_back(stack, row + 1, lane, numbers)
@@ -86,15 +91,4 @@ def halve(stack: Array, row: int, lane: int, lever: Array, numbers: Boxes) -> No
     above, below = (row, row + 1) if near_lower else (row + 1, row)
     stack[above, widest] = middle
     stack[below, n + widest] = middle
-
-
-@inlined
-def take_out(
-    lane: int, half: Array, poses: Array, alone_half: NDArray[np.float64], alone: Array
-) -> None:
-    """Copy half-widths and poses from a lane."""
-    for i in range(half.shape[0]):
-        alone_half[i] = half[i, lane]
-    for frame in range(poses.shape[0]):
-        for entry in range(poses.shape[1]):
-            alone[frame, entry] = poses[frame, entry, lane]
+    return True
