@@ -16,8 +16,8 @@ from kinarm.policies.oracle.inverse import (
 from kinarm.policies.oracle.motion import along_path, steps_between, straight, two_segments
 from kinarm.simulator import Simulator
 
-SAMPLES = (48, 512)
-"""Configurations from which goals are sought for each number of steps: a few, then many."""
+SAMPLES = (8, 48, 512)
+"""Configurations from which goals are sought for each number of steps: a few, then more."""
 
 VIAS = 128
 """Motions by way of another configuration that are tried for each number of steps."""

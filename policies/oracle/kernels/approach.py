@@ -8,6 +8,7 @@ that is not excluded is tried where the linear model of the arm comes closest to
 halved. Several boxes of a search are examined side by side, in lanes.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.collision import ContactShapes
-from kinarm.kernels.compiling import Array, Vector, inlined, kernel
+from kinarm.kernels.compiling import Array, Vector, kernel
 from kinarm.kernels.kinematics import POSE, point_jacobian
 from kinarm.kernels.lanes import LANES, any_lane, as_lanes, lane_bits
 from kinarm.motion_bounds import MotionBounds
@@ -27,19 +28,18 @@ from kinarm.policies.oracle.kernels.box_bound import (
     trim,
 )
 from kinarm.policies.oracle.kernels.boxes import (
+    ROUNDING,
     WAITING,
     Boxes,
     halve,
     put_back,
     take_in,
+    within_steps,
 )
 from kinarm.policies.oracle.kernels.overlap import ENDS, overlaps
 
-LAYOUT = "b1038fd77f6f"
+LAYOUT = "19e9d1ebec3e"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
-
-ROUNDING = 1e-9
-"""By how much boxes and distances are enlarged to cover rounding [rad, m]."""
 
 
 class ArmInScene(NamedTuple):
@@ -48,17 +48,6 @@ class ArmInScene(NamedTuple):
     chain: Chain
     bounds: MotionBounds
     shapes: ContactShapes
-
-
-@inlined
-def within_steps(
-    chain: Chain, start: Array, step_limit: Array, steps: int, lower: Array, upper: Array
-) -> None:
-    """Fill in the corners of what the first joints can reach in some steps."""
-    for i in range(step_limit.shape[0]):
-        reach = steps * step_limit[i] + ROUNDING
-        lower[i] = max(chain.lower[i], start[i] - reach)
-        upper[i] = min(chain.upper[i], start[i] + reach)
 
 
 @kernel
@@ -78,14 +67,14 @@ def search(
     best: Array,
     stack: Array,
 ) -> tuple[bool, int, float, float]:
-    """Search a box for the configuration that is closest to a goal, or for the nearest one there.
+    """Search a box for the configuration that reaches a goal in the fewest steps, or is closest.
 
     The box, from ``lower`` to ``upper``, is of the first n joints. If the ``resolution`` is
     infinite, the search is for a configuration with the tool within a distance of ``enough`` [m] of
     the goal that takes the fewest steps from the start: from ``fewest`` to ``most``, which are
-    those that the box takes. Else it is for the closest one, whose distance may exceed what is
-    proven by the resolution [m]. It ends without a proof after ``budget`` boxes. With ``contact``,
-    what is proven to touch something is ruled out.
+    those that the box takes. Else it is for the one closest to the goal, whose distance may exceed
+    what is proven by the resolution [m]. It ends without a proof after ``budget`` boxes. With
+    ``contact``, what is proven to touch something is ruled out.
 
     ``best``, shape (n_joints,), takes what was found; joints beyond the n-th stay as at the start.
     The box shrinks with every configuration that takes fewer steps. ``stack``, shape
@@ -132,13 +121,15 @@ def search(
     bend = as_lanes(np.zeros((n, LANES)))
     ends = as_lanes(np.zeros((shapes.link.shape[0], ENDS, LANES)))
     turns, lever = as_lanes(np.zeros((3, n, LANES))), np.zeros(n)
-    places, known = (numbers.q, numbers.tried), (chain, shapes)
+    places = (numbers.q, numbers.tried)
     for i in range(n_joints):
         block.q[0, i] = start[i]
         block.tried[0, i] = start[i]
         best[i] = start[i]
     for i in range(n):
         lever[i] = 1.0 if chain.prismatic[i] else bounds.curvature[i, i]
+        # Joints that hardly move the tool still decide what it touches.
+        lever[i] = math.sqrt(lever[i]) if contact else lever[i]
         stack[0, i], stack[0, n + i], stack[0, 2 * n] = lower[i], upper[i], 0.0
     fewer = resolution == np.inf
     steps, closest, proven = most + 1, np.inf, np.inf
@@ -185,12 +176,13 @@ def search(
             block.tried[0, i] = block.q[0, i] + step[i]
         block.distance[1] = offset_from_goal(chain, block.tried, goal, block.between, offset)
         far = enough if fewer else closest
-        near = ~empty & (block.distance[0] <= far)
-        nearby = ~empty & (block.distance[1] <= far)
-        if contact and any_lane(near | nearby):
-            near = near & ~overlaps(near, *known, block.poses, block.half, 0.0, ends, turns)
-            nearby = nearby & ~overlaps(nearby, *known, block.between, block.half, 0.0, ends, turns)
-        bits = (lane_bits(near), lane_bits(nearby))
+        at_centre = ~empty & (block.distance[0] <= far)
+        at_step = ~empty & (block.distance[1] <= far)
+        if contact and any_lane(at_centre | at_step):
+            work = (block.half, 0.0, ends, turns)
+            at_centre = at_centre & ~overlaps(at_centre, chain, shapes, block.poses, *work)
+            at_step = at_step & ~overlaps(at_step, chain, shapes, block.between, *work)
+        bits = (lane_bits(at_centre), lane_bits(at_step))
         for index in range(2 * count if bits[0] | bits[1] != 0 else 0):
             lane, attempt = index >> 1, index & 1
             distance = numbers.distance[attempt, lane]
@@ -224,10 +216,8 @@ def search(
         if contact and any_lane(~beyond & ~empty):
             # Contact comes last, since it asks about every pair. A box that touches something
             # throughout holds no configuration that counts: nothing is to be proven of it.
-            open_boxes = ~beyond & ~empty
-            empty = empty | overlaps(
-                open_boxes, *known, block.poses, block.half, 1.0, ends, turns
-            )
+            work = (block.half, 1.0, ends, turns)
+            empty = empty | overlaps(~beyond & ~empty, chain, shapes, block.poses, *work)
         excluded, gone = lane_bits(beyond), lane_bits(empty)
         for lane in range(count - 1, -1, -1):
             if gone >> lane & 1:
@@ -247,9 +237,7 @@ def search(
                 # Such boxes are left where bounds meet what is asked for, or proofs of contact end.
                 undecided = True
                 proven = min(proven, numbers.proven[0, lane])
-    complete = (waiting == 0 and not undecided) or (
-        steps <= fewest if fewer else closest <= enough
-    )
+    complete = (waiting == 0 and not undecided) or (steps <= fewest if fewer else closest <= enough)
     # Of boxes that still wait, no more is known than of those that they are halves of.
     for i in range(waiting):
         proven = min(proven, stack[i, 2 * n])
@@ -315,7 +303,8 @@ def bound_steps(
             if steps <= limit if complete else not all_at_once:
                 break
             # All at once is least work, unless the budget is too small: then each number of steps
-            # has one of its own, up to those that the configuration found takes.
+            # has one of its own, up to those that the configuration found takes. Where contact
+            # counts, what is closest to the goal rarely counts, and larger boxes are harder.
             if all_at_once:
                 many, all_at_once = steps - 1, False
 

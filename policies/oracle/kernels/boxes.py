@@ -1,7 +1,8 @@
-"""Boxes of configurations: a stack of those that wait, and a block of them side by side in lanes."""
+"""Boxes of configurations: a stack of those that wait, and a block of them in lanes."""
 
 from typing import NamedTuple
 
+from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, inlined
 
 WAITING = 4096
@@ -9,6 +10,10 @@ WAITING = 4096
 
 SMALLEST = 1e-6
 """How far the tool can move in a box that is not halved any more [m]."""
+
+
+ROUNDING = 1e-9
+"""By how much boxes and distances are enlarged to cover rounding [rad, m]."""
 
 
 class Boxes(NamedTuple):
@@ -41,6 +46,17 @@ class Boxes(NamedTuple):
     proven: Array
     distance: Array
     share: Array
+
+
+@inlined
+def within_steps(
+    chain: Chain, start: Array, step_limit: Array, steps: int, lower: Array, upper: Array
+) -> None:
+    """Fill in the corners of what the first joints can reach in some steps."""
+    for i in range(step_limit.shape[0]):
+        reach = steps * step_limit[i] + ROUNDING
+        lower[i] = max(chain.lower[i], start[i] - reach)
+        upper[i] = min(chain.upper[i], start[i] + reach)
 
 
 @inlined

@@ -9,7 +9,6 @@ All of it is free of branches on values, for a box or for one in each lane.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.collision import BETWEEN_CAPSULES, WITH_BOX, ContactShapes
