@@ -41,11 +41,11 @@ def offset_from_goal(chain: Chain, q: Array, goal: Vector, poses: Array, offset:
     return math.sqrt(x * x + y * y + z * z)
 
 
-@inlined
+@helper
 def joint_bound(bounds: MotionBounds, poses: Array, goal: Vector, half: Array) -> float:
     """Lower bound of the distance over a box, from where the joints can be."""
     swing, length = bounds.swing, bounds.length
-    bound = 0.0 * half[0]
+    bound: float = 0.0 * half[0]
     for k in range(half.shape[0]):
         x, y, z = poses[k + 1, 13] - goal[0], poses[k + 1, 14] - goal[1], poses[k + 1, 15] - goal[2]
         # Only the joints up to a joint move its origin; those beyond it are in its length.
@@ -56,7 +56,7 @@ def joint_bound(bounds: MotionBounds, poses: Array, goal: Vector, half: Array) -
     return bound
 
 
-@inlined
+@helper
 def closest_step(jacobian: Array, offset: Array, half: Array, step: Array, scale: Array) -> Vector:
     """Fill in the e, |e_i| <= half_i, for which |offset + J e| is nearly least; return the vector.
 
@@ -91,7 +91,7 @@ def third_order(prismatic: NDArray[np.bool_], curvature: Array, half: Array) -> 
     """
     n = half.shape[0]
     before = 0.0 * half[0]
-    rest = 0.0 * half[0]
+    rest: float = 0.0 * half[0]
     for i in range(n):
         # Of triples of joints in any order, six are the same if all differ, three if two do.
         rest += curvature[i, i] * half[i] * half[i] * (0.5 * before + half[i] / 6.0)
@@ -102,7 +102,7 @@ def third_order(prismatic: NDArray[np.bool_], curvature: Array, half: Array) -> 
     return rest
 
 
-@inlined
+@helper
 def curved_bound(
     chain: Chain,
     curvature: Array,
@@ -154,7 +154,7 @@ def curved_bound(
     return bound
 
 
-@inlined
+@helper
 def trim(
     cutoff: float,
     bound: float,
@@ -171,7 +171,7 @@ def trim(
     Takes a bound of at most the cutoff, and what `curved_bound` filled in. With the other joints
     wherever they add least, a joint alone may take the bound beyond the cutoff.
     """
-    share = 0.0 * half[0] + 1.0
+    share: float = 0.0 * half[0] + 1.0
     for i in range(half.shape[0]):
         size, h = abs(slope[i]), half[i]
         allowed = cutoff - (bound - least[i]) - bend[i]

@@ -11,7 +11,6 @@ WAITING = 4096
 SMALLEST = 1e-6
 """How far the tool can move in a box that is not halved any more [m]."""
 
-
 ROUNDING = 1e-9
 """By how much boxes and distances are enlarged to cover rounding [rad, m]."""
 

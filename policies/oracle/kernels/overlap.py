@@ -101,7 +101,7 @@ def overlaps(
     link, capsules, boxes, pairs, travel, exact = shapes[:6]
     n = half.shape[0]
     place_capsules(shapes, poses, ends)
-    proven = wanted & (half[0] < 0.0)
+    proven: bool = wanted & (half[0] < 0.0)
     for pair in range(pairs.shape[0]):
         kind, i, j = pairs[pair, 0], pairs[pair, 1], pairs[pair, 2]
         if not exact[i] or (kind == BETWEEN_CAPSULES and not exact[j]):
