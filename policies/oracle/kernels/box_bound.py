@@ -124,7 +124,7 @@ def curved_bound(
     x, y, z = direction
     norm = math.sqrt(x * x + y * y + z * z)
     # Where the model reaches the goal, no direction separates the box from it.
-    scale = select(norm > NEGLIGIBLE, 1.0 / norm, 0.0)
+    scale: float = select(norm > NEGLIGIBLE, 1.0 / norm, 0.0)
     x, y, z = scale * x, scale * y, scale * z
     bound = x * offset[0] + y * offset[1] + z * offset[2]
     bound -= third_order(chain.prismatic, curvature, half)
