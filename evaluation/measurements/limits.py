@@ -15,7 +15,7 @@ from kinarm.evaluation.measurements.attainable import (
 from kinarm.evaluation.measurements.operations import measure_operations
 from kinarm.evaluation.measurements.shares import time_shares
 from kinarm.evaluation.measurements.timing import alternated
-from kinarm.kernels.lanes import work_space
+from kinarm.kernels.lanes import LANES
 from kinarm.policies.learners import begin_training
 from kinarm.policies.policy import Policy
 from kinarm.policies.recipes import recipe
@@ -30,7 +30,7 @@ PROFILED_ITERATIONS = 20
 def measure_attainable(simulator: Simulator, policy: Policy, repetitions: int) -> dict[str, Any]:
     """Operations per second of one core, and steps per second of rollouts on it, by turns."""
     scenarios = simulator.sample(np.random.default_rng(BATCH), BATCH)
-    threads, space = simulator.threads, work_space(2 + CHAINS)
+    threads, space = simulator.threads, np.zeros((2 + CHAINS, LANES))
     space[0], space[1] = 0.999, 0.001
 
     def multiply() -> int:

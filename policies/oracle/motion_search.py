@@ -13,11 +13,11 @@ from kinarm.policies.oracle.inverse import (
     solve_within,
     step_box,
 )
-from kinarm.policies.oracle.motion import along_path, straight, two_segments
+from kinarm.policies.oracle.motion import along_path, steps_between, straight, two_segments
 from kinarm.simulator import Simulator
 
-SAMPLES = (48, 512)
-"""Configurations from which goals are sought for each number of steps: a few, then many."""
+SAMPLES = (8, 48, 512)
+"""Configurations from which goals are sought for each number of steps: a few, then more."""
 
 VIAS = 128
 """Motions by way of another configuration that are tried for each number of steps."""
@@ -48,8 +48,9 @@ class MotionSearch:
         The motions; at rest where there is none.
     costs : ndarray, shape (n,)
         Their costs; infinite where there is none.
-    has_solution : ndarray of bool, shape (n,)
-        Whether some contact-free configuration at the goal was found.
+    solved : ndarray of int, shape (n,)
+        Fewest steps in which a contact-free configuration at the goal was found, whether or not a
+        motion leads there; the horizon + 1 where there is none.
     """
 
     def __init__(
@@ -60,7 +61,7 @@ class MotionSearch:
         self.witnesses = starts.copy()
         self.actions = np.zeros((n, simulator.task.horizon, simulator.n_actions))
         self.costs = np.full(n, np.inf)
-        self.has_solution = np.zeros(n, dtype=bool)
+        self.solved = np.full(n, simulator.task.horizon + 1)
 
     @property
     def reached(self) -> NDArray[np.bool_]:
@@ -86,7 +87,7 @@ class MotionSearch:
                 return
             tolerances = np.full(rows.size, self.simulator.task.tolerance)
             solutions = self._try_straight(rows, steps, tolerances, samples)
-            self.has_solution[rows[solutions.owner]] = True
+            np.minimum.at(self.solved, rows[solutions.owner], steps[solutions.owner])
         self._try_vias(rows, steps, solutions, np.flatnonzero(~self.reached[rows] & (steps > 1)))
 
     def try_detours(self, rows: NDArray[np.int64]) -> None:
@@ -95,7 +96,8 @@ class MotionSearch:
             ends = inverse_kinematics(self.simulator, self.starts[row], self.goals[row])
             if len(ends) == 0:
                 continue
-            self.has_solution[row] = True
+            nearest = steps_between(self.simulator, self.starts[row], ends[0])
+            self.solved[row] = min(self.solved[row], int(np.ceil(nearest)))
             # Random numbers of a trial are a function of its start and goal.
             numbers = np.concatenate([self.starts[row], self.goals[row]]) + 0.0
             digest = hashlib.sha256(numbers.tobytes()).digest()

@@ -37,7 +37,7 @@ from kinarm.problem import ProblemLike
 from kinarm.rollouts import Rollouts
 from kinarm.simulator import Simulator
 
-ORACLE_SEMANTICS = "1"
+ORACLE_SEMANTICS = "2"
 """Version of what the oracle proves and finds: raised with every change of its results."""
 
 BUDGET = 100_000
@@ -145,12 +145,9 @@ class Oracle:
         """From trials to bounds, motions and their replay."""
         horizon, n = self.simulator.task.horizon, len(starts)
         search = MotionSearch(self.simulator, starts, goals)
-        # The horizon comes first: most of what is out of reach is settled at once.
-        last = np.full(n, horizon)
-        steps_bounds, tight = self._bound_steps(search, np.arange(n), last, last)
+        ones, last = np.ones(n, dtype=np.int64), np.full(n, horizon)
+        steps_bounds, tight = self._bound_steps(search, np.arange(n), ones, last)
         within = np.flatnonzero(steps_bounds <= horizon)
-        ones = np.ones(within.size, dtype=np.int64)
-        steps_bounds[within], tight[within] = self._bound_steps(search, within, ones, last[within])
         for extra in range(EXTRA_STEPS + 1):
             search.try_steps(within, steps_bounds[within] + extra)
         search.try_detours(within)
@@ -166,7 +163,7 @@ class Oracle:
             distance_lower_bound=distance_bounds,
             actions=search.actions,
             paths=replay.paths,
-            reasons=self._reasons(replay, steps_bounds, distance_bounds, search.has_solution),
+            reasons=self._reasons(replay, steps_bounds, distance_bounds, search.solved <= horizon),
         )
 
     def _count_contact(
@@ -174,15 +171,19 @@ class Oracle:
     ) -> None:
         """Raise the bounds of motions that are slower, and of goals that none reaches."""
         horizon = self.simulator.task.horizon
-        slow = np.flatnonzero(search.reached & (search.steps > steps_bounds))
+        # A contact-free configuration ends the proof, whether or not the motion goes there.
+        fewest = np.fmin(search.steps, search.solved)
+        slow = np.flatnonzero(search.reached & (fewest > steps_bounds))
         steps_bounds[slow], tight[slow] = self._bound_steps(
-            search, slow, steps_bounds[slow], search.steps[slow] - 1, contact=True
+            search, slow, steps_bounds[slow], fewest[slow] - 1, contact=True
         )
-        blocked = np.flatnonzero(~search.reached & (steps_bounds <= horizon))
+        blocked = np.flatnonzero((fewest > horizon) & (steps_bounds <= horizon))
         last = np.full(blocked.size, horizon)
         beyond, _ = self._bound_steps(search, blocked, last, last, contact=True)
-        tight[blocked] = beyond > horizon
-        steps_bounds[blocked] = np.where(tight[blocked], beyond, steps_bounds[blocked])
+        unsettled = ~search.reached & (steps_bounds <= horizon)
+        tight[unsettled] = False
+        shut = blocked[beyond > horizon]
+        steps_bounds[shut], tight[shut] = horizon + 1, True
 
     def _approach(
         self, search: MotionSearch, steps_bounds: NDArray[np.int64]

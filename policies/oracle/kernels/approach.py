@@ -1,12 +1,14 @@
-"""How close the tool can come to a goal within a box of configurations: proof by branch and bound.
+"""How close the tool can come to a goal, and in how few steps: proof by branch and bound.
 
-A box is excluded when a lower bound of the distance over it exceeds what is asked for
-(`kinarm.policies.oracle.kernels.box_bound`). Nor does a motion end where the arm touches
-something: on demand a box is excluded, too, if some pair of bodies is proven to overlap throughout
-it (`kinarm.policies.oracle.kernels.overlap`). A box that is not excluded is tried at its centre and
-where the linear model of the arm comes closest to the goal, then halved.
+A box of configurations is excluded when a lower bound of the distance over it exceeds what is asked
+for, and what such a bound excludes of it is cut off (`kinarm.policies.oracle.kernels.box_bound`).
+Nor does a motion end where the arm touches something: on demand a box is excluded, too, if some
+pair of bodies is proven to overlap throughout it (`kinarm.policies.oracle.kernels.overlap`). A box
+that is not excluded is tried where the linear model of the arm comes closest to the goal, and
+halved. Several boxes of a search are examined side by side, in lanes.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -14,28 +16,30 @@ from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.contact_shapes import ContactShapes
-from kinarm.kernels.compiling import inlined, kernel
+from kinarm.kernels.compiling import Array, Vector, kernel
 from kinarm.kernels.kinematics import POSE, point_jacobian
+from kinarm.kernels.lanes import LANES, any_lane, as_lanes, lane_bits
 from kinarm.motion_bounds import MotionBounds
 from kinarm.policies.oracle.kernels.box_bound import (
+    closest_step,
+    curved_bound,
     joint_bound,
-    linear_bound,
-    model_error,
     offset_from_goal,
+    trim,
 )
-from kinarm.policies.oracle.kernels.overlap import overlaps
+from kinarm.policies.oracle.kernels.boxes import (
+    ROUNDING,
+    WAITING,
+    Boxes,
+    halve,
+    put_back,
+    take_in,
+    within_steps,
+)
+from kinarm.policies.oracle.kernels.overlap import ENDS, overlaps
 
-LAYOUT = "8398700e37cf"
+LAYOUT = "e5a700415d46"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
-
-FOUND, EXCLUDED, EXHAUSTED = range(3)
-"""Outcomes of a search: close enough, proven not to be, or undecided within the budget."""
-
-ROUNDING = 1e-9
-"""By how much boxes and distances are enlarged to cover rounding [rad, m]."""
-
-BOXES = 1024
-"""Boxes that can wait at a time; halving one to the resolution of numbers takes fewer."""
 
 
 class ArmInScene(NamedTuple):
@@ -46,136 +50,198 @@ class ArmInScene(NamedTuple):
     shapes: ContactShapes
 
 
-@inlined
-def improves(
-    distance: float,
-    closest: float,
-    contact: bool,
-    chain: Chain,
-    shapes: ContactShapes,
-    poses: NDArray[np.float64],
-    half: NDArray[np.float64],
-    jacobian: NDArray[np.float64],
-) -> bool:
-    """Whether a configuration is closer than any before, and not ruled out by contact."""
-    if distance >= closest:
-        return False
-    return not contact or not overlaps(chain, shapes, poses, half, 0.0, jacobian)
-
-
-@inlined
-def halve(
-    boxes: NDArray[np.float64],
-    last: int,
-    bound: float,
-    step: NDArray[np.float64],
-    parts: NDArray[np.float64],
-) -> None:
-    """Replace a box by its halves, of which the one with the point proposed is examined first.
-
-    It is cut across the joint that has the largest part in what the linear model misses: that is
-    what keeps the bound from excluding it.
-    """
-    n = step.shape[0]
-    widest = 0
-    for i in range(n):
-        if parts[i] > parts[widest]:
-            widest = i
-    middle = 0.5 * (boxes[last, widest] + boxes[last, n + widest])
-    # What is proven of the whole holds for its halves.
-    boxes[last, 2 * n] = bound
-    for i in range(2 * n + 1):
-        boxes[last + 1, i] = boxes[last, i]
-    # The last box is examined next.
-    above, below = (last, last + 1) if step[widest] <= 0.0 else (last + 1, last)
-    boxes[above, widest] = middle
-    boxes[below, n + widest] = middle
-
-
 @kernel
 def search(
     arm: ArmInScene,
-    lower: NDArray[np.float64],
-    upper: NDArray[np.float64],
-    goal: tuple[float, float, float],
+    start: Array,
+    goal: Vector,
+    step_limit: Array,
+    fewest: int,
+    most: int,
     enough: float,
     resolution: float,
     contact: bool,
     budget: int,
-    best: NDArray[np.float64],
-    boxes: NDArray[np.float64],
-) -> tuple[int, float, float]:
-    """Search a box for a configuration that brings the tool close to the goal.
+    lower: Array,
+    upper: Array,
+    best: Array,
+    stack: Array,
+) -> tuple[bool, int, float, float]:
+    """Search a box for the configuration that reaches a goal in the fewest steps, or is closest.
 
-    The box, from ``lower`` to ``upper``, is of the first n joints. The search ends at a distance of
-    ``enough`` [m], or after ``budget`` boxes. The smallest distance found may exceed the proven one
-    by ``resolution`` [m]; if that is infinite, the search only decides whether some configuration
-    is close enough. With ``contact``, what is proven to touch something is ruled out.
+    The box, from ``lower`` to ``upper``, is of the first n joints. If the ``resolution`` is
+    infinite, the search is for a configuration with the tool within a distance of ``enough`` [m] of
+    the goal that takes the fewest steps from the start: from ``fewest`` to ``most``, which are
+    those that the box takes. Else it is for the one closest to the goal, whose distance may exceed
+    what is proven by the resolution [m]. It ends without a proof after ``budget`` boxes. With
+    ``contact``, what is proven to touch something is ruled out.
 
-    ``best``, shape (1, n_joints), brings the other joints and takes the closest configuration.
-    ``boxes``, shape (BOXES, 2 n + 1), is work space: corners of the boxes that wait, and the
-    distance proven of each.
+    ``best``, shape (n_joints,), takes what was found; joints beyond the n-th stay as at the start.
+    The box shrinks with every configuration that takes fewer steps. ``stack``, shape
+    (WAITING, 2 n + 1), is work space.
 
     Returns
     -------
-    outcome : int
-        `FOUND`, `EXCLUDED` or `EXHAUSTED`.
+    complete : bool
+        Whether nothing better is proven to exist.
+    steps : int
+        That the configuration found takes; more than ``most`` if there is none.
     distance, proven : float
         That of the closest configuration found, and a lower bound over the box [m].
     """
     chain, bounds, shapes = arm
-    n, n_joints = lower.shape[0], best.shape[1]
-    poses, jacobian, offset = np.empty((n_joints + 1, POSE)), np.empty((3, n)), np.empty(3)
-    half, step, parts, q = np.empty(n), np.empty(n), np.empty(n), best.copy()
-    boxes[0, :n], boxes[0, n : 2 * n], boxes[0, 2 * n] = lower, upper, 0.0
-    waiting, examined = 1, 0
+    n, n_joints = lower.shape[0], start.shape[0]
+    numbers = Boxes(
+        lower=np.zeros((n, LANES)),
+        upper=np.zeros((n, LANES)),
+        half=np.zeros((n, LANES)),
+        q=np.zeros((1, n_joints, LANES)),
+        tried=np.zeros((1, n_joints, LANES)),
+        poses=np.zeros((n_joints + 1, POSE, LANES)),
+        between=np.zeros((n_joints + 1, POSE, LANES)),
+        proven=np.zeros((1, LANES)),
+        distance=np.zeros((2, LANES)),
+        share=np.zeros((1, LANES)),
+    )
+    block = Boxes(
+        lower=as_lanes(numbers.lower),
+        upper=as_lanes(numbers.upper),
+        half=as_lanes(numbers.half),
+        q=as_lanes(numbers.q),
+        tried=as_lanes(numbers.tried),
+        poses=as_lanes(numbers.poses),
+        between=as_lanes(numbers.between),
+        proven=as_lanes(numbers.proven),
+        distance=as_lanes(numbers.distance),
+        share=as_lanes(numbers.share),
+    )
+    offset, jacobian = as_lanes(np.zeros((3, LANES))), as_lanes(np.zeros((3, n, LANES)))
+    step, scale = as_lanes(np.zeros((n, LANES))), as_lanes(np.zeros((n, LANES)))
+    slope, least = as_lanes(np.zeros((n, LANES))), as_lanes(np.zeros((n, LANES)))
+    bend = as_lanes(np.zeros((n, LANES)))
+    ends = as_lanes(np.zeros((shapes.link.shape[0], ENDS, LANES)))
+    turns, lever = as_lanes(np.zeros((3, n, LANES))), np.zeros(n)
+    places = (numbers.q, numbers.tried)
+    for i in range(n_joints):
+        block.q[0, i] = start[i]
+        block.tried[0, i] = start[i]
+        best[i] = start[i]
+    for i in range(n):
+        lever[i] = 1.0 if chain.prismatic[i] else bounds.curvature[i, i]
+        # Joints that hardly move the tool still decide what it touches.
+        lever[i] = math.sqrt(lever[i]) if contact else lever[i]
+        stack[0, i], stack[0, n + i], stack[0, 2 * n] = lower[i], upper[i], 0.0
+    fewer = resolution == np.inf
+    steps, closest, proven = most + 1, np.inf, np.inf
     # Boxes are excluded beyond the cutoff. It falls with every closer configuration that is found:
     # what is not closer by the resolution is of no interest.
-    closest, proven, cutoff = np.inf, np.inf, enough + ROUNDING
-    # Depth first: a stack of halves stays short, one box for each halving, and leads straight
-    # to where the model expects the goal. A configuration close enough is met long before the
-    # box is searched through, and closer ones lower the cutoff for all boxes that wait.
-    while waiting > 0 and closest > enough and examined < budget and waiting + 1 < BOXES:
-        waiting -= 1
-        examined += 1
+    cutoff = enough + ROUNDING if fewer else np.inf
+    waiting, examined, undecided = 1, 0, False
+    # Depth first: a stack of halves stays short, and leads straight to where the model expects the
+    # goal. What is found there lowers the cutoff, or the steps, for all boxes that wait.
+    while waiting > 0 and examined < budget and waiting + LANES < WAITING:
+        if steps <= fewest if fewer else closest <= enough:
+            break
+        count = min(waiting, LANES, budget - examined)
+        take_in(stack, waiting - 1, count, numbers)
+        waiting -= count
+        examined += count
+        narrowest = 0.0 * block.lower[0]
         for i in range(n):
-            q[0, i] = 0.5 * (boxes[waiting, i] + boxes[waiting, n + i])
-            half[i] = 0.5 * (boxes[waiting, n + i] - boxes[waiting, i])
-        # Both bounds start from the poses at the centre, so trying the centre costs nothing.
-        distance = offset_from_goal(chain, q, goal, poses, offset)
-        if improves(distance, closest, contact, chain, shapes, poses, half, jacobian):
-            closest, cutoff = distance, max(enough, distance - resolution) + ROUNDING
-            best[0, :n] = q[0, :n]
-        # The bounds in the order of their cost. That of the joints settles large boxes far from
-        # the goal, for which the linear model is of no use; the model settles small ones.
-        bound = max(boxes[waiting, 2 * n], joint_bound(bounds, poses, goal, half))
-        if bound <= cutoff:
-            error = model_error(bounds.curvature, half, parts)
-            tool = (goal[0] + offset[0], goal[1] + offset[1], goal[2] + offset[2])
-            point_jacobian(chain.prismatic, chain.axis, poses, tool, jacobian)
-            bound = max(bound, linear_bound(jacobian, offset, half, cutoff + error, step) - error)
-        if bound > cutoff:
-            # Nothing in the box comes closer than this.
-            proven = min(proven, bound)
-            continue
-        # Contact comes last, since it asks about every pair. A box that touches something
-        # throughout holds no configuration that counts: nothing is to be proven of it.
-        if contact and overlaps(chain, shapes, poses, half, 1.0, jacobian):
-            continue
+            block.lower[i] = max(block.lower[i], lower[i])
+            block.upper[i] = min(block.upper[i], upper[i])
+            block.half[i] = 0.5 * (block.upper[i] - block.lower[i])
+            block.q[0, i] = 0.5 * (block.upper[i] + block.lower[i])
+            narrowest = min(narrowest, block.half[i])
+        # Nothing is left of a box that takes no fewer steps than what was found.
+        empty = narrowest < 0.0
+        block.distance[0] = offset_from_goal(chain, block.q, goal, block.poses, offset)
+        tool = (goal[0] + offset[0], goal[1] + offset[1], goal[2] + offset[2])
+        point_jacobian(chain.prismatic, chain.axis, block.poses, tool, jacobian)
+        direction = closest_step(jacobian, offset, block.half, step, scale)
+        bound = curved_bound(
+            chain,
+            bounds.curvature,
+            block.poses,
+            jacobian,
+            offset,
+            direction,
+            block.half,
+            slope,
+            least,
+            bend,
+        )
         # Where the linear model comes closest to the goal, the arm mostly does, too.
         for i in range(n):
-            q[0, i] += step[i]
-        distance = offset_from_goal(chain, q, goal, poses, offset)
-        if improves(distance, closest, contact, chain, shapes, poses, half, jacobian):
-            closest, cutoff = distance, max(enough, distance - resolution) + ROUNDING
-            best[0, :n] = q[0, :n]
-        halve(boxes, waiting, bound, step, parts)
-        waiting += 2
-    outcome = FOUND if closest <= enough else EXCLUDED if waiting == 0 else EXHAUSTED
+            block.tried[0, i] = block.q[0, i] + step[i]
+        block.distance[1] = offset_from_goal(chain, block.tried, goal, block.between, offset)
+        far = enough if fewer else closest
+        at_centre = ~empty & (block.distance[0] <= far)
+        at_step = ~empty & (block.distance[1] <= far)
+        if contact and any_lane(at_centre | at_step):
+            work = (block.half, 0.0, ends, turns)
+            at_centre = at_centre & ~overlaps(at_centre, chain, shapes, block.poses, *work)
+            at_step = at_step & ~overlaps(at_step, chain, shapes, block.between, *work)
+        bits = (lane_bits(at_centre), lane_bits(at_step))
+        for index in range(2 * count if bits[0] | bits[1] != 0 else 0):
+            lane, attempt = index >> 1, index & 1
+            distance = numbers.distance[attempt, lane]
+            tried = places[attempt]
+            if bits[attempt] >> lane & 1 == 0:
+                continue
+            if fewer:
+                needed = float(fewest)
+                for i in range(n):
+                    moved = abs(tried[0, i, lane] - start[i]) - 2.0 * ROUNDING
+                    needed = max(needed, moved / step_limit[i])
+                if np.ceil(needed) >= steps:
+                    continue
+                steps = int(np.ceil(needed))
+                within_steps(chain, start, step_limit, steps - 1, lower, upper)
+            elif distance >= closest:
+                continue
+            else:
+                cutoff = max(enough, distance - resolution) + ROUNDING
+            closest = distance
+            for i in range(n):
+                best[i] = tried[0, i, lane]
+        block.share[0] = trim(
+            cutoff, bound, slope, least, bend, block.q, block.half, block.lower, block.upper
+        )
+        # The bound of the joints settles large boxes far from the goal.
+        bound = max(bound, joint_bound(bounds, block.poses, goal, block.half))
+        # What is proven of the whole holds for its parts.
+        block.proven[0] = max(block.proven[0], bound)
+        beyond = block.proven[0] > cutoff
+        if contact and any_lane(~beyond & ~empty):
+            # Contact comes last, since it asks about every pair. A box that touches something
+            # throughout holds no configuration that counts: nothing is to be proven of it.
+            work = (block.half, 1.0, ends, turns)
+            empty = empty | overlaps(~beyond & ~empty, chain, shapes, block.poses, *work)
+        excluded, gone = lane_bits(beyond), lane_bits(empty)
+        for lane in range(count - 1, -1, -1):
+            if gone >> lane & 1:
+                continue
+            if excluded >> lane & 1:
+                # Nothing in the box comes closer than this.
+                proven = min(proven, numbers.proven[0, lane])
+                continue
+            if numbers.share[0, lane] < 1.0:
+                proven = min(proven, cutoff)
+            if numbers.share[0, lane] < 0.5:
+                put_back(stack, waiting, lane, numbers)
+                waiting += 1
+            elif halve(stack, waiting, lane, lever, numbers):
+                waiting += 2
+            else:
+                # Such boxes are left where bounds meet what is asked for, or proofs of contact end.
+                undecided = True
+                proven = min(proven, numbers.proven[0, lane])
+    complete = (waiting == 0 and not undecided) or (steps <= fewest if fewer else closest <= enough)
     # Of boxes that still wait, no more is known than of those that they are halves of.
     for i in range(waiting):
-        proven = min(proven, boxes[i, 2 * n])
-    return outcome, closest, max(min(proven, closest) - ROUNDING, 0.0)
+        proven = min(proven, stack[i, 2 * n])
+    return complete, steps, closest, max(min(proven, closest) - ROUNDING, 0.0)
 
 
 @kernel
@@ -183,9 +249,9 @@ def bound_steps(
     first: int,
     last: int,
     arm: ArmInScene,
-    starts: NDArray[np.float64],
-    goals: NDArray[np.float64],
-    step_limit: NDArray[np.float64],
+    starts: Array,
+    goals: Array,
+    step_limit: Array,
     tolerance: float,
     contact: bool,
     budget: int,
@@ -193,38 +259,54 @@ def bound_steps(
     most: NDArray[np.int64],
     lower_bounds: NDArray[np.int64],
     tight: NDArray[np.bool_],
-    witnesses: NDArray[np.float64],
+    witnesses: Array,
 ) -> None:
     """Prove how many steps it takes at least to bring the tool to goals, for some rows.
 
-    Numbers of steps from ``fewest`` to ``most`` are examined, each by a `search` with the budget;
-    fewer than ``fewest`` are impossible. Written are ``lower_bounds``, below which no number of
-    steps suffices; whether they are ``tight``, that is, some configuration that counts reaches the
-    goal in so many steps, or none does in ``most``; and such configurations as ``witnesses``.
+    Numbers of steps from ``fewest`` to ``most`` are examined; fewer than ``fewest`` are impossible.
+    Written are ``lower_bounds``, below which no number of steps suffices; whether they are
+    ``tight``, that is, some configuration that counts reaches the goal in so many steps, or none
+    does in ``most``; and such configurations as ``witnesses``. A search may examine as many boxes
+    as are in the budget.
     """
     n = step_limit.shape[0]
-    lower, upper, best = np.empty(n), np.empty(n), np.empty((1, starts.shape[1]))
-    boxes = np.empty((BOXES, 2 * n + 1))
+    lower, upper, best = np.empty(n), np.empty(n), np.empty(starts.shape[1])
+    stack = np.empty((WAITING, 2 * n + 1))
     for row in range(first, last):
-        goal = (goals[row, 0], goals[row, 1], goals[row, 2])
-        # One step more at a time: boxes that are far too small are excluded at a glance, and none
-        # is searched that is larger than need be.
-        lower_bounds[row], tight[row] = fewest[row], True
-        while lower_bounds[row] <= most[row]:
-            best[0] = starts[row]
-            for i in range(n):
-                reach = lower_bounds[row] * step_limit[i] + ROUNDING
-                lower[i] = max(arm.chain.lower[i], starts[row, i] - reach)
-                upper[i] = min(arm.chain.upper[i], starts[row, i] + reach)
-            outcome, _, _ = search(
-                arm, lower, upper, goal, tolerance, np.inf, contact, budget, best, boxes
+        start, goal = starts[row], (goals[row, 0], goals[row, 1], goals[row, 2])
+        few, many, all_at_once = fewest[row], most[row], not contact
+        lower_bounds[row], tight[row] = few, True
+        while few <= many:
+            limit = many if all_at_once else few
+            within_steps(arm.chain, start, step_limit, limit, lower, upper)
+            complete, steps, _, _ = search(
+                arm,
+                start,
+                goal,
+                step_limit,
+                few,
+                limit,
+                tolerance,
+                np.inf,
+                contact,
+                budget,
+                lower,
+                upper,
+                best,
+                stack,
             )
-            if outcome != EXCLUDED:
-                tight[row] = outcome == FOUND
-                if outcome == FOUND:
-                    witnesses[row] = best[0]
+            for i in range(best.shape[0] if steps <= limit else 0):
+                witnesses[row, i] = best[i]
+            if complete:
+                few = steps
+            lower_bounds[row], tight[row] = few, complete
+            if steps <= limit if complete else not all_at_once:
                 break
-            lower_bounds[row] += 1
+            # All at once is least work, unless the budget is too small: then each number of steps
+            # has one of its own, up to those that the configuration found takes. Where contact
+            # counts, what is closest to the goal rarely counts, and larger boxes are harder.
+            if all_at_once:
+                many, all_at_once = steps - 1, False
 
 
 @kernel
@@ -232,27 +314,37 @@ def bound_distance(
     first: int,
     last: int,
     arm: ArmInScene,
-    lower: NDArray[np.float64],
-    upper: NDArray[np.float64],
-    starts: NDArray[np.float64],
-    goals: NDArray[np.float64],
+    lower: Array,
+    upper: Array,
+    starts: Array,
+    goals: Array,
     resolution: float,
     contact: bool,
     budget: int,
-    distances: NDArray[np.float64],
-    configurations: NDArray[np.float64],
+    distances: Array,
+    configurations: Array,
 ) -> None:
     """Bound from below how close the tool can come to goals, for some rows; see `search`.
 
     Written are the distances, shape (m, 2), proven and found [m], and the closest configurations
     found; joints beyond those of the boxes stay as in ``starts``.
     """
-    best, boxes = np.empty((1, starts.shape[1])), np.empty((BOXES, 2 * lower.shape[1] + 1))
+    n = lower.shape[1]
+    unlimited, stack = np.full(n, np.inf), np.empty((WAITING, 2 * n + 1))
     for row in range(first, last):
-        best[0] = starts[row]
-        goal = (goals[row, 0], goals[row, 1], goals[row, 2])
-        _, found, proven = search(
-            arm, lower[row], upper[row], goal, 0.0, resolution, contact, budget, best, boxes
+        _, _, distances[row, 1], distances[row, 0] = search(
+            arm,
+            starts[row],
+            (goals[row, 0], goals[row, 1], goals[row, 2]),
+            unlimited,
+            n,
+            n,
+            0.0,
+            resolution,
+            contact,
+            budget,
+            lower[row],
+            upper[row],
+            configurations[row],
+            stack,
         )
-        distances[row, 0], distances[row, 1] = proven, found
-        configurations[row] = best[0]

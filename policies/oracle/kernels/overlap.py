@@ -2,39 +2,39 @@
 
 Two points prove it, one of each body's axis, or of obstacle or ground, that stay closer than the
 radii however the arm moves in the box. Bodies that are only enclosed by a capsule prove nothing.
+
+All of it is free of branches on values, for a box or for one in each lane.
 """
 
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.contact_shapes import BETWEEN_CAPSULES, WITH_BOX, ContactShapes
-from kinarm.kernels.compiling import helper, inlined
+from kinarm.kernels.compiling import Array, Vector, helper, inlined
 from kinarm.kernels.distance import between_segments, closest_to_box
 from kinarm.kernels.kinematics import point_jacobian, to_world
+from kinarm.kernels.lanes import any_lane, select
 from kinarm.kernels.proof import MARGIN
 
 TRIED = 5
 """Evenly spaced points of an axis that are tried for the deepest one, beside the closest one."""
 
+ENDS = 7
+"""Entries of a capsule in the world: its end points (3 + 3), and half their distance."""
+
 
 @inlined
 def distance_from_box(x: float, y: float, z: float) -> float:
     """Distance from a box, given how far a point is beyond it per axis; less than 0 within."""
-    if x <= 0.0 and y <= 0.0 and z <= 0.0:
-        return max(x, y, z)
+    farthest = max(max(x, y), z)
     x, y, z = max(x, 0.0), max(y, 0.0), max(z, 0.0)
-    return math.sqrt(x * x + y * y + z * z)
+    return select(farthest <= 0.0, farthest, math.sqrt(x * x + y * y + z * z))
 
 
 @inlined
-def excess_over_box(
-    point: tuple[float, float, float],
-    lower: tuple[float, float, float],
-    upper: tuple[float, float, float],
-) -> tuple[float, float, float]:
+def excess_over_box(point: Vector, lower: Vector, upper: Vector) -> Vector:
     """How far a point is beyond a box, per axis; less than 0 between its faces."""
     return (
         max(lower[0] - point[0], point[0] - upper[0]),
@@ -44,21 +44,8 @@ def excess_over_box(
 
 
 @inlined
-def deepest_point(
-    a: tuple[float, float, float],
-    b: tuple[float, float, float],
-    lower: tuple[float, float, float],
-    upper: tuple[float, float, float],
-) -> tuple[float, float, float]:
-    """Point of the segment ab that is deepest in a box, or closest to it: the best of a few."""
-    best, share = np.inf, 0.0
-    for k in range(TRIED + 1):
-        t = k / (TRIED - 1) if k < TRIED else closest_to_box(a, b, lower, upper)
-        x, y, z = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
-        ex, ey, ez = excess_over_box((x, y, z), lower, upper)
-        distance = distance_from_box(ex, ey, ez)
-        if distance < best:
-            best, share = distance, t
+def along(a: Vector, b: Vector, share: float) -> Vector:
+    """Point of the segment ab."""
     return (
         a[0] + share * (b[0] - a[0]),
         a[1] + share * (b[1] - a[1]),
@@ -67,76 +54,97 @@ def deepest_point(
 
 
 @inlined
-def capsules_overlap(
-    a: tuple[float, float, float],
-    b: tuple[float, float, float],
-    c: tuple[float, float, float],
-    d: tuple[float, float, float],
-    radii: tuple[float, float],
-    pair: int,
-    travel: NDArray[np.float64],
-    half: NDArray[np.float64],
-    share: float,
-) -> bool:
-    """Whether capsules about the segments ab and cd overlap throughout a box.
+def deepest_point(a: Vector, b: Vector, lower: Vector, upper: Vector) -> Vector:
+    """Point of the segment ab that is deepest in a box, or closest to it: the best of a few."""
+    share = closest_to_box(a, b, lower, upper)
+    x, y, z = excess_over_box(along(a, b, share), lower, upper)
+    least = distance_from_box(x, y, z)
+    for k in range(TRIED):
+        x, y, z = excess_over_box(along(a, b, k / (TRIED - 1)), lower, upper)
+        distance = distance_from_box(x, y, z)
+        share = select(distance < least, k / (TRIED - 1), share)
+        least = min(distance, least)
+    return along(a, b, share)
 
-    No two of their points move apart by more than the travel of the pair.
-    """
-    x, y, z = between_segments(a, b, c, d)
-    gap = math.sqrt(x * x + y * y + z * z) - radii[1]
-    for axis in range(half.shape[0]):
-        gap += share * half[axis] * travel[axis, pair]
-    return gap < radii[0]
+
+@inlined
+def place_capsules(shapes: ContactShapes, poses: Array, ends: Array) -> None:
+    """Fill in where the capsules are in the world, shape (n_shapes, ENDS)."""
+    link, capsules = shapes[:2]
+    for i in range(link.shape[0]):
+        a = to_world(poses, link[i], capsules[i, 0], capsules[i, 1], capsules[i, 2])
+        b = to_world(poses, link[i], capsules[i, 3], capsules[i, 4], capsules[i, 5])
+        ends[i, 0], ends[i, 1], ends[i, 2] = a
+        ends[i, 3], ends[i, 4], ends[i, 5] = b
+        x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        ends[i, 6] = 0.5 * math.sqrt(x * x + y * y + z * z)
 
 
 @helper
 def overlaps(
+    wanted: bool,
     chain: Chain,
     shapes: ContactShapes,
-    poses: NDArray[np.float64],
-    half: NDArray[np.float64],
+    poses: Array,
+    half: Array,
     share: float,
-    jacobian: NDArray[np.float64],
+    ends: Array,
+    jacobian: Array,
 ) -> bool:
     """Whether some pair of bodies is proven to touch throughout a box of configurations.
 
     The box is centred where the ``poses`` are, with half-widths ``share`` times ``half``; a share
-    of 0 leaves its centre alone. The Jacobian, shape (3, n), is work space.
+    of 0 leaves its centre alone. Only what is ``wanted`` is examined. ``ends``, shape
+    (n_shapes, ENDS), and the Jacobian, shape (3, n), are work space.
     """
     prismatic, axes = chain.prismatic, chain.axis
-    link, capsules, boxes, pairs, travel, exact = shapes
+    link, capsules, boxes, pairs, travel, exact = shapes[:6]
     n = half.shape[0]
+    place_capsules(shapes, poses, ends)
+    proven: bool = wanted & (half[0] < 0.0)
     for pair in range(pairs.shape[0]):
         kind, i, j = pairs[pair, 0], pairs[pair, 1], pairs[pair, 2]
         if not exact[i] or (kind == BETWEEN_CAPSULES and not exact[j]):
             continue
-        a = to_world(poses, link[i], capsules[i, 0], capsules[i, 1], capsules[i, 2])
-        b = to_world(poses, link[i], capsules[i, 3], capsules[i, 4], capsules[i, 5])
+        a, b = (ends[i, 0], ends[i, 1], ends[i, 2]), (ends[i, 3], ends[i, 4], ends[i, 5])
+        middle = along(a, b, 0.5)
         # What only just touches is left to Coal, whose iterations are no more precise.
         radius = capsules[i, 6] - MARGIN
         if kind == BETWEEN_CAPSULES:
-            c = to_world(poses, link[j], capsules[j, 0], capsules[j, 1], capsules[j, 2])
-            d = to_world(poses, link[j], capsules[j, 3], capsules[j, 4], capsules[j, 5])
-            radii = (radius, capsules[j, 6])
-            if capsules_overlap(a, b, c, d, radii, pair, travel, half, share):
-                return True
+            c, d = (ends[j, 0], ends[j, 1], ends[j, 2]), (ends[j, 3], ends[j, 4], ends[j, 5])
+            other, radius = along(c, d, 0.5), radius + capsules[j, 6]
+            x, y, z = middle[0] - other[0], middle[1] - other[1], middle[2] - other[2]
+            # Most pairs are far apart at the centre already.
+            reach = ends[i, 6] + ends[j, 6] + radius
+            if not any_lane((x * x + y * y + z * z < reach * reach) & wanted & ~proven):
+                continue
+            x, y, z = between_segments(a, b, c, d)
+            gap = math.sqrt(x * x + y * y + z * z)
+            # No two points of the bodies move apart by more than the travel of the pair.
+            for axis in range(n):
+                gap += share * half[axis] * travel[axis, pair]
+            proven = proven | (wanted & (gap < radius))
             continue
         # A point deep in an obstacle stays in it longest. The ground is a box without end, of which
         # the lower end of the segment is the deepest point.
         lower, upper = (-np.inf, -np.inf, -np.inf), (np.inf, np.inf, 0.0)
-        point = a if a[2] < b[2] else b
+        first = a[2] < b[2]
+        point = select(first, a[0], b[0]), select(first, a[1], b[1]), select(first, a[2], b[2])
         if kind == WITH_BOX:
             lower = (boxes[j, 0, 0], boxes[j, 0, 1], boxes[j, 0, 2])
             upper = (boxes[j, 1, 0], boxes[j, 1, 1], boxes[j, 1, 2])
+            x, y, z = excess_over_box(middle, lower, upper)
+            apart = distance_from_box(x, y, z) >= radius + ends[i, 6]
+            if not any_lane(wanted & ~proven & ~apart):
+                continue
             point = deepest_point(a, b, lower, upper)
         x, y, z = excess_over_box(point, lower, upper)
-        # Most pairs are apart at the centre already: no need to bound how the point moves.
-        if distance_from_box(x, y, z) >= radius:
+        if not any_lane(wanted & ~proven & (distance_from_box(x, y, z) < radius)):
             continue
         # The point's motion along each world axis to first order, by its Jacobian: an arm that
         # slides along an obstacle does not leave it, however far it goes.
         point_jacobian(prismatic, axes, poses, point, jacobian)
-        remainder = 0.0
+        remainder = 0.0 * half[0]
         for axis in range(min(n, link[i])):
             width = share * half[axis]
             x += width * abs(jacobian[0, axis])
@@ -146,9 +154,8 @@ def overlaps(
             # later joint, by its angle. A pair of joints counts once, a joint with itself by half.
             if not prismatic[axis]:
                 later = 0.5 * width * travel[axis, pair]
-                for other in range(axis + 1, min(n, link[i])):
-                    later += share * half[other] * travel[other, pair]
+                for other_axis in range(axis + 1, min(n, link[i])):
+                    later += share * half[other_axis] * travel[other_axis, pair]
                 remainder += width * later
-        if distance_from_box(x, y, z) + remainder < radius:
-            return True
-    return False
+        proven = proven | (wanted & (distance_from_box(x, y, z) + remainder < radius))
+    return proven

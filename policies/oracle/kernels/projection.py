@@ -1,15 +1,17 @@
 """Inverse kinematics: configurations moved until they bring the tool to a goal, within limits."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.chain import Chain
-from kinarm.kernels.compiling import inlined, kernel
+from kinarm.kernels.compiling import Array, Vector, inlined, kernel
 from kinarm.kernels.kinematics import POSE, forward_kinematics, point_jacobian, to_world
+from kinarm.kernels.lanes import LANES, any_lane, as_lanes, lane_bits, select
 
-LAYOUT = "82154f075c74"
+LAYOUT = "5fa7884942e1"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 ITERATIONS = 24
@@ -22,12 +24,34 @@ LONGEST_STEP = 0.5
 """Largest move of a joint in an iteration [rad or m]."""
 
 
+class Moving(NamedTuple):
+    """Configurations side by side in lanes, as arrays of lanes and as the numbers behind them.
+
+    Attributes
+    ----------
+    q : (1, n_joints)
+        Configuration [rad or m].
+    lower, upper : (n,)
+        Limits of the first n joints [rad or m].
+    goal : (3,)
+        Goal position [m].
+    radius, distance : (1,)
+        Distance from the goal at which it is left, and where it is [m].
+    iteration : (1,)
+        Steps so far.
+    """
+
+    q: Array
+    lower: Array
+    upper: Array
+    goal: Array
+    radius: Array
+    distance: Array
+    iteration: Array
+
+
 @inlined
-def damped_step(
-    jacobian: NDArray[np.float64],
-    vector: tuple[float, float, float],
-    step: NDArray[np.float64],
-) -> None:
+def damped_step(jacobian: Array, vector: Vector, step: Array) -> None:
     """Fill in J^T (J J^T + damping)^-1 v, by the adjugate of the 3 x 3 matrix."""
     a00, a11, a22 = DAMPING, DAMPING, DAMPING
     a01, a02, a12 = 0.0, 0.0, 0.0
@@ -50,59 +74,112 @@ def damped_step(
         step[k] = jacobian[0, k] * x + jacobian[1, k] * y + jacobian[2, k] * z
 
 
+@inlined
+def move(moving: Moving, vector: Vector, jacobian: Array, step: Array) -> None:
+    """Move configurations by a damped step along a vector [m], within their limits."""
+    n = step.shape[0]
+    q, lower, upper = moving.q, moving.lower, moving.upper
+    # A joint that rests on a limit and would leave it is taken out of the Jacobian, so that the
+    # others make up for it. That changes their steps: until none is blocked.
+    blocked = True
+    while blocked:
+        blocked = False
+        damped_step(jacobian, vector, step)
+        for k in range(n):
+            outward = ((q[0, k] >= upper[k]) & (step[k] > 0.0)) | (
+                (q[0, k] <= lower[k]) & (step[k] < 0.0)
+            )
+            if any_lane(outward):
+                blocked = True
+                for i in range(3):
+                    jacobian[i, k] = select(outward, 0.0, jacobian[i, k])
+    # Scaled down as a whole, a step keeps its direction, in which the tool nears the goal.
+    longest = 0.0 * step[0] + LONGEST_STEP
+    for k in range(n):
+        longest = max(longest, abs(step[k]))
+    for k in range(n):
+        moved = q[0, k] + LONGEST_STEP / longest * step[k]
+        q[0, k] = min(max(moved, lower[k]), upper[k])
+
+
 @kernel
 def damped_least_squares(
     first: int,
     last: int,
     chain: Chain,
     owner: NDArray[np.int64],
-    lower: NDArray[np.float64],
-    upper: NDArray[np.float64],
-    goals: NDArray[np.float64],
-    radius: NDArray[np.float64],
-    configurations: NDArray[np.float64],
-    distances: NDArray[np.float64],
+    lower: Array,
+    upper: Array,
+    goals: Array,
+    radius: Array,
+    configurations: Array,
+    distances: Array,
 ) -> None:
     """Move configurations until the tool is within a radius of the goal, by damped Newton steps.
 
     For rows ``first`` to ``last``, ``configurations`` are changed in place, and ``distances`` from
     the tool to the goal written [m]. ``owner`` says which row of goals and limits (of the first n
-    joints; the others stay) belongs to each, and ``radius`` at which distance it is left [m].
+    joints; the others stay) belongs to each, and ``radius`` at which distance it is left [m]. A row
+    that has ended makes room in its lane for the next one.
     """
     prismatic, translation, rotation, axis, tool = chain[:5]
     n_joints, n = configurations.shape[1], lower.shape[1]
-    poses, jacobian, step = np.empty((n_joints + 1, POSE)), np.empty((3, n)), np.empty(n)
-    q = configurations
-    for row in range(first, last):
-        goal = owner[row]
-        for iteration in range(ITERATIONS + 1):
-            forward_kinematics(prismatic, translation, rotation, axis, q, row, poses)
-            x, y, z = to_world(poses, n_joints, tool[0], tool[1], tool[2])
-            dx, dy, dz = goals[goal, 0] - x, goals[goal, 1] - y, goals[goal, 2] - z
-            distance = math.sqrt(dx * dx + dy * dy + dz * dz)
-            distances[row] = distance
-            if distance <= radius[row] or iteration == ITERATIONS:
-                break
-            point_jacobian(prismatic, axis, poses, (x, y, z), jacobian)
-            # Aimed at half the radius, a step that falls short still arrives.
-            share = 1.0 - 0.5 * radius[row] / distance
-            # A joint that rests on a limit and would leave it is taken out of the Jacobian, so that
-            # the others make up for it. That changes their steps: until none is blocked.
-            blocked = True
-            while blocked:
-                blocked = False
-                damped_step(jacobian, (share * dx, share * dy, share * dz), step)
+    numbers = Moving(
+        q=np.zeros((1, n_joints, LANES)),
+        lower=np.zeros((n, LANES)),
+        upper=np.zeros((n, LANES)),
+        goal=np.zeros((3, LANES)),
+        radius=np.zeros((1, LANES)),
+        distance=np.zeros((1, LANES)),
+        iteration=np.zeros((1, LANES)),
+    )
+    moving = Moving(
+        q=as_lanes(numbers.q),
+        lower=as_lanes(numbers.lower),
+        upper=as_lanes(numbers.upper),
+        goal=as_lanes(numbers.goal),
+        radius=as_lanes(numbers.radius),
+        distance=as_lanes(numbers.distance),
+        iteration=as_lanes(numbers.iteration),
+    )
+    poses = as_lanes(np.zeros((n_joints + 1, POSE, LANES)))
+    jacobian, step = as_lanes(np.zeros((3, n, LANES))), as_lanes(np.zeros((n, LANES)))
+    rows = np.full(LANES, -1)
+    waiting, n_moving, free = first, 0, (1 << LANES) - 1
+    while True:
+        for lane in range(LANES if waiting < last else 0):
+            if free >> lane & 1 and waiting < last:
+                goal, rows[lane] = owner[waiting], waiting
+                for k in range(n_joints):
+                    numbers.q[0, k, lane] = configurations[waiting, k]
                 for k in range(n):
-                    outward = (q[row, k] >= upper[goal, k] and step[k] > 0.0) or (
-                        q[row, k] <= lower[goal, k] and step[k] < 0.0
-                    )
-                    if outward:
-                        jacobian[0, k], jacobian[1, k], jacobian[2, k] = 0.0, 0.0, 0.0
-                        blocked = True
-            # Scaled down as a whole, a step keeps its direction, in which the tool nears the goal.
-            longest = LONGEST_STEP
-            for k in range(n):
-                longest = max(longest, abs(step[k]))
-            for k in range(n):
-                moved = q[row, k] + LONGEST_STEP / longest * step[k]
-                q[row, k] = min(max(moved, lower[goal, k]), upper[goal, k])
+                    numbers.lower[k, lane] = lower[goal, k]
+                    numbers.upper[k, lane] = upper[goal, k]
+                for k in range(3):
+                    numbers.goal[k, lane] = goals[goal, k]
+                numbers.radius[0, lane] = radius[waiting]
+                numbers.iteration[0, lane] = 0.0
+                waiting += 1
+                n_moving += 1
+                free &= ~(1 << lane)
+        if n_moving == 0:
+            return
+        forward_kinematics(prismatic, translation, rotation, axis, moving.q, 0, poses)
+        point = to_world(poses, n_joints, tool[0], tool[1], tool[2])
+        x, y, z = moving.goal[0] - point[0], moving.goal[1] - point[1], moving.goal[2] - point[2]
+        distance = math.sqrt(x * x + y * y + z * z)
+        moving.distance[0] = distance
+        ended = (distance <= moving.radius[0]) | (moving.iteration[0] >= ITERATIONS)
+        ended_bits = lane_bits(ended) & ~free
+        for lane in range(LANES if ended_bits != 0 else 0):
+            if ended_bits >> lane & 1:
+                for k in range(n):
+                    configurations[rows[lane], k] = numbers.q[0, k, lane]
+                distances[rows[lane]] = numbers.distance[0, lane]
+                n_moving -= 1
+        free |= ended_bits
+        # Aimed at half the radius, a step that falls short still arrives. What has ended stays.
+        share = select(ended, 0.0, 1.0 - 0.5 * moving.radius[0] / distance)
+        point_jacobian(prismatic, axis, poses, point, jacobian)
+        move(moving, (share * x, share * y, share * z), jacobian, step)
+        moving.iteration[0] += 1.0

@@ -13,13 +13,13 @@ from kinarm.evaluation.measurements.attainable import (
     multiply_and_add,
 )
 from kinarm.evaluation.measurements.shares import time_shares
-from kinarm.kernels.lanes import LANES, work_space
+from kinarm.kernels.lanes import LANES
 from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
 
 
 def test_kernel_multiplies_and_adds_in_every_lane():
-    space = work_space(2 + CHAINS)
+    space = np.zeros((2 + CHAINS, LANES))
     space[0], space[1] = 0.5, 3.0
     space[2:] = np.arange(CHAINS * LANES, dtype=float).reshape(CHAINS, LANES)
     expected = space[2:].copy()

@@ -10,6 +10,7 @@ from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError
 from kinarm.policies import inverse_kinematics
 from kinarm.policies.oracle.inverse import evenly_spread, project, solve_within, step_box
+from kinarm.policies.oracle.kernels.projection import damped_least_squares
 from kinarm.policies.oracle.motion import steps_between
 from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
@@ -253,6 +254,43 @@ class TestProject:
         owner = np.arange(400) % 4
         _, distances = project(simulator, begun, owner, box, goals, np.full(400, 1e-4))
         assert (distances <= 1e-4).mean() > 0.5
+
+
+class TestLanes:
+    """Rows share the lanes of a block, and make room for the next ones."""
+
+    @pytest.fixture
+    def rows(self, any_simulator):
+        simulator, arm = any_simulator, any_simulator.arm
+        rng, n = np.random.default_rng(20), simulator.n_actions
+        begun = rng.uniform(arm.lower, arm.upper, (90, arm.n_joints))
+        goals = np.array([arm.tool_position(q) for q in begun[:9]])
+        box = step_box(simulator, begun[:9], rng.integers(5, 60, 9))
+        owner = rng.integers(0, 9, 90)
+        begun[:, :n] = np.clip(begun[:, :n], box[0][owner], box[1][owner])
+        # Some have arrived where they begin, some never do.
+        return begun, owner, box, goals, rng.choice([0.0, 1e-3, 0.05, 5.0], 90)
+
+    def test_the_company_does_not_matter(self, any_simulator, rows):
+        begun, owner, box, goals, radius = rows
+        ended, distances = project(any_simulator, begun, owner, box, goals, radius)
+        assert np.isfinite(ended).all()
+        assert np.isfinite(distances).all()
+        order = np.random.default_rng(21).permutation(90)
+        for some in (*np.split(order, [1, 3, 10, 17, 25, 42]), order, np.arange(0)):
+            one, other = project(any_simulator, begun[some], owner[some], box, goals, radius[some])
+            np.testing.assert_array_equal(one, ended[some])
+            np.testing.assert_array_equal(other, distances[some])
+
+    def test_other_rows_are_left_alone(self, any_simulator, rows):
+        begun, owner, box, goals, radius = rows
+        ended, distances = begun.copy(), np.full(90, -1.0)
+        chain = any_simulator.arm.chain
+        damped_least_squares(20, 31, chain, owner, *box, goals, radius, ended, distances)
+        expected, away = project(any_simulator, begun, owner, box, goals, radius)
+        moved = np.isin(np.arange(90), np.arange(20, 31))
+        np.testing.assert_array_equal(ended, np.where(moved[:, None], expected, begun))
+        np.testing.assert_array_equal(distances, np.where(moved, away, -1.0))
 
 
 def test_step_box_by_hand(simulator):

@@ -271,6 +271,32 @@ class TestPlanarSteps:
         for fewest in (floor - 3, floor, floor + 5):
             assert prove_steps(planar, starts, goals, fewest=fewest)[0][0] == max(floor, fewest)
 
+    def test_all_numbers_of_steps_at_once_are_one_after_the_other(self, simulator, trials):
+        floors, _, witnesses = prove_steps(simulator, *trials)
+        steps, done = np.ones(len(floors), dtype=np.int64), np.zeros(len(floors), dtype=bool)
+        while not done.all():
+            one, certain, _ = prove_steps(simulator, *trials, fewest=steps, most=steps)
+            assert certain.all()
+            done |= one == steps
+            steps = np.where(done, steps, one)
+        np.testing.assert_array_equal(steps, floors)
+        moved = np.abs(witnesses - trials[0])[:, :5] / simulator.step_limit
+        assert (np.ceil(moved.max(axis=1) - 1e-6) == floors).all()
+
+    def test_budget_for_each_number_of_steps(self, simulator, trials):
+        # Too small for all numbers at once, it suffices for most of them one by one.
+        floors, _, _ = prove_steps(simulator, *trials)
+        for budget in (37, 250):
+            proven, tight, _ = prove_steps(simulator, *trials, budget=budget)
+            for row in range(len(floors)):
+                some = [part[row : row + 1] for part in trials]
+                for steps in range(1, proven[row]):
+                    limits = {"fewest": steps, "most": steps, "budget": budget}
+                    if not tight[row]:
+                        assert prove_steps(simulator, *some, **limits)[0][0] == steps + 1
+            np.testing.assert_array_equal(proven[tight], floors[tight])
+            assert (~tight).sum() > 2
+
     def test_rows_are_treated_alone(self, planar):
         rng = np.random.default_rng(10)
         starts, goals = rng.uniform(-3, 3, (8, 2)), planar_goals(rng, 8, 0.2, 0.8)

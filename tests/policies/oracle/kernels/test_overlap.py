@@ -9,7 +9,7 @@ from numba import njit
 from kinarm.arm import Arm
 from kinarm.kernels.kinematics import POSE, forward_kinematics
 from kinarm.kernels.rollout import screen
-from kinarm.policies.oracle.kernels.overlap import overlaps
+from kinarm.policies.oracle.kernels.overlap import ENDS, overlaps
 from kinarm.problem import PROBLEMS
 from kinarm.scene import PAPER_BENCHES, Obstacle, Scene
 from kinarm.simulator import Simulator
@@ -18,12 +18,12 @@ CAPSULE_ARMS = ("lrmate200ic_5l", "paper", "paper_flange")
 
 
 @njit
-def claims_of(chain, shapes, centres, halves, share, poses, jacobian, claimed):
+def claims_of(chain, shapes, centres, halves, share, poses, ends, jacobian, claimed):
     for i in range(len(centres)):
         forward_kinematics(
             chain.prismatic, chain.translation, chain.rotation, chain.axis, centres, i, poses
         )
-        claimed[i] = overlaps(chain, shapes, poses, halves[i], share, jacobian)
+        claimed[i] = overlaps(True, chain, shapes, poses, halves[i], share, ends, jacobian)
 
 
 def claims(simulator, centres, halves=None, share=1.0):
@@ -34,7 +34,8 @@ def claims(simulator, centres, halves=None, share=1.0):
     poses, jacobian = np.empty((simulator.arm.n_joints + 1, POSE)), np.empty((3, n))
     claimed = np.empty(len(centres), dtype=bool)
     shapes = simulator.world.contact_model.shapes
-    claims_of(simulator.arm.chain, shapes, centres, halves, share, poses, jacobian, claimed)
+    work = poses, np.empty((len(shapes.link), ENDS)), jacobian
+    claims_of(simulator.arm.chain, shapes, centres, halves, share, *work, claimed)
     return claimed
 
 

@@ -1,0 +1,109 @@
+"""Boxes of configurations: a stack of those that wait, and a block of them in lanes."""
+
+from typing import NamedTuple
+
+from kinarm.chain import Chain
+from kinarm.kernels.compiling import Array, inlined
+
+WAITING = 4096
+"""Boxes that can wait at a time; halving eight until they are too small takes fewer."""
+
+SMALLEST = 1e-6
+"""How far the tool can move in a box that is not halved any more [m]."""
+
+ROUNDING = 1e-9
+"""By how much boxes and distances are enlarged to cover rounding [rad, m]."""
+
+
+class Boxes(NamedTuple):
+    """Work space of a block of boxes of the first n joints.
+
+    Kernels have it twice: as arrays of lanes of the shapes below, and as the numbers behind them,
+    whose arrays have one axis more, that of the boxes.
+
+    Attributes
+    ----------
+    lower, upper, half : (n,)
+        Corners and half-widths [rad or m].
+    q, tried : (1, n_joints)
+        Centre, and a configuration that may be close to the goal [rad or m].
+    poses, between : (n_joints + 1, POSE)
+        Forward kinematics at the centre, and where it is tried.
+    proven, share : (1,)
+        Distance proven of a box [m], and what is left of it.
+    distance : (2,)
+        Distances from the goal at the centre and where it is tried [m].
+    """
+
+    lower: Array
+    upper: Array
+    half: Array
+    q: Array
+    tried: Array
+    poses: Array
+    between: Array
+    proven: Array
+    distance: Array
+    share: Array
+
+
+@inlined
+def within_steps(
+    chain: Chain, start: Array, step_limit: Array, steps: int, lower: Array, upper: Array
+) -> None:
+    """Fill in the corners of what the first joints can reach in some steps."""
+    for i in range(step_limit.shape[0]):
+        reach = steps * step_limit[i] + ROUNDING
+        lower[i] = max(chain.lower[i], start[i] - reach)
+        upper[i] = min(chain.upper[i], start[i] + reach)
+
+
+@inlined
+def take_in(stack: Array, last: int, count: int, numbers: Boxes) -> None:
+    """Put the boxes at the end of the stack into lanes; the last one repeats where there is none.
+
+    A row of the ``stack`` holds the corners of a box, and the distance proven of it.
+    """
+    n, n_lanes = numbers.lower.shape
+    for lane in range(n_lanes):
+        row = last - min(lane, count - 1)
+        for i in range(n):
+            numbers.lower[i, lane] = stack[row, i]
+            numbers.upper[i, lane] = stack[row, n + i]
+        numbers.proven[0, lane] = stack[row, 2 * n]
+
+
+@inlined
+def put_back(stack: Array, row: int, lane: int, numbers: Boxes) -> None:
+    """Put a box from a lane into the stack."""
+    n = numbers.lower.shape[0]
+    for i in range(n):
+        stack[row, i] = numbers.lower[i, lane]
+        stack[row, n + i] = numbers.upper[i, lane]
+    stack[row, 2 * n] = numbers.proven[0, lane]
+
+
+@inlined
+def halve(stack: Array, row: int, lane: int, lever: Array, numbers: Boxes) -> bool:
+    """Put the halves of a box from a lane into the stack, that with the point tried above.
+
+    It is cut across the joint that can move the tool farthest in it. Returns whether it is large
+    enough.
+    """
+    n = numbers.lower.shape[0]
+    widest, farthest = 0, -1.0
+    for i in range(n):
+        moved = lever[i] * (numbers.upper[i, lane] - numbers.lower[i, lane])
+        if moved > farthest:
+            widest, farthest = i, moved
+    if farthest < SMALLEST:
+        return False
+    middle = 0.5 * (numbers.lower[widest, lane] + numbers.upper[widest, lane])
+    put_back(stack, row, lane, numbers)
+    put_back(stack, row + 1, lane, numbers)
+    # The last box is examined next.
+    near_lower = numbers.tried[0, widest, lane] <= middle
+    above, below = (row, row + 1) if near_lower else (row + 1, row)
+    stack[above, widest] = middle
+    stack[below, n + widest] = middle
+    return True
