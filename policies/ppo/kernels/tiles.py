@@ -70,7 +70,7 @@ class _Entries:
         numbers, self._first, self._row, self._column = (
             builder.extract_value(given, k) for k in range(4)
         )
-        array: Any = make_array(kind.types[0])  # type: ignore[no-untyped-call]
+        array: Any = make_array(kind.types[0])
         self._data = array(context, builder, numbers).data
         self._builder = builder
 

@@ -30,7 +30,7 @@ from kinarm.policies.ppo.kernels.loss import (
 )
 from kinarm.policies.ppo.kernels.tiles import LANES, ROWS, Numbers
 
-LAYOUT = "62e652fea60a"
+LAYOUT = "f4e4a14e8fd0"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 
