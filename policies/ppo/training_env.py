@@ -87,26 +87,12 @@ class TrainingVecEnv(SB3VecEnv):
         self._shown.normalize_by(normalizer)
 
     def draw_from(self, rng: np.random.Generator, start_spread: float | None = None) -> None:
-        """From now on, draw scenarios from this generator, with the task's start spread or another.
-
-        They are drawn for all arms at once, which is faster, and kept until they are needed.
-        """
+        """From now on, draw scenarios from this generator; with the task's start spread if None."""
         self._rng, self._start_spread = rng, start_spread
-        self._drawn = self._draw_for_all()
-
-    def _draw_for_all(self) -> list[NDArray[np.float64]]:
-        """As many starts and goals as there are arms."""
-        return [*self.simulator.sample(self._rng, self.num_envs, start_spread=self._start_spread)]
 
     def _draw(self, rows: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The next starts and goals, in the order in which they were drawn."""
-        count = rows.size
-        if len(self._drawn[0]) < count:
-            parts = zip(self._drawn, self._draw_for_all(), strict=True)
-            self._drawn = [np.concatenate(part) for part in parts]
-        starts, goals = (part[:count] for part in self._drawn)
-        self._drawn = [part[count:] for part in self._drawn]
-        return starts, goals
+        """Starts and goals from the one generator."""
+        return self.simulator.sample(self._rng, rows.size, start_spread=self._start_spread)
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Take note of the actions, given what the learner saw, as the simulator needs them."""
