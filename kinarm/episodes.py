@@ -89,6 +89,8 @@ class Episodes(NamedTuple):
         Where the step under way leads.
     doubt : ndarray of int, shape (n,)
         Bit k - 1 set: configuration k of the step under way is not proven free.
+    touched : ndarray of int, shape (n,)
+        Number, from 1, of the pair that refused the last step; 0 if none did, or nobody looked.
     cleared : ndarray of bool, shape (n,)
         The step under way was judged free.
     planes : ndarray, shape (n, n_pairs, PLANE)
@@ -118,6 +120,7 @@ class Episodes(NamedTuple):
     q: NDArray[np.float64]
     target: NDArray[np.float64]
     doubt: NDArray[np.int64]
+    touched: NDArray[np.int64]
     cleared: NDArray[np.bool_]
     planes: NDArray[np.float64]
     goal: NDArray[np.float64]
@@ -156,6 +159,7 @@ class Episodes(NamedTuple):
             q=np.array(starts),
             target=np.array(starts),
             doubt=np.zeros(n, dtype=np.int64),
+            touched=np.zeros(n, dtype=np.int64),
             cleared=np.zeros(n, dtype=bool),
             planes=np.zeros((n, n_pairs, PLANE)),
             goal=np.array(goals),

@@ -11,13 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm._parallel import run_rows
 from kinarm._validation import finite_array
 from kinarm.arm import Arm
-from kinarm.episodes import PAUSED, RUNNING, Control, Episodes, Rules
+from kinarm.episodes import PAUSED, RUNNING, Control, Episodes
 from kinarm.errors import InvalidInputError, StartInContactError
 from kinarm.kernels.rollout import (
     advance,
     allow_one_step,
     begin,
-    bind,
     refuse,
     results_of_step,
 )
@@ -32,6 +31,10 @@ from kinarm.world import World
 
 PolicyFunction = Callable[[NDArray[np.float64]], ArrayLike]
 """Maps observations, shape (n, n_observations), to actions, shape (n, n_actuated)."""
+
+
+FEW = 4
+"""Up to so many episodes in doubt are judged one by one, which also tells what touches."""
 
 
 class _Stepped(NamedTuple):
@@ -76,14 +79,6 @@ class Simulator:
         self.threads = self.world.threads
         self.judged = 0
         self._last: _Stepped | None = None
-        task, stepping, arm = self.task, self.problem.stepping, self.arm
-        self._rules = Rules(
-            step_limit=arm.velocity_limits[: arm.n_actuated] * stepping.time_step,
-            tested=stepping.tested_configurations,
-            tolerance=float(task.tolerance),
-            horizon=int(task.horizon),
-            reward=task.reward.vector,
-        )
 
     def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"_last": None}
@@ -124,7 +119,7 @@ class Simulator:
     @property
     def step_limit(self) -> NDArray[np.float64]:
         """Largest move of each actuated joint in a step, shape (n_actions,) [rad or m]."""
-        return self._rules.step_limit.copy()
+        return self.world.rules.step_limit.copy()
 
     def sample(
         self, rng: np.random.Generator, count: int, *, start_spread: float | None = None
@@ -151,7 +146,7 @@ class Simulator:
         StartInContactError
             If a start touches something.
         """
-        return self._begin(*self.check_scenarios(starts, goals), record, None)
+        return self._begin(*self.check_scenarios(starts, goals), None, record=record)[0]
 
     def step(self, episodes: Episodes, actions: ArrayLike) -> StepResult:
         """Advance every running episode by one step, in place.
@@ -214,15 +209,16 @@ class Simulator:
         q, goal = self.check_scenarios(starts, goals)
         if shift is not None:
             shift = finite_array("shift", shift, (self.n_observations,))
-        episodes = self._begin(q, goal, record, shift)
         if callable(policies) and not isinstance(policies, CompiledPolicy):
             if policy_index is not None:
                 raise InvalidInputError("policy_index does not apply to a function")
+            episodes, _ = self._begin(q, goal, None, record=record, shift=shift)
             self._follow(policies, episodes)
         else:
             widths = (self.n_observations, self.n_actions)
             control = network_control(policies, policy_index, len(q), widths)
-            self._advance(self._session(control, episodes), episodes, len(q) * self.task.horizon)
+            episodes, session = self._begin(q, goal, control, record=record, shift=shift)
+            self._advance(session, episodes, len(q) * self.task.horizon)
         return Rollouts.from_episodes(q, episodes)
 
     def rollout_actions(
@@ -239,10 +235,8 @@ class Simulator:
         """
         q, goal = self.check_scenarios(starts, goals)
         table = finite_array("actions", actions, (len(q), self.task.horizon, self.n_actions))
-        episodes = self._begin(q, goal, record, None)
-        self._advance(
-            self._session(table_control(table), episodes), episodes, len(q) * self.task.horizon
-        )
+        episodes, session = self._begin(q, goal, table_control(table), record=record)
+        self._advance(session, episodes, len(q) * self.task.horizon)
         return Rollouts.from_episodes(q, episodes)
 
     def contact_pairs(self, rollouts: Rollouts) -> tuple[tuple[str, str] | None, ...]:
@@ -269,16 +263,7 @@ class Simulator:
         StartInContactError
             If a start touches something.
         """
-        contacts = self.world.contact_model
-        arrays = (rows, self.arm.chain, contacts.shapes, episodes)
-        run_rows(begin, len(rows), len(rows), self.threads, *arrays)
-        paused = rows[episodes.status[rows] == PAUSED]
-        touching = contacts.in_contact(episodes.q[paused])
-        if touching.any():
-            index = int(paused[touching.argmax()])
-            pair = contacts.contact_pair(episodes.q[index])
-            raise StartInContactError(index, pair or ("arm", "scene"))
-        episodes.status[paused] = RUNNING
+        self._start(episodes, rows, self._session_of_steps(episodes))
 
     def check_scenarios(
         self, starts: ArrayLike, goals: ArrayLike
@@ -296,31 +281,52 @@ class Simulator:
         self,
         starts: NDArray[np.float64],
         goals: NDArray[np.float64],
+        control: Control | None,
+        *,
         record: bool,
-        shift: NDArray[np.float64] | None,
-    ) -> Episodes:
-        """Allocate and start episodes."""
+        shift: NDArray[np.float64] | None = None,
+    ) -> tuple[Episodes, Session]:
+        """Allocate and start episodes; without a control they are to be stepped."""
         n_pairs = len(self.world.contact_model.shapes.pairs)
         episodes = Episodes.allocate(
             starts, goals, n_pairs=n_pairs, horizon=self.task.horizon, record=record, shift=shift
         )
-        self.begin(episodes, np.arange(len(starts)))
-        return episodes
+        if control is None:
+            session = self._session_of_steps(episodes)
+        else:
+            session = self.world.session(control, episodes)
+        self._start(episodes, np.arange(len(starts)), session)
+        return episodes, session
 
-    def _session(self, control: Control, episodes: Episodes) -> Session:
-        """Bind episodes and where their actions come from."""
-        shapes = self.world.contact_model.shapes
-        return bind(self.arm.chain, shapes, self._rules, control, episodes)
+    def _start(self, episodes: Episodes, rows: NDArray[np.int64], session: Session) -> None:
+        """Start some episodes; see `begin`."""
+        if not run_rows(begin, len(rows), len(rows), self.threads, rows, session):
+            return
+        contacts = self.world.contact_model
+        paused = rows[episodes.status[rows] == PAUSED]
+        touching = contacts.in_contact(episodes.q[paused])
+        if touching.any():
+            index = int(paused[touching.argmax()])
+            pair = contacts.contact_pair(episodes.q[index])
+            raise StartInContactError(index, pair or ("arm", "scene"))
+        episodes.status[paused] = RUNNING
+
+    def _session_of_steps(self, episodes: Episodes) -> Session:
+        """A session in which episodes are stepped, bound anew only for others than before."""
+        if self._last is None or self._last.episodes is not episodes:
+            table = np.zeros((len(episodes.status), 1, self.n_actions))
+            session = self.world.session(table_control(table), episodes)
+            self._last = _Stepped(episodes, table, session)
+        return self._last.session
 
     def _step(self, episodes: Episodes, actions: NDArray[np.float64]) -> Session:
-        """Advance running episodes by one step; the session is bound anew for others only."""
-        if self._last is None or self._last.episodes is not episodes:
-            table = np.zeros((len(actions), 1, self.n_actions))
-            self._last = _Stepped(episodes, table, self._session(table_control(table), episodes))
+        """Advance running episodes by one step."""
+        session = self._session_of_steps(episodes)
+        assert self._last is not None
         self._last.actions[:, 0] = actions
-        allow_one_step(self._last.session)
-        self._advance(self._last.session, episodes, len(actions))
-        return self._last.session
+        allow_one_step(session)
+        self._advance(session, episodes, len(actions))
+        return session
 
     def _advance(self, session: Session, episodes: Episodes, work: int) -> None:
         """Advance episodes to their stop, asking Coal about every step that is in doubt."""
@@ -337,14 +343,27 @@ class Simulator:
 
         Configurations are judged in the order of the motion, and not beyond the first contact.
         """
+        contacts = self.world.contact_model
         tested = self.world.substeps(episodes.q[paused], episodes.target[paused])
         doubt = episodes.doubt[paused]
         refused = np.zeros(paused.size, dtype=bool)
-        for k in range(tested.shape[1]):
-            rows = np.flatnonzero((doubt & 1 << k != 0) & ~refused)
-            if rows.size:
-                refused[rows] = self.world.contact_model.in_contact(tested[rows, k])
-                self.judged += rows.size
+        episodes.touched[paused] = 0
+        if paused.size <= FEW:
+            for row, (way, bits) in enumerate(zip(tested, doubt.tolist(), strict=True)):
+                for k, configuration in enumerate(way):
+                    if bits >> k & 1:
+                        self.judged += 1
+                        index = contacts.first_in_contact(configuration)
+                        if index is not None:
+                            episodes.touched[paused[row]] = index + 1
+                            refused[row] = True
+                            break
+        else:
+            for k in range(tested.shape[1]):
+                rows = np.flatnonzero((doubt & 1 << k != 0) & ~refused)
+                if rows.size:
+                    refused[rows] = contacts.in_contact(tested[rows, k])
+                    self.judged += rows.size
         episodes.status[paused[~refused]] = RUNNING
         episodes.cleared[paused] = ~refused
         if refused.any():

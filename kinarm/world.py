@@ -9,8 +9,10 @@ from kinarm._parallel import available_threads, run_rows
 from kinarm._validation import finite_array, whole_number
 from kinarm.arm import Arm
 from kinarm.collision import Contact, ContactModel
-from kinarm.episodes import Episodes
-from kinarm.kernels.rollout import begin, screen
+from kinarm.episodes import Control, Episodes, Rules
+from kinarm.kernels.rollout import begin, bind, screen
+from kinarm.kernels.session import Session
+from kinarm.networks import table_control
 from kinarm.observation import observation_size
 from kinarm.problem import ProblemLike, ReachProblem
 
@@ -33,6 +35,8 @@ class World:
         The arm.
     contact_model : ContactModel
         Shapes that may touch.
+    rules : Rules
+        Task and motion limits as the kernels need them.
     """
 
     def __init__(self, problem: ProblemLike, *, threads: int | None = None) -> None:
@@ -42,7 +46,15 @@ class World:
         )
         self.arm = Arm.load(self.problem.arm)
         self.contact_model = ContactModel.build(self.arm, self.problem.scene)
-        n_tested = self.problem.stepping.tested_configurations
+        task, stepping = self.problem.task, self.problem.stepping
+        n_tested = stepping.tested_configurations
+        self.rules = Rules(
+            step_limit=self.arm.velocity_limits[: self.arm.n_actuated] * stepping.time_step,
+            tested=n_tested,
+            tolerance=float(task.tolerance),
+            horizon=int(task.horizon),
+            reward=task.reward.vector,
+        )
         self._shares = np.arange(1, n_tested + 1)[:, None] / n_tested
 
     def __repr__(self) -> str:
@@ -151,11 +163,16 @@ class World:
         ways[:, -1] = targets
         return ways
 
+    def session(self, control: Control, episodes: Episodes) -> Session:
+        """Bind episodes, and where their actions come from, for the kernels."""
+        return bind(self.arm.chain, self.contact_model.shapes, self.rules, control, episodes)
+
     def _begun_at(self, configurations: ArrayLike, goals: ArrayLike) -> Episodes:
         """Episodes that begin at configurations, whether or not those touch something."""
         q = finite_array("configurations", configurations, (None, self.arm.n_joints))
         goal = finite_array("goals", goals, (len(q), 3))
         n_pairs = len(self.contact_model.shapes.pairs)
         episodes = Episodes.allocate(q, goal, n_pairs=n_pairs, horizon=1)
-        begin(0, len(q), np.arange(len(q)), self.arm.chain, self.contact_model.shapes, episodes)
+        at_rest = table_control(np.zeros((len(q), 1, self.n_actions)))
+        begin(0, len(q), np.arange(len(q)), self.session(at_rest, episodes))
         return episodes

@@ -40,7 +40,7 @@ class Contacts:
             rows = refused.nonzero()[0]
             ways = self._world.substeps(episodes.q[rows], episodes.target[rows])
             for row, way, doubt in zip(rows.tolist(), ways, episodes.doubt[rows], strict=True):
-                numbers[row] = self._first(way, int(doubt))
+                numbers[row] = episodes.touched[row] or self._first(way, int(doubt))
         return numbers
 
     def _first(self, way: NDArray[np.float64], doubt: int) -> int:

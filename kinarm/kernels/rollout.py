@@ -66,25 +66,19 @@ def screen(
 
 
 @kernel
-def begin(
-    first: int,
-    last: int,
-    rows: NDArray[np.int64],
-    chain: Chain,
-    shapes: ContactShapes,
-    episodes: Episodes,
-) -> None:
+def begin(first: int, last: int, rows: NDArray[np.int64], session: Session) -> int:
     """Start episodes ``rows[first]`` to ``rows[last - 1]`` at their ``q`` and ``goal``.
 
-    An episode whose start is not proven contact-free is left paused.
+    An episode whose start is not proven contact-free is left paused; returns how many are.
     """
+    chain, shapes, episodes = session.chain, session.shapes, session.episodes
     q, planes, path = episodes.q, episodes.planes, episodes.path
     n_joints, n_observations = q.shape[1], episodes.observation.shape[1]
     n_pairs = shapes.planes.shape[0]
     block, alone = work_space(n_joints, 0, n_observations, n_pairs, 0, 0, 0, 0)
     starts, goals = as_numbers(block.q), as_numbers(block.goal)
     distances, observations = as_numbers(block.distance), as_numbers(block.observation)
-    proposed = as_numbers(block.planes)
+    proposed, n_paused = as_numbers(block.planes), 0
     for start in range(first, last, LANES):
         filled = min(last - start, LANES)
         for lane in range(LANES):
@@ -98,6 +92,7 @@ def begin(
         for lane in range(filled):
             e = rows[start + lane]
             episodes.status[e] = RUNNING if free >> lane & 1 else PAUSED
+            n_paused += 0 if free >> lane & 1 else 1
             episodes.steps[e] = 0
             episodes.total[e] = 0.0
             episodes.cleared[e] = False
@@ -112,6 +107,7 @@ def begin(
             if path.shape[0] > 0:
                 for joint in range(n_joints):
                     path[e, 0, joint] = q[e, joint]
+    return n_paused
 
 
 @inlined

@@ -253,7 +253,7 @@ def doubted_steps(simulator, starts, actions):
     episodes = simulator.reset(starts, np.tile([0.0, 0.0, 5.0], (len(starts), 1)))
     np.copyto(episodes.stop, 1)
     control = table_control(actions[:, None])
-    advance(0, len(starts), simulator._session(control, episodes))
+    advance(0, len(starts), simulator.world.session(control, episodes))
     paused = episodes.status == PAUSED
     tested = simulator.problem.stepping.tested_configurations
     bits = episodes.doubt[:, None] >> np.arange(tested) & 1
