@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 UNCALLED: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-"""Options of what only kernels call: the way there from Python or C is not compiled."""
+"""Options of what only kernels call: without a way there from Python, which would crash."""
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

@@ -6,6 +6,7 @@ Loops over numbers run over slices from zero on: only then are they compiled to 
 from typing import NamedTuple
 
 import numpy as np
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import helper, inlined
@@ -39,7 +40,7 @@ class Network(NamedTuple):
     turned: Numbers
 
 
-@inlined
+@register_jitable
 def padded(width: int) -> int:
     """The width in whole vectors."""
     return (width + LANES - 1) // LANES * LANES
