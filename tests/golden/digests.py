@@ -7,11 +7,9 @@ Numbers are rounded to 8 decimals, far above what processors and C libraries dif
 
 import hashlib
 import json
-import re
 import sys
 from collections.abc import Iterable
 from dataclasses import replace
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -109,7 +107,7 @@ def ars_digests() -> dict[str, str]:
 
 
 def ppo_digests() -> dict[str, str]:
-    """Three iterations of PPO, which follow torch's kernels: the same on one machine only."""
+    """Three iterations of PPO."""
     from kinarm.policies.ppo.state import PPOState
 
     found = {}
@@ -148,12 +146,6 @@ def oracle_digests() -> dict[str, str]:
     return found
 
 
-def machine() -> str:
-    """What PPO's numbers depend on besides the settings: processor and torch."""
-    models = re.findall(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text())
-    return f"{models[0]}, torch {version('torch')}"
-
-
 def changed(record: dict[str, Any], digests: dict[str, str]) -> list[str]:
     """Names under which a record holds another digest, or none."""
     return [name for name, found in digests.items() if record["digests"].get(name) != found]
@@ -165,22 +157,20 @@ def seal(record: dict[str, Any]) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def renewed(record: dict[str, Any], digests: dict[str, str], where: str) -> dict[str, Any]:
+def renewed(record: dict[str, Any], digests: dict[str, str]) -> dict[str, Any]:
     """A record of the digests; refused if those of the same version change."""
     versions = {"semantics": SEMANTICS, "oracle_semantics": ORACLE_SEMANTICS}
     kept = {name for name, version in versions.items() if record[name] == version}
-    comparable = record["machine"] == where
     refused = [
         name
         for name, recorded in record["digests"].items()
         if digests.get(name) != recorded
         and "semantics" in kept
         and ("oracle_semantics" in kept or not name.startswith("oracle "))
-        and (comparable or not name.startswith("ppo "))
     ]
     if refused:
         raise SystemExit(f"results changed under the same versions {versions}: {refused}; {RAISE}")
-    made = {**versions, "machine": where, "digests": digests}
+    made = {**versions, "digests": digests}
     return {"seal": seal(made), **made}
 
 
@@ -193,6 +183,6 @@ if __name__ == "__main__":
         **ppo_digests(),
     }
     if "--record" in sys.argv:
-        record = renewed(json.loads(RECORDED.read_text()), found, machine())
+        record = renewed(json.loads(RECORDED.read_text()), found)
         RECORDED.write_text(json.dumps(record, indent=1) + "\n")
     sys.stdout.write(json.dumps(found, indent=1) + "\n")
