@@ -64,6 +64,8 @@ class ContactShapes(NamedTuple):
         against it; the first axis that moves it, and the one after the last.
     proxies : ndarray of int, shape (n_pairs, 2, 2)
         Per pair, the bodies that stand for these two: in every step, and where it is close.
+    farthest : ndarray, shape (n_actuated,)
+        Largest entry of each row of ``travel``.
     """
 
     link: NDArray[np.int64]
@@ -78,6 +80,7 @@ class ContactShapes(NamedTuple):
     extents: NDArray[np.float64]
     planes: NDArray[np.int64]
     proxies: NDArray[np.int64]
+    farthest: NDArray[np.float64]
 
     @classmethod
     def build(
@@ -146,6 +149,7 @@ class ContactShapes(NamedTuple):
             ).reshape(-1, 2, 3),
             planes=np.array(planes, dtype=np.int64).reshape(-1, 4),
             proxies=np.array(proxies, dtype=np.int64).reshape(-1, 2, 2),
+            farthest=travel.max(axis=1, initial=0.0),
         )
 
 

@@ -28,41 +28,46 @@ def is_apart(bound: float) -> bool:
 
 
 @inlined
-def bend_step(shapes: ContactShapes, block: Block) -> None:
-    """Fill in the bends of a block's step [m].
+def twist_step(block: Block) -> None:
+    """Fill in how the axes of a block move together in a step.
 
     The second derivative of a point by two axes is no larger than how fast the later one moves
     it, since the earlier one only turns that motion.
     """
-    travel, twist = shapes.travel, block.twist
-    for first in range(travel.shape[0]):
+    n_axes = block.twist.shape[0]
+    for first in range(n_axes):
         before = 0.0 * block.q[0, 0]
-        for axis in range(first, travel.shape[0]):
+        for axis in range(first, n_axes):
             turn = abs(block.target[0, axis] - block.q[0, axis])
-            twist[first, axis] = turn * (turn + 2.0 * before)
+            block.twist[first, axis] = turn * (turn + 2.0 * before)
             before += turn
-    for pair in range(shapes.planes.shape[0]):
-        first, last = shapes.planes[pair, 2], shapes.planes[pair, 3]
-        bend = 0.0 * block.q[0, 0]
-        for axis in range(first, last):
-            bend += twist[first, axis] * travel[axis, pair]
-        block.bend[pair] = bend
+
+
+@inlined
+def bend_of(shapes: ContactShapes, pair: int, block: Block) -> float:
+    """Bend of a pair's heights in a step [m]."""
+    first, last = shapes.planes[pair, 2], shapes.planes[pair, 3]
+    bend = 0.0 * block.q[0, 0]
+    for axis in range(first, last):
+        bend += block.twist[first, axis] * shapes.travel[axis, pair]
+    return bend
 
 
 @inlined
 def prove_step(shapes: ContactShapes, tested: int, poses: Array, block: Block) -> float:
     """Renew the heights of all pairs, and return a bound that shows which steps are free.
 
-    Takes the poses at the target.
+    Takes the poses at the target. One bend, larger than that of any pair, serves for all.
     """
-    bend_step(shapes, block)
-    least = 0.0 * block.bend[0] + 1.0
-    share = 1.0 / tested
+    twist_step(block)
+    bend = 0.0 * block.q[0, 0]
+    for axis in range(block.twist.shape[0]):
+        bend += block.twist[0, axis] * shapes.farthest[axis]
+    bent, least, share = 0.125 * bend, bend + 1.0, 1.0 / tested
     for pair in range(shapes.planes.shape[0]):
         before = block.planes[pair, GAP]
         after = height_above(shapes, pair, EVERYDAY, poses, block.planes, pair)
-        early = before + share * (after - before)
-        bound = min(after, early) - 0.125 * block.bend[pair]
+        bound = min(after, before + share * (after - before)) - bent
         block.height[pair], block.bound[pair], block.planes[pair, GAP] = before, bound, after
         least = min(least, bound)
     return least
@@ -72,31 +77,34 @@ def prove_step(shapes: ContactShapes, tested: int, poses: Array, block: Block) -
 def renew_planes(
     shapes: ContactShapes, tested: int, stale: bool, before: Array, poses: Array, block: Block
 ) -> float:
-    """Give pairs new planes where the step is not proven by those they have; return the bound.
+    """Prove steps by the pairs' own bends, or give these new planes; return the bound.
 
     ``stale`` says of which episodes the step is to be proven. Takes the poses ``before`` the step
     and at the target.
     """
-    least = 0.0 * block.bend[0] + 1.0
+    least = 0.0 * block.q[0, 0] + 1.0
     n_pairs, share = shapes.planes.shape[0], 1.0 / tested
     for pair in range(n_pairs):
         bound = block.bound[pair]
         open_here = stale & ~is_apart(bound)
-        if shapes.planes[pair, 0] != GROUND and any_lane(open_here):
-            propose(shapes, pair, poses, block.planes, n_pairs)
-            at_start = height_above(shapes, pair, EVERYDAY, before, block.planes, n_pairs)
-            at_end = height_above(shapes, pair, EVERYDAY, poses, block.planes, n_pairs)
-            early = at_start + share * (at_end - at_start)
-            renewed = min(at_end, early) - 0.125 * block.bend[pair]
-            better = open_here & (renewed > bound)
-            bound = select(better, renewed, bound)
-            block.bound[pair] = bound
-            block.height[pair] = select(better, at_start, block.height[pair])
-            block.planes[n_pairs, GAP] = at_end
-            for i in range(PLANE):
-                block.planes[pair, i] = select(
-                    better, block.planes[n_pairs, i], block.planes[pair, i]
-                )
+        if any_lane(open_here):
+            bend = bend_of(shapes, pair, block)
+            at_start, at_end = block.height[pair], block.planes[pair, GAP]
+            bound = min(at_end, at_start + share * (at_end - at_start)) - 0.125 * bend
+            open_here = stale & ~is_apart(bound)
+            if shapes.planes[pair, 0] != GROUND and any_lane(open_here):
+                propose(shapes, pair, poses, block.planes, n_pairs)
+                at_start = height_above(shapes, pair, EVERYDAY, before, block.planes, n_pairs)
+                at_end = height_above(shapes, pair, EVERYDAY, poses, block.planes, n_pairs)
+                renewed = min(at_end, at_start + share * (at_end - at_start)) - 0.125 * bend
+                better = open_here & (renewed > bound)
+                bound = select(better, renewed, bound)
+                block.height[pair] = select(better, at_start, block.height[pair])
+                block.planes[n_pairs, GAP] = at_end
+                for i in range(PLANE):
+                    kept, proposed = block.planes[pair, i], block.planes[n_pairs, i]
+                    block.planes[pair, i] = select(better, proposed, kept)
+            block.bend[pair], block.bound[pair] = bend, bound
         least = min(least, bound)
     return least
 
