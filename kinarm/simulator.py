@@ -13,11 +13,11 @@ from kinarm._validation import finite_array
 from kinarm.arm import Arm
 from kinarm.episodes import PAUSED, RUNNING, Control, Episodes
 from kinarm.errors import InvalidInputError, StartInContactError
+from kinarm.judging import judge_steps
 from kinarm.kernels.rollout import (
     advance,
     allow_one_step,
     begin,
-    refuse,
     results_of_step,
 )
 from kinarm.kernels.session import Session
@@ -31,10 +31,6 @@ from kinarm.world import World
 
 PolicyFunction = Callable[[NDArray[np.float64]], ArrayLike]
 """Maps observations, shape (n, n_observations), to actions, shape (n, n_actuated)."""
-
-
-FEW = 4
-"""Up to so many episodes in doubt are judged one by one, which also tells what touches."""
 
 
 class _Stepped(NamedTuple):
@@ -263,7 +259,7 @@ class Simulator:
         StartInContactError
             If a start touches something.
         """
-        self._start(episodes, rows, self._session_of_steps(episodes))
+        self._start(episodes, rows, self._stepped(episodes).session)
 
     def check_scenarios(
         self, starts: ArrayLike, goals: ArrayLike
@@ -292,7 +288,7 @@ class Simulator:
             starts, goals, n_pairs=n_pairs, horizon=self.task.horizon, record=record, shift=shift
         )
         if control is None:
-            session = self._session_of_steps(episodes)
+            session = self._stepped(episodes).session
         else:
             session = self.world.session(control, episodes)
         self._start(episodes, np.arange(len(starts)), session)
@@ -311,19 +307,18 @@ class Simulator:
             raise StartInContactError(index, pair or ("arm", "scene"))
         episodes.status[paused] = RUNNING
 
-    def _session_of_steps(self, episodes: Episodes) -> Session:
-        """A session in which episodes are stepped, bound anew only for others than before."""
+    def _stepped(self, episodes: Episodes) -> _Stepped:
+        """What it takes to step episodes, bound anew only for others than before."""
         if self._last is None or self._last.episodes is not episodes:
             table = np.zeros((len(episodes.status), 1, self.n_actions))
             session = self.world.session(table_control(table), episodes)
             self._last = _Stepped(episodes, table, session)
-        return self._last.session
+        return self._last
 
     def _step(self, episodes: Episodes, actions: NDArray[np.float64]) -> Session:
         """Advance running episodes by one step."""
-        session = self._session_of_steps(episodes)
-        assert self._last is not None
-        self._last.actions[:, 0] = actions
+        _, table, session = self._stepped(episodes)
+        table[:, 0] = actions
         allow_one_step(session)
         self._advance(session, episodes, len(actions))
         return session
@@ -332,42 +327,11 @@ class Simulator:
         """Advance episodes to their stop, asking Coal about every step that is in doubt."""
         while run_rows(advance, len(episodes.status), work, self.threads, session):
             paused = np.flatnonzero(episodes.status == PAUSED)
-            self._judge(session, episodes, paused)
+            self.judged += judge_steps(self.world, session, episodes, paused)
             resumed = paused[episodes.cleared[paused]]
             if resumed.size == 0:
                 return
             work = int((episodes.stop - episodes.steps)[resumed].sum())
-
-    def _judge(self, session: Session, episodes: Episodes, paused: NDArray[np.int64]) -> None:
-        """Let Coal decide the steps in doubt: refuse those that touch, clear the others.
-
-        Configurations are judged in the order of the motion, and not beyond the first contact.
-        """
-        contacts = self.world.contact_model
-        tested = self.world.substeps(episodes.q[paused], episodes.target[paused])
-        doubt = episodes.doubt[paused]
-        refused = np.zeros(paused.size, dtype=bool)
-        episodes.touched[paused] = 0
-        if paused.size <= FEW:
-            for row, (way, bits) in enumerate(zip(tested, doubt.tolist(), strict=True)):
-                for k, configuration in enumerate(way):
-                    if bits >> k & 1:
-                        self.judged += 1
-                        index = contacts.first_in_contact(configuration)
-                        if index is not None:
-                            episodes.touched[paused[row]] = index + 1
-                            refused[row] = True
-                            break
-        else:
-            for k in range(tested.shape[1]):
-                rows = np.flatnonzero((doubt & 1 << k != 0) & ~refused)
-                if rows.size:
-                    refused[rows] = contacts.in_contact(tested[rows, k])
-                    self.judged += rows.size
-        episodes.status[paused[~refused]] = RUNNING
-        episodes.cleared[paused] = ~refused
-        if refused.any():
-            refuse(paused[refused], session)
 
     def _follow(self, policy: PolicyFunction, episodes: Episodes) -> None:
         """Drive episodes to their end with a Python function."""

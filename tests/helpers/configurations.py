@@ -32,3 +32,9 @@ def depths(simulator, configurations):
         pin.computeDistances(model, data, geometry, geometry_data, q)
         found.append(-min(result.min_distance for result in geometry_data.distanceResults))
     return np.array(found)
+
+
+def jittered(configurations, seed):
+    rng = np.random.default_rng(seed)
+    size = 10.0 ** rng.uniform(-10, -2, (len(configurations), 1))
+    return configurations + size * rng.normal(size=configurations.shape)

@@ -5,7 +5,7 @@ import pickle
 import numpy as np
 import pinocchio as pin
 import pytest
-from configurations import contact_boundary, random_configurations
+from configurations import contact_boundary, jittered, random_configurations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from simulators import changed
@@ -44,12 +44,6 @@ def in_contact(simulator, configurations):
             for q in configurations
         ]
     )
-
-
-def jittered(configurations, seed):
-    rng = np.random.default_rng(seed)
-    size = 10.0 ** rng.uniform(-10, -2, (len(configurations), 1))
-    return configurations + size * rng.normal(size=configurations.shape)
 
 
 class TestPairs:

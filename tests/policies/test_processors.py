@@ -1,4 +1,4 @@
-"""ARS comes to the same bits whatever the processor, and whatever is compiled for it, can do."""
+"""Results have the same bits whatever the processor, and whatever is compiled for it, can do."""
 
 import os
 import platform
@@ -12,16 +12,26 @@ pytestmark = pytest.mark.skipif(
     platform.machine() != "x86_64", reason="the instruction sets are x86-64's"
 )
 
-TRAIN_AND_PRINT = """
+COMPUTE_AND_PRINT = """
 import hashlib
 import numpy as np
-from kinarm.policies import train_policy
+from kinarm import Simulator
+from kinarm.policies import Oracle, load_policy, train_policy
 from kinarm.policies.recipes import recipe
+
+def show(*arrays):
+    print(hashlib.sha256(b"".join(np.asarray(array).tobytes() for array in arrays)).hexdigest())
+
+simulator = Simulator("both")
+starts, goals = simulator.sample(np.random.default_rng(0), 64)
+rollouts = simulator.rollout(load_policy("ppo-tuned-both-seed0"), starts, goals, record=True)
+show(starts, goals, rollouts.returns, rollouts.steps, rollouts.paths)
+solutions = Oracle("both").solve_batch(starts[:8], goals[:8])
+show(solutions.steps_lower_bound, solutions.actions, solutions.distance_lower_bound)
 for name, problem in (("paper", "right"), ("tuned", "both")):
     state = train_policy(recipe("ars", name, problem=problem, iterations=10)).state
     curve = np.array([point[:4] for point in state.curve])
-    arrays = (state.theta, state.normalizer.mean, state.normalizer.squares, curve)
-    print(hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest())
+    show(state.theta, state.normalizer.mean, state.normalizer.squares, curve)
 """
 
 CAN = {name for name, present in numpy_core.__cpu_features__.items() if present}
@@ -46,32 +56,32 @@ SLOW = {"plain kernels"}
 
 
 @pytest.fixture(scope="module")
-def trained(tmp_path_factory):
-    """Trains in a process with other environment variables, and returns hashes of the results."""
+def computed(tmp_path_factory):
+    """Computes in a process with other environment variables, and returns hashes of the results."""
 
-    def train(variables):
+    def compute(variables):
         environment = os.environ | variables
         if "NUMBA_CPU_NAME" in variables:
             environment["NUMBA_CACHE_DIR"] = str(tmp_path_factory.mktemp("numba"))
-        command = [sys.executable, "-P", "-c", TRAIN_AND_PRINT]
+        command = [sys.executable, "-P", "-c", COMPUTE_AND_PRINT]
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
         return done.stdout.split()
 
-    return train
+    return compute
 
 
 @pytest.fixture(scope="module")
-def usual(trained):
-    return trained({})
+def usual(computed):
+    return computed({})
 
 
 @pytest.mark.parametrize(
     "machine",
     [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in MACHINES],
 )
-def test_ten_iterations_are_the_same_bits(machine, trained, usual):
+def test_rollouts_bounds_and_trainings_are_the_same_bits(machine, computed, usual):
     variables, needs = MACHINES[machine]
     if needs not in CAN:
         pytest.skip(f"this processor lacks {needs}")
-    assert len(set(usual)) == 2
-    assert trained(variables) == usual
+    assert len(set(usual)) == 4
+    assert computed(variables) == usual
