@@ -8,7 +8,8 @@ import pytest
 from count import RECORDED, changes, counted, read_count
 
 ANEW = "python tests/instructions/count.py --record"
-TOLERANCE = 0.05
+TOLERANCE, INTERPRETED = 0.05, 0.1
+"""How far a section may be off: one of kernels, and one with much of Python, whose builds differ."""
 
 
 @pytest.mark.slow
@@ -16,7 +17,12 @@ TOLERANCE = 0.05
 @pytest.mark.skipif(shutil.which("valgrind") is None, reason="needs valgrind (apt-get install it)")
 def test_instructions_are_those_recorded():
     found = changes(json.loads(RECORDED.read_text()), counted())
-    more = {name: f"{change:+.1%}" for name, change in found.items() if abs(change) > TOLERANCE}
+    allowed = {"batch environment": INTERPRETED}
+    more = {
+        name: f"{change:+.1%}"
+        for name, change in found.items()
+        if abs(change) > allowed.get(name, TOLERANCE)
+    }
     assert not more, f"other numbers of instructions; if that is meant, {ANEW}"
 
 
