@@ -9,7 +9,7 @@ from count import RECORDED, changes, counted, read_count
 
 ANEW = "python tests/instructions/count.py --record"
 TOLERANCE, INTERPRETED = 0.05, 0.1
-"""How far a section may be off: one of kernels, and one with much of Python, whose builds differ."""
+"""How far a section of kernels may be off, and one with much of Python, whose builds differ."""
 
 
 @pytest.mark.slow
