@@ -11,7 +11,7 @@ from sphinx.util.docutils import SphinxDirective
 
 from kinarm import PROBLEMS, REWARD_TERMS, Arm, RewardWeights, Scene, Simulator, arm_names
 from kinarm._fields import init_fields, summary_of
-from kinarm.collision import enclosing_capsule
+from kinarm.capsules import enclosing_capsule
 from kinarm.envs.registration import ENVIRONMENTS
 from kinarm.evaluation import METRICS
 from kinarm.evaluation.commands.bench import BenchmarkRequest
