@@ -62,6 +62,7 @@ nitpick_ignore_regex = [
         r"NDArray|ndarray|np\.\w+",
     ),  # NumPy's, where annotations are kept as they are written
     (r"py:class", r".*\.[A-Z]\w*T"),  # type variables
+    (r"py:class", r"kinarm\.kernels\.session\.Session"),  # what only kernels look into
 ]
 
 sphinx_gallery_conf = {

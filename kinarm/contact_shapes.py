@@ -60,7 +60,7 @@ class ContactShapes(NamedTuple):
     extents : ndarray, shape (n_bodies, 2, 3)
         Lower and upper ends of the corners [m].
     planes : ndarray of int, shape (n_pairs, 4)
-        Per pair: the body that carries the separating plane, or `GROUND`; the body that moves
+        Per pair: the body that carries the separating plane, or ``GROUND``; the body that moves
         against it; the first axis that moves it, and the one after the last.
     proxies : ndarray of int, shape (n_pairs, 2, 2)
         Per pair, the bodies that stand for these two: in every step, and where it is close.

@@ -95,7 +95,7 @@ class Episodes(NamedTuple):
         The step under way was judged free.
     planes : ndarray, shape (n, n_pairs, PLANE)
         Separating plane of each pair and the height above it at ``q``; see
-        `kinarm.kernels.planes`.
+        ``kinarm.kernels.planes``.
     goal : ndarray, shape (n, 3)
         Goal position [m].
     observation : ndarray, shape (n, n_observations)

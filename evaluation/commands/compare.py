@@ -113,7 +113,7 @@ class ComparisonRequest:
         Parameters
         ----------
         executor, command
-            As for `ReproductionRequest.run`.
+            As for ``ReproductionRequest.run``.
 
         Raises
         ------
