@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from typing import Any
 
-PARALLEL_STEPS = 1024
+PARALLEL_STEPS = 8192
 BALANCED_STEPS = 16384
 
 
