@@ -8,7 +8,6 @@ import time
 
 from kinarm.evaluation.bounds import CACHE_VARIABLE
 
-
 RUN_AND_TELL = """
 import resource, subprocess, sys
 run = [sys.executable, "-P", "-m", *sys.argv[1:]]
