@@ -105,15 +105,17 @@ def test_the_evaluation_is_measured(document):
 def test_the_evaluation_is_measured_before_and_after_its_bounds_are_known(monkeypatch, own_cache):
     clock, seen = iter([0.0, 9.0, 10.0, 13.0]), []
 
-    def run(*_, env, **__):
+    def run(command, *, env, **_):
         folder = Path(env["KINARM_CACHE"])
         seen.append((folder, len(list(folder.iterdir()))))
         (folder / "bounds").touch()
+        return subprocess.CompletedProcess(command, 0, stdout=b"204800\n")
 
     monkeypatch.setattr(subprocess, "run", run)
     monkeypatch.setattr(time, "perf_counter", lambda: next(clock))
     figures = measure_evaluation()
     assert (figures["seconds_without_bounds"], figures["seconds"]) == (9, 3)
+    assert figures["peak_memory_mb"] == 200
     ((folder, before), (again, after)) = seen
     assert (folder == again, before, after) == (True, 0, 1)
     assert folder != own_cache
