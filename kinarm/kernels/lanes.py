@@ -117,11 +117,10 @@ def _choose(symbol: str) -> Callable[..., Any]:
 
 def _call(name: str) -> Callable[..., Any]:
     """One of LLVM's functions of a number, for each episode."""
+    form = ir.FunctionType(NUMBERS, [NUMBERS])
 
     def instruction(builder: Any, value: Any) -> Any:
-        suffix = f"v{LANES}f64" if isinstance(value.type, ir.VectorType) else "f64"
-        form = ir.FunctionType(value.type, [value.type])
-        function = builder.module.declare_intrinsic(f"llvm.{name}.{suffix}", (), form)
+        function = builder.module.declare_intrinsic(f"llvm.{name}.v{LANES}f64", (), form)
         return builder.call(function, [value])
 
     return instruction

@@ -18,7 +18,7 @@ from kinarm.chain import Chain
 from kinarm.contact_shapes import ContactShapes
 from kinarm.kernels.compiling import Array, Vector, kernel
 from kinarm.kernels.kinematics import POSE, point_jacobian
-from kinarm.kernels.lanes import LANES, any_lane, as_lanes, lane_bits
+from kinarm.kernels.lanes import LANES, any_lane, as_lanes, as_numbers, lane_bits
 from kinarm.motion_bounds import MotionBounds
 from kinarm.policies.oracle.kernels.box_bound import (
     closest_step,
@@ -38,7 +38,7 @@ from kinarm.policies.oracle.kernels.boxes import (
 )
 from kinarm.policies.oracle.kernels.overlap import ENDS, overlaps
 
-LAYOUT = "6d41ebdc7697"
+LAYOUT = "7de1a56efac0"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 
@@ -91,29 +91,17 @@ def search(
     """
     chain, bounds, shapes = arm
     n, n_joints = lower.shape[0], start.shape[0]
-    numbers = Boxes(
-        lower=np.zeros((n, LANES)),
-        upper=np.zeros((n, LANES)),
-        half=np.zeros((n, LANES)),
-        q=np.zeros((1, n_joints, LANES)),
-        tried=np.zeros((1, n_joints, LANES)),
-        poses=np.zeros((n_joints + 1, POSE, LANES)),
-        between=np.zeros((n_joints + 1, POSE, LANES)),
-        proven=np.zeros((1, LANES)),
-        distance=np.zeros((2, LANES)),
-        share=np.zeros((1, LANES)),
-    )
     block = Boxes(
-        lower=as_lanes(numbers.lower),
-        upper=as_lanes(numbers.upper),
-        half=as_lanes(numbers.half),
-        q=as_lanes(numbers.q),
-        tried=as_lanes(numbers.tried),
-        poses=as_lanes(numbers.poses),
-        between=as_lanes(numbers.between),
-        proven=as_lanes(numbers.proven),
-        distance=as_lanes(numbers.distance),
-        share=as_lanes(numbers.share),
+        lower=as_lanes(np.zeros((n, LANES))),
+        upper=as_lanes(np.zeros((n, LANES))),
+        half=as_lanes(np.zeros((n, LANES))),
+        q=as_lanes(np.zeros((1, n_joints, LANES))),
+        tried=as_lanes(np.zeros((1, n_joints, LANES))),
+        poses=as_lanes(np.zeros((n_joints + 1, POSE, LANES))),
+        between=as_lanes(np.zeros((n_joints + 1, POSE, LANES))),
+        proven=as_lanes(np.zeros((1, LANES))),
+        distance=as_lanes(np.zeros((2, LANES))),
+        share=as_lanes(np.zeros((1, LANES))),
     )
     offset, jacobian = as_lanes(np.zeros((3, LANES))), as_lanes(np.zeros((3, n, LANES)))
     step, scale = as_lanes(np.zeros((n, LANES))), as_lanes(np.zeros((n, LANES)))
@@ -121,7 +109,9 @@ def search(
     bend = as_lanes(np.zeros((n, LANES)))
     ends = as_lanes(np.zeros((shapes.link.shape[0], ENDS, LANES)))
     turns, lever = as_lanes(np.zeros((3, n, LANES))), np.zeros(n)
-    places = (numbers.q, numbers.tried)
+    places = (as_numbers(block.q), as_numbers(block.tried))
+    found, floors = as_numbers(block.distance), as_numbers(block.proven)
+    shares = as_numbers(block.share)
     for i in range(n_joints):
         block.q[0, i] = start[i]
         block.tried[0, i] = start[i]
@@ -143,7 +133,7 @@ def search(
         if steps <= fewest if fewer else closest <= enough:
             break
         count = min(waiting, LANES, budget - examined)
-        take_in(stack, waiting - 1, count, numbers)
+        take_in(stack, waiting - 1, count, block)
         waiting -= count
         examined += count
         narrowest = 0.0 * block.lower[0]
@@ -185,7 +175,7 @@ def search(
         bits = (lane_bits(at_centre), lane_bits(at_step))
         for index in range(2 * count if bits[0] | bits[1] != 0 else 0):
             lane, attempt = index >> 1, index & 1
-            distance = numbers.distance[attempt, lane]
+            distance = found[attempt, lane]
             tried = places[attempt]
             if bits[attempt] >> lane & 1 == 0:
                 continue
@@ -224,19 +214,19 @@ def search(
                 continue
             if excluded >> lane & 1:
                 # Nothing in the box comes closer than this.
-                proven = min(proven, numbers.proven[0, lane])
+                proven = min(proven, floors[0, lane])
                 continue
-            if numbers.share[0, lane] < 1.0:
+            if shares[0, lane] < 1.0:
                 proven = min(proven, cutoff)
-            if numbers.share[0, lane] < 0.5:
-                put_back(stack, waiting, lane, numbers)
+            if shares[0, lane] < 0.5:
+                put_back(stack, waiting, lane, block)
                 waiting += 1
-            elif halve(stack, waiting, lane, lever, numbers):
+            elif halve(stack, waiting, lane, lever, block):
                 waiting += 2
             else:
                 # Such boxes are left where bounds meet what is asked for, or proofs of contact end.
                 undecided = True
-                proven = min(proven, numbers.proven[0, lane])
+                proven = min(proven, floors[0, lane])
     complete = (waiting == 0 and not undecided) or (steps <= fewest if fewer else closest <= enough)
     # Of boxes that still wait, no more is known than of those that they are halves of.
     for i in range(waiting):

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, inlined
+from kinarm.kernels.lanes import as_numbers
 
 WAITING = 4096
 """Boxes that can wait at a time; halving eight until they are too small takes fewer."""
@@ -18,8 +19,8 @@ ROUNDING = 1e-9
 class Boxes(NamedTuple):
     """Work space of a block of boxes of the first n joints.
 
-    Kernels have it twice: as arrays of lanes of the shapes below, and as the numbers behind them,
-    whose arrays have one axis more, that of the boxes.
+    Its arrays are of lanes; `kinarm.kernels.lanes.as_numbers` views them with one axis more, that
+    of the boxes.
 
     Attributes
     ----------
@@ -59,50 +60,57 @@ def within_steps(
 
 
 @inlined
-def take_in(stack: Array, last: int, count: int, numbers: Boxes) -> None:
+def take_in(stack: Array, last: int, count: int, boxes: Boxes) -> None:
     """Put the boxes at the end of the stack into lanes; the last one repeats where there is none.
 
     A row of the ``stack`` holds the corners of a box, and the distance proven of it.
     """
-    n, n_lanes = numbers.lower.shape
+    lower, upper, proven = (
+        as_numbers(boxes.lower),
+        as_numbers(boxes.upper),
+        as_numbers(boxes.proven),
+    )
+    n, n_lanes = lower.shape
     for lane in range(n_lanes):
         row = last - min(lane, count - 1)
         for i in range(n):
-            numbers.lower[i, lane] = stack[row, i]
-            numbers.upper[i, lane] = stack[row, n + i]
-        numbers.proven[0, lane] = stack[row, 2 * n]
+            lower[i, lane] = stack[row, i]
+            upper[i, lane] = stack[row, n + i]
+        proven[0, lane] = stack[row, 2 * n]
 
 
 @inlined
-def put_back(stack: Array, row: int, lane: int, numbers: Boxes) -> None:
+def put_back(stack: Array, row: int, lane: int, boxes: Boxes) -> None:
     """Put a box from a lane into the stack."""
-    n = numbers.lower.shape[0]
+    lower, upper = as_numbers(boxes.lower), as_numbers(boxes.upper)
+    n = lower.shape[0]
     for i in range(n):
-        stack[row, i] = numbers.lower[i, lane]
-        stack[row, n + i] = numbers.upper[i, lane]
-    stack[row, 2 * n] = numbers.proven[0, lane]
+        stack[row, i] = lower[i, lane]
+        stack[row, n + i] = upper[i, lane]
+    stack[row, 2 * n] = as_numbers(boxes.proven)[0, lane]
 
 
 @inlined
-def halve(stack: Array, row: int, lane: int, lever: Array, numbers: Boxes) -> bool:
+def halve(stack: Array, row: int, lane: int, lever: Array, boxes: Boxes) -> bool:
     """Put the halves of a box from a lane into the stack, that with the point tried above.
 
     It is cut across the joint that can move the tool farthest in it. Returns whether it is large
     enough.
     """
-    n = numbers.lower.shape[0]
+    lower, upper = as_numbers(boxes.lower), as_numbers(boxes.upper)
+    n = lower.shape[0]
     widest, farthest = 0, -1.0
     for i in range(n):
-        moved = lever[i] * (numbers.upper[i, lane] - numbers.lower[i, lane])
+        moved = lever[i] * (upper[i, lane] - lower[i, lane])
         if moved > farthest:
             widest, farthest = i, moved
     if farthest < SMALLEST:
         return False
-    middle = 0.5 * (numbers.lower[widest, lane] + numbers.upper[widest, lane])
-    put_back(stack, row, lane, numbers)
-    put_back(stack, row + 1, lane, numbers)
+    middle = 0.5 * (lower[widest, lane] + upper[widest, lane])
+    put_back(stack, row, lane, boxes)
+    put_back(stack, row + 1, lane, boxes)
     # The last box is examined next.
-    near_lower = numbers.tried[0, widest, lane] <= middle
+    near_lower = as_numbers(boxes.tried)[0, widest, lane] <= middle
     above, below = (row, row + 1) if near_lower else (row + 1, row)
     stack[above, widest] = middle
     stack[below, n + widest] = middle

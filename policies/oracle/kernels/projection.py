@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, Vector, inlined, kernel
 from kinarm.kernels.kinematics import POSE, forward_kinematics, point_jacobian, to_world
-from kinarm.kernels.lanes import LANES, any_lane, as_lanes, lane_bits, select
+from kinarm.kernels.lanes import LANES, any_lane, as_lanes, as_numbers, lane_bits, select
 
-LAYOUT = "6e6fef552c4c"
+LAYOUT = "088df799e894"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 ITERATIONS = 24
@@ -25,7 +25,7 @@ LONGEST_STEP = 0.5
 
 
 class Moving(NamedTuple):
-    """Configurations side by side in lanes, as arrays of lanes and as the numbers behind them.
+    """Configurations side by side in lanes.
 
     Attributes
     ----------
@@ -124,24 +124,19 @@ def damped_least_squares(
     """
     prismatic, translation, rotation, axis, tool = chain[:5]
     n_joints, n = configurations.shape[1], lower.shape[1]
-    numbers = Moving(
-        q=np.zeros((1, n_joints, LANES)),
-        lower=np.zeros((n, LANES)),
-        upper=np.zeros((n, LANES)),
-        goal=np.zeros((3, LANES)),
-        radius=np.zeros((1, LANES)),
-        distance=np.zeros((1, LANES)),
-        iteration=np.zeros((1, LANES)),
-    )
     moving = Moving(
-        q=as_lanes(numbers.q),
-        lower=as_lanes(numbers.lower),
-        upper=as_lanes(numbers.upper),
-        goal=as_lanes(numbers.goal),
-        radius=as_lanes(numbers.radius),
-        distance=as_lanes(numbers.distance),
-        iteration=as_lanes(numbers.iteration),
+        q=as_lanes(np.zeros((1, n_joints, LANES))),
+        lower=as_lanes(np.zeros((n, LANES))),
+        upper=as_lanes(np.zeros((n, LANES))),
+        goal=as_lanes(np.zeros((3, LANES))),
+        radius=as_lanes(np.zeros((1, LANES))),
+        distance=as_lanes(np.zeros((1, LANES))),
+        iteration=as_lanes(np.zeros((1, LANES))),
     )
+    # The numbers in the lanes.
+    q, lowest, highest = as_numbers(moving.q), as_numbers(moving.lower), as_numbers(moving.upper)
+    aims, radii = as_numbers(moving.goal), as_numbers(moving.radius)
+    found, iterations = as_numbers(moving.distance), as_numbers(moving.iteration)
     poses = as_lanes(np.zeros((n_joints + 1, POSE, LANES)))
     jacobian, step = as_lanes(np.zeros((3, n, LANES))), as_lanes(np.zeros((n, LANES)))
     rows = np.full(LANES, -1)
@@ -151,14 +146,14 @@ def damped_least_squares(
             if free >> lane & 1 and waiting < last:
                 goal, rows[lane] = owner[waiting], waiting
                 for k in range(n_joints):
-                    numbers.q[0, k, lane] = configurations[waiting, k]
+                    q[0, k, lane] = configurations[waiting, k]
                 for k in range(n):
-                    numbers.lower[k, lane] = lower[goal, k]
-                    numbers.upper[k, lane] = upper[goal, k]
+                    lowest[k, lane] = lower[goal, k]
+                    highest[k, lane] = upper[goal, k]
                 for k in range(3):
-                    numbers.goal[k, lane] = goals[goal, k]
-                numbers.radius[0, lane] = radius[waiting]
-                numbers.iteration[0, lane] = 0.0
+                    aims[k, lane] = goals[goal, k]
+                radii[0, lane] = radius[waiting]
+                iterations[0, lane] = 0.0
                 waiting += 1
                 n_moving += 1
                 free &= ~(1 << lane)
@@ -174,8 +169,8 @@ def damped_least_squares(
         for lane in range(LANES if ended_bits != 0 else 0):
             if ended_bits >> lane & 1:
                 for k in range(n):
-                    configurations[rows[lane], k] = numbers.q[0, k, lane]
-                distances[rows[lane]] = numbers.distance[0, lane]
+                    configurations[rows[lane], k] = q[0, k, lane]
+                distances[rows[lane]] = found[0, lane]
                 n_moving -= 1
         free |= ended_bits
         # Aimed at half the radius, a step that falls short still arrives. What has ended stays.
