@@ -43,34 +43,35 @@ def to_plain(value: Any) -> Any:
     return str(value) if isinstance(value, Path) else value
 
 
-def read_toml(
-    path: Path, what: str, bases: Collection[str], default: str
-) -> tuple[str, dict[str, Any]]:
-    """Read a TOML file whose entry ``base`` names one of some bases that it adds to.
-
-    Returns
-    -------
-    base : str
-        The name, or the default.
-    entries : dict
-        All other entries.
+def read_toml(path: Path, what: str) -> dict[str, Any]:
+    """Read a TOML file.
 
     Raises
     ------
     InvalidInputError
-        If the file cannot be read, is no TOML or names no such base; it is called ``what``.
+        If the file, called ``what``, cannot be read or is no TOML; says where.
     """
     name = str(path)
     try:
-        entries = tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise InvalidInputError(f"cannot read {what} {name!r}: {error.strerror}") from error
     except (ValueError, RecursionError) as error:
         raise InvalidInputError(f"{name}: not a {what} file: {first_line(error)}") from error
+
+
+def take_base(entries: dict[str, Any], where: str, bases: Collection[str], default: str) -> str:
+    """Remove the entry ``base`` of a file, and return it, or the default if there is none.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is none of the bases.
+    """
     base = entries.pop("base", default)
     if not isinstance(base, str) or base not in bases:
-        raise InvalidInputError(f"{name}: base must be one of {', '.join(bases)}, got {base!r}")
-    return base, entries
+        raise InvalidInputError(f"{where}: base must be one of {', '.join(bases)}, got {base!r}")
+    return base
 
 
 def from_plain(kind: type[T], entries: object, where: str, path: str = "") -> T:
@@ -128,6 +129,8 @@ def check_fields(given: Any) -> None:
 
 def _value(hint: Any, entry: Any, where: str, path: str, kind: type) -> Any:
     """Convert a value to what a type hint asks for."""
+    if hint is Any:
+        return entry
     choices = alternatives(hint)
     if isinstance(entry, np.ndarray | np.generic):
         entry = entry.tolist()
@@ -149,7 +152,10 @@ def _value(hint: Any, entry: Any, where: str, path: str, kind: type) -> Any:
                 for number, (part, value) in enumerate(zip(each, entry, strict=True))
             )
     elif origin is dict and isinstance(entry, Mapping):
-        return dict(entry)
+        return {
+            str(key): _value(arguments[1], value, where, f"{path}.{key}", kind)
+            for key, value in entry.items()
+        }
     elif origin is Literal:
         if entry in arguments:
             return entry

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
-from kinarm._fields import check_fields, from_plain, init_fields, read_toml, to_plain
+from kinarm._fields import check_fields, from_plain, init_fields, read_toml, take_base, to_plain
 from kinarm._files import write_text
 from kinarm._validation import whole_number
 from kinarm.arm_specification import ArmSpecification
@@ -301,7 +301,8 @@ def _check_names(what: str, given: Mapping[str, Any], *kinds: type) -> None:
 
 def _read_problem(path: Path) -> ReachProblem:
     """Read a problem file; what it leaves out is that of the problem ``base``."""
-    base, entries = read_toml(path, "problem", PROBLEMS, "right")
+    entries = read_toml(path, "problem")
+    base = take_base(entries, str(path), PROBLEMS, "right")
     given = {"name": path.stem, **entries}
     problem = from_plain(ReachProblem, _merged(to_plain(PROBLEMS[base]), given), str(path))
     return replace(problem, arm=problem.arm.resolved(path.resolve().parent))
