@@ -2,7 +2,6 @@
 
 import hashlib
 import os
-import tempfile
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -12,6 +11,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from kinarm._archive import load_archive, save_archive
+from kinarm._cache import cache_folder
 from kinarm._files import check_folder
 from kinarm.errors import InvalidInputError, OutputError
 from kinarm.evaluation.statistics import Estimate
@@ -19,9 +19,6 @@ from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle import ORACLE_SEMANTICS, Oracle, OracleSolutions, Progress
 from kinarm.policies.provenance import package_versions
 from kinarm.semantics import SEMANTICS
-
-CACHE_VARIABLE = "KINARM_CACHE"
-"""Environment variable that names another cache folder."""
 
 KEPT_FILES, KEPT_BYTES = 200, 256 * 2**20
 """Trial sets whose bounds are kept, and how large their files may be together."""
@@ -65,17 +62,6 @@ def oracle_bounds(trials: TrialSet, on_progress: Progress | None = None) -> Orac
             _save(path, solutions)
         _known[trials] = solutions
     return _known[trials]
-
-
-def cache_folder() -> Path:
-    """Folder for what can be computed anew: ``$KINARM_CACHE``, or kinarm in the user's cache."""
-    chosen, users = os.environ.get(CACHE_VARIABLE), os.environ.get("XDG_CACHE_HOME")
-    if chosen:
-        return Path(chosen)
-    try:
-        return (Path(users) if users else Path.home() / ".cache") / "kinarm"
-    except RuntimeError:  # a user without a home
-        return Path(tempfile.gettempdir()) / "kinarm"
 
 
 @cache

@@ -29,11 +29,18 @@ field_types: Callable[[type], dict[str, Any]] = cache(get_type_hints)
 SCALARS = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
 
 
+OPTIONAL: Mapping[str, Any] = {"optional": True}
+"""Metadata of a field that files and hashes hold only where it is not at its default."""
+
+
 def to_plain(value: Any) -> Any:
-    """Turn a dataclass into what TOML and JSON hold; fields that are None are left out."""
+    """Turn a dataclass into what TOML and JSON hold.
+
+    Fields that are None are left out, and those marked as ``OPTIONAL`` at their default.
+    """
     if is_dataclass(value):
-        given = ((item.name, getattr(value, item.name)) for item in fields(value))
-        return {name: to_plain(entry) for name, entry in given if entry is not None}
+        given = ((item, getattr(value, item.name)) for item in fields(value))
+        return {item.name: to_plain(entry) for item, entry in given if not _omitted(item, entry)}
     if isinstance(value, Mapping):
         return {str(key): to_plain(entry) for key, entry in value.items()}
     if isinstance(value, tuple | list):
@@ -41,6 +48,15 @@ def to_plain(value: Any) -> Any:
     if isinstance(value, np.generic):
         return value.item()
     return str(value) if isinstance(value, Path) else value
+
+
+def _omitted(item: Field[Any], entry: Any) -> bool:
+    """Whether plain values leave a field out."""
+    if entry is None:
+        return True
+    make = item.default_factory
+    default = item.default if make is MISSING else make()
+    return "optional" in item.metadata and bool(entry == default)
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:

@@ -128,14 +128,17 @@ class Arm:
         """Frame whose origin is the tool point."""
         return self.description.tool_frame
 
-    def placed(self, base: pin.SE3) -> Arm:
+    def placed(self, position: ArrayLike, rotation: ArrayLike) -> Arm:
         """The same arm with its base elsewhere.
 
         Parameters
         ----------
-        base : pinocchio.SE3
-            Pose of the base in the world.
+        position : array_like, shape (3,)
+            Origin of the base in the world [m].
+        rotation : array_like, shape (3, 3)
+            Orientation of the base in the world.
         """
+        base = pin.SE3(np.asarray(rotation, dtype=float), np.asarray(position, dtype=float))
         if base.isIdentity(0.0):
             return self
         model, geometry = self.model.copy(), self.geometry.copy()

@@ -1,12 +1,16 @@
 """Pinocchio's model of an arm, and its collision shapes, from a URDF reduced to a chain."""
 
+from pathlib import Path
+from xml.etree import ElementTree
+
+import coal
 import numpy as np
 import pinocchio as pin
 
 from kinarm._files import first_line
 from kinarm._validation import finite_array
 from kinarm.errors import ArmError
-from kinarm.hulls import convex_hull
+from kinarm.hulls import hull_of_mesh
 from kinarm.urdf import Description
 
 
@@ -61,22 +65,35 @@ def build_shapes(description: Description, model: pin.Model) -> pin.GeometryMode
     ArmError
         If a shape cannot be loaded.
     """
-    name = description.path.name
+    name, robot = description.path.name, ElementTree.fromstring(description.text)
+    hulls, declared = {}, 0
+    for link in robot.findall("link"):
+        for number, shape in enumerate(link.findall("collision/geometry")):
+            declared += 1
+            mesh = shape.find("mesh")
+            if mesh is not None:
+                hulls[f"{link.get('name')}_{number}"] = _hull(mesh)
+                shape.remove(mesh)
+                ElementTree.SubElement(shape, "sphere", radius="1")
+    text = ElementTree.tostring(robot, encoding="unicode")
     try:
-        geometry = pin.buildGeomFromUrdfString(
-            model, description.text, pin.GeometryType.COLLISION, package_dirs=[]
-        )
+        geometry = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
     except (ValueError, RuntimeError) as error:
         raise ArmError(
             f"collision shapes of {name} cannot be loaded: {first_line(error)}"
         ) from error
-    if geometry.ngeoms != description.n_shapes:
+    if geometry.ngeoms != declared:
         raise ArmError(
-            f"{name} declares {description.n_shapes} collision shapes but {geometry.ngeoms} were "
-            "read"
+            f"{name} declares {declared} collision shapes but {geometry.ngeoms} were read"
         )
     for shape in geometry.geometryObjects:
-        if hasattr(shape.geometry, "buildConvexHull"):
-            shape.geometry = convex_hull(shape.geometry)
+        if shape.name in hulls:
+            shape.geometry = hulls[shape.name]
         shape.geometry.computeLocalAABB()
     return geometry
+
+
+def _hull(mesh: ElementTree.Element) -> coal.ConvexBase:
+    """Hull of a mesh of a description."""
+    scale = np.array([float(factor) for factor in mesh.get("scale", "1 1 1").split()])
+    return hull_of_mesh(Path(mesh.get("filename", "")), finite_array("scale", scale, (3,)))

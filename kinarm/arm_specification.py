@@ -183,4 +183,3 @@ class ArmFile:
         if file.arm.source.endswith(".toml"):
             raise ArmError(f"{path}: 'arm.source' must be a URDF or a known arm, no arm file")
         return replace(file, arm=file.arm.resolved(path.parent))
-

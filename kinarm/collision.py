@@ -198,7 +198,8 @@ def make_verdicts_reliable(data: pin.GeometryData) -> pin.GeometryData:
 def _add_scene(geometry: pin.GeometryModel, scene: Scene) -> None:
     """Add obstacles, then the ground, to a geometry model."""
     for obstacle in scene.obstacles:
-        placement, box = pin.SE3(np.eye(3), obstacle.centre), coal.Box(*obstacle.size)
+        placement = pin.SE3(obstacle.rotation, obstacle.centre)
+        box = coal.Box(*obstacle.size)
         geometry.addGeometryObject(pin.GeometryObject(obstacle.name, 0, placement, box))
     if scene.ground:
         halfspace = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)

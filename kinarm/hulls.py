@@ -1,11 +1,20 @@
 """Convex hulls of meshes, with few vertices: never smaller than the hull of the mesh."""
 
 import itertools
+from pathlib import Path
 
 import coal
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import HalfspaceIntersection
+
+from kinarm._archive import Arrays
+from kinarm._cache import cached_arrays
+from kinarm._files import first_line
+from kinarm.errors import ArmError
+
+VERSION = 1
+"""To be raised when the same mesh gets another hull."""
 
 MANY_VERTICES = 1000
 """Vertices above which a hull is replaced by a simpler one around it."""
@@ -20,21 +29,43 @@ GRID = 1e-9
 """Normals and offsets are multiples of this [1 and m], so that machines agree on them."""
 
 
-def convex_hull(mesh: coal.BVHModelBase) -> coal.ConvexBase:
-    """Convex hull of a mesh, or a simpler polytope around it where that has many vertices.
+def hull_of_mesh(path: Path, scale: NDArray[np.float64]) -> coal.ConvexBase:
+    """Convex hull of a mesh, or a simpler polytope around it where it has many vertices.
+
+    Its corners are kept in the cache folder.
 
     Parameters
     ----------
-    mesh : coal.BVHModelBase
-        Its vertices count, not its triangles.
+    path : Path
+        File of the mesh; its vertices count, not its triangles.
+    scale : ndarray, shape (3,)
+        Factors along its axes.
+
+    Raises
+    ------
+    ArmError
+        If the file cannot be read as a mesh.
     """
-    mesh.buildConvexHull(True, "Qt")
-    hull = mesh.convex
-    if hull.num_points <= MANY_VERTICES:
-        return hull
+    content = scale.tobytes() + path.read_bytes()
+    corners = cached_arrays("hull", VERSION, content, lambda: _corners(path, scale))["corners"]
+    return _hull(corners)
+
+
+def _corners(path: Path, scale: NDArray[np.float64]) -> Arrays:
+    """Corners of the hull of a mesh, or of the polytope around it."""
+    try:
+        mesh = coal.MeshLoader().load(str(path), scale)
+        mesh.buildConvexHull(True, "Qt")
+    except (ValueError, RuntimeError) as error:
+        raise ArmError(f"mesh {path.name} cannot be loaded: {first_line(error)}") from error
+    corners = np.array(mesh.convex.points())
+    return {"corners": enclosing_corners(corners) if len(corners) > MANY_VERTICES else corners}
+
+
+def _hull(points: NDArray[np.float64]) -> coal.ConvexBase:
+    """Convex hull of points, shape (n, 3)."""
     corners = coal.StdVec_Vec3s()
-    for corner in enclosing_corners(np.array(hull.points())):
-        corners.append(corner)
+    corners.extend(points)
     return coal.Convex.convexHull(corners, True, "Qt")
 
 
@@ -74,16 +105,19 @@ def enclosing_corners(points: NDArray[np.float64]) -> NDArray[np.float64]:
         depths = [known[key][0] for key in keys]
         deepest = int(np.argmax(depths))
         if depths[deepest] <= EXCESS or len(normals) == PLANES:
-            return corners + middle
+            break
         cut = known[keys[deepest]][1]
         normals = np.vstack([normals, cut])
         offsets = np.append(offsets, _support(around, cut[None]))
+    placed: NDArray[np.float64] = corners + middle
+    return placed
 
 
 def _unit(direction: NDArray[np.float64]) -> NDArray[np.float64]:
     """A direction of about length one, on the grid."""
     length = np.sqrt(np.square(direction).sum())
-    return np.round(direction / length / GRID) * GRID
+    unit: NDArray[np.float64] = np.round(direction / length / GRID) * GRID
+    return unit
 
 
 def _support(points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -91,4 +125,5 @@ def _support(points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArr
     # Sums without BLAS: the same on every machine.
     x, y, z = points.T
     reach = [(nx * x + ny * y + nz * z).max() for nx, ny, nz in normals]
-    return np.ceil(np.array(reach) / GRID + 1e-3) * GRID
+    support: NDArray[np.float64] = np.ceil(np.array(reach) / GRID + 1e-3) * GRID
+    return support

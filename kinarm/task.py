@@ -97,7 +97,7 @@ class ReachTask:
         If a number is out of range, or regions and weights do not fit together.
     """
 
-    goal_regions: tuple[str, ...]
+    goal_regions: tuple[str, ...] = ()
     goal_weights: tuple[float, ...] = ()
     tolerance: float = 0.05
     horizon: int = 64
@@ -106,8 +106,6 @@ class ReachTask:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        if not self.goal_regions:
-            raise ProblemError("a task needs at least one goal region")
         if len(set(self.goal_regions)) < len(self.goal_regions):
             raise ProblemError(f"goal_regions names one twice: {', '.join(self.goal_regions)}")
         weights = self.goal_weights

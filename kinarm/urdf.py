@@ -1,8 +1,8 @@
 """Robot descriptions: what of a URDF an arm is made of, as a text that Pinocchio can read.
 
-Of a tree of links, the joints between base and tool are kept. The others, and those that are to be
-held, become fixed where they are held; joints that mimic a held one follow it. Continuous joints get
-a range, and the names of meshes become paths.
+Of a tree of links, the joints between base and tool are kept. The others, and those that are to
+be held, become fixed where they are held; joints that mimic a held one follow it. Continuous joints
+get a range, and the names of meshes become paths.
 """
 
 import math
@@ -37,8 +37,6 @@ class Description(NamedTuple):
         Its text, in which all moving joints are in series, from the base to the tool.
     links : tuple of str
         Names of all links.
-    n_shapes : int
-        Collision shapes that it declares.
     tool_frame : str
         Link whose origin is the tool point.
     held : dict
@@ -50,7 +48,6 @@ class Description(NamedTuple):
     path: Path
     text: str
     links: tuple[str, ...]
-    n_shapes: int
     tool_frame: str
     held: dict[str, float]
     notes: tuple[str, ...]
@@ -161,7 +158,6 @@ def _reduced(
         path=path,
         text=ElementTree.tostring(robot, encoding="unicode"),
         links=tuple(links),
-        n_shapes=len(robot.findall("link/collision")),
         tool_frame=tool,
         held=held,
         notes=notes,

@@ -7,7 +7,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import available_threads, run_rows
 from kinarm._validation import finite_array, whole_number
-from kinarm.arm import Arm
 from kinarm.collision import Contact, ContactModel
 from kinarm.episodes import Control, Episodes, Rules
 from kinarm.kernels.rollout import begin, bind, screen
@@ -44,7 +43,7 @@ class World:
         self.threads = (
             available_threads() if threads is None else whole_number("threads", threads, 1)
         )
-        self.arm = Arm.load(self.problem.arm)
+        self.arm = self.problem.load_arm()
         self.contact_model = ContactModel.build(self.arm, self.problem.scene)
         task, stepping = self.problem.task, self.problem.stepping
         n_tested = stepping.tested_configurations

@@ -14,7 +14,6 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from kinarm._files import write_text
-from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError
 from kinarm.recording import Recording
 from kinarm.viewer.player_data import player_data
@@ -120,7 +119,7 @@ def _check_recordings(recordings: Sequence[Recording], ghosts: Sequence[Recordin
 
 def _page_html(recordings: Sequence[Recording], ghosts: Sequence[Recording]) -> str:
     """Fill the template with Meshcat's viewer, the scene, the trials and the player."""
-    arm = Arm.load(recordings[0].problem.arm)
+    arm = recordings[0].problem.load_arm()
     trials = [[run for run in runs if run is not None] for runs in zip_longest(recordings, ghosts)]
     data = json.dumps(player_data(trials, arm), separators=(",", ":"), sort_keys=True)
     template = Environment(autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True)
