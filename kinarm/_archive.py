@@ -1,4 +1,4 @@
-"""The only reader and writer of ``.npz`` files: a header in JSON and arrays, without pickle."""
+"""The only reader of files with results: ``.npz`` with a header in JSON, without pickle; JSON."""
 
 import json
 import math
@@ -97,6 +97,18 @@ def load_archive(path: str | Path, kind: str, version: int, error: type[KinarmEr
             raise error(f"{name} is not a complete kinarm {kind}: its header is no table")
         skip = ("format", "version", "header")
         return Archive(header, {key: content[key] for key in content if key not in skip})
+
+
+def load_json(path: str | Path, kind: str, error: type[KinarmError]) -> Any:
+    """Read a JSON document.
+
+    Raises
+    ------
+    KinarmError
+        Of the given type, in one line: if the file is missing or no JSON.
+    """
+    with reading(repr(str(path)), kind, error):
+        return json.loads(Path(path).read_text(encoding="utf-8"))
 
 
 def _arrays(file: IO[bytes]) -> dict[str, NDArray[Any]]:

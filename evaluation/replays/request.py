@@ -7,6 +7,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from kinarm._console import open_console
 from kinarm._files import check_output
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
@@ -154,8 +155,6 @@ class ReplayRequest(ProblemOptions):
         return chosen_recordings(self)
 
     def _write(self, report: Callable[[str], object]) -> "ReplayPage":
-        from rich.console import Console
-
         from kinarm.recording import save_recordings
         from kinarm.viewer import replay_page
 
@@ -163,7 +162,7 @@ class ReplayRequest(ProblemOptions):
         check_output(out, overwrite=self.overwrite)
         if self.record is not None:
             check_output(self.record, overwrite=self.overwrite, suffix=".npz")
-        with Console(stderr=True).status("recording; the first run compiles"):
+        with open_console(stderr=True).status("recording; the first run compiles"):
             runs = self.recordings()
             page = replay_page(runs[0], ghosts=runs[1] if len(runs) > 1 else ())
         if self.record is not None:
