@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from kinarm._command_line import Parser, add_options, given_options, run_command
 from kinarm._console import open_console
-from kinarm._files import check_output
+from kinarm._files import check_output, only_writer
 from kinarm.errors import InvalidInputError, KinarmError, PolicyFileError
 from kinarm.policies.learners import (
     Learner,
@@ -87,11 +87,18 @@ class TrainRequest(ProblemOptions):
         KeyboardInterrupt
             If it is interrupted; the checkpoint is then complete, and the message says so.
         """
-        from kinarm.policies.curve import write_curve
-
         path = checkpoint_path(self.out)
         config, state = self._resumed(path) if self.resume else (self._config(path), None)
         check_output(self.out, overwrite=self.overwrite, suffix=".npz")
+        with only_writer(self.out):
+            return self._carry_out(config, state, path)
+
+    def _carry_out(
+        self, config: "TrainingConfig", state: TrainingState | None, path: Path
+    ) -> TrainingResult:
+        """Train, with a checkpoint at a path."""
+        from kinarm.policies.curve import write_curve
+
         options = {} if self.tensorboard is None else {"tensorboard": self.tensorboard}
         training = begin_training(config, **options)
         keeper = CheckpointKeeper(config, path)
