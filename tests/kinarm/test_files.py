@@ -5,6 +5,7 @@ import os
 import signal
 import stat
 import time
+from pathlib import Path
 
 import pytest
 
@@ -103,7 +104,7 @@ class TestWhatIsNoPlainFile:
 
     def test_a_device_stays_a_device(self):
         write_atomically("/dev/null", lambda file: file.write(b"gone"))
-        assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
+        assert Path("/dev/null").is_char_device()
 
     def test_a_pipe_gets_the_content(self, tmp_path):
         pipe = tmp_path / "pipe"
