@@ -65,6 +65,8 @@ def _status(prog: str, command: Callable[[], None]) -> int:
     except OSError as error:
         _discard_output()
         return _report(prog, f"{error.filename or 'standard output'}: {error.strerror}", 1)
+    except MemoryError as error:
+        return _report(prog, f"out of memory: {str(error) or 'no more to be had'}", 1)
     except KeyboardInterrupt as interruption:
         # CPython remembers an interrupt within `exec`, as imports are full of, and would end
         # this process by the signal whatever it returns; it forgets it at the next `exec`.

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from kinarm.viewer import ReplayPage
 
 PAGE = Path("replay.html")
+LAST_PORT = 65535
+
 SMALLEST = {"trials": 1, "worst": 1, "seed": 0, "port": 1}
 ALTERNATIVES = (("policy", "compare"), ("trial", "worst", "collisions"))
 """Fields of which one at most can be given."""
@@ -103,6 +105,8 @@ class ReplayRequest(ProblemOptions):
                 raise InvalidInputError(f"{given[0]} and {given[1]} exclude each other")
         if self.port is not None and not self.live:
             raise InvalidInputError("--port goes with --live")
+        if self.port is not None and self.port > LAST_PORT:
+            raise InvalidInputError(f"port must be at most {LAST_PORT}, got {self.port}")
         self._refuse("--live", NOT_LIVE if self.live else ())
         self._refuse("trials from a file", NOT_FROM_FILE if self.source else ())
         if self.source is not None and self.source.suffix == ".json":

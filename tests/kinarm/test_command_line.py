@@ -275,6 +275,7 @@ class TestCommands:
         [
             ("raise BrokenPipeError", 0, ""),
             ("raise OSError(28, 'No space left', 'bread')", 1, "bake: bread: No space left\n"),
+            ("raise MemoryError('Unable to allocate')", 1, "bake: out of memory: Unable to"),
             ("raise OSError(5, 'Input/output error')", 1, "bake: standard output: Input/output"),
         ],
     )
