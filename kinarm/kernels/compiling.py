@@ -44,13 +44,12 @@ def unit(function: Function) -> Function:
     return _linked(function)
 
 
-def _linked(function: Function, **options: Any) -> Function:
+def _linked(function: Function, **more: Any) -> Function:
     """Compile what only kernels call, with no way there from Python, which would crash."""
-    compiled = njit(
-        error_model="numpy",
-        no_cpython_wrapper=True,
-        no_cfunc_wrapper=True,
-        pipeline_class=HelperCompiler,
-        **options,
-    )(function)
-    return cast("Function", compiled_once(compiled))
+    options: dict[str, Any] = {
+        "error_model": "numpy",
+        "no_cpython_wrapper": True,
+        "no_cfunc_wrapper": True,
+        "pipeline_class": HelperCompiler,
+    }
+    return cast("Function", compiled_once(njit(**options, **more)(function)))

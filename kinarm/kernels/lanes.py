@@ -82,9 +82,9 @@ def _spread(_: Any, builder: Any, given: types.Type, __: types.Type, value: Any)
     return builder.shuffle_vector(first, nothing, places)
 
 
-for _operator, _template in ((operator.getitem, GetItemBuffer), (operator.setitem, SetItemBuffer)):
+for _access, _template in ((operator.getitem, GetItemBuffer), (operator.setitem, SetItemBuffer)):
     # Most of what kernels do is to read and write elements.
-    infer_global(_operator)(type(_template.__name__, (_template,), {"metadata": FIRST}))
+    infer_global(_access)(type(_template.__name__, (_template,), {"metadata": FIRST}))
 
 
 def _is_number(kind: types.Type) -> bool:

@@ -14,7 +14,7 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 
 
-class KernelCompiler(CompilerBase):  # type: ignore[misc]
+class KernelCompiler(CompilerBase):
     """Numba's compiler, without collecting garbage: it keeps nearly all that it makes."""
 
     def define_pipelines(self) -> list[Any]:
@@ -42,7 +42,7 @@ class HelperCompiler(KernelCompiler):
         return super().compile_extra(func)
 
 
-class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc]
+class LinkedLibrary(JITCodeLibrary):
     """Code to be linked into kernels, which never becomes machine code of its own."""
 
     @property

@@ -4,7 +4,8 @@ Numba takes apart every array that Python hands to a kernel, which for short cal
 the call. A session is taken apart once.
 """
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, cast
 
 from numba import types
 from numba.core import cgutils
@@ -35,8 +36,7 @@ class Session(structref.StructRefProxy):
 structref.define_proxy(Session, SessionType, ["chain", "shapes", "rules", "control", "episodes"])
 
 
-@intrinsic
-def parts(_: Any, session: SessionType) -> Any:
+def _parts(_: Any, session: SessionType) -> Any:
     """What a session binds, in the order of its attributes, without counting references.
 
     For helpers, which hold none: a kernel that takes the attributes counts those of every array.
@@ -54,3 +54,7 @@ def parts(_: Any, session: SessionType) -> Any:
         return context.make_tuple(builder, signature.return_type, values)
 
     return types.Tuple(list(fields.values()))(session), code
+
+
+Parts = tuple[Chain, ContactShapes, Rules, Control, Episodes]
+parts = cast("Callable[[Session], Parts]", intrinsic(_parts))

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import Array, kernel
 
-LAYOUT = "ac2c1355e491"
+LAYOUT = "c77b9a713586"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 
