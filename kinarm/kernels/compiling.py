@@ -7,17 +7,22 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from kinarm.kernels.linking import HelperCompiler, KernelCompiler, compiled_once
+
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
-UNCALLED: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-"""Options of what only kernels call: without a way there from Python, which would crash."""
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def kernel(function: Function) -> Function:
     """Compile a function that Python calls, into the disk cache where there can be one."""
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+    options: dict[str, Any] = {
+        "nogil": True,
+        "error_model": "numpy",
+        "no_cfunc_wrapper": True,
+        "pipeline_class": KernelCompiler,
+    }
     try:
         return cast("Function", njit(cache=True, **options)(function))
     except RuntimeError:
@@ -26,21 +31,25 @@ def kernel(function: Function) -> Function:
 
 def inlined(function: Function) -> Function:
     """Compile a helper that allocates nothing: several times faster without reference counts."""
-    options: dict[str, Any] = {
-        "error_model": "numpy",
-        "forceinline": True,
-        "_nrt": False,
-        **UNCALLED,
-    }
-    return cast("Function", njit(**options)(function))
+    return _linked(function, forceinline=True, _nrt=False)
 
 
 def helper(function: Function) -> Function:
     """Compile a long helper that allocates nothing: called, it is compiled only once."""
-    options: dict[str, Any] = {"error_model": "numpy", "_nrt": False, **UNCALLED}
-    return cast("Function", njit(**options)(function))
+    return _linked(function, _nrt=False)
 
 
 def unit(function: Function) -> Function:
     """Compile a function that allocates what it returns, for kernels."""
-    return cast("Function", njit(error_model="numpy", **UNCALLED)(function))
+    return _linked(function)
+
+
+def _linked(function: Function, **more: Any) -> Function:
+    """Compile what only kernels call, with no way there from Python, which would crash."""
+    options: dict[str, Any] = {
+        "error_model": "numpy",
+        "no_cpython_wrapper": True,
+        "no_cfunc_wrapper": True,
+        "pipeline_class": HelperCompiler,
+    }
+    return cast("Function", compiled_once(njit(**options, **more)(function)))

@@ -15,11 +15,16 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 from numba.core.typeconv.castgraph import Conversion
+from numba.core.typing.arraydecl import GetItemBuffer, SetItemBuffer
 from numba.core.typing.templates import AbstractTemplate, Signature, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
 
 LANES = 8
 """Episodes in a value: as many doubles as the widest vector registers hold."""
+
+FIRST = {"target": "cpu"}
+"""Lets Numba try how an operator acts on lanes before how it acts on whatever else: it asks what
+is specific to a target first."""
 
 NUMBERS = ir.VectorType(ir.DoubleType(), LANES)
 BITS = ir.VectorType(ir.IntType(1), LANES)
@@ -77,6 +82,11 @@ def _spread(_: Any, builder: Any, given: types.Type, __: types.Type, value: Any)
     return builder.shuffle_vector(first, nothing, places)
 
 
+for _access, _template in ((operator.getitem, GetItemBuffer), (operator.setitem, SetItemBuffer)):
+    # Most of what kernels do is to read and write elements.
+    infer_global(_access)(type(_template.__name__, (_template,), {"metadata": FIRST}))
+
+
 def _is_number(kind: types.Type) -> bool:
     return kind == lanes or isinstance(kind, types.Float | types.Integer)
 
@@ -91,6 +101,8 @@ def _teach(
     """Let a Python function or operator act on lanes, or on masks, by an instruction."""
 
     class Template(AbstractTemplate):
+        metadata = FIRST
+
         def generic(self, arguments: tuple[types.Type, ...], _: Any) -> Signature | None:
             fits = all(kind == given or (given == lanes and _is_number(kind)) for kind in arguments)
             if len(arguments) == arity and given in arguments and fits:

@@ -26,9 +26,9 @@ from kinarm.kernels.proof import (
     stands_free,
 )
 from kinarm.kernels.reward import add_reward
-from kinarm.kernels.session import Session
+from kinarm.kernels.session import Session, parts
 
-LAYOUT = "69e76db5787f"
+LAYOUT = "7024bf8776e7"
 """Hash of what is compiled in from other files; a test tells when to renew it.
 
 Numba's disk cache notices changes only in this file, so changing this line is what makes it
@@ -47,8 +47,24 @@ def screen(
     proven: NDArray[np.bool_],
 ) -> None:
     """Find the tool points of configurations, shape (n, 3) [m], and which are proven free."""
+    block, alone = work_space(configurations.shape[1], 0, 0, shapes.planes.shape[0], 0, 0, 0, 0)
+    screen_blocks(first, last, chain, shapes, configurations, tools, proven, block, alone)
+
+
+@inlined
+def screen_blocks(
+    first: int,
+    last: int,
+    chain: Chain,
+    shapes: ContactShapes,
+    configurations: Array,
+    tools: Array,
+    proven: NDArray[np.bool_],
+    block: Block,
+    alone: Alone,
+) -> None:
+    """Screen configurations block by block."""
     n_joints, tool = configurations.shape[1], chain.tool
-    block, alone = work_space(n_joints, 0, 0, shapes.planes.shape[0], 0, 0, 0, 0)
     q, points = as_numbers(block.q), as_numbers(block.goal)
     for start in range(first, last, LANES):
         filled = min(last - start, LANES)
@@ -71,11 +87,25 @@ def begin(first: int, last: int, rows: NDArray[np.int64], session: Session) -> i
 
     An episode whose start is not proven contact-free is left paused; returns how many are.
     """
-    chain, shapes, episodes = session.chain, session.shapes, session.episodes
+    n_joints, _, n_observations, n_pairs = sizes(first, last, session)[:4]
+    block, alone = work_space(n_joints, 0, n_observations, n_pairs, 0, 0, 0, 0)
+    return begin_blocks(first, last, rows, session, block, alone)
+
+
+@inlined
+def begin_blocks(
+    first: int,
+    last: int,
+    rows: NDArray[np.int64],
+    session: Session,
+    block: Block,
+    alone: Alone,
+) -> int:
+    """Start episodes block by block."""
+    chain, shapes, _, _, episodes = parts(session)
     q, planes, path = episodes.q, episodes.planes, episodes.path
     n_joints, n_observations = q.shape[1], episodes.observation.shape[1]
     n_pairs = shapes.planes.shape[0]
-    block, alone = work_space(n_joints, 0, n_observations, n_pairs, 0, 0, 0, 0)
     starts, goals = as_numbers(block.q), as_numbers(block.goal)
     distances, observations = as_numbers(block.distance), as_numbers(block.observation)
     proposed, n_paused = as_numbers(block.planes), 0
@@ -137,28 +167,46 @@ def advance(first: int, last: int, session: Session) -> int:
     Each goes on until it ends, reaches its ``stop`` or pauses before a step that is not proven
     free of contact; then the next one takes its place in the block. Returns how many paused.
     """
-    chain, shapes, rules = session.chain, session.shapes, session.rules
-    control, episodes = session.control, session.episodes
-    prismatic, translation, rotation, axes, tool, lower, upper = chain[:7]
-    n_joints, n_actuated = episodes.q.shape[1], rules.step_limit.shape[0]
-    n_observations, n_pairs = episodes.observation.shape[1], shapes.planes.shape[0]
-    shared = shared_policy(first, last, control)
-    own = control.weights.shape[1] if shared < 0 else 0
-    summed = n_observations if episodes.moments.shape[0] > 0 else 0
-    widest = 1
+    block, alone = work_space(*sizes(first, last, session))
+    row = np.full(LANES, -1)
+    return advance_blocks(first, last, session, row, block, alone)
+
+
+@inlined
+def sizes(first: int, last: int, session: Session) -> tuple[int, int, int, int, int, int, int, int]:
+    """What `work_space` takes to advance a range of episodes."""
+    _, shapes, rules, control, episodes = parts(session)
+    n_observations, widest = episodes.observation.shape[1], 1
+    own = control.weights.shape[1] if shared_policy(first, last, control) < 0 else 0
     for layer in range(1, control.layers.shape[0]):
         widest = max(widest, control.layers[layer])
-    block, alone = work_space(
-        n_joints,
-        n_actuated,
+    return (
+        episodes.q.shape[1],
+        rules.step_limit.shape[0],
         n_observations,
-        n_pairs,
+        shapes.planes.shape[0],
         rules.reward.shape[0],
         widest,
         own,
-        summed,
+        n_observations if episodes.moments.shape[0] > 0 else 0,
     )
-    row = np.full(LANES, -1)
+
+
+@inlined
+def advance_blocks(
+    first: int,
+    last: int,
+    session: Session,
+    row: NDArray[np.int64],
+    block: Block,
+    alone: Alone,
+) -> int:
+    """Advance episodes block by block; ``row`` tells which are in the lanes, -1 where none is."""
+    chain, shapes, rules, control, episodes = parts(session)
+    prismatic, translation, rotation, axes, tool, lower, upper = chain[:7]
+    shared = shared_policy(first, last, control)
+    n_joints, n_actuated = episodes.q.shape[1], rules.step_limit.shape[0]
+    n_pairs, summed = shapes.planes.shape[0], block.first.shape[0]
     before, poses = block.before, block.after
     waiting, n_alive, n_paused, changed = first, 0, 0, True
     while True:

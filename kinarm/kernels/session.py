@@ -4,8 +4,14 @@ Numba takes apart every array that Python hands to a kernel, which for short cal
 the call. A session is taken apart once.
 """
 
+from collections.abc import Callable
+from typing import Any, cast
+
 from numba import types
+from numba.core import cgutils
+from numba.core.runtime.context import NRTContext
 from numba.experimental import structref
+from numba.extending import intrinsic
 
 from kinarm.chain import Chain
 from kinarm.contact_shapes import ContactShapes
@@ -28,3 +34,27 @@ class Session(structref.StructRefProxy):
 
 
 structref.define_proxy(Session, SessionType, ["chain", "shapes", "rules", "control", "episodes"])
+
+
+def _parts(_: Any, session: SessionType) -> Any:
+    """What a session binds, in the order of its attributes, without counting references.
+
+    For helpers, which hold none: a kernel that takes the attributes counts those of every array.
+    """
+    fields = session.field_dict
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        data = session.get_data_type()
+        held = cgutils.create_struct_proxy(session)(context, builder, value=arguments[0])
+        place = NRTContext(context, enabled=True).meminfo_data(builder, held.meminfo)
+        kind = context.data_model_manager[data].get_value_type().as_pointer()
+        place = builder.bitcast(place, kind)
+        bound = cgutils.create_struct_proxy(data, kind="data")(context, builder, ref=place)
+        values = [getattr(bound, name) for name in fields]
+        return context.make_tuple(builder, signature.return_type, values)
+
+    return types.Tuple(list(fields.values()))(session), code
+
+
+Parts = tuple[Chain, ContactShapes, Rules, Control, Episodes]
+parts = cast("Callable[[Session], Parts]", intrinsic(_parts))

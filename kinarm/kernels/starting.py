@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import Array, kernel
 
-LAYOUT = "93735432281e"
+LAYOUT = "c77b9a713586"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 

@@ -29,8 +29,9 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm._parallel import run_rows
 from kinarm._validation import finite_array
 from kinarm.motion_bounds import MotionBounds
+from kinarm.policies.oracle.bounding import bound_distance, bound_steps
 from kinarm.policies.oracle.inverse import inverse_kinematics, step_box
-from kinarm.policies.oracle.kernels.approach import ArmInScene, bound_distance, bound_steps
+from kinarm.policies.oracle.kernels.approach import ArmInScene
 from kinarm.policies.oracle.motion_search import MotionSearch
 from kinarm.policies.oracle.solution import OracleSolution, OracleSolutions
 from kinarm.problem import ProblemLike

@@ -12,11 +12,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.contact_shapes import ContactShapes
-from kinarm.kernels.compiling import Array, Vector, kernel
+from kinarm.kernels.compiling import Array, Vector, inlined, kernel
 from kinarm.kernels.kinematics import POSE, point_jacobian
 from kinarm.kernels.lanes import LANES, any_lane, as_lanes, as_numbers, lane_bits
 from kinarm.motion_bounds import MotionBounds
@@ -28,6 +27,7 @@ from kinarm.policies.oracle.kernels.box_bound import (
     trim,
 )
 from kinarm.policies.oracle.kernels.boxes import (
+    MODEL,
     ROUNDING,
     WAITING,
     Boxes,
@@ -38,7 +38,7 @@ from kinarm.policies.oracle.kernels.boxes import (
 )
 from kinarm.policies.oracle.kernels.overlap import ENDS, overlaps
 
-LAYOUT = "f12f90d8c560"
+LAYOUT = "d8011ee3b735"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 
@@ -89,7 +89,6 @@ def search(
     distance, proven : float
         That of the closest configuration found, and a lower bound over the box [m].
     """
-    chain, bounds, shapes = arm
     n, n_joints = lower.shape[0], start.shape[0]
     block = Boxes(
         lower=as_lanes(np.zeros((n, LANES))),
@@ -102,13 +101,56 @@ def search(
         proven=as_lanes(np.zeros((1, LANES))),
         distance=as_lanes(np.zeros((2, LANES))),
         share=as_lanes(np.zeros((1, LANES))),
+        jacobian=as_lanes(np.zeros((3, n, LANES))),
+        turns=as_lanes(np.zeros((3, n, LANES))),
+        model=as_lanes(np.zeros((MODEL, max(n, 3), LANES))),
+        ends=as_lanes(np.zeros((arm.shapes.link.shape[0], ENDS, LANES))),
     )
-    offset, jacobian = as_lanes(np.zeros((3, LANES))), as_lanes(np.zeros((3, n, LANES)))
-    step, scale = as_lanes(np.zeros((n, LANES))), as_lanes(np.zeros((n, LANES)))
-    slope, least = as_lanes(np.zeros((n, LANES))), as_lanes(np.zeros((n, LANES)))
-    bend = as_lanes(np.zeros((n, LANES)))
-    ends = as_lanes(np.zeros((shapes.link.shape[0], ENDS, LANES)))
-    turns, lever = as_lanes(np.zeros((3, n, LANES))), np.zeros(n)
+    return search_lanes(
+        arm,
+        start,
+        goal,
+        step_limit,
+        fewest,
+        most,
+        enough,
+        resolution,
+        contact,
+        budget,
+        lower,
+        upper,
+        best,
+        stack,
+        np.zeros(n),
+        block,
+    )
+
+
+@inlined
+def search_lanes(
+    arm: ArmInScene,
+    start: Array,
+    goal: Vector,
+    step_limit: Array,
+    fewest: int,
+    most: int,
+    enough: float,
+    resolution: float,
+    contact: bool,
+    budget: int,
+    lower: Array,
+    upper: Array,
+    best: Array,
+    stack: Array,
+    lever: Array,
+    block: Boxes,
+) -> tuple[bool, int, float, float]:
+    """Search a box; see `search`, which allocates the block and space for ``lever``, shape (n,)."""
+    chain, bounds, shapes = arm
+    n, n_joints = lower.shape[0], start.shape[0]
+    jacobian, turns, ends, model = block.jacobian, block.turns, block.ends, block.model
+    offset, step, scale = model[0], model[1], model[2]
+    slope, least, bend = model[3], model[4], model[5]
     places = (as_numbers(block.q), as_numbers(block.tried))
     found, floors = as_numbers(block.distance), as_numbers(block.proven)
     shares = as_numbers(block.share)
@@ -232,109 +274,3 @@ def search(
     for i in range(waiting):
         proven = min(proven, stack[i, 2 * n])
     return complete, steps, closest, max(min(proven, closest) - ROUNDING, 0.0)
-
-
-@kernel
-def bound_steps(
-    first: int,
-    last: int,
-    arm: ArmInScene,
-    starts: Array,
-    goals: Array,
-    step_limit: Array,
-    tolerance: float,
-    contact: bool,
-    budget: int,
-    fewest: NDArray[np.int64],
-    most: NDArray[np.int64],
-    lower_bounds: NDArray[np.int64],
-    tight: NDArray[np.bool_],
-    witnesses: Array,
-) -> None:
-    """Prove how many steps it takes at least to bring the tool to goals, for some rows.
-
-    Numbers of steps from ``fewest`` to ``most`` are examined; fewer than ``fewest`` are impossible.
-    Written are ``lower_bounds``, below which no number of steps suffices; whether they are
-    ``tight``, that is, some configuration that counts reaches the goal in so many steps, or none
-    does in ``most``; and such configurations as ``witnesses``. A search may examine as many boxes
-    as are in the budget.
-    """
-    n = step_limit.shape[0]
-    lower, upper, best = np.empty(n), np.empty(n), np.empty(starts.shape[1])
-    stack = np.empty((WAITING, 2 * n + 1))
-    for row in range(first, last):
-        start, goal = starts[row], (goals[row, 0], goals[row, 1], goals[row, 2])
-        few, many, all_at_once = fewest[row], most[row], not contact
-        lower_bounds[row], tight[row] = few, True
-        while few <= many:
-            limit = many if all_at_once else few
-            within_steps(arm.chain, start, step_limit, limit, lower, upper)
-            complete, steps, _, _ = search(
-                arm,
-                start,
-                goal,
-                step_limit,
-                few,
-                limit,
-                tolerance,
-                np.inf,
-                contact,
-                budget,
-                lower,
-                upper,
-                best,
-                stack,
-            )
-            for i in range(best.shape[0] if steps <= limit else 0):
-                witnesses[row, i] = best[i]
-            if complete:
-                few = steps
-            lower_bounds[row], tight[row] = few, complete
-            if steps <= limit if complete else not all_at_once:
-                break
-            # All at once is least work, unless the budget is too small: then each number of steps
-            # has one of its own, up to those that the configuration found takes. Where contact
-            # counts, what is closest to the goal rarely counts, and larger boxes are harder.
-            if all_at_once:
-                many, all_at_once = steps - 1, False
-
-
-@kernel
-def bound_distance(
-    first: int,
-    last: int,
-    arm: ArmInScene,
-    lower: Array,
-    upper: Array,
-    starts: Array,
-    goals: Array,
-    resolution: float,
-    contact: bool,
-    budget: int,
-    distances: Array,
-    configurations: Array,
-) -> None:
-    """Bound from below how close the tool can come to goals, for some rows; see `search`.
-
-    Written are the distances, shape (m, 2), proven and found [m], and the closest configurations
-    found; joints beyond those of the boxes stay as in ``starts``.
-    """
-    n = lower.shape[1]
-    unlimited, stack = np.full(n, np.inf), np.empty((WAITING, 2 * n + 1))
-    for row in range(first, last):
-        _, _, distances[row, 1], distances[row, 0] = search(
-            arm,
-            starts[row],
-            (goals[row, 0], goals[row, 1], goals[row, 2]),
-            unlimited,
-            n,
-            n,
-            0.0,
-            resolution,
-            contact,
-            budget,
-            lower[row],
-            upper[row],
-            configurations[row],
-            stack,
-        )

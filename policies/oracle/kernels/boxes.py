@@ -16,6 +16,10 @@ ROUNDING = 1e-9
 """By how much boxes and distances are enlarged to cover rounding [rad, m]."""
 
 
+MODEL = 6
+"""Rows of `Boxes.model`."""
+
+
 class Boxes(NamedTuple):
     """Work space of a block of boxes of the first n joints.
 
@@ -34,6 +38,13 @@ class Boxes(NamedTuple):
         Distance proven of a box [m], and what is left of it.
     distance : (2,)
         Distances from the goal at the centre and where it is tried [m].
+    jacobian, turns : (3, n)
+        Jacobian of the tool at the centre, and of a point of the arm [m/rad, or m/m].
+    model : (MODEL, n), but at least 3 columns
+        Vector from the goal to the tool, and what `kinarm.policies.oracle.kernels.box_bound` fills
+        in: step, scale, slope, least and bend.
+    ends : (n_shapes, ENDS)
+        Capsules in the world.
     """
 
     lower: Array
@@ -46,6 +57,10 @@ class Boxes(NamedTuple):
     proven: Array
     distance: Array
     share: Array
+    jacobian: Array
+    turns: Array
+    model: Array
+    ends: Array
 
 
 @inlined

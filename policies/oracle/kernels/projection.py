@@ -11,7 +11,7 @@ from kinarm.kernels.compiling import Array, Vector, inlined, kernel
 from kinarm.kernels.kinematics import POSE, forward_kinematics, point_jacobian, to_world
 from kinarm.kernels.lanes import LANES, any_lane, as_lanes, as_numbers, lane_bits, select
 
-LAYOUT = "088df799e894"
+LAYOUT = "9bce2e20329f"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 ITERATIONS = 24
@@ -39,6 +39,12 @@ class Moving(NamedTuple):
         Distance from the goal at which it is left, and where it is [m].
     iteration : (1,)
         Steps so far.
+    poses : (n_joints + 1, POSE)
+        Forward kinematics.
+    jacobian : (3, n)
+        How fast the tool moves per unit speed of each joint [m/rad, or m/m].
+    step : (n,)
+        Where the joints go next [rad or m].
     """
 
     q: Array
@@ -48,6 +54,9 @@ class Moving(NamedTuple):
     radius: Array
     distance: Array
     iteration: Array
+    poses: Array
+    jacobian: Array
+    step: Array
 
 
 @inlined
@@ -122,7 +131,6 @@ def damped_least_squares(
     joints; the others stay) belongs to each, and ``radius`` at which distance it is left [m]. A row
     that has ended makes room in its lane for the next one.
     """
-    prismatic, translation, rotation, axis, tool = chain[:5]
     n_joints, n = configurations.shape[1], lower.shape[1]
     moving = Moving(
         q=as_lanes(np.zeros((1, n_joints, LANES))),
@@ -132,14 +140,49 @@ def damped_least_squares(
         radius=as_lanes(np.zeros((1, LANES))),
         distance=as_lanes(np.zeros((1, LANES))),
         iteration=as_lanes(np.zeros((1, LANES))),
+        poses=as_lanes(np.zeros((n_joints + 1, POSE, LANES))),
+        jacobian=as_lanes(np.zeros((3, n, LANES))),
+        step=as_lanes(np.zeros((n, LANES))),
     )
+    project_lanes(
+        first,
+        last,
+        chain,
+        owner,
+        lower,
+        upper,
+        goals,
+        radius,
+        configurations,
+        distances,
+        moving,
+        np.full(LANES, -1),
+    )
+
+
+@inlined
+def project_lanes(
+    first: int,
+    last: int,
+    chain: Chain,
+    owner: NDArray[np.int64],
+    lower: Array,
+    upper: Array,
+    goals: Array,
+    radius: Array,
+    configurations: Array,
+    distances: Array,
+    moving: Moving,
+    rows: NDArray[np.int64],
+) -> None:
+    """Move configurations; see `damped_least_squares`. ``rows`` tells which are in the lanes."""
+    prismatic, translation, rotation, axis, tool = chain[:5]
+    n_joints, n = configurations.shape[1], lower.shape[1]
+    poses, jacobian, step = moving.poses, moving.jacobian, moving.step
     # The numbers in the lanes.
     q, lowest, highest = as_numbers(moving.q), as_numbers(moving.lower), as_numbers(moving.upper)
     aims, radii = as_numbers(moving.goal), as_numbers(moving.radius)
     found, iterations = as_numbers(moving.distance), as_numbers(moving.iteration)
-    poses = as_lanes(np.zeros((n_joints + 1, POSE, LANES)))
-    jacobian, step = as_lanes(np.zeros((3, n, LANES))), as_lanes(np.zeros((n, LANES)))
-    rows = np.full(LANES, -1)
     waiting, n_moving, free = first, 0, (1 << LANES) - 1
     while True:
         for lane in range(LANES if waiting < last else 0):

@@ -9,8 +9,9 @@ from scipy.optimize import minimize
 
 from kinarm.arm import Arm
 from kinarm.motion_bounds import MotionBounds
+from kinarm.policies.oracle.bounding import bound_distance, bound_steps
 from kinarm.policies.oracle.inverse import project, solve_within, step_box
-from kinarm.policies.oracle.kernels.approach import ArmInScene, bound_distance, bound_steps
+from kinarm.policies.oracle.kernels.approach import ArmInScene
 from kinarm.problem import PROBLEMS
 from kinarm.scene import Obstacle, Scene
 from kinarm.simulator import Simulator

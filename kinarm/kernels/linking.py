@@ -1,0 +1,78 @@
+"""Quicker first compilation: Numba compiles helpers no further than kernels need them.
+
+Numba optimises every function and makes machine code of it, though code of helpers that only
+kernels call reaches these as LLVM code and is optimised once more in there. Here a helper is only
+simplified before it is linked. What this module takes from within Numba is all that kinarm does.
+"""
+
+import gc
+from collections.abc import Callable
+from typing import Any
+
+from numba import types
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+
+
+class KernelCompiler(CompilerBase):
+    """Numba's compiler, without collecting garbage: it keeps nearly all that it makes."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Take the passes that Numba takes."""
+        return [DefaultPassBuilder.define_nopython_pipeline(self.state)]
+
+    def compile_extra(self, func: Callable[..., Any]) -> Any:
+        """Compile a function, and the helpers that it calls."""
+        collects = gc.isenabled()
+        gc.disable()
+        try:
+            return super().compile_extra(func)
+        finally:
+            if collects:
+                gc.enable()
+
+
+class HelperCompiler(KernelCompiler):
+    """Compiles what only kernels call, into a `LinkedLibrary`."""
+
+    def compile_extra(self, func: Callable[..., Any]) -> Any:
+        """Compile a helper, and those that it calls."""
+        codegen = self.state.targetctx.codegen()
+        self.state.library = LinkedLibrary(codegen, func.__qualname__)
+        return super().compile_extra(func)
+
+
+class LinkedLibrary(JITCodeLibrary):
+    """Code to be linked into kernels, which never becomes machine code of its own."""
+
+    @property
+    def codegen(self) -> "LinkedLibrary":
+        """What is told of the environment of the function: nobody, since it has no address."""
+        return self
+
+    def set_env(self, name: str, environment: object) -> None:
+        """Leave the environment alone; Python objects, which it would hold, are not for helpers."""
+
+    def finalize(self) -> None:
+        """Link in what is called, and leave optimisation and machine code to kernels."""
+        for library in dict.fromkeys(self._linking_libraries):
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        self._final_module.verify()
+        self._finalized = True
+
+    def get_pointer_to_function(self, _: str) -> int:
+        """Finalize; there is no machine code to point to."""
+        self._ensure_finalized()
+        return 0
+
+
+def compiled_once(dispatcher: Any) -> Any:
+    """Let a helper be compiled once for all numbers: by itself, Numba does so for each literal."""
+    find = dispatcher.get_call_template
+
+    def get_call_template(arguments: list[Any], keywords: dict[str, Any]) -> Any:
+        named = {name: types.unliteral(kind) for name, kind in keywords.items()}
+        return find([types.unliteral(kind) for kind in arguments], named)
+
+    dispatcher.get_call_template = get_call_template
+    return dispatcher

@@ -1,0 +1,62 @@
+"""Helpers reach kernels as code that is not compiled further than that."""
+
+import gc
+
+import pytest
+from numba.core.errors import TypingError
+
+from kinarm.kernels.compiling import helper, inlined, kernel
+
+
+@inlined
+def double(x):
+    return 2.0 * x
+
+
+@helper
+def doubled_sum(x, n):
+    total = 0.0
+    for _ in range(n):
+        total += double(x)
+    return total
+
+
+@kernel
+def both(x, n):
+    return doubled_sum(x, 3), doubled_sum(x, n)
+
+
+@kernel
+def misspelt(x):
+    return x.missing
+
+
+def test_kernel_calls_what_is_linked():
+    assert both(1.5, 4) == (9.0, 12.0)
+
+
+def test_literals_and_numbers_share_a_helper():
+    both(1.5, 4)
+    assert len(doubled_sum.signatures) == 1
+
+
+def test_helper_has_no_machine_code_of_its_own():
+    both(1.5, 4)
+    (compiled,) = doubled_sum.overloads.values()
+    name = compiled.fndesc.mangled_name
+    engine = compiled.library._codegen._engine
+    assert not engine.is_symbol_defined(name)
+    assert compiled.library.get_pointer_to_function(name) == 0
+    assert engine.is_symbol_defined(both.overloads[both.signatures[0]].fndesc.mangled_name)
+
+
+@pytest.mark.parametrize("collects", [True, False])
+def test_garbage_is_collected_as_before(collects):
+    before = gc.isenabled()
+    (gc.enable if collects else gc.disable)()
+    try:
+        with pytest.raises(TypingError, match="missing"):
+            misspelt(1.0)
+        assert gc.isenabled() == collects
+    finally:
+        (gc.enable if before else gc.disable)()
