@@ -60,7 +60,8 @@ class InverseSolutions:
 
     def of(self, target: int) -> NDArray[np.float64]:
         """Configurations of a target, shape (k, n_joints) [rad or m]; k may be 0."""
-        return self.configurations[self.owner == target]
+        chosen: NDArray[np.float64] = self.configurations[self.owner == target]
+        return chosen
 
 
 def solve(
@@ -186,9 +187,9 @@ def _units(name: str, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _approach(arm: Arm) -> NDArray[np.float64]:
     """Axis of the last joint in its own frame, away from the joint before."""
-    axis, before = arm.chain.axis[-1], arm.model.jointPlacements[arm.n_joints]
-    ahead = float(((before.actInv(np.zeros(3)) - arm.chain.tool) * axis).sum())
-    return np.where(ahead > 0, -axis, axis)
+    axis: NDArray[np.float64] = arm.chain.axis[-1]
+    before = arm.model.jointPlacements[arm.n_joints].actInv(np.zeros(3))
+    return -axis if float(((before - arm.chain.tool) * axis).sum()) > 0 else axis
 
 
 def _moved(arm: Arm, axes: NDArray[np.float64]) -> int:

@@ -130,9 +130,7 @@ class World:
         touching[touching] = self.contact_model.in_contact(q[touching])
         return tools, touching
 
-    def poses(
-        self, configurations: ArrayLike, frame: str | None = None
-    ) -> NDArray[np.float64]:
+    def poses(self, configurations: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
         """Poses of a frame, compiled.
 
         Parameters
@@ -154,9 +152,7 @@ class World:
         run_rows(place_frame, len(q), len(q), self.threads, *arrays)
         return transforms[0] if one else transforms
 
-    def jacobians(
-        self, configurations: ArrayLike, frame: str | None = None
-    ) -> NDArray[np.float64]:
+    def jacobians(self, configurations: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
         """Jacobians of a frame: how it moves per unit speed of each joint, compiled.
 
         Parameters
@@ -186,20 +182,20 @@ class World:
 
         Parameters
         ----------
-        configurations : array_like, shape (n_joints,) or (n, n_joints)
-            Joint positions [rad or m].
+        configurations : array_like
+            As for `poses`.
         """
         q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
         found = self._closeness.measure(q, self.threads)
         return Clearance(*(each[0] for each in found)) if one else found
 
     def in_contact(self, configurations: ArrayLike) -> NDArray[np.bool_]:
-        """Tell which configurations touch something, shape (n,), as Coal judges.
+        """Tell which configurations touch something, shape () or (n,); Coal is the judge.
 
         Parameters
         ----------
-        configurations : array_like, shape (n_joints,) or (n, n_joints)
-            Joint positions [rad or m].
+        configurations : array_like
+            As for `poses`.
         """
         q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
         touching = self.screen(q)[1]
@@ -221,7 +217,7 @@ class World:
         )
 
     def contact(self, configuration: ArrayLike, target: ArrayLike | None = None) -> Contact | None:
-        """Describe the contact of a configuration, or the first one on the way of a step.
+        """Describe the contact of a configuration, or the first on a step's way; None without one.
 
         Parameters
         ----------
@@ -229,11 +225,6 @@ class World:
             Where the arm is, or the step begins [rad or m].
         target : array_like, shape (n_joints,), optional
             Where the step ends [rad or m].
-
-        Returns
-        -------
-        Contact or None
-            None if nothing touches.
         """
         q = finite_array("configuration", configuration, (self.arm.n_joints,))
         if target is None:
@@ -272,11 +263,10 @@ class World:
         """Find all configurations within the limits that bring the tool to positions or poses.
 
         Seeds all over the joints' ranges are moved by damped Newton steps, to an error of 1e-10
-        of the arm's reach and 1e-10 rad. Solutions are *isolated* if what is wanted has as many
-        coordinates (3 of a position, 5 with a direction, 6 of a pose) as joints are moved: then
-        each is found once, and the search ends when several seeds have arrived at each. With more
-        joints there is a continuum of solutions, over which those found are spread; so it is at
-        singular configurations. The result for a target depends on nothing else.
+        of the arm's reach and 1e-10 rad. Solutions are *isolated* if no more joints are moved than
+        what is wanted has coordinates: 3 of a position, 5 with a direction, 6 of a pose. Then each
+        is given once. Else, and at singular configurations, there is a continuum of solutions, over
+        which those given are spread. The result for a target depends on nothing else.
 
         Parameters
         ----------

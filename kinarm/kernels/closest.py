@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, Vector, helper, inlined, kernel
 from kinarm.kernels.kinematics import POSE, forward_kinematics, to_world
-from kinarm.kernels.planes import rotated, rotated_back
+from kinarm.kernels.planes import rotated_back
 from kinarm.kernels.simplex import of_segment, of_triangle, shrink
 
 LAYOUT = "604fb66daf87"

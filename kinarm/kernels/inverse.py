@@ -16,7 +16,7 @@ from kinarm.kernels.compiling import Array, Vector, helper, inlined, kernel
 from kinarm.kernels.elementary import nearest_whole
 from kinarm.kernels.jacobian import spatial_jacobian
 from kinarm.kernels.kinematics import POSE, forward_kinematics, to_world
-from kinarm.kernels.lanes import LANES, as_lanes, as_numbers, lane_bits, select
+from kinarm.kernels.lanes import LANES, as_lanes, as_numbers, lane_bits
 from kinarm.kernels.limits import take_out_blocked, take_step
 from kinarm.kernels.planes import rotated
 
@@ -29,11 +29,17 @@ PRECISION = 1e-10
 ITERATIONS = 48
 """Steps after which a seed is given up."""
 
+PATIENCE, PROGRESS = 20, 0.98
+"""Steps after which a seed is given up whose squared error shrinks no further than to a share."""
+
 DAMPING, LEAST_DAMPING = 0.1, 1e-12
 """Of the squared error, what is added to the diagonal of J J^T; and what is added at least."""
 
 HITS = 3
 """Seeds that have to arrive at each solution before the search for isolated ones ends."""
+
+ROUNDING = 1e-9
+"""By how much a solution may lie beyond a limit, to which it is then moved [rad or m]."""
 
 TURN = 6.28318530717958647693
 
@@ -69,9 +75,7 @@ class Search(NamedTuple):
 
 
 @inlined
-def orientation_error(
-    axes: Array, poses: Array, wanted: Array, jacobian: Array
-) -> Vector:
+def orientation_error(axes: Array, poses: Array, wanted: Array, jacobian: Array) -> Vector:
     """Vector about which the tool has to turn, as long as the angle where that is small [rad].
 
     With one axis, the Jacobian's last three rows lose what turns the tool about it.
@@ -150,6 +154,7 @@ def keep_new(
     q: Array,
     lane: int,
     search: Search,
+    prismatic: NDArray[np.bool_],
     lower: Array,
     upper: Array,
     configurations: Array,
@@ -160,21 +165,25 @@ def keep_new(
 
     Returns how many there are.
     """
-    n_joints, n = configurations.shape[1], lower.shape[0]
-    for k in range(n_joints):
+    n = lower.shape[0]
+    for k in range(configurations.shape[1]):
         value = q[0, k, lane]
         if k < n:
-            if upper[k] - lower[k] >= TURN:
-                value -= TURN * nearest_whole((value - search.near[k]) / TURN)
-                value -= TURN if value > upper[k] else 0.0
-                value += TURN if value < lower[k] else 0.0
-            elif value > upper[k] or value < lower[k]:
+            if not prismatic[k]:
+                endless = upper[k] - lower[k] >= TURN
+                about = search.near[k] if endless else 0.5 * (lower[k] + upper[k])
+                value -= TURN * nearest_whole((value - about) / TURN)
+                if endless:
+                    value -= TURN if value > upper[k] else 0.0
+                    value += TURN if value < lower[k] else 0.0
+            if value > upper[k] + ROUNDING or value < lower[k] - ROUNDING:
                 return found
+            value = min(max(value, lower[k]), upper[k])
         configurations[found, k] = value
     for other in range(found):
         apart = 0.0
         for k in range(n):
-            turns = upper[k] - lower[k] >= TURN
+            turns = not prismatic[k] and upper[k] - lower[k] >= TURN
             here, there = configurations[found, k], configurations[other, k]
             apart = max(apart, difference(here, there, turns))
         if apart <= search.separation:
@@ -199,8 +208,8 @@ def solve_targets(
 
     ``positions`` has the shape (n_targets, 3) [m], and ``directions``, of the tool's axes,
     (n_targets, n_axes, 3). Of each target, the ``counts`` first rows of ``configurations``, shape
-    (n_targets, most + 1, n_joints), are filled in. A joint that can make a whole turn has each solution
-    once, the one nearest to ``search.near``.
+    (n_targets, most + 1, n_joints), are filled in. Of solutions that differ by whole turns, the one
+    nearest to ``search.near`` is given.
     """
     prismatic, translation, rotation, axis = chain[:4]
     n_joints, (n_seeds, n) = configurations.shape[2], search.seeds.shape
@@ -210,14 +219,15 @@ def solve_targets(
     aim, wanted = as_lanes(np.zeros((3, LANES))), as_lanes(np.zeros((n_axes, 3, LANES)))
     iteration, error = as_lanes(np.zeros((1, LANES))), as_lanes(np.zeros((rows, LANES)))
     jacobian, step = as_lanes(np.zeros((rows, n, LANES))), as_lanes(np.zeros((n, LANES)))
-    square = as_lanes(np.zeros((rows + 1, rows, LANES)))
+    square, before = as_lanes(np.zeros((rows + 1, rows, LANES))), as_lanes(np.zeros((1, LANES)))
     poses = as_lanes(np.zeros((n_joints + 1, POSE, LANES)))
     numbers, iterations = as_numbers(q), as_numbers(iteration)
     lower, upper = chain.lower[:n], chain.upper[:n]
     lowest, highest = np.empty(n), np.empty(n)
     for k in range(n):
-        endless = not prismatic[k] and upper[k] - lower[k] >= TURN
-        lowest[k], highest[k] = (-math.inf, math.inf) if endless else (lower[k], upper[k])
+        # Solutions of a continuum are sought within the limits, isolated ones wherever they are.
+        turns = not prismatic[k] and (search.least > 0 or upper[k] - lower[k] >= TURN)
+        lowest[k], highest[k] = (-math.inf, math.inf) if turns else (lower[k], upper[k])
     hits = np.zeros(most + 1, dtype=np.int64)
     everything = (1 << LANES) - 1
     for target in range(first, last):
@@ -258,15 +268,24 @@ def solve_targets(
             while blocked:
                 damped_step(jacobian, error, damping, square, step)
                 blocked = take_out_blocked(q, lowest, highest, step, jacobian)
-            ended = arrived | (iteration[0] >= ITERATIONS)
+            stuck = (iteration[0] >= PATIENCE) & (squared > PROGRESS * before[0])
+            ended = arrived | stuck | (iteration[0] >= ITERATIONS)
+            before[0] = squared
             ended_bits, arrived_bits = lane_bits(ended) & ~free, lane_bits(arrived) & ~free
             for lane in range(LANES if ended_bits != 0 else 0):
                 if ended_bits >> lane & 1:
                     tried, n_moving = tried + 1, n_moving - 1
                     if arrived_bits >> lane & 1 and found < most:
                         found = keep_new(
-                            numbers, lane, search, lower, upper,
-                            configurations[target], hits, found,
+                            numbers,
+                            lane,
+                            search,
+                            prismatic,
+                            lower,
+                            upper,
+                            configurations[target],
+                            hits,
+                            found,
                         )
             free |= ended_bits
             if found == most:

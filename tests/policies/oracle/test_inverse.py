@@ -9,11 +9,12 @@ from scipy.stats import qmc
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError
 from kinarm.policies import inverse_kinematics
-from kinarm.policies.oracle.inverse import evenly_spread, project, solve_within, step_box
+from kinarm.policies.oracle.inverse import project, solve_within, step_box
 from kinarm.policies.oracle.kernels.projection import damped_least_squares
 from kinarm.policies.oracle.motion import steps_between
 from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
+from kinarm.spread import evenly_spread
 
 SHIPPED = ("lrmate200ic_5l", "paper", "paper_flange")
 
