@@ -26,6 +26,12 @@ simulator = Simulator("both")
 starts, goals = simulator.sample(np.random.default_rng(0), 64)
 rollouts = simulator.rollout(load_policy("ppo-tuned-both-seed0"), starts, goals, record=True)
 show(starts, goals, rollouts.returns, rollouts.steps, rollouts.paths)
+world = simulator.world
+poses = world.poses(starts)
+pointing = world.inverse_kinematics(poses[:, :3, 3], [0, 0, -1])
+solutions = world.inverse_kinematics(poses)
+show(poses, world.jacobians(starts), solutions.configurations, pointing.configurations)
+show(*world.clearance(starts)[::2])
 solutions = Oracle("both").solve_batch(starts[:8], goals[:8])
 show(solutions.steps_lower_bound, solutions.actions, solutions.distance_lower_bound)
 for name, problem in (("paper", "right"), ("tuned", "both")):
