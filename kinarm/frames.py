@@ -53,6 +53,8 @@ class Frames:
         tool_id = arm.model.getFrameId(arm.tool_frame, pin.FrameType.BODY)
         self.tool = _frame(arm.model.frames[tool_id])
         self.tool.placement[:3, 3] = arm.chain.tool
+        for frame in (self.tool, *self._named.values()):
+            frame.placement.flags.writeable = False
 
     @property
     def names(self) -> tuple[str, ...]:

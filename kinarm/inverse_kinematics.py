@@ -152,7 +152,8 @@ def _targets(
     else:
         given = _units("tool_axis", finite_array("tool_axis", tool_axis, (3,))[None])
         axis = (tool.placement[:3, :3] * given).sum(axis=1)
-    return positions, np.ascontiguousarray(along[:, None]), axis[None]
+    # Copied, they can be written to like the others: kernels are not compiled once more for them.
+    return positions, np.array(along[:, None], order="C"), np.array(axis[None])
 
 
 def _are_poses(targets: ArrayLike) -> bool:

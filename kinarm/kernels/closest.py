@@ -149,7 +149,8 @@ def between(
         weights = (here, there, 0.0)
     elif size == 3:
         weights = of_triangle(simplex, 0, 1, 2)
-    points[:] = 0.0
+    for k in range(3):
+        points[0, k], points[1, k] = 0.0, 0.0
     for i in range(size):
         number = 0
         while (
@@ -211,6 +212,8 @@ def closest_pairs(
             known[pair], bounds[row, pair] = True, distance
             if distance < shortest:
                 shortest = distance
-                points[row] = found
+                for side in range(2):
+                    for k in range(3):
+                        points[row, side, k] = found[side, k]
         exact = bodies.exact[one] and bodies.exact[other] and shortest > -math.inf
         nearest[row] = pair if exact else -1
