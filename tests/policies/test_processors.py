@@ -29,8 +29,8 @@ show(starts, goals, rollouts.returns, rollouts.steps, rollouts.paths)
 world = simulator.world
 poses = world.poses(starts)
 pointing = world.inverse_kinematics(poses[:, :3, 3], [0, 0, -1])
-solutions = world.inverse_kinematics(poses)
-show(poses, world.jacobians(starts), solutions.configurations, pointing.configurations)
+posed = world.inverse_kinematics(poses)
+show(poses, world.jacobians(starts), posed.configurations, pointing.configurations)
 show(*world.clearance(starts)[::2])
 solutions = Oracle("both").solve_batch(starts[:8], goals[:8])
 show(solutions.steps_lower_bound, solutions.actions, solutions.distance_lower_bound)
@@ -89,5 +89,5 @@ def test_rollouts_bounds_and_trainings_are_the_same_bits(machine, computed, usua
     variables, needs = MACHINES[machine]
     if needs not in CAN:
         pytest.skip(f"this processor lacks {needs}")
-    assert len(set(usual)) == 4
+    assert len(set(usual)) == 6
     assert computed(variables) == usual
