@@ -1,6 +1,8 @@
 from .arm import Arm as Arm
 from .arm_specification import ArmSpecification as ArmSpecification
 from .arm_specification import arm_names as arm_names
+from .clearance import Clearance as Clearance
+from .collision import Contact as Contact
 from .envs import ReachEnv as ReachEnv
 from .envs import ReachGoalEnv as ReachGoalEnv
 from .envs import ReachGoalVectorEnv as ReachGoalVectorEnv
@@ -16,9 +18,11 @@ from .errors import RecordingFileError as RecordingFileError
 from .errors import StartInContactError as StartInContactError
 from .errors import UnknownNameError as UnknownNameError
 from .errors import WorkerError as WorkerError
+from .inverse_kinematics import InverseSolutions as InverseSolutions
 from .networks import CompiledPolicy as CompiledPolicy
 from .networks import Mirror as Mirror
 from .networks import Networks as Networks
+from .paths import record_path as record_path
 from .problem import PROBLEMS as PROBLEMS
 from .problem import ReachProblem as ReachProblem
 from .problem import Stepping as Stepping

@@ -33,6 +33,25 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> 
     return array
 
 
+def one_or_many(
+    name: str, value: ArrayLike, shape: tuple[int, ...]
+) -> tuple[NDArray[np.float64], bool]:
+    """Copy one item of a shape, or n of them, into an array of n; and whether it was one.
+
+    Raises
+    ------
+    InvalidInputError
+        As `finite_array` does.
+    """
+    try:
+        one = np.ndim(value) == len(shape)
+    except ValueError:
+        one = False
+    if one:
+        return finite_array(name, value, shape)[None], True
+    return finite_array(name, value, (None, *shape)), False
+
+
 def _matches(actual: tuple[int, ...], expected: tuple[int | None, ...]) -> bool:
     """Whether a shape is the expected one, in which None stands for any length."""
     return len(actual) == len(expected) and all(

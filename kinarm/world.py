@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import available_threads, run_rows
-from kinarm._validation import finite_array, whole_number
+from kinarm._validation import finite_array, one_or_many, whole_number
+from kinarm.clearance import Clearance, Closeness
 from kinarm.collision import Contact, ContactModel
 from kinarm.episodes import Control, Episodes, Rules
 from kinarm.errors import ProblemError
+from kinarm.frames import Frames
+from kinarm.inverse_kinematics import InverseSolutions, solve
+from kinarm.kernels.frames import move_frame, place_frame
 from kinarm.kernels.rollout import begin, bind, screen
 from kinarm.kernels.session import Session
 from kinarm.networks import table_control
@@ -72,6 +78,11 @@ class World:
     def __repr__(self) -> str:
         return f"World({self.problem!r})"
 
+    @cached_property
+    def frames(self) -> Frames:
+        """Frames that `poses` and `jacobians` know; ``frames.names`` lists them."""
+        return Frames(self.arm)
+
     @property
     def n_observations(self) -> int:
         """Length of an observation."""
@@ -131,30 +142,187 @@ class World:
         touching[touching] = self.contact_model.in_contact(q[touching])
         return tools, touching
 
-    def contact(self, configuration: ArrayLike, target: ArrayLike) -> Contact | None:
-        """Describe the first contact on the way of a step, or return None.
+    def poses(self, configurations: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
+        """Poses of a frame, compiled.
 
         Parameters
         ----------
-        configuration, target : array_like, shape (n_joints,)
-            Ends of the step [rad or m].
+        configurations : array_like, shape (n_joints,) or (n, n_joints)
+            Joint positions [rad or m].
+        frame : str, optional
+            Name of a joint or link; the tool, its origin in the tool point, by default.
+
+        Returns
+        -------
+        ndarray, shape (4, 4) or (n, 4, 4)
+            Homogeneous transforms from the frame to the world [m].
+        """
+        q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
+        joint, placement = self.frames[frame]
+        transforms = np.empty((len(q), 4, 4))
+        arrays = (self.arm.chain, joint, placement, q, transforms)
+        run_rows(place_frame, len(q), len(q), self.threads, *arrays)
+        return transforms[0] if one else transforms
+
+    def jacobians(self, configurations: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
+        """Jacobians of a frame: how it moves per unit speed of each joint, compiled.
+
+        Parameters
+        ----------
+        configurations, frame
+            As for `poses`.
+
+        Returns
+        -------
+        ndarray, shape (6, n_joints) or (n, 6, n_joints)
+            Velocity of the frame's origin, then angular velocity, along the world's axes
+            [m/rad and rad/rad; m/m and 0 of a joint that slides].
+        """
+        q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
+        joint, placement = self.frames[frame]
+        jacobians = np.zeros((len(q), 6, self.arm.n_joints))
+        arrays = (self.arm.chain, joint, placement, q, jacobians)
+        run_rows(move_frame, len(q), len(q), self.threads, *arrays)
+        return jacobians[0] if one else jacobians
+
+    def clearance(self, configurations: ArrayLike) -> Clearance:
+        """Measure how far the closest of the tested pairs is apart, and where.
+
+        Distances of capsules, spheres, boxes, convex hulls and the ground are compiled, to within
+        1e-10 m. Coal measures where a cylinder may be closest, and where shapes overlap: capsules
+        and spheres deeper than their radii, others at all.
+
+        Parameters
+        ----------
+        configurations : array_like
+            As for `poses`.
+        """
+        q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
+        found = self._closeness.measure(q, self.threads)
+        return Clearance(*(each[0] for each in found)) if one else found
+
+    def in_contact(self, configurations: ArrayLike) -> NDArray[np.bool_]:
+        """Tell which configurations touch something, shape () or (n,); Coal is the judge.
+
+        Parameters
+        ----------
+        configurations : array_like
+            As for `poses`.
+        """
+        q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
+        touching = self.screen(q)[1]
+        return touching[0] if one else touching
+
+    def contact_pairs(self, configurations: ArrayLike) -> tuple[tuple[str, str] | None, ...]:
+        """Name the first tested pair that touches, per configuration; None where nothing does.
+
+        Parameters
+        ----------
+        configurations : array_like, shape (n, n_joints)
+            Joint positions [rad or m].
+        """
+        q = finite_array("configurations", configurations, (None, self.arm.n_joints))
+        judge, touching = self.contact_model, self.in_contact(q)
+        return tuple(
+            judge.contact_pair(each) if touches else None
+            for each, touches in zip(q, touching, strict=True)
+        )
+
+    def contact(self, configuration: ArrayLike, target: ArrayLike | None = None) -> Contact | None:
+        """Describe the contact of a configuration, or the first on a step's way; None without one.
+
+        Parameters
+        ----------
+        configuration : array_like, shape (n_joints,)
+            Where the arm is, or the step begins [rad or m].
+        target : array_like, shape (n_joints,), optional
+            Where the step ends [rad or m].
         """
         q = finite_array("configuration", configuration, (self.arm.n_joints,))
+        if target is None:
+            return self.contact_model.contact(q)
         aim = finite_array("target", target, (self.arm.n_joints,))
         tested = self.substeps(q[None], aim[None])[0]
         touching = np.flatnonzero(self.contact_model.in_contact(tested))
         return self.contact_model.contact(tested[touching[0]]) if touching.size else None
 
-    def contact_pair(self, configuration: ArrayLike, target: ArrayLike) -> tuple[str, str] | None:
-        """Name the first two bodies that touch on the way of a step, or None.
+    def contact_pair(
+        self, configuration: ArrayLike, target: ArrayLike | None = None
+    ) -> tuple[str, str] | None:
+        """Name the two bodies of what `contact` describes, or None.
 
         Parameters
         ----------
-        configuration, target : array_like, shape (n_joints,)
-            Ends of the step [rad or m].
+        configuration, target : array_like
+            As for `contact`.
         """
         contact = self.contact(configuration, target)
         return contact.pair if contact else None
+
+    def inverse_kinematics(
+        self,
+        targets: ArrayLike,
+        directions: ArrayLike | None = None,
+        *,
+        near: ArrayLike | None = None,
+        free: bool = False,
+        tool_axis: ArrayLike | None = None,
+        joints: int | None = None,
+        turns: bool = False,
+        most: int = 64,
+        separation: float | None = None,
+    ) -> InverseSolutions:
+        """Find all configurations within the limits that bring the tool to positions or poses.
+
+        Seeds all over the joints' ranges are moved by damped Newton steps, to an error of 1e-10
+        of the arm's reach and 1e-10 rad. Solutions are *isolated* if no more joints are moved than
+        what is wanted has coordinates: 3 of a position, 5 with a direction, 6 of a pose. Then each
+        is given once. Else, and at singular configurations, there is a continuum of solutions, over
+        which those given are spread. The result for a target depends on nothing else.
+
+        Parameters
+        ----------
+        targets : array_like, shape (3,), (n, 3), (4, 4) or (n, 4, 4)
+            Positions of the tool point [m], or poses of the tool as `poses` gives them.
+        directions : array_like, shape (3,) or (n, 3), optional
+            Where the tool's axis is to point at these positions.
+        near : array_like, shape (n_joints,), optional
+            Solutions nearest to it come first, and of those that differ by whole turns the nearest
+            is meant. Joints that are not moved rest there. Home by default [rad or m].
+        free : bool
+            Keep only what touches nothing.
+        tool_axis : array_like, shape (3,), optional
+            The tool's axis, in the tool frame; along the last joint's axis and away from the joint
+            before, by default.
+        joints : int, optional
+            How many joints are moved, counted from the base. By default those that actions move,
+            if positions are wanted, else all that matter.
+        turns : bool
+            Give solutions that differ by whole turns one by one.
+        most : int
+            Solutions of a target that are looked for, contact and whole turns apart.
+        separation : float, optional
+            Least difference of two solutions in some joint; 0.001 if they are isolated, else 0.2
+            by default [rad or m].
+
+        Raises
+        ------
+        InvalidInputError
+            If a shape is wrong, an entry is not finite, a matrix is no pose, a direction is zero,
+            ``near`` is beyond the limits or a number is out of range.
+        """
+        return solve(
+            self,
+            targets,
+            directions,
+            near=near,
+            tool_axis=tool_axis,
+            joints=joints,
+            free=free,
+            turns=turns,
+            most=most,
+            separation=separation,
+        )
 
     def substeps(
         self, configurations: NDArray[np.float64], targets: NDArray[np.float64]
@@ -178,6 +346,10 @@ class World:
     def session(self, control: Control, episodes: Episodes) -> Session:
         """Bind episodes, and where their actions come from, for the kernels."""
         return bind(self.arm.chain, self.contact_model.shapes, self.rules, control, episodes)
+
+    @cached_property
+    def _closeness(self) -> Closeness:
+        return Closeness(self.contact_model)
 
     def _begun_at(self, configurations: ArrayLike, goals: ArrayLike) -> Episodes:
         """Episodes that begin at configurations, whether or not those touch something."""

@@ -16,6 +16,7 @@ from kinarm.errors import InvalidInputError
 from kinarm.policies.oracle.kernels.projection import damped_least_squares
 from kinarm.policies.oracle.motion import steps_between
 from kinarm.simulator import Simulator
+from kinarm.spread import evenly_spread
 
 RESERVE = 1e-6
 """Share of the tolerance that is left against rounding."""
@@ -157,16 +158,3 @@ def step_box(
     lower = np.maximum(simulator.arm.lower[moved], starts[:, moved] - extent)
     upper = np.minimum(simulator.arm.upper[moved], starts[:, moved] + extent)
     return lower, upper
-
-
-def evenly_spread(count: int, dimensions: int) -> NDArray[np.float64]:
-    """Points of low discrepancy in the unit cube: multiples of powers of a root, modulo 1.
-
-    The root solves x^(d + 1) = x + 1, which for d = 1 is the golden ratio (Roberts 2018).
-    """
-    root = 2.0
-    for _ in range(64):
-        root = (1.0 + root) ** (1.0 / (dimensions + 1))
-    strides = root ** -np.arange(1.0, dimensions + 1)
-    points: NDArray[np.float64] = (0.5 + np.arange(1, count + 1)[:, None] * strides) % 1.0
-    return points

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 from kinarm.policies.oracle.detour import find_detour
 from kinarm.policies.oracle.inverse import (
     Solutions,
-    evenly_spread,
     inverse_kinematics,
     solve_within,
     step_box,
 )
 from kinarm.policies.oracle.motion import along_path, steps_between, straight, two_segments
 from kinarm.simulator import Simulator
+from kinarm.spread import evenly_spread
 
 SAMPLES = (8, 48, 512)
 """Configurations from which goals are sought for each number of steps: a few, then more."""

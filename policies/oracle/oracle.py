@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import run_rows
-from kinarm._validation import finite_array
+from kinarm._validation import finite_array, one_or_many
 from kinarm.motion_bounds import MotionBounds
 from kinarm.policies.oracle.bounding import bound_distance, bound_steps
 from kinarm.policies.oracle.inverse import inverse_kinematics, step_box
@@ -112,10 +112,10 @@ class Oracle:
 
         Parameters
         ----------
-        starts : array_like, shape (n, n_joints)
-            Contact-free start configurations [rad or m].
-        goals : array_like, shape (n, 3)
-            Goal positions [m].
+        starts : array_like, shape (n, n_joints) or (n_joints,)
+            Contact-free start configurations, or one for all goals [rad or m].
+        goals : array_like, shape (n, 3) or (3,)
+            Goal positions, or one for all starts [m].
         on_progress : callable, optional
             Called with the number of trials solved so far and in all.
 
@@ -126,7 +126,11 @@ class Oracle:
         StartInContactError
             If a start touches something.
         """
-        episodes = self.simulator.reset(starts, goals)
+        q, one_start = one_or_many("starts", starts, (self.simulator.arm.n_joints,))
+        g, one_goal = one_or_many("goals", goals, (3,))
+        q = np.tile(q, (len(g) if one_start else 1, 1))
+        g = np.tile(g, (len(q) if one_goal else 1, 1))
+        episodes = self.simulator.reset(q, g)
         q, g = episodes.q, episodes.goal
         parts = []
         for first in range(0, max(len(q), 1), LOT):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kinarm._validation import finite_array
+from kinarm._validation import finite_array, one_or_many
 from kinarm.errors import InvalidInputError
 
 
@@ -48,3 +48,14 @@ def test_not_finite_says_where(bad):
 def test_not_numbers(value):
     with pytest.raises(InvalidInputError, match="x must"):
         finite_array("x", value, (2,))
+
+
+def test_one_or_many():
+    for given in ([1, 2, 3], [[1, 2, 3]]):
+        array, one = one_or_many("x", given, (3,))
+        np.testing.assert_array_equal(array, [[1, 2, 3]])
+        assert one == (np.ndim(given) == 1)
+    assert one_or_many("x", np.zeros((5, 4, 4)), (4, 4))[0].shape == (5, 4, 4)
+    for given in ([1, 2], [[1, 2]], [[1, 2, 3], [1, 2]], 1.0, "here"):
+        with pytest.raises(InvalidInputError, match="x must"):
+            one_or_many("x", given, (3,))

@@ -78,6 +78,15 @@ class TestContact:
             with pytest.raises(InvalidInputError, match="configuration must"):
                 ask(end, np.zeros(6))
 
+    def test_of_configurations(self, any_simulator):
+        world, q = any_simulator.world, random_configurations(any_simulator, 6, 200)
+        touching, pairs = world.in_contact(q), world.contact_pairs(q)
+        np.testing.assert_array_equal(touching, world.contact_model.in_contact(q))
+        for each, touches, pair in zip(q, touching, pairs, strict=True):
+            assert pair == world.contact_pair(each)
+            assert (pair is not None) == touches
+            assert pair is None or pair in world.contact_model.pair_names
+
     def test_none_where_nothing_touches(self, simulator):
         assert simulator.world.contact(np.zeros(6), np.full(6, 0.01)) is None
         assert simulator.world.contact_pair(np.zeros(6), np.full(6, 0.01)) is None

@@ -26,6 +26,12 @@ simulator = Simulator("both")
 starts, goals = simulator.sample(np.random.default_rng(0), 64)
 rollouts = simulator.rollout(load_policy("ppo-tuned-both-seed0"), starts, goals, record=True)
 show(starts, goals, rollouts.returns, rollouts.steps, rollouts.paths)
+world = simulator.world
+poses = world.poses(starts)
+pointing = world.inverse_kinematics(poses[:, :3, 3], [0, 0, -1])
+posed = world.inverse_kinematics(poses)
+show(poses, world.jacobians(starts), posed.configurations, pointing.configurations)
+show(*world.clearance(starts)[::2])
 solutions = Oracle("both").solve_batch(starts[:8], goals[:8])
 show(solutions.steps_lower_bound, solutions.actions, solutions.distance_lower_bound)
 for name, problem in (("paper", "right"), ("tuned", "both")):
@@ -83,5 +89,5 @@ def test_rollouts_bounds_and_trainings_are_the_same_bits(machine, computed, usua
     variables, needs = MACHINES[machine]
     if needs not in CAN:
         pytest.skip(f"this processor lacks {needs}")
-    assert len(set(usual)) == 4
+    assert len(set(usual)) == 6
     assert computed(variables) == usual

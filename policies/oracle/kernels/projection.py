@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, Vector, inlined, kernel
 from kinarm.kernels.kinematics import POSE, forward_kinematics, point_jacobian, to_world
-from kinarm.kernels.lanes import LANES, any_lane, as_lanes, as_numbers, lane_bits, select
+from kinarm.kernels.lanes import LANES, as_lanes, as_numbers, lane_bits, select
+from kinarm.kernels.limits import take_out_blocked, take_step
 
-LAYOUT = "9bce2e20329f"
+LAYOUT = "4510a3428761"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 ITERATIONS = 24
@@ -19,9 +20,6 @@ ITERATIONS = 24
 
 DAMPING = 1e-4
 """Added to the diagonal of J J^T, which limits steps near singular configurations [m^2]."""
-
-LONGEST_STEP = 0.5
-"""Largest move of a joint in an iteration [rad or m]."""
 
 
 class Moving(NamedTuple):
@@ -86,29 +84,12 @@ def damped_step(jacobian: Array, vector: Vector, step: Array) -> None:
 @inlined
 def move(moving: Moving, vector: Vector, jacobian: Array, step: Array) -> None:
     """Move configurations by a damped step along a vector [m], within their limits."""
-    n = step.shape[0]
     q, lower, upper = moving.q, moving.lower, moving.upper
-    # A joint that rests on a limit and would leave it is taken out of the Jacobian, so that the
-    # others make up for it. That changes their steps: until none is blocked.
     blocked = True
     while blocked:
-        blocked = False
         damped_step(jacobian, vector, step)
-        for k in range(n):
-            outward = ((q[0, k] >= upper[k]) & (step[k] > 0.0)) | (
-                (q[0, k] <= lower[k]) & (step[k] < 0.0)
-            )
-            if any_lane(outward):
-                blocked = True
-                for i in range(3):
-                    jacobian[i, k] = select(outward, 0.0, jacobian[i, k])
-    # Scaled down as a whole, a step keeps its direction, in which the tool nears the goal.
-    longest = 0.0 * step[0] + LONGEST_STEP
-    for k in range(n):
-        longest = max(longest, abs(step[k]))
-    for k in range(n):
-        moved = q[0, k] + LONGEST_STEP / longest * step[k]
-        q[0, k] = min(max(moved, lower[k]), upper[k])
+        blocked = take_out_blocked(q, lower, upper, step, jacobian)
+    take_step(q, lower, upper, step)
 
 
 @kernel

@@ -5,6 +5,7 @@ import pickle
 import numpy as np
 import pytest
 
+from kinarm import record_path
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, StartInContactError, UnknownNameError
 from kinarm.policies import Oracle, OracleSolution, OracleSolutions
@@ -412,7 +413,7 @@ class TestRefusals:
     @pytest.mark.parametrize(
         ("starts", "goals", "message"),
         [
-            (HOME, [GOAL], "starts must have shape"),
+            ([HOME[:5]], [GOAL], "starts must have shape"),
             ([HOME], [GOAL, GOAL], "goals must have shape"),
             ([HOME, [0.0, 0.0, 9.0, 0.0, 0.0, 0.0]], [GOAL, GOAL], "start 1 lies outside"),
             ([HOME], [[0.0, 0.0, -np.inf]], "goals must be finite"),
@@ -522,3 +523,21 @@ def test_inverse_kinematics_is_at_hand(oracle):
     tools = np.array([oracle.simulator.arm.tool_position(q) for q in found])
     assert (np.linalg.norm(tools - goal, axis=1) <= TOLERANCE).all()
     assert not oracle.simulator.world.contact_model.in_contact(found).any()
+
+
+class TestOwnTrials:
+    def test_one_start_for_many_goals_and_one_goal_for_many_starts(self, oracle):
+        goals, starts = [GOAL, [0.2, 0.6, 0.325]], [[0.1] * 6, [0] * 6]
+        for given, meant in (
+            ((HOME, goals), ([HOME] * 2, goals)),
+            ((starts, GOAL), (starts, [GOAL] * 2)),
+            ((HOME, GOAL), ([HOME], [GOAL])),
+        ):
+            assert_identical(oracle.solve_batch(*given), oracle.solve_batch(*meant))
+
+    def test_path_can_be_recorded(self, oracle):
+        solution = oracle.solve(HOME, GOAL)
+        recording = record_path(oracle.simulator.world, solution.path, goal=GOAL)
+        np.testing.assert_array_equal(recording.states, solution.path)
+        assert recording.outcome == "success"
+        assert recording.final_distance == pytest.approx(solution.final_distance)

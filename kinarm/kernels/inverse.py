@@ -1,0 +1,301 @@
+"""Inverse kinematics: all configurations that bring the tool where it is wanted, from many seeds.
+
+A seed is moved by damped Newton steps (Levenberg 1944, Marquardt 1963) whose damping shrinks with
+the square of the error, so that they converge quadratically. Eight seeds move side by side in
+lanes; one that has ended makes room for the next.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.chain import Chain
+from kinarm.kernels.compiling import Array, Vector, helper, inlined, kernel
+from kinarm.kernels.elementary import nearest_whole
+from kinarm.kernels.jacobian import spatial_jacobian
+from kinarm.kernels.kinematics import POSE, forward_kinematics, to_world
+from kinarm.kernels.lanes import LANES, as_lanes, as_numbers, lane_bits
+from kinarm.kernels.limits import take_out_blocked, take_step
+from kinarm.kernels.planes import rotated
+
+LAYOUT = "4f8111d07a2e"
+"""Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
+
+PRECISION = 1e-10
+"""Error at which a seed has arrived: lengths as shares of the arm's reach, and angles [rad]."""
+
+ITERATIONS = 48
+"""Steps after which a seed is given up."""
+
+PATIENCE, PROGRESS = 20, 0.98
+"""Steps after which a seed is given up whose squared error shrinks no further than to a share."""
+
+DAMPING, LEAST_DAMPING = 0.1, 1e-12
+"""Of the squared error, what is added to the diagonal of J J^T; and what is added at least."""
+
+HITS = 3
+"""Seeds that have to arrive at each solution before the search for isolated ones ends."""
+
+ROUNDING = 1e-9
+"""By how much a solution may lie beyond a limit, to which it is then moved [rad or m]."""
+
+TURN = 6.28318530717958647693
+
+
+class Search(NamedTuple):
+    """What is looked for, and where.
+
+    Attributes
+    ----------
+    tool : ndarray, shape (3,)
+        Tool point in the last joint frame [m].
+    axes : ndarray, shape (n_axes, 3)
+        Unit vectors of the last joint frame whose directions are wanted: none, one or three.
+    scale : float
+        Inverse of the arm's reach [1/m].
+    near : ndarray, shape (n_joints,)
+        First seed; where joints that are not moved rest, and by which whole turns are chosen.
+    seeds : ndarray, shape (n_seeds, n)
+        Where further seeds lie between the limits of the first n joints, from 0 to 1.
+    least : int
+        Seeds that are tried before the search for isolated solutions may end; 0 if it may not.
+    separation : float
+        Least difference of two solutions in some joint [rad or m].
+    """
+
+    tool: Array
+    axes: Array
+    scale: float
+    near: Array
+    seeds: Array
+    least: int
+    separation: float
+
+
+@inlined
+def orientation_error(axes: Array, poses: Array, wanted: Array, jacobian: Array) -> Vector:
+    """Vector about which the tool has to turn, as long as the angle where that is small [rad].
+
+    With one axis, the Jacobian's last three rows lose what turns the tool about it.
+    """
+    n_axes, last = axes.shape[0], poses.shape[0] - 1
+    zero = 0.0 * poses[last, 13]
+    wx, wy, wz, cosine = zero, zero, zero, zero
+    for i in range(n_axes):
+        ax, ay, az = rotated(poses, last, axes[i, 0], axes[i, 1], axes[i, 2])
+        bx, by, bz = wanted[i, 0], wanted[i, 1], wanted[i, 2]
+        wx += ay * bz - az * by
+        wy += az * bx - ax * bz
+        wz += ax * by - ay * bx
+        cosine += ax * bx + ay * by + az * bz
+        if n_axes == 1:
+            for k in range(jacobian.shape[1]):
+                along = ax * jacobian[3, k] + ay * jacobian[4, k] + az * jacobian[5, k]
+                jacobian[3, k] -= along * ax
+                jacobian[4, k] -= along * ay
+                jacobian[5, k] -= along * az
+    if n_axes == 3:
+        wx, wy, wz, cosine = 0.5 * wx, 0.5 * wy, 0.5 * wz, 0.5 * (cosine - 1.0)
+    # From the sine of the angle to twice that of its half, which grows up to half a turn.
+    longer = 1.0 / math.sqrt(max(0.5 + 0.5 * cosine, 1e-6))
+    return longer * wx, longer * wy, longer * wz
+
+
+@inlined
+def damped_step(jacobian: Array, error: Array, damping: float, square: Array, step: Array) -> None:
+    """Fill in J^T (J J^T + damping)^-1 e, by a Cholesky decomposition without roots.
+
+    ``square``, shape (rows + 1, rows), is work space.
+    """
+    rows, n = jacobian.shape
+    solved = square[rows]
+    for i in range(rows):
+        solved[i] = error[i]
+        for j in range(i + 1):
+            entry = 0.0 * damping
+            for k in range(n):
+                entry += jacobian[i, k] * jacobian[j, k]
+            square[i, j] = entry
+        square[i, i] += damping
+    # Below the diagonal the factor, above it the factor times the pivot.
+    for j in range(rows):
+        inverse = 1.0 / square[j, j]
+        for i in range(j + 1, rows):
+            square[j, i] = square[i, j]
+            square[i, j] = square[i, j] * inverse
+        for i in range(j + 1, rows):
+            for k in range(j + 1, i + 1):
+                square[i, k] -= square[i, j] * square[j, k]
+            solved[i] -= square[i, j] * solved[j]
+        square[j, j] = inverse
+    for i in range(rows - 1, -1, -1):
+        solved[i] = solved[i] * square[i, i]
+        for j in range(i + 1, rows):
+            solved[i] -= square[j, i] * solved[j]
+    for k in range(n):
+        step[k] = 0.0 * damping
+        for i in range(rows):
+            step[k] += jacobian[i, k] * solved[i]
+
+
+@inlined
+def difference(first: float, second: float, turns: bool) -> float:
+    """Difference of two joint positions, whole turns apart if the joint turns without end."""
+    apart = first - second
+    if turns:
+        apart -= TURN * nearest_whole(apart / TURN)
+    return abs(apart)
+
+
+@helper
+def keep_new(
+    q: Array,
+    lane: int,
+    search: Search,
+    prismatic: NDArray[np.bool_],
+    lower: Array,
+    upper: Array,
+    configurations: Array,
+    hits: NDArray[np.int64],
+    found: int,
+) -> int:
+    """Add what a lane holds to the solutions found, unless it is there or out of the limits.
+
+    Returns how many there are.
+    """
+    n = lower.shape[0]
+    for k in range(configurations.shape[1]):
+        value = q[0, k, lane]
+        if k < n:
+            if not prismatic[k]:
+                endless = upper[k] - lower[k] >= TURN
+                about = search.near[k] if endless else 0.5 * (lower[k] + upper[k])
+                value -= TURN * nearest_whole((value - about) / TURN)
+                if endless:
+                    value -= TURN if value > upper[k] else 0.0
+                    value += TURN if value < lower[k] else 0.0
+            if value > upper[k] + ROUNDING or value < lower[k] - ROUNDING:
+                return found
+            value = min(max(value, lower[k]), upper[k])
+        configurations[found, k] = value
+    for other in range(found):
+        apart = 0.0
+        for k in range(n):
+            turns = not prismatic[k] and upper[k] - lower[k] >= TURN
+            here, there = configurations[found, k], configurations[other, k]
+            apart = max(apart, difference(here, there, turns))
+        if apart <= search.separation:
+            hits[other] += 1
+            return found
+    hits[found] = 1
+    return found + 1
+
+
+@kernel
+def solve_targets(
+    first: int,
+    last: int,
+    chain: Chain,
+    search: Search,
+    positions: Array,
+    directions: Array,
+    configurations: Array,
+    counts: NDArray[np.int64],
+) -> None:
+    """Find the configurations at which the tool is where it is wanted, for rows of targets.
+
+    ``positions`` has the shape (n_targets, 3) [m], and ``directions``, of the tool's axes,
+    (n_targets, n_axes, 3). Of each target, the ``counts`` first rows of ``configurations``, shape
+    (n_targets, most + 1, n_joints), are filled in. Of solutions that differ by whole turns, the one
+    nearest to ``search.near`` is given.
+    """
+    prismatic, translation, rotation, axis = chain[:4]
+    n_joints, (n_seeds, n) = configurations.shape[2], search.seeds.shape
+    most, n_axes, tool = configurations.shape[1] - 1, directions.shape[1], search.tool
+    rows = 3 if n_axes == 0 else 6
+    q = as_lanes(np.zeros((1, n_joints, LANES)))
+    aim, wanted = as_lanes(np.zeros((3, LANES))), as_lanes(np.zeros((n_axes, 3, LANES)))
+    iteration, error = as_lanes(np.zeros((1, LANES))), as_lanes(np.zeros((rows, LANES)))
+    jacobian, step = as_lanes(np.zeros((rows, n, LANES))), as_lanes(np.zeros((n, LANES)))
+    square, before = as_lanes(np.zeros((rows + 1, rows, LANES))), as_lanes(np.zeros((1, LANES)))
+    poses = as_lanes(np.zeros((n_joints + 1, POSE, LANES)))
+    numbers, iterations = as_numbers(q), as_numbers(iteration)
+    lower, upper = chain.lower[:n], chain.upper[:n]
+    lowest, highest = np.empty(n), np.empty(n)
+    for k in range(n):
+        # Solutions of a continuum are sought within the limits, isolated ones wherever they are.
+        turns = not prismatic[k] and (search.least > 0 or upper[k] - lower[k] >= TURN)
+        lowest[k], highest[k] = (-math.inf, math.inf) if turns else (lower[k], upper[k])
+    hits = np.zeros(most + 1, dtype=np.int64)
+    everything = (1 << LANES) - 1
+    for target in range(first, last):
+        for k in range(3):
+            aim[k] = positions[target, k]
+            for i in range(n_axes):
+                wanted[i, k] = directions[target, i, k]
+        found, tried, waiting, n_moving, free = 0, 0, 0, 0, everything
+        while True:
+            for lane in range(LANES):
+                if free >> lane & 1 and waiting < n_seeds + 1:
+                    for k in range(n_joints):
+                        numbers[0, k, lane] = search.near[k]
+                        if k < n and waiting > 0:
+                            share = search.seeds[waiting - 1, k]
+                            numbers[0, k, lane] = lower[k] + share * (upper[k] - lower[k])
+                    iterations[0, lane] = 0.0
+                    waiting, n_moving, free = waiting + 1, n_moving + 1, free & ~(1 << lane)
+            if n_moving == 0:
+                break
+            forward_kinematics(prismatic, translation, rotation, axis, q, 0, poses)
+            point = to_world(poses, n_joints, tool[0], tool[1], tool[2])
+            spatial_jacobian(chain, poses, point, jacobian)
+            squared = 0.0 * point[0]
+            for i in range(3):
+                error[i] = search.scale * (aim[i] - point[i])
+                squared += error[i] * error[i]
+                for k in range(n):
+                    jacobian[i, k] = search.scale * jacobian[i, k]
+            if n_axes > 0:
+                turn = orientation_error(search.axes, poses, wanted, jacobian)
+                for i in range(3):
+                    error[3 + i] = turn[i]
+                    squared += turn[i] * turn[i]
+            arrived = squared <= PRECISION * PRECISION
+            damping = DAMPING * squared + LEAST_DAMPING
+            blocked = True
+            while blocked:
+                damped_step(jacobian, error, damping, square, step)
+                blocked = take_out_blocked(q, lowest, highest, step, jacobian)
+            stuck = (iteration[0] >= PATIENCE) & (squared > PROGRESS * before[0])
+            ended = arrived | stuck | (iteration[0] >= ITERATIONS)
+            before[0] = squared
+            ended_bits, arrived_bits = lane_bits(ended) & ~free, lane_bits(arrived) & ~free
+            for lane in range(LANES if ended_bits != 0 else 0):
+                if ended_bits >> lane & 1:
+                    tried, n_moving = tried + 1, n_moving - 1
+                    if arrived_bits >> lane & 1 and found < most:
+                        found = keep_new(
+                            numbers,
+                            lane,
+                            search,
+                            prismatic,
+                            lower,
+                            upper,
+                            configurations[target],
+                            hits,
+                            found,
+                        )
+            free |= ended_bits
+            if found == most:
+                break
+            if search.least > 0 and tried >= search.least and found > 0:
+                fewest = HITS
+                for solution in range(found):
+                    fewest = min(fewest, hits[solution])
+                if fewest == HITS:
+                    break
+            take_step(q, lowest, highest, step)
+            iteration[0] += 1.0
+        counts[target] = found

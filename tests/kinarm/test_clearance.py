@@ -1,0 +1,113 @@
+"""The closest pair and its closest points, held against Coal."""
+
+import pickle
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+from configurations import contact_boundary, random_configurations
+
+from kinarm.arm import Arm
+from kinarm.clearance import Closeness
+from kinarm.problem import ReachProblem
+from kinarm.scene import Scene
+from kinarm.world import World
+
+COAL = 2e-6
+"""Precision of Coal's distances of hulls and cylinders [m]."""
+
+
+def coal_distances(world, q):
+    """Distances of all tested pairs according to Coal."""
+    geometry, data = world.contact_model.geometry, world.arm.model.createData()
+    distances = geometry.createData()
+    pin.computeDistances(world.arm.model, data, geometry, distances, q)
+    return np.array([result.min_distance for result in distances.distanceResults])
+
+
+def test_equals_the_smallest_distance_of_coal(any_simulator):
+    world = any_simulator.world
+    q = random_configurations(any_simulator, 1, 300)
+    q = np.concatenate([q, *contact_boundary(any_simulator, 2, 60)])
+    found = world.clearance(q)
+    assert (found.distance > 0.01).sum() > 20
+    assert (found.distance < -0.01).sum() > 20
+    names = list(world.contact_model.pair_names)
+    for row, each in enumerate(q):
+        distances = coal_distances(world, each)
+        assert found.distance[row] == pytest.approx(distances.min(), rel=0, abs=COAL)
+        pair = names.index(tuple(found.bodies[row]))
+        assert distances[pair] == pytest.approx(distances.min(), rel=0, abs=COAL)
+
+
+def test_capsules_are_exact(simulator):
+    q = random_configurations(simulator, 3, 300)
+    expected = [coal_distances(simulator.world, each).min() for each in q]
+    found = simulator.world.clearance(q).distance
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+
+
+def test_sign_tells_contact(any_simulator):
+    world, q = any_simulator.world, random_configurations(any_simulator, 4, 1500)
+    distance = world.clearance(q).distance
+    sure = np.abs(distance) > COAL
+    np.testing.assert_array_equal((distance < 0)[sure], world.in_contact(q)[sure])
+
+
+def test_points_are_as_far_apart_and_on_the_line_between_the_bodies(any_simulator):
+    world, q = any_simulator.world, random_configurations(any_simulator, 5, 400)
+    distance, _, points = world.clearance(q)
+    apart = np.linalg.norm(points[:, 0] - points[:, 1], axis=1)
+    np.testing.assert_allclose(apart, np.abs(distance), rtol=0, atol=1e-5)
+
+
+def test_points_lie_on_the_bodies(any_simulator):
+    """Half of a small ball about a point lies in the body; of cylinders the points are Coal's."""
+    world, data = any_simulator.world, any_simulator.arm.model.createData()
+    geometry = world.contact_model.geometry
+    placed = geometry.createData()
+    for q in random_configurations(any_simulator, 6, 60):
+        distance, bodies, points = world.clearance(q)
+        if distance <= 0:
+            continue
+        pin.updateGeometryPlacements(any_simulator.arm.model, data, geometry, placed, q)
+        for name, point in zip(bodies, points, strict=True):
+            index = world.contact_model.body_names.index(name)
+            shape = geometry.geometryObjects[index].geometry
+            if isinstance(shape, coal.Cylinder):
+                continue
+            at = coal.Transform3s(np.eye(3), point)
+            place = coal.Transform3s(placed.oMg[index].rotation, placed.oMg[index].translation)
+            gap = coal.distance(
+                coal.Sphere(1e-3), at, shape, place, coal.DistanceRequest(), coal.DistanceResult()
+            )
+            assert gap == pytest.approx(-1e-3, rel=0, abs=1e-5)
+
+
+def test_one_is_as_many_and_threads_do_not_matter(simulator):
+    q = random_configurations(simulator, 7, 1500)
+    together, spread = simulator.world.clearance(q), World("both", threads=3).clearance(q)
+    for first, second in zip(together, spread, strict=True):
+        np.testing.assert_array_equal(first, second)
+    alone = simulator.world.clearance(q[5].tolist())
+    assert alone.distance == together.distance[5]
+    assert alone.bodies.tolist() == together.bodies[5].tolist()
+    assert alone.points.tolist() == together.points[5].tolist()
+    assert simulator.world.clearance(np.empty((0, 6))).points.shape == (0, 2, 3)
+
+
+def test_infinite_where_nothing_is_tested(make_joint, write_robot):
+    arm = Arm.load(write_robot([make_joint(axis="0 1 0")]))
+    world = World(ReachProblem.load("left").replace(arm=arm, scene=Scene()), threads=1)
+    distance, bodies, points = world.clearance(np.zeros((2, 1)))
+    assert np.isposinf(distance).all()
+    assert bodies.tolist() == [["", ""]] * 2
+    assert np.isnan(points).all()
+
+
+def test_survives_a_copy(simulator):
+    closeness = Closeness(simulator.world.contact_model)
+    again, q = pickle.loads(pickle.dumps(closeness)), random_configurations(simulator, 8, 20)
+    for first, second in zip(closeness.measure(q, 1), again.measure(q, 1), strict=True):
+        np.testing.assert_array_equal(first, second)
