@@ -112,11 +112,12 @@ class World:
         """
         q = finite_array("configurations", configurations, (None, self.arm.n_joints))
         n = len(q)
-        tools, proven = np.empty((n, 3)), np.empty(n, dtype=bool)
-        arrays = (self.arm.chain, self.contact_model.shapes, q, tools, proven)
+        tools, free, touching = np.empty((n, 3)), np.empty(n, dtype=bool), np.empty(n, dtype=bool)
+        arrays = (self.arm.chain, self.contact_model.shapes, q, tools, free, touching)
         run_rows(screen, n, n, self.threads, *arrays)
-        touching = ~proven
-        touching[touching] = self.contact_model.in_contact(q[touching])
+        doubtful = ~(free | touching)
+        if doubtful.any():
+            touching[doubtful] = self.contact_model.in_contact(q[doubtful])
         return tools, touching
 
     def contact(self, configuration: ArrayLike, target: ArrayLike) -> Contact | None:

@@ -27,8 +27,9 @@ from kinarm.kernels.proof import (
 )
 from kinarm.kernels.reward import add_reward
 from kinarm.kernels.session import Session
+from kinarm.kernels.touching import deepest_overlap, first_contact, overlaps
 
-LAYOUT = "a8db920f12fc"
+LAYOUT = "c65fe8a3e33e"
 """Hash of what is compiled in from other files; a test tells when to renew it.
 
 Numba's disk cache notices changes only in this file, so changing this line is what makes it
@@ -44,9 +45,13 @@ def screen(
     shapes: ContactShapes,
     configurations: Array,
     tools: Array,
-    proven: NDArray[np.bool_],
+    free: NDArray[np.bool_],
+    touching: NDArray[np.bool_],
 ) -> None:
-    """Find the tool points of configurations, shape (n, 3) [m], and which are proven free."""
+    """Find the tool points of configurations, shape (n, 3) [m], and which surely are free or touch.
+
+    Of those that neither is proven of, Coal has to judge.
+    """
     n_joints, tool = configurations.shape[1], chain.tool
     block, alone = work_space(n_joints, 0, 0, shapes.planes.shape[0], 0, 0, 0, 0)
     q, points = as_numbers(block.q), as_numbers(block.goal)
@@ -56,11 +61,14 @@ def screen(
             row = start + min(lane, filled - 1)
             for joint in range(n_joints):
                 q[0, joint, lane] = configurations[row, joint]
-        free = stand(chain, shapes, filled, block, alone)
+        place_arms(chain, block)
+        touched = lane_bits(overlaps(deepest_overlap(shapes, block.after)))
+        apart = stand(shapes, touched, filled, block, alone)
         x, y, z = to_world(block.after, n_joints, tool[0], tool[1], tool[2])
         block.goal[0, 0], block.goal[0, 1], block.goal[0, 2] = x, y, z
         for lane in range(filled):
-            proven[start + lane] = free >> lane & 1 != 0
+            free[start + lane] = apart >> lane & 1 != 0
+            touching[start + lane] = touched >> lane & 1 != 0
             for axis in range(3):
                 tools[start + lane, axis] = points[0, axis, lane]
 
@@ -87,7 +95,8 @@ def begin(first: int, last: int, rows: NDArray[np.int64], session: Session) -> i
                 starts[0, joint, lane] = q[e, joint]
             for axis in range(3):
                 goals[0, axis, lane] = episodes.goal[e, axis]
-        free = stand(chain, shapes, filled, block, alone)
+        place_arms(chain, block)
+        free = stand(shapes, 0, filled, block, alone)
         block.distance[0] = observe(chain.tool, block.after, block.goal, 0, block.observation)
         for lane in range(filled):
             e = rows[start + lane]
@@ -111,13 +120,19 @@ def begin(first: int, last: int, rows: NDArray[np.int64], session: Session) -> i
 
 
 @inlined
-def stand(chain: Chain, shapes: ContactShapes, filled: int, block: Block, alone: Alone) -> int:
-    """Place the arms of a block, and return the bits of those that are proven free of contact."""
+def place_arms(chain: Chain, block: Block) -> None:
+    """Place the arms of a block at their configurations."""
     prismatic, translation, rotation, axes = chain[:4]
     forward_kinematics(prismatic, translation, rotation, axes, block.q, 0, block.after)
+
+
+@inlined
+def stand(shapes: ContactShapes, touched: int, filled: int, block: Block, alone: Alone) -> int:
+    """Bits of the arms that are proven free of contact; not tried where those of ``touched`` are set."""
     free = lane_bits(is_apart(propose_planes(shapes, block.after, block)))
     for lane in range(filled):
-        if free >> lane & 1 == 0 and stands_free(lane, shapes, block.after, block, alone):
+        open_here = (free | touched) >> lane & 1 == 0
+        if open_here and stands_free(lane, shapes, block.after, block, alone):
             free |= 1 << lane
     return free
 
@@ -207,10 +222,15 @@ def advance(first: int, last: int, session: Session) -> int:
                     for pair in range(n_pairs):
                         # It has not moved yet.
                         episodes.planes[e, pair, GAP] = as_numbers(block.height)[pair, lane]
-                    episodes.doubt[e] = doubt
-                    episodes.status[e] = PAUSED
                     n_alive -= 1
-                    n_paused += 1
+                    episodes.doubt[e] = doubt
+                    pair = first_contact(lane, doubt, chain, shapes, rules.tested, block, alone)
+                    episodes.touched[e] = pair
+                    if pair > 0:
+                        refuse_step(e, rules, episodes)
+                    else:
+                        episodes.status[e] = PAUSED
+                        n_paused += 1
             if n_alive == 0:
                 continue
         changed = False
@@ -275,14 +295,18 @@ def results_of_step(
 
 @kernel
 def refuse(rows: NDArray[np.int64], session: Session) -> None:
-    """End episodes whose step touches something: the arm stays where it is."""
-    rules, episodes = session.rules, session.episodes
+    """End episodes whose step Coal found to touch something."""
     for index in range(rows.shape[0]):
-        e = rows[index]
-        episodes.status[e] = COLLISION
-        episodes.steps[e] += 1
-        distance = episodes.distance[e]
-        add_reward(rules.reward, distance, distance, True, False, episodes.terms, episodes.total, e)
-        if episodes.path.shape[0] > 0:
-            for joint in range(episodes.q.shape[1]):
-                episodes.path[e, episodes.steps[e], joint] = episodes.q[e, joint]
+        refuse_step(rows[index], session.rules, session.episodes)
+
+
+@inlined
+def refuse_step(e: int, rules: Rules, episodes: Episodes) -> None:
+    """End an episode whose step touches something: the arm stays where it is."""
+    episodes.status[e] = COLLISION
+    episodes.steps[e] += 1
+    distance = episodes.distance[e]
+    add_reward(rules.reward, distance, distance, True, False, episodes.terms, episodes.total, e)
+    if episodes.path.shape[0] > 0:
+        for joint in range(episodes.q.shape[1]):
+            episodes.path[e, episodes.steps[e], joint] = episodes.q[e, joint]
