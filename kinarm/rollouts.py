@@ -7,32 +7,71 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.episodes import COLLISION, SUCCESS, Episodes
+from kinarm.task import REWARD_TERMS
 
 
 class StepResult(NamedTuple):
-    """Outcome of one step of n episodes; arrays of shape (n,).
+    """Outcome of one step of n episodes, in three tables that the kernel fills in.
 
     Attributes
     ----------
-    reward : ndarray
-        Sum of the terms.
-    terms : ndarray, shape (n, n_terms)
-        The weighted terms, in the order of `kinarm.REWARD_TERMS`; zero for episodes that
-        were over before.
-    success, collision, truncated : ndarray of bool
-        How the step ended; all false for episodes that go on or were over before.
+    numbers : ndarray, shape (2 + n_terms, n)
+        Rewards, distances from the tool to the goal [m], and the weighted terms, in the order of
+        `kinarm.REWARD_TERMS`. Rewards are zero for episodes that were over before.
+    flags : ndarray of bool, shape (3, n)
+        Whether the horizon was reached, the goal, or the step was refused because something
+        touches; all false for episodes that go on or were over before.
+    contact : ndarray of int, shape (n,)
+        Number, from 1, of the pair that refused the step; 0 if none did, or nobody looked.
     """
 
-    reward: NDArray[np.float64]
-    terms: NDArray[np.float64]
-    success: NDArray[np.bool_]
-    collision: NDArray[np.bool_]
-    truncated: NDArray[np.bool_]
+    numbers: NDArray[np.float64]
+    flags: NDArray[np.bool_]
+    contact: NDArray[np.int64]
+
+    @classmethod
+    def empty(cls, n: int) -> "StepResult":
+        """Tables yet to be filled in."""
+        return cls(
+            np.empty((2 + len(REWARD_TERMS), n)),
+            np.empty((3, n), dtype=bool),
+            np.empty(n, dtype=np.int64),
+        )
+
+    @property
+    def reward(self) -> NDArray[np.float64]:
+        """Sums of the terms, shape (n,)."""
+        return self.numbers[0]
+
+    @property
+    def distance(self) -> NDArray[np.float64]:
+        """From the tool to the goal [m], shape (n,)."""
+        return self.numbers[1]
+
+    @property
+    def terms(self) -> NDArray[np.float64]:
+        """The weighted terms, shape (n, n_terms)."""
+        return self.numbers[2:].T
+
+    @property
+    def truncated(self) -> NDArray[np.bool_]:
+        """Whether the step ended an episode at the horizon, shape (n,)."""
+        return self.flags[0]
+
+    @property
+    def success(self) -> NDArray[np.bool_]:
+        """Whether it reached the goal, shape (n,)."""
+        return self.flags[1]
+
+    @property
+    def collision(self) -> NDArray[np.bool_]:
+        """Whether it was refused, shape (n,)."""
+        return self.flags[2]
 
     @property
     def terminated(self) -> NDArray[np.bool_]:
-        """Success or collision."""
-        return self.success | self.collision
+        """Success or collision, shape (n,)."""
+        return self.flags[1] | self.flags[2]
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,7 +34,7 @@ PolicyFunction = Callable[[NDArray[np.float64]], ArrayLike]
 
 
 class _Stepped(NamedTuple):
-    """Episodes that are stepped, the table of their actions, and the session of both."""
+    """Episodes that are stepped, their actions, shape (n, n_actions), and the session of both."""
 
     episodes: Episodes
     actions: NDArray[np.float64]
@@ -159,12 +159,10 @@ class Simulator:
         InvalidInputError
             If the shape is wrong or an entry is NaN.
         """
-        table = finite_array("actions", actions, (len(episodes.status), self.n_actions))
-        session = self._step(episodes, table)
-        n, n_terms = episodes.terms.shape
-        reward, terms, ended = np.empty(n), np.empty((n, n_terms)), np.empty((n, 3), dtype=bool)
-        results_of_step(session, reward, terms, ended)
-        return StepResult(reward, terms, ended[:, 0], ended[:, 1], ended[:, 2])
+        session = self._step(episodes, actions)
+        result = StepResult.empty(len(episodes.status))
+        results_of_step(session, *result)
+        return result
 
     def rollout(
         self,
@@ -312,15 +310,18 @@ class Simulator:
         if self._last is None or self._last.episodes is not episodes:
             table = np.zeros((len(episodes.status), 1, self.n_actions))
             session = self.world.session(table_control(table), episodes)
-            self._last = _Stepped(episodes, table, session)
+            self._last = _Stepped(episodes, table[:, 0], session)
         return self._last
 
-    def _step(self, episodes: Episodes, actions: NDArray[np.float64]) -> Session:
+    def _step(self, episodes: Episodes, actions: ArrayLike) -> Session:
         """Advance running episodes by one step."""
         _, table, session = self._stepped(episodes)
-        table[:, 0] = actions
-        allow_one_step(session)
-        self._advance(session, episodes, len(actions))
+        if not isinstance(actions, np.ndarray) or actions.shape != table.shape:
+            actions = finite_array("actions", actions, table.shape)
+        table[...] = actions
+        if not allow_one_step(session):
+            finite_array("actions", actions, table.shape)  # which says what is wrong
+        self._advance(session, episodes, len(table))
         return session
 
     def _advance(self, session: Session, episodes: Episodes, work: int) -> None:

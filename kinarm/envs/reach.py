@@ -23,7 +23,6 @@ from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.rollouts import StepResult
 from kinarm.scenarios import ScenarioStream
 from kinarm.simulator import Simulator
-from kinarm.task import REWARD_TERMS
 
 Array = NDArray[np.float64]
 
@@ -169,6 +168,7 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
             self._check_action(action)
             raise
         reward, terminated, truncated = self.interface.judge(episode, result)
+        self._contacts.find(episode, result)
         self._pictures.step(episode)
         return (
             self._observation(episode),
@@ -197,9 +197,11 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
             "step() was called although the episode is over: call reset() first. "
             "Nothing moves until then, and rewards are 0."
         )
-        nothing, status = np.zeros((1, len(REWARD_TERMS))), episode.status
-        ends = (status == SUCCESS, status == COLLISION, status == TRUNCATED)
-        result = StepResult(nothing[:, 0], nothing, *ends)
+        result, status = StepResult.empty(1), episode.status
+        result.numbers[:], result.contact[:] = 0.0, episode.touched * (status == COLLISION)
+        result.numbers[1] = episode.distance
+        result.flags[:] = np.equal.outer((TRUNCATED, SUCCESS, COLLISION), status)
+        self._contacts.find(episode, result)
         ended = bool(result.terminated[0]), bool(result.truncated[0])
         return self._observation(episode), 0.0, *ended, self._info(episode, result)
 
@@ -217,7 +219,7 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
             "success": success,
             "is_success": success,
             "collision": collision,
-            "contact": self._contacts.of(episode, result.collision).item() if collision else 0,
+            "contact": result.contact.item(),
         }
         if self.interface.tells_terms:
             info.update(zip(TERM_KEYS, result.terms[0].tolist(), strict=True))

@@ -12,7 +12,7 @@ from kinarm.contact_shapes import PLANE, ContactShapes
 from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Control, Episodes, Rules
 from kinarm.kernels.acting import choose_actions, shared_policy
 from kinarm.kernels.block import Alone, Block, put_back, take_in, work_space
-from kinarm.kernels.compiling import Array, inlined, kernel
+from kinarm.kernels.compiling import Array, inlined, kernel, unit
 from kinarm.kernels.kinematics import forward_kinematics, to_world
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.observing import observe
@@ -29,7 +29,7 @@ from kinarm.kernels.reward import add_reward
 from kinarm.kernels.session import Session
 from kinarm.kernels.touching import deepest_overlap, first_contact, overlaps
 
-LAYOUT = "c65fe8a3e33e"
+LAYOUT = "6faadf9ba986"
 """Hash of what is compiled in from other files; a test tells when to renew it.
 
 Numba's disk cache notices changes only in this file, so changing this line is what makes it
@@ -83,7 +83,9 @@ def begin(first: int, last: int, rows: NDArray[np.int64], session: Session) -> i
     q, planes, path = episodes.q, episodes.planes, episodes.path
     n_joints, n_observations = q.shape[1], episodes.observation.shape[1]
     n_pairs = shapes.planes.shape[0]
-    block, alone = work_space(n_joints, 0, n_observations, n_pairs, 0, 0, 0, 0)
+    block, alone = session.block, session.alone
+    if last - first < rows.shape[0]:
+        block, alone = work_space(n_joints, 0, n_observations, n_pairs, 0, 0, 0, 0)
     starts, goals = as_numbers(block.q), as_numbers(block.goal)
     distances, observations = as_numbers(block.distance), as_numbers(block.observation)
     proposed, n_paused = as_numbers(block.planes), 0
@@ -142,7 +144,35 @@ def bind(
     chain: Chain, shapes: ContactShapes, rules: Rules, control: Control, episodes: Episodes
 ) -> Session:
     """Bind a session, whose arrays stay those given."""
-    return Session(chain, shapes, rules, control, episodes)
+    n_episodes = episodes.status.shape[0]
+    block, alone = space_for(0, n_episodes, shapes, rules, control, episodes)
+    return Session(chain, shapes, rules, control, episodes, block, alone)
+
+
+@unit
+def space_for(
+    first: int,
+    last: int,
+    shapes: ContactShapes,
+    rules: Rules,
+    control: Control,
+    episodes: Episodes,
+) -> tuple[Block, Alone]:
+    """Allocate what it takes to advance the episodes ``first`` to ``last - 1``."""
+    own = control.weights.shape[1] if shared_policy(first, last, control) < 0 else 0
+    n_observations, widest = episodes.observation.shape[1], 1
+    for layer in range(1, control.layers.shape[0]):
+        widest = max(widest, control.layers[layer])
+    return work_space(
+        episodes.q.shape[1],
+        rules.step_limit.shape[0],
+        n_observations,
+        shapes.planes.shape[0],
+        rules.reward.shape[0],
+        widest,
+        own,
+        n_observations if episodes.moments.shape[0] > 0 else 0,
+    )
 
 
 @kernel
@@ -156,24 +186,11 @@ def advance(first: int, last: int, session: Session) -> int:
     control, episodes = session.control, session.episodes
     prismatic, translation, rotation, axes, tool, lower, upper = chain[:7]
     n_joints, n_actuated = episodes.q.shape[1], rules.step_limit.shape[0]
-    n_observations, n_pairs = episodes.observation.shape[1], shapes.planes.shape[0]
-    shared = shared_policy(first, last, control)
-    own = control.weights.shape[1] if shared < 0 else 0
-    summed = n_observations if episodes.moments.shape[0] > 0 else 0
-    widest = 1
-    for layer in range(1, control.layers.shape[0]):
-        widest = max(widest, control.layers[layer])
-    block, alone = work_space(
-        n_joints,
-        n_actuated,
-        n_observations,
-        n_pairs,
-        rules.reward.shape[0],
-        widest,
-        own,
-        summed,
-    )
-    row = np.full(LANES, -1)
+    n_pairs, shared = shapes.planes.shape[0], shared_policy(first, last, control)
+    block, alone = session.block, session.alone
+    if last - first < episodes.status.shape[0]:
+        block, alone = space_for(first, last, shapes, rules, control, episodes)
+    summed, row = block.first.shape[0], np.full(LANES, -1)
     before, poses = block.before, block.after
     waiting, n_alive, n_paused, changed = first, 0, 0, True
     while True:
@@ -265,32 +282,37 @@ def advance(first: int, last: int, session: Session) -> int:
 
 
 @kernel
-def allow_one_step(session: Session) -> None:
-    """Let every episode go on by one step."""
-    steps, stop = session.episodes.steps, session.episodes.stop
+def allow_one_step(session: Session) -> bool:
+    """Let every episode go on by one step; returns whether all its actions are finite."""
+    steps, stop, actions = session.episodes.steps, session.episodes.stop, session.control.actions
+    nothing = 0.0
     for e in range(steps.shape[0]):
         stop[e] = steps[e] + 1
+        for axis in range(actions.shape[2]):
+            nothing += 0.0 * actions[e, 0, axis]
+    return nothing == 0.0
 
 
 @kernel
 def results_of_step(
-    session: Session, reward: Array, terms: Array, ended: NDArray[np.bool_]
+    session: Session, numbers: Array, flags: NDArray[np.bool_], contact: NDArray[np.int64]
 ) -> None:
-    """Read off the one step that was allowed: rewards, their terms, and how episodes ended.
-
-    ``ended``, shape (n, 3), tells of success, contact and truncation. Of episodes that had ended
-    before the step, all is zero.
-    """
+    """Read off the one step that was allowed; see `kinarm.rollouts.StepResult`."""
     episodes = session.episodes
-    for e in range(reward.shape[0]):
+    for e in range(contact.shape[0]):
         stepped = episodes.steps[e] == episodes.stop[e]
-        reward[e] = 0.0
-        for term in range(terms.shape[1]):
-            terms[e, term] = episodes.terms[e, term] if stepped else 0.0
-            reward[e] += terms[e, term]
-        ended[e, 0] = stepped and episodes.status[e] == SUCCESS
-        ended[e, 1] = stepped and episodes.status[e] == COLLISION
-        ended[e, 2] = stepped and episodes.status[e] == TRUNCATED
+        reward = 0.0
+        for term in range(episodes.terms.shape[1]):
+            part = episodes.terms[e, term] if stepped else 0.0
+            numbers[2 + term, e] = part
+            reward += part
+        numbers[0, e] = reward
+        numbers[1, e] = episodes.distance[e]
+        refused = stepped and episodes.status[e] == COLLISION
+        flags[0, e] = stepped and episodes.status[e] == TRUNCATED
+        flags[1, e] = stepped and episodes.status[e] == SUCCESS
+        flags[2, e] = refused
+        contact[e] = episodes.touched[e] if refused else 0
 
 
 @kernel

@@ -10,6 +10,7 @@ from numba.experimental import structref
 from kinarm.chain import Chain
 from kinarm.contact_shapes import ContactShapes
 from kinarm.episodes import Control, Episodes, Rules
+from kinarm.kernels.block import Alone, Block
 
 
 @structref.register
@@ -18,13 +19,19 @@ class SessionType(types.StructRef):
 
 
 class Session(structref.StructRefProxy):
-    """Arm, scene, rules, source of actions and episodes; kernels see them as its attributes."""
+    """Arm, scene, rules, source of actions and episodes; kernels see them as its attributes.
+
+    A kernel that is called for all episodes has its block of lanes, and the space for a single
+    episode, to itself; calls for some of them, on several threads, need space of their own.
+    """
 
     chain: Chain
     shapes: ContactShapes
     rules: Rules
     control: Control
     episodes: Episodes
+    block: Block
+    alone: Alone
 
 
-structref.define_proxy(Session, SessionType, ["chain", "shapes", "rules", "control", "episodes"])
+structref.define_proxy(Session, SessionType, list(Session.__annotations__))
