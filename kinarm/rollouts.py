@@ -32,21 +32,20 @@ class StepResult(NamedTuple):
     @classmethod
     def empty(cls, n: int) -> "StepResult":
         """Tables yet to be filled in."""
-        return cls(
-            np.empty((2 + len(REWARD_TERMS), n)),
-            np.empty((3, n), dtype=bool),
-            np.empty(n, dtype=np.int64),
-        )
+        rows = 2 + len(REWARD_TERMS)
+        return cls(np.empty((rows, n)), np.empty((3, n), bool), np.empty(n, np.int64))
 
     @property
     def reward(self) -> NDArray[np.float64]:
         """Sums of the terms, shape (n,)."""
-        return self.numbers[0]
+        reward: NDArray[np.float64] = self.numbers[0]
+        return reward
 
     @property
     def distance(self) -> NDArray[np.float64]:
         """From the tool to the goal [m], shape (n,)."""
-        return self.numbers[1]
+        distance: NDArray[np.float64] = self.numbers[1]
+        return distance
 
     @property
     def terms(self) -> NDArray[np.float64]:
@@ -56,22 +55,39 @@ class StepResult(NamedTuple):
     @property
     def truncated(self) -> NDArray[np.bool_]:
         """Whether the step ended an episode at the horizon, shape (n,)."""
-        return self.flags[0]
+        truncated: NDArray[np.bool_] = self.flags[0]
+        return truncated
 
     @property
     def success(self) -> NDArray[np.bool_]:
         """Whether it reached the goal, shape (n,)."""
-        return self.flags[1]
+        success: NDArray[np.bool_] = self.flags[1]
+        return success
 
     @property
     def collision(self) -> NDArray[np.bool_]:
         """Whether it was refused, shape (n,)."""
-        return self.flags[2]
+        collision: NDArray[np.bool_] = self.flags[2]
+        return collision
 
     @property
     def terminated(self) -> NDArray[np.bool_]:
         """Success or collision, shape (n,)."""
-        return self.flags[1] | self.flags[2]
+        terminated: NDArray[np.bool_] = self.flags[1] | self.flags[2]
+        return terminated
+
+
+KEPT = {
+    "goals": "goal",
+    "steps": "steps",
+    "distance": "distance",
+    "returns": "total",
+    "configurations": "q",
+    "targets": "target",
+    "moments": "moments",
+    "paths": "path",
+}
+"""What of the outcome is kept as it is, by the name of its array in `kinarm.episodes.Episodes`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,23 +131,25 @@ class Rollouts:
     paths: NDArray[np.float64]
 
     @classmethod
-    def from_episodes(cls, starts: NDArray[np.float64], episodes: Episodes) -> "Rollouts":
-        """Collect the outcome of episodes that have ended; their arrays become read-only."""
-        for array in (starts, *episodes):
-            array.flags.writeable = False
-        return cls(
+    def from_episodes(
+        cls, starts: NDArray[np.float64], episodes: Episodes, *, copy: bool = False
+    ) -> "Rollouts":
+        """Collect the outcome of episodes that have ended; its arrays are read-only.
+
+        They are those of the episodes, or copies.
+        """
+        rollouts = cls(
             starts=starts,
-            goals=episodes.goal,
             success=episodes.status == SUCCESS,
             collision=episodes.status == COLLISION,
-            steps=episodes.steps,
-            distance=episodes.distance,
-            returns=episodes.total,
-            configurations=episodes.q,
-            targets=episodes.target,
-            moments=episodes.moments,
-            paths=episodes.path,
+            **{
+                name: np.array(getattr(episodes, field), copy=copy or None)
+                for name, field in KEPT.items()
+            },
         )
+        for array in vars(rollouts).values():
+            array.flags.writeable = False
+        return rollouts
 
     def __len__(self) -> int:
         return len(self.steps)

@@ -37,7 +37,7 @@ class Contacts:
             Its outcome; changed in place.
         """
         contact, refused = result.contact, result.collision
-        if np.count_nonzero(contact) == np.count_nonzero(refused):
+        if np.count_nonzero(refused) == np.count_nonzero(contact):
             return
         rows = (refused & (contact == 0)).nonzero()[0]
         ways = self._world.substeps(episodes.q[rows], episodes.target[rows])

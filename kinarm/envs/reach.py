@@ -131,6 +131,7 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
         picture = {"width": width, "height": height, "camera": camera}
         self._pictures = EnvPictures(self.simulator, render_mode, 1, **picture)
         self._contacts = Contacts(self.simulator.world)
+        self._told = ("distance", *(TERM_KEYS if self.interface.tells_terms else ()))
         self._stream: ScenarioStream | None = None
 
     def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> Interface:
@@ -175,7 +176,7 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
             reward.item(),
             terminated.item(),
             truncated.item(),
-            self._info(episode, result),
+            self._info(result),
         )
 
     def render(self) -> Any:
@@ -203,7 +204,7 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
         result.flags[:] = np.equal.outer((TRUNCATED, SUCCESS, COLLISION), status)
         self._contacts.find(episode, result)
         ended = bool(result.terminated[0]), bool(result.truncated[0])
-        return self._observation(episode), 0.0, *ended, self._info(episode, result)
+        return self._observation(episode), 0.0, *ended, self._info(result)
 
     def _observation(self, episode: Episodes) -> Observations:
         shown = self.interface.observe(episode.observation)
@@ -211,19 +212,13 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
             return {name: part[0] for name, part in shown.items()}
         return shown[0]
 
-    def _info(self, episode: Episodes, result: StepResult) -> dict[str, Any]:
+    def _info(self, result: StepResult) -> dict[str, Any]:
         """What there is to tell about a step."""
-        success, collision = result.success.item(), result.collision.item()
-        info = {
-            "distance": episode.distance.item(),
-            "success": success,
-            "is_success": success,
-            "collision": collision,
-            "contact": result.contact.item(),
-        }
-        if self.interface.tells_terms:
-            info.update(zip(TERM_KEYS, result.terms[0].tolist(), strict=True))
-        return info
+        told = dict(zip(self._told, result.numbers[1:, 0].tolist(), strict=False))
+        _, success, collision = result.flags[:, 0].tolist()
+        told["success"] = told["is_success"] = success
+        told["collision"], told["contact"] = collision, result.contact.item()
+        return told
 
     def _check_action(self, action: Array) -> None:
         """Refuse an action that is not one number for each actuated joint."""

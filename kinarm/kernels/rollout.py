@@ -27,9 +27,10 @@ from kinarm.kernels.proof import (
 )
 from kinarm.kernels.reward import add_reward
 from kinarm.kernels.session import Session
+from kinarm.kernels.sharing import take_number
 from kinarm.kernels.touching import deepest_overlap, first_contact, overlaps
 
-LAYOUT = "6faadf9ba986"
+LAYOUT = "5832c9218dd5"
 """Hash of what is compiled in from other files; a test tells when to renew it.
 
 Numba's disk cache notices changes only in this file, so changing this line is what makes it
@@ -47,14 +48,14 @@ def screen(
     tools: Array,
     free: NDArray[np.bool_],
     touching: NDArray[np.bool_],
-) -> None:
+) -> int:
     """Find the tool points of configurations, shape (n, 3) [m], and which surely are free or touch.
 
-    Of those that neither is proven of, Coal has to judge.
+    Returns of how many one of both is proven; Coal has to judge the others.
     """
     n_joints, tool = configurations.shape[1], chain.tool
     block, alone = work_space(n_joints, 0, 0, shapes.planes.shape[0], 0, 0, 0, 0)
-    q, points = as_numbers(block.q), as_numbers(block.goal)
+    q, points, n_proven = as_numbers(block.q), as_numbers(block.goal), 0
     for start in range(first, last, LANES):
         filled = min(last - start, LANES)
         for lane in range(LANES):
@@ -69,8 +70,10 @@ def screen(
         for lane in range(filled):
             free[start + lane] = apart >> lane & 1 != 0
             touching[start + lane] = touched >> lane & 1 != 0
+            n_proven += (apart | touched) >> lane & 1
             for axis in range(3):
                 tools[start + lane, axis] = points[0, axis, lane]
+    return n_proven
 
 
 @kernel
@@ -130,7 +133,7 @@ def place_arms(chain: Chain, block: Block) -> None:
 
 @inlined
 def stand(shapes: ContactShapes, touched: int, filled: int, block: Block, alone: Alone) -> int:
-    """Bits of the arms that are proven free of contact; not tried where those of ``touched`` are set."""
+    """Bits of the arms that are proven free of contact; ``touched`` are those that are not."""
     free = lane_bits(is_apart(propose_planes(shapes, block.after, block)))
     for lane in range(filled):
         open_here = (free | touched) >> lane & 1 == 0
@@ -144,22 +147,20 @@ def bind(
     chain: Chain, shapes: ContactShapes, rules: Rules, control: Control, episodes: Episodes
 ) -> Session:
     """Bind a session, whose arrays stay those given."""
-    n_episodes = episodes.status.shape[0]
-    block, alone = space_for(0, n_episodes, shapes, rules, control, episodes)
+    block, alone = space_for(shapes, rules, control, episodes)
     return Session(chain, shapes, rules, control, episodes, block, alone)
 
 
 @unit
 def space_for(
-    first: int,
-    last: int,
     shapes: ContactShapes,
     rules: Rules,
     control: Control,
     episodes: Episodes,
 ) -> tuple[Block, Alone]:
-    """Allocate what it takes to advance the episodes ``first`` to ``last - 1``."""
-    own = control.weights.shape[1] if shared_policy(first, last, control) < 0 else 0
+    """Allocate what it takes to advance episodes."""
+    n_episodes = episodes.status.shape[0]
+    own = control.weights.shape[1] if shared_policy(n_episodes, control) < 0 else 0
     n_observations, widest = episodes.observation.shape[1], 1
     for layer in range(1, control.layers.shape[0]):
         widest = max(widest, control.layers[layer])
@@ -176,35 +177,35 @@ def space_for(
 
 
 @kernel
-def advance(first: int, last: int, session: Session) -> int:
-    """Advance the running episodes among ``first`` to ``last - 1``, a block at a time.
+def advance(counters: NDArray[np.int64], session: Session) -> int:
+    """Advance the running episodes, a block at a time.
 
-    Each goes on until it ends, reaches its ``stop`` or pauses before a step that is not proven
-    free of contact; then the next one takes its place in the block. Returns how many paused.
+    Each goes on until it ends, reaches its ``stop`` or pauses before a step that is neither proven
+    free of contact nor proven to touch; then the next one takes its place in the block. Returns
+    how many paused.
+
+    Several threads may do so together: the counters, zero at first, tell which episode is the next
+    one, and how many threads have come.
     """
     chain, shapes, rules = session.chain, session.shapes, session.rules
     control, episodes = session.control, session.episodes
     prismatic, translation, rotation, axes, tool, lower, upper = chain[:7]
     n_joints, n_actuated = episodes.q.shape[1], rules.step_limit.shape[0]
-    n_pairs, shared = shapes.planes.shape[0], shared_policy(first, last, control)
+    n_episodes, n_pairs = episodes.status.shape[0], shapes.planes.shape[0]
+    shared = shared_policy(n_episodes, control)
     block, alone = session.block, session.alone
-    if last - first < episodes.status.shape[0]:
-        block, alone = space_for(first, last, shapes, rules, control, episodes)
+    if take_number(counters, 1) > 0:
+        block, alone = space_for(shapes, rules, control, episodes)
     summed, row = block.first.shape[0], np.full(LANES, -1)
     before, poses = block.before, block.after
-    waiting, n_alive, n_paused, changed = first, 0, 0, True
+    waiting, n_alive, n_paused, changed = 0, 0, 0, True
     while True:
         for lane in range(row.shape[0]):
-            if row[lane] < 0 and waiting < last:
-                while waiting < last and not (
-                    episodes.status[waiting] == RUNNING
-                    and episodes.steps[waiting] < episodes.stop[waiting]
-                ):
-                    waiting += 1
-                if waiting < last:
+            if row[lane] < 0 and waiting < n_episodes:
+                waiting = next_waiting(counters, episodes)
+                if waiting < n_episodes:
                     row[lane] = waiting
                     take_in(waiting, lane, control, episodes, block)
-                    waiting += 1
                     n_alive += 1
                     changed = True
         if n_alive == 0:
@@ -279,6 +280,17 @@ def advance(first: int, last: int, session: Session) -> int:
                         episodes.status[e] = SUCCESS
                     elif ends >> lane & 1:
                         episodes.status[e] = TRUNCATED
+
+
+@inlined
+def next_waiting(counters: NDArray[np.int64], episodes: Episodes) -> int:
+    """Take the next episode that is to be advanced; past the last one if there is none."""
+    while True:
+        e = take_number(counters, 0)
+        if e >= episodes.status.shape[0]:
+            return e
+        if episodes.status[e] == RUNNING and episodes.steps[e] < episodes.stop[e]:
+            return e
 
 
 @kernel

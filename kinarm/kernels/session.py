@@ -21,8 +21,8 @@ class SessionType(types.StructRef):
 class Session(structref.StructRefProxy):
     """Arm, scene, rules, source of actions and episodes; kernels see them as its attributes.
 
-    A kernel that is called for all episodes has its block of lanes, and the space for a single
-    episode, to itself; calls for some of them, on several threads, need space of their own.
+    One thread at a time may use its block of lanes, and the space for a single episode; others
+    need space of their own.
     """
 
     chain: Chain

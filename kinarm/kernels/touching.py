@@ -8,14 +8,15 @@ with other shapes nothing is claimed.
 import math
 
 from kinarm.chain import Chain
-from kinarm.contact_shapes import BETWEEN_CAPSULES, WITH_GROUND, ContactShapes
+from kinarm.contact_shapes import BETWEEN_CAPSULES, GROUND, WITH_GROUND, ContactShapes
 from kinarm.kernels.block import Alone, Block
 from kinarm.kernels.compiling import Array, helper, inlined
-from kinarm.kernels.distance import between_segments
+from kinarm.kernels.distance import between_segments, closest_to_box
 from kinarm.kernels.kinematics import to_world
 from kinarm.kernels.lanes import as_numbers
-from kinarm.kernels.planes import FINE, from_box, height_above, propose
+from kinarm.kernels.planes import FINE, height_above, propose
 from kinarm.kernels.proof import MARGIN, is_apart, place
+from kinarm.kernels.separation import separate
 
 
 @inlined
@@ -25,7 +26,7 @@ def is_exact(shapes: ContactShapes, pair: int) -> bool:
     return shapes.exact[first] and (kind != BETWEEN_CAPSULES or shapes.exact[second])
 
 
-@inlined
+@helper
 def overlap(shapes: ContactShapes, pair: int, poses: Array) -> float:
     """Lower bound of how deep an exact pair overlaps [m]; negative if it may be apart."""
     kind, first, second = shapes.pairs[pair, 0], shapes.pairs[pair, 1], shapes.pairs[pair, 2]
@@ -41,8 +42,13 @@ def overlap(shapes: ContactShapes, pair: int, poses: Array) -> float:
         x, y, z = between_segments(a, b, c, d)
         radius += axes[second, 6]
     else:
-        lower, upper = shapes.boxes[second, 0], shapes.boxes[second, 1]
-        x, y, z = from_box(a, b, (lower[0], lower[1], lower[2]), (upper[0], upper[1], upper[2]))
+        low, high = shapes.boxes[second, 0], shapes.boxes[second, 1]
+        lower, upper = (low[0], low[1], low[2]), (high[0], high[1], high[2])
+        t = closest_to_box(a, b, lower, upper)
+        x, y, z = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
+        x -= min(max(x, lower[0]), upper[0])
+        y -= min(max(y, lower[1]), upper[1])
+        z -= min(max(z, lower[2]), upper[2])
     return radius - math.sqrt(x * x + y * y + z * z)
 
 
@@ -88,6 +94,11 @@ def first_contact(
         if is_exact(shapes, pair) and overlaps(overlap(shapes, pair, alone.before)):
             return pair + 1
         propose(shapes, pair, alone.before, alone.plane, 0)
-        if not is_apart(height_above(shapes, pair, FINE, alone.before, alone.plane, 0)):
+        height = height_above(shapes, pair, FINE, alone.before, alone.plane, 0)
+        if not is_apart(height) and shapes.planes[pair, 0] != GROUND:
+            height = separate(
+                shapes, pair, alone.before, alone.relative, alone.simplex, alone.plane
+            )
+        if not is_apart(height):
             return 0
     return 0
