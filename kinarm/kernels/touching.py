@@ -8,13 +8,13 @@ with other shapes nothing is claimed.
 import math
 
 from kinarm.chain import Chain
-from kinarm.contact_shapes import BETWEEN_CAPSULES, GROUND, WITH_GROUND, ContactShapes
+from kinarm.contact_shapes import BETWEEN_CAPSULES, GROUND, PLANE, WITH_GROUND, ContactShapes
 from kinarm.kernels.block import Alone, Block
 from kinarm.kernels.compiling import Array, helper, inlined
 from kinarm.kernels.distance import between_segments, closest_to_box
 from kinarm.kernels.kinematics import to_world
 from kinarm.kernels.lanes import as_numbers
-from kinarm.kernels.planes import FINE, height_above, propose
+from kinarm.kernels.planes import FINE, height_above
 from kinarm.kernels.proof import MARGIN, is_apart, place
 from kinarm.kernels.separation import separate
 
@@ -85,7 +85,7 @@ def first_contact(
     k = 1
     while doubt >> (k - 1) & 1 == 0:
         k += 1
-    q, target = as_numbers(block.q), as_numbers(block.target)
+    q, target, planes = as_numbers(block.q), as_numbers(block.target), as_numbers(block.planes)
     for joint in range(block.q.shape[1]):
         start, end = q[0, joint, lane], target[0, joint, lane]
         alone.q[0, joint] = end if k == tested else start + k / tested * (end - start)
@@ -93,7 +93,8 @@ def first_contact(
     for pair in range(shapes.pairs.shape[0]):
         if is_exact(shapes, pair) and overlaps(overlap(shapes, pair, alone.before)):
             return pair + 1
-        propose(shapes, pair, alone.before, alone.plane, 0)
+        for i in range(PLANE):
+            alone.plane[0, i] = planes[pair, i, lane]
         height = height_above(shapes, pair, FINE, alone.before, alone.plane, 0)
         if not is_apart(height) and shapes.planes[pair, 0] != GROUND:
             height = separate(

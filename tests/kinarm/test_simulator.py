@@ -428,7 +428,7 @@ class TestBatchesThatServeAgain:
                 expected = Simulator(simulator.problem, threads=1).rollout(
                     networks, *scenarios, shift=moved
                 )
-                assert_same(found, expected)
+                assert_identical(found, expected)
             np.testing.assert_array_equal(networks.weights, kept)
 
     def test_outcomes_stay_as_they_were(self, simulator, scenarios):
