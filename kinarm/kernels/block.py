@@ -105,6 +105,24 @@ class Alone(NamedTuple):
     listed: NDArray[np.int64]
 
 
+@inlined
+def numbers_needed(
+    n_joints: int,
+    n_actuated: int,
+    n_observations: int,
+    n_pairs: int,
+    n_terms: int,
+    widest: int,
+    own: int,
+    summed: int,
+) -> int:
+    """Numbers that a block and the space for a single episode take together."""
+    placed = (n_joints + 1) * POSE
+    lanes = 2 * n_joints + 3 + 2 * n_observations + 2 * placed + (n_pairs + 1) * PLANE
+    lanes += 3 * n_pairs + (n_actuated + 1) * n_actuated + 2 * widest + own + 6 + n_terms
+    return (lanes + 2 * summed) * LANES + n_joints + 2 * placed + PLANE + 24
+
+
 @unit
 def work_space(
     n_joints: int,
@@ -117,13 +135,10 @@ def work_space(
     summed: int,
 ) -> tuple[Block, Alone]:
     """Allocate a block, and the space for a single episode, both out of one buffer."""
-    placed = (n_joints + 1) * POSE
-    lanes = (
-        *(2 * n_joints + 3, 2 * n_observations, 2 * placed, (n_pairs + 1) * PLANE, 3 * n_pairs),
-        *(n_actuated * n_actuated, n_actuated, 2 * widest, own, 6, n_terms, 2 * summed),
+    space = np.zeros(
+        numbers_needed(n_joints, n_actuated, n_observations, n_pairs, n_terms, widest, own, summed)
     )
-    numbers = n_joints + 2 * placed + PLANE + 24
-    space, used = np.zeros(sum(lanes) * LANES + numbers), np.zeros(1, dtype=np.int64)
+    used = np.zeros(1, dtype=np.int64)
     block = Block(
         q=carve_lanes(space, used, (1, n_joints)),
         target=carve_lanes(space, used, (1, n_joints)),

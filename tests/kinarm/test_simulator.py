@@ -3,6 +3,7 @@
 import copy
 import math
 import pickle
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -430,6 +431,13 @@ class TestBatchesThatServeAgain:
                 )
                 assert_identical(found, expected)
             np.testing.assert_array_equal(networks.weights, kept)
+
+    def test_threads_may_use_one_simulator(self, simulator, scenarios):
+        batches = [linear_policies(simulator, 1, seed) for seed in range(8)]
+        with ThreadPoolExecutor(4) as pool:
+            found = list(pool.map(lambda each: simulator.rollout(each, *scenarios), batches))
+        for networks, rollouts in zip(batches, found, strict=True):
+            assert_identical(rollouts, simulator.rollout(networks, *scenarios))
 
     def test_outcomes_stay_as_they_were(self, simulator, scenarios):
         first = simulator.rollout(linear_policies(simulator, 1, 1), *scenarios)
