@@ -15,12 +15,7 @@ from kinarm.batches import Batch, IdleBatch
 from kinarm.episodes import PAUSED, RUNNING, Episodes
 from kinarm.errors import InvalidInputError, StartInContactError
 from kinarm.judging import judge_steps
-from kinarm.kernels.rollout import (
-    advance,
-    allow_one_step,
-    begin,
-    results_of_step,
-)
+from kinarm.kernels.rollout import advance, allow_one_step, begin, results_of_step
 from kinarm.kernels.session import Session
 from kinarm.networks import CompiledPolicy, Networks, network_control, table_control
 from kinarm.problem import ProblemLike, ReachProblem
@@ -323,7 +318,8 @@ class Simulator:
     def _step(self, episodes: Episodes, actions: ArrayLike) -> Session:
         """Advance running episodes by one step."""
         _, table, session = self._stepped(episodes)
-        if not isinstance(actions, np.ndarray) or actions.shape != table.shape:
+        plain = isinstance(actions, np.ndarray) and actions.dtype.kind == "f"
+        if not plain or np.shape(actions) != table.shape:
             actions = finite_array("actions", actions, table.shape)
         table[...] = actions
         if not allow_one_step(session):
@@ -345,8 +341,7 @@ class Simulator:
         """Drive episodes to their end with a Python function."""
         actions = np.zeros((len(episodes.status), self.n_actions))
         while (running := episodes.status == RUNNING).any():
-            chosen = finite_array(
+            actions[running] = finite_array(
                 "actions", policy(episodes.observation[running]), (running.sum(), self.n_actions)
             )
-            actions[running] = chosen
             self._step(episodes, actions)
