@@ -6,8 +6,11 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from typing import Any
 
+import numpy as np
+
 PARALLEL_STEPS = 8192
 BALANCED_STEPS = 16384
+SHARED_STEPS = 2048
 
 
 def available_threads() -> int:
@@ -35,6 +38,22 @@ def run_rows(
         pool.submit(kernel, first, min(first + size, n), *arrays) for first in range(0, n, size)
     ]
     return sum(done.result() or 0 for done in ranges)
+
+
+def run_together(kernel: Callable[..., int], work: int, threads: int, *arrays: Any) -> int:
+    """Call ``kernel(counters, *arrays)`` on several threads; add up what it returns.
+
+    The kernels share out the rows among them by two counters, zero at first, so that none is left
+    with more than the others. The calling thread is one of them, and the only one for little
+    ``work``, estimated in episode steps. A thread that comes too late is not waited for.
+    """
+    counters = np.zeros(2, dtype=np.int64)
+    if threads == 1 or work < SHARED_STEPS:
+        return kernel(counters, *arrays)
+    pool = _thread_pool(os.getpid(), threads)
+    helpers = [pool.submit(kernel, counters, *arrays) for _ in range(threads - 1)]
+    total = kernel(counters, *arrays)
+    return total + sum(helper.result() for helper in helpers if not helper.cancel())
 
 
 @cache

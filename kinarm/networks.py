@@ -196,8 +196,8 @@ def network_control(
             raise InvalidInputError(f"{count} policies for {n} episodes: give policy_index")
         index = np.arange(n) if count == n else np.zeros(n, dtype=np.int64)
     else:
-        index = np.array(policy_index)
-        whole = index.shape == (n,) and np.issubdtype(index.dtype, np.integer)
+        index = np.asarray(policy_index)
+        whole = index.shape == (n,) and index.dtype.kind in "iu"
         if not whole or (n and not 0 <= index.min() <= index.max() < count):
             raise InvalidInputError(f"policy_index must hold {n} whole numbers in 0..{count - 1}")
     control = table_control(np.zeros((0, 0, 0)))._replace(

@@ -7,32 +7,87 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.episodes import COLLISION, SUCCESS, Episodes
+from kinarm.task import REWARD_TERMS
 
 
 class StepResult(NamedTuple):
-    """Outcome of one step of n episodes; arrays of shape (n,).
+    """Outcome of one step of n episodes, in three tables that the kernel fills in.
 
     Attributes
     ----------
-    reward : ndarray
-        Sum of the terms.
-    terms : ndarray, shape (n, n_terms)
-        The weighted terms, in the order of `kinarm.REWARD_TERMS`; zero for episodes that
-        were over before.
-    success, collision, truncated : ndarray of bool
-        How the step ended; all false for episodes that go on or were over before.
+    numbers : ndarray, shape (2 + n_terms, n)
+        Rewards, distances from the tool to the goal [m], and the weighted terms, in the order of
+        `kinarm.REWARD_TERMS`. Rewards are zero for episodes that were over before.
+    flags : ndarray of bool, shape (3, n)
+        Whether the horizon was reached, the goal, or the step was refused because something
+        touches; all false for episodes that go on or were over before.
+    contact : ndarray of int, shape (n,)
+        Number, from 1, of the pair that refused the step; 0 if none did, or nobody looked.
     """
 
-    reward: NDArray[np.float64]
-    terms: NDArray[np.float64]
-    success: NDArray[np.bool_]
-    collision: NDArray[np.bool_]
-    truncated: NDArray[np.bool_]
+    numbers: NDArray[np.float64]
+    flags: NDArray[np.bool_]
+    contact: NDArray[np.int64]
+
+    @classmethod
+    def empty(cls, n: int) -> "StepResult":
+        """Tables yet to be filled in."""
+        rows = 2 + len(REWARD_TERMS)
+        return cls(np.empty((rows, n)), np.empty((3, n), bool), np.empty(n, np.int64))
+
+    @property
+    def reward(self) -> NDArray[np.float64]:
+        """Sums of the terms, shape (n,)."""
+        reward: NDArray[np.float64] = self.numbers[0]
+        return reward
+
+    @property
+    def distance(self) -> NDArray[np.float64]:
+        """From the tool to the goal [m], shape (n,)."""
+        distance: NDArray[np.float64] = self.numbers[1]
+        return distance
+
+    @property
+    def terms(self) -> NDArray[np.float64]:
+        """The weighted terms, shape (n, n_terms)."""
+        return self.numbers[2:].T
+
+    @property
+    def truncated(self) -> NDArray[np.bool_]:
+        """Whether the step ended an episode at the horizon, shape (n,)."""
+        truncated: NDArray[np.bool_] = self.flags[0]
+        return truncated
+
+    @property
+    def success(self) -> NDArray[np.bool_]:
+        """Whether it reached the goal, shape (n,)."""
+        success: NDArray[np.bool_] = self.flags[1]
+        return success
+
+    @property
+    def collision(self) -> NDArray[np.bool_]:
+        """Whether it was refused, shape (n,)."""
+        collision: NDArray[np.bool_] = self.flags[2]
+        return collision
 
     @property
     def terminated(self) -> NDArray[np.bool_]:
-        """Success or collision."""
-        return self.success | self.collision
+        """Success or collision, shape (n,)."""
+        terminated: NDArray[np.bool_] = self.flags[1] | self.flags[2]
+        return terminated
+
+
+KEPT = {
+    "goals": "goal",
+    "steps": "steps",
+    "distance": "distance",
+    "returns": "total",
+    "configurations": "q",
+    "targets": "target",
+    "moments": "moments",
+    "paths": "path",
+}
+"""What of the outcome is kept as it is, by the name of its array in `kinarm.episodes.Episodes`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,23 +131,25 @@ class Rollouts:
     paths: NDArray[np.float64]
 
     @classmethod
-    def from_episodes(cls, starts: NDArray[np.float64], episodes: Episodes) -> "Rollouts":
-        """Collect the outcome of episodes that have ended; their arrays become read-only."""
-        for array in (starts, *episodes):
-            array.flags.writeable = False
-        return cls(
+    def from_episodes(
+        cls, starts: NDArray[np.float64], episodes: Episodes, *, copy: bool = False
+    ) -> "Rollouts":
+        """Collect the outcome of episodes that have ended; its arrays are read-only.
+
+        They are those of the episodes, or copies.
+        """
+        rollouts = cls(
             starts=starts,
-            goals=episodes.goal,
             success=episodes.status == SUCCESS,
             collision=episodes.status == COLLISION,
-            steps=episodes.steps,
-            distance=episodes.distance,
-            returns=episodes.total,
-            configurations=episodes.q,
-            targets=episodes.target,
-            moments=episodes.moments,
-            paths=episodes.path,
+            **{
+                name: np.array(getattr(episodes, field), copy=copy or None)
+                for name, field in KEPT.items()
+            },
         )
+        for array in vars(rollouts).values():
+            array.flags.writeable = False
+        return rollouts
 
     def __len__(self) -> int:
         return len(self.steps)

@@ -1,6 +1,7 @@
 """Scenarios: where an episode starts and what it has to reach."""
 
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,19 +80,19 @@ def draw_for_each(
     spread = task.start_spread if start_spread is None else start_spread
     lower = arm.home + spread * (arm.lower - arm.home)
     extent = spread * (arm.upper - arm.lower)
+    source = rngs[0] if len(rngs) == 1 else cast("np.random.Generator", _Sources(rngs))
+    goals = task.draw_goals(world.problem.scene, source, count * len(rngs))
     listed = np.array(task.starts)
-    goals = np.concatenate([task.draw_goals(world.problem.scene, rng, count) for rng in rngs])
-    starts = np.tile(arm.home, (len(goals), 1))
+    starts = np.empty((len(goals), arm.n_joints))
+    starts[:] = arm.home
     pending = np.arange(len(goals))
     for _ in range(START_ATTEMPTS):
-        wanted = np.bincount(pending // max(count, 1), minlength=len(rngs)).tolist()
-        drawn = [rng.random((n, n_actions)) for rng, n in zip(rngs, wanted, strict=True)]
-        uniforms = np.concatenate(drawn)
+        uniforms = _draw_uniforms(rngs, pending // max(count, 1), n_actions)
         if len(listed):
             starts[pending] = proposed = listed[(uniforms[:, 0] * len(listed)).astype(np.int64)]
         else:
             proposed = propose_starts(pending, uniforms, lower, extent, starts)
-        tools, touching = world.screen(proposed)
+        tools, touching = world.screened(proposed)
         pending = rejected_rows(pending, goals, tools, touching, task.tolerance)
         if pending.size == 0:
             return starts.reshape(len(rngs), count, arm.n_joints), goals.reshape(
@@ -99,11 +100,39 @@ def draw_for_each(
             )
     pair = world.contact_model.contact_pair(starts[pending[0]])
     reason = f"{pair[0]} touches {pair[1]}" if pair else "the tool already is at the goal"
-    source = "from task.starts" if len(listed) else f"with start_spread {spread}"
+    drawn_from = "from task.starts" if len(listed) else f"with start_spread {spread}"
     raise ProblemError(
         f"no contact-free start away from the goal found in {START_ATTEMPTS} attempts for arm "
-        f"{arm.name!r} {source}; in the last one {reason}"
+        f"{arm.name!r} {drawn_from}; in the last one {reason}"
     )
+
+
+class _Sources:
+    """Generators that are asked for equal shares of numbers, as if they were one."""
+
+    def __init__(self, rngs: Sequence[np.random.Generator]) -> None:
+        self._rngs = rngs
+
+    def random(self, shape: tuple[int, ...]) -> NDArray[np.float64]:
+        """Draw numbers in [0, 1), the first rows with the first generator."""
+        numbers = np.empty((len(self._rngs), shape[0] // len(self._rngs), *shape[1:]))
+        for rng, own in zip(self._rngs, numbers, strict=True):
+            rng.random(out=own)
+        return numbers.reshape(shape)
+
+
+def _draw_uniforms(
+    rngs: Sequence[np.random.Generator], askers: NDArray[np.int64], n_actions: int
+) -> NDArray[np.float64]:
+    """Draw a row of numbers in [0, 1) from the generator of each asker, who come in order."""
+    if len(rngs) == 1:
+        return rngs[0].random((len(askers), n_actions))
+    uniforms, first = np.empty((len(askers), n_actions)), 0
+    for rng, wanted in zip(rngs, np.bincount(askers, minlength=len(rngs)).tolist(), strict=True):
+        if wanted:
+            rng.random(out=uniforms[first : first + wanted])
+        first += wanted
+    return uniforms
 
 
 class ScenarioStream:

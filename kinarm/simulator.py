@@ -8,18 +8,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm._parallel import run_rows
+from kinarm._parallel import run_rows, run_together
 from kinarm._validation import finite_array
 from kinarm.arm import Arm
-from kinarm.episodes import PAUSED, RUNNING, Control, Episodes
+from kinarm.batches import Batch, IdleBatch
+from kinarm.episodes import PAUSED, RUNNING, Episodes
 from kinarm.errors import InvalidInputError, StartInContactError
 from kinarm.judging import judge_steps
-from kinarm.kernels.rollout import (
-    advance,
-    allow_one_step,
-    begin,
-    results_of_step,
-)
+from kinarm.kernels.rollout import advance, allow_one_step, begin, results_of_step
 from kinarm.kernels.session import Session
 from kinarm.networks import CompiledPolicy, Networks, network_control, table_control
 from kinarm.problem import ProblemLike, ReachProblem
@@ -34,7 +30,7 @@ PolicyFunction = Callable[[NDArray[np.float64]], ArrayLike]
 
 
 class _Stepped(NamedTuple):
-    """Episodes that are stepped, the table of their actions, and the session of both."""
+    """Episodes that are stepped, their actions, shape (n, n_actions), and the session of both."""
 
     episodes: Episodes
     actions: NDArray[np.float64]
@@ -75,9 +71,10 @@ class Simulator:
         self.threads = self.world.threads
         self.judged = 0
         self._last: _Stepped | None = None
+        self._idle = IdleBatch()
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_last": None}
+        return self.__dict__ | {"_last": None, "_idle": IdleBatch()}
 
     def __repr__(self) -> str:
         return f"Simulator({self.problem!r})"
@@ -142,7 +139,7 @@ class Simulator:
         StartInContactError
             If a start touches something.
         """
-        return self._begin(*self.check_scenarios(starts, goals), None, record=record)[0]
+        return self._begin(*self.check_scenarios(starts, goals), record=record)
 
     def step(self, episodes: Episodes, actions: ArrayLike) -> StepResult:
         """Advance every running episode by one step, in place.
@@ -159,12 +156,10 @@ class Simulator:
         InvalidInputError
             If the shape is wrong or an entry is NaN.
         """
-        table = finite_array("actions", actions, (len(episodes.status), self.n_actions))
-        session = self._step(episodes, table)
-        n, n_terms = episodes.terms.shape
-        reward, terms, ended = np.empty(n), np.empty((n, n_terms)), np.empty((n, 3), dtype=bool)
-        results_of_step(session, reward, terms, ended)
-        return StepResult(reward, terms, ended[:, 0], ended[:, 1], ended[:, 2])
+        session = self._step(episodes, actions)
+        result = StepResult.empty(len(episodes.status))
+        results_of_step(session, *result)
+        return result
 
     def rollout(
         self,
@@ -208,14 +203,18 @@ class Simulator:
         if callable(policies) and not isinstance(policies, CompiledPolicy):
             if policy_index is not None:
                 raise InvalidInputError("policy_index does not apply to a function")
-            episodes, _ = self._begin(q, goal, None, record=record, shift=shift)
+            episodes = self._begin(q, goal, record=record, shift=shift)
             self._follow(policies, episodes)
-        else:
-            widths = (self.n_observations, self.n_actions)
-            control = network_control(policies, policy_index, len(q), widths)
-            episodes, session = self._begin(q, goal, control, record=record, shift=shift)
-            self._advance(session, episodes, len(q) * self.task.horizon)
-        return Rollouts.from_episodes(q, episodes)
+            return Rollouts.from_episodes(q, episodes)
+        widths = (self.n_observations, self.n_actions)
+        control = network_control(policies, policy_index, len(q), widths)
+        if record:
+            batch = Batch.bound(self.world, control, q, goal, record=True, shift=shift)
+            return Rollouts.from_episodes(q, self._run(batch))
+        batch = self._idle.taken(self.world, control, q, goal, shift)
+        rollouts = Rollouts.from_episodes(q, self._run(batch), copy=True)
+        self._idle.keep(batch)
+        return rollouts
 
     def rollout_actions(
         self, actions: ArrayLike, starts: ArrayLike, goals: ArrayLike, *, record: bool = False
@@ -231,9 +230,8 @@ class Simulator:
         """
         q, goal = self.check_scenarios(starts, goals)
         table = finite_array("actions", actions, (len(q), self.task.horizon, self.n_actions))
-        episodes, session = self._begin(q, goal, table_control(table), record=record)
-        self._advance(session, episodes, len(q) * self.task.horizon)
-        return Rollouts.from_episodes(q, episodes)
+        batch = Batch.bound(self.world, table_control(table), q, goal, record=record)
+        return Rollouts.from_episodes(q, self._run(batch))
 
     def contact_pairs(self, rollouts: Rollouts) -> tuple[tuple[str, str] | None, ...]:
         """Name the bodies that touched, per episode; None where nothing did."""
@@ -277,22 +275,24 @@ class Simulator:
         self,
         starts: NDArray[np.float64],
         goals: NDArray[np.float64],
-        control: Control | None,
         *,
         record: bool,
         shift: NDArray[np.float64] | None = None,
-    ) -> tuple[Episodes, Session]:
-        """Allocate and start episodes; without a control they are to be stepped."""
-        n_pairs = len(self.world.contact_model.shapes.pairs)
-        episodes = Episodes.allocate(
-            starts, goals, n_pairs=n_pairs, horizon=self.task.horizon, record=record, shift=shift
-        )
-        if control is None:
-            session = self._stepped(episodes).session
-        else:
-            session = self.world.session(control, episodes)
-        self._start(episodes, np.arange(len(starts)), session)
-        return episodes, session
+    ) -> Episodes:
+        """Allocate and start episodes that are to be stepped."""
+        at_rest = table_control(np.zeros((len(starts), 1, self.n_actions)))
+        batch = Batch.bound(self.world, at_rest, starts, goals, record=record, shift=shift)
+        self._last = _Stepped(batch.episodes, at_rest.actions[:, 0], batch.session)
+        self._start(batch.episodes, np.arange(len(starts)), batch.session)
+        return batch.episodes
+
+    def _run(self, batch: Batch) -> Episodes:
+        """Start the episodes of a batch, and advance them to their end."""
+        episodes = batch.episodes
+        n = len(episodes.status)
+        self._start(episodes, np.arange(n), batch.session)
+        self._advance(batch.session, episodes, n * self.task.horizon)
+        return episodes
 
     def _start(self, episodes: Episodes, rows: NDArray[np.int64], session: Session) -> None:
         """Start some episodes; see `begin`."""
@@ -312,20 +312,24 @@ class Simulator:
         if self._last is None or self._last.episodes is not episodes:
             table = np.zeros((len(episodes.status), 1, self.n_actions))
             session = self.world.session(table_control(table), episodes)
-            self._last = _Stepped(episodes, table, session)
+            self._last = _Stepped(episodes, table[:, 0], session)
         return self._last
 
-    def _step(self, episodes: Episodes, actions: NDArray[np.float64]) -> Session:
+    def _step(self, episodes: Episodes, actions: ArrayLike) -> Session:
         """Advance running episodes by one step."""
         _, table, session = self._stepped(episodes)
-        table[:, 0] = actions
-        allow_one_step(session)
-        self._advance(session, episodes, len(actions))
+        plain = isinstance(actions, np.ndarray) and actions.dtype.kind == "f"
+        if not plain or np.shape(actions) != table.shape:
+            actions = finite_array("actions", actions, table.shape)
+        table[...] = actions
+        if not allow_one_step(session):
+            finite_array("actions", actions, table.shape)  # which says what is wrong
+        self._advance(session, episodes, len(table))
         return session
 
     def _advance(self, session: Session, episodes: Episodes, work: int) -> None:
         """Advance episodes to their stop, asking Coal about every step that is in doubt."""
-        while run_rows(advance, len(episodes.status), work, self.threads, session):
+        while run_together(advance, work, self.threads, session):
             paused = np.flatnonzero(episodes.status == PAUSED)
             self.judged += judge_steps(self.world, session, episodes, paused)
             resumed = paused[episodes.cleared[paused]]
@@ -337,8 +341,7 @@ class Simulator:
         """Drive episodes to their end with a Python function."""
         actions = np.zeros((len(episodes.status), self.n_actions))
         while (running := episodes.status == RUNNING).any():
-            chosen = finite_array(
+            actions[running] = finite_array(
                 "actions", policy(episodes.observation[running]), (running.sum(), self.n_actions)
             )
-            actions[running] = chosen
             self._step(episodes, actions)

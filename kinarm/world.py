@@ -134,12 +134,16 @@ class World:
         touching : ndarray of bool, shape (n,)
         """
         q = finite_array("configurations", configurations, (None, self.arm.n_joints))
+        return self.screened(q)
+
+    def screened(self, q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """As `screen`, for finite configurations in a contiguous array."""
         n = len(q)
-        tools, proven = np.empty((n, 3)), np.empty(n, dtype=bool)
-        arrays = (self.arm.chain, self.contact_model.shapes, q, tools, proven)
-        run_rows(screen, n, n, self.threads, *arrays)
-        touching = ~proven
-        touching[touching] = self.contact_model.in_contact(q[touching])
+        tools, free, touching = np.empty((n, 3)), np.empty(n, dtype=bool), np.empty(n, dtype=bool)
+        arrays = (self.arm.chain, self.contact_model.shapes, q, tools, free, touching)
+        if run_rows(screen, n, n, self.threads, *arrays) < n:
+            doubtful = ~(free | touching)
+            touching[doubtful] = self.contact_model.in_contact(q[doubtful])
         return tools, touching
 
     def poses(self, configurations: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:

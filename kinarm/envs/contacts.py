@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.episodes import Episodes
+from kinarm.rollouts import StepResult
 from kinarm.world import World
 
 
@@ -25,23 +26,23 @@ class Contacts:
         self._world = world
         self.names: tuple[tuple[str, str] | None, ...] = (None, *world.contact_model.pair_names)
 
-    def of(self, episodes: Episodes, refused: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """Numbers of the first contacts of the last step, shape (n,); 0 where it went on.
+    def find(self, episodes: Episodes, result: StepResult) -> None:
+        """Fill in the numbers of the first contacts of a step that are not known yet.
 
         Parameters
         ----------
         episodes : Episodes
             After the step.
-        refused : ndarray of bool, shape (n,)
-            Which of them were refused it.
+        result : StepResult
+            Its outcome; changed in place.
         """
-        numbers = np.zeros(len(refused), dtype=np.int64)
-        if np.count_nonzero(refused):
-            rows = refused.nonzero()[0]
-            ways = self._world.substeps(episodes.q[rows], episodes.target[rows])
-            for row, way, doubt in zip(rows.tolist(), ways, episodes.doubt[rows], strict=True):
-                numbers[row] = episodes.touched[row] or self._first(way, int(doubt))
-        return numbers
+        contact, refused = result.contact, result.collision
+        if np.count_nonzero(refused) == np.count_nonzero(contact):
+            return
+        rows = (refused & (contact == 0)).nonzero()[0]
+        ways = self._world.substeps(episodes.q[rows], episodes.target[rows])
+        for row, way, doubt in zip(rows.tolist(), ways, episodes.doubt[rows], strict=True):
+            contact[row] = self._first(way, int(doubt))
 
     def _first(self, way: NDArray[np.float64], doubt: int) -> int:
         """Number of the first contact on the way of a step, shape (n_tested, n_joints).

@@ -24,39 +24,23 @@ class StepInfos:
     """
 
     def __init__(self, *, tells_terms: bool) -> None:
-        self._n_terms = len(TERM_KEYS) if tells_terms else 0
-        terms = TERM_KEYS[: self._n_terms]
-        entries = ("distance", *terms, "success", "is_success", "collision", "contact")
+        terms = TERM_KEYS if tells_terms else ()
+        self._numbers = slice(1, 2 + len(terms))
+        entries = ("distance", *terms, "success", "collision", "contact")
         self._keys = (*entries, *(f"_{key}" for key in entries))
 
-    def tables(
-        self, distance: NDArray[np.float64], result: StepResult, contact: NDArray[np.int64]
-    ) -> tuple[NDArray[Any], ...]:
-        """Arrays of shape (n_entries, n) for the infos of a step.
-
-        Parameters
-        ----------
-        distance : ndarray, shape (n,)
-            From the tool to the goal [m].
-        result : StepResult
-            Outcome of the step.
-        contact : ndarray of int, shape (n,)
-            Numbers of the contacts; see `kinarm.envs.contacts.Contacts`.
-        """
-        numbers = np.empty((1 + self._n_terms, len(distance)))
-        numbers[0] = distance
-        numbers[1:] = result.terms.T[: self._n_terms]
-        flags = np.empty((3, len(distance)), dtype=bool)
-        flags[:2] = result.success
-        flags[2] = result.collision
-        return numbers, flags, contact[None]
+    def tables(self, result: StepResult) -> tuple[NDArray[Any], ...]:
+        """Arrays of shape (n_entries, n) for the infos of a step, which are those of its result."""
+        return result.numbers[self._numbers], result.flags[1:], result.contact[None]
 
     def named(
         self, tables: tuple[NDArray[Any], ...], told: NDArray[np.bool_]
     ) -> dict[str, NDArray[Any]]:
         """Name the rows of the tables, and add the mask of the arms of which they tell."""
         values = chain(*tables, repeat(told))
-        return dict(zip(self._keys, values, strict=False))
+        infos = dict(zip(self._keys, values, strict=False))
+        infos["is_success"], infos["_is_success"] = infos["success"], told
+        return infos
 
 
 def taken_out(table: NDArray[Any], arms: NDArray[np.bool_]) -> NDArray[Any]:

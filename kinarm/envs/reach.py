@@ -23,7 +23,6 @@ from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.rollouts import StepResult
 from kinarm.scenarios import ScenarioStream
 from kinarm.simulator import Simulator
-from kinarm.task import REWARD_TERMS
 
 Array = NDArray[np.float64]
 
@@ -132,6 +131,7 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
         picture = {"width": width, "height": height, "camera": camera}
         self._pictures = EnvPictures(self.simulator, render_mode, 1, **picture)
         self._contacts = Contacts(self.simulator.world)
+        self._told = ("distance", *(TERM_KEYS if self.interface.tells_terms else ()))
         self._stream: ScenarioStream | None = None
 
     def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> Interface:
@@ -169,13 +169,14 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
             self._check_action(action)
             raise
         reward, terminated, truncated = self.interface.judge(episode, result)
+        self._contacts.find(episode, result)
         self._pictures.step(episode)
         return (
             self._observation(episode),
             reward.item(),
             terminated.item(),
             truncated.item(),
-            self._info(episode, result),
+            self._info(result),
         )
 
     def render(self) -> Any:
@@ -197,11 +198,13 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
             "step() was called although the episode is over: call reset() first. "
             "Nothing moves until then, and rewards are 0."
         )
-        nothing, status = np.zeros((1, len(REWARD_TERMS))), episode.status
-        ends = (status == SUCCESS, status == COLLISION, status == TRUNCATED)
-        result = StepResult(nothing[:, 0], nothing, *ends)
+        result, status = StepResult.empty(1), episode.status
+        result.numbers[:], result.contact[:] = 0.0, episode.touched * (status == COLLISION)
+        result.numbers[1] = episode.distance
+        result.flags[:] = np.equal.outer((TRUNCATED, SUCCESS, COLLISION), status)
+        self._contacts.find(episode, result)
         ended = bool(result.terminated[0]), bool(result.truncated[0])
-        return self._observation(episode), 0.0, *ended, self._info(episode, result)
+        return self._observation(episode), 0.0, *ended, self._info(result)
 
     def _observation(self, episode: Episodes) -> Observations:
         shown = self.interface.observe(episode.observation)
@@ -209,19 +212,13 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
             return {name: part[0] for name, part in shown.items()}
         return shown[0]
 
-    def _info(self, episode: Episodes, result: StepResult) -> dict[str, Any]:
+    def _info(self, result: StepResult) -> dict[str, Any]:
         """What there is to tell about a step."""
-        success, collision = result.success.item(), result.collision.item()
-        info = {
-            "distance": episode.distance.item(),
-            "success": success,
-            "is_success": success,
-            "collision": collision,
-            "contact": self._contacts.of(episode, result.collision).item() if collision else 0,
-        }
-        if self.interface.tells_terms:
-            info.update(zip(TERM_KEYS, result.terms[0].tolist(), strict=True))
-        return info
+        told = dict(zip(self._told, result.numbers[1:, 0].tolist(), strict=False))
+        _, success, collision = result.flags[:, 0].tolist()
+        told["success"] = told["is_success"] = success
+        told["collision"], told["contact"] = collision, result.contact.item()
+        return told
 
     def _check_action(self, action: Array) -> None:
         """Refuse an action that is not one number for each actuated joint."""

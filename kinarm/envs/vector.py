@@ -154,8 +154,8 @@ class ReachVectorEnv(Lifecycle, PortableSpec, VectorEnv[Any, Array, NDArray[Any]
         result = self.simulator.step(episodes, actions)
         reward, terminated, truncated = self.interface.judge(episodes, result)
         self._pictures.step(episodes)
-        contact = self._contacts.of(episodes, result.collision)
-        tables = self._infos.tables(episodes.distance, result, contact)
+        self._contacts.find(episodes, result)
+        tables = self._infos.tables(result)
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             infos = self._with_finals(episodes, tables, terminated | truncated)
         else:

@@ -11,14 +11,14 @@ from kinarm.kernels.network import act
 
 
 @inlined
-def shared_policy(first: int, last: int, control: Control) -> int:
-    """The policy of all episodes of a range; -1 if they have several, 0 if they have a table."""
-    if control.layers.shape[0] == 0 or first >= last:
+def shared_policy(n_episodes: int, control: Control) -> int:
+    """The policy of all episodes; -1 if they have several, 0 if they have a table."""
+    if control.layers.shape[0] == 0 or n_episodes == 0:
         return 0
-    for e in range(first + 1, last):
-        if control.policy[e] != control.policy[first]:
+    for e in range(1, n_episodes):
+        if control.policy[e] != control.policy[0]:
             return -1
-    return control.policy[first]
+    return control.policy[0]
 
 
 @inlined

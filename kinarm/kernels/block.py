@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 
 from kinarm.contact_shapes import PLANE
 from kinarm.episodes import Control, Episodes
+from kinarm.kernels.carving import carve_lanes, carve_numbers
 from kinarm.kernels.compiling import Array, inlined, unit
 from kinarm.kernels.kinematics import POSE
-from kinarm.kernels.lanes import LANES, as_lanes, as_numbers
+from kinarm.kernels.lanes import LANES, as_numbers
 
 
 class Block(NamedTuple):
@@ -104,6 +105,24 @@ class Alone(NamedTuple):
     listed: NDArray[np.int64]
 
 
+@inlined
+def numbers_needed(
+    n_joints: int,
+    n_actuated: int,
+    n_observations: int,
+    n_pairs: int,
+    n_terms: int,
+    widest: int,
+    own: int,
+    summed: int,
+) -> int:
+    """Numbers that a block and the space for a single episode take together."""
+    placed = (n_joints + 1) * POSE
+    lanes = 2 * n_joints + 3 + 2 * n_observations + 2 * placed + (n_pairs + 1) * PLANE
+    lanes += 3 * n_pairs + (n_actuated + 1) * n_actuated + 2 * widest + own + 6 + n_terms
+    return (lanes + 2 * summed) * LANES + n_joints + 2 * placed + PLANE + 24
+
+
 @unit
 def work_space(
     n_joints: int,
@@ -115,40 +134,44 @@ def work_space(
     own: int,
     summed: int,
 ) -> tuple[Block, Alone]:
-    """Allocate a block, and the space for a single episode."""
+    """Allocate a block, and the space for a single episode, both out of one buffer."""
+    space = np.zeros(
+        numbers_needed(n_joints, n_actuated, n_observations, n_pairs, n_terms, widest, own, summed)
+    )
+    used = np.zeros(1, dtype=np.int64)
     block = Block(
-        q=as_lanes(np.zeros((1, n_joints, LANES))),
-        target=as_lanes(np.zeros((1, n_joints, LANES))),
-        goal=as_lanes(np.zeros((1, 3, LANES))),
-        observation=as_lanes(np.zeros((1, n_observations, LANES))),
-        seen=as_lanes(np.zeros((1, n_observations, LANES))),
-        before=as_lanes(np.zeros((n_joints + 1, POSE, LANES))),
-        after=as_lanes(np.zeros((n_joints + 1, POSE, LANES))),
-        planes=as_lanes(np.zeros((n_pairs + 1, PLANE, LANES))),
-        height=as_lanes(np.zeros((n_pairs, LANES))),
-        bend=as_lanes(np.zeros((n_pairs, LANES))),
-        bound=as_lanes(np.zeros((n_pairs, LANES))),
-        twist=as_lanes(np.zeros((n_actuated, n_actuated, LANES))),
-        action=as_lanes(np.zeros((1, n_actuated, LANES))),
-        hidden=as_lanes(np.zeros((2, widest, LANES))),
-        weights=as_lanes(np.zeros((own, LANES))),
-        distance=as_lanes(np.zeros((1, LANES))),
-        total=as_lanes(np.zeros((1, LANES))),
-        steps=as_lanes(np.zeros((1, LANES))),
-        stop=as_lanes(np.zeros((1, LANES))),
-        alive=as_lanes(np.zeros((1, LANES))),
-        judged=as_lanes(np.zeros((1, LANES))),
-        terms=as_lanes(np.zeros((1, n_terms, LANES))),
-        first=as_lanes(np.zeros((summed, LANES))),
-        second=as_lanes(np.zeros((summed, LANES))),
+        q=carve_lanes(space, used, (1, n_joints)),
+        target=carve_lanes(space, used, (1, n_joints)),
+        goal=carve_lanes(space, used, (1, 3)),
+        observation=carve_lanes(space, used, (1, n_observations)),
+        seen=carve_lanes(space, used, (1, n_observations)),
+        before=carve_lanes(space, used, (n_joints + 1, POSE)),
+        after=carve_lanes(space, used, (n_joints + 1, POSE)),
+        planes=carve_lanes(space, used, (n_pairs + 1, PLANE)),
+        height=carve_lanes(space, used, (n_pairs,)),
+        bend=carve_lanes(space, used, (n_pairs,)),
+        bound=carve_lanes(space, used, (n_pairs,)),
+        twist=carve_lanes(space, used, (n_actuated, n_actuated)),
+        action=carve_lanes(space, used, (1, n_actuated)),
+        hidden=carve_lanes(space, used, (2, widest)),
+        weights=carve_lanes(space, used, (own,)),
+        distance=carve_lanes(space, used, (1,)),
+        total=carve_lanes(space, used, (1,)),
+        steps=carve_lanes(space, used, (1,)),
+        stop=carve_lanes(space, used, (1,)),
+        alive=carve_lanes(space, used, (1,)),
+        judged=carve_lanes(space, used, (1,)),
+        terms=carve_lanes(space, used, (1, n_terms)),
+        first=carve_lanes(space, used, (summed,)),
+        second=carve_lanes(space, used, (summed,)),
     )
     alone = Alone(
-        q=np.zeros((1, n_joints)),
-        before=np.zeros((n_joints + 1, POSE)),
-        after=np.zeros((n_joints + 1, POSE)),
-        plane=np.zeros((1, PLANE)),
-        relative=np.zeros((4, 3)),
-        simplex=np.zeros((4, 3)),
+        q=carve_numbers(space, used, (1, n_joints)),
+        before=carve_numbers(space, used, (n_joints + 1, POSE)),
+        after=carve_numbers(space, used, (n_joints + 1, POSE)),
+        plane=carve_numbers(space, used, (1, PLANE)),
+        relative=carve_numbers(space, used, (4, 3)),
+        simplex=carve_numbers(space, used, (4, 3)),
         listed=np.zeros((n_pairs + 1, 2), dtype=np.int64),
     )
     return block, alone
@@ -156,7 +179,7 @@ def work_space(
 
 @inlined
 def take_in(e: int, lane: int, control: Control, episodes: Episodes, block: Block) -> None:
-    """Put an episode into a lane."""
+    """Put an episode into a lane; its observation only if something depends on it."""
     q = as_numbers(block.q)
     target = as_numbers(block.target)
     goal = as_numbers(block.goal)
@@ -176,8 +199,9 @@ def take_in(e: int, lane: int, control: Control, episodes: Episodes, block: Bloc
         target[0, joint, lane] = episodes.target[e, joint]
     for i in range(3):
         goal[0, i, lane] = episodes.goal[e, i]
-    for i in range(block.observation.shape[1]):
-        observation[0, i, lane] = episodes.observation[e, i]
+    if control.layers.shape[0] > 0 or block.first.shape[0] > 0:
+        for i in range(block.observation.shape[1]):
+            observation[0, i, lane] = episodes.observation[e, i]
     for pair in range(episodes.planes.shape[1]):
         for i in range(PLANE):
             planes[pair, i, lane] = episodes.planes[e, pair, i]
@@ -211,8 +235,9 @@ def put_back(lane: int, e: int, episodes: Episodes, block: Block) -> None:
     for joint in range(block.q.shape[1]):
         episodes.q[e, joint] = q[0, joint, lane]
         episodes.target[e, joint] = target[0, joint, lane]
-    for i in range(block.observation.shape[1]):
-        episodes.observation[e, i] = observation[0, i, lane]
+    if int(steps[0, lane]) > episodes.steps[e]:
+        for i in range(block.observation.shape[1]):
+            episodes.observation[e, i] = observation[0, i, lane]
     for pair in range(episodes.planes.shape[1]):
         for i in range(PLANE):
             episodes.planes[e, pair, i] = planes[pair, i, lane]

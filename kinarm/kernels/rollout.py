@@ -12,7 +12,7 @@ from kinarm.contact_shapes import PLANE, ContactShapes
 from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Control, Episodes, Rules
 from kinarm.kernels.acting import choose_actions, shared_policy
 from kinarm.kernels.block import Alone, Block, put_back, take_in, work_space
-from kinarm.kernels.compiling import Array, inlined, kernel
+from kinarm.kernels.compiling import Array, inlined, kernel, unit
 from kinarm.kernels.kinematics import forward_kinematics, to_world
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.observing import observe
@@ -27,8 +27,10 @@ from kinarm.kernels.proof import (
 )
 from kinarm.kernels.reward import add_reward
 from kinarm.kernels.session import Session, parts
+from kinarm.kernels.sharing import take_number
+from kinarm.kernels.touching import deepest_overlap, first_contact, overlaps
 
-LAYOUT = "7024bf8776e7"
+LAYOUT = "0c4aad9d186a"
 """Hash of what is compiled in from other files; a test tells when to renew it.
 
 Numba's disk cache notices changes only in this file, so changing this line is what makes it
@@ -44,11 +46,17 @@ def screen(
     shapes: ContactShapes,
     configurations: Array,
     tools: Array,
-    proven: NDArray[np.bool_],
-) -> None:
-    """Find the tool points of configurations, shape (n, 3) [m], and which are proven free."""
+    free: NDArray[np.bool_],
+    touching: NDArray[np.bool_],
+) -> int:
+    """Find the tool points of configurations, shape (n, 3) [m], and which surely are free or touch.
+
+    Returns of how many one of both is proven; Coal has to judge the others.
+    """
     block, alone = work_space(configurations.shape[1], 0, 0, shapes.planes.shape[0], 0, 0, 0, 0)
-    screen_blocks(first, last, chain, shapes, configurations, tools, proven, block, alone)
+    return screen_blocks(
+        first, last, chain, shapes, configurations, tools, free, touching, block, alone
+    )
 
 
 @inlined
@@ -59,26 +67,32 @@ def screen_blocks(
     shapes: ContactShapes,
     configurations: Array,
     tools: Array,
-    proven: NDArray[np.bool_],
+    free: NDArray[np.bool_],
+    touching: NDArray[np.bool_],
     block: Block,
     alone: Alone,
-) -> None:
+) -> int:
     """Screen configurations block by block."""
     n_joints, tool = configurations.shape[1], chain.tool
-    q, points = as_numbers(block.q), as_numbers(block.goal)
+    q, points, n_proven = as_numbers(block.q), as_numbers(block.goal), 0
     for start in range(first, last, LANES):
         filled = min(last - start, LANES)
         for lane in range(LANES):
             row = start + min(lane, filled - 1)
             for joint in range(n_joints):
                 q[0, joint, lane] = configurations[row, joint]
-        free = stand(chain, shapes, filled, block, alone)
+        place_arms(chain, block)
+        touched = lane_bits(overlaps(deepest_overlap(shapes, block.after)))
+        apart = stand(shapes, touched, filled, block, alone)
         x, y, z = to_world(block.after, n_joints, tool[0], tool[1], tool[2])
         block.goal[0, 0], block.goal[0, 1], block.goal[0, 2] = x, y, z
         for lane in range(filled):
-            proven[start + lane] = free >> lane & 1 != 0
+            free[start + lane] = apart >> lane & 1 != 0
+            touching[start + lane] = touched >> lane & 1 != 0
+            n_proven += (apart | touched) >> lane & 1
             for axis in range(3):
                 tools[start + lane, axis] = points[0, axis, lane]
+    return n_proven
 
 
 @kernel
@@ -87,8 +101,14 @@ def begin(first: int, last: int, rows: NDArray[np.int64], session: Session) -> i
 
     An episode whose start is not proven contact-free is left paused; returns how many are.
     """
-    n_joints, _, n_observations, n_pairs = sizes(first, last, session)[:4]
-    block, alone = work_space(n_joints, 0, n_observations, n_pairs, 0, 0, 0, 0)
+    block, alone = session.block, session.alone
+    if last - first < rows.shape[0]:
+        n_joints, n_observations = (
+            session.episodes.q.shape[1],
+            session.episodes.observation.shape[1],
+        )
+        n_pairs = session.shapes.planes.shape[0]
+        block, alone = work_space(n_joints, 0, n_observations, n_pairs, 0, 0, 0, 0)
     return begin_blocks(first, last, rows, session, block, alone)
 
 
@@ -117,7 +137,8 @@ def begin_blocks(
                 starts[0, joint, lane] = q[e, joint]
             for axis in range(3):
                 goals[0, axis, lane] = episodes.goal[e, axis]
-        free = stand(chain, shapes, filled, block, alone)
+        place_arms(chain, block)
+        free = stand(shapes, 0, filled, block, alone)
         block.distance[0] = observe(chain.tool, block.after, block.goal, 0, block.observation)
         for lane in range(filled):
             e = rows[start + lane]
@@ -141,13 +162,19 @@ def begin_blocks(
 
 
 @inlined
-def stand(chain: Chain, shapes: ContactShapes, filled: int, block: Block, alone: Alone) -> int:
-    """Place the arms of a block, and return the bits of those that are proven free of contact."""
+def place_arms(chain: Chain, block: Block) -> None:
+    """Place the arms of a block at their configurations."""
     prismatic, translation, rotation, axes = chain[:4]
     forward_kinematics(prismatic, translation, rotation, axes, block.q, 0, block.after)
+
+
+@inlined
+def stand(shapes: ContactShapes, touched: int, filled: int, block: Block, alone: Alone) -> int:
+    """Bits of the arms that are proven free of contact; ``touched`` are those that are not."""
     free = lane_bits(is_apart(propose_planes(shapes, block.after, block)))
     for lane in range(filled):
-        if free >> lane & 1 == 0 and stands_free(lane, shapes, block.after, block, alone):
+        open_here = (free | touched) >> lane & 1 == 0
+        if open_here and stands_free(lane, shapes, block.after, block, alone):
             free |= 1 << lane
     return free
 
@@ -157,30 +184,24 @@ def bind(
     chain: Chain, shapes: ContactShapes, rules: Rules, control: Control, episodes: Episodes
 ) -> Session:
     """Bind a session, whose arrays stay those given."""
-    return Session(chain, shapes, rules, control, episodes)
+    block, alone = space_for(shapes, rules, control, episodes)
+    return Session(chain, shapes, rules, control, episodes, block, alone)
 
 
-@kernel
-def advance(first: int, last: int, session: Session) -> int:
-    """Advance the running episodes among ``first`` to ``last - 1``, a block at a time.
-
-    Each goes on until it ends, reaches its ``stop`` or pauses before a step that is not proven
-    free of contact; then the next one takes its place in the block. Returns how many paused.
-    """
-    block, alone = work_space(*sizes(first, last, session))
-    row = np.full(LANES, -1)
-    return advance_blocks(first, last, session, row, block, alone)
-
-
-@inlined
-def sizes(first: int, last: int, session: Session) -> tuple[int, int, int, int, int, int, int, int]:
-    """What `work_space` takes to advance a range of episodes."""
-    _, shapes, rules, control, episodes = parts(session)
+@unit
+def space_for(
+    shapes: ContactShapes,
+    rules: Rules,
+    control: Control,
+    episodes: Episodes,
+) -> tuple[Block, Alone]:
+    """Allocate what it takes to advance episodes."""
+    n_episodes = episodes.status.shape[0]
+    own = control.weights.shape[1] if shared_policy(n_episodes, control) < 0 else 0
     n_observations, widest = episodes.observation.shape[1], 1
-    own = control.weights.shape[1] if shared_policy(first, last, control) < 0 else 0
     for layer in range(1, control.layers.shape[0]):
         widest = max(widest, control.layers[layer])
-    return (
+    return work_space(
         episodes.q.shape[1],
         rules.step_limit.shape[0],
         n_observations,
@@ -192,10 +213,27 @@ def sizes(first: int, last: int, session: Session) -> tuple[int, int, int, int, 
     )
 
 
+@kernel
+def advance(counters: NDArray[np.int64], session: Session) -> int:
+    """Advance the running episodes, a block at a time.
+
+    Each goes on until it ends, reaches its ``stop`` or pauses before a step that is neither proven
+    free of contact nor proven to touch; then the next one takes its place in the block. Returns
+    how many paused.
+
+    Several threads may do so together: the counters, zero at first, tell which episode is the next
+    one, and how many threads have come.
+    """
+    block, alone = session.block, session.alone
+    if take_number(counters, 1) > 0:
+        block, alone = space_for(session.shapes, session.rules, session.control, session.episodes)
+    row = np.full(LANES, -1)
+    return advance_blocks(counters, session, row, block, alone)
+
+
 @inlined
 def advance_blocks(
-    first: int,
-    last: int,
+    counters: NDArray[np.int64],
     session: Session,
     row: NDArray[np.int64],
     block: Block,
@@ -204,23 +242,18 @@ def advance_blocks(
     """Advance episodes block by block; ``row`` tells which are in the lanes, -1 where none is."""
     chain, shapes, rules, control, episodes = parts(session)
     prismatic, translation, rotation, axes, tool, lower, upper = chain[:7]
-    shared = shared_policy(first, last, control)
     n_joints, n_actuated = episodes.q.shape[1], rules.step_limit.shape[0]
-    n_pairs, summed = shapes.planes.shape[0], block.first.shape[0]
+    n_episodes, n_pairs = episodes.status.shape[0], shapes.planes.shape[0]
+    shared, summed = shared_policy(n_episodes, control), block.first.shape[0]
     before, poses = block.before, block.after
-    waiting, n_alive, n_paused, changed = first, 0, 0, True
+    waiting, n_alive, n_paused, changed = 0, 0, 0, True
     while True:
         for lane in range(row.shape[0]):
-            if row[lane] < 0 and waiting < last:
-                while waiting < last and not (
-                    episodes.status[waiting] == RUNNING
-                    and episodes.steps[waiting] < episodes.stop[waiting]
-                ):
-                    waiting += 1
-                if waiting < last:
+            if row[lane] < 0 and waiting < n_episodes:
+                waiting = next_waiting(counters, episodes)
+                if waiting < n_episodes:
                     row[lane] = waiting
                     take_in(waiting, lane, control, episodes, block)
-                    waiting += 1
                     n_alive += 1
                     changed = True
         if n_alive == 0:
@@ -255,10 +288,15 @@ def advance_blocks(
                     for pair in range(n_pairs):
                         # It has not moved yet.
                         episodes.planes[e, pair, GAP] = as_numbers(block.height)[pair, lane]
-                    episodes.doubt[e] = doubt
-                    episodes.status[e] = PAUSED
                     n_alive -= 1
-                    n_paused += 1
+                    episodes.doubt[e] = doubt
+                    pair = first_contact(lane, doubt, chain, shapes, rules.tested, block, alone)
+                    episodes.touched[e] = pair
+                    if pair > 0:
+                        refuse_step(e, rules, episodes)
+                    else:
+                        episodes.status[e] = PAUSED
+                        n_paused += 1
             if n_alive == 0:
                 continue
         changed = False
@@ -292,45 +330,65 @@ def advance_blocks(
                         episodes.status[e] = TRUNCATED
 
 
+@inlined
+def next_waiting(counters: NDArray[np.int64], episodes: Episodes) -> int:
+    """Take the next episode that is to be advanced; past the last one if there is none."""
+    while True:
+        e = take_number(counters, 0)
+        if e >= episodes.status.shape[0]:
+            return e
+        if episodes.status[e] == RUNNING and episodes.steps[e] < episodes.stop[e]:
+            return e
+
+
 @kernel
-def allow_one_step(session: Session) -> None:
-    """Let every episode go on by one step."""
-    steps, stop = session.episodes.steps, session.episodes.stop
+def allow_one_step(session: Session) -> bool:
+    """Let every episode go on by one step; returns whether all its actions are finite."""
+    steps, stop, actions = session.episodes.steps, session.episodes.stop, session.control.actions
+    nothing = 0.0
     for e in range(steps.shape[0]):
         stop[e] = steps[e] + 1
+        for axis in range(actions.shape[2]):
+            nothing += 0.0 * actions[e, 0, axis]
+    return nothing == 0.0
 
 
 @kernel
 def results_of_step(
-    session: Session, reward: Array, terms: Array, ended: NDArray[np.bool_]
+    session: Session, numbers: Array, flags: NDArray[np.bool_], contact: NDArray[np.int64]
 ) -> None:
-    """Read off the one step that was allowed: rewards, their terms, and how episodes ended.
-
-    ``ended``, shape (n, 3), tells of success, contact and truncation. Of episodes that had ended
-    before the step, all is zero.
-    """
+    """Read off the one step that was allowed; see `kinarm.rollouts.StepResult`."""
     episodes = session.episodes
-    for e in range(reward.shape[0]):
+    for e in range(contact.shape[0]):
         stepped = episodes.steps[e] == episodes.stop[e]
-        reward[e] = 0.0
-        for term in range(terms.shape[1]):
-            terms[e, term] = episodes.terms[e, term] if stepped else 0.0
-            reward[e] += terms[e, term]
-        ended[e, 0] = stepped and episodes.status[e] == SUCCESS
-        ended[e, 1] = stepped and episodes.status[e] == COLLISION
-        ended[e, 2] = stepped and episodes.status[e] == TRUNCATED
+        reward = 0.0
+        for term in range(episodes.terms.shape[1]):
+            part = episodes.terms[e, term] if stepped else 0.0
+            numbers[2 + term, e] = part
+            reward += part
+        numbers[0, e] = reward
+        numbers[1, e] = episodes.distance[e]
+        refused = stepped and episodes.status[e] == COLLISION
+        flags[0, e] = stepped and episodes.status[e] == TRUNCATED
+        flags[1, e] = stepped and episodes.status[e] == SUCCESS
+        flags[2, e] = refused
+        contact[e] = episodes.touched[e] if refused else 0
 
 
 @kernel
 def refuse(rows: NDArray[np.int64], session: Session) -> None:
-    """End episodes whose step touches something: the arm stays where it is."""
-    rules, episodes = session.rules, session.episodes
+    """End episodes whose step Coal found to touch something."""
     for index in range(rows.shape[0]):
-        e = rows[index]
-        episodes.status[e] = COLLISION
-        episodes.steps[e] += 1
-        distance = episodes.distance[e]
-        add_reward(rules.reward, distance, distance, True, False, episodes.terms, episodes.total, e)
-        if episodes.path.shape[0] > 0:
-            for joint in range(episodes.q.shape[1]):
-                episodes.path[e, episodes.steps[e], joint] = episodes.q[e, joint]
+        refuse_step(rows[index], session.rules, session.episodes)
+
+
+@inlined
+def refuse_step(e: int, rules: Rules, episodes: Episodes) -> None:
+    """End an episode whose step touches something: the arm stays where it is."""
+    episodes.status[e] = COLLISION
+    episodes.steps[e] += 1
+    distance = episodes.distance[e]
+    add_reward(rules.reward, distance, distance, True, False, episodes.terms, episodes.total, e)
+    if episodes.path.shape[0] > 0:
+        for joint in range(episodes.q.shape[1]):
+            episodes.path[e, episodes.steps[e], joint] = episodes.q[e, joint]

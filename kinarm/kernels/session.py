@@ -16,6 +16,7 @@ from numba.extending import intrinsic
 from kinarm.chain import Chain
 from kinarm.contact_shapes import ContactShapes
 from kinarm.episodes import Control, Episodes, Rules
+from kinarm.kernels.block import Alone, Block
 
 
 @structref.register
@@ -24,24 +25,31 @@ class SessionType(types.StructRef):
 
 
 class Session(structref.StructRefProxy):
-    """Arm, scene, rules, source of actions and episodes; kernels see them as its attributes."""
+    """Arm, scene, rules, source of actions and episodes; kernels see them as its attributes.
+
+    One thread at a time may use its block of lanes, and the space for a single episode; others
+    need space of their own.
+    """
 
     chain: Chain
     shapes: ContactShapes
     rules: Rules
     control: Control
     episodes: Episodes
+    block: Block
+    alone: Alone
 
 
-structref.define_proxy(Session, SessionType, ["chain", "shapes", "rules", "control", "episodes"])
+structref.define_proxy(Session, SessionType, list(Session.__annotations__))
 
 
 def _parts(_: Any, session: SessionType) -> Any:
-    """What a session binds, in the order of its attributes, without counting references.
+    """What a session binds, work space apart, without counting references.
 
     For helpers, which hold none: a kernel that takes the attributes counts those of every array.
     """
-    fields = session.field_dict
+    own = ("block", "alone")
+    fields = {name: kind for name, kind in session.field_dict.items() if name not in own}
 
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         data = session.get_data_type()

@@ -17,7 +17,7 @@ from kinarm.collision import (
     ContactModel,
     make_verdicts_reliable,
 )
-from kinarm.episodes import PAUSED
+from kinarm.episodes import COLLISION, PAUSED
 from kinarm.kernels.rollout import advance, screen
 from kinarm.networks import table_control
 from kinarm.reference import ReferenceSimulator
@@ -27,11 +27,17 @@ CAPSULE_ARMS = ("lrmate200ic_5l", "paper", "paper_flange")
 
 
 def proven_free(simulator, configurations):
+    return screened(simulator, configurations)[0]
+
+
+def screened(simulator, configurations):
+    """Which configurations the kernel proves free, and which it proves to touch."""
     n = len(configurations)
-    tools, proven = np.empty((n, 3)), np.empty(n, dtype=bool)
+    tools, free, touching = np.empty((n, 3)), np.empty(n, dtype=bool), np.empty(n, dtype=bool)
     shapes = simulator.world.contact_model.shapes
-    screen(0, n, simulator.arm.chain, shapes, configurations, tools, proven)
-    return proven
+    proven = screen(0, n, simulator.arm.chain, shapes, configurations, tools, free, touching)
+    assert proven == (free | touching).sum()
+    return free, touching
 
 
 def in_contact(simulator, configurations):
@@ -247,11 +253,11 @@ def doubted_steps(simulator, starts, actions):
     episodes = simulator.reset(starts, np.tile([0.0, 0.0, 5.0], (len(starts), 1)))
     np.copyto(episodes.stop, 1)
     control = table_control(actions[:, None])
-    advance(0, len(starts), simulator.world.session(control, episodes))
-    paused = episodes.status == PAUSED
+    advance(np.zeros(2, dtype=np.int64), simulator.world.session(control, episodes))
+    stopped = (episodes.status == PAUSED) | (episodes.status == COLLISION)
     tested = simulator.problem.stepping.tested_configurations
     bits = episodes.doubt[:, None] >> np.arange(tested) & 1
-    return episodes, paused[:, None] & bits.astype(bool)
+    return episodes, stopped[:, None] & bits.astype(bool)
 
 
 def steps_near_contact(simulator, seed, count):
@@ -264,6 +270,43 @@ def steps_near_contact(simulator, seed, count):
     starts = starts[~simulator.world.contact_model.in_contact(starts)]
     actions = rng.normal(size=(len(starts), arm.n_actuated))
     return starts, actions * 10.0 ** rng.uniform(-3, 0.5, (len(starts), 1))
+
+
+class TestProofOfContact:
+    """What the kernel claims to touch, Coal finds to touch."""
+
+    def test_holds_at_random_and_on_the_boundary_of_contact(self, any_simulator):
+        free, touching = contact_boundary(any_simulator, 41, 4000)
+        near = [jittered(each, 42 + k) for k, each in enumerate((free, touching))]
+        drawn = random_configurations(any_simulator, 44, 20_000)
+        configurations = np.concatenate([free, touching, *near, drawn])
+        claimed = screened(any_simulator, configurations)[1]
+        assert any_simulator.world.contact_model.in_contact(configurations[claimed]).all()
+
+    @pytest.mark.parametrize("name", CAPSULE_ARMS)
+    def test_leaves_little_to_coal_where_shapes_are_known(self, simulators, name):
+        drawn = random_configurations(simulators[name], 45, 20_000)
+        free, touching = screened(simulators[name], drawn)
+        assert touching.mean() > 0.2
+        assert (free | touching).mean() > 0.999
+
+    def test_says_nothing_of_meshes(self, simulators):
+        drawn = random_configurations(simulators["mesh"], 46, 5000)
+        assert not screened(simulators["mesh"], drawn)[1].any()
+
+    @pytest.mark.parametrize("bad", [np.nan, np.inf])
+    def test_says_nothing_of_numbers_that_are_not_finite(self, simulator, bad):
+        assert not screened(simulator, np.where(np.eye(6, dtype=bool)[:5], bad, 0.0))[1].any()
+
+    def test_names_the_pair_that_coal_finds_first(self, any_simulator):
+        starts, actions = steps_near_contact(any_simulator, 47, 3000)
+        episodes, _ = doubted_steps(any_simulator, starts, actions)
+        refused = episodes.status == COLLISION
+        ways = any_simulator.world.substeps(starts, episodes.target)[refused]
+        contacts = any_simulator.world.contact_model
+        for way, number in zip(ways, episodes.touched[refused], strict=True):
+            found = [contacts.first_in_contact(q) for q in way]
+            assert next(index for index in found if index is not None) == number - 1
 
 
 class TestStepProof:

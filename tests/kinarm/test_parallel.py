@@ -5,7 +5,7 @@ import threading
 import numpy as np
 import pytest
 
-from kinarm._parallel import available_threads, run_rows
+from kinarm._parallel import available_threads, run_rows, run_together
 
 
 @pytest.mark.parametrize("n", [1, 2, 7, 255, 256, 1000])
@@ -37,6 +37,55 @@ def test_failure_of_a_thread_reaches_the_caller():
 
     with pytest.raises(RuntimeError, match="rows 0 to"):
         run_rows(fail, 100, 10**6, 2)
+
+
+class TestTogether:
+    @pytest.mark.parametrize(
+        ("work", "threads", "at_most"), [(1, 4, 1), (10**6, 1, 1), (10**6, 3, 3)]
+    )
+    def test_results_of_all_threads_are_added_up(self, work, threads, at_most):
+        seen, lock = [], threading.Lock()
+
+        def kernel(counters, rows):
+            done = 0
+            while True:
+                with lock:
+                    row, counters[0] = counters[0], counters[0] + 1
+                if row >= len(rows):
+                    seen.append(threading.current_thread())
+                    return done
+                rows[row] += 1
+                done += 1
+
+        counts = np.zeros(500, dtype=int)
+        assert run_together(kernel, work, threads, counts) == 500
+        np.testing.assert_array_equal(counts, 1)
+        assert threading.current_thread() in seen
+        assert len(seen) <= at_most
+
+    def test_a_thread_that_comes_too_late_is_not_waited_for(self):
+        busy, free = [threading.Event() for _ in range(2)]
+
+        def block(counters):
+            busy.set()
+            free.wait()
+            return 0
+
+        others = threading.Thread(target=run_together, args=(block, 10**6, 5))
+        others.start()
+        busy.wait()
+        try:
+            assert run_together(lambda counters: 1, 10**6, 5) >= 1
+        finally:
+            free.set()
+            others.join()
+
+    def test_failure_of_a_thread_reaches_the_caller(self):
+        def fail(counters):
+            raise RuntimeError("no")
+
+        with pytest.raises(RuntimeError, match="no"):
+            run_together(fail, 10**6, 2)
 
 
 def test_at_least_one_thread():

@@ -3,6 +3,7 @@
 import copy
 import math
 import pickle
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -406,12 +407,44 @@ class TestRefusals:
             setattr(simulator, part, None)
 
 
-def test_coal_is_asked_only_where_freedom_is_not_proven(simulator):
-    idle = Simulator("right", threads=1)
-    idle.rollout_actions(np.zeros((1, 64, 5)), HOME, FAR_GOAL)
-    assert idle.judged == 0
-    idle.rollout_actions(np.tile([0.0, 1, 0, 0, 0], (1, 64, 1)), HOME, FAR_GOAL)
-    assert 0 < idle.judged < 4 * 64
+@pytest.mark.parametrize(("name", "asked"), [("paper", False), ("mesh", True)])
+def test_coal_is_asked_only_where_nothing_is_proven(simulators, name, asked):
+    simulator, rng = simulators[name], np.random.default_rng(27)
+    starts, goals = simulator.sample(rng, 200)
+    actions = rng.uniform(-1, 1, (200, simulator.task.horizon, simulator.n_actions))
+    before = simulator.judged
+    assert simulator.rollout_actions(actions, starts, goals).collision.any()
+    assert (simulator.judged > before) == asked
+
+
+class TestBatchesThatServeAgain:
+    def test_rollouts_are_those_of_a_new_simulator(self, simulator):
+        again = Simulator(simulator.problem, threads=2)
+        for seed, n, count in ((1, 40, 1), (2, 40, 1), (3, 40, 40), (4, 40, 40), (5, 7, 7)):
+            scenarios = simulator.sample(np.random.default_rng(seed), n)
+            networks, shift = linear_policies(simulator, count, seed), np.full(48, 0.1 * seed)
+            kept = networks.weights.copy()
+            for moved in (None, shift):
+                found = again.rollout(networks, *scenarios, shift=moved)
+                expected = Simulator(simulator.problem, threads=1).rollout(
+                    networks, *scenarios, shift=moved
+                )
+                assert_identical(found, expected)
+            np.testing.assert_array_equal(networks.weights, kept)
+
+    def test_threads_may_use_one_simulator(self, simulator, scenarios):
+        batches = [linear_policies(simulator, 1, seed) for seed in range(8)]
+        with ThreadPoolExecutor(4) as pool:
+            found = list(pool.map(lambda each: simulator.rollout(each, *scenarios), batches))
+        for networks, rollouts in zip(batches, found, strict=True):
+            assert_identical(rollouts, simulator.rollout(networks, *scenarios))
+
+    def test_outcomes_stay_as_they_were(self, simulator, scenarios):
+        first = simulator.rollout(linear_policies(simulator, 1, 1), *scenarios)
+        kept = first.returns.copy(), first.configurations.copy()
+        simulator.rollout(linear_policies(simulator, 1, 2), *scenarios)
+        np.testing.assert_array_equal(first.returns, kept[0])
+        np.testing.assert_array_equal(first.configurations, kept[1])
 
 
 def test_kernels_are_compiled_once_for_all(simulators, scenarios):

@@ -25,7 +25,7 @@ FUNCTIONS = {
 @njit
 def act_all(control, observations, actions):
     n, n_observations = observations.shape
-    shared, widest = shared_policy(0, n, control), control.layers.max()
+    shared, widest = shared_policy(n, control), control.layers.max()
     own = control.weights.shape[1] if shared < 0 else 0
     block, _ = work_space(0, actions.shape[1], n_observations, 0, 0, widest, own, 0)
     given, weights = as_numbers(block.observation), as_numbers(block.weights)

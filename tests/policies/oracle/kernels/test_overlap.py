@@ -123,9 +123,10 @@ class TestSingleConfigurations:
     def test_agrees_with_the_proof_of_freedom(self, any_simulator):
         configurations = random_configurations(any_simulator, 6, 20_000)
         n = len(configurations)
-        tools, free = np.empty((n, 3)), np.empty(n, dtype=bool)
+        tools, (free, touching) = np.empty((n, 3)), np.empty((2, n), dtype=bool)
         shapes = any_simulator.world.contact_model.shapes
-        screen(0, n, any_simulator.arm.chain, shapes, configurations, tools, free)
+        chain = any_simulator.arm.chain
+        screen(0, n, chain, shapes, configurations, tools, free, touching)
         assert not (free & claims(any_simulator, configurations)).any()
 
 

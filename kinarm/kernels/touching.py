@@ -1,0 +1,105 @@
+"""Proof of contact between bodies whose shapes are known exactly, for a number or lanes.
+
+Such bodies are capsules, obstacles and the ground. Two points of them that are closer to each
+other than the radii about them prove that they overlap, wherever these points come from. Of arms
+with other shapes nothing is claimed.
+"""
+
+import math
+
+from kinarm.chain import Chain
+from kinarm.contact_shapes import BETWEEN_CAPSULES, GROUND, PLANE, WITH_GROUND, ContactShapes
+from kinarm.kernels.block import Alone, Block
+from kinarm.kernels.compiling import Array, helper, inlined
+from kinarm.kernels.distance import between_segments, closest_to_box
+from kinarm.kernels.kinematics import to_world
+from kinarm.kernels.lanes import as_numbers
+from kinarm.kernels.planes import FINE, height_above
+from kinarm.kernels.proof import MARGIN, is_apart, place
+from kinarm.kernels.separation import separate
+
+
+@inlined
+def is_exact(shapes: ContactShapes, pair: int) -> bool:
+    """Whether the shapes of a pair are known exactly."""
+    kind, first, second = shapes.pairs[pair, 0], shapes.pairs[pair, 1], shapes.pairs[pair, 2]
+    return shapes.exact[first] and (kind != BETWEEN_CAPSULES or shapes.exact[second])
+
+
+@helper
+def overlap(shapes: ContactShapes, pair: int, poses: Array) -> float:
+    """Lower bound of how deep an exact pair overlaps [m]; negative if it may be apart."""
+    kind, first, second = shapes.pairs[pair, 0], shapes.pairs[pair, 1], shapes.pairs[pair, 2]
+    link, axes = shapes.link, shapes.capsules
+    a = to_world(poses, link[first], axes[first, 0], axes[first, 1], axes[first, 2])
+    b = to_world(poses, link[first], axes[first, 3], axes[first, 4], axes[first, 5])
+    radius = axes[first, 6]
+    if kind == WITH_GROUND:
+        return radius - min(a[2], b[2])
+    if kind == BETWEEN_CAPSULES:
+        c = to_world(poses, link[second], axes[second, 0], axes[second, 1], axes[second, 2])
+        d = to_world(poses, link[second], axes[second, 3], axes[second, 4], axes[second, 5])
+        x, y, z = between_segments(a, b, c, d)
+        radius += axes[second, 6]
+    else:
+        low, high = shapes.boxes[second, 0], shapes.boxes[second, 1]
+        lower, upper = (low[0], low[1], low[2]), (high[0], high[1], high[2])
+        t = closest_to_box(a, b, lower, upper)
+        x, y, z = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
+        x -= min(max(x, lower[0]), upper[0])
+        y -= min(max(y, lower[1]), upper[1])
+        z -= min(max(z, lower[2]), upper[2])
+    return radius - math.sqrt(x * x + y * y + z * z)
+
+
+@inlined
+def overlaps(depth: float) -> bool:
+    """Whether a lower bound of a depth proves contact: shallower ones are left to Coal."""
+    return depth > MARGIN
+
+
+@inlined
+def deepest_overlap(shapes: ContactShapes, poses: Array) -> float:
+    """Lower bound of how deep the deepest of all exact pairs overlaps [m]."""
+    depth = 0.0 * poses[0, 13] - 1.0
+    for pair in range(shapes.pairs.shape[0]):
+        if is_exact(shapes, pair):
+            depth = max(depth, overlap(shapes, pair, poses))
+    return depth
+
+
+@helper
+def first_contact(
+    lane: int,
+    doubt: int,
+    chain: Chain,
+    shapes: ContactShapes,
+    tested: int,
+    block: Block,
+    alone: Alone,
+) -> int:
+    """Number, from 1, of the pair that surely is the first to touch in a step; 0 if none is.
+
+    Looks at the first configuration of which the bits of ``doubt`` say that it is not proven free.
+    """
+    k = 1
+    while doubt >> (k - 1) & 1 == 0:
+        k += 1
+    q, target, planes = as_numbers(block.q), as_numbers(block.target), as_numbers(block.planes)
+    for joint in range(block.q.shape[1]):
+        start, end = q[0, joint, lane], target[0, joint, lane]
+        alone.q[0, joint] = end if k == tested else start + k / tested * (end - start)
+    place(chain, alone.q, alone.before)
+    for pair in range(shapes.pairs.shape[0]):
+        if is_exact(shapes, pair) and overlaps(overlap(shapes, pair, alone.before)):
+            return pair + 1
+        for i in range(PLANE):
+            alone.plane[0, i] = planes[pair, i, lane]
+        height = height_above(shapes, pair, FINE, alone.before, alone.plane, 0)
+        if not is_apart(height) and shapes.planes[pair, 0] != GROUND:
+            height = separate(
+                shapes, pair, alone.before, alone.relative, alone.simplex, alone.plane
+            )
+        if not is_apart(height):
+            return 0
+    return 0
