@@ -2,7 +2,6 @@
 
 import hashlib
 import os
-import tempfile
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -12,6 +11,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from kinarm._archive import load_archive, save_archive
+from kinarm._cache import cache_folder, delete_least_recently_used
 from kinarm._files import check_folder
 from kinarm.errors import InvalidInputError, OutputError
 from kinarm.evaluation.statistics import Estimate
@@ -19,9 +19,6 @@ from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle import ORACLE_SEMANTICS, Oracle, OracleSolutions, Progress
 from kinarm.policies.provenance import package_versions
 from kinarm.semantics import SEMANTICS
-
-CACHE_VARIABLE = "KINARM_CACHE"
-"""Environment variable that names another cache folder."""
 
 KEPT_FILES, KEPT_BYTES = 200, 256 * 2**20
 """Trial sets whose bounds are kept, and how large their files may be together."""
@@ -67,17 +64,6 @@ def oracle_bounds(trials: TrialSet, on_progress: Progress | None = None) -> Orac
     return _known[trials]
 
 
-def cache_folder() -> Path:
-    """Folder for what can be computed anew: ``$KINARM_CACHE``, or kinarm in the user's cache."""
-    chosen, users = os.environ.get(CACHE_VARIABLE), os.environ.get("XDG_CACHE_HOME")
-    if chosen:
-        return Path(chosen)
-    try:
-        return (Path(users) if users else Path.home() / ".cache") / "kinarm"
-    except RuntimeError:  # a user without a home
-        return Path(tempfile.gettempdir()) / "kinarm"
-
-
 @cache
 def oracle_version() -> str:
     """Hash of the versions of oracle, simulator and packages that solutions depend on."""
@@ -110,25 +96,7 @@ def _save(path: Path, solutions: OracleSolutions) -> None:
     with suppress(OutputError):
         check_folder(path.parent)
         save_archive(path, *ARCHIVE, solutions.arrays(), {}, compress=True)
-        _delete_least_recently_used(path.parent)
-
-
-def _delete_least_recently_used(folder: Path) -> None:
-    """Delete the files that are too many, whatever other processes do to them meanwhile.
-
-    What a process that was killed left half written counts, too.
-    """
-    used = []
-    for path in (*folder.glob("oracle-*.npz"), *folder.glob(".oracle-*.npz.*")):
-        with suppress(OSError):
-            status = path.stat()
-            used.append((status.st_mtime_ns, status.st_size, path))
-    total = 0
-    for rank, (_, size, path) in enumerate(sorted(used, reverse=True)):
-        total += size
-        if rank > 0 and (rank >= KEPT_FILES or total > KEPT_BYTES):
-            with suppress(OSError):
-                path.unlink()
+        delete_least_recently_used(path.parent, "oracle", KEPT_FILES, KEPT_BYTES)
 
 
 def bounds_document(solutions: OracleSolutions) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import sys
 import tempfile
 import time
 
-from kinarm.evaluation.bounds import CACHE_VARIABLE
+from kinarm._cache import CACHE_VARIABLE
 
 RUN_AND_TELL = """
 import resource, subprocess, sys

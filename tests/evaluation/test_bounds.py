@@ -14,9 +14,10 @@ from oracle_calls import count_calls
 from trial_bounds import draw, same
 
 import kinarm
+from kinarm._cache import cache_folder
 from kinarm.arm import Arm
 from kinarm.evaluation import bounds
-from kinarm.evaluation.bounds import bounds_document, cache_folder, oracle_bounds
+from kinarm.evaluation.bounds import bounds_document, oracle_bounds
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle import Oracle
 from kinarm.problem import PROBLEMS

@@ -11,8 +11,9 @@ import pytest
 from oracle_calls import count_calls
 from trial_bounds import draw, same
 
+from kinarm._cache import cache_folder
 from kinarm.evaluation import bounds
-from kinarm.evaluation.bounds import cache_folder, oracle_bounds
+from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.policies.oracle import Oracle
 from kinarm.policies.provenance import package_versions
 
