@@ -33,6 +33,7 @@ GOAL_SLAB = Finish(0xCBD2DA, roughness=0.7)
 CUBE = Finish(0x009E73, roughness=0.5)
 HALO = Finish(0x009E73, opacity=0.16, glow=True)
 FLASH = Finish(OUTCOME_COLOURS["collision"], opacity=0.5, glow=True)
+SHAPE = Finish(0x56B4E9, roughness=0.6, opacity=0.34)
 GRID_COLOUR = 0xC6CCD3
 BACKGROUND = [0.93, 0.945, 0.96]
 
