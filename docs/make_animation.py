@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from kinarm import Arm, CompiledPolicy, Recording, Simulator
+from kinarm import CompiledPolicy, Recording, Simulator
 from kinarm.policies import load_policy
 from kinarm.recording import record_rollouts
 from kinarm.viewer import Camera, Renderer
@@ -70,7 +70,7 @@ def photograph(motions: list[Recording]) -> list[Image.Image]:
     """Pictures of motions, one after the other."""
     problem = motions[0].problem
     size = {"width": SCALE * WIDTH, "height": SCALE * HEIGHT}
-    renderer, arm = Renderer(problem, camera=CAMERA, **size), Arm.load(problem.arm)
+    renderer, arm = Renderer(problem, camera=CAMERA, **size), problem.load_arm()
     pictures = []
     for motion in motions:
         way = [arm.tool_position(state) for state in motion.states]

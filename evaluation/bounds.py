@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from kinarm._archive import load_archive, save_archive
-from kinarm._cache import cache_folder, delete_least_recently_used
+from kinarm._cache import cache_folder
 from kinarm._files import check_folder
 from kinarm.errors import InvalidInputError, OutputError
 from kinarm.evaluation.statistics import Estimate
@@ -96,7 +96,25 @@ def _save(path: Path, solutions: OracleSolutions) -> None:
     with suppress(OutputError):
         check_folder(path.parent)
         save_archive(path, *ARCHIVE, solutions.arrays(), {}, compress=True)
-        delete_least_recently_used(path.parent, "oracle", KEPT_FILES, KEPT_BYTES)
+        _delete_least_recently_used(path.parent)
+
+
+def _delete_least_recently_used(folder: Path) -> None:
+    """Delete the files that are too many, whatever other processes do to them meanwhile.
+
+    What a process that was killed left half written counts, too.
+    """
+    used = []
+    for path in (*folder.glob("oracle-*.npz"), *folder.glob(".oracle-*.npz.*")):
+        with suppress(OSError):
+            status = path.stat()
+            used.append((status.st_mtime_ns, status.st_size, path))
+    total = 0
+    for rank, (_, size, path) in enumerate(sorted(used, reverse=True)):
+        total += size
+        if rank > 0 and (rank >= KEPT_FILES or total > KEPT_BYTES):
+            with suppress(OSError):
+                path.unlink()
 
 
 def bounds_document(solutions: OracleSolutions) -> dict[str, Any]:

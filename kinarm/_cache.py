@@ -1,9 +1,18 @@
-"""The user's cache folder: what was computed once and can be computed anew."""
+"""Where what can be computed anew is kept: in the user's cache folder, for other processes."""
 
+import hashlib
 import os
 import tempfile
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kinarm._archive import Arrays, load_archive, save_archive
+from kinarm._files import check_folder
+from kinarm.errors import InvalidInputError, OutputError
 
 CACHE_VARIABLE = "KINARM_CACHE"
 """Environment variable that names another cache folder."""
@@ -20,29 +29,29 @@ def cache_folder() -> Path:
         return Path(tempfile.gettempdir()) / "kinarm"
 
 
-def delete_least_recently_used(folder: Path, stem: str, most_files: int, most_bytes: int) -> None:
-    """Delete ``.npz`` files that are too many or too large together; the latest one stays.
+def cached_arrays(
+    kind: str, version: int, made_of: bytes, make: Callable[[], Mapping[str, ArrayLike]]
+) -> Arrays:
+    """Look arrays up, or make and keep them.
 
-    Whatever other processes do to them meanwhile. What a process that was killed left half written
-    counts, too.
+    A file that cannot be read is replaced; where none can be written, nothing is kept.
 
     Parameters
     ----------
-    folder : Path
-        Where the files lie.
-    stem : str
-        What their names begin with.
-    most_files, most_bytes : int
-        How many may stay, and how large they may be together.
+    kind : str
+        What they are, one word.
+    version : int
+        To be raised when the same content makes other arrays.
+    made_of : bytes
+        Everything that they depend on.
+    make : callable
+        Makes them.
     """
-    used = []
-    for path in (*folder.glob(f"{stem}-*.npz"), *folder.glob(f".{stem}-*.npz.*")):
-        with suppress(OSError):
-            status = path.stat()
-            used.append((status.st_mtime_ns, status.st_size, path))
-    total = 0
-    for rank, (_, size, path) in enumerate(sorted(used, reverse=True)):
-        total += size
-        if rank > 0 and (rank >= most_files or total > most_bytes):
-            with suppress(OSError):
-                path.unlink()
+    path = cache_folder() / f"{kind}-{hashlib.sha256(made_of).hexdigest()[:24]}.npz"
+    with suppress(InvalidInputError):
+        return load_archive(path, kind, version, InvalidInputError).arrays
+    arrays = {name: np.asarray(array) for name, array in make().items()}
+    with suppress(OutputError):
+        check_folder(path.parent)
+        save_archive(path, kind, version, arrays, {})
+    return arrays

@@ -29,11 +29,18 @@ field_types: Callable[[type], dict[str, Any]] = cache(get_type_hints)
 SCALARS = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
 
 
+OPTIONAL: Mapping[str, Any] = {"optional": True}
+"""Metadata of a field that files and hashes hold only where it is not at its default."""
+
+
 def to_plain(value: Any) -> Any:
-    """Turn a dataclass into what TOML and JSON hold; fields that are None are left out."""
+    """Turn a dataclass into what TOML and JSON hold.
+
+    Fields that are None are left out, and those marked as ``OPTIONAL`` at their default.
+    """
     if is_dataclass(value):
-        given = ((item.name, getattr(value, item.name)) for item in fields(value))
-        return {name: to_plain(entry) for name, entry in given if entry is not None}
+        given = ((item, getattr(value, item.name)) for item in fields(value))
+        return {item.name: to_plain(entry) for item, entry in given if not _omitted(item, entry)}
     if isinstance(value, Mapping):
         return {str(key): to_plain(entry) for key, entry in value.items()}
     if isinstance(value, tuple | list):
@@ -43,34 +50,44 @@ def to_plain(value: Any) -> Any:
     return str(value) if isinstance(value, Path) else value
 
 
-def read_toml(
-    path: Path, what: str, bases: Collection[str], default: str
-) -> tuple[str, dict[str, Any]]:
-    """Read a TOML file whose entry ``base`` names one of some bases that it adds to.
+def _omitted(item: Field[Any], entry: Any) -> bool:
+    """Whether plain values leave a field out."""
+    if entry is None:
+        return True
+    make = item.default_factory
+    default = item.default if make is MISSING else make()
+    return "optional" in item.metadata and bool(entry == default)
 
-    Returns
-    -------
-    base : str
-        The name, or the default.
-    entries : dict
-        All other entries.
+
+def read_toml(path: Path, what: str) -> dict[str, Any]:
+    """Read a TOML file.
 
     Raises
     ------
     InvalidInputError
-        If the file cannot be read, is no TOML or names no such base; it is called ``what``.
+        If the file, called ``what``, cannot be read or is no TOML; says where.
     """
     name = str(path)
     try:
-        entries = tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise InvalidInputError(f"cannot read {what} {name!r}: {error.strerror}") from error
     except (ValueError, RecursionError) as error:
         raise InvalidInputError(f"{name}: not a {what} file: {first_line(error)}") from error
+
+
+def take_base(entries: dict[str, Any], where: str, bases: Collection[str], default: str) -> str:
+    """Remove the entry ``base`` of a file, and return it, or the default if there is none.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is none of the bases.
+    """
     base = entries.pop("base", default)
     if not isinstance(base, str) or base not in bases:
-        raise InvalidInputError(f"{name}: base must be one of {', '.join(bases)}, got {base!r}")
-    return base, entries
+        raise InvalidInputError(f"{where}: base must be one of {', '.join(bases)}, got {base!r}")
+    return base
 
 
 def from_plain(kind: type[T], entries: object, where: str, path: str = "") -> T:
@@ -128,6 +145,8 @@ def check_fields(given: Any) -> None:
 
 def _value(hint: Any, entry: Any, where: str, path: str, kind: type) -> Any:
     """Convert a value to what a type hint asks for."""
+    if hint is Any:
+        return entry
     choices = alternatives(hint)
     if isinstance(entry, np.ndarray | np.generic):
         entry = entry.tolist()
@@ -149,7 +168,10 @@ def _value(hint: Any, entry: Any, where: str, path: str, kind: type) -> Any:
                 for number, (part, value) in enumerate(zip(each, entry, strict=True))
             )
     elif origin is dict and isinstance(entry, Mapping):
-        return dict(entry)
+        return {
+            str(key): _value(arguments[1], value, where, f"{path}.{key}", kind)
+            for key, value in entry.items()
+        }
     elif origin is Literal:
         if entry in arguments:
             return entry

@@ -14,18 +14,19 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._validation import finite_array
-from kinarm.arm_specification import ArmSpecification
+from kinarm.arm_model import build_model, build_shapes, limit_velocities
+from kinarm.arm_specification import AllowedContact, ArmSpecification
 from kinarm.chain import Chain
-from kinarm.errors import ArmError
+from kinarm.errors import ArmError, UnknownNameError
 from kinarm.motion_bounds import link_lengths
-from kinarm.urdf import check_supported, find_urdf, read_urdf
+from kinarm.urdf import Description, find_urdf, read_urdf
 
 DEFAULT_ARM = "paper"
 
 
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """A fixed-base serial chain of revolute and prismatic joints, read from a URDF.
+    """A fixed-base chain of revolute and prismatic joints in series, read from a URDF.
 
     Build one with `Arm.load`. All arrays are read-only.
 
@@ -33,8 +34,8 @@ class Arm:
     ----------
     specification : ArmSpecification
         What it was made of.
-    urdf_path : Path
-        The file that it was read from.
+    description : Description
+        The URDF, reduced to the chain that carries the tool.
     model : pinocchio.Model
         Kinematics.
     geometry : pinocchio.GeometryModel
@@ -43,16 +44,19 @@ class Arm:
         Joints that actions move: the first ``n_actuated`` ones; the others stay at `home`.
     home : ndarray, shape (n_joints,)
         Reference configuration [rad or m].
+    allowed_contacts : tuple of AllowedContact
+        Links that may touch.
     chain : Chain
         The kinematics as flat arrays, for the compiled simulator.
     """
 
     specification: ArmSpecification
-    urdf_path: Path
+    description: Description
     model: pin.Model
     geometry: pin.GeometryModel
     n_actuated: int
     home: NDArray[np.float64]
+    allowed_contacts: tuple[AllowedContact, ...]
     chain: Chain
 
     def __post_init__(self) -> None:
@@ -65,13 +69,13 @@ class Arm:
 
     @classmethod
     def load(cls, arm: ArmSpecification | str | Path = DEFAULT_ARM, **changes: Any) -> Arm:
-        """Load a shipped arm by name, or any supported arm from a URDF file.
+        """Load an arm by name, or any supported arm from a URDF or an arm file.
 
         Parameters
         ----------
         arm : ArmSpecification, str or Path
-            ``"paper"``, ``"paper_flange"``, ``"lrmate200ic_5l"``, the path of a URDF, or a
-            specification.
+            A name of `arm_names`, such as ``"paper"`` or ``"ur5"``, the path of a URDF or of an
+            arm file, or a specification.
         **changes
             Fields of `ArmSpecification` to replace.
 
@@ -80,26 +84,26 @@ class Arm:
         UnknownNameError
             If neither an arm nor a file of that name exists.
         ArmError
-            If the file is malformed, the robot is not a fixed-base serial chain of limited
-            revolute and prismatic joints with velocity limits and a tool frame, or it does not
+            If the file is malformed, the robot is not a tree on a fixed base, its tool is not
+            carried by limited revolute and prismatic joints with velocity limits, or it does not
             fit the specification.
         """
         if not isinstance(arm, ArmSpecification):
             arm = ArmSpecification(source=str(arm))
         specification = replace(arm, **changes).resolved(Path())
-        path = find_urdf(specification.source)
-        model, geometry = read_urdf(path, list(specification.package_dirs))
-        tool_id = check_supported(model, path, specification.tool_frame)
-        if specification.velocity_limits is not None:
-            model.velocityLimit = _velocity_limits(specification.velocity_limits, model, path)
-        chain = Chain.from_model(model, tool_id)
+        wanted = specification.completed()
+        description = read_urdf(find_urdf(wanted.source), wanted)
+        model = build_model(description)
+        limit_velocities(model, wanted.velocity_limits, description)
+        chain = Chain.from_model(model, description.tool_frame)
         loaded = cls(
             specification=specification,
-            urdf_path=path,
+            description=description,
             model=model,
-            geometry=geometry,
-            n_actuated=_n_actuated(specification, model, chain, path),
-            home=_home(specification.home, chain),
+            geometry=build_shapes(description, model),
+            n_actuated=_n_actuated(wanted.actuated, model, chain, description),
+            home=_home(wanted.home, chain),
+            allowed_contacts=_allowed_contacts(wanted.allowed_contacts, description),
             chain=chain,
         )
         if specification.digest not in (None, loaded.digest):
@@ -115,9 +119,35 @@ class Arm:
         return self.specification.name
 
     @property
+    def urdf_path(self) -> Path:
+        """The file that it was read from."""
+        return self.description.path
+
+    @property
     def tool_frame(self) -> str:
         """Frame whose origin is the tool point."""
-        return self.specification.tool_frame
+        return self.description.tool_frame
+
+    def placed(self, position: ArrayLike, rotation: ArrayLike) -> Arm:
+        """The same arm with its base elsewhere.
+
+        Parameters
+        ----------
+        position : array_like, shape (3,)
+            Origin of the base in the world [m].
+        rotation : array_like, shape (3, 3)
+            Orientation of the base in the world.
+        """
+        base = pin.SE3(np.asarray(rotation, dtype=float), np.asarray(position, dtype=float))
+        if base.isIdentity(0.0):
+            return self
+        model, geometry = self.model.copy(), self.geometry.copy()
+        model.jointPlacements[1] = base * model.jointPlacements[1]
+        for part in (*model.frames, *geometry.geometryObjects):
+            if part.parentJoint == 0:
+                part.placement = base * part.placement
+        chain = Chain.from_model(model, self.tool_frame)
+        return replace(self, model=model, geometry=geometry, chain=chain)
 
     @property
     def n_joints(self) -> int:
@@ -160,11 +190,16 @@ class Arm:
             arrays += [shape.placement.homogeneous, np.array([box.min_, box.max_])]
             if isinstance(shape.geometry, coal.ConvexBase):
                 arrays.append(np.array(shape.geometry.points()))
+        names += [f"{first} may touch {second}" for first, second in self._allowed_links]
         content = hashlib.sha256("\n".join(names).encode())
         for array in arrays:
             # Adding zero removes the sign of zeros.
             content.update((np.round(np.asarray(array, dtype=float), 12) + 0.0).tobytes())
         return content.hexdigest()[:16]
+
+    @property
+    def _allowed_links(self) -> list[tuple[str, ...]]:
+        return sorted(tuple(sorted(each.links)) for each in self.allowed_contacts)
 
     def tool_position(self, configuration: ArrayLike) -> NDArray[np.float64]:
         """Forward kinematics of the tool point, through Pinocchio.
@@ -201,30 +236,41 @@ def _trailing_idle_axes(model: pin.Model, chain: Chain) -> int:
     return chain.n_joints
 
 
-def _n_actuated(specification: ArmSpecification, model: pin.Model, chain: Chain, path: Path) -> int:
+def _n_actuated(
+    named: tuple[str, ...] | None, model: pin.Model, chain: Chain, description: Description
+) -> int:
     """How many joints actions move: those named, which come first, or all that move the tool."""
-    names, named = list(model.names)[1:], specification.actuated
+    names = list(model.names)[1:]
     if named is None:
         n_actuated = chain.n_joints - _trailing_idle_axes(model, chain)
         if n_actuated == 0:
             raise ArmError(
-                f"no joint of {path.name} moves the tool frame {specification.tool_frame!r}"
+                f"no joint of {description.path.name} moves the tool frame "
+                f"{description.tool_frame!r}"
             )
         return n_actuated
+    for name in named:
+        if name not in names:
+            raise UnknownNameError(f"joint in actuated of {description.path.name}:", name, names)
     if not named or list(named) != names[: len(named)]:
         raise ArmError(
-            f"actuated must name the first joints of {path.name} in their order, "
-            f"{', '.join(names)}; got {', '.join(named) or 'none'}"
+            f"actuated must name the first joints of {description.path.name} in their order, "
+            f"{', '.join(names)}; got {', '.join(named) or 'none'} (held locks others)"
         )
     return len(named)
 
 
-def _velocity_limits(given: tuple[float, ...], model: pin.Model, path: Path) -> NDArray[np.float64]:
-    """Check velocity limits that replace those of the URDF."""
-    limits = finite_array("velocity_limits", given, (model.nv,))
-    if (limits <= 0).any():
-        raise ArmError(f"velocity_limits of {path.name} must be greater than 0, got {list(given)}")
-    return limits
+def _allowed_contacts(
+    given: tuple[AllowedContact, ...] | None, description: Description
+) -> tuple[AllowedContact, ...]:
+    """Check that allowed contacts name links."""
+    for contact in given or ():
+        for link in contact.links:
+            if link not in description.links:
+                raise UnknownNameError(
+                    f"link in allowed_contacts of {description.path.name}:", link, description.links
+                )
+    return given or ()
 
 
 def _home(home: ArrayLike | None, chain: Chain) -> NDArray[np.float64]:

@@ -1,47 +1,87 @@
 """Which arm: its name or file and what of it is used, without the libraries that read it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 
-from kinarm._fields import check_fields
+from kinarm._fields import check_fields, from_plain, init_fields, read_toml
+from kinarm.errors import ArmError
+
+PACKAGE = "example-robot-data:"
+"""What a source begins with that lies in the installed package of that name."""
 
 
 def arm_names() -> tuple[str, ...]:
-    """Names of the arms that ship with kinarm."""
+    """Names of the arms that ship with kinarm, or whose package it knows."""
     folder = resources.files("kinarm.data") / "arms"
-    return tuple(sorted(Path(f.name).stem for f in folder.iterdir() if f.name.endswith(".urdf")))
+    return tuple(sorted(Path(f.name).stem for f in folder.iterdir() if f.name.endswith(".toml")))
+
+
+@dataclass(frozen=True, kw_only=True)
+class AllowedContact:
+    """Two links whose contact counts for nothing.
+
+    Parameters
+    ----------
+    links : tuple of str
+        Their names.
+    reason : str
+        Why, for people.
+    """
+
+    links: tuple[str, str]
+    reason: str
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ArmSpecification:
     """Which arm, and what of it the simulator is to use.
 
+    What is left out is what the arm file says, if the source has one; see `ArmFile`.
+
     Parameters
     ----------
     source : str
-        Name of a shipped arm, or path of a URDF.
+        Name of an arm, or path of a URDF or of an arm file.
     tool_frame : str
-        Link (frame) whose origin is the tool point.
+        Link (frame) whose origin is the tool point; by default ``tool0``, or the last link of the
+        longest chain of joints.
+    tool_offset : tuple of float
+        The tool point in the tool frame, instead of its origin [m].
     package_dirs : tuple of str
-        Folders that hold the packages which ``package://`` mesh names refer to.
+        Folders that hold the packages which ``package://`` mesh names refer to; the folders
+        around the URDF are searched, too.
     actuated : tuple of str
         Names of the joints that actions move, from the base on; by default all but the trailing
         ones that cannot move the tool point. The others stay at home.
+    held : dict
+        Positions of joints that are locked, by name [rad or m]; those that do not carry the tool
+        are locked anyway, where the URDF has them at zero or as close to it as their limits allow.
+    limits : dict
+        Lower and upper limits to use instead of the URDF's, by joint [rad or m].
     home : tuple of float
         Reference configuration; zero, clipped to the limits, by default [rad or m].
     velocity_limits : tuple of float
         Limits to use instead of the URDF's [rad/s or m/s].
+    allowed_contacts : tuple of AllowedContact
+        Links that may touch.
     digest : str
         Hash that the arm must have; see `Arm.digest`.
     """
 
     source: str = "paper"
-    tool_frame: str = "tool0"
+    tool_frame: str | None = None
+    tool_offset: tuple[float, float, float] | None = None
     package_dirs: tuple[str, ...] = ()
     actuated: tuple[str, ...] | None = None
+    held: dict[str, float] | None = field(default=None, hash=False)
+    limits: dict[str, tuple[float, float]] | None = field(default=None, hash=False)
     home: tuple[float, ...] | None = None
     velocity_limits: tuple[float, ...] | None = None
+    allowed_contacts: tuple[AllowedContact, ...] | None = None
     digest: str | None = None
 
     def __post_init__(self) -> None:
@@ -50,13 +90,96 @@ class ArmSpecification:
     def resolved(self, folder: Path) -> "ArmSpecification":
         """The same arm with absolute paths; relative ones start at a folder."""
         source, path = self.source, folder / self.source
-        is_path = Path(source).suffix == ".urdf" or Path(source).parent != Path()
-        if source not in arm_names() and (is_path or path.is_file()):
+        is_path = Path(source).suffix in (".urdf", ".toml") or Path(source).parent != Path()
+        known = source in arm_names() or source.startswith(PACKAGE)
+        if not known and (is_path or path.is_file()):
             source = str(path.resolve())
         folders = tuple(str((folder / each).resolve()) for each in self.package_dirs)
         return replace(self, source=source, package_dirs=folders)
 
+    def completed(self) -> "ArmSpecification":
+        """The same arm with what its arm files say of it; its source is then a URDF.
+
+        Raises
+        ------
+        InvalidInputError
+            If an arm file cannot be used.
+        """
+        file = ArmFile.of(self.source)
+        if file is None:
+            return self
+        below = file.arm.completed()
+        given = {name: getattr(self, name) for name in init_fields(type(self)) if name != "source"}
+        given = {name: value for name, value in given.items() if value not in (None, ())}
+        for name in ("held", "limits"):
+            if name in given:
+                given[name] = {**(getattr(below, name) or {}), **given[name]}
+        return replace(below, **given)
+
     @property
     def name(self) -> str:
-        """Name of a shipped arm, or of the file without its ending."""
+        """Name of a known arm, or of the file without its ending."""
         return self.source if self.source in arm_names() else Path(self.source).stem
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmFile:
+    """An arm file: which arm, and where what is known of it comes from.
+
+    A TOML file with a table ``arm``, the fields of `ArmSpecification`, beside what people want to
+    know.
+
+    Parameters
+    ----------
+    title : str
+        The arm's full name.
+    licence : str
+        Licence of URDF and meshes.
+    origin : str
+        Where they come from.
+    velocities : str
+        Where the velocity limits come from.
+    notes : str
+        What else was chosen, and why.
+    arm : ArmSpecification
+        The arm; its ``source`` is a URDF or a known arm.
+    """
+
+    title: str = ""
+    licence: str = ""
+    origin: str = ""
+    velocities: str = ""
+    notes: str = ""
+    arm: ArmSpecification
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    @classmethod
+    def of(cls, source: str) -> "ArmFile | None":
+        """The arm file of a known arm or of a path; None if the source is a URDF.
+
+        Raises
+        ------
+        InvalidInputError
+            If it cannot be used.
+        ArmError
+            If there is no such file.
+        """
+        if source in arm_names():
+            with resources.as_file(resources.files("kinarm.data") / "arms") as folder:
+                return cls._read(folder / f"{source}.toml")
+        path = Path(source)
+        if path.suffix != ".toml":
+            return None
+        if not path.is_file():
+            raise ArmError(f"arm file {source!r} does not exist")
+        return cls._read(path.resolve())
+
+    @classmethod
+    def _read(cls, path: Path) -> "ArmFile":
+        """Read an arm file."""
+        file = from_plain(cls, read_toml(path, "arm"), str(path))
+        if file.arm.source.endswith(".toml"):
+            raise ArmError(f"{path}: 'arm.source' must be a URDF or a known arm, no arm file")
+        return replace(file, arm=file.arm.resolved(path.parent))

@@ -43,17 +43,17 @@ class Chain(NamedTuple):
         return len(self.lower)
 
     @classmethod
-    def from_model(cls, model: pin.Model, tool_frame_id: int) -> "Chain":
+    def from_model(cls, model: pin.Model, tool_frame: str) -> "Chain":
         """Extract the arrays from a Pinocchio model of a serial chain.
 
         Parameters
         ----------
         model : pinocchio.Model
             Joints of one degree of freedom, each the child of the one before.
-        tool_frame_id : int
-            Frame on the last link whose origin is the tool point.
+        tool_frame : str
+            Link whose origin is the tool point; the last joint carries it.
         """
-        frame = model.frames[tool_frame_id]
+        frame = model.frames[model.getFrameId(tool_frame, pin.FrameType.BODY)]
         placements = [model.jointPlacements[i] for i in range(1, model.njoints)]
         subspaces = np.array([_motion_subspace(model.joints[i]) for i in range(1, model.njoints)])
         prismatic = np.logical_not(np.any(subspaces[:, 3:], axis=1))

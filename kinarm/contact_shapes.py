@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -17,7 +17,7 @@ from kinarm.motion_bounds import point_speed
 
 if TYPE_CHECKING:
     from kinarm.arm import Arm
-    from kinarm.scene import Scene
+    from kinarm.scene import Obstacle, Scene
 
 BETWEEN_CAPSULES, WITH_BOX, WITH_GROUND = range(3)
 """Kinds of pairs in `ContactShapes.pairs`."""
@@ -43,7 +43,7 @@ class ContactShapes(NamedTuple):
         The capsule that is or encloses the shape: its end points (3 + 3) in the joint frame and
         its radius [m].
     boxes : ndarray, shape (n_boxes, 2, 3)
-        Lower and upper corners of the obstacles [m].
+        Lower and upper corners of the obstacles, in the world turned back by their yaw [m].
     pairs : ndarray of int, shape (n_pairs, 3)
         Kind of the pair, index of a shape, and index of the other shape or box.
     travel : ndarray, shape (n_actuated, n_pairs)
@@ -66,6 +66,8 @@ class ContactShapes(NamedTuple):
         Per pair, the bodies that stand for these two: in every step, and where it is close.
     farthest : ndarray, shape (n_actuated,)
         Largest entry of each row of ``travel``.
+    turns : ndarray, shape (n_boxes, 2)
+        Cosine and sine of the yaw of the obstacles.
     """
 
     link: NDArray[np.int64]
@@ -81,6 +83,7 @@ class ContactShapes(NamedTuple):
     planes: NDArray[np.int64]
     proxies: NDArray[np.int64]
     farthest: NDArray[np.float64]
+    turns: NDArray[np.float64]
 
     @classmethod
     def build(
@@ -108,7 +111,7 @@ class ContactShapes(NamedTuple):
         link = np.array([shape.parentJoint for shape in objects], dtype=np.int64)
         capsules = [enclosing_capsule(shape) for shape in objects]
         bodies = [enclosing_polytope(shape, FEW) for shape in objects]
-        bodies += [Enclosure(_corners(each.lower, each.upper), 0.0) for each in scene.obstacles]
+        bodies += [Enclosure(_corners(each), 0.0) for each in scene.obstacles]
         links = [*link.tolist(), *(0 for _ in scene.obstacles)]
         finer = list(range(len(bodies)))
         for index, shape in enumerate(objects):
@@ -135,9 +138,7 @@ class ContactShapes(NamedTuple):
         return cls(
             link=link,
             capsules=np.array([np.hstack(capsule) for capsule in capsules]).reshape(-1, 7),
-            boxes=np.array([(each.lower, each.upper) for each in scene.obstacles]).reshape(
-                -1, 2, 3
-            ),
+            boxes=np.array([_turned_back(each) for each in scene.obstacles]).reshape(-1, 2, 3),
             pairs=np.array(rows, dtype=np.int64).reshape(-1, 3),
             travel=travel,
             exact=np.array([is_capsule(shape) for shape in objects], dtype=bool),
@@ -150,12 +151,32 @@ class ContactShapes(NamedTuple):
             planes=np.array(planes, dtype=np.int64).reshape(-1, 4),
             proxies=np.array(proxies, dtype=np.int64).reshape(-1, 2, 2),
             farthest=travel.max(axis=1, initial=0.0),
+            turns=np.array([each.rotation[:2, 0] for each in scene.obstacles]).reshape(-1, 2),
         )
 
 
-def _corners(lower: Sequence[float], upper: Sequence[float]) -> NDArray[np.float64]:
-    """Corners of a box, shape (8, 3)."""
-    return np.array(list(product(*zip(lower, upper, strict=True))))
+def _corners(obstacle: Obstacle) -> NDArray[np.float64]:
+    """Corners of an obstacle in the world, shape (8, 3)."""
+    corners = np.array(list(product(*zip(obstacle.lower, obstacle.upper, strict=True))))
+    return _turned(corners, obstacle.rotation, obstacle.centre) if obstacle.yaw else corners
+
+
+def _turned_back(obstacle: Obstacle) -> NDArray[np.float64]:
+    """Opposite corners of an obstacle in the world turned back by its yaw, shape (2, 3)."""
+    ends = np.array([obstacle.lower, obstacle.upper])
+    if not obstacle.yaw:
+        return ends
+    return ends - obstacle.centre + _turned(obstacle.centre[None], obstacle.rotation.T)
+
+
+def _turned(
+    points: NDArray[np.float64],
+    rotation: NDArray[np.float64],
+    about: NDArray[np.float64] | float = 0.0,
+) -> NDArray[np.float64]:
+    """Points, shape (n, 3), turned about another one; without BLAS, the same on every machine."""
+    terms = [(points - about)[:, k, None] * rotation[:, k] for k in range(3)]
+    return about + terms[0] + terms[1] + terms[2]
 
 
 def _keeps_height(chain: Chain) -> bool:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
-from kinarm._fields import check_fields, from_plain, init_fields, read_toml, to_plain
+from kinarm._fields import check_fields, from_plain, init_fields, to_plain
 from kinarm._files import write_text
 from kinarm._validation import whole_number
 from kinarm.arm_specification import ArmSpecification
@@ -93,6 +93,10 @@ class ReachProblem:
     def __post_init__(self) -> None:
         check_fields(self)
         available = [region.name for region in self.scene.goal_regions]
+        if not available:
+            raise ProblemError("a scene needs at least one goal region")
+        if not self.task.goal_regions:
+            object.__setattr__(self, "task", replace(self.task, goal_regions=tuple(available)))
         for name in self.task.goal_regions:
             if name not in available:
                 raise UnknownNameError("goal region in task.goal_regions:", name, available)
@@ -108,8 +112,9 @@ class ReachProblem:
         Parameters
         ----------
         problem : str, Path, mapping or ReachProblem
-            ``"left"``, ``"right"`` or ``"both"``, the paper's tasks 1, 2 and 3; the path of a
-            TOML file; what `to_json` returned; or a problem, which is returned as it is.
+            ``"left"``, ``"right"`` or ``"both"``, the paper's tasks 1, 2 and 3, or another name of
+            `problem_names`; the path of a TOML file; what `to_json` returned; or a problem, which
+            is returned as it is.
 
         Raises
         ------
@@ -122,12 +127,9 @@ class ReachProblem:
             return problem
         if isinstance(problem, Mapping):
             return cls.from_json(problem)
-        if str(problem) in PROBLEMS:
-            return PROBLEMS[str(problem)]
-        path = Path(problem)
-        if path.suffix == ".toml" or path.is_file() or path.parent != Path():
-            return _read_problem(path)
-        raise UnknownNameError("problem", str(problem), (*PROBLEMS, "path/to/problem.toml"))
+        from kinarm.problem_files import find_problem
+
+        return find_problem(problem)
 
     def replace(self, **overrides: Any) -> "ReachProblem":
         """Change some parts of it.
@@ -135,10 +137,11 @@ class ReachProblem:
         Parameters
         ----------
         **overrides
-            ``name``; ``arm`` (a name, a path or a specification), ``scene`` and ``task`` (of
-            another problem, by name, file or as they are), ``stepping``; ``reward`` (weights, or
-            a mapping of those that change); or any field of the task or of the stepping, such as
-            ``tolerance``. None leaves what there is.
+            ``name``; ``arm`` (a name, a path or a specification), ``scene`` and ``task`` (by
+            name, of a file, of another problem, or as they are), ``stepping``; ``reward``
+            (weights, or a mapping of those that change); or any field of the task or of the
+            stepping, such as ``tolerance``. None leaves what there is. In a scene, by name or
+            file, that lacks a goal region of the task, all regions are to be reached.
 
         Raises
         ------
@@ -155,6 +158,10 @@ class ReachProblem:
             if name in changes:
                 changes[name] = convert(changes[name])
         task, stepping = changes.get("task", self.task), changes.get("stepping", self.stepping)
+        if isinstance(overrides.get("scene"), str | Path) and "task" not in changes:
+            regions = {region.name for region in changes["scene"].goal_regions}
+            if not regions.issuperset(task.goal_regions):
+                task = changes["task"] = replace(task, goal_regions=(), goal_weights=())
         if isinstance(given.get("reward"), Mapping):
             weights = dict(given["reward"])
             _check_names("reward term", weights, RewardWeights)
@@ -166,6 +173,13 @@ class ReachProblem:
         if of_stepping:
             changes["stepping"] = replace(stepping, **of_stepping)
         return replace(self, **changes)
+
+    def load_arm(self) -> "Arm":
+        """The arm, where it stands in the scene."""
+        from kinarm.arm import Arm
+
+        mount = self.scene.mount
+        return Arm.load(self.arm).placed(mount.position, mount.rotation)
 
     @cached_property
     def arm_digest(self) -> str:
@@ -278,11 +292,19 @@ def _specification(arm: "Arm | ArmSpecification | str | Path") -> ArmSpecificati
     return Arm.load(arm).specification
 
 
-PARTS: dict[str, Callable[[Any], Any]] = {
-    "arm": _specification,
-    "scene": lambda scene: scene if isinstance(scene, Scene) else ReachProblem.load(scene).scene,
-    "task": lambda task: task if isinstance(task, ReachTask) else ReachProblem.load(task).task,
-}
+def _scene(scene: "Scene | str | Path") -> Scene:
+    from kinarm.problem_files import find_scene
+
+    return scene if isinstance(scene, Scene) else find_scene(scene)
+
+
+def _task(task: "ReachTask | str | Path") -> ReachTask:
+    from kinarm.problem_files import find_task
+
+    return task if isinstance(task, ReachTask) else find_task(task)
+
+
+PARTS: dict[str, Callable[[Any], Any]] = {"arm": _specification, "scene": _scene, "task": _task}
 """How `ReachProblem.replace` understands what it is given for some parts."""
 
 
@@ -297,21 +319,6 @@ def _check_names(what: str, given: Mapping[str, Any], *kinds: type) -> None:
     for name in given:
         if name not in available:
             raise UnknownNameError(what, name, available)
-
-
-def _read_problem(path: Path) -> ReachProblem:
-    """Read a problem file; what it leaves out is that of the problem ``base``."""
-    base, entries = read_toml(path, "problem", PROBLEMS, "right")
-    given = {"name": path.stem, **entries}
-    problem = from_plain(ReachProblem, _merged(to_plain(PROBLEMS[base]), given), str(path))
-    return replace(problem, arm=problem.arm.resolved(path.resolve().parent))
-
-
-def _merged(below: Any, above: Any) -> Any:
-    """Tables merged key by key; everything else from above."""
-    if not (isinstance(below, Mapping) and isinstance(above, Mapping)):
-        return above
-    return {**below, **{key: _merged(below.get(key), entry) for key, entry in above.items()}}
 
 
 def _flattened(value: Any, path: str = "") -> dict[str, Any]:

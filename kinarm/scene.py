@@ -1,12 +1,13 @@
 """The world around the arm: the ground, solid boxes, and where goals may lie."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm._fields import check_fields
+from kinarm._fields import OPTIONAL, check_fields
 from kinarm.errors import ProblemError, UnknownNameError
 
 Point = tuple[float, float, float]
@@ -22,30 +23,88 @@ def _check_box(what: str, lower: Point, upper: Point, *, flat: bool) -> None:
         raise ProblemError(f"{what} is empty: {lower} to {upper}; expected {wanted}")
 
 
+def _check_finite(what: str, numbers: Iterable[float]) -> None:
+    """Refuse numbers that are not finite."""
+    given = list(numbers)
+    if not all(math.isfinite(number) for number in given):
+        raise ProblemError(f"{what} must be finite, got {given}")
+
+
+def rotation_matrix(rpy: Point) -> NDArray[np.float64]:
+    """Rotation by roll, pitch and yaw about the fixed axes x, y and z, shape (3, 3).
+
+    Entries are rounded to 12 digits: the same on every machine.
+    """
+    (cr, cp, cy), (sr, sp, sy) = (
+        [round(of(angle), 12) + 0.0 for angle in rpy] for of in (math.cos, math.sin)
+    )
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mount:
+    """Where the arm stands.
+
+    Parameters
+    ----------
+    position : tuple of float
+        Origin of the arm's base in the world [m].
+    rpy : tuple of float
+        Its orientation: roll, pitch and yaw about the axes of the world [rad].
+
+    Raises
+    ------
+    ProblemError
+        If a number is not finite.
+    """
+
+    position: Point = (0.0, 0.0, 0.0)
+    rpy: Point = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        _check_finite("mount", (*self.position, *self.rpy))
+
+    @property
+    def rotation(self) -> NDArray[np.float64]:
+        """Orientation: rotation matrix, shape (3, 3)."""
+        return rotation_matrix(self.rpy)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Obstacle:
-    """A solid box, its edges along the axes of the world.
+    """A solid box, its edges along the axes of the world, or turned about the vertical.
 
     Parameters
     ----------
     name : str
         How contact reports call it.
     lower, upper : tuple of float
-        Opposite corners in the world frame [m].
+        Opposite corners, before it is turned, in the world frame [m].
+    yaw : float
+        Angle by which it is turned about the vertical through its centre [rad].
 
     Raises
     ------
     ProblemError
-        If it is empty or a corner is not finite.
+        If it is empty or a number is not finite.
     """
 
     name: str
     lower: Point
     upper: Point
+    yaw: float = field(default=0.0, metadata=OPTIONAL)
 
     def __post_init__(self) -> None:
         check_fields(self)
         _check_box(f"obstacle {self.name!r}", self.lower, self.upper, flat=False)
+        _check_finite(f"yaw of obstacle {self.name!r}", (self.yaw,))
 
     @property
     def size(self) -> NDArray[np.float64]:
@@ -58,6 +117,11 @@ class Obstacle:
         """Its centre in the world [m], shape (3,)."""
         centre: NDArray[np.float64] = (np.array(self.lower) + np.array(self.upper)) / 2
         return centre
+
+    @property
+    def rotation(self) -> NDArray[np.float64]:
+        """Orientation of its edges in the world: rotation matrix, shape (3, 3)."""
+        return rotation_matrix((0.0, 0.0, self.yaw))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,8 +168,8 @@ class Scene:
     """Ground, obstacles and goal regions.
 
     The world frame has z up, x forward (the arm's zero heading) and y to the left; the base of
-    the arm stands at the origin. The default is the paper's scene (section 3.3): two benches to
-    the right and the left of the arm.
+    the arm stands at the origin unless told otherwise. The default is the paper's scene (section
+    3.3): two benches to the right and the left of the arm.
 
     Parameters
     ----------
@@ -117,6 +181,8 @@ class Scene:
         Solid boxes, whether goals lie on them or not.
     goal_regions : tuple of GoalRegion
         Where goals may lie.
+    mount : Mount
+        Where the arm stands.
 
     Raises
     ------
@@ -128,6 +194,7 @@ class Scene:
     cube_edge: float = 0.05
     obstacles: tuple[Obstacle, ...] = PAPER_BENCHES
     goal_regions: tuple[GoalRegion, ...] = PAPER_GOALS
+    mount: Mount = field(default_factory=Mount, metadata=OPTIONAL)
 
     def __post_init__(self) -> None:
         check_fields(self)

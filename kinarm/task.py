@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm._fields import check_fields
+from kinarm._fields import OPTIONAL, check_fields
 from kinarm._validation import whole_number
 from kinarm.errors import ProblemError
 from kinarm.scene import Scene
@@ -88,6 +88,8 @@ class ReachTask:
     start_spread : float
         Scales the range of the start configurations about the home pose; 1 is the whole range
         of every actuated joint, 0 always starts at home.
+    starts : tuple
+        Start configurations, each as likely, instead of that range [rad or m].
     reward : RewardWeights
         What is rewarded.
 
@@ -97,17 +99,16 @@ class ReachTask:
         If a number is out of range, or regions and weights do not fit together.
     """
 
-    goal_regions: tuple[str, ...]
+    goal_regions: tuple[str, ...] = ()
     goal_weights: tuple[float, ...] = ()
     tolerance: float = 0.05
     horizon: int = 64
     start_spread: float = 1.0
+    starts: tuple[tuple[float, ...], ...] = field(default=(), metadata=OPTIONAL)
     reward: RewardWeights = field(default_factory=RewardWeights)
 
     def __post_init__(self) -> None:
         check_fields(self)
-        if not self.goal_regions:
-            raise ProblemError("a task needs at least one goal region")
         if len(set(self.goal_regions)) < len(self.goal_regions):
             raise ProblemError(f"goal_regions names one twice: {', '.join(self.goal_regions)}")
         weights = self.goal_weights

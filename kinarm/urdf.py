@@ -1,22 +1,86 @@
-"""Reading robot descriptions: the kinematics and collision shapes of a URDF, or why not."""
+"""Robot descriptions: what of a URDF an arm is made of, as a text that Pinocchio can read.
 
-from importlib import resources
+Of a tree of links, the joints between base and tool are kept. The others, and those that are to
+be held, become fixed where they are held; joints that mimic a held one follow it. Continuous joints
+get a range, and the names of meshes become paths.
+"""
+
+import math
+from collections.abc import Collection, Mapping
+from importlib import metadata
 from pathlib import Path
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from kinarm._files import first_line
-from kinarm.arm_specification import arm_names
+from kinarm.arm_specification import PACKAGE, ArmSpecification, arm_names
 from kinarm.errors import ArmError, UnknownNameError
+
+USUAL_TOOL = "tool0"
+"""Name of the tool frame by ROS's convention."""
+
+MOVING = ("revolute", "prismatic", "continuous")
+
+
+class Description(NamedTuple):
+    """A URDF made ready for an arm.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    text : str
+        Its text, in which all moving joints are in series, from the base to the tool.
+    links : tuple of str
+        Names of all links.
+    tool_frame : str
+        Link whose origin is the tool point.
+    held : dict
+        Positions at which joints were fixed, by name [rad or m].
+    notes : tuple of str
+        What was chosen where nothing was said.
+    """
+
+    path: Path
+    text: str
+    links: tuple[str, ...]
+    tool_frame: str
+    held: dict[str, float]
+    notes: tuple[str, ...]
+
+
+class _Joint(NamedTuple):
+    """A joint of the file."""
+
+    element: ElementTree.Element
+    name: str
+    kind: str
+    parent: str
+    child: str
+
+    @property
+    def mimics(self) -> str | None:
+        """The joint that it mimics."""
+        mimic = self.element.find("mimic")
+        return None if mimic is None else mimic.get("joint")
 
 
 def find_urdf(source: str) -> Path:
-    """Resolve a name or path to a file."""
-    if source in arm_names():
-        with resources.as_file(resources.files("kinarm.data") / "arms") as folder:
-            return folder / f"{source}.urdf"
+    """Resolve the source of a completed specification to a file.
+
+    Raises
+    ------
+    ArmError
+        If there is no such file.
+    UnknownNameError
+        If it is no path but a name.
+    """
+    if source.startswith(PACKAGE):
+        return _installed(source)
     path = Path(source)
     if path.is_file():
         return path.resolve()
@@ -27,38 +91,81 @@ def find_urdf(source: str) -> Path:
     raise UnknownNameError("arm", source, (*arm_names(), "path/to/robot.urdf"))
 
 
-def read_urdf(path: Path, package_dirs: list[str]) -> tuple[pin.Model, pin.GeometryModel]:
-    """Parse kinematics and collision shapes; meshes become convex hulls."""
-    robot = _check_xml(path)
+def _installed(source: str) -> Path:
+    """Find a file of the installed package of robot descriptions."""
+    name, _, inside = source.partition(":")
     try:
-        model = pin.buildModelFromUrdf(str(path))
-    except (ValueError, RuntimeError) as error:
+        package = metadata.distribution(name)
+    except metadata.PackageNotFoundError:
+        raise ArmError(
+            f"{Path(inside).name} is part of the package {name}: pip install 'kinarm[robots]'"
+        ) from None
+    share = Path(str(package.locate_file(f"cmeel.prefix/share/{name}/robots")))
+    if not (share / inside).is_file():
+        raise ArmError(f"the package {name} {package.version} has no {inside}: another version?")
+    return (share / inside).resolve()
+
+
+def read_urdf(path: Path, specification: ArmSpecification) -> Description:
+    """Read a URDF and reduce it to a chain.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    specification : ArmSpecification
+        What of it is to be used; a completed one.
+
+    Raises
+    ------
+    ArmError
+        If the file is malformed, or the robot cannot be reduced to a chain.
+    UnknownNameError
+        If the specification names a joint that there is none of.
+    """
+    robot = _parsed(path)
+    try:
+        return _reduced(robot, path, specification)
+    except ValueError as error:
         raise ArmError(f"{path.name} is not a readable URDF: {first_line(error)}") from error
-    try:
-        geometry = pin.buildGeomFromUrdf(
-            model, str(path), pin.GeometryType.COLLISION, package_dirs=package_dirs
-        )
-    except (ValueError, RuntimeError) as error:
-        raise ArmError(
-            f"collision shapes of {path.name} cannot be loaded: {first_line(error)}; "
-            "package_dirs names the folders of package:// meshes"
-        ) from error
-    declared = len(robot.findall("link/collision"))
-    if geometry.ngeoms != declared:
-        raise ArmError(
-            f"{path.name} declares {declared} collision shapes but {geometry.ngeoms} were read; "
-            'capsules need <robot version="1.2">'
-        )
-    for shape in geometry.geometryObjects:
-        if hasattr(shape.geometry, "buildConvexHull"):
-            shape.geometry.buildConvexHull(True, "Qt")
-            shape.geometry = shape.geometry.convex
-        shape.geometry.computeLocalAABB()
-    return model, geometry
 
 
-def _check_xml(path: Path) -> ElementTree.Element:
-    """Parse the file and refuse joints that Pinocchio would drop or take for independent."""
+def _reduced(
+    robot: ElementTree.Element, path: Path, specification: ArmSpecification
+) -> Description:
+    """Keep the chain that carries the tool."""
+    joints = _joints(robot, path)
+    links = [link.get("name", "") for link in robot.findall("link")]
+    tool, notes = _tool_frame(specification.tool_frame, joints, links, path)
+    chain = _chain_to(tool, joints)
+    for what in ("held", "limits"):
+        _check_joints(what, getattr(specification, what) or {}, joints, path)
+    asked = specification.held or {}
+    kept = [joint.name for joint in chain if joint.name not in asked]
+    for joint in joints.values():
+        if joint.name in kept:
+            notes += _bounded(joint, specification.limits or {}, path)
+    held = _held_positions(joints, kept, asked, path)
+    for name, position in held.items():
+        _fix(joints[name].element, position)
+    free = [name for name in held if name not in asked]
+    if free:
+        notes += (f"joints that do not carry the tool are held: {', '.join(free)}",)
+    _resolve_meshes(robot, path, specification.package_dirs)
+    if specification.tool_offset is not None:
+        tool = _add_tool_point(robot, tool, specification.tool_offset)
+    return Description(
+        path=path,
+        text=ElementTree.tostring(robot, encoding="unicode"),
+        links=tuple(links),
+        tool_frame=tool,
+        held=held,
+        notes=notes,
+    )
+
+
+def _parsed(path: Path) -> ElementTree.Element:
+    """Parse the file."""
     try:
         robot = ElementTree.parse(path).getroot()
     except (ElementTree.ParseError, OSError, UnicodeError) as error:
@@ -70,47 +177,221 @@ def _check_xml(path: Path) -> ElementTree.Element:
     capsules = robot.find("link/collision/geometry/capsule") is not None
     if capsules and robot.get("version", "1.0") not in ("1.1", "1.2"):
         raise ArmError(f'{path.name} has capsules, which need <robot version="1.2">')
-    for joint in robot.findall("joint"):
-        name, kind = joint.get("name"), joint.get("type")
-        if joint.find("mimic") is not None:
-            raise ArmError(f"joint {name!r} of {path.name} mimics another one: not supported")
-        if kind in ("revolute", "prismatic") and joint.find("limit") is None:
-            raise ArmError(f"joint {name!r} of {path.name} has no limits")
     return robot
 
 
-def check_supported(model: pin.Model, path: Path, tool_frame: str) -> int:
-    """Refuse what the simulator cannot represent; return the id of the tool frame."""
-    names = list(model.names)
-    if model.njoints < 2:
-        raise ArmError(f"{path.name} has no moving joint")
-    for index in range(1, model.njoints):
-        joint, name = model.joints[index], names[index]
-        kind = joint.shortname()
-        if "FreeFlyer" in kind or "Planar" in kind:
-            raise ArmError(f"joint {name!r} of {path.name} is {kind}: the base must be fixed")
-        if "RUB" in kind or "RevoluteUnbounded" in kind:
-            raise ArmError(f"joint {name!r} of {path.name} is continuous: give it limits")
-        if joint.nq != 1 or joint.nv != 1:
-            raise ArmError(f"joint {name!r} of {path.name} is {kind}: only revolute and prismatic")
-        if model.parents[index] != index - 1:
+def _joints(robot: ElementTree.Element, path: Path) -> dict[str, _Joint]:
+    """Joints by the link that they carry; refuses what is no tree on a fixed base."""
+    found: dict[str, _Joint] = {}
+    links = {link.get("name") for link in robot.findall("link")}
+    carried: dict[str, str] = {}
+    for element in robot.findall("joint"):
+        name, kind = element.get("name", ""), element.get("type", "")
+        ends = [element.find(end) for end in ("parent", "child")]
+        parent, child = ("" if end is None else end.get("link", "") for end in ends)
+        for link in (parent, child):
+            if link not in links:
+                raise ArmError(
+                    f"{path.name} is not a readable URDF: joint {name!r} joins {link!r}, which is "
+                    "no link"
+                )
+        if name in found:
+            raise ArmError(f"{path.name} is not a readable URDF: two joints are called {name!r}")
+        if child in carried:
             raise ArmError(
-                f"{path.name} branches at joint {name!r}: only a serial chain is supported"
+                f"link {child!r} of {path.name} hangs on two joints, {carried[child]!r} and "
+                f"{name!r}: closed loops are not supported"
             )
-        lower = model.lowerPositionLimit[index - 1]
-        upper = model.upperPositionLimit[index - 1]
-        if not (np.isfinite(lower) and np.isfinite(upper) and lower < upper) or upper > 1e10:
-            raise ArmError(f"joint {name!r} of {path.name} has no usable limits: {lower}..{upper}")
-        speed = model.velocityLimit[index - 1]
-        if not (np.isfinite(speed) and 0 < speed < 1e10):
-            raise ArmError(f"joint {name!r} of {path.name} has no velocity limit: velocity={speed}")
-    if not model.existFrame(tool_frame, pin.FrameType.BODY):
-        frames = [frame.name for frame in model.frames if frame.type == pin.FrameType.BODY]
+        if kind in ("floating", "planar"):
+            raise ArmError(f"joint {name!r} of {path.name} is {kind}: the base must be fixed")
+        if kind not in (*MOVING, "fixed"):
+            raise ArmError(f"joint {name!r} of {path.name} is {kind!r}: not supported")
+        carried[child] = name
+        found[name] = _Joint(element, name, kind, parent, child)
+    if links and len(carried) == len(links):
+        raise ArmError(f"the links of {path.name} form a loop: closed loops are not supported")
+    return found
+
+
+def _chain_to(link: str, joints: Mapping[str, _Joint]) -> list[_Joint]:
+    """Moving joints between the base and a link, in that order."""
+    carrier = {joint.child: joint for joint in joints.values()}
+    chain: list[_Joint] = []
+    while link in carrier and len(chain) <= len(joints):
+        joint = carrier[link]
+        chain.append(joint)
+        link = joint.parent
+    return [joint for joint in reversed(chain) if joint.kind in MOVING]
+
+
+def _tool_frame(
+    asked: str | None, joints: Mapping[str, _Joint], links: list[str], path: Path
+) -> tuple[str, tuple[str, ...]]:
+    """The tool frame, and a note if it had to be chosen."""
+    if asked is not None or USUAL_TOOL in links:
+        chosen = asked or USUAL_TOOL
+        if chosen not in links:
+            raise ArmError(
+                f"{path.name} has no tool frame {chosen!r}; tool_frame can be one of its links: "
+                + ", ".join(links)
+            )
+        return chosen, ()
+    lengths = [sum(joint.mimics is None for joint in _chain_to(link, joints)) for link in links]
+    if not links or max(lengths) == 0:
+        raise ArmError(f"{path.name} has no moving joint")
+    longest = [link for link, n in zip(links, lengths, strict=True) if n == max(lengths)]
+    parents = {joint.parent for joint in joints.values() if joint.child in longest}
+    last = next(link for link in reversed(longest) if link not in parents)
+    return last, (f"tool frame: {last!r}, the last link of the longest chain",)
+
+
+def _check_joints(
+    what: str, named: Collection[str], joints: Mapping[str, _Joint], path: Path
+) -> None:
+    """Refuse names that no moving joint has."""
+    moving = [joint.name for joint in joints.values() if joint.kind in MOVING]
+    for name in named:
+        if name not in moving:
+            raise UnknownNameError(f"joint in {what} of {path.name}:", name, moving)
+
+
+def _bounded(
+    joint: _Joint, limits: Mapping[str, tuple[float, float]], path: Path
+) -> tuple[str, ...]:
+    """See that a joint that is kept has limits; return what was chosen."""
+    element, name = joint.element, joint.name
+    if joint.mimics is not None:
         raise ArmError(
-            f"{path.name} has no tool frame {tool_frame!r}; tool_frame can be one of its links: "
-            + ", ".join(frames)
+            f"joint {name!r} of {path.name} mimics {joint.mimics!r} and carries the tool: hold it "
+            "(held), or choose a tool frame before it"
         )
-    tool_id = int(model.getFrameId(tool_frame, pin.FrameType.BODY))
-    if model.frames[tool_id].parentJoint != model.njoints - 1:
-        raise ArmError(f"tool frame {tool_frame!r} of {path.name} is not on the last moving link")
-    return tool_id
+    limit = element.find("limit")
+    notes: tuple[str, ...] = ()
+    if joint.kind == "continuous":
+        element.set("type", "revolute")
+        if limit is None:
+            limit = ElementTree.SubElement(element, "limit", effort="0")
+        if name not in limits:
+            limit.set("lower", repr(-math.pi))
+            limit.set("upper", repr(math.pi))
+            notes = (f"joint {name!r} is continuous: its range is taken as -180 to 180 deg",)
+    if limit is None:
+        raise ArmError(f"joint {name!r} of {path.name} has no limits")
+    if name in limits:
+        for end, value in zip(("lower", "upper"), limits[name], strict=True):
+            limit.set(end, repr(value))
+    return notes
+
+
+def _held_positions(
+    joints: Mapping[str, _Joint], kept: Collection[str], asked: Mapping[str, float], path: Path
+) -> dict[str, float]:
+    """Where the joints stay that are not kept."""
+    positions = {}
+    for joint in joints.values():
+        if joint.kind not in MOVING or joint.name in kept:
+            continue
+        if joint.mimics in kept and joint.name not in asked:
+            raise ArmError(
+                f"joint {joint.name!r} of {path.name} mimics {joint.mimics!r}, which moves: hold "
+                "it (held)"
+            )
+        if joint.mimics is None or joint.name in asked:
+            positions[joint.name] = asked.get(joint.name, _near_zero(joint))
+    for joint in joints.values():
+        leader = joint.mimics
+        if joint.kind in MOVING and joint.name not in kept and joint.name not in positions:
+            if leader not in positions:
+                raise ArmError(
+                    f"joint {joint.name!r} of {path.name} mimics {leader!r}, which is no joint "
+                    "that is held"
+                )
+            mimic = joint.element.find("mimic")
+            assert mimic is not None
+            factor, offset = (float(mimic.get(name, d)) for name, d in FOLLOWING)
+            positions[joint.name] = factor * positions[leader] + offset
+    return {name: positions[name] for name in joints if name in positions}
+
+
+FOLLOWING = (("multiplier", "1"), ("offset", "0"))
+"""Attributes of a mimicking joint, and what they are where they are left out."""
+
+
+def _near_zero(joint: _Joint) -> float:
+    """Position closest to zero within the limits of a joint, if it has any."""
+    limit = joint.element.find("limit")
+    if limit is None or joint.kind == "continuous":
+        return 0.0
+    lower, upper = (float(limit.get(end, "0")) for end in ("lower", "upper"))
+    return min(max(0.0, lower), upper)
+
+
+def _fix(element: ElementTree.Element, position: float) -> None:
+    """Make a joint a fixed one at a position."""
+    kind = element.get("type")
+    element.set("type", "fixed")
+    mimic = element.find("mimic")
+    if mimic is not None:
+        element.remove(mimic)
+    if position == 0:
+        return
+    origin, axis = element.find("origin"), element.find("axis")
+    if origin is None:
+        origin = ElementTree.SubElement(element, "origin")
+    along = _numbers("1 0 0" if axis is None else axis.get("xyz", "1 0 0"))
+    along = along / np.linalg.norm(along)
+    turned = pin.rpy.rpyToMatrix(_numbers(origin.get("rpy", "0 0 0")))
+    moved = _numbers(origin.get("xyz", "0 0 0"))
+    if kind == "prismatic":
+        moved = moved + turned @ along * position
+    else:
+        turned = turned @ pin.AngleAxis(position, along).toRotationMatrix()
+    origin.set("xyz", " ".join(map(repr, moved.tolist())))
+    origin.set("rpy", " ".join(map(repr, pin.rpy.matrixToRpy(turned).tolist())))
+
+
+def _numbers(text: str) -> NDArray[np.float64]:
+    """Numbers of an attribute."""
+    return np.array([float(word) for word in text.split()])
+
+
+def _add_tool_point(robot: ElementTree.Element, tool: str, offset: tuple[float, ...]) -> str:
+    """Add a link at a point of the tool frame; return its name."""
+    name = f"{tool}_point"
+    ElementTree.SubElement(robot, "link", name=name)
+    joint = ElementTree.SubElement(robot, "joint", name=f"{name}_joint", type="fixed")
+    ElementTree.SubElement(joint, "parent", link=tool)
+    ElementTree.SubElement(joint, "child", link=name)
+    ElementTree.SubElement(joint, "origin", xyz=" ".join(map(repr, offset)), rpy="0 0 0")
+    return name
+
+
+def _resolve_meshes(robot: ElementTree.Element, path: Path, folders: Collection[str]) -> None:
+    """Replace names of meshes by paths; those that are missing are refused, if they can touch."""
+    for use in ("collision", "visual"):
+        for mesh in robot.findall(f"link/{use}/geometry/mesh"):
+            name = mesh.get("filename", "")
+            found = _mesh_path(name, path, folders)
+            if found is not None:
+                mesh.set("filename", str(found))
+            elif use == "collision":
+                raise ArmError(
+                    f"mesh {name!r} of {path.name} is not found; package_dirs names the folders "
+                    "of package:// meshes"
+                )
+
+
+def _mesh_path(name: str, path: Path, folders: Collection[str]) -> Path | None:
+    """Find a mesh in the package folders, or in one that the URDF lies in."""
+    scheme, separator, inside = name.partition("://")
+    if scheme == "file":
+        return Path(inside) if Path(inside).is_file() else None
+    if not separator:
+        beside = path.parent / name
+        return beside.resolve() if beside.is_file() else None
+    around = (*map(Path, folders), *path.parents)
+    own = (folder.parent for folder in around if folder.name == inside.partition("/")[0])
+    for folder in (*around, *own):
+        if (folder / inside).is_file():
+            return (folder / inside).resolve()
+    return None

@@ -7,6 +7,8 @@ wherever the signs of input and output disagree: it then does on one bench what 
 other. Any other network does so if it sees goals on the left in the mirror; see `kinarm.Networks`.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -76,10 +78,18 @@ def is_symmetric(problem: ReachProblem) -> bool:
     weights = task.goal_weights or (1.0,) * len(task.goal_regions)
     regions = [scene.goal_region(name) for name in task.goal_regions]
     goals = {(region.lower, region.upper, w) for region, w in zip(regions, weights, strict=True)}
-    obstacles = {(obstacle.lower, obstacle.upper, 1.0) for obstacle in scene.obstacles}
-    return all(boxes == {_reflected(*box) for box in boxes} for boxes in (goals, obstacles))
+    obstacles = {(each.lower, each.upper, _of_half_turn(each.yaw)) for each in scene.obstacles}
+    return goals == {(*_reflected(lower, upper), w) for lower, upper, w in goals} and (
+        obstacles
+        == {(*_reflected(lower, upper), _of_half_turn(-yaw)) for lower, upper, yaw in obstacles}
+    )
 
 
-def _reflected(lower: Point, upper: Point, weight: float) -> tuple[Point, Point, float]:
+def _of_half_turn(yaw: float) -> float:
+    """The angle in [0, pi) by which a box looks the same, rounded [rad]."""
+    return round(yaw % math.pi, 9) % round(math.pi, 9)
+
+
+def _reflected(lower: Point, upper: Point) -> tuple[Point, Point]:
     """Mirror image of a box."""
-    return (lower[0], -upper[1], lower[2]), (upper[0], -lower[1], upper[2]), weight
+    return (lower[0], -upper[1], lower[2]), (upper[0], -lower[1], upper[2])

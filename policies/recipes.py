@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from kinarm._fields import from_plain, init_fields, read_toml, to_plain
+from kinarm._fields import from_plain, init_fields, read_toml, take_base, to_plain
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.policies.learners import Learner, find_learner
 from kinarm.problem import ReachProblem
@@ -66,7 +66,8 @@ def _named_recipe(learner: Learner[Any, Any], name: str, circumstances: Mapping[
 
 def _read_recipe(learner: Learner[Any, Any], path: Path, circumstances: Mapping[str, Any]) -> Any:
     """Settings of a file for a problem and a seed, which may be in the file."""
-    base, entries = read_toml(path, "recipe", learner.recipes, "paper")
+    entries = read_toml(path, "recipe")
+    base = take_base(entries, str(path), learner.recipes, "paper")
     known = {**circumstances}
     problem = entries.pop("problem", None)
     if problem is not None and "problem" not in known:

@@ -162,14 +162,13 @@ class EvaluationRequest(ProblemOptions):
         KinarmError
             As for `run`.
         """
-        from kinarm.arm import Arm
         from kinarm.evaluation.bounds import oracle_bounds
         from kinarm.evaluation.evaluation import run_trials
         from kinarm.evaluation.trials import TrialSet
 
         pairs, evaluations = self.pairs(), []
         problems = {problem.name: problem for _, problem in pairs}
-        arms = {name: Arm.load(problem.arm) for name, problem in problems.items()}
+        arms = {name: problem.load_arm() for name, problem in problems.items()}
         for entrant, problem in pairs:
             entrant.check(arms[problem.name], allow_other_arm=self.allow_other_arm)
         self._check_outputs(pairs)

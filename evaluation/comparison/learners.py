@@ -115,7 +115,7 @@ def read_learners(path: Path | None = None) -> dict[str, ComparedLearner]:
     if path is None:
         with as_file(files(__package__).joinpath("learners.toml")) as shipped:
             return read_learners(shipped)
-    _, tables = read_toml(path, "table of learners", ("",), "")
+    tables = read_toml(path, "table of learners")
     if not all(isinstance(entries, dict) for entries in tables.values()):
         raise InvalidInputError(f"{path}: every learner must be a table")
     return {

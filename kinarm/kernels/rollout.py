@@ -28,7 +28,7 @@ from kinarm.kernels.proof import (
 from kinarm.kernels.reward import add_reward
 from kinarm.kernels.session import Session
 
-LAYOUT = "a8db920f12fc"
+LAYOUT = "69e76db5787f"
 """Hash of what is compiled in from other files; a test tells when to renew it.
 
 Numba's disk cache notices changes only in this file, so changing this line is what makes it

@@ -49,7 +49,7 @@ def arm_page(
     Parameters
     ----------
     arm : Arm, ArmSpecification, str or Path
-        The arm, or what `Arm.load` takes.
+        The arm, where it stands; or what `Arm.load` takes, which is mounted as the scene says.
     path : str or Path, optional
         Where to write the page, if at all.
     scene : Scene
@@ -62,7 +62,9 @@ def arm_page(
     OutputError
         If the file cannot be written.
     """
-    page = ArmPage.of(arm if isinstance(arm, Arm) else Arm.load(arm), scene)
+    if not isinstance(arm, Arm):
+        arm = Arm.load(arm).placed(scene.mount.position, scene.mount.rotation)
+    page = ArmPage.of(arm, scene)
     if path is not None:
         page.save(path)
     return page

@@ -2,35 +2,29 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Sequence
-from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from kinarm._archive import load_archive, save_archive
-from kinarm._cache import cache_folder, delete_least_recently_used
-from kinarm._files import check_folder, first_line
-from kinarm.errors import ArmError, InvalidInputError, MissingExtraError, OutputError
+from kinarm._cache import cached_arrays
+from kinarm._files import first_line
+from kinarm.errors import ArmError, MissingExtraError
 from kinarm.viewer.finishes import original_colour, packed_colour
 from kinarm.viewer.meshes import Mesh
 
 TOLERANCE = 3e-4
 """How far a simplified surface may lie from the planes of the triangles that it replaces [m]."""
 
-ARCHIVE = ("mesh", 1)
-"""Kind and version of the cached files; to be raised when what is read or made changes."""
+UNKNOWN = -1
+"""Stands for a colour that a file does not state."""
 
-ARRAYS = ("vertices", "faces", "normals")
-"""What they hold of each piece, by number."""
-
-KEPT_FILES, KEPT_BYTES = 500, 128 * 2**20
-"""Mesh files whose triangles are kept, and how large they may be together."""
+VERSION = 1
+"""Of what is kept of a file; to be raised when the same file makes other triangles."""
 
 READERS = ("trimesh", "pycollada", "fast-simplification")
 """Packages of the extra ``robots`` that meshes are read and simplified with."""
@@ -75,24 +69,38 @@ def read_mesh_file(path: Path, scale: Sequence[float]) -> tuple[PaintedMesh, ...
         content = path.read_bytes()
     except OSError as error:
         raise ArmError(f"cannot read mesh {path.name!r}: {error.strerror}") from error
-    cached = cache_folder() / f"mesh-{_digest(content, path.suffix, scale)}.npz"
-    found = _load(cached)
-    if found is None:
-        found = tuple(
-            PaintedMesh(_simplified(piece.mesh), piece.colour) for piece in _pieces(path, scale)
+    made_with = json.dumps([path.suffix, list(scale), TOLERANCE, _versions()])
+    made_of = made_with.encode() + content
+    arrays = cached_arrays("mesh", VERSION, made_of, lambda: _simplified_arrays(path, scale))
+    return tuple(
+        PaintedMesh(
+            Mesh(*(arrays[f"{name} {number}"] for name in ("vertices", "faces", "normals"))),
+            None if colour == UNKNOWN else int(colour),
         )
-        _save(cached, found)
-    return found
+        for number, colour in enumerate(arrays["colours"])
+    )
 
 
-def _digest(content: bytes, suffix: str, scale: Sequence[float]) -> str:
-    """Hash of what triangles are made of and with."""
+def _versions() -> list[str]:
+    """Versions of the packages that meshes are read and simplified with."""
     try:
-        versions = [metadata.version(name) for name in READERS]
+        return [metadata.version(name) for name in READERS]
     except metadata.PackageNotFoundError as error:
         raise MissingExtraError(str(error.name), "robots") from error
-    made_with = json.dumps([suffix, list(scale), TOLERANCE, versions])
-    return hashlib.sha256(made_with.encode() + content).hexdigest()[:24]
+
+
+def _simplified_arrays(path: Path, scale: Sequence[float]) -> dict[str, ArrayLike]:
+    """Triangles and colours of a file, as they are kept."""
+    pieces = _pieces(path, scale)
+    arrays: dict[str, ArrayLike] = {
+        "colours": [UNKNOWN if piece.colour is None else piece.colour for piece in pieces]
+    }
+    for number, piece in enumerate(pieces):
+        vertices, normals, faces = _simplified(piece.mesh).with_normals()
+        arrays[f"vertices {number}"] = vertices
+        arrays[f"faces {number}"] = faces
+        arrays[f"normals {number}"] = normals
+    return arrays
 
 
 def _pieces(path: Path, scale: Sequence[float]) -> list[PaintedMesh]:
@@ -144,7 +152,7 @@ def _colour(geometry: Any, path: Path) -> int | None:
 
 
 def _simplified(mesh: Mesh) -> Mesh:
-    """Fewer triangles within `TOLERANCE`, with normals; open edges stay as they are."""
+    """Fewer triangles within `TOLERANCE`; open edges stay as they are."""
     import fast_simplification
 
     welded = mesh.welded()
@@ -157,31 +165,4 @@ def _simplified(mesh: Mesh) -> Mesh:
         lossless=True,
         preserve_border=True,
     )
-    corners, normals, faces = Mesh(vertices * unit, faces.astype(np.int64)).with_normals()
-    return Mesh(corners, faces, normals)
-
-
-def _load(path: Path) -> tuple[PaintedMesh, ...] | None:
-    """Look up triangles; None if there are none or they cannot be used."""
-    try:
-        archive = load_archive(path, *ARCHIVE, InvalidInputError)
-        return tuple(
-            PaintedMesh(Mesh(*(archive.arrays[f"{name} {number}"] for name in ARRAYS)), colour)
-            for number, colour in enumerate(archive.header["colours"])
-        )
-    except (InvalidInputError, KeyError):
-        return None
-
-
-def _save(path: Path, pieces: Sequence[PaintedMesh]) -> None:
-    """Keep triangles, if possible, and make room for them."""
-    arrays = {
-        f"{name} {number}": getattr(piece.mesh, name)
-        for number, piece in enumerate(pieces)
-        for name in ARRAYS
-    }
-    with suppress(OutputError):
-        check_folder(path.parent)
-        header = {"colours": [piece.colour for piece in pieces]}
-        save_archive(path, *ARCHIVE, arrays, header)
-        delete_least_recently_used(path.parent, "mesh", KEPT_FILES, KEPT_BYTES)
+    return Mesh(vertices * unit, faces.astype(np.int64))

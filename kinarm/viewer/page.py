@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from itertools import zip_longest
 from pathlib import Path
 
-from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError
 from kinarm.recording import Recording
 from kinarm.viewer.html_page import HtmlPage
@@ -18,7 +17,7 @@ class ReplayPage(HtmlPage):
     @classmethod
     def of(cls, recordings: Sequence[Recording], ghosts: Sequence[Recording]) -> "ReplayPage":
         """Make a page of recordings that can share one."""
-        arm = Arm.load(recordings[0].problem.arm)
+        arm = recordings[0].problem.load_arm()
         trials = [
             [run for run in runs if run is not None] for runs in zip_longest(recordings, ghosts)
         ]

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._validation import finite_array
-from kinarm.arm import Arm
 from kinarm.collision import Contact
 from kinarm.errors import UnknownNameError
 from kinarm.problem import ProblemLike, ReachProblem
@@ -82,7 +81,7 @@ class Renderer:
         self.problem = ReachProblem.load(problem)
         self.width, self.height = picture_size(width, height)
         self.camera = Camera.of_replays(self.problem) if camera is None else Camera.checked(camera)
-        self._scene = TriangleScene(self.problem, Arm.load(self.problem.arm))
+        self._scene = TriangleScene(self.problem, self.problem.load_arm())
         self._projection = self.camera.projection(self.width, self.height)
         self._eye = self._make_eye()
         self._backdrop = self._make_backdrop()

@@ -31,7 +31,7 @@ def visual_parts(arm: Arm) -> Iterator[ArmPart]:
     ArmError
         If a shape cannot be read.
     """
-    robot = ElementTree.parse(arm.urdf_path).getroot()
+    robot = ElementTree.fromstring(arm.description.text)
     named: dict[str, int | None] = {}
     for defined in robot.iter("material"):
         name, colour = str(defined.get("name")), _stated_colour(defined)
@@ -59,10 +59,9 @@ def _shapes(visual: Element, arm: Arm) -> tuple[PaintedMesh, ...]:
     geometry = visual.find("geometry")
     shape = None if geometry is None else next(iter(geometry), None)
     if shape is None:
-        raise ArmError(f"{arm.urdf_path.name} has a visual shape without geometry")
+        raise ArmError(f"{arm.description.path.name} has a visual shape without geometry")
     if shape.tag == "mesh":
-        path = _mesh_path(str(shape.get("filename")), arm)
-        return read_mesh_file(path, _numbers(shape, "scale", (1, 1, 1)))
+        return read_mesh_file(Path(shape.get("filename", "")), _numbers(shape, "scale", (1, 1, 1)))
     if shape.tag == "box":
         mesh = box(_numbers(shape, "size", (0, 0, 0)))
     elif shape.tag == "sphere":
@@ -71,18 +70,10 @@ def _shapes(visual: Element, arm: Arm) -> tuple[PaintedMesh, ...]:
         (length,), (radius,) = (_numbers(shape, name, (0,)) for name in ("length", "radius"))
         mesh = capsule(length, radius) if shape.tag == "capsule" else cylinder(length, radius, 0.0)
     else:
-        raise ArmError(f"{arm.urdf_path.name} has a visual shape <{shape.tag}>: not supported")
+        raise ArmError(
+            f"{arm.description.path.name} has a visual shape <{shape.tag}>: not supported"
+        )
     return (PaintedMesh(mesh, None),)
-
-
-def _mesh_path(name: str, arm: Arm) -> Path:
-    """File that a mesh's name in a URDF refers to."""
-    for scheme in ("package://", "model://"):
-        if name.startswith(scheme):
-            folders = [Path(folder) for folder in arm.specification.package_dirs]
-            found = (folder / name.removeprefix(scheme) for folder in folders)
-            return next((path for path in found if path.is_file()), Path(name))
-    return arm.urdf_path.parent / name.removeprefix("file://")
 
 
 def _origin(visual: Element) -> pin.SE3:

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, MissingExtraError
 from kinarm.observation import observation_size
 from kinarm.policies.conversion.pieces import Clip, Piece, chained
@@ -28,7 +27,7 @@ def policy_from_torch(
     **origin: Any,
 ) -> Policy:
     """Convert a module; see `Policy.from_torch`. The origin is that of `Provenance`."""
-    arm = Arm.load(problem.arm)
+    arm = problem.load_arm()
     n_observations, n_actions = observation_size(arm.n_joints), arm.n_actuated
     layers, activations = chained(module_pieces(module), n_observations)
     if len(layers[-1].bias) != n_actions:

@@ -54,8 +54,8 @@ def along(a: Vector, b: Vector, share: float) -> Vector:
 
 
 @inlined
-def deepest_point(a: Vector, b: Vector, lower: Vector, upper: Vector) -> Vector:
-    """Point of the segment ab that is deepest in a box, or closest to it: the best of a few."""
+def deepest_share(a: Vector, b: Vector, lower: Vector, upper: Vector) -> float:
+    """Where on the segment ab it is deepest in a box, or closest to it: the best of a few."""
     share = closest_to_box(a, b, lower, upper)
     x, y, z = excess_over_box(along(a, b, share), lower, upper)
     least = distance_from_box(x, y, z)
@@ -64,7 +64,13 @@ def deepest_point(a: Vector, b: Vector, lower: Vector, upper: Vector) -> Vector:
         distance = distance_from_box(x, y, z)
         share = select(distance < least, k / (TRIED - 1), share)
         least = min(distance, least)
-    return along(a, b, share)
+    return share
+
+
+@inlined
+def turned(x: float, y: float, cosine: float, sine: float) -> tuple[float, float]:
+    """Coordinates along axes that are turned about z."""
+    return cosine * x + sine * y, cosine * y - sine * x
 
 
 @inlined
@@ -99,6 +105,7 @@ def overlaps(
     """
     prismatic, axes = chain.prismatic, chain.axis
     link, capsules, boxes, pairs, travel, exact = shapes[:6]
+    turns = shapes.turns
     n = half.shape[0]
     place_capsules(shapes, poses, ends)
     proven: bool = wanted & (half[0] < 0.0)
@@ -130,25 +137,34 @@ def overlaps(
         lower, upper = (-np.inf, -np.inf, -np.inf), (np.inf, np.inf, 0.0)
         first = a[2] < b[2]
         point = select(first, a[0], b[0]), select(first, a[1], b[1]), select(first, a[2], b[2])
+        cosine, sine = 1.0, 0.0
         if kind == WITH_BOX:
+            # All of it along the edges of the box.
+            cosine, sine = turns[j, 0], turns[j, 1]
+            ax, ay = turned(a[0], a[1], cosine, sine)
+            bx, by = turned(b[0], b[1], cosine, sine)
+            edge_a, edge_b = (ax, ay, a[2]), (bx, by, b[2])
             lower = (boxes[j, 0, 0], boxes[j, 0, 1], boxes[j, 0, 2])
             upper = (boxes[j, 1, 0], boxes[j, 1, 1], boxes[j, 1, 2])
-            x, y, z = excess_over_box(middle, lower, upper)
+            x, y, z = excess_over_box(along(edge_a, edge_b, 0.5), lower, upper)
             apart = distance_from_box(x, y, z) >= radius + ends[i, 6]
             if not any_lane(wanted & ~proven & ~apart):
                 continue
-            point = deepest_point(a, b, lower, upper)
-        x, y, z = excess_over_box(point, lower, upper)
+            share_of_segment = deepest_share(edge_a, edge_b, lower, upper)
+            point = along(a, b, share_of_segment)
+        px, py = turned(point[0], point[1], cosine, sine)
+        x, y, z = excess_over_box((px, py, point[2]), lower, upper)
         if not any_lane(wanted & ~proven & (distance_from_box(x, y, z) < radius)):
             continue
-        # The point's motion along each world axis to first order, by its Jacobian: an arm that
+        # The point's motion along each edge to first order, by its Jacobian: an arm that
         # slides along an obstacle does not leave it, however far it goes.
         point_jacobian(prismatic, axes, poses, point, jacobian)
         remainder = 0.0 * half[0]
         for axis in range(min(n, link[i])):
             width = share * half[axis]
-            x += width * abs(jacobian[0, axis])
-            y += width * abs(jacobian[1, axis])
+            jx, jy = turned(jacobian[0, axis], jacobian[1, axis], cosine, sine)
+            x += width * abs(jx)
+            y += width * abs(jy)
             z += width * abs(jacobian[2, axis])
             # The rest is of second order: a revolute joint turns its own motion, and that of every
             # later joint, by its angle. A pair of joints counts once, a joint with itself by half.

@@ -1,0 +1,99 @@
+"""Pinocchio's model of an arm, and its collision shapes, from a URDF reduced to a chain."""
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from kinarm._files import first_line
+from kinarm._validation import finite_array
+from kinarm.errors import ArmError
+from kinarm.hulls import hull_of_mesh
+from kinarm.urdf import Description
+
+
+def build_model(description: Description) -> pin.Model:
+    """Build the kinematics.
+
+    Raises
+    ------
+    ArmError
+        If Pinocchio cannot read the description, or a joint has no usable limits.
+    """
+    name = description.path.name
+    try:
+        model = pin.buildModelFromXML(description.text)
+    except (ValueError, RuntimeError) as error:
+        raise ArmError(f"{name} is not a readable URDF: {first_line(error)}") from error
+    if model.njoints < 2:
+        raise ArmError(f"{name} has no moving joint")
+    for index, joint in enumerate(list(model.names)[1:]):
+        lower, upper = model.lowerPositionLimit[index], model.upperPositionLimit[index]
+        if not (np.isfinite(lower) and np.isfinite(upper) and lower < upper) or upper > 1e10:
+            raise ArmError(f"joint {joint!r} of {name} has no usable limits: {lower}..{upper}")
+    return model
+
+
+def limit_velocities(
+    model: pin.Model, given: tuple[float, ...] | None, description: Description
+) -> None:
+    """Set the velocity limits that are given, or check those of the URDF.
+
+    Raises
+    ------
+    ArmError
+        If one is missing or not above zero.
+    """
+    name = description.path.name
+    if given is not None:
+        limits = finite_array("velocity_limits", given, (model.nv,))
+        if (limits <= 0).any():
+            raise ArmError(f"velocity_limits of {name} must be greater than 0, got {list(given)}")
+        model.velocityLimit = limits
+    for joint, speed in zip(list(model.names)[1:], model.velocityLimit, strict=True):
+        if not (np.isfinite(speed) and 0 < speed < 1e10):
+            raise ArmError(f"joint {joint!r} of {name} has no velocity limit: velocity={speed}")
+
+
+def build_shapes(description: Description, model: pin.Model) -> pin.GeometryModel:
+    """Load the collision shapes; meshes become convex hulls.
+
+    Raises
+    ------
+    ArmError
+        If a shape cannot be loaded.
+    """
+    name, robot = description.path.name, ElementTree.fromstring(description.text)
+    hulls, declared = {}, 0
+    for link in robot.findall("link"):
+        for number, shape in enumerate(link.findall("collision/geometry")):
+            declared += 1
+            mesh = shape.find("mesh")
+            if mesh is not None:
+                hulls[f"{link.get('name')}_{number}"] = _hull(mesh)
+                shape.remove(mesh)
+                ElementTree.SubElement(shape, "sphere", radius="1")
+    text = ElementTree.tostring(robot, encoding="unicode")
+    try:
+        geometry = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
+    except (ValueError, RuntimeError) as error:
+        raise ArmError(
+            f"collision shapes of {name} cannot be loaded: {first_line(error)}"
+        ) from error
+    if geometry.ngeoms != declared:
+        raise ArmError(
+            f"{name} declares {declared} collision shapes but {geometry.ngeoms} were read"
+        )
+    for shape in geometry.geometryObjects:
+        if shape.name in hulls:
+            shape.geometry = hulls[shape.name]
+        shape.geometry.computeLocalAABB()
+    return geometry
+
+
+def _hull(mesh: ElementTree.Element) -> coal.ConvexBase:
+    """Hull of a mesh of a description."""
+    scale = np.array([float(factor) for factor in mesh.get("scale", "1 1 1").split()])
+    return hull_of_mesh(Path(mesh.get("filename", "")), finite_array("scale", scale, (3,)))
