@@ -13,8 +13,12 @@ from kinarm.collision import ContactModel
 from kinarm.errors import ArmError
 from kinarm.scene import Scene
 from kinarm.viewer.arm_data import arm_data
+from kinarm.viewer.camera import stage_scale
 from kinarm.viewer.html_page import HtmlPage
 from kinarm.viewer.scene_commands import arm_commands
+
+NEARER = 0.8
+"""Distance of the camera, as a share of that in replays, which show more than the arm."""
 
 BARE_GROUND = Scene(obstacles=(), goal_regions=())
 
@@ -30,7 +34,12 @@ class ArmPage(HtmlPage):
             "arm_page",
             f"{arm.name} · kinarm arm",
             arm_commands(model, scene),
-            {**arm_data(arm), **_motion_data(arm), **_contact_data(model)},
+            {
+                **arm_data(arm, scene),
+                **_motion_data(arm),
+                **_contact_data(model),
+                "scale": NEARER * stage_scale(arm, scene),
+            },
             ("contact", "arm_page"),
         )
 
