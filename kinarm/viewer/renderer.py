@@ -179,7 +179,8 @@ class Renderer:
         """The halo within which the goal counts as reached, and a flash at a contact."""
         balls = [(goal, self.problem.task.tolerance, CUBE.colour, HALO_OPACITY, False)]
         if contact is not None:
-            flash = (contact.point, FLASH_SWELL * FLASH_RADIUS, OUTCOME_COLOURS["collision"])
+            size = self._scene.scale * FLASH_SWELL * FLASH_RADIUS
+            flash = (contact.point, size, OUTCOME_COLOURS["collision"])
             balls.append((*flash, FLASH_OPACITY, True))
         centres, radii, colours, opacities, on_top = zip(*balls, strict=True)
         encoded = [lighting.channels(colour) for colour in colours]
