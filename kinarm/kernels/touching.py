@@ -11,7 +11,7 @@ from kinarm.chain import Chain
 from kinarm.contact_shapes import BETWEEN_CAPSULES, GROUND, PLANE, WITH_GROUND, ContactShapes
 from kinarm.kernels.block import Alone, Block
 from kinarm.kernels.compiling import Array, helper, inlined
-from kinarm.kernels.distance import between_segments, closest_to_box
+from kinarm.kernels.distance import between_segments, closest_to_box, turned_back
 from kinarm.kernels.kinematics import to_world
 from kinarm.kernels.lanes import as_numbers
 from kinarm.kernels.planes import FINE, height_above
@@ -44,6 +44,8 @@ def overlap(shapes: ContactShapes, pair: int, poses: Array) -> float:
     else:
         low, high = shapes.boxes[second, 0], shapes.boxes[second, 1]
         lower, upper = (low[0], low[1], low[2]), (high[0], high[1], high[2])
+        cosine, sine = shapes.turns[second, 0], shapes.turns[second, 1]
+        a, b = turned_back(a, cosine, sine), turned_back(b, cosine, sine)
         t = closest_to_box(a, b, lower, upper)
         x, y, z = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
         x -= min(max(x, lower[0]), upper[0])

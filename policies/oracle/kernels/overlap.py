@@ -13,7 +13,7 @@ import numpy as np
 from kinarm.chain import Chain
 from kinarm.contact_shapes import BETWEEN_CAPSULES, WITH_BOX, ContactShapes
 from kinarm.kernels.compiling import Array, Vector, helper, inlined
-from kinarm.kernels.distance import between_segments, closest_to_box
+from kinarm.kernels.distance import between_segments, closest_to_box, turned_back
 from kinarm.kernels.kinematics import point_jacobian, to_world
 from kinarm.kernels.lanes import any_lane, select
 from kinarm.kernels.proof import MARGIN
@@ -65,12 +65,6 @@ def deepest_share(a: Vector, b: Vector, lower: Vector, upper: Vector) -> float:
         share = select(distance < least, k / (TRIED - 1), share)
         least = min(distance, least)
     return share
-
-
-@inlined
-def turned(x: float, y: float, cosine: float, sine: float) -> tuple[float, float]:
-    """Coordinates along axes that are turned about z."""
-    return cosine * x + sine * y, cosine * y - sine * x
 
 
 @inlined
@@ -141,19 +135,15 @@ def overlaps(
         if kind == WITH_BOX:
             # All of it along the edges of the box.
             cosine, sine = turns[j, 0], turns[j, 1]
-            ax, ay = turned(a[0], a[1], cosine, sine)
-            bx, by = turned(b[0], b[1], cosine, sine)
-            edge_a, edge_b = (ax, ay, a[2]), (bx, by, b[2])
+            c, d = turned_back(a, cosine, sine), turned_back(b, cosine, sine)
             lower = (boxes[j, 0, 0], boxes[j, 0, 1], boxes[j, 0, 2])
             upper = (boxes[j, 1, 0], boxes[j, 1, 1], boxes[j, 1, 2])
-            x, y, z = excess_over_box(along(edge_a, edge_b, 0.5), lower, upper)
+            x, y, z = excess_over_box(along(c, d, 0.5), lower, upper)
             apart = distance_from_box(x, y, z) >= radius + ends[i, 6]
             if not any_lane(wanted & ~proven & ~apart):
                 continue
-            share_of_segment = deepest_share(edge_a, edge_b, lower, upper)
-            point = along(a, b, share_of_segment)
-        px, py = turned(point[0], point[1], cosine, sine)
-        x, y, z = excess_over_box((px, py, point[2]), lower, upper)
+            point = along(a, b, deepest_share(c, d, lower, upper))
+        x, y, z = excess_over_box(turned_back(point, cosine, sine), lower, upper)
         if not any_lane(wanted & ~proven & (distance_from_box(x, y, z) < radius)):
             continue
         # The point's motion along each edge to first order, by its Jacobian: an arm that
@@ -162,10 +152,11 @@ def overlaps(
         remainder = 0.0 * half[0]
         for axis in range(min(n, link[i])):
             width = share * half[axis]
-            jx, jy = turned(jacobian[0, axis], jacobian[1, axis], cosine, sine)
-            x += width * abs(jx)
-            y += width * abs(jy)
-            z += width * abs(jacobian[2, axis])
+            speed = (jacobian[0, axis], jacobian[1, axis], jacobian[2, axis])
+            speed = turned_back(speed, cosine, sine)
+            x += width * abs(speed[0])
+            y += width * abs(speed[1])
+            z += width * abs(speed[2])
             # The rest is of second order: a revolute joint turns its own motion, and that of every
             # later joint, by its angle. A pair of joints counts once, a joint with itself by half.
             if not prismatic[axis]:
