@@ -1,22 +1,20 @@
 """How an arm looks: as an industrial one where that fits, else by its own shapes."""
 
+import logging
 from functools import lru_cache
 
 import coal
 import pinocchio as pin
 
 from kinarm.arm import Arm
+from kinarm.errors import KinarmError
 from kinarm.viewer import industrial_arm
 from kinarm.viewer.meshes import from_coal
-from kinarm.viewer.parts import ACCENT, GRAPHITE, PAINT, ArmPart, Finish
-
-MOST_TRIANGLES = 60_000
-"""Above this, visual meshes make way for the hulls that decide contact."""
-
-PLAIN = (GRAPHITE, PAINT)
-"""Finishes of links by turns, where a robot states no colours."""
+from kinarm.viewer.parts import ACCENT, PLAIN, ArmPart
+from kinarm.viewer.visual_shapes import visual_parts
 
 TOOL_RADIUS = 0.012
+"""Of the ball at the tool point; a share of the arm's reach if that is less than 1 m [m]."""
 
 
 @lru_cache(maxsize=8)
@@ -24,41 +22,28 @@ def arm_parts(arm: Arm) -> tuple[ArmPart, ...]:
     """All parts of an arm.
 
     One with the geometry of the shipped ones looks like an industrial arm; any other shows the
-    visual shapes of its URDF, or where there are none that can be read, its collision shapes.
+    visual shapes of its URDF, or where there are none that can be read, its collision shapes. Why
+    they cannot is logged as a warning, in one line.
     """
     if industrial_arm.fits(arm):
         return tuple(industrial_arm.parts(arm))
-    geometry = _visual_shapes(arm)
-    found = [] if geometry is None else _painted_parts(geometry)
-    if not found or sum(len(part.mesh.faces) for part in found) > MOST_TRIANGLES:
-        found = _plain_parts(arm.geometry)
-    tool = from_coal(coal.Sphere(TOOL_RADIUS)).moved(arm.chain.tool)
-    return (*found, ArmPart(arm.n_joints, ACCENT, tool))
-
-
-def _visual_shapes(arm: Arm) -> pin.GeometryModel | None:
-    """Visual shapes of an arm's URDF; None if they cannot be read."""
     try:
-        return pin.buildGeomFromUrdf(arm.model, str(arm.urdf_path), pin.GeometryType.VISUAL)
-    except (ValueError, RuntimeError):
-        return None
+        found = tuple(visual_parts(arm))
+    except KinarmError as error:
+        logging.getLogger(__name__).warning(
+            "%s is shown by its collision shapes: %s", arm.name, error
+        )
+        found = ()
+    tool = from_coal(coal.Sphere(TOOL_RADIUS * min(arm.reach, 1.0))).moved(arm.chain.tool)
+    return (*(found or collision_parts(arm)), ArmPart(arm.n_joints, ACCENT, tool))
 
 
-def _painted_parts(geometry: pin.GeometryModel) -> list[ArmPart]:
-    """Parts in the colours of their shapes."""
-    parts = []
-    for shape in geometry.geometryObjects:
-        red, green, blue = (round(255 * float(value)) for value in shape.meshColor[:3])
-        finish = Finish(red << 16 | green << 8 | blue, roughness=0.45, metalness=0.1)
-        parts.append(_shape_part(shape, finish))
-    return parts
+def collision_parts(arm: Arm) -> tuple[ArmPart, ...]:
+    """The shapes that decide about contact, in colours of our own."""
+    return tuple(_shape_part(shape) for shape in arm.geometry.geometryObjects)
 
 
-def _plain_parts(geometry: pin.GeometryModel) -> list[ArmPart]:
-    """Parts in colours of our own."""
-    return [_shape_part(shape, PLAIN[shape.parentJoint % 2]) for shape in geometry.geometryObjects]
-
-
-def _shape_part(shape: pin.GeometryObject, finish: Finish) -> ArmPart:
-    placement, mesh = shape.placement, from_coal(shape.geometry)
-    return ArmPart(shape.parentJoint, finish, mesh.moved(placement.translation, placement.rotation))
+def _shape_part(shape: pin.GeometryObject) -> ArmPart:
+    finish, placement = PLAIN[shape.parentJoint % len(PLAIN)], shape.placement
+    mesh = from_coal(shape.geometry).moved(placement.translation, placement.rotation)
+    return ArmPart(shape.parentJoint, finish, mesh)

@@ -33,6 +33,7 @@ GOAL_SLAB = Finish(0xCBD2DA, roughness=0.7)
 CUBE = Finish(0x009E73, roughness=0.5)
 HALO = Finish(0x009E73, opacity=0.16, glow=True)
 FLASH = Finish(OUTCOME_COLOURS["collision"], opacity=0.5, glow=True)
+SHAPE = Finish(0x56B4E9, roughness=0.6, opacity=0.34)
 GRID_COLOUR = 0xC6CCD3
 BACKGROUND = [0.93, 0.945, 0.96]
 
@@ -55,11 +56,29 @@ class _BufferGeometry(Geometry):
             "attributes": {name: _typed_array(array, 3) for name, array in attributes.items()}
         }
         if faces is not None:
-            self.data["index"] = _typed_array(faces.astype(np.uint32), 1)
+            few = faces.max(initial=0) < 2**16
+            self.data["index"] = _typed_array(faces.astype(np.uint16 if few else np.uint32), 1)
 
     def lower(self, _: dict[str, object]) -> dict[str, object]:
         """Describe it to three.js."""
         return {"uuid": self.uuid, "type": "BufferGeometry", "data": self.data}
+
+
+class _QuantisedGeometry(_BufferGeometry):
+    """A mesh whose corners lie on a grid of 65535 steps along its longest side."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        vertices, normals, faces = mesh.with_normals()
+        low, high = vertices.min(axis=0), vertices.max(axis=0)
+        self._middle, self._step = (low + high) / 2, max((high - low).max(), 1e-9) / 65534
+        position = np.round((vertices - self._middle) / self._step).astype(np.int16)
+        super().__init__(faces, position=position, normal=np.round(127 * normals).astype(np.int8))
+
+    def intrinsic_transform(self) -> NDArray[np.float64]:
+        """Grid to frame, shape (4, 4), transposed: three.js reads it column by column."""
+        transform = np.diag([self._step, self._step, self._step, 1.0])
+        transform[3, :3] = self._middle
+        return transform
 
 
 class _FinishMaterial(Material):
@@ -103,7 +122,9 @@ class _Sun(Object):
 
 BUFFER_TYPES = {
     "float32": ("Float32Array", 0x17),
+    "int16": ("Int16Array", 0x13),
     "int8": ("Int8Array", 0x11),
+    "uint16": ("Uint16Array", 0x14),
     "uint32": ("Uint32Array", 0x16),
 }
 
@@ -116,10 +137,7 @@ def _typed_array(array: NDArray[np.generic], size: int) -> dict[str, object]:
 
 def put(window: Visualizer, finish: Finish, *meshes: Mesh) -> None:
     """Show meshes with one finish."""
-    vertices, normals, faces = Mesh.joined(meshes).with_normals()
-    position, normal = vertices.astype(np.float32), np.round(127 * normals).astype(np.int8)
-    geometry = _BufferGeometry(faces, position=position, normal=normal)
-    window.set_object(DrawnMesh(geometry, _FinishMaterial(finish)))
+    window.set_object(DrawnMesh(_QuantisedGeometry(Mesh.joined(meshes)), _FinishMaterial(finish)))
 
 
 def draw_surroundings(window: Visualizer, scene: Scene) -> None:

@@ -8,6 +8,7 @@ collision shapes.
 from collections.abc import Iterator
 
 import numpy as np
+import pinocchio as pin
 
 from kinarm.arm import Arm
 from kinarm.viewer.meshes import Mesh, box, capsule, cylinder, housing, lathe, loft
@@ -50,10 +51,12 @@ def fits(arm: Arm) -> bool:
     if chain.n_joints != 6 or chain.prismatic.any() or not np.allclose(chain.axis, AXES):
         return False
     upper, forearm = chain.translation[2][2], chain.translation[3][0]
-    expected = [(0, 0, 0.33), (0.075, 0, 0), (0, 0, upper), (forearm, 0, 0.075)]
+    first = _base_placement(arm) * pin.SE3(np.eye(3), np.array([0, 0, 0.33]))
+    expected = [(0.075, 0, 0), (0, 0, upper), (forearm, 0, 0.075), (0, 0, 0), (0.08, 0, 0)]
     return (
-        np.allclose(chain.translation, [*expected, (0, 0, 0), (0.08, 0, 0)])
-        and np.allclose(chain.rotation, [1, 0, 0, 0])
+        arm.model.jointPlacements[1].isApprox(first, 1e-6)
+        and np.allclose(chain.translation[1:], expected)
+        and np.allclose(chain.rotation[1:], [1, 0, 0, 0])
         and np.allclose(chain.tool[1:], 0)
         and 0.2 <= upper <= 0.6
         and 0.25 <= forearm <= 0.6
@@ -61,10 +64,16 @@ def fits(arm: Arm) -> bool:
     )
 
 
+def _base_placement(arm: Arm) -> pin.SE3:
+    """Where the link stands that is fixed in the world."""
+    return arm.model.frames[1].placement
+
+
 def parts(arm: Arm) -> Iterator[ArmPart]:
     """All parts of an arm that `fits`."""
-    chain = arm.chain
-    yield from _base()
+    chain, base = arm.chain, _base_placement(arm)
+    for part in _base():
+        yield part._replace(mesh=part.mesh.moved(base.translation, base.rotation))
     yield from _shoulder()
     yield from _upper_arm(float(chain.translation[2][2]))
     yield from _elbow()

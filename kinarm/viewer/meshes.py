@@ -28,25 +28,40 @@ class Mesh:
         Corners [m].
     faces : ndarray of int, shape (m, 3)
         Indices of corners, anticlockwise seen from outside.
+    normals : ndarray, shape (n, 3), optional
+        Unit normals at the corners; `with_normals` finds them if they are not given.
     """
 
     vertices: Array
     faces: NDArray[np.int64]
+    normals: Array | None = None
 
     def moved(self, translation: ArrayLike = (0, 0, 0), rotation: ArrayLike | None = None) -> Mesh:
         """Rotate by a matrix, then translate [m]."""
-        turned = self.vertices if rotation is None else self.vertices @ np.asarray(rotation).T
-        return Mesh(turned + np.asarray(translation, dtype=float), self.faces)
+        vertices, normals = self.vertices, self.normals
+        if rotation is not None:
+            turn = np.asarray(rotation).T
+            vertices, normals = vertices @ turn, None if normals is None else normals @ turn
+        return Mesh(vertices + np.asarray(translation, dtype=float), self.faces, normals)
 
     @classmethod
     def joined(cls, meshes: Sequence[Mesh]) -> Mesh:
-        """Put meshes into one."""
-        offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
-        faces = [mesh.faces + offset for mesh, offset in zip(meshes, offsets, strict=True)]
-        return cls(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+        """Put meshes into one; each of them has normals of its own."""
+        vertices, normals, faces = zip(*(mesh.with_normals() for mesh in meshes), strict=True)
+        offsets = np.cumsum([0, *(len(each) for each in vertices[:-1])])
+        joined = [each + offset for each, offset in zip(faces, offsets, strict=True)]
+        return cls(np.concatenate(vertices), np.concatenate(joined), np.concatenate(normals))
+
+    def welded(self) -> Mesh:
+        """Join corners that are less than 1e-6 m apart, and drop faces that have no area then."""
+        places, welded = np.unique(np.round(self.vertices, 6), axis=0, return_inverse=True)
+        faces = welded.reshape(-1)[self.faces]
+        return Mesh(places, faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)])
 
     def with_normals(self) -> tuple[Array, Array, NDArray[np.int64]]:
         """Vertices, normals, faces: split where faces meet at an edge, each corner has a normal."""
+        if self.normals is not None:
+            return self.vertices, self.normals, self.faces
         places, welded = np.unique(np.round(self.vertices, 6), axis=0, return_inverse=True)
         corners = welded.reshape(-1)[self.faces]
         a, b, c = (places[corners[:, k]] for k in range(3))

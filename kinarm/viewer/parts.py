@@ -49,3 +49,6 @@ PAINT = Finish(0xF2B21B, roughness=0.36, metalness=0.05)
 GRAPHITE = Finish(0x2E3238, roughness=0.5, metalness=0.25)
 STEEL = Finish(0xC3C9D0, roughness=0.28, metalness=0.75)
 ACCENT = Finish(0xE8EBEE, roughness=0.3, metalness=0.1)
+
+PLAIN = (GRAPHITE, PAINT)
+"""Finishes of links by turns, where a robot states no colours."""

@@ -1,6 +1,5 @@
 "use strict";
 
-const element = (id) => document.getElementById(id);
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2];
 const HOLD = 1.4; // seconds between the end of a trial and the next one
 const BADGES = {
@@ -9,52 +8,7 @@ const BADGES = {
   truncated: ["Out of time", "M12 6v6.5l4 2.5M12 3a9 9 0 1 0 .01 0"],
 };
 
-/* ---------- data ---------- */
-
-async function inflated(id) {
-  const packed = Uint8Array.from(atob(element(id).textContent), (letter) => letter.charCodeAt(0));
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
-}
-
-async function startViewer() {
-  const script = document.createElement("script");
-  script.textContent = new TextDecoder().decode(await inflated("data-viewer"));
-  document.head.append(script);
-  const viewer = new MeshCat.Viewer(element("stage"));
-  const bytes = await inflated("data-scene");
-  const view = new DataView(bytes.buffer);
-  for (let at = 0; at < bytes.length; ) {
-    const length = view.getUint32(at, true);
-    viewer.handle_command_bytearray(bytes.subarray(at + 4, at + 4 + length));
-    at += 4 + length;
-  }
-  return viewer;
-}
-
 /* ---------- the panels: card, plot and controls ---------- */
-
-function make(tag, attributes = {}, text = "") {
-  const svg = ["path", "line", "svg"].includes(tag);
-  const node = svg ? document.createElementNS("http://www.w3.org/2000/svg", tag) : document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) {
-    node.setAttribute(name, value);
-  }
-  node.append(text);
-  return node;
-}
-
-function badge(outcome) {
-  const [words, shape] = BADGES[outcome];
-  const node = make("span", { class: `badge ${outcome}` });
-  const icon = make("svg", { viewBox: "0 0 24 24", "aria-hidden": "true" });
-  icon.append(make("path", { d: shape }));
-  node.append(icon, words);
-  return node;
-}
-
-const metres = (value) => `${value.toFixed(3)} m`;
-const count = (number, noun) => `${number} ${noun}${number === 1 ? "" : "s"}`;
 
 /** How a run ended, in words. */
 function verdict(run, trial) {
@@ -71,16 +25,16 @@ function verdict(run, trial) {
   return `${count(steps, "step")}${trial.floor ? ratio : ""}`;
 }
 
-function fillCard(trial) {
+function fillCard(trial, swatch) {
   element("eyebrow").textContent = `Problem ${trial.problem} · trial ${trial.trial}`;
   element("runs").replaceChildren(...trial.runs.map((run, k) => {
     const row = make("li");
     const name = make("span", { class: "name" });
     if (trial.runs.length > 1) {
-      name.append(make("span", { class: "swatch", style: `background: ${k ? "#56b4e9" : "#f2b21b"}` }));
+      name.append(make("span", { class: "swatch", style: `background: ${k ? "#56b4e9" : swatch}` }));
     }
     name.append(run.policy);
-    row.append(name, badge(run.outcome), make("span", { class: "note" }, verdict(run, trial)));
+    row.append(name, badge(run.outcome, ...BADGES[run.outcome]), make("span", { class: "note" }, verdict(run, trial)));
     return row;
   }));
   element("floor-row").hidden = trial.floor === null;
@@ -139,7 +93,7 @@ class Player {
   select(index) {
     this.index = (index + this.data.trials.length) % this.data.trials.length;
     this.frames = Math.max(...this.trial.runs.map((run) => run.states.length - 1));
-    fillCard(this.trial);
+    fillCard(this.trial, this.data.swatch);
     this.stage.select(this.index);
     element("trial").value = this.index;
     element("frame").max = this.frames;
@@ -235,7 +189,7 @@ class Player {
     click("next", () => this.select(this.index + 1));
     click("view", () => this.stage.look(this.stage.side));
     click("theme", () => this.setTheme(this.theme === "dark" ? "light" : "dark"));
-    click("help", () => this.toggleKeys());
+    click("help", toggleKeys);
     element("frame").addEventListener("input", (event) => this.seek(Number(event.target.value)));
     element("speed").addEventListener("change", (event) => this.setSpeed(Number(event.target.value)));
     element("trial").addEventListener("change", (event) => this.select(Number(event.target.value)));
@@ -261,11 +215,6 @@ class Player {
     }
   }
 
-  toggleKeys() {
-    element("keys").hidden = !element("keys").hidden;
-    element("help").setAttribute("aria-expanded", String(!element("keys").hidden));
-  }
-
   press(event) {
     const tag = event.target.tagName;
     const own = { SELECT: () => true, INPUT: (key) => key !== " " && key.length > 1, BUTTON: (key) => key === " " || key === "Enter" };
@@ -285,7 +234,7 @@ class Player {
       ".": () => faster(1),
       r: () => this.stage.look(this.stage.side),
       t: () => this.setTheme(this.theme === "dark" ? "light" : "dark"),
-      "?": () => this.toggleKeys(),
+      "?": toggleKeys,
     };
     const action = actions[event.key.length > 1 ? event.key : event.key.toLowerCase()];
     if (action) {
@@ -303,31 +252,22 @@ class Player {
   }
 }
 
-async function main() {
-  const data = JSON.parse(new TextDecoder().decode(await inflated("data-trials")));
-  const viewer = await startViewer();
-  element("card").hidden = element("dock").hidden = false;
-  const stage = new Stage(viewer, data);
+function main(viewer, data) {
+  const stage = new ReplayStage(viewer, data);
   const player = new Player(stage, data);
-  viewer.set_3d_pane_size();
-  element("message").hidden = true;
   window.kinarm = {
     seek: (frame) => player.seek(frame),
     select: (index) => player.select(index),
     play: () => player.play(),
     pause: () => player.pause(),
     lookFrom: (eye, target) => stage.lookFrom(eye, target),
-    pose: (name, run) => stage.pose(name, run),
+    pose: (name, run) => stage.poseOf(name, run),
     census: () => stage.census(),
     get state() { return player.state; },
   };
-  document.body.dataset.ready = "";
   if (!player.calm) {
     player.play();
   }
 }
 
-main().catch((error) => {
-  element("message").textContent = `This browser cannot show the replay, which needs WebGL and gzip streams: ${error.message}`;
-  throw error;
-});
+start(main);

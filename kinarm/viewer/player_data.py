@@ -4,30 +4,15 @@ from collections.abc import Sequence
 from typing import Any
 
 from kinarm.arm import Arm
-from kinarm.collision import body_names
 from kinarm.recording import Recording
+from kinarm.viewer.arm_data import arm_data
 from kinarm.viewer.surroundings import OUTCOME_COLOURS, TRACE_SIDES
 
 
 def player_data(trials: Sequence[Sequence[Recording]], arm: Arm) -> dict[str, Any]:
     """Describe an arm and what it did in one or two recordings of each trial."""
-    chain = arm.chain
     return {
-        "arm": arm.name,
-        "axes": [
-            {
-                "translation": chain.translation[k].tolist(),
-                "rotation": chain.rotation[k].tolist(),
-                "axis": chain.axis[k].tolist(),
-                "slides": bool(chain.prismatic[k]),
-            }
-            for k in range(arm.n_joints)
-        ],
-        "tool": chain.tool.tolist(),
-        "links": {
-            name: shape.parentJoint
-            for name, shape in zip(body_names(arm), arm.geometry.geometryObjects, strict=True)
-        },
+        **arm_data(arm),
         "traceIndices": 6 * TRACE_SIDES,
         "colours": {name: f"#{colour:06x}" for name, colour in OUTCOME_COLOURS.items()},
         "trials": [_trial_data(runs) for runs in trials],

@@ -9,29 +9,54 @@ import numpy as np
 import umsgpack
 
 from kinarm.arm import Arm
+from kinarm.collision import ContactModel
 from kinarm.recording import Recording
-from kinarm.viewer.drawing import FLASH, draw_arm, draw_goal, draw_surroundings, draw_trace, put
+from kinarm.scene import Scene
+from kinarm.viewer.arm_shapes import collision_parts
+from kinarm.viewer.drawing import (
+    FLASH,
+    SHAPE,
+    draw_arm,
+    draw_goal,
+    draw_surroundings,
+    draw_trace,
+    put,
+)
 from kinarm.viewer.meshes import capsule
 from kinarm.viewer.surroundings import FLASH_RADIUS
 
 
-def scene_commands(trials: Sequence[Sequence[Recording]], arm: Arm) -> bytes:
+def replay_commands(trials: Sequence[Sequence[Recording]], arm: Arm) -> bytes:
     """Draw surroundings, goal, arm and the ways of the tool in each trial's recordings.
 
     Returns the commands as Meshcat's viewer decodes them, each led by its length.
     """
     capture = CapturingWindow()
-    window = meshcat.Visualizer(window=capture)
-    problem = trials[0][0].problem
-    draw_surroundings(window, problem.scene)
+    window, problem = meshcat.Visualizer(window=capture), trials[0][0].problem
+    _draw_stage(window, arm, problem.scene)
     draw_goal(window["goal"], problem)
-    put(window["flash"], FLASH, capsule(0.0, FLASH_RADIUS))
-    draw_arm(window["arm"], arm)
     for number, runs in enumerate(trials):
         for name, run in zip(("run", "ghost"), runs, strict=False):
             points = np.array([arm.tool_position(state) for state in run.states])
             draw_trace(window[f"trials/{number}/{name}"], points, run.outcome)
-    return b"".join(struct.pack("<I", len(each)) + each for each in capture.commands)
+    return capture.content
+
+
+def arm_commands(model: ContactModel, scene: Scene) -> bytes:
+    """Draw an arm in a scene, and the shapes that decide about contact; see `replay_commands`."""
+    capture = CapturingWindow()
+    window = meshcat.Visualizer(window=capture)
+    frames = _draw_stage(window, model.arm, scene)
+    for number, part in enumerate(collision_parts(model.arm)):
+        put(frames[part.joint][f"shape_{number}"], SHAPE, part.mesh)
+    return capture.content
+
+
+def _draw_stage(window: meshcat.Visualizer, arm: Arm, scene: Scene) -> list[meshcat.Visualizer]:
+    """Draw surroundings, the ball that marks a contact, and an arm; return the arm's frames."""
+    draw_surroundings(window, scene)
+    put(window["flash"], FLASH, capsule(0.0, FLASH_RADIUS))
+    return draw_arm(window["arm"], arm)
 
 
 class CapturingWindow:
@@ -44,6 +69,11 @@ class CapturingWindow:
     def send(self, command: Any) -> None:
         """Keep a command, with its random ids replaced by numbers."""
         self.commands.append(umsgpack.packb(self._renumbered(command.lower())))
+
+    @property
+    def content(self) -> bytes:
+        """All commands, each led by its length."""
+        return b"".join(struct.pack("<I", len(each)) + each for each in self.commands)
 
     def _renumbered(self, value: Any, key: str = "") -> Any:
         if isinstance(value, dict):

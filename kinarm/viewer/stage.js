@@ -4,8 +4,9 @@ const THEMES = {
   light: { back: 0xeef1f4, floor: 0xd3d9df, grid: 0xb4bdc7, obstacle: 0x8f9aa8, slab: 0xb3bdc8, ghost: 0x4d5a68, sky: 0.3, sun: 0.62 },
   dark: { back: 0x1a1f25, floor: 0x171c22, grid: 0x3c4753, obstacle: 0x3d4752, slab: 0x586573, ghost: 0xb4c1ce, sky: 0.22, sun: 0.6 },
 };
-const RIVAL = 0x56b4e9;
+const TOUCHED = 0x8c2f00;
 const BEHIND = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 8 }; // gives way to what coincides
+const IN_FRONT = { polygonOffset: true, polygonOffsetFactor: -1, polygonOffsetUnits: -4 };
 
 /* ---------- the arm: joint values to poses ---------- */
 
@@ -62,7 +63,7 @@ class ArmModel {
   }
 }
 
-/* ---------- the stage: everything that is drawn in three dimensions ---------- */
+/* ---------- the stage: an arm, what stands around it, light and camera ---------- */
 
 class Stage {
   constructor(viewer, data) {
@@ -78,15 +79,10 @@ class Stage {
     this.light();
     this.arm = new ArmModel(THREE, this.find("arm"), data);
     this.tint = this.finishes();
-    this.start = this.arm.ghost(data, 0x808890, 0.16);
-    this.refused = this.arm.ghost(data, data.colours.collision, 0.34);
-    this.rival = data.trials.some((trial) => trial.runs.length > 1) ? this.arm.ghost(data, RIVAL, 0.55) : null;
     this.flash = this.find("flash");
     this.mesh("flash").renderOrder = 9;
     this.mesh("flash").material.depthTest = false;
-    for (const name of ["goal", "flash"]) {
-      this.find(name).traverse((node) => { node.castShadow = node.castShadow && node.material && !node.material.transparent; });
-    }
+    this.mesh("flash").castShadow = false;
     this.find("floor").traverse((node) => { node.castShadow = false; });
     this.camera();
   }
@@ -128,19 +124,30 @@ class Stage {
       frame.children.filter((child) => child.name.startsWith("part_")).map((part) => part.children[0].material));
   }
 
+  /** Light up what some joints carry, of which something touches. */
+  glow(joints) {
+    this.tint.forEach((materials, joint) => {
+      for (const material of materials) {
+        material.emissive.set(joints.includes(joint) ? TOUCHED : 0x000000);
+      }
+    });
+  }
+
+  colour(value) {
+    return new this.THREE.Color(value).convertSRGBToLinear();
+  }
+
   theme(name) {
     const { viewer } = this;
     const look = THEMES[name];
-    const colour = (value) => new this.THREE.Color(value).convertSRGBToLinear();
     viewer.scene.fog = new this.THREE.Fog(look.back, 1, 2); // mixed in after the conversion to sRGB
     this.clear();
-    const paint = (value, node) => node.traverse((mesh) => mesh.material && mesh.material.color.copy(colour(value)));
+    const paint = (value, node) => node.traverse((mesh) => mesh.material && mesh.material.color.copy(this.colour(value)));
     paint(look.floor, this.find("floor"));
     paint(look.grid, this.find("grid"));
     for (const part of this.find("obstacles").children.flatMap((obstacle) => obstacle.children)) {
       paint(part.name === "top" ? look.slab : look.obstacle, part);
     }
-    this.start.material.color.copy(colour(look.ghost));
     this.sky.intensity = look.sky;
     this.mesh("sun").intensity = look.sun;
     viewer.set_dirty();
@@ -207,83 +214,8 @@ class Stage {
     viewer.set_dirty();
   }
 
-  select(index) {
-    const trial = this.data.trials[index];
-    this.trial = trial;
-    for (const group of this.find("trials").children) {
-      group.visible = group.name === String(index);
-    }
-    this.traces = trial.runs.map((run, k) => run.states.length > 1 && this.mesh("trials", String(index), k ? "ghost" : "run"));
-    if (this.traces[1]) {
-      Object.assign(this.traces[1].material, { transparent: true, opacity: 0.5 });
-    }
-    this.find("goal").position.fromArray(trial.goal);
-    this.find("goal", "halo").scale.setScalar(trial.tolerance / this.data.trials[0].tolerance);
-    this.start.show(trial.runs[0].states[0]);
-    if (this.rival) {
-      this.rival.root.visible = trial.runs.length > 1;
-    }
-    const side = trial.goal[1] < 0 ? -1 : 1;
-    if (!this.touched && side !== this.side) {
-      this.look(side);
-    }
-  }
-
-  /** Show a moment; between steps the joints move evenly, as they do in the simulator. */
-  show(time) {
-    const { trial } = this;
-    trial.runs.forEach((run, k) => {
-      const arm = k ? this.rival : this.arm;
-      const last = run.states.length - 1;
-      const at = Math.min(time, last);
-      const step = Math.min(Math.floor(at), Math.max(last - 1, 0));
-      const share = at - step;
-      const next = run.states[Math.min(step + 1, last)];
-      const exact = share === 0 ? run.states[step] : share === 1 ? next : null;
-      arm.show(exact || run.states[step].map((value, axis) => value + share * (next[axis] - value)));
-      if (this.traces[k]) {
-        this.traces[k].geometry.setDrawRange(0, Math.ceil(at) * this.data.traceIndices);
-        this.traces[k].visible = at > 0;
-      }
-    });
-    const main = trial.runs[0];
-    const ended = time >= main.states.length - 1;
-    this.start.root.visible = time > 0.5;
-    this.over(main, ended);
-    this.viewer.set_dirty();
-  }
-
-  /** What shows only at the end: the cube lights up, or what touched does. */
-  over(run, ended) {
-    const cube = this.mesh("goal", "cube").material;
-    cube.emissive.set(ended && run.outcome === "success" ? 0x0b6b50 : 0x000000);
-    const touched = ended && run.outcome === "collision";
-    this.flash.visible = touched && run.contactPoint !== null;
-    this.refused.root.visible = touched && run.refused !== null;
-    if (this.flash.visible) {
-      this.flash.position.fromArray(run.contactPoint);
-    }
-    if (this.refused.root.visible) {
-      this.refused.show(run.refused);
-    }
-    const joints = touched ? (run.contact || []).map((body) => this.data.links[body]) : [];
-    this.tint.forEach((materials, joint) => {
-      for (const material of materials) {
-        material.emissive.set(joints.includes(joint) ? 0x8c2f00 : 0x000000);
-      }
-    });
-  }
-
-  pulse(seconds) {
-    const swing = 0.5 - 0.5 * Math.cos(2 * Math.PI * 1.1 * seconds);
-    this.flash.scale.setScalar(1 + 1.1 * swing);
-    this.mesh("flash").material.opacity = 0.75 - 0.45 * swing;
-    this.viewer.set_dirty();
-  }
-
-  /** Pose of "base", "axis_1", ... or "tool" in the world, column by column. */
-  pose(name, run = 0) {
-    const arm = run ? this.rival : this.arm;
+  /** Pose of "base", "axis_1", ... or "tool" of an arm in the world, column by column. */
+  pose(name, arm = this.arm) {
     const node = name === "tool" ? arm.tool : name === "base" ? arm.root : arm.frames[Number(name.slice(5))];
     const { scene } = this.viewer;
     scene.updateMatrixWorld(true);

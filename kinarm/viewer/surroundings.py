@@ -43,20 +43,21 @@ def obstacle_meshes(obstacle: Obstacle, scene: Scene) -> ObstacleMeshes:
     """Shapes of an obstacle."""
     size, centre = obstacle.size, obstacle.centre
     if not any(_lies_on(region, obstacle, scene.cube_edge) for region in scene.goal_regions):
-        return ObstacleMeshes(box(size, 0.04 * size.min()).moved(centre), None)
+        plain = box(size, 0.04 * size.min())
+        return ObstacleMeshes(plain.moved(centre, obstacle.rotation), None)
     top = min(SLAB_THICKNESS, size[2] / 2)
     inset = np.minimum(0.03, 0.2 * size[:2])
     slab = box((*size[:2], top), 0.2 * top).moved((0, 0, (size[2] - top) / 2))
     body = box((*size[:2] - inset, size[2] - top)).moved((0, 0, -top / 2))
-    return ObstacleMeshes(body.moved(centre), slab.moved(centre))
+    return ObstacleMeshes(*(part.moved(centre, obstacle.rotation) for part in (body, slab)))
 
 
 def _lies_on(region: GoalRegion, obstacle: Obstacle, edge: float) -> bool:
     """Whether cubes with a given edge [m], centred in a region, lie on an obstacle."""
     gap = region.lower[2] - obstacle.upper[2]
-    above = all(
-        region.lower[k] < obstacle.upper[k] and obstacle.lower[k] < region.upper[k] for k in (0, 1)
-    )
+    half = np.abs(obstacle.rotation) @ obstacle.size / 2
+    lower, upper = obstacle.centre - half, obstacle.centre + half
+    above = all(region.lower[k] < upper[k] and lower[k] < region.upper[k] for k in (0, 1))
     return above and 0 <= gap <= edge
 
 

@@ -74,7 +74,7 @@ def test_the_page_refers_to_nothing_outside(recordings):
 
 
 def test_states_are_there_to_the_last_bit(recordings, simulator):
-    trials = json.loads(unpacked(replay_page(recordings), "trials"))
+    trials = json.loads(unpacked(replay_page(recordings), "page"))
     assert [trial["trial"] for trial in trials["trials"]] == [0, 1, 2]
     for trial, recording in zip(trials["trials"], recordings, strict=True):
         assert np.array(trial["runs"][0]["states"]).tobytes() == recording.states.tobytes()
@@ -121,7 +121,7 @@ def test_ids_are_not_random(recordings):
 
 def test_ghosts(recordings, simulator):
     page = replay_page(recordings, ghosts=waving(simulator, seed=1))
-    runs = json.loads(unpacked(page, "trials"))["trials"][0]["runs"]
+    runs = json.loads(unpacked(page, "page"))["trials"][0]["runs"]
     assert [run["policy"] for run in runs] == ["wave-0", "wave-1"]
     assert "<title>wave-0 and wave-1 · kinarm replay</title>" in page.html
 

@@ -1,0 +1,117 @@
+"""Pages of arms: joints to move by hand, and what touches then."""
+
+from pathlib import Path
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from kinarm.arm import Arm
+from kinarm.arm_specification import ArmSpecification
+from kinarm.collision import ContactModel
+from kinarm.errors import ArmError
+from kinarm.scene import Scene
+from kinarm.viewer.arm_data import arm_data
+from kinarm.viewer.html_page import HtmlPage
+from kinarm.viewer.scene_commands import arm_commands
+
+BARE_GROUND = Scene(obstacles=(), goal_regions=())
+
+
+class ArmPage(HtmlPage):
+    """A page on which an arm can be moved. In a notebook it shows itself."""
+
+    @classmethod
+    def of(cls, arm: Arm, scene: Scene) -> "ArmPage":
+        """Make a page of an arm in a scene."""
+        model = ContactModel.build(arm, scene)
+        return cls._filled(
+            "arm_page",
+            f"{arm.name} · kinarm arm",
+            arm_commands(model, scene),
+            {**arm_data(arm), **_motion_data(arm), **_contact_data(model)},
+            ("contact", "arm_page"),
+        )
+
+
+def arm_page(
+    arm: Arm | ArmSpecification | str | Path,
+    path: str | Path | None = None,
+    *,
+    scene: Scene = BARE_GROUND,
+) -> ArmPage:
+    """Make a page on which an arm's joints are moved with sliders, and contact shows as it happens.
+
+    The page tests the same pairs of shapes for contact as the simulator, in the browser: its
+    verdicts are those of Coal, but for shapes that are less than 1e-6 m from touching.
+
+    Parameters
+    ----------
+    arm : Arm, ArmSpecification, str or Path
+        The arm, where it stands; or what `Arm.load` takes, which is mounted as the scene says.
+    path : str or Path, optional
+        Where to write the page, if at all.
+    scene : Scene
+        What stands around it; the bare ground by default.
+
+    Raises
+    ------
+    KinarmError
+        If there is no such arm, or it cannot be loaded.
+    OutputError
+        If the file cannot be written.
+    """
+    if not isinstance(arm, Arm):
+        arm = Arm.load(arm).placed(scene.mount.position, scene.mount.rotation)
+    page = ArmPage.of(arm, scene)
+    if path is not None:
+        page.save(path)
+    return page
+
+
+def _motion_data(arm: Arm) -> dict[str, Any]:
+    """Joints and their limits."""
+    return {
+        "joints": list(arm.joint_names),
+        "lower": arm.lower.tolist(),
+        "upper": arm.upper.tolist(),
+        "home": arm.home.tolist(),
+        "reach": arm.reach,
+    }
+
+
+def _contact_data(model: ContactModel) -> dict[str, Any]:
+    """Shapes and pairs that are tested."""
+    objects = zip(model.geometry.geometryObjects, model.body_names, strict=True)
+    return {
+        "bodies": [
+            {"name": name, "joint": shape.parentJoint, **_shape_data(shape)}
+            for shape, name in objects
+        ],
+        "pairs": [[pair.first, pair.second] for pair in model.geometry.collisionPairs],
+    }
+
+
+def _shape_data(shape: pin.GeometryObject) -> dict[str, Any]:
+    """Points whose hull a shape is, widened by a radius; or discs about them; none of the ground.
+
+    In the frame of its joint [m].
+    """
+    body, discs, radius = shape.geometry, 0.0, 0.0
+    if isinstance(body, coal.Halfspace):
+        return {}
+    if isinstance(body, coal.Sphere):
+        points, radius = np.zeros((1, 3)), float(body.radius)
+    elif isinstance(body, coal.Capsule | coal.Cylinder):
+        points = np.array([(0.0, 0.0, -body.halfLength), (0.0, 0.0, body.halfLength)])
+        rounded = isinstance(body, coal.Capsule)
+        discs, radius = (0.0, body.radius) if rounded else (body.radius, 0.0)
+    elif isinstance(body, coal.Box):
+        points = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T * body.halfSide
+    elif isinstance(body, coal.ConvexBase):
+        points = np.array(body.points())
+    else:
+        raise ArmError(f"collision shape {shape.name!r} is a {type(body).__name__}: not supported")
+    placed = points @ shape.placement.rotation.T + shape.placement.translation
+    return {"points": placed.tolist(), "discs": float(discs), "radius": float(radius)}

@@ -1,0 +1,123 @@
+"""Pages: one HTML file with Meshcat's viewer and all that it shows, which needs no network."""
+
+import base64
+import gzip
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any, Self
+
+from jinja2 import Environment, FunctionLoader, StrictUndefined
+from markupsafe import Markup
+
+from kinarm._files import write_text
+
+NOTEBOOK_HEIGHT = 560
+"""Height of a page in a notebook [pixels]."""
+
+NOTEBOOK_FRAME = Markup(
+    '<iframe srcdoc="{}" title="{}" '
+    'style="width: 100%; height: {}px; border: 0; border-radius: 8px" '
+    'loading="lazy" allowfullscreen></iframe>'
+)
+
+
+@dataclass(frozen=True)
+class HtmlPage:
+    """A page. In a notebook it shows itself.
+
+    Attributes
+    ----------
+    html : str
+        The whole page; it refers to nothing outside of itself.
+    """
+
+    html: str
+
+    @classmethod
+    def _filled(
+        cls,
+        template: str,
+        title: str,
+        scene: bytes,
+        data: Any,
+        parts: Sequence[str],
+        **content: Any,
+    ) -> Self:
+        """Make a page of a template.
+
+        Parameters
+        ----------
+        template : str
+            The template, which extends ``page.html``; its style sheet is called alike.
+        title : str
+            Title of the page.
+        scene : bytes
+            Commands to Meshcat's viewer, each led by its length.
+        data : object
+            What the scripts have to know, in terms that JSON can hold.
+        parts : sequence of str
+            Scripts, after those of every page.
+        **content
+            What the template names.
+        """
+        described = json.dumps(data, separators=(",", ":"), sort_keys=True)
+        environment = Environment(
+            autoescape=True,
+            undefined=StrictUndefined,
+            keep_trailing_newline=True,
+            loader=FunctionLoader(_own_text),
+        )
+        return cls(
+            environment.get_template(f"{template}.html").render(
+                title=title,
+                style=_own_text("page.css") + _own_text(f"{template}.css"),
+                licence=_licence(),
+                meshcat=_meshcat_base64(),
+                scene=_gzip_base64(scene),
+                data=_gzip_base64(described.encode()),
+                scripts=[_own_text(f"{name}.js") for name in ("page", "stage", *parts)],
+                **content,
+            )
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write the page to a file.
+
+        Raises
+        ------
+        OutputError
+            If the file cannot be written; an existing file is then left as it was.
+        """
+        write_text(path, self.html)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({len(self.html) / 1e6:.1f} MB of HTML)"
+
+    def _repr_html_(self) -> str:
+        return NOTEBOOK_FRAME.format(self.html, type(self).__name__, NOTEBOOK_HEIGHT)
+
+
+def _own_text(name: str) -> Markup:
+    """Text of a file beside this one, to be put into the page as it is."""
+    return Markup((resources.files("kinarm.viewer") / name).read_text(encoding="utf-8"))
+
+
+@cache
+def _licence() -> Markup:
+    """Licence of Meshcat's viewer, fit for a comment."""
+    text = resources.files("meshcat") / "viewer/dist/main.min.js.LICENSE.txt"
+    return Markup(text.read_text(encoding="utf-8").replace("--", "- -"))
+
+
+@cache
+def _meshcat_base64() -> str:
+    script = resources.files("meshcat") / "viewer/dist/main.min.js"
+    return _gzip_base64(script.read_bytes())
+
+
+def _gzip_base64(content: bytes) -> str:
+    return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()

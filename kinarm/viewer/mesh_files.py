@@ -1,0 +1,168 @@
+"""Mesh files of robot descriptions as painted, simplified triangles; read once, then cached."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from importlib import metadata
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kinarm._cache import cached_arrays
+from kinarm._files import first_line
+from kinarm.errors import ArmError, MissingExtraError
+from kinarm.viewer.finishes import original_colour, packed_colour
+from kinarm.viewer.meshes import Mesh
+
+TOLERANCE = 3e-4
+"""How far a simplified surface may lie from the planes of the triangles that it replaces [m]."""
+
+UNKNOWN = -1
+"""Stands for a colour that a file does not state."""
+
+VERSION = 1
+"""Of what is kept of a file; to be raised when the same file makes other triangles."""
+
+READERS = ("trimesh", "pycollada", "fast-simplification")
+"""Packages of the extra ``robots`` that meshes are read and simplified with."""
+
+
+class PaintedMesh(NamedTuple):
+    """Triangles of one material.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        Its triangles, in the frame of the file [m, if that says so].
+    colour : int or None
+        Red, green and blue as 0xRRGGBB; None if the file does not say.
+    """
+
+    mesh: Mesh
+    colour: int | None
+
+
+def read_mesh_file(path: Path, scale: Sequence[float]) -> tuple[PaintedMesh, ...]:
+    """Read a mesh file and simplify it; or look up what came of it before.
+
+    Nodes are placed and units converted as the file says. Its up axis counts for nothing, as in
+    ROS and in Pinocchio, so that looks and collision shapes agree.
+
+    Parameters
+    ----------
+    path : Path
+        A file that trimesh reads: Collada, STL, OBJ, ...
+    scale : sequence of float
+        Factors along the axes.
+
+    Raises
+    ------
+    MissingExtraError
+        If the extra ``robots`` is not installed.
+    ArmError
+        If the file cannot be read.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise ArmError(f"cannot read mesh {path.name!r}: {error.strerror}") from error
+    made_with = json.dumps([path.suffix, list(scale), TOLERANCE, _versions()])
+    made_of = made_with.encode() + content
+    arrays = cached_arrays("mesh", VERSION, made_of, lambda: _simplified_arrays(path, scale))
+    return tuple(
+        PaintedMesh(
+            Mesh(*(arrays[f"{name} {number}"] for name in ("vertices", "faces", "normals"))),
+            None if colour == UNKNOWN else int(colour),
+        )
+        for number, colour in enumerate(arrays["colours"])
+    )
+
+
+def _versions() -> list[str]:
+    """Versions of the packages that meshes are read and simplified with."""
+    try:
+        return [metadata.version(name) for name in READERS]
+    except metadata.PackageNotFoundError as error:
+        raise MissingExtraError(str(error.name), "robots") from error
+
+
+def _simplified_arrays(path: Path, scale: Sequence[float]) -> dict[str, ArrayLike]:
+    """Triangles and colours of a file, as they are kept."""
+    pieces = _pieces(path, scale)
+    arrays: dict[str, ArrayLike] = {
+        "colours": [UNKNOWN if piece.colour is None else piece.colour for piece in pieces]
+    }
+    for number, piece in enumerate(pieces):
+        vertices, normals, faces = _simplified(piece.mesh).with_normals()
+        arrays[f"vertices {number}"] = vertices
+        arrays[f"faces {number}"] = faces
+        arrays[f"normals {number}"] = normals
+    return arrays
+
+
+def _pieces(path: Path, scale: Sequence[float]) -> list[PaintedMesh]:
+    """Triangles of a file by node and material."""
+    import trimesh
+
+    try:
+        scene = trimesh.load_scene(path, process=False)
+        nodes = [scene.graph[node] for node in sorted(scene.graph.nodes_geometry)]
+        pieces = [
+            PaintedMesh(
+                _placed(scene.geometry[name], transform, scale), _colour(scene.geometry[name], path)
+            )
+            for transform, name in nodes
+            if len(getattr(scene.geometry[name], "faces", ()))
+        ]
+    except Exception as error:  # a damaged file can raise anything
+        raise ArmError(f"mesh {path.name!r} cannot be read: {first_line(error)}") from error
+    if not pieces:
+        raise ArmError(f"mesh {path.name!r} has no triangles")
+    return pieces
+
+
+def _placed(geometry: Any, transform: NDArray[np.float64], scale: Sequence[float]) -> Mesh:
+    """Triangles of a geometry where a node puts it."""
+    factors = _unit(geometry) * np.asarray(scale, dtype=float)
+    stretch = factors[:, None] * transform[:3, :3]
+    mirrored = np.linalg.det(stretch) < 0  # which turns triangles inside out
+    faces = geometry.faces[:, ::-1] if mirrored else geometry.faces
+    return Mesh(geometry.vertices, faces).moved(factors * transform[:3, 3], stretch)
+
+
+def _unit(geometry: Any) -> float:
+    """Unit of length of a geometry [m]; files that name none are in metres."""
+    factor = str(geometry.metadata.get("units", "")).partition(" * ")[0]
+    try:
+        return float(factor)
+    except ValueError:
+        return 1.0
+
+
+def _colour(geometry: Any, path: Path) -> int | None:
+    """Colour of a geometry as 0xRRGGBB; None if the file does not say."""
+    look = geometry.visual
+    if look.kind is None:
+        return None
+    colour = (look.material if look.kind == "texture" else look).main_color
+    return packed_colour(original_colour(path, np.asarray(colour[:3]) / 255))
+
+
+def _simplified(mesh: Mesh) -> Mesh:
+    """Fewer triangles within `TOLERANCE`; open edges stay as they are."""
+    import fast_simplification
+
+    welded = mesh.welded()
+    # Without loss means for this package that the squared distances of a corner from the planes
+    # that meet there sum up to less than this.
+    unit = TOLERANCE / np.sqrt(np.finfo(float).eps)
+    vertices, faces = fast_simplification.simplify(
+        welded.vertices / unit,
+        welded.faces.astype(np.int32),
+        lossless=True,
+        preserve_border=True,
+    )
+    return Mesh(vertices * unit, faces.astype(np.int64))

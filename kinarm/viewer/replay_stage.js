@@ -1,0 +1,95 @@
+"use strict";
+
+const RIVAL = 0x56b4e9;
+
+/* ---------- the stage of a replay: goal, ways of the tool, ghosts and contacts ---------- */
+
+class ReplayStage extends Stage {
+  constructor(viewer, data) {
+    super(viewer, data);
+    this.start = this.arm.ghost(data, 0x808890, 0.16);
+    this.refused = this.arm.ghost(data, data.colours.collision, 0.34);
+    this.rival = data.trials.some((trial) => trial.runs.length > 1) ? this.arm.ghost(data, RIVAL, 0.55) : null;
+    this.find("goal").traverse((node) => { node.castShadow = node.castShadow && node.material && !node.material.transparent; });
+  }
+
+  theme(name) {
+    super.theme(name);
+    this.start.material.color.copy(this.colour(THEMES[name].ghost));
+  }
+
+  select(index) {
+    const trial = this.data.trials[index];
+    this.trial = trial;
+    for (const group of this.find("trials").children) {
+      group.visible = group.name === String(index);
+    }
+    this.traces = trial.runs.map((run, k) => run.states.length > 1 && this.mesh("trials", String(index), k ? "ghost" : "run"));
+    if (this.traces[1]) {
+      Object.assign(this.traces[1].material, { transparent: true, opacity: 0.5 });
+    }
+    this.find("goal").position.fromArray(trial.goal);
+    this.find("goal", "halo").scale.setScalar(trial.tolerance / this.data.trials[0].tolerance);
+    this.start.show(trial.runs[0].states[0]);
+    if (this.rival) {
+      this.rival.root.visible = trial.runs.length > 1;
+    }
+    const side = trial.goal[1] < 0 ? -1 : 1;
+    if (!this.touched && side !== this.side) {
+      this.look(side);
+    }
+  }
+
+  /** Show a moment; between steps the joints move evenly, as they do in the simulator. */
+  show(time) {
+    const { trial } = this;
+    trial.runs.forEach((run, k) => {
+      const arm = k ? this.rival : this.arm;
+      const last = run.states.length - 1;
+      const at = Math.min(time, last);
+      const step = Math.min(Math.floor(at), Math.max(last - 1, 0));
+      const share = at - step;
+      const next = run.states[Math.min(step + 1, last)];
+      const exact = share === 0 ? run.states[step] : share === 1 ? next : null;
+      arm.show(exact || run.states[step].map((value, axis) => value + share * (next[axis] - value)));
+      if (this.traces[k]) {
+        this.traces[k].geometry.setDrawRange(0, Math.ceil(at) * this.data.traceIndices);
+        this.traces[k].visible = at > 0;
+      }
+    });
+    const main = trial.runs[0];
+    const ended = time >= main.states.length - 1;
+    this.start.root.visible = time > 0.5;
+    this.over(main, ended);
+    this.viewer.set_dirty();
+  }
+
+  /** What shows only at the end: the cube lights up, or what touched does. */
+  over(run, ended) {
+    const cube = this.mesh("goal", "cube").material;
+    cube.emissive.set(ended && run.outcome === "success" ? 0x0b6b50 : 0x000000);
+    const touched = ended && run.outcome === "collision";
+    this.flash.visible = touched && run.contactPoint !== null;
+    this.refused.root.visible = touched && run.refused !== null;
+    if (this.flash.visible) {
+      this.flash.position.fromArray(run.contactPoint);
+    }
+    if (this.refused.root.visible) {
+      this.refused.show(run.refused);
+    }
+    const joints = touched ? (run.contact || []).map((body) => this.data.links[body]) : [];
+    this.glow(joints);
+  }
+
+  pulse(seconds) {
+    const swing = 0.5 - 0.5 * Math.cos(2 * Math.PI * 1.1 * seconds);
+    this.flash.scale.setScalar(1 + 1.1 * swing);
+    this.mesh("flash").material.opacity = 0.75 - 0.45 * swing;
+    this.viewer.set_dirty();
+  }
+
+  /** Pose of a part of the arm, or of its rival; see `Stage.pose`. */
+  poseOf(name, run = 0) {
+    return this.pose(name, run ? this.rival : this.arm);
+  }
+}

@@ -1,0 +1,105 @@
+"""The visual shapes of a URDF as parts of an arm, in the colours that it or its meshes state."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+
+from kinarm.arm import Arm
+from kinarm.errors import ArmError
+from kinarm.viewer.finishes import packed_colour, shape_finish
+from kinarm.viewer.mesh_files import PaintedMesh, read_mesh_file
+from kinarm.viewer.meshes import box, capsule, cylinder
+from kinarm.viewer.parts import PLAIN, ArmPart
+
+Element = ElementTree.Element
+
+
+def visual_parts(arm: Arm) -> Iterator[ArmPart]:
+    """Visual shapes of an arm's URDF, simplified where they are meshes.
+
+    A mesh of several colours keeps them; else the URDF's colour goes before that of the mesh.
+
+    Raises
+    ------
+    MissingExtraError
+        If there are meshes, and the extra ``robots`` is not installed.
+    ArmError
+        If a shape cannot be read.
+    """
+    robot = ElementTree.fromstring(arm.description.text)
+    named: dict[str, int | None] = {}
+    for defined in robot.iter("material"):
+        name, colour = str(defined.get("name")), _stated_colour(defined)
+        named[name] = named.get(name) if named.get(name) is not None else colour
+    for link in robot.findall("link"):
+        frame = arm.model.frames[arm.model.getFrameId(link.get("name"), pin.FrameType.BODY)]
+        for visual in link.findall("visual"):
+            placement = frame.placement * _origin(visual)
+            material = visual.find("material")
+            stated = None if material is None else _stated_colour(material)
+            if material is not None and stated is None:
+                stated = named[str(material.get("name"))]
+            pieces = _shapes(visual, arm)
+            alike = len({piece.colour for piece in pieces}) == 1
+            for mesh, colour in pieces:
+                chosen = stated if stated is not None and alike else colour
+                plain = PLAIN[frame.parentJoint % len(PLAIN)]
+                finish = plain if chosen is None else shape_finish(chosen)
+                moved = mesh.moved(placement.translation, placement.rotation)
+                yield ArmPart(frame.parentJoint, finish, moved)
+
+
+def _shapes(visual: Element, arm: Arm) -> tuple[PaintedMesh, ...]:
+    """Shapes of a visual element, in its frame."""
+    geometry = visual.find("geometry")
+    shape = None if geometry is None else next(iter(geometry), None)
+    if shape is None:
+        raise ArmError(f"{arm.description.path.name} has a visual shape without geometry")
+    if shape.tag == "mesh":
+        return read_mesh_file(Path(shape.get("filename", "")), _numbers(shape, "scale", (1, 1, 1)))
+    if shape.tag == "box":
+        mesh = box(_numbers(shape, "size", (0, 0, 0)))
+    elif shape.tag == "sphere":
+        mesh = capsule(0.0, *_numbers(shape, "radius", (0,)))
+    elif shape.tag in ("cylinder", "capsule"):
+        (length,), (radius,) = (_numbers(shape, name, (0,)) for name in ("length", "radius"))
+        mesh = capsule(length, radius) if shape.tag == "capsule" else cylinder(length, radius, 0.0)
+    else:
+        raise ArmError(
+            f"{arm.description.path.name} has a visual shape <{shape.tag}>: not supported"
+        )
+    return (PaintedMesh(mesh, None),)
+
+
+def _origin(visual: Element) -> pin.SE3:
+    """Where a shape stands on its link."""
+    origin = visual.find("origin")
+    if origin is None:
+        return pin.SE3.Identity()
+    turn = pin.rpy.rpyToMatrix(np.array(_numbers(origin, "rpy", (0, 0, 0))))
+    return pin.SE3(turn, np.array(_numbers(origin, "xyz", (0, 0, 0))))
+
+
+def _stated_colour(material: Element) -> int | None:
+    """Colour of a material as 0xRRGGBB, if it is defined here."""
+    colour = material.find("color")
+    return None if colour is None else packed_colour(_numbers(colour, "rgba", (0, 0, 0, 1))[:3])
+
+
+def _numbers(element: Element, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
+    """Numbers of an attribute."""
+    text = element.get(name)
+    if text is None:
+        return default
+    try:
+        numbers = tuple(float(word) for word in text.split())
+    except ValueError:
+        numbers = ()
+    if len(numbers) != len(default):
+        raise ArmError(f"<{element.tag}> has {name}={text!r}; expected {len(default)} numbers")
+    return numbers
