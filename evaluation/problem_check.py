@@ -109,7 +109,8 @@ class ProblemCheck:
             "problem": problem.to_json(),
             "digest": problem.digest,
             "goals": {
-                **{"trials": len(self.trials), "seed": self.trials.seed},
+                "trials": len(self.trials),
+                "seed": self.trials.seed,
                 **{name: estimate.to_json() for name, estimate in self.shares.items()},
                 "not_reached": [
                     {

@@ -274,12 +274,12 @@ def run_commands(
 def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     """Print a table on standard output, as wide as the terminal, or as it is if that is none."""
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table
+    from rich.text import Text
 
-    table = Table(*headings, box=None, header_style="bold", pad_edge=False)
+    table = Table(*map(escape, headings), box=None, header_style="bold", pad_edge=False)
     for row in rows:
-        table.add_row(*row)
-    console = Console(highlight=False)
-    if not sys.stdout.isatty():
-        console.width = max(console.measure(table).maximum, console.width)
-    console.print(table, markup=False)
+        table.add_row(*map(Text, row))
+    console = Console(highlight=False, width=None if sys.stdout.isatty() else 1000)
+    console.print(table)

@@ -53,7 +53,8 @@ class ContactStatistics:
     @property
     def free(self) -> NDArray[np.bool_]:
         """Configurations at which nothing touches, shape (n_samples,)."""
-        return ~self.touching.any(axis=1)
+        touching: NDArray[np.bool_] = self.touching.any(axis=1)
+        return ~touching
 
     @property
     def shares(self) -> dict[tuple[str, str], float]:

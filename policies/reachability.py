@@ -99,6 +99,6 @@ def reach_warning(world: World) -> str | None:
     if missed <= MANY * GOALS:
         return None
     return (
-        f"problem {world.problem.name}: for {missed} of {GOALS} goals no contact-free configuration "
-        f"was found; see kinarm-problem check"
+        f"problem {world.problem.name}: no contact-free configuration was found for {missed} of "
+        f"{GOALS} goals; see kinarm-problem check"
     )

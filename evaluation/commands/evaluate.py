@@ -90,7 +90,9 @@ class EvaluationRequest(ProblemOptions):
     problems: tuple[str, ...] = field(
         default=(),
         metadata={
-            **{"flag": "--problem", "metavar": "NAME_OR_FILE", "repeat": True},
+            "flag": "--problem",
+            "metavar": "NAME_OR_FILE",
+            "repeat": True,
             "names": problem_names,
         },
     )

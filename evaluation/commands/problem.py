@@ -155,7 +155,9 @@ def _show(request: ShowRequest) -> None:
 def _check(request: CheckRequest) -> None:
     check = request.run()
     problem = check.trials.problem
-    print(f"{problem.name}: arm {problem.arm.name}, goals {' and '.join(problem.task.goal_regions)}")
+    print(
+        f"{problem.name}: arm {problem.arm.name}, goals {' and '.join(problem.task.goal_regions)}"
+    )
     for about, line in check.lines().items():
         print(f"  {about:8} {line}")
     for path in (request.json, request.picture):
