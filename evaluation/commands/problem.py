@@ -90,8 +90,7 @@ class CheckRequest(ShowRequest):
             If a name, file or number cannot be used, the arm cannot move, or a file cannot be
             written.
         """
-        from rich.console import Console
-
+        from kinarm._console import open_console
         from kinarm.evaluation.problem_check import ProblemCheck
         from kinarm.world import World
 
@@ -101,7 +100,7 @@ class CheckRequest(ShowRequest):
                 check_output(path, overwrite=self.overwrite, suffix=suffix)
         say_choices([problem])
         world = World(problem)
-        with Console(stderr=True).status("checking; the first run compiles") as status:
+        with open_console(stderr=True).status("checking; the first run compiles") as status:
             check = ProblemCheck.of(
                 world,
                 self.trials,

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinarm._command_line import option_name
+from kinarm._console import open_console
 from kinarm._files import check_output
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from kinarm.viewer import ReplayPage
 
 PAGE = Path("replay.html")
+LAST_PORT = 65535
+
 SMALLEST = {"trials": 1, "worst": 1, "seed": 0, "port": 1}
 ALTERNATIVES = (("policy", "compare"), ("trial", "worst", "collisions"))
 """Fields of which one at most can be given."""
@@ -106,6 +109,8 @@ class ReplayRequest(ProblemOptions):
                 raise InvalidInputError(f"{given[0]} and {given[1]} exclude each other")
         if self.port is not None and not self.live:
             raise InvalidInputError("--port goes with --live")
+        if self.port is not None and self.port > LAST_PORT:
+            raise InvalidInputError(f"port must be at most {LAST_PORT}, got {self.port}")
         self._refuse("--live", NOT_LIVE if self.live else ())
         self._refuse("trials from a file", NOT_FROM_FILE if self.source else ())
         if self.source is not None and self.source.suffix == ".json":
@@ -158,8 +163,6 @@ class ReplayRequest(ProblemOptions):
         return chosen_recordings(self)
 
     def _write(self, report: Callable[[str], object]) -> "ReplayPage":
-        from rich.console import Console
-
         from kinarm.recording import save_recordings
         from kinarm.viewer import replay_page
 
@@ -167,7 +170,7 @@ class ReplayRequest(ProblemOptions):
         check_output(out, overwrite=self.overwrite)
         if self.record is not None:
             check_output(self.record, overwrite=self.overwrite, suffix=".npz")
-        with Console(stderr=True).status("recording; the first run compiles"):
+        with open_console(stderr=True).status("recording; the first run compiles"):
             runs = self.recordings()
             if self.source is None:
                 say_choices([runs[0][0].problem])
