@@ -6,12 +6,12 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from reference_episodes import compare_actions
 
 from kinarm.arm import Arm
 from kinarm.collision import ContactModel
 from kinarm.errors import ProblemError
 from kinarm.problem import PROBLEMS
-from kinarm.reference import ReferenceSimulator
 from kinarm.scene import GoalRegion, Mount, Obstacle, Scene, rotation_matrix
 from kinarm.simulator import Simulator
 from kinarm.world import World
@@ -88,21 +88,8 @@ def test_a_turned_box_is_where_coal_has_it(yaw):
     ids=["turned box", "on a plinth", "upside down", "leaning"],
 )
 def test_rollouts_equal_the_reference_path(scene):
-    moved = problem(scene)
-    simulator, reference = Simulator(moved, threads=1), ReferenceSimulator(moved)
-    rng = np.random.default_rng(2)
-    starts, goals = simulator.sample(rng, 40)
-    actions = rng.uniform(-1, 1, (40, 64, 5)).repeat(1, axis=1)
-    actions[:] = actions[:, :1]  # straight on, until something touches
-    compiled = simulator.rollout_actions(actions, starts, goals, record=True)
-    assert compiled.collision.any()
-    for index in range(40):
-        slow = reference.rollout(actions[index], starts[index], goals[index])
-        assert compiled.steps[index] == slow.steps
-        assert (compiled.success[index], compiled.collision[index]) == (
-            slow.success,
-            slow.collision,
-        )
+    _, collision, _ = compare_actions(Simulator(problem(scene), threads=1), 2, 40)
+    assert collision > 2
 
 
 @pytest.mark.parametrize(
@@ -116,9 +103,7 @@ def test_a_box_that_the_first_link_cannot_leave_is_refused(lower, upper, pair):
     box = Obstacle(name="box", lower=lower, upper=upper)
     scene = Scene(
         obstacles=(box,),
-        goal_regions=(
-            REGION.__class__(name="goal", lower=(0.3, -0.3, 1.0), upper=(0.6, 0.3, 1.1)),
-        ),
+        goal_regions=(GoalRegion(name="goal", lower=(0.3, -0.3, 1.0), upper=(0.6, 0.3, 1.1)),),
     )
     with pytest.raises(ProblemError, match=f"arm 'paper' cannot move: {pair} wherever"):
         World(problem(scene))
