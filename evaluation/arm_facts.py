@@ -118,5 +118,5 @@ def _shown(values: NDArray[np.float64], prismatic: bool) -> list[float]:
 
 def _frequency(share: float) -> str:
     """How often a pair touches."""
-    words = {0.0: "never", 1.0: "always"}
-    return f"{words.get(share, f'{share:.1%}')} of {SAMPLES} random configurations"
+    often = {0.0: "at none", 1.0: "at all"}.get(share, f"at {share:.1%}")
+    return f"{often} of {SAMPLES} random configurations"
