@@ -5,11 +5,13 @@ from typing import Any
 
 from kinarm.arm import Arm
 from kinarm.collision import body_names
+from kinarm.scene import Scene
 from kinarm.viewer.arm_shapes import arm_parts
+from kinarm.viewer.camera import stage_scale
 
 
-def arm_data(arm: Arm) -> dict[str, Any]:
-    """Describe an arm: its axes, its tool, which joint carries which body, and its colour."""
+def arm_data(arm: Arm, scene: Scene) -> dict[str, Any]:
+    """Describe an arm: its axes and tool, which joint carries which body, its colour and size."""
     chain, painted = arm.chain, Counter[int]()
     for part in arm_parts(arm):
         painted[part.finish.colour] += len(part.mesh.faces)
@@ -29,5 +31,6 @@ def arm_data(arm: Arm) -> dict[str, Any]:
             name: shape.parentJoint
             for name, shape in zip(body_names(arm), arm.geometry.geometryObjects, strict=True)
         },
+        "scale": stage_scale(arm, scene),
         "swatch": f"#{painted.most_common(1)[0][0]:06x}",
     }

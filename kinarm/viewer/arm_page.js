@@ -70,7 +70,7 @@ class ArmControls {
     row.append(label);
     element("joints").append(row);
     input.addEventListener("input", () => this.move(k, Number(input.value)));
-    return { input, output, row, text: (value) => (axes[k].slides ? metres(value) : `${(value / TURN).toFixed(1)}°`) };
+    return { input, output, row, text: (value) => (axes[k].slides ? metres(value) : `${fixed(value / TURN, 1)}°`) };
   }
 
   /** Move one joint, as far as its limits allow. */

@@ -13,26 +13,17 @@ from kinarm.collision import ContactModel
 from kinarm.errors import ArmError
 from kinarm.scene import Scene
 from kinarm.viewer.arm_data import arm_data
-from kinarm.viewer.html_page import HtmlPage
+from kinarm.viewer.html_page import HtmlPage, page_html
 from kinarm.viewer.scene_commands import arm_commands
+
+NEARER = 0.8
+"""Distance of the camera, as a share of that in replays, which show more than the arm."""
 
 BARE_GROUND = Scene(obstacles=(), goal_regions=())
 
 
 class ArmPage(HtmlPage):
     """A page on which an arm can be moved. In a notebook it shows itself."""
-
-    @classmethod
-    def of(cls, arm: Arm, scene: Scene) -> "ArmPage":
-        """Make a page of an arm in a scene."""
-        model = ContactModel.build(arm, scene)
-        return cls._filled(
-            "arm_page",
-            f"{arm.name} · kinarm arm",
-            arm_commands(model, scene),
-            {**arm_data(arm), **_motion_data(arm), **_contact_data(model)},
-            ("contact", "arm_page"),
-        )
 
 
 def arm_page(
@@ -64,10 +55,19 @@ def arm_page(
     """
     if not isinstance(arm, Arm):
         arm = Arm.load(arm).placed(scene.mount.position, scene.mount.rotation)
-    page = ArmPage.of(arm, scene)
+    page = ArmPage(_arm_html(arm, scene))
     if path is not None:
         page.save(path)
     return page
+
+
+def _arm_html(arm: Arm, scene: Scene) -> str:
+    """Page of an arm in a scene."""
+    model = ContactModel.build(arm, scene)
+    data = {**arm_data(arm, scene), **_motion_data(arm), **_contact_data(model)}
+    data["scale"] *= NEARER
+    title = f"{arm.name} · kinarm arm"
+    return page_html("arm_page", title, arm_commands(model, scene), data, ("contact", "arm_page"))
 
 
 def _motion_data(arm: Arm) -> dict[str, Any]:

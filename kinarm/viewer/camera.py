@@ -10,13 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._validation import finite_array, whole_number
+from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError
 from kinarm.problem import ReachProblem
+from kinarm.scene import Scene
 
 FIELD_OF_VIEW = 30.0
 TARGET, EYE = (0.05, 0.1, 0.38), (-2.42, 1.9, 1.5)
 """Middle of the picture, and the camera relative to it, if goals lie on the left [m]: as on the
 replay page, a little farther so that an upright arm fits in."""
+
+NEAR, FAR = 1.0, 1.45
+"""Stages whose radius lies between these are seen from there; smaller ones from nearer by, larger
+ones from farther away [m]."""
 
 
 class Camera(NamedTuple):
@@ -35,13 +41,22 @@ class Camera(NamedTuple):
     field_of_view: float = FIELD_OF_VIEW
 
     @classmethod
-    def of_replays(cls, problem: ReachProblem) -> Camera:
-        """Stand where the replay page does: behind the arm, on the side of most goals."""
+    def of_replays(cls, problem: ReachProblem, arm: Arm | None = None) -> Camera:
+        """Stand where the replay page does: behind the arm, on the side of most goals.
+
+        Parameters
+        ----------
+        problem : ReachProblem
+            The problem.
+        arm : Arm, optional
+            Its arm, if that is loaded.
+        """
         regions = [problem.scene.goal_region(name) for name in problem.task.goal_regions]
         across = sum(region.lower[1] + region.upper[1] for region in regions)
         side = 1.0 if across > 0 else -1.0
-        target = np.array(TARGET) * (1, side, 1)
-        eye = target + np.array(EYE) * (1, side, 1)
+        scale = stage_scale(arm or problem.load_arm(), problem.scene)
+        target = scale * np.array(TARGET) * (1, side, 1)
+        eye = target + scale * np.array(EYE) * (1, side, 1)
         return cls(_point(eye), _point(target))
 
     @classmethod
@@ -91,6 +106,13 @@ class Camera(NamedTuple):
         lens = np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]])
         projection: NDArray[np.float64] = lens @ np.column_stack([turn, -turn @ position])
         return projection
+
+
+def stage_scale(arm: Arm, scene: Scene) -> float:
+    """How far away cameras stand that show an arm and where goals lie; 1 if that is about 1 m."""
+    corners = [corner for region in scene.goal_regions for corner in (region.lower, region.upper)]
+    radius = max([arm.reach, *(float(np.linalg.norm(corner)) for corner in corners)])
+    return radius / min(max(radius, NEAR), FAR)
 
 
 CameraLike = Camera | Mapping[str, Any] | Sequence[Any]

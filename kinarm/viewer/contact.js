@@ -2,6 +2,7 @@
 
 /* ---------- contact: distances between convex shapes by Gilbert, Johnson and Keerthi's way ---------- */
 
+const CLOSE = 5e-7; // bodies this far apart touch: half of the distance that Coal may take for none [m]
 const NARROW = 1e-10; // bounds of a distance that are this close decide [m]
 const MOST_CUTS = 200;
 
@@ -143,7 +144,7 @@ function touch(first, second) {
     const [a, b] = [first.support(found.point.map((value) => -value)), second.support(found.point)];
     const corner = { a, b, apart: minus(a, b) };
     const least = dot(corner.apart, found.point) / found.length;
-    if (least > radius) {
+    if (least > radius + CLOSE) {
       return null;
     }
     const known = simplex.some((other) => other.apart.every((value, k) => value === corner.apart[k]));
@@ -157,11 +158,11 @@ function touch(first, second) {
     }
     found = next;
     simplex = found.members.map((n) => wider[n]);
-    if (found.length <= Math.max(radius, NARROW)) {
+    if (found.length <= radius + NARROW) {
       break;
     }
   }
-  if (found.length > radius + NARROW) {
+  if (found.length > radius + CLOSE) {
     return null;
   }
   const [a, b] = ["a", "b"].map((end) => mixed(simplex.map((corner) => corner[end]), found.weights));

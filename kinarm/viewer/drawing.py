@@ -41,8 +41,8 @@ SUN_PLACE = [-2.0, -1.0, 3.4]
 CLUTTER = ("/Axes", "/Grid", "/Lights/PointLightPositiveX", "/Lights/PointLightNegativeX")
 """What Meshcat shows by default and a replay does not."""
 DIMMED = {"/Lights/AmbientLight/<object>": 0.42, "/Lights/FillLight/<object>": 0.2}
-CAMERA = {"fov": 32, "position": [-2.4, 1.6, 1.9]}
-"""In the frame of three.js, whose y axis points up."""
+FIELD_OF_VIEW, CAMERA_PLACE = 32, (-2.4, 1.6, 1.9)
+"""Of the live page [degrees, m], in the frame of three.js, whose y axis points up."""
 
 
 class _BufferGeometry(Geometry):
@@ -175,10 +175,11 @@ def _grid_lines() -> NDArray[np.float64]:
     return np.column_stack([np.array(lines), np.full(len(lines), 0.0005)])
 
 
-def aim_camera(window: Visualizer) -> None:
-    """Look at the arm from behind its right side."""
-    for name, value in CAMERA.items():
-        window["/Cameras/default/rotated/<object>"].set_property(name, value)
+def aim_camera(window: Visualizer, scale: float = 1.0) -> None:
+    """Look at the arm from behind its right side; see `kinarm.viewer.camera.stage_scale`."""
+    camera = window["/Cameras/default/rotated/<object>"]
+    camera.set_property("fov", FIELD_OF_VIEW)
+    camera.set_property("position", [scale * value for value in CAMERA_PLACE])
 
 
 def draw_goal(window: Visualizer, problem: ReachProblem) -> None:
@@ -203,7 +204,9 @@ def draw_arm(window: Visualizer, arm: Arm) -> list[Visualizer]:
     return frames
 
 
-def draw_trace(window: Visualizer, points: NDArray[np.float64], outcome: str | None) -> None:
+def draw_trace(
+    window: Visualizer, points: NDArray[np.float64], outcome: str | None, scale: float
+) -> None:
     """The way of the tool, shape (n, 3) [m], in the colour of the outcome; none of a point."""
     if len(points) > 1:
-        put(window, TRACES[outcome], tube(points, TRACE_RADIUS, TRACE_SIDES))
+        put(window, TRACES[outcome], tube(points, scale * TRACE_RADIUS, TRACE_SIDES))

@@ -3,12 +3,12 @@
 import base64
 import gzip
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
@@ -37,53 +37,6 @@ class HtmlPage:
 
     html: str
 
-    @classmethod
-    def _filled(
-        cls,
-        template: str,
-        title: str,
-        scene: bytes,
-        data: Any,
-        parts: Sequence[str],
-        **content: Any,
-    ) -> Self:
-        """Make a page of a template.
-
-        Parameters
-        ----------
-        template : str
-            The template, which extends ``page.html``; its style sheet is called alike.
-        title : str
-            Title of the page.
-        scene : bytes
-            Commands to Meshcat's viewer, each led by its length.
-        data : object
-            What the scripts have to know, in terms that JSON can hold.
-        parts : sequence of str
-            Scripts, after those of every page.
-        **content
-            What the template names.
-        """
-        described = json.dumps(data, separators=(",", ":"), sort_keys=True)
-        environment = Environment(
-            autoescape=True,
-            undefined=StrictUndefined,
-            keep_trailing_newline=True,
-            loader=FunctionLoader(_own_text),
-        )
-        return cls(
-            environment.get_template(f"{template}.html").render(
-                title=title,
-                style=_own_text("page.css") + _own_text(f"{template}.css"),
-                licence=_licence(),
-                meshcat=_meshcat_base64(),
-                scene=_gzip_base64(scene),
-                data=_gzip_base64(described.encode()),
-                scripts=[_own_text(f"{name}.js") for name in ("page", "stage", *parts)],
-                **content,
-            )
-        )
-
     def save(self, path: str | Path) -> None:
         """Write the page to a file.
 
@@ -99,6 +52,42 @@ class HtmlPage:
 
     def _repr_html_(self) -> str:
         return NOTEBOOK_FRAME.format(self.html, type(self).__name__, NOTEBOOK_HEIGHT)
+
+
+def page_html(
+    template: str, title: str, scene: bytes, data: Mapping[str, Any], parts: Sequence[str]
+) -> str:
+    """Fill a template.
+
+    Parameters
+    ----------
+    template : str
+        Name of the template, which extends ``page.html``, and of its style sheet.
+    title : str
+        Title of the page.
+    scene : bytes
+        Commands to Meshcat's viewer, each led by its length.
+    data : mapping
+        What the scripts have to know, in terms that JSON can hold.
+    parts : sequence of str
+        Scripts, after those of every page.
+    """
+    described = json.dumps(data, separators=(",", ":"), sort_keys=True)
+    environment = Environment(
+        autoescape=True,
+        undefined=StrictUndefined,
+        keep_trailing_newline=True,
+        loader=FunctionLoader(_own_text),
+    )
+    return environment.get_template(f"{template}.html").render(
+        title=title,
+        style=_own_text("page.css") + _own_text(f"{template}.css"),
+        licence=_licence(),
+        meshcat=_meshcat_base64(),
+        scene=_gzip_base64(scene),
+        data=_gzip_base64(described.encode()),
+        scripts=[_own_text(f"{name}.js") for name in ("page", "stage", *parts)],
+    )
 
 
 def _own_text(name: str) -> Markup:

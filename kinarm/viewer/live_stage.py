@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm.arm import Arm
 from kinarm.problem import ReachProblem
+from kinarm.viewer.camera import stage_scale
 from kinarm.viewer.drawing import aim_camera, draw_arm, draw_goal, draw_surroundings, draw_trace
 from kinarm.viewer.live_server import LiveServer
 
@@ -34,7 +35,8 @@ class LiveStage:
         self._due = 0.0
         window = server.window
         draw_surroundings(window, problem.scene)
-        aim_camera(window)
+        self._scale = stage_scale(arm, problem.scene)
+        aim_camera(window, self._scale)
         draw_goal(window["goal"], problem)
         self._frames = draw_arm(window["arm"], arm)[1:]
 
@@ -67,7 +69,7 @@ class LiveStage:
 
     def draw_trace(self, points: ArrayLike, outcome: str | None) -> None:
         """Show the way of the tool, shape (n, 3) [m], in the colour of an outcome."""
-        draw_trace(self.server.window["trace"], np.asarray(points), outcome)
+        draw_trace(self.server.window["trace"], np.asarray(points), outcome, self._scale)
 
     def pace(self, seconds: float) -> None:
         """Wait until some time has passed since the last call was over [s]."""

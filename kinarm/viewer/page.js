@@ -1,7 +1,8 @@
 "use strict";
 
 const element = (id) => document.getElementById(id);
-const metres = (value) => `${value.toFixed(3)} m`;
+const fixed = (value, digits) => (Math.round(value * 10 ** digits) / 10 ** digits + 0).toFixed(digits); // no "-0.0"
+const metres = (value) => `${fixed(value, 3)} m`;
 const count = (number, noun) => `${number} ${noun}${number === 1 ? "" : "s"}`;
 
 /* ---------- data ---------- */

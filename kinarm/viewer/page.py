@@ -6,29 +6,13 @@ from pathlib import Path
 
 from kinarm.errors import InvalidInputError
 from kinarm.recording import Recording
-from kinarm.viewer.html_page import HtmlPage
+from kinarm.viewer.html_page import HtmlPage, page_html
 from kinarm.viewer.player_data import player_data
 from kinarm.viewer.scene_commands import replay_commands
 
 
 class ReplayPage(HtmlPage):
     """A page that plays recordings. In a notebook it shows itself."""
-
-    @classmethod
-    def of(cls, recordings: Sequence[Recording], ghosts: Sequence[Recording]) -> "ReplayPage":
-        """Make a page of recordings that can share one."""
-        arm = recordings[0].problem.load_arm()
-        trials = [
-            [run for run in runs if run is not None] for runs in zip_longest(recordings, ghosts)
-        ]
-        policies = dict.fromkeys(run.policy for runs in trials for run in runs)
-        return cls._filled(
-            "player",
-            f"{' and '.join(policies)} · kinarm replay",
-            replay_commands(trials, arm),
-            player_data(trials, arm),
-            ("replay_stage", "player"),
-        )
 
 
 def replay_page(
@@ -59,7 +43,7 @@ def replay_page(
     """
     chosen = [recordings] if isinstance(recordings, Recording) else list(recordings)
     _check_recordings(chosen, ghosts)
-    page = ReplayPage.of(chosen, ghosts)
+    page = ReplayPage(_replay_html(chosen, ghosts))
     if path is not None:
         page.save(path)
     return page
@@ -88,3 +72,17 @@ def _check_recordings(recordings: Sequence[Recording], ghosts: Sequence[Recordin
                 f"trial {recording.trial} of {recording.policy!r} and trial {ghost.trial} of "
                 f"{ghost.policy!r} differ in start or goal: they cannot be compared"
             )
+
+
+def _replay_html(recordings: Sequence[Recording], ghosts: Sequence[Recording]) -> str:
+    """Page of recordings that can share one."""
+    arm = recordings[0].problem.load_arm()
+    trials = [[run for run in runs if run is not None] for runs in zip_longest(recordings, ghosts)]
+    policies = dict.fromkeys(run.policy for runs in trials for run in runs)
+    return page_html(
+        "player",
+        f"{' and '.join(policies)} · kinarm replay",
+        replay_commands(trials, arm),
+        player_data(trials, arm),
+        ("replay_stage", "player"),
+    )

@@ -80,8 +80,11 @@ class Renderer:
     ) -> None:
         self.problem = ReachProblem.load(problem)
         self.width, self.height = picture_size(width, height)
-        self.camera = Camera.of_replays(self.problem) if camera is None else Camera.checked(camera)
-        self._scene = TriangleScene(self.problem, self.problem.load_arm())
+        if camera is not None:
+            camera = Camera.checked(camera)
+        arm = self.problem.load_arm()
+        self.camera = camera or Camera.of_replays(self.problem, arm)
+        self._scene = TriangleScene(self.problem, arm)
         self._projection = self.camera.projection(self.width, self.height)
         self._eye = self._make_eye()
         self._backdrop = self._make_backdrop()
@@ -176,7 +179,8 @@ class Renderer:
         """The halo within which the goal counts as reached, and a flash at a contact."""
         balls = [(goal, self.problem.task.tolerance, CUBE.colour, HALO_OPACITY, False)]
         if contact is not None:
-            flash = (contact.point, FLASH_SWELL * FLASH_RADIUS, OUTCOME_COLOURS["collision"])
+            size = self._scene.scale * FLASH_SWELL * FLASH_RADIUS
+            flash = (contact.point, size, OUTCOME_COLOURS["collision"])
             balls.append((*flash, FLASH_OPACITY, True))
         centres, radii, colours, opacities, on_top = zip(*balls, strict=True)
         encoded = [lighting.channels(colour) for colour in colours]

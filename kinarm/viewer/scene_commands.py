@@ -13,6 +13,7 @@ from kinarm.collision import ContactModel
 from kinarm.recording import Recording
 from kinarm.scene import Scene
 from kinarm.viewer.arm_shapes import collision_parts
+from kinarm.viewer.camera import stage_scale
 from kinarm.viewer.drawing import (
     FLASH,
     SHAPE,
@@ -33,12 +34,13 @@ def replay_commands(trials: Sequence[Sequence[Recording]], arm: Arm) -> bytes:
     """
     capture = CapturingWindow()
     window, problem = meshcat.Visualizer(window=capture), trials[0][0].problem
-    _draw_stage(window, arm, problem.scene)
+    scale = stage_scale(arm, problem.scene)
+    _draw_stage(window, arm, problem.scene, scale)
     draw_goal(window["goal"], problem)
     for number, runs in enumerate(trials):
         for name, run in zip(("run", "ghost"), runs, strict=False):
             points = np.array([arm.tool_position(state) for state in run.states])
-            draw_trace(window[f"trials/{number}/{name}"], points, run.outcome)
+            draw_trace(window[f"trials/{number}/{name}"], points, run.outcome, scale)
     return capture.content
 
 
@@ -46,16 +48,18 @@ def arm_commands(model: ContactModel, scene: Scene) -> bytes:
     """Draw an arm in a scene, and the shapes that decide about contact; see `replay_commands`."""
     capture = CapturingWindow()
     window = meshcat.Visualizer(window=capture)
-    frames = _draw_stage(window, model.arm, scene)
+    frames = _draw_stage(window, model.arm, scene, stage_scale(model.arm, scene))
     for number, part in enumerate(collision_parts(model.arm)):
         put(frames[part.joint][f"shape_{number}"], SHAPE, part.mesh)
     return capture.content
 
 
-def _draw_stage(window: meshcat.Visualizer, arm: Arm, scene: Scene) -> list[meshcat.Visualizer]:
+def _draw_stage(
+    window: meshcat.Visualizer, arm: Arm, scene: Scene, scale: float
+) -> list[meshcat.Visualizer]:
     """Draw surroundings, the ball that marks a contact, and an arm; return the arm's frames."""
     draw_surroundings(window, scene)
-    put(window["flash"], FLASH, capsule(0.0, FLASH_RADIUS))
+    put(window["flash"], FLASH, capsule(0.0, scale * FLASH_RADIUS))
     return draw_arm(window["arm"], arm)
 
 

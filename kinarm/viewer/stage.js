@@ -156,7 +156,7 @@ class Stage {
   camera() {
     const { viewer } = this;
     viewer.camera.fov = 30;
-    viewer.camera.near = 0.05;
+    viewer.camera.near = 0.05 * this.data.scale;
     this.side = 0;
     this.touched = false;
     viewer.controls.addEventListener("start", () => { this.touched = true; });
@@ -167,8 +167,8 @@ class Stage {
       stage.addEventListener("pointerdown", () => { viewer.controls.enableZoom = true; });
       stage.addEventListener("pointerleave", () => { viewer.controls.enableZoom = false; });
     }
-    viewer.controls.minDistance = 0.3;
-    viewer.controls.maxDistance = 7;
+    viewer.controls.minDistance = 0.3 * this.data.scale;
+    viewer.controls.maxDistance = 7 * Math.max(this.data.scale, 1);
     viewer.controls.maxPolarAngle = 1.54;
     window.addEventListener("resize", () => this.touched || this.look(this.side));
   }
@@ -195,8 +195,8 @@ class Stage {
     const right = tall ? 0 : 0.32 * card.offsetWidth * narrow;
     const up = (dock.offsetHeight - (tall ? card.offsetHeight : 0)) / 2;
     viewer.camera.setViewOffset(width, height, -right, up, width, height);
-    viewer.controls.target.set(0.05, 0.3, -0.1 * side);
-    const eye = new THREE.Vector3(-2.35, 1.5, -1.85 * side).multiplyScalar(away);
+    viewer.controls.target.set(0.05, 0.3, -0.1 * side).multiplyScalar(this.data.scale);
+    const eye = new THREE.Vector3(-2.35, 1.5, -1.85 * side).multiplyScalar(away * this.data.scale);
     viewer.camera.position.copy(viewer.controls.target).add(eye);
     this.side = side;
     this.touched = false;

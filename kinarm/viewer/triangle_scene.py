@@ -10,6 +10,7 @@ from kinarm.arm import Arm
 from kinarm.collision import body_names
 from kinarm.problem import ReachProblem
 from kinarm.viewer.arm_shapes import arm_parts
+from kinarm.viewer.camera import stage_scale
 from kinarm.viewer.kernels.rasterising import place
 from kinarm.viewer.kernels.views import Surfaces
 from kinarm.viewer.lighting import channels
@@ -49,10 +50,13 @@ class TriangleScene:
     ----------
     n_joints : int
         Length of a configuration.
+    scale : float
+        Size of the stage; see `kinarm.viewer.camera.stage_scale`.
     """
 
     def __init__(self, problem: ReachProblem, arm: Arm) -> None:
         self.n_joints = arm.n_joints
+        self.scale = stage_scale(arm, problem.scene)
         self._arm, self._data = arm, arm.model.createData()
         self._goal_frame = arm.n_joints + 1
         self._links = {
@@ -88,7 +92,7 @@ class TriangleScene:
         place(self._vertices, self._normals, self._frames, poses, places, normals)
         faces, materials = self._faces, self._materials
         if len(trace) > 1:
-            way, aside, stretches = _tube(trace)
+            way, aside, stretches = _tube(trace, self.scale * TRACE_RADIUS)
             material = self._owners.index((0, TRACES[outcome]))
             places, normals = np.concatenate([places, way]), np.concatenate([normals, aside])
             faces = np.concatenate([faces, stretches + n_vertices])
@@ -129,9 +133,9 @@ def _parts(problem: ReachProblem, arm: Arm, goal_frame: int) -> list[tuple[int, 
     return [*parts, (goal_frame, CUBE, cube_mesh(problem.scene))]
 
 
-def _tube(points: Array) -> tuple[Array, Array, NDArray[np.int64]]:
+def _tube(points: Array, radius: float) -> tuple[Array, Array, NDArray[np.int64]]:
     """Vertices, normals and faces of a tube along points, shape (n, 3) [m]."""
-    mesh = tube(points, TRACE_RADIUS, TRACE_SIDES)
+    mesh = tube(points, radius, TRACE_SIDES)
     around = mesh.vertices[:-2].reshape(len(points), TRACE_SIDES, 3) - points[:, None]
     ends = points[[0, -1]] - points[[1, -2]]
     normals = np.concatenate([around.reshape(-1, 3), ends])

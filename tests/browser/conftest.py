@@ -3,6 +3,7 @@
 import os
 import shutil
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -84,6 +85,19 @@ class Watched:
     @property
     def state(self) -> dict[str, object]:
         return self.tell("window.kinarm.state")
+
+
+@pytest.fixture(scope="session")
+def visit(browser: object) -> Callable[[Path], AbstractContextManager[Watched]]:
+    """Open a page for the length of a ``with`` block."""
+
+    @contextmanager
+    def visited(path: Path) -> Iterator[Watched]:
+        page = Watched(browser, path, (800, 600), calm=True)
+        yield page
+        page.context.close()
+
+    return visited
 
 
 @pytest.fixture(scope="module")

@@ -13,12 +13,17 @@ import pytest
 import umsgpack
 
 import kinarm
-from kinarm.errors import ArmError, InvalidInputError, OutputError
+from kinarm.arm import Arm
+from kinarm.collision import ContactModel
+from kinarm.errors import ArmError, InvalidInputError, OutputError, UnknownNameError
+from kinarm.problem import ReachProblem
 from kinarm.recording import record_rollouts
-from kinarm.scene import Obstacle, Scene
-from kinarm.viewer import replay_page
+from kinarm.scene import GoalRegion, Obstacle, Scene, rotation_matrix
+from kinarm.viewer import Camera, arm_page, replay_page
 from kinarm.viewer.arm_shapes import arm_parts
+from kinarm.viewer.camera import stage_scale
 from kinarm.viewer.meshes import Mesh, box, capsule, cylinder, housing, lathe, tube
+from kinarm.viewer.surroundings import obstacle_meshes
 
 
 def waving(simulator, count=3, seed=0):
@@ -182,6 +187,25 @@ def test_any_arm_can_be_drawn(simulators, name):
     )
 
 
+def test_an_arm_page(tmp_path):
+    """It holds the pairs and shapes that the simulator tests; the same arm makes the same page."""
+    scene = ReachProblem.load("both").scene
+    page = arm_page("paper", tmp_path / "made.html", scene=scene)
+    assert (tmp_path / "made.html").read_text(encoding="utf-8") == page.html
+    assert page.html == arm_page(Arm.load("paper"), scene=scene).html
+    assert re.findall(r'(?:src|href)="(?!data:)[^"]*"', page.html) == []
+    assert "<title>paper · kinarm arm</title>" in page.html
+    data = json.loads(unpacked(page, "page"))
+    model = ContactModel.build(Arm.load("paper"), scene)
+    assert [body["name"] for body in data["bodies"]] == list(model.body_names)
+    assert len(data["pairs"]) == len(model.pair_names) == 28
+    assert data["upper"] == Arm.load("paper").upper.tolist()
+    with pytest.raises(OutputError):
+        arm_page("paper", tmp_path / "none" / "made.html")
+    with pytest.raises(UnknownNameError):
+        arm_page("nobody")
+
+
 def volume(mesh: Mesh) -> float:
     a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
     return float((np.cross(a, b) * c).sum() / 6)
@@ -226,3 +250,61 @@ def test_a_tube_grows_with_its_frames():
     points = [(0, 0, 0), (1, 0, 0), (1, 0, 0), (1, 1, 0)]
     assert len(tube(points, 0.1).with_normals()[2]) == 12 * 3 + 2 * 6
     assert np.isfinite(tube([(0, 0, 0)] * 4, 0.1).vertices).all()
+
+
+def test_an_arm_that_is_mounted_elsewhere_looks_the_same(recordings):
+    """The base moves along; nothing else in the joints' frames changes."""
+    arm = Arm.load("paper")
+    placed = arm.placed((0.1, 0.2, 0.3), rotation_matrix((0.0, 0.1, 0.5)))
+    assert len(arm_parts(arm)) == len(arm_parts(placed))
+    rotation = rotation_matrix((0.0, 0.1, 0.5))
+    for one, other in zip(arm_parts(arm), arm_parts(placed), strict=True):
+        expected = one.mesh.vertices
+        if one.joint == 0:
+            expected = expected @ rotation.T + (0.1, 0.2, 0.3)
+        np.testing.assert_allclose(other.mesh.vertices, expected, atol=1e-12)
+
+
+def test_boxes_are_turned():
+    """About the vertical through their centre; goals over a turned one make it a bench."""
+    region = GoalRegion(name="over", lower=(0.4, 0.75, 0.52), upper=(0.6, 0.85, 0.52))
+    turned = Obstacle(name="a", lower=(0.1, 0.3, 0.0), upper=(0.9, 0.5, 0.5), yaw=np.pi / 2)
+    scene = Scene(obstacles=(turned,), goal_regions=(replace(region, lower=(0.4, 0.7, 0.52)),))
+    body, top = obstacle_meshes(turned, scene)
+    assert top is not None
+    np.testing.assert_allclose(top.vertices.min(axis=0), (0.4, 0.0, 0.48), atol=1e-9)
+    np.testing.assert_allclose(top.vertices.max(axis=0), (0.6, 0.8, 0.5), atol=1e-9)
+    aside = replace(region, lower=(0.7, 0.3, 0.52), upper=(0.9, 0.5, 0.52))
+    assert obstacle_meshes(turned, replace(scene, goal_regions=(aside,))).top is None
+    assert volume(body) > 0
+
+
+def test_corners_are_kept_to_a_65534th_of_the_size(recordings):
+    """On a grid along the longest side, which the page scales back."""
+    vertices = []
+    for command in commands(replay_page(recordings)):
+        if command.get("path", "").startswith("/meshcat/arm") and "object" in command:
+            described = command["object"]
+            positions = described["geometries"][0]["data"]["attributes"]["position"]["array"].data
+            matrix = np.array(described["object"]["matrix"]).reshape(4, 4).T
+            vertices.append(np.frombuffer(positions, "<i2").reshape(-1, 3) @ matrix[:3, :3].T)
+            vertices[-1] = vertices[-1] + matrix[:3, 3]
+    by_joint = {}
+    for part in arm_parts(Arm.load("paper")):
+        by_joint.setdefault((part.joint, part.finish), []).append(part.mesh)
+    assert len(vertices) == len(by_joint)
+    for drawn, meshes in zip(vertices, by_joint.values(), strict=True):
+        exact = Mesh.joined(meshes).vertices
+        np.testing.assert_allclose(drawn, exact, atol=np.ptp(exact, axis=0).max() / 65534)
+
+
+def test_small_stages_are_seen_from_nearer_by():
+    camera, arm = Camera.of_replays(ReachProblem.load("left")), Arm.load("paper")
+    small = Scene(goal_regions=(GoalRegion(name="left", lower=(0, 0, 0), upper=(0.1, 0.1, 0)),))
+    assert stage_scale(arm, small) == stage_scale(arm, Scene()) == 1
+    short = replace(arm, chain=arm.chain._replace(translation=arm.chain.translation / 4))
+    assert 0.2 < stage_scale(short, small) < 0.5
+    far = GoalRegion(name="left", lower=(0, 0, 0), upper=(2.9, 0, 0.0001))
+    assert stage_scale(arm, Scene(goal_regions=(far,))) == pytest.approx(2, rel=1e-3)
+    near = ReachProblem.load("left").replace(scene=small)
+    assert Camera.of_replays(near, short).position[0] > camera.position[0]

@@ -1,0 +1,312 @@
+"""Meshes of robots: what files say is what is seen, simplified within a bound, read once."""
+
+import struct
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from kinarm.arm import Arm
+from kinarm.errors import ArmError, MissingExtraError
+from kinarm.viewer import arm_page, mesh_files
+from kinarm.viewer.arm_shapes import arm_parts, collision_parts
+from kinarm.viewer.finishes import original_colour, packed_colour, shape_finish
+from kinarm.viewer.mesh_files import TOLERANCE, read_mesh_file
+from kinarm.viewer.meshes import Mesh, box, capsule
+from kinarm.viewer.visual_shapes import visual_parts
+
+pytest.importorskip("trimesh", reason="pip install 'kinarm[robots]'")
+
+ROBOTS = ("kinova", "panda", "so100", "so101", "ur10", "ur3", "ur5", "xarm7", "z1")
+
+DAE = """<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit name="millimeter" meter="0.001"/><up_axis>Y_UP</up_axis></asset>
+<library_effects>{effects}</library_effects>
+<library_materials>{materials}</library_materials>
+<library_geometries><geometry id="cube"><mesh>
+<source id="p"><float_array id="pa" count="24">{places}</float_array><technique_common>
+<accessor source="#pa" count="8" stride="3"><param name="X" type="float"/>
+<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="12" material="look"><input semantic="VERTEX" source="#v" offset="0"/>
+<p>{faces}</p></triangles></mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="scene">
+<node id="outer"><translate>100 0 0</translate>{first}
+<node id="inner"><matrix>0 -1 0 0  1 0 0 200  0 0 1 0  0 0 0 1</matrix>{second}</node></node>
+<node id="mirror"><matrix>-1 0 0 0  0 1 0 0  0 0 1 -300  0 0 0 1</matrix>{second}</node>
+</visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#scene"/></scene></COLLADA>"""
+
+EFFECT = """<effect id="e{0}"><profile_COMMON><technique sid="t"><lambert><diffuse>
+<color>{1}</color></diffuse></lambert></technique></profile_COMMON></effect>"""
+
+INSTANCE = """<instance_geometry url="#cube"><bind_material><technique_common>
+<instance_material symbol="look" target="#m{}"/></technique_common></bind_material>
+</instance_geometry>"""
+
+
+def write_dae(path, size=(20, 40, 60), colours=("1 0 0 1", "0 0.4 0.8 1")):
+    """Three boxes [mm] in nodes: one red, two blue, of which one mirrored."""
+    mesh = box(size)
+    path.write_text(
+        DAE.format(
+            effects="".join(EFFECT.format(k, colour) for k, colour in enumerate(colours)),
+            materials="".join(
+                f'<material id="m{k}"><instance_effect url="#e{k}"/></material>' for k in (0, 1)
+            ),
+            places=" ".join(map(str, mesh.vertices.ravel())),
+            faces=" ".join(map(str, mesh.faces.ravel())),
+            first=INSTANCE.format(0),
+            second=INSTANCE.format(1),
+        )
+    )
+    return path
+
+
+def write_stl(path, mesh):
+    """A binary STL whose normals are zero."""
+    corners = mesh.vertices[mesh.faces].astype("<f4")
+    rows = b"".join(bytes(12) + corner.tobytes() + bytes(2) for corner in corners)
+    path.write_bytes(bytes(80) + struct.pack("<I", len(corners)) + rows)
+    return path
+
+
+def volume(mesh):
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    return float((np.cross(a, b) * c).sum() / 6)
+
+
+def bounds(*meshes):
+    vertices = np.concatenate([mesh.vertices for mesh in meshes])
+    return np.array([vertices.min(axis=0), vertices.max(axis=0)])
+
+
+def coal_mesh(mesh):
+    """A mesh for Coal's distances."""
+    shape = coal.BVHModelOBBRSS()
+    shape.beginModel(len(mesh.faces), len(mesh.vertices))
+    for corners in mesh.vertices[mesh.faces]:
+        shape.addTriangle(*corners)
+    shape.endModel()
+    return shape
+
+
+def distance_from(surface, points):
+    """Largest distance of points from a surface, by Coal [m]."""
+    ball, identity = coal.Sphere(1e-9), coal.Transform3s()
+    farthest = 0.0
+    for point in points:
+        request, result = coal.DistanceRequest(), coal.DistanceResult()
+        there = coal.Transform3s(np.eye(3), point)
+        farthest = max(farthest, coal.distance(surface, identity, ball, there, request, result))
+    return farthest
+
+
+class TestFiles:
+    def test_collada_has_nodes_units_and_colours(self, tmp_path):
+        pieces = read_mesh_file(write_dae(tmp_path / "a.dae"), (1, 1, 1))
+        by_place = {tuple(np.round(bounds(p.mesh).mean(axis=0), 6)): p for p in pieces}
+        assert set(by_place) == {(0.1, 0, 0), (0.1, 0.2, 0), (0, 0, -0.3)}
+        red, blue = by_place[0.1, 0, 0], by_place[0.1, 0.2, 0]
+        np.testing.assert_allclose(np.ptp(bounds(red.mesh), axis=0), (0.02, 0.04, 0.06), atol=1e-9)
+        np.testing.assert_allclose(np.ptp(bounds(blue.mesh), axis=0), (0.04, 0.02, 0.06), atol=1e-9)
+        assert (red.colour, blue.colour) == (0xFF0000, 0x0066CC)
+        for piece in pieces:  # the mirrored one, too, has its outside out
+            assert volume(piece.mesh) == pytest.approx(0.02 * 0.04 * 0.06)
+
+    def test_collada_lies_where_coal_reads_it(self, tmp_path):
+        """Its up axis counts for nothing, there as here; nor do units, there."""
+        path = write_dae(tmp_path / "a.dae")
+        loaded = coal.MeshLoader().load(str(path), np.array([1.0, 2.0, 0.5]))
+        pieces = read_mesh_file(path, (1, 2, 0.5))
+        expected = 0.001 * np.array(loaded.vertices())
+        found = bounds(*(piece.mesh for piece in pieces))
+        np.testing.assert_allclose(found, [expected.min(0), expected.max(0)], atol=1e-6)
+
+    def test_stl_without_normals(self, tmp_path):
+        path = write_stl(tmp_path / "a.stl", box((30, 20, 10)))
+        (piece,) = read_mesh_file(path, (0.001, 0.001, 0.001))
+        assert piece.colour is None
+        vertices, normals, faces = piece.mesh.with_normals()
+        assert len(faces) == 12
+        assert (np.abs(normals).max(axis=1) == 1).all()
+        assert ((normals * vertices).sum(axis=1) > 0).all()
+
+    def test_a_negative_scale_leaves_the_outside_out(self, tmp_path):
+        path = write_stl(tmp_path / "a.stl", box((1, 1, 1)))
+        assert volume(read_mesh_file(path, (1, -1, 1))[0].mesh) == pytest.approx(1)
+
+    @pytest.mark.parametrize("content", [b"", b"solid", b"<COLLADA>", bytes(84)])
+    @pytest.mark.parametrize("suffix", ["stl", "dae", "xyz"])
+    def test_what_cannot_be_read(self, tmp_path, content, suffix):
+        path = tmp_path / f"damaged.{suffix}"
+        path.write_bytes(content)
+        with pytest.raises(ArmError, match=f"mesh 'damaged.{suffix}' (cannot be read|has no)"):
+            read_mesh_file(path, (1, 1, 1))
+        with pytest.raises(ArmError, match="cannot read mesh 'none.stl': No such file"):
+            read_mesh_file(tmp_path / "none.stl", (1, 1, 1))
+
+
+class TestSimplification:
+    def fine(self) -> Mesh:
+        """A ball of 19,200 triangles."""
+        ball = capsule(0.0, 0.08)
+        for _ in range(2):
+            ball = self.refined(ball)
+        unit = ball.vertices / np.linalg.norm(ball.vertices, axis=1, keepdims=True)
+        return Mesh(0.08 * unit, ball.faces)
+
+    def refined(self, mesh):
+        """Each triangle as four."""
+        a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+        ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+        corners = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+        vertices = np.concatenate([np.stack(each, axis=1).reshape(-1, 3) for each in corners])
+        return Mesh(vertices, np.arange(len(vertices)).reshape(-1, 3)).welded()
+
+    def test_a_ball_stays_within_the_bound(self, tmp_path):
+        fine = self.fine()
+        path = write_stl(tmp_path / "ball.stl", fine)
+        (piece,) = read_mesh_file(path, (1, 1, 1))
+        assert len(piece.mesh.faces) < len(fine.faces) / 3
+        rng = np.random.default_rng(0)
+        some = fine.vertices[rng.choice(len(fine.vertices), 1000, replace=False)]
+        assert distance_from(coal_mesh(piece.mesh), some) < TOLERANCE
+        assert distance_from(coal_mesh(fine), piece.mesh.vertices) < TOLERANCE
+
+    def test_open_edges_stay(self, tmp_path):
+        flat = np.array([(x, y, 0.0) for x in range(6) for y in range(6)]) / 50
+        cells = [6 * x + y for x in range(5) for y in range(5)]
+        faces = np.array([(k, k + 6, k + 7) for k in cells] + [(k, k + 7, k + 1) for k in cells])
+        (piece,) = read_mesh_file(write_stl(tmp_path / "flat.stl", Mesh(flat, faces)), (1, 1, 1))
+        np.testing.assert_allclose(bounds(piece.mesh), bounds(Mesh(flat, faces)), atol=1e-7)
+        assert len(piece.mesh.faces) < 50
+
+
+class TestCache:
+    def test_files_are_read_once(self, tmp_path, monkeypatch):
+        path = write_dae(tmp_path / "a.dae", size=(21, 41, 61))
+        first = read_mesh_file(path, (1, 1, 1))
+        monkeypatch.setattr(mesh_files, "_pieces", lambda *_: pytest.fail("read again"))
+        again = read_mesh_file(path, (1, 1, 1))
+        for one, other in zip(first, again, strict=True):
+            assert one.colour == other.colour
+            np.testing.assert_array_equal(one.mesh.vertices, other.mesh.vertices)
+            np.testing.assert_array_equal(one.mesh.faces, other.mesh.faces)
+
+    def test_other_files_scales_and_versions_are_read(self, tmp_path, monkeypatch):
+        path = write_dae(tmp_path / "a.dae", size=(22, 42, 62))
+        size = np.ptp(bounds(read_mesh_file(path, (1, 1, 1))[0].mesh), axis=0)
+        twice = np.ptp(bounds(read_mesh_file(path, (2, 2, 2))[0].mesh), axis=0)
+        np.testing.assert_allclose(twice, 2 * size)
+        write_dae(path, size=(44, 84, 124))
+        other = np.ptp(bounds(read_mesh_file(path, (1, 1, 1))[0].mesh), axis=0)
+        np.testing.assert_allclose(other, 2 * size)
+
+    def test_it_works_where_nothing_can_be_kept(self, tmp_path, monkeypatch):
+        (tmp_path / "file").write_text("no folder")
+        monkeypatch.setenv("KINARM_CACHE", str(tmp_path / "file" / "below"))
+        assert len(read_mesh_file(write_dae(tmp_path / "a.dae"), (1, 1, 1))) == 3
+
+
+class TestColours:
+    def test_universal_robots_are_not_dimmed(self, tmp_path):
+        path = tmp_path / "ur_description" / "a.dae"
+        for passes in (1, 2, 3):
+            dimmed = 0.8**passes * np.array([0.49, 0.678, 0.8])
+            assert packed_colour(original_colour(path, dimmed)) == 0x7DADCC
+            np.testing.assert_array_equal(original_colour(tmp_path / "a.dae", dimmed), dimmed)
+        other = np.array([0.9, 0.1, 0.1])
+        np.testing.assert_array_equal(original_colour(path, other), other)
+
+    def test_white_reflects_less_than_all(self):
+        assert 0xD0D0D0 < shape_finish(0xFFFFFF).colour < 0xE8E8E8
+        assert shape_finish(0).colour == 0
+
+    def test_which_colour_counts(self, tmp_path, make_joint, write_robot):
+        """A file of several colours keeps them, else the URDF's goes before; the first one wins."""
+        many = write_dae(tmp_path / "many.dae")
+        one = write_dae(tmp_path / "one.dae", colours=("1 0 0 1", "1 0 0 1"))
+        plain = write_stl(tmp_path / "plain.stl", box((0.1, 0.1, 0.1)))
+        green = '<material name="g"><color rgba="0 1 0 1"/></material>'
+        grey = '<material name="g"><color rgba="0.5 0.5 0.5 1"/></material>'
+        named = '<material name="g"/>'
+        visuals = [
+            (many, green),
+            (one, named),
+            (one, ""),
+            (plain, named),
+            (plain, ""),
+            (plain, grey),
+        ]
+        shapes = {
+            k: f'<visual><geometry><mesh filename="{path}"/></geometry>{look}</visual>'
+            for k, (path, look) in enumerate(visuals)
+        }
+        arm = Arm.load(write_robot([make_joint()] * 5, shapes))
+        found = {}
+        for part in visual_parts(arm):
+            found.setdefault(part.joint, set()).add(part.finish.colour)
+        red, blue, lime, middle = (
+            shape_finish(colour).colour for colour in (0xFF0000, 0x0066CC, 0x00FF00, 0x808080)
+        )
+        assert [found[k] for k in (0, 1, 2, 3, 5)] == [{red, blue}, {lime}, {red}, {lime}, {middle}]
+        assert found[4] not in ({lime}, {middle})
+
+
+class TestWithoutTheExtra:
+    def test_collision_shapes_are_shown_and_it_is_said(self, simulators, monkeypatch, caplog):
+        def missing(name):
+            raise mesh_files.metadata.PackageNotFoundError(name)
+
+        monkeypatch.setattr(mesh_files.metadata, "version", missing)
+        with pytest.raises(MissingExtraError):
+            mesh_files._versions()
+        arm = Arm.load(simulators["mesh"].arm.specification)
+        path = next(iter(simulators["mesh"].arm.urdf_path.parent.glob("*.stl")))
+        monkeypatch.setattr(
+            "kinarm.viewer.arm_shapes.visual_parts", lambda _: read_mesh_file(path, (1, 1, 1))
+        )
+        parts = arm_parts(arm)
+        assert len(parts) == len(collision_parts(arm)) + 1
+        assert [record.getMessage() for record in caplog.records] == [
+            f"{arm.name} is shown by its collision shapes: trimesh is not installed: "
+            "pip install 'kinarm[robots]'"
+        ]
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+class TestRobots:
+    def test_pages_are_small(self, name):
+        page = arm_page(name)
+        assert len(page.html.encode()) < 5_000_000
+        parts = arm_parts(Arm.load(name))
+        assert {part.joint for part in parts} == set(range(Arm.load(name).n_joints + 1))
+        assert sum(len(part.mesh.faces) for part in parts) < 200_000
+
+    def test_meshes_lie_where_pinocchio_puts_them(self, name):
+        """Of the part of the file that Pinocchio reads, by joint."""
+        arm = Arm.load(name)
+        geometry = pin.buildGeomFromUrdfString(
+            arm.model, arm.description.text, pin.GeometryType.VISUAL, package_dirs=[]
+        )
+        ours = {joint: [] for joint in range(arm.n_joints + 1)}
+        for part in visual_parts(arm):
+            ours[part.joint].append(part.mesh)
+        for shape in geometry.geometryObjects:
+            vertices = np.array(shape.geometry.vertices()) @ shape.placement.rotation.T
+            theirs = bounds(Mesh(vertices + shape.placement.translation, np.zeros((0, 3), int)))
+            whole = bounds(*ours[shape.parentJoint])
+            assert (theirs[0] > whole[0] - 2 * TOLERANCE).all(), shape.name
+            assert (theirs[1] < whole[1] + 2 * TOLERANCE).all(), shape.name
+
+    def test_meshes_fill_the_collision_shapes(self, name):
+        """Links look about as large as what decides about contact."""
+        arm = Arm.load(name)
+        for joint in range(1, arm.n_joints + 1):
+            seen = [part.mesh for part in visual_parts(arm) if part.joint == joint]
+            touched = [part.mesh for part in collision_parts(arm) if part.joint == joint]
+            if touched:
+                np.testing.assert_allclose(bounds(*seen), bounds(*touched), atol=0.12)
