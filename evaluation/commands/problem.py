@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kinarm._command_line import Command, run_commands
+from kinarm._command_line import Command, print_table, run_commands
 from kinarm._files import check_output, write_atomically, write_text
 from kinarm._validation import whole_number
 from kinarm.problem_files import problem_names
@@ -23,6 +23,8 @@ examples:
   kinarm-problem show --arm ur5 --scene ring > mine.toml  parts put together
   kinarm-problem check mine.toml --picture mine.png       what can be reached, and what touches
 """
+
+HEADINGS = ("problem", "arm", "obstacles", "goals", "step [s]", "tolerance [m]")
 
 PICTURE_SIZE = 960, 640
 
@@ -128,23 +130,24 @@ def write_picture(path: Path, problem: "ReachProblem") -> None:
     write_atomically(path, lambda file: imsave(file, taken, format="png"))
 
 
-def _list(_: ListRequest) -> None:
-    from kinarm._command_line import print_table
+def rows() -> list[tuple[str, ...]]:
+    """A row for each problem that ships, under `HEADINGS`."""
     from kinarm.problem import ReachProblem
 
-    print_table(
-        ("problem", "arm", "obstacles", "goals", "step [s]", "tolerance [m]"),
-        [
-            (
-                *(problem.name, problem.arm.name),
-                ", ".join(each.name for each in problem.scene.obstacles) or "none",
-                ", ".join(problem.task.goal_regions),
-                f"{problem.stepping.time_step:g}",
-                f"{problem.task.tolerance:g}",
-            )
-            for problem in map(ReachProblem.load, problem_names())
-        ],
-    )
+    return [
+        (
+            *(problem.name, problem.arm.name),
+            ", ".join(each.name for each in problem.scene.obstacles) or "none",
+            ", ".join(problem.task.goal_regions),
+            f"{problem.stepping.time_step:g}",
+            f"{problem.task.tolerance:g}",
+        )
+        for problem in map(ReachProblem.load, problem_names())
+    ]
+
+
+def _list(_: ListRequest) -> None:
+    print_table(HEADINGS, rows())
 
 
 def _show(request: ShowRequest) -> None:

@@ -33,22 +33,20 @@ name = "box"
 lower = [-0.3, -0.3, 0.0]
 upper = [0.3, 0.3, 0.6]
 """
-LOW = """
-[[scene.obstacles]]
-name = "lid"
-lower = [0.2, -2.0, 0.0]
-upper = [2.0, 2.0, 2.0]
-[[scene.obstacles]]
-name = "back"
-lower = [-2.0, -2.0, 0.0]
-upper = [-0.2, 2.0, 2.0]
-[[scene.obstacles]]
-name = "roof"
-lower = [-0.2, -2.0, 0.52]
-upper = [0.2, 2.0, 2.0]
-[task]
-goal_regions = ["right"]
-"""
+
+
+def wall(name, lower, upper):
+    return f'[[scene.obstacles]]\nname = "{name}"\nlower = {lower}\nupper = {upper}\n'
+
+
+SHAFT = (
+    wall("front", [0.2, -2.0, 0.0], [2.0, 2.0, 2.0])
+    + wall("back", [-2.0, -2.0, 0.0], [-0.2, 2.0, 2.0])
+    + wall("left", [-0.2, 0.2, 0.0], [0.2, 2.0, 2.0])
+    + wall("right", [-0.2, -2.0, 0.0], [0.2, -0.2, 2.0])
+    + wall("roof", [-0.2, -0.2, 0.47], [0.2, 0.2, 2.0])
+    + '[[scene.goal_regions]]\nname = "right"\nlower = [-0.1, -0.1, 3.0]\nupper = [0.1, 0.1, 3.0]\n'
+)
 
 
 @pytest.fixture
@@ -134,7 +132,7 @@ def test_training_says_when_many_goals_are_out_of_reach(run, write):
     ("text", "words"),
     [
         (AROUND, ["cannot move", "shoulder touches box"]),
-        (LOW, ["cannot move", "and roof"]),
+        (SHAFT, ["cannot move: it touches something at all of 2000"]),
         ("[[scene.obstacles]\n", ["line 1, column 18"]),
         ('arm = "nobody"', ["'nobody'", "panda"]),
         ('arm = "gone.urdf"', ["gone.urdf", "does not exist"]),
