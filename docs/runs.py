@@ -65,6 +65,10 @@ class Page:
             raise ExtensionError(f"{self._source}:{line}: commands failed: {ended.stderr}")
         return ended.stdout
 
+    def write(self, name: str, text: str) -> None:
+        """Write a file that later blocks use."""
+        Path(self._folder.name, name).write_text(f"{text}\n", encoding="utf-8")
+
     def read(self, name: str) -> bytes:
         """Read a file that a block made."""
         return Path(self._folder.name, name).read_bytes()
@@ -84,15 +88,22 @@ def shown(name: str, content: bytes) -> str:
 
 
 class KinarmRun(SphinxDirective):
-    """Show Python or command lines (``sh``), run them, and show what they printed and made."""
+    """Show Python or command lines (``sh``), run them, and show what they printed and made.
+
+    What has an option ``file`` is written to that file instead, for the blocks after it.
+    """
 
     has_content = True
     required_arguments = 1
-    option_spec = {"shows": directives.unchanged}  # noqa: RUF012
+    option_spec = {"shows": directives.unchanged, "file": directives.unchanged}  # noqa: RUF012
 
     def run(self) -> list[nodes.Node]:
         language, code = self.arguments[0], "\n".join(self.content)
         page = self._page()
+        if name := self.options.get("file"):
+            page.write(name, code)
+            title = nodes.paragraph("", "", nodes.literal(name, name), classes=["file-name"])
+            return [title, nodes.literal_block(code, code, language=language)]
         run = {"python": page.run_python, "sh": page.run_commands}[language]
         printed = run(code, self.lineno + self.content_offset + 1)
         found: list[nodes.Node] = [nodes.literal_block(code, code, language=language)]

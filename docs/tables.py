@@ -9,11 +9,12 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from kinarm import PROBLEMS, REWARD_TERMS, Arm, RewardWeights, Scene, Simulator, arm_names
+from kinarm import PROBLEMS, REWARD_TERMS, Arm, RewardWeights, Scene, Simulator
 from kinarm._fields import init_fields, summary_of
 from kinarm.capsules import enclosing_capsule
 from kinarm.envs.registration import ENVIRONMENTS
 from kinarm.evaluation import METRICS
+from kinarm.evaluation.commands import arms, problem
 from kinarm.evaluation.commands.bench import BenchmarkRequest
 from kinarm.evaluation.commands.compare import ComparisonRequest
 from kinarm.evaluation.commands.evaluate import EvaluationRequest
@@ -63,23 +64,17 @@ def capsule_table(name: str) -> str:
 
 
 def arms_table() -> str:
-    """The shipped arms beside each other."""
-    rows = []
-    for name in arm_names():
-        arm = Arm.load(name)
-        links = np.linalg.norm(arm.chain.translation, axis=1)
-        rows.append(
-            [
-                f"`{name}`",
-                numbers(links[2:3]),
-                numbers(links[3:4]),
-                numbers(arm.chain.tool[:1]),
-                numbers(arm.tool_position(arm.home)),
-                numbers(np.rad2deg(arm.model.velocityLimit)),
-            ]
-        )
-    header = ["arm", "joint 2 to 3 [m]", "joint 3 to 4 [m]", "tool [m]", "tool point at zero [m]"]
-    return markdown([*header, "velocity limits [deg/s]"], rows)
+    """The arms that have a name."""
+    rows = [[f"`{name}`", *others] for name, *others, _ in arms.ListRequest().rows()]
+    return markdown(arms.HEADINGS[:-1], rows)
+
+
+def shipped_problems_table() -> str:
+    """The problems that ship, but for the paper's."""
+    return markdown(
+        problem.HEADINGS,
+        [[f"`{name}`", *others] for name, *others in problem.rows() if name not in PROBLEMS],
+    )
 
 
 def scene_table() -> str:
@@ -192,6 +187,7 @@ TABLES = {
     "arm": lambda: arm_table("paper"),
     "capsules": lambda: capsule_table("paper"),
     "arms": arms_table,
+    "shipped-problems": shipped_problems_table,
     "scene": scene_table,
     "problems": problems_table,
     "reward": reward_table,

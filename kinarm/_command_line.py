@@ -7,10 +7,10 @@ import os
 import re
 import shlex
 import sys
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import MISSING, Field, is_dataclass
 from pathlib import Path
-from typing import Any, Literal, NoReturn, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, Literal, NamedTuple, NoReturn, TypeVar, get_args, get_origin, get_type_hints
 
 from kinarm._fields import alternatives, expected, init_fields, summary_of
 from kinarm.errors import KinarmError
@@ -96,7 +96,8 @@ def add_options(
 
     Names, types and help come from the dataclass and its docstring. A field's metadata may hold
     ``flag`` (another name of the option, or one without dashes for a positional argument),
-    ``metavar``, and ``repeat`` (a tuple is collected from repetitions of the option). The fields
+    ``metavar``, ``repeat`` (a tuple is collected from repetitions of the option), and ``names`` (a
+    function that lists the names that an option takes, for its help). The fields
     of a nested dataclass get its name as a prefix, such as ``--reward-success``. If ``negatable``,
     there is an option ``--no-x`` also for what is false by default.
     """
@@ -119,7 +120,7 @@ def _add_option(
             _add_option(parser, hint, inner, f"{prefix}{item.name}.", negatable=True)
         return
     name = f"{prefix}{item.name}"
-    flag = item.metadata.get("flag", "--" + re.sub(r"[._]", "-", name))
+    flag = option_name(item, prefix)
     options: dict[str, Any] = {"default": argparse.SUPPRESS, "help": _help(kind, item)}
     if flag.startswith("--"):
         options["dest"] = name
@@ -143,6 +144,12 @@ def _add_option(
     parser.add_argument(flag, type=_parser_of(hint), **options)
 
 
+def option_name(item: Field[Any], prefix: str = "") -> str:
+    """What the option of a field is called."""
+    usual = "--" + re.sub(r"[._]", "-", f"{prefix}{item.name}")
+    return str(item.metadata.get("flag", usual))
+
+
 METAVARS = {int: "N", float: "X", Path: "FILE"}
 
 
@@ -150,6 +157,8 @@ def _help(kind: type, item: Field[Any]) -> str:
     """Description of a field and its default, as argparse formats it."""
     default = item.default
     said = summary_of(kind, item.name).replace("`", "")
+    if "names" in item.metadata:
+        said = f"{said.removesuffix('.')}. Names: {', '.join(item.metadata['names']())}."
     if isinstance(default, bool) or default in (None, (), MISSING):
         return said.replace("%", "%%")
     shown = " ".join(map(str, default)) if isinstance(default, tuple) else default
@@ -222,3 +231,67 @@ def run_request(
     add_options(parser, kind, skip=skip)
     command = shlex.join([prog, *typed])
     run_command(prog, lambda: report(request_of(parser.parse_args(typed), kind), command))
+
+
+class Command(NamedTuple):
+    """One of several commands of a program.
+
+    Attributes
+    ----------
+    kind : type
+        Its request, a dataclass; the first line of its docstring says what it does.
+    report : callable
+        Runs a request and prints what it came to.
+    """
+
+    kind: type
+    report: Callable[[Any], None]
+
+
+def run_commands(
+    prog: str,
+    description: str,
+    commands: Mapping[str, Command],
+    arguments: Sequence[str] | None,
+    *,
+    epilog: str = "",
+) -> NoReturn:
+    """Run a command line whose first word is one of several commands; see `run_command`.
+
+    Parameters
+    ----------
+    prog : str
+        Name of the program.
+    description : str
+        What it is for.
+    commands : mapping
+        The commands by name.
+    arguments : sequence of str, optional
+        What is typed after the name; by default that of this process.
+    epilog : str
+        What help ends with.
+    """
+    parser = Parser(prog=prog, description=description, epilog=epilog)
+    parsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for name, command in commands.items():
+        said = (command.kind.__doc__ or "").partition("\n")[0]
+        add_options(parsers.add_parser(name, help=said, description=said), command.kind)
+
+    def run() -> None:
+        options = parser.parse_args(arguments)
+        command = commands[options.command]
+        command.report(request_of(options, command.kind))
+
+    run_command(prog, run)
+
+
+def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Print a table on standard output, as wide as the terminal, or as it is if that is none."""
+    from rich.table import Table
+
+    from kinarm._console import open_console
+
+    table = Table(*headings, box=None, header_style="bold", pad_edge=False)
+    for row in rows:
+        table.add_row(*row)
+    open_console(piped_width=1000).print(table)

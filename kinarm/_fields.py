@@ -67,13 +67,18 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     InvalidInputError
         If the file, called ``what``, cannot be read or is no TOML; says where.
     """
-    name = str(path)
+    name, text = str(path), ""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        return tomllib.loads(text)
     except OSError as error:
         raise InvalidInputError(f"cannot read {what} {name!r}: {error.strerror}") from error
     except (ValueError, RecursionError) as error:
-        raise InvalidInputError(f"{name}: not a {what} file: {first_line(error)}") from error
+        *_, last = lines = text.split("\n")
+        end = f"at line {len(lines)}, column {len(last) + 1}"
+        reason = first_line(error).replace("at end of document", end)
+        article = "an" if what[0] in "aeiou" else "a"
+        raise InvalidInputError(f"{name}: not {article} {what} file: {reason}") from error
 
 
 def take_base(entries: dict[str, Any], where: str, bases: Collection[str], default: str) -> str:

@@ -7,7 +7,7 @@ which the compiled simulator proves that most configurations need no judge.
 
 import warnings
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import NamedTuple
 
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from kinarm.arm import Arm
 from kinarm.contact_shapes import BETWEEN_CAPSULES, WITH_BOX, WITH_GROUND, ContactShapes
+from kinarm.errors import ProblemError
 from kinarm.scene import Scene
 
 CLOSE, OFTEN, CLOSENESS_SAMPLES = 0.025, 0.05, 200
@@ -61,12 +62,17 @@ class ContactModel:
         Shapes of arm and scene, and the pairs.
     body_names : tuple of str
         Readable name of each shape in `geometry`.
+    shapes : ContactShapes
+        The same pairs for the kernels.
+    left_out : dict
+        Why a pair is left out that moves against each other, by the names of its bodies.
     """
 
     arm: Arm
     geometry: pin.GeometryModel
     body_names: tuple[str, ...]
     shapes: ContactShapes
+    left_out: dict[tuple[str, str], str]
 
     def __post_init__(self) -> None:
         for array in self.shapes:
@@ -74,7 +80,13 @@ class ContactModel:
 
     @classmethod
     def build(cls, arm: Arm, scene: Scene) -> "ContactModel":
-        """Place an arm in a scene and choose the pairs to test."""
+        """Place an arm in a scene and choose the pairs to test.
+
+        Raises
+        ------
+        ProblemError
+            If the first link touches an obstacle wherever its joint is.
+        """
         geometry = arm.geometry.copy()
         n_shapes = geometry.ngeoms
         _add_scene(geometry, scene)
@@ -82,7 +94,8 @@ class ContactModel:
         candidates = _candidate_pairs(arm, geometry, n_shapes, len(scene.obstacles))
         for first, second, _ in candidates:
             geometry.addCollisionPair(pin.CollisionPair(first, second))
-        dropped = _uninformative_pairs(arm, geometry, n_shapes)
+        names = (*body_names(arm), *surroundings)
+        dropped = _uninformative_pairs(arm, geometry, n_shapes, names)
         kept = [pair for index, pair in enumerate(candidates) if index not in dropped]
         geometry.removeAllCollisionPairs()
         for first, second, _ in kept:
@@ -90,8 +103,12 @@ class ContactModel:
         return cls(
             arm=arm,
             geometry=geometry,
-            body_names=(*body_names(arm), *surroundings),
+            body_names=names,
             shapes=ContactShapes.build(arm, scene, kept, n_shapes, _close_pairs(arm, geometry)),
+            left_out={
+                (names[candidates[index][0]], names[candidates[index][1]]): reason
+                for index, reason in sorted(dropped.items())
+            },
         )
 
     @cached_property
@@ -176,7 +193,7 @@ class ContactModel:
         return next(index for index, result in enumerate(results) if result.isCollision())
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
-        return type(self), (self.arm, self.geometry, self.body_names, self.shapes)
+        return type(self), tuple(getattr(self, item.name) for item in fields(self))
 
 
 def make_verdicts_reliable(data: pin.GeometryData) -> pin.GeometryData:
@@ -250,11 +267,13 @@ def _touching(
     return {index for index in pairs if pin.computeCollision(geometry, geometry_data, index)}
 
 
-def _uninformative_pairs(arm: Arm, geometry: pin.GeometryModel, n_shapes: int) -> set[int]:
-    """Pairs within the arm that touch at home, and pairs of the mounting.
+def _uninformative_pairs(
+    arm: Arm, geometry: pin.GeometryModel, n_shapes: int, names: tuple[str, ...]
+) -> dict[int, str]:
+    """Pairs within the arm that touch at home, and pairs of the mounting, with the reason.
 
-    The mounting is the first link against the world, where it touches everywhere or nowhere
-    along the range of the first joint, which is sampled at 721 positions.
+    The mounting is the first link against the world, where it touches nowhere along the range of
+    the first joint, which is sampled at 721 positions, or the ground everywhere.
     """
     data, geometry_data = arm.model.createData(), make_verdicts_reliable(geometry.createData())
     pairs, objects = list(geometry.collisionPairs), geometry.geometryObjects
@@ -272,7 +291,17 @@ def _uninformative_pairs(arm: Arm, geometry: pin.GeometryModel, n_shapes: int) -
         now = _touching(arm, geometry, q, data, geometry_data, mounting)
         always &= now
         never -= now
-    return always | never | resting
+    for index in sorted(always):
+        if not isinstance(objects[pairs[index].second].geometry, coal.Halfspace):
+            raise ProblemError(
+                f"arm {arm.name!r} cannot move: {names[pairs[index].first]} touches "
+                f"{names[pairs[index].second]} wherever the first joint is"
+            )
+    return {
+        **dict.fromkeys(resting, "touch at home"),
+        **dict.fromkeys(always, "the mounting: always touch"),
+        **dict.fromkeys(never, "never touch, wherever the first joint is"),
+    }
 
 
 def _close_pairs(arm: Arm, geometry: pin.GeometryModel) -> set[int]:

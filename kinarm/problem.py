@@ -82,6 +82,8 @@ class ReachProblem:
     ------
     UnknownNameError
         If the scene has no goal region that the task names.
+    ProblemError
+        If such a region lies inside an obstacle.
     """
 
     name: str
@@ -100,6 +102,9 @@ class ReachProblem:
         for name in self.task.goal_regions:
             if name not in available:
                 raise UnknownNameError("goal region in task.goal_regions:", name, available)
+            obstacle = self.scene.obstacle_around(self.scene.goal_region(name))
+            if obstacle is not None:
+                raise ProblemError(f"goal region {name!r} lies inside obstacle {obstacle.name!r}")
 
     def __repr__(self) -> str:
         goals = " and ".join(self.task.goal_regions)

@@ -1,11 +1,16 @@
 """Which problem: the options that all commands and their requests share."""
 
-from dataclasses import dataclass
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from kinarm._fields import init_fields
+from kinarm.arm_specification import arm_names
+from kinarm.problem_files import problem_names, scene_names
 
 if TYPE_CHECKING:
+    from kinarm.arm import Arm
     from kinarm.problem import ProblemLike, ReachProblem
 
 
@@ -16,13 +21,17 @@ class ProblemOptions:
     Parameters
     ----------
     problem : str
-        Left, right, both, or a problem file.
+        A problem by name, or a problem file.
     arm : str
-        Another arm: its name, or a URDF.
+        Another arm: its name, a URDF, or an arm file.
+    tool_frame : str
+        Link of the arm whose origin is the tool point.
+    package_dirs : tuple of str
+        Folder of packages that package:// meshes of a URDF are in; repeatable.
     task : str
         The task of another problem, by its name or file.
     scene : str
-        The scene of another problem, by its name or file.
+        Another scene, by its name or that of a problem, or a file.
     tolerance : float
         Distance at which a goal counts as reached [m].
     horizon : int
@@ -31,10 +40,14 @@ class ProblemOptions:
         Scales the range of the start configurations, from 0 (home) to 1 (all).
     """
 
-    problem: str | None = None
-    arm: str | None = None
+    problem: str | None = field(default=None, metadata={"names": problem_names})
+    arm: str | None = field(default=None, metadata={"names": arm_names})
+    tool_frame: str | None = None
+    package_dirs: tuple[str, ...] = field(
+        default=(), metadata={"flag": "--package-dir", "metavar": "FOLDER", "repeat": True}
+    )
     task: str | None = None
-    scene: str | None = None
+    scene: str | None = field(default=None, metadata={"names": scene_names})
     tolerance: float | None = None
     horizon: int | None = None
     start_spread: float | None = None
@@ -47,10 +60,34 @@ class ProblemOptions:
         KinarmError
             If a name or file cannot be used, or a number is out of range.
         """
-        from kinarm.problem import ReachProblem  # loads Pinocchio: --help does without
+        from kinarm.problem import ReachProblem
 
         changed = {name: getattr(self, name) for name in init_fields(ProblemOptions)}
         named = changed.pop("problem")
         if named is None and self.task is not None:
             named = changed.pop("task")
-        return ReachProblem.load(named or default).replace(**changed)
+        problem = ReachProblem.load(named or default)
+        for name in ("arm", "tool_frame", "package_dirs"):
+            del changed[name]
+        return problem.replace(arm=self._arm(problem), **changed)
+
+    def _arm(self, problem: "ReachProblem") -> "Arm | None":
+        """The arm that the options make of that of a problem, if they say anything of it."""
+        from kinarm.arm import Arm  # loads Pinocchio: --help does without
+
+        given = {"tool_frame": self.tool_frame, "package_dirs": self.package_dirs or None}
+        given = {name: value for name, value in given.items() if value is not None}
+        if self.arm is not None:
+            return Arm.load(self.arm, **given)
+        return Arm.load(replace(problem.arm, digest=None), **given) if given else None
+
+
+def say_choices(problems: "Iterable[ReachProblem]") -> None:
+    """Say on standard error what was chosen where a URDF says nothing, a line for each arm."""
+    for specification in dict.fromkeys(problem.arm for problem in problems):
+        if specification.source not in arm_names():
+            from kinarm.arm import Arm
+
+            notes = Arm.load(specification).description.notes
+            if notes:
+                sys.stderr.write(f"arm {specification.name}: {'; '.join(notes)}\n")

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,9 @@ from kinarm._fields import OPTIONAL, check_fields
 from kinarm.errors import ProblemError, UnknownNameError
 
 Point = tuple[float, float, float]
+
+ROUNDING = 1e-12
+"""Lengths that differ by less are the same [m]."""
 
 
 def _check_box(what: str, lower: Point, upper: Point, *, flat: bool) -> None:
@@ -218,3 +222,17 @@ class Scene:
             if region.name == name:
                 return region
         raise UnknownNameError("goal region", name, (region.name for region in self.goal_regions))
+
+    def obstacle_around(self, region: GoalRegion) -> Obstacle | None:
+        """The first obstacle that a goal region lies inside of, all of it; None if there is none.
+
+        What lies on an obstacle's face is not inside.
+        """
+        corners = np.array(list(product(*zip(region.lower, region.upper, strict=True))))
+        for obstacle in self.obstacles:
+            offsets = np.abs((corners - obstacle.centre) @ obstacle.rotation)
+            middle = np.abs((corners.mean(axis=0) - obstacle.centre) @ obstacle.rotation)
+            half = obstacle.size / 2
+            if (offsets <= half + ROUNDING).all() and (middle < half - ROUNDING).all():
+                return obstacle
+        return None

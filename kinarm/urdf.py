@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from kinarm._files import first_line
 from kinarm.arm_specification import PACKAGE, ArmSpecification, arm_names
-from kinarm.errors import ArmError, UnknownNameError
+from kinarm.errors import ArmError, InvalidInputError, UnknownNameError
 
 USUAL_TOOL = "tool0"
 """Name of the tool frame by ROS's convention."""
@@ -126,6 +126,8 @@ def read_urdf(path: Path, specification: ArmSpecification) -> Description:
     robot = _parsed(path)
     try:
         return _reduced(robot, path, specification)
+    except InvalidInputError:
+        raise
     except ValueError as error:
         raise ArmError(f"{path.name} is not a readable URDF: {first_line(error)}") from error
 

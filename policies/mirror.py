@@ -10,17 +10,23 @@ other. Any other network does so if it sees goals on the left in the mirror; see
 import math
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
+from kinarm.contact_statistics import random_configurations
 from kinarm.errors import InvalidInputError
 from kinarm.networks import Mirror
 from kinarm.observation import observation_signs
 from kinarm.problem import ReachProblem
-from kinarm.scene import Point
+from kinarm.scene import Obstacle, Point
 from kinarm.world import World
 
 TESTED_CONFIGURATIONS = 16
 ACCURACY = 1e-9
+MIRRORED_CONFIGURATIONS = 2000
+"""Configurations at which `mirror_findings` compares contact."""
+
+REFLECTION = (1.0, -1.0, 1.0)
 
 
 def commuting_weights(mirror: Mirror) -> NDArray[np.bool_]:
@@ -57,8 +63,58 @@ def _is_mirror(mirror: Mirror, axes: NDArray[np.float64], world: World) -> bool:
     q = rng.uniform(arm.lower, arm.upper, (TESTED_CONFIGURATIONS, arm.n_joints))
     goals = rng.normal(size=(TESTED_CONFIGURATIONS, 3))
     seen = world.observe(q, goals)
-    reflected = world.observe(axes * q, goals * (1.0, -1.0, 1.0))
+    reflected = world.observe(axes * q, goals * REFLECTION)
     return np.allclose(reflected, seen * mirror.observations, rtol=0, atol=ACCURACY)
+
+
+def mirror_findings(world: World) -> dict[str, str]:
+    """What stands against reflecting arm, scene and task about the x-z plane.
+
+    Joints that turn about y, or slide across it, keep their sign; that is looked at where all
+    joints are at zero. Joints that are not actuated stay at home.
+
+    Returns
+    -------
+    dict
+        ``kinematics``, ``limits``, ``contact``, ``scene`` and ``observations`` (whether the mirror
+        image of an observation differs from it by signs alone, which symmetric policies build on):
+        a reason, or an empty text where it holds.
+    """
+    arm = world.arm
+    axes, moved = _axis_signs(world)[: arm.n_actuated], slice(arm.n_actuated)
+    q = random_configurations(world.contact_model, MIRRORED_CONFIGURATIONS)
+    lower, upper = arm.lower[moved], arm.upper[moved]
+    beyond = np.abs(np.sort([axes * lower, axes * upper], axis=0) - [lower, upper]).max(axis=0)
+    uneven = [arm.joint_names[joint] for joint in np.flatnonzero(beyond > ACCURACY)]
+    mirrored = q.copy()
+    mirrored[:, moved] *= axes
+    tools, touching = world.screen(q)
+    reflected, touching_there = world.screen(mirrored)
+    apart = np.abs(reflected - tools * REFLECTION).max()
+    differing = (touching != touching_there).mean()
+    found = {
+        "kinematics": f"tool points differ by up to {apart:.3g} m" if apart > ACCURACY else "",
+        "limits": f"those of {', '.join(uneven)} are uneven" if uneven else "",
+        "contact": f"differs at {differing:.1%} of {len(q)} configurations" if differing else "",
+        "scene": "" if is_symmetric(world.problem) else "obstacles or goals are not their image",
+        "observations": "",
+    }
+    try:
+        find_mirror(world)
+    except InvalidInputError:
+        found["observations"] = "joint frames are not their image"
+    return found
+
+
+def _axis_signs(world: World) -> NDArray[np.float64]:
+    """Signs that the reflection gives to the joints, shape (n_joints,)."""
+    model, chain = world.arm.model, world.arm.chain
+    data = model.createData()
+    pin.forwardKinematics(model, data, np.zeros(model.nq))
+    turned = zip(list(data.oMi)[1:], chain.axis, strict=True)
+    across = np.array([abs((pose.rotation @ axis)[1]) > 0.5 for pose, axis in turned])
+    signs: NDArray[np.float64] = np.where(across ^ chain.prismatic, 1.0, -1.0)
+    return signs
 
 
 def task_mirror(symmetric: bool, world: World) -> Mirror | None:
@@ -78,16 +134,18 @@ def is_symmetric(problem: ReachProblem) -> bool:
     weights = task.goal_weights or (1.0,) * len(task.goal_regions)
     regions = [scene.goal_region(name) for name in task.goal_regions]
     goals = {(region.lower, region.upper, w) for region, w in zip(regions, weights, strict=True)}
-    obstacles = {(each.lower, each.upper, _of_half_turn(each.yaw)) for each in scene.obstacles}
+    boxes = [(each, (each.lower, each.upper)) for each in scene.obstacles]
+    obstacles = {(*ends, _turned(box, box.yaw)) for box, ends in boxes}
     return goals == {(*_reflected(lower, upper), w) for lower, upper, w in goals} and (
-        obstacles
-        == {(*_reflected(lower, upper), _of_half_turn(-yaw)) for lower, upper, yaw in obstacles}
+        obstacles == {(*_reflected(*ends), _turned(box, -box.yaw)) for box, ends in boxes}
     )
 
 
-def _of_half_turn(yaw: float) -> float:
-    """The angle in [0, pi) by which a box looks the same, rounded [rad]."""
-    return round(yaw % math.pi, 9) % round(math.pi, 9)
+def _turned(box: Obstacle, yaw: float) -> float:
+    """The smallest angle at which a box looks as at another one, rounded [rad]."""
+    square = abs(box.size[0] - box.size[1]) < ACCURACY
+    turn = math.pi / 2 if square else math.pi
+    return round(yaw % turn, 9) % round(turn, 9)
 
 
 def _reflected(lower: Point, upper: Point) -> tuple[Point, Point]:

@@ -23,7 +23,7 @@ from kinarm.policies.learners import (
     run_training,
 )
 from kinarm.policies.recipes import recipe
-from kinarm.problem_options import ProblemOptions
+from kinarm.problem_options import ProblemOptions, say_choices
 
 if TYPE_CHECKING:
     from kinarm.policies.checkpoint import Checkpoint
@@ -99,6 +99,8 @@ class TrainRequest(ProblemOptions):
         """Train, with a checkpoint at a path."""
         from kinarm.policies.curve import write_curve
 
+        if state is None:
+            _say_reach(config)
         options = {} if self.tensorboard is None else {"tensorboard": self.tensorboard}
         training = begin_training(config, **options)
         keeper = CheckpointKeeper(config, path)
@@ -156,6 +158,22 @@ class TrainRequest(ProblemOptions):
             )
         self.resolve(default=config.problem).check_same(config.problem, f"{str(path)!r}")
         return checkpoint
+
+
+def _say_reach(config: "TrainingConfig") -> None:
+    """Say on standard error what was chosen for the arm, and whether many goals are out of reach.
+
+    The paper's problems are known.
+    """
+    from kinarm.policies.reachability import reach_warning
+    from kinarm.problem import PROBLEMS
+    from kinarm.world import World
+
+    say_choices([config.problem])
+    if config.problem.digest not in [known.digest for known in PROBLEMS.values()]:
+        line = reach_warning(World(config.problem))
+        if line is not None:
+            sys.stderr.write(f"{line}\n")
 
 
 def checkpoint_path(out: str | Path) -> Path:

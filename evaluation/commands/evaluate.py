@@ -12,7 +12,8 @@ from kinarm._console import open_console
 from kinarm._files import check_output, write_text
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
-from kinarm.problem_options import ProblemOptions
+from kinarm.problem_files import problem_names
+from kinarm.problem_options import ProblemOptions, say_choices
 
 if TYPE_CHECKING:
     from kinarm.evaluation.entrants import Entrant
@@ -53,7 +54,7 @@ class EvaluationRequest(ProblemOptions):
         Stable-Baselines3's model.zip (runs its code: only if you trust it), or module:function;
         repeatable; by default all shipped ones, random and zero.
     problems : tuple of str
-        Left, right, both, or a problem file; repeatable. ``problem`` is for a single one.
+        A problem by name, or a problem file; repeatable. ``problem`` is for a single one.
     trials : int
         Trials a problem.
     seed : int
@@ -87,7 +88,13 @@ class EvaluationRequest(ProblemOptions):
         default=(), metadata={"flag": "--policy", "metavar": "NAME_OR_FILE", "repeat": True}
     )
     problems: tuple[str, ...] = field(
-        default=(), metadata={"flag": "--problem", "metavar": "NAME_OR_FILE", "repeat": True}
+        default=(),
+        metadata={
+            "flag": "--problem",
+            "metavar": "NAME_OR_FILE",
+            "repeat": True,
+            "names": problem_names,
+        },
     )
     trials: int = 200
     seed: int = 0
@@ -172,6 +179,7 @@ class EvaluationRequest(ProblemOptions):
         for entrant, problem in pairs:
             entrant.check(arms[problem.name], allow_other_arm=self.allow_other_arm)
         self._check_outputs(pairs)
+        say_choices(problems.values())
         for name, problem in problems.items():
             trials = TrialSet.draw(problem, self.trials, self.seed)
             if self.oracle:

@@ -7,11 +7,12 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from kinarm._command_line import option_name
 from kinarm._console import open_console
 from kinarm._files import check_output
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
-from kinarm.problem_options import ProblemOptions
+from kinarm.problem_options import ProblemOptions, say_choices
 
 if TYPE_CHECKING:
     from kinarm.evaluation.replays.candidates import Runs
@@ -26,7 +27,10 @@ ALTERNATIVES = (("policy", "compare"), ("trial", "worst", "collisions"))
 """Fields of which one at most can be given."""
 
 NOT_LIVE = ("source", "compare", "trial", "worst", "collisions", "trials", "out", "record")
-NOT_FROM_FILE = ("task", "scene", "tolerance", "horizon", "start_spread", "seed", "trials")
+NOT_FROM_FILE = (
+    *("tool_frame", "package_dirs", "task", "scene", "tolerance", "horizon", "start_spread"),
+    *("seed", "trials"),
+)
 """Fields that mean nothing for the live page, and for trials from a file."""
 
 
@@ -119,9 +123,9 @@ class ReplayRequest(ProblemOptions):
 
     def _given(self, names: Sequence[str]) -> list[str]:
         """Options of the fields that are given."""
-        defaults = {item.name: item.default for item in fields(self)}
-        given = (name for name in names if getattr(self, name) != defaults[name])
-        return ["a file" if name == "source" else f"--{name.replace('_', '-')}" for name in given]
+        items = {item.name: item for item in fields(self)}
+        given = (items[name] for name in names if getattr(self, name) != items[name].default)
+        return ["a file" if item.name == "source" else option_name(item) for item in given]
 
     def run(self, report: Callable[[str], object] = lambda _: None) -> "ReplayPage | None":
         """Write the page, and the recordings if that is asked for; or serve the live page.
@@ -168,6 +172,8 @@ class ReplayRequest(ProblemOptions):
             check_output(self.record, overwrite=self.overwrite, suffix=".npz")
         with open_console(stderr=True).status("recording; the first run compiles"):
             runs = self.recordings()
+            if self.source is None:
+                say_choices([runs[0][0].problem])
             page = replay_page(runs[0], ghosts=runs[1] if len(runs) > 1 else ())
         if self.record is not None:
             save_recordings(self.record, [recording for run in runs for recording in run])
@@ -194,6 +200,7 @@ class ReplayRequest(ProblemOptions):
 
         entrant = first_entrant(self.policy, stated_problem(self))
         simulator = Simulator(faced_problem([entrant], self))
+        say_choices([simulator.problem])
         entrant.check(simulator.arm, allow_other_arm=self.allow_other_arm)
         fresh = fresh_recordings(entrant, simulator, self.seed or 0)
         # The first one loads and compiles what is needed before the page is announced.

@@ -8,8 +8,8 @@ KINDS = {
 }
 """Classes of the single environment and of the native batch."""
 
-TASKS = {"Left": "left", "Right": "right", "Both": "both"}
-"""Problems as they are called in ids."""
+TASKS = {"Left": "left", "Right": "right", "Both": "both", "": "right"}
+"""Problems as they are called in ids; the last id is for those that ``problem`` names."""
 
 ENVIRONMENTS = {
     f"kinarm/{kind}{task}-v0": problem for kind in KINDS for task, problem in TASKS.items()

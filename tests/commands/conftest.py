@@ -11,7 +11,7 @@ from typing import NamedTuple
 import pytest
 from oracle_calls import count_calls
 
-from kinarm.evaluation.commands import bench, compare, evaluate, replay, reproduce
+from kinarm.evaluation.commands import arms, bench, compare, evaluate, problem, replay, reproduce
 from kinarm.policies import Policy, recipe, train, train_policy
 from kinarm.problem import PROBLEMS
 
@@ -21,7 +21,9 @@ MODULES = {
     "kinarm-replay": "kinarm.evaluation.commands.replay",
     "kinarm-train": "kinarm.policies.train",
     "kinarm-bench": "kinarm.evaluation.commands.bench",
+    "kinarm-arms": "kinarm.evaluation.commands.arms",
     "kinarm-compare": "kinarm.evaluation.commands.compare",
+    "kinarm-problem": "kinarm.evaluation.commands.problem",
     "kinarm-reproduce": "kinarm.evaluation.commands.reproduce",
 }
 MAINS = {
@@ -29,7 +31,9 @@ MAINS = {
     "kinarm-train": train.main,
     "kinarm-bench": bench.main,
     "kinarm-replay": replay.main,
+    "kinarm-arms": arms.main,
     "kinarm-compare": compare.main,
+    "kinarm-problem": problem.main,
     "kinarm-reproduce": reproduce.main,
 }
 

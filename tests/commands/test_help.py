@@ -14,7 +14,9 @@ PROGRAMS = {
     "kinarm-replay": "kinarm.evaluation.commands.replay",
     "kinarm-train": "kinarm.policies.train",
     "kinarm-bench": "kinarm.evaluation.commands.bench",
+    "kinarm-arms": "kinarm.evaluation.commands.arms",
     "kinarm-compare": "kinarm.evaluation.commands.compare",
+    "kinarm-problem": "kinarm.evaluation.commands.problem",
     "kinarm-reproduce": "kinarm.evaluation.commands.reproduce",
 }
 HEAVY = ("torch", "numba", "matplotlib", "pinocchio", "coal", "scipy", "stable_baselines3")
@@ -53,6 +55,7 @@ def test_learners_have_help_of_their_own(run, learner):
         (
             "kinarm-eval",
             "--problem --task --policy --trials --seed --arm --scene --tolerance --horizon "
+            "--tool-frame --package-dir "
             "--start-spread --out --report --card --overwrite --json --matrix --allow-other-arm "
             "--no-oracle --markdown",
         ),
@@ -71,6 +74,25 @@ def test_learners_have_help_of_their_own(run, learner):
 )
 def test_help_names_every_option(run, program, options):
     text = run(program, "--help").out
+    assert [option for option in options.split() if option not in text] == []
+
+
+def test_help_lists_the_names_that_options_take(run):
+    text = " ".join(run("kinarm-eval", "--help").out.split())
+    for name in ("shelf-panda", "benches-ur5", "kinova", "so101", "shelf", "desk"):
+        assert name in text
+
+
+@pytest.mark.parametrize(
+    ("program", "options"),
+    [
+        ("list", ""),
+        ("show", "--arm --tool-frame --package-dir --scene --task"),
+        ("check", "--arm --scene --task --trials --seed --picture --json --overwrite"),
+    ],
+)
+def test_help_of_problem_commands(run, program, options):
+    text = run("kinarm-problem", program, "--help").out
     assert [option for option in options.split() if option not in text] == []
 
 

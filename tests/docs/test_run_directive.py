@@ -8,7 +8,8 @@ from types import ModuleType
 import pytest
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-PAGES = ("stable_baselines3", "her", "pytorch", "films", "share")
+PAGES = ("stable_baselines3", "her", "pytorch", "films", "share", "own_arm", "own_scene")
+FROM_FILE_TO_REPLAY = ("own_arm", "own_scene")
 
 
 @pytest.fixture
@@ -26,6 +27,20 @@ def page(runs):
     page = runs.Page("some.md")
     yield page
     page.close()
+
+
+def test_files_are_there_for_later_blocks(page):
+    page.write("mine.toml", 'arm = "paper"')
+    assert page.run_commands("cat mine.toml") == 'arm = "paper"\n'
+
+
+@pytest.mark.parametrize("name", FROM_FILE_TO_REPLAY)
+def test_from_file_to_replay_takes_thirty_lines(name):
+    text = (DOCS / f"{name}.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```\{kinarm-run\} (?:xml|toml|sh)\n(.*?)^```$", text, re.M | re.S)
+    lines = [line for block in blocks for line in block.splitlines() if line.strip(": ")]
+    assert len([line for line in lines if not line.startswith(":")]) <= 30
+    assert "kinarm-replay" in blocks[-1]
 
 
 @pytest.mark.parametrize("name", PAGES)

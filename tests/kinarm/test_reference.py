@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from reference_episodes import assert_equal_outcome, compare_actions
 from simulators import changed
 
 from kinarm.networks import ACTIVATIONS, Networks
@@ -69,27 +70,6 @@ def evaluate(networks, index, observation):
     return mirror.actions * action if left else action
 
 
-def scripted(table):
-    """A policy that plays the rows of a table."""
-    rows = iter(table)
-    return lambda _: next(rows)
-
-
-def assert_equal_outcome(simulator, rollouts, i, episode, atol=1e-12):
-    steps = len(episode.rewards)
-    assert rollouts.success[i] == episode.success
-    assert rollouts.collision[i] == episode.collision
-    assert rollouts.steps[i] == steps
-    np.testing.assert_allclose(rollouts.paths[i, : steps + 1], episode.path, rtol=0, atol=atol)
-    assert np.isnan(rollouts.paths[i, steps + 1 :]).all()
-    np.testing.assert_allclose(rollouts.distance[i], episode.distance, rtol=0, atol=atol)
-    np.testing.assert_allclose(rollouts.returns[i], episode.rewards.sum(), rtol=0, atol=atol)
-    np.testing.assert_array_equal(rollouts.configurations[i], rollouts.paths[i, steps])
-    if episode.collision:
-        pair = simulator.world.contact_pair(rollouts.configurations[i], rollouts.targets[i])
-        assert pair == episode.contact
-
-
 def compare_networks(simulator, networks, seed, count, atol=1e-12):
     """Run the same episodes on both sides; return how they ended."""
     starts, goals = simulator.sample(np.random.default_rng(seed), count)
@@ -101,20 +81,6 @@ def compare_networks(simulator, networks, seed, count, atol=1e-12):
             lambda seen, k=index[i]: evaluate(networks, k, seen), starts[i], goals[i]
         )
         assert_equal_outcome(simulator, rollouts, i, episode, atol)
-    return np.array([rollouts.success.sum(), rollouts.collision.sum(), count])
-
-
-def compare_actions(simulator, seed, count, held=6):
-    rng = np.random.default_rng(seed)
-    horizon = simulator.task.horizon
-    starts, goals = simulator.sample(rng, count)
-    blocks = rng.uniform(-1.5, 1.5, (count, -(-horizon // held), simulator.n_actions))
-    actions = np.repeat(blocks, held, axis=1)[:, :horizon]
-    rollouts = simulator.rollout_actions(actions, starts, goals, record=True)
-    reference = ReferenceSimulator(simulator)
-    for i in range(count):
-        episode = reference.rollout(scripted(actions[i]), starts[i], goals[i])
-        assert_equal_outcome(simulator, rollouts, i, episode)
     return np.array([rollouts.success.sum(), rollouts.collision.sum(), count])
 
 

@@ -280,7 +280,22 @@ def test_registration_is_part_of_the_import():
         "kinarm/ReachLeft-v0": "left",
         "kinarm/ReachRight-v0": "right",
         "kinarm/ReachBoth-v0": "both",
+        "kinarm/Reach-v0": "right",
         "kinarm/ReachGoalLeft-v0": "left",
         "kinarm/ReachGoalRight-v0": "right",
         "kinarm/ReachGoalBoth-v0": "both",
+        "kinarm/ReachGoal-v0": "right",
     }
+
+
+@pytest.mark.parametrize("kind", ["Reach", "ReachGoal"])
+def test_problems_by_name_and_from_files(kind, tmp_path):
+    named = gymnasium.make(f"kinarm/{kind}-v0", problem="post-paper").unwrapped
+    assert named.simulator.problem == ReachProblem.load("post-paper")
+    path = tmp_path / "mine.toml"
+    path.write_text('scene = "table"\n[task]\nhorizon = 9')
+    made = gymnasium.make(f"kinarm/{kind}-v0", problem=path).unwrapped
+    assert made.simulator.problem == ReachProblem.load(path)
+    batch = gymnasium.make_vec(f"kinarm/{kind}-v0", num_envs=2, problem=str(path))
+    assert batch.reset(seed=0)[1] is not None
+    batch.close()

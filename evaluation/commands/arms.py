@@ -1,0 +1,132 @@
+"""``kinarm-arms``: what arms there are, and what is known of one."""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from kinarm._command_line import Command, print_table, run_commands
+from kinarm._files import check_output
+from kinarm.arm_specification import PACKAGE, ArmFile, arm_names
+
+if TYPE_CHECKING:
+    from kinarm.arm import Arm
+
+EPILOG = """
+examples:
+  kinarm-arms                                           the arms that kinarm knows
+  kinarm-arms show ur5                                  joints, shapes, and pairs that are tested
+  kinarm-arms show ur5 --out ur5.html                   a page to move its joints on
+  kinarm-arms show my.urdf --tool-frame flange --package-dir .   an arm of your own
+"""
+
+HEADINGS = (
+    *("arm", "title", "joints", "actuated", "reach [m]", "speeds [deg/s]", "pairs"),
+    *("licence", "source", "installed"),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ListRequest:
+    """List the arms that kinarm knows."""
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """A row for each arm, under `HEADINGS`."""
+        return [_row(name) for name in arm_names()]
+
+
+def _row(name: str) -> tuple[str, ...]:
+    """What is known of an arm; of one that is not installed, what its file says."""
+    from kinarm.errors import ArmError
+
+    file = ArmFile.of(name)
+    assert file is not None
+    try:
+        from kinarm.arm import Arm
+        from kinarm.evaluation.arm_facts import ArmFacts
+
+        facts = ArmFacts.of(Arm.load(name))
+    except ArmError:
+        return (name, file.title, "", "", "", "", "", file.licence, file.origin, "no")
+    arm = facts.arm
+    return (
+        *(name, file.title, str(arm.n_joints), str(arm.n_actuated), f"{arm.reach:.2f}"),
+        *(facts.speeds, str(len(facts.contact.pair_names)), file.licence, file.origin, "yes"),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShowRequest:
+    """Say what is known of an arm, and write a page on which its joints can be moved.
+
+    Parameters
+    ----------
+    arm : str
+        The arm: its name, a URDF, or an arm file.
+    tool_frame : str
+        Link whose origin is the tool point.
+    package_dirs : tuple of str
+        Folder of packages that package:// meshes of a URDF are in; repeatable.
+    out : Path
+        The page to write (.html).
+    overwrite : bool
+        Replace an earlier page.
+    """
+
+    arm: str = field(metadata={"flag": "arm", "metavar": "ARM", "names": arm_names})
+    tool_frame: str | None = None
+    package_dirs: tuple[str, ...] = field(
+        default=(), metadata={"flag": "--package-dir", "metavar": "FOLDER", "repeat": True}
+    )
+    out: Path | None = field(default=None, metadata={"metavar": "FILE.html"})
+    overwrite: bool = False
+
+    def load(self) -> "Arm":
+        """The arm.
+
+        Raises
+        ------
+        KinarmError
+            If it cannot be used.
+        """
+        from kinarm.arm import Arm
+
+        return Arm.load(self.arm, tool_frame=self.tool_frame, package_dirs=self.package_dirs)
+
+
+def _list(request: ListRequest) -> None:
+    rows = request.rows()
+    print_table(HEADINGS, rows)
+    if any(row[-1] == "no" for row in rows):
+        package = PACKAGE.removesuffix(":")
+        sys.stderr.write(f"not installed: part of {package}; pip install 'kinarm[robots]'\n")
+
+
+def _show(request: ShowRequest) -> None:
+    from kinarm.evaluation.arm_facts import ArmFacts
+
+    if request.out is not None:
+        check_output(request.out, overwrite=request.overwrite, suffix=".html")
+    facts = ArmFacts.of(request.load())
+    for heading, lines in facts.sections().items():
+        if lines:
+            print(heading, *(f"  {line}" for line in lines), sep="\n")
+    if request.out is not None:
+        from kinarm.viewer import arm_page
+
+        page = arm_page(facts.arm, request.out)
+        print(f"written: {request.out}, {len(page.html) / 1e6:.1f} MB, opens in any browser")
+
+
+COMMANDS = {"list": Command(ListRequest, _list), "show": Command(ShowRequest, _show)}
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line."""
+    typed = sys.argv[1:] if arguments is None else arguments
+    run_commands("kinarm-arms", "Arms.", COMMANDS, typed or ["list"], epilog=EPILOG)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,173 @@
+"""``kinarm-problem``: list, show and check."""
+
+import json
+import re
+
+import pytest
+from matplotlib.image import imread
+from refusals import check_refused
+
+from kinarm.problem import PROBLEMS, ReachProblem
+from kinarm.problem_files import problem_names
+
+FREE = """
+[[scene.obstacles]]
+name = "post"
+lower = [0.4, -0.05, 0.0]
+upper = [0.5, 0.05, 0.3]
+yaw = 0.4
+"""
+FAR = """
+[[goal_regions]]
+name = "near"
+lower = [0.3, -0.3, 0.4]
+upper = [0.5, 0.3, 0.6]
+[[goal_regions]]
+name = "far"
+lower = [3.0, -0.3, 0.4]
+upper = [3.2, 0.3, 0.6]
+"""
+AROUND = """
+[[scene.obstacles]]
+name = "box"
+lower = [-0.3, -0.3, 0.0]
+upper = [0.3, 0.3, 0.6]
+"""
+
+
+def wall(name, lower, upper):
+    return f'[[scene.obstacles]]\nname = "{name}"\nlower = {lower}\nupper = {upper}\n'
+
+
+SHAFT = (
+    wall("front", [0.2, -2.0, 0.0], [2.0, 2.0, 2.0])
+    + wall("back", [-2.0, -2.0, 0.0], [-0.2, 2.0, 2.0])
+    + wall("left", [-0.2, 0.2, 0.0], [0.2, 2.0, 2.0])
+    + wall("right", [-0.2, -2.0, 0.0], [0.2, -0.2, 2.0])
+    + wall("roof", [-0.2, -0.2, 0.47], [0.2, 0.2, 2.0])
+    + '[[scene.goal_regions]]\nname = "right"\nlower = [-0.1, -0.1, 3.0]\nupper = [0.1, 0.1, 3.0]\n'
+)
+
+
+@pytest.fixture
+def write(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def write_file(text, name="mine.toml"):
+        (tmp_path / name).write_text(text)
+        return name
+
+    return write_file
+
+
+def test_list_names_every_problem(run):
+    answer = run("kinarm-problem", "list")
+    assert (answer.status, answer.err) == (0, "")
+    head, *lines = answer.out.splitlines()
+    assert head.split()[:4] == ["problem", "arm", "obstacles", "goals"]
+    assert [line.split()[0] for line in lines] == list(problem_names())
+
+
+def test_show_prints_what_can_be_read_again(run, write):
+    answer = run("kinarm-problem", "show", "both", "--arm", "paper_flange", "--scene", "post")
+    assert (answer.status, answer.err) == (0, "")
+    shown = ReachProblem.load(write(answer.out))
+    expected = PROBLEMS["both"].replace(arm="paper_flange", scene="post")
+    assert shown == expected
+
+
+def test_check_of_the_papers_third_task(run, write, tmp_path):
+    answer = run(
+        "kinarm-problem", "check", "both", "--trials", 20, "--json", "a.json", "--picture", "a.png"
+    )
+    assert (answer.status, answer.err) == (0, "")
+    assert "reached 100.0 % (83.9..100.0), out of reach 0.0 %" in answer.out
+    assert "mirror   yes: the problem is its own image" in answer.out
+    assert "at home nothing touches" in answer.out
+    found = json.loads((tmp_path / "a.json").read_text())
+    assert ReachProblem.from_json(found["problem"]) == PROBLEMS["both"]
+    assert found["goals"]["reached"]["value"] == 1
+    assert found["starts"]["home_contact"] is None
+    # FACTS of the arm: about 72 % of uniform configurations are free.
+    low, high = found["starts"]["free"]["ci95"]
+    assert low < 0.72 < high
+    assert len(found["contact"]["touching"]) == 28
+    assert not any(found["mirror"].values())
+    assert imread(tmp_path / "a.png").shape[:2] == (640, 960)
+    again = run("kinarm-problem", "check", "both", "--json", "a.json")
+    check_refused(again, "a.json", "exists", "--overwrite")
+
+
+def test_check_says_what_is_out_of_reach(run, write, tmp_path):
+    path = write(f'arm = "paper"\nscene = "{write(FAR, "scene.toml")}"\n')
+    answer = run("kinarm-problem", "check", path, "--trials", 30, "--json", "a.json")
+    assert (answer.status, answer.err) == (0, "")
+    goals = json.loads((tmp_path / "a.json").read_text())["goals"]
+    assert goals["undecided"]["value"] == 0
+    assert goals["reached"]["value"] + goals["out_of_reach"]["value"] == pytest.approx(1)
+    assert 0.2 < goals["out_of_reach"]["value"] < 0.8
+    for missed in goals["not_reached"]:
+        assert missed["goal"][0] >= 3
+        assert "out of reach" in missed["reason"]
+
+
+def test_training_says_when_many_goals_are_out_of_reach(run, write):
+    path = write(f'arm = "paper"\nscene = "{write(FAR, "scene.toml")}"\n')
+    options = ("--recipe", "paper", "--iterations", 1, "--out", "far.npz")
+    answer = run("kinarm-train", "ars", "--problem", path, *options)
+    assert answer.status == 0
+    found = re.search(
+        r"problem mine: no contact-free configuration was found for (\d+) of 100 goals", answer.err
+    )
+    assert 30 < int(found[1]) < 70
+    fine = run("kinarm-train", "ars", "--problem", write(FREE), *options, "--overwrite")
+    assert fine.status == 0
+    assert "goals" not in fine.err
+
+
+@pytest.mark.parametrize(
+    "command", ["kinarm-problem check", "kinarm-train ars --out x.npz --problem"]
+)
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (AROUND, ["cannot move", "shoulder touches box"]),
+        (SHAFT, ["cannot move: it touches something at all of 2000"]),
+        ("[[scene.obstacles]\n", ["line 1, column 18"]),
+        ('arm = "nobody"', ["'nobody'", "panda"]),
+        ('arm = "gone.urdf"', ["gone.urdf", "does not exist"]),
+        ('scene = "nowhere"', ["'nowhere'", "shelf"]),
+        ('task = "gone.toml"', ["gone.toml"]),
+        ('[arm]\nsource = "paper"\n[arm.held]\naxis_9 = 1.0', ["'axis_9'", "axis_1"]),
+        (
+            '[[scene.goal_regions]]\nname = "right"\n'
+            "lower = [-0.4, -0.7, 0.1]\nupper = [0.4, -0.6, 0.2]",
+            ["goal region 'right' lies inside obstacle 'right bench'"],
+        ),
+    ],
+)
+def test_refusals(run, write, tmp_path, command, text, words):
+    path = write(text)
+    program, *arguments = command.split()
+    check_refused(run(program, *arguments, path), *words)
+    assert [file.name for file in tmp_path.iterdir()] == ["mine.toml"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], ["COMMAND"]),
+        (["check", "nothing"], ["'nothing'", "shelf-panda"]),
+        (["check", "both", "--trials", "0"], ["trials", "at least 1"]),
+        (["check", "both", "--seed", "-1"], ["seed"]),
+        (["check", "both", "--picture", "a.jpg"], ["a.jpg", ".png"]),
+        (["check", "both", "--json", "a.txt"], ["a.txt", ".json"]),
+        (["show", "gone.toml"], ["gone.toml"]),
+        (["show", "--arm", "missing.urdf"], ["missing.urdf"]),
+        (["show", "--tool-frame", "hook"], ["'hook'"]),
+        (["list", "both"], ["both"]),
+    ],
+)
+def test_bad_usage(run, write, tmp_path, arguments, words):
+    check_refused(run("kinarm-problem", *arguments), *words)
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,40 @@
+"""Episodes held against the slow reference, one at a time."""
+
+import numpy as np
+
+from kinarm.reference import ReferenceSimulator
+
+
+def scripted(table):
+    """A policy that plays the rows of a table."""
+    rows = iter(table)
+    return lambda _: next(rows)
+
+
+def assert_equal_outcome(simulator, rollouts, i, episode, atol=1e-12):
+    steps = len(episode.rewards)
+    assert rollouts.success[i] == episode.success
+    assert rollouts.collision[i] == episode.collision
+    assert rollouts.steps[i] == steps
+    np.testing.assert_allclose(rollouts.paths[i, : steps + 1], episode.path, rtol=0, atol=atol)
+    assert np.isnan(rollouts.paths[i, steps + 1 :]).all()
+    np.testing.assert_allclose(rollouts.distance[i], episode.distance, rtol=0, atol=atol)
+    np.testing.assert_allclose(rollouts.returns[i], episode.rewards.sum(), rtol=0, atol=atol)
+    np.testing.assert_array_equal(rollouts.configurations[i], rollouts.paths[i, steps])
+    if episode.collision:
+        pair = simulator.world.contact_pair(rollouts.configurations[i], rollouts.targets[i])
+        assert pair == episode.contact
+
+
+def compare_actions(simulator, seed, count, held=6):
+    rng = np.random.default_rng(seed)
+    horizon = simulator.task.horizon
+    starts, goals = simulator.sample(rng, count)
+    blocks = rng.uniform(-1.5, 1.5, (count, -(-horizon // held), simulator.n_actions))
+    actions = np.repeat(blocks, held, axis=1)[:, :horizon]
+    rollouts = simulator.rollout_actions(actions, starts, goals, record=True)
+    reference = ReferenceSimulator(simulator)
+    for i in range(count):
+        episode = reference.rollout(scripted(actions[i]), starts[i], goals[i])
+        assert_equal_outcome(simulator, rollouts, i, episode)
+    return np.array([rollouts.success.sum(), rollouts.collision.sum(), count])

@@ -1,0 +1,168 @@
+"""What says which arm: specifications and arm files."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from kinarm.arm import Arm
+from kinarm.arm_specification import AllowedContact, ArmFile, ArmSpecification, arm_names
+from kinarm.collision import ContactModel
+from kinarm.errors import ArmError, InvalidInputError, UnknownNameError
+from kinarm.scene import Scene
+
+AXIS_NAMES = tuple(f"axis_{number}" for number in range(1, 7))
+
+
+def test_is_kept_by_the_arm():
+    given = ArmSpecification(source="paper_flange", home=(0.1, 0, 0, 0, 0, 0))
+    arm = Arm.load(given, actuated=AXIS_NAMES[:3])
+    assert arm.specification == ArmSpecification(
+        source="paper_flange", home=(0.1, 0, 0, 0, 0, 0), actuated=AXIS_NAMES[:3]
+    )
+    assert Arm.load(arm.specification).digest == arm.digest
+    assert arm.name == "paper_flange"
+
+
+def test_values_become_what_is_annotated(tmp_path):
+    given = ArmSpecification(
+        source=tmp_path / "robot.urdf",
+        package_dirs=[tmp_path],
+        home=np.zeros(6),
+        velocity_limits=[1, 2],
+        actuated=["axis_1"],
+    )
+    assert given == ArmSpecification(
+        source=str(tmp_path / "robot.urdf"),
+        package_dirs=(str(tmp_path),),
+        home=(0.0,) * 6,
+        velocity_limits=(1.0, 2.0),
+        actuated=("axis_1",),
+    )
+    assert hash(given)
+    assert given.name == "robot"
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"source": 3}, "source must be a text"),
+        ({"home": "zero"}, r"home must be a list, each entry a number \[rad or m\]"),
+        ({"actuated": 5}, "actuated must be a list, each entry a text, got 5"),
+        ({"package_dirs": "meshes"}, "package_dirs must be a list"),
+        ({"tool_frame": 3}, "tool_frame must be a text"),
+        ({"limits": {"axis_1": 3}}, "limits"),
+        ({"held": {"axis_1": "zero"}}, "held"),
+        ({"allowed_contacts": [{"links": ["a", "b"]}]}, "reason"),
+    ],
+)
+def test_wrong_types_are_refused(changes, message):
+    with pytest.raises(InvalidInputError, match=message):
+        ArmSpecification(**changes)
+
+
+def test_relative_paths_start_at_a_folder(tmp_path):
+    given = ArmSpecification(source="robot.urdf", package_dirs=("meshes", "/opt/meshes"))
+    assert given.resolved(tmp_path) == ArmSpecification(
+        source=str(tmp_path / "robot.urdf"),
+        package_dirs=(str(tmp_path / "meshes"), "/opt/meshes"),
+    )
+
+
+@pytest.mark.parametrize("name", ["paper", "nope"])
+def test_names_are_no_paths(tmp_path, name):
+    assert ArmSpecification(source=name).resolved(tmp_path).source == name
+
+
+def test_a_shipped_name_wins_over_a_file(tmp_path, monkeypatch):
+    (tmp_path / "paper").write_text("")
+    monkeypatch.chdir(tmp_path)
+    assert Arm.load("paper").name == "paper"
+
+
+def test_pinned_digest_has_to_hold(shipped_arms):
+    digest = shipped_arms["paper"].digest
+    assert Arm.load("paper", digest=digest).digest == digest
+    with pytest.raises(ArmError, match=f"'paper_flange' is another version .*{digest}"):
+        Arm.load("paper_flange", digest=digest)
+
+
+class TestArmFiles:
+    """Files that say of an arm what its URDF does not."""
+
+    def write(self, folder, text):
+        path = folder / "mine.toml"
+        path.write_text(text)
+        return path
+
+    def test_every_known_arm_has_one(self):
+        names = arm_names()
+        assert {"paper", "ur3", "ur5", "ur10", "panda", "xarm7", "z1", "kinova"} < set(names)
+        assert {"so100", "so101"} < set(names)
+        for name in names:
+            file = ArmFile.of(name)
+            assert all((file.title, file.licence, file.origin, file.velocities)), name
+            for contact in file.arm.allowed_contacts or ():
+                assert contact.reason
+
+    def test_a_urdf_has_none(self):
+        assert ArmFile.of("robot.urdf") is None
+
+    def test_an_arm_file_says_what_is_used_and_options_win(self, tmp_path):
+        path = self.write(
+            tmp_path,
+            '[arm]\nsource = "paper"\nvelocity_limits = [1, 1, 1, 1, 1, 1]\n'
+            "[arm.limits]\naxis_1 = [-1, 1]\n[arm.held]\naxis_6 = 0.5",
+        )
+        arm = Arm.load(path, limits={"axis_2": (-0.5, 0.5)}, velocity_limits=[2] * 5)
+        np.testing.assert_array_equal(arm.velocity_limits, 2)
+        np.testing.assert_array_equal(arm.lower[:2], [-1, -0.5])
+        assert arm.n_joints == 5
+        assert arm.name == "mine"
+
+    def test_source_and_folders_start_at_the_file(self, tmp_path, shipped_arms, monkeypatch):
+        urdf = shipped_arms["paper"].urdf_path.read_text()
+        (tmp_path / "own.urdf").write_text(urdf)
+        path = self.write(tmp_path, '[arm]\nsource = "own.urdf"\npackage_dirs = ["meshes"]')
+        monkeypatch.chdir("/")
+        assert Arm.load(path).digest == shipped_arms["paper"].digest
+        assert ArmFile.of(str(path)).arm.package_dirs == (str(tmp_path / "meshes"),)
+
+    @pytest.mark.parametrize(
+        ("text", "message"),
+        [
+            ("[arm", r"at line 1, column"),
+            ("title = 3", "title|arm"),
+            ("[arm]\nsource = 'other.toml'", "'arm.source' must be a URDF or a known arm"),
+            ("[arm]\nsources = 'paper'", "unknown key 'arm.sources'"),
+        ],
+    )
+    def test_unusable_files_are_refused(self, tmp_path, text, message):
+        with pytest.raises((ArmError, InvalidInputError), match=message) as caught:
+            Arm.load(self.write(tmp_path, text))
+        assert "mine.toml" in str(caught.value)
+        assert "\n" not in str(caught.value)
+
+    def test_missing_file(self):
+        with pytest.raises(ArmError, match=r"arm file 'gone.toml' does not exist"):
+            ArmFile.of("gone.toml")
+
+
+class TestAllowedContacts:
+    def test_their_pairs_are_not_tested_and_count_for_the_digest(self, shipped_arms):
+        (one, other), *_ = (
+            pair
+            for pair in ContactModel.build(shipped_arms["paper"], Scene()).pair_names
+            if "ground" not in pair and "bench" not in pair[1]
+        )
+        contact = AllowedContact(links=(one, other), reason="they are soft")
+        arm = Arm.load("paper", allowed_contacts=(contact,))
+        assert (one, other) not in ContactModel.build(arm, Scene()).pair_names
+        assert arm.digest != shipped_arms["paper"].digest
+        other_reason = dataclasses.replace(contact, reason="they are small")
+        assert Arm.load("paper", allowed_contacts=(other_reason,)).digest == arm.digest
+
+    def test_unknown_links_are_refused(self):
+        contact = AllowedContact(links=("gripper", "base"), reason="none")
+        with pytest.raises(UnknownNameError, match="link in allowed_contacts of paper.urdf: 'gr"):
+            Arm.load("paper", allowed_contacts=(contact,))

@@ -1,0 +1,101 @@
+"""Hulls of meshes: never smaller than the mesh, little larger, and the same every time."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import ConvexHull
+
+from kinarm import hulls
+from kinarm.errors import ArmError
+from kinarm.hulls import EXCESS, MANY_VERTICES, PLANES, enclosing_corners, hull_of_mesh
+
+
+@st.composite
+def clouds(draw):
+    """Points that span a volume: on boxes, spheres and rods of all sizes."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    points = rng.normal(size=(draw(st.integers(30, 400)), 3))
+    kind = draw(st.sampled_from(["ball", "sphere", "box", "grid"]))
+    if kind == "sphere":
+        points /= np.linalg.norm(points, axis=1)[:, None]
+    elif kind == "box":
+        points = np.clip(points, -0.7, 0.7)
+    elif kind == "grid":
+        points = np.round(points, 1)
+    sizes = [10.0 ** draw(st.floats(-2.5, 0)) for _ in range(3)]
+    return points * sizes + rng.normal(size=3)
+
+
+def outside(points, corners):
+    """How far points lie outside the hull of corners at most [m]; SciPy decides."""
+    hull = ConvexHull(corners)
+    return (points @ hull.equations[:, :3].T + hull.equations[:, 3]).max()
+
+
+@settings(max_examples=25, deadline=None)
+@given(clouds())
+def test_no_point_is_left_outside(points):
+    corners = enclosing_corners(points)
+    # The tests of SciPy are that exact themselves.
+    assert outside(points, corners) < 1e-9
+    assert len(corners) <= 2 * PLANES - 4
+    np.testing.assert_array_equal(enclosing_corners(points), corners)
+
+
+def ball(count):
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(count, 3))
+    return points / np.linalg.norm(points, axis=1)[:, None]
+
+
+@pytest.mark.parametrize("radius", [0.01, 0.05, 0.2])
+def test_stands_out_by_little(radius):
+    points = radius * ball(3000)
+    corners = enclosing_corners(points)
+    # 160 planes about a ball: corners stand out by a few per cent of its radius.
+    assert outside(corners, points) <= max(EXCESS, 0.08 * radius)
+
+
+def test_what_has_few_faces_keeps_its_shape():
+    box = np.array([(x, y, z) for x in (0, 0.3) for y in (0, 0.2) for z in (0, 0.1)])
+    corners = enclosing_corners(np.vstack([box, box.mean(axis=0) + 0.01 * ball(50)]))
+    assert outside(corners, box) < 1e-8
+
+
+def write_ball(path, count):
+    """A mesh of a ball whose vertices are all corners of its hull."""
+    points = 0.1 * ball(count)
+    faces = ConvexHull(points).simplices + 1
+    lines = ["v {} {} {}".format(*point) for point in points]
+    path.write_text("\n".join(lines + ["f {} {} {}".format(*face) for face in faces]) + "\n")
+    return points
+
+
+@pytest.mark.parametrize("count", [200, MANY_VERTICES + 500])
+def test_of_a_mesh_encloses_its_vertices(tmp_path, count):
+    points = write_ball(tmp_path / "ball.obj", count)
+    scale = np.array([1.0, 2.0, 0.5])
+    hull = hull_of_mesh(tmp_path / "ball.obj", scale)
+    corners = np.array(hull.points())
+    assert outside(points * scale, corners) < 1e-7  # Coal reads meshes in single precision
+    assert outside(corners, points * scale) < 0.02
+    assert len(corners) == count or (count > MANY_VERTICES and len(corners) <= 2 * PLANES - 4)
+
+
+def test_is_looked_up_the_second_time(tmp_path, monkeypatch):
+    write_ball(tmp_path / "ball.obj", 100)
+    first = hull_of_mesh(tmp_path / "ball.obj", np.ones(3))
+    monkeypatch.setattr(hulls, "_corners", None)
+    second = hull_of_mesh(tmp_path / "ball.obj", np.ones(3))
+    np.testing.assert_array_equal(first.points(), second.points())
+    with pytest.raises(TypeError):
+        hull_of_mesh(tmp_path / "ball.obj", np.full(3, 2.0))
+
+
+@pytest.mark.parametrize("name", ["part.stl", "part.obj", "part.xyz"])
+def test_what_is_no_mesh_is_refused(tmp_path, name):
+    (tmp_path / name).write_text("nothing")
+    with pytest.raises(ArmError, match=f"mesh {name} cannot be loaded") as caught:
+        hull_of_mesh(tmp_path / name, np.ones(3))
+    assert "\n" not in str(caught.value)

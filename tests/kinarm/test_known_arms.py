@@ -1,0 +1,146 @@
+"""Arms of other packages: kinematics against Pinocchio's and MuJoCo's reading of the whole URDF."""
+
+import math
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from known_arms import INSTALLED, KNOWN_ARMS
+
+from kinarm.arm import Arm
+from kinarm.collision import ContactModel
+from kinarm.problem import PROBLEMS
+from kinarm.scene import Scene
+from kinarm.world import World
+
+pytestmark = INSTALLED
+
+
+@pytest.fixture(scope="module", params=KNOWN_ARMS)
+def arm(request):
+    return Arm.load(request.param)
+
+
+def configurations(arm, count=100):
+    return np.random.default_rng(3).uniform(arm.lower, arm.upper, (count, arm.n_joints))
+
+
+def positions(arm, q):
+    """Positions of all joints by name, the held ones included."""
+    return {**arm.description.held, **dict(zip(arm.joint_names, q, strict=True))}
+
+
+def whole_configuration(model, arm, q):
+    """The same configuration of the robot with all its joints, as Pinocchio orders them."""
+    whole = pin.neutral(model)
+    for name, position in positions(arm, q).items():
+        joint = model.joints[model.getJointId(name)]
+        turns = joint.nq == 2  # continuous: cosine and sine
+        whole[joint.idx_q : joint.idx_q + joint.nq] = (
+            (math.cos(position), math.sin(position)) if turns else position
+        )
+    return whole
+
+
+def tool_of(arm, pose):
+    """The tool point, from the pose of the frame that the arm's file names."""
+    completed = arm.specification.completed()
+    offset = np.array(completed.tool_offset or (0.0, 0.0, 0.0))
+    return pose.rotation @ offset + pose.translation
+
+
+def test_joint_frames_and_tool_are_those_of_the_whole_robot(arm):
+    whole = pin.buildModelFromUrdf(str(arm.urdf_path))
+    data, own = whole.createData(), arm.model.createData()
+    frame = whole.getFrameId(arm.specification.completed().tool_frame, pin.FrameType.BODY)
+    for q in configurations(arm):
+        pin.framesForwardKinematics(whole, data, whole_configuration(whole, arm, q))
+        pin.forwardKinematics(arm.model, own, q)
+        for index, name in enumerate(arm.joint_names, start=1):
+            expected = data.oMi[whole.getJointId(name)].homogeneous
+            np.testing.assert_allclose(own.oMi[index].homogeneous, expected, rtol=0, atol=1e-12)
+        expected = tool_of(arm, data.oMf[frame])
+        np.testing.assert_allclose(arm.tool_position(q), expected, rtol=0, atol=1e-12)
+
+
+def test_and_those_of_pinocchios_own_reduced_model(arm):
+    if arm.name == "so100":
+        pytest.skip("Pinocchio reduces no robot of which a joint and a link share a name")
+    whole = pin.buildModelFromUrdf(str(arm.urdf_path))
+    locked = [
+        whole.getJointId(name) for name in list(whole.names)[1:] if name not in arm.joint_names
+    ]
+    held = whole_configuration(whole, arm, arm.home)
+    reduced = pin.buildReducedModel(whole, locked, held)
+    assert tuple(reduced.names)[1:] == arm.joint_names
+    data, frame = reduced.createData(), arm.specification.completed().tool_frame
+    for q in configurations(arm, 20):
+        own = whole_configuration(whole, arm, q)
+        rows = [whole.joints[whole.getJointId(name)] for name in arm.joint_names]
+        shorter = np.concatenate([own[row.idx_q : row.idx_q + row.nq] for row in rows])
+        pin.framesForwardKinematics(reduced, data, shorter)
+        expected = tool_of(arm, data.oMf[reduced.getFrameId(frame, pin.FrameType.BODY)])
+        np.testing.assert_allclose(arm.tool_position(q), expected, rtol=0, atol=1e-12)
+
+
+def test_kernels_agree_with_pinocchio(arm):
+    world = World(PROBLEMS["both"].replace(arm=arm))
+    q = configurations(arm)
+    expected = [arm.tool_position(each) for each in q]
+    np.testing.assert_allclose(world.screen(q)[0], expected, rtol=0, atol=1e-12)
+    data, origins = arm.model.createData(), []
+    for each in q:
+        pin.forwardKinematics(arm.model, data, each)
+        origins.append(np.concatenate([pose.translation for pose in list(data.oMi)[1:]]))
+    seen = world.observe(q, np.zeros((len(q), 3)))[:, -3 * arm.n_joints :]
+    np.testing.assert_allclose(seen, origins, rtol=0, atol=1e-12)
+
+
+def test_limits_are_those_of_the_urdf_unless_the_arm_file_says_otherwise(arm):
+    robot, given = ElementTree.parse(arm.urdf_path), arm.specification.completed()
+    joints = {joint.get("name"): joint for joint in robot.findall("joint")}
+    for index, name in enumerate(arm.joint_names):
+        limit = joints[name].find("limit")
+        lower, upper = (given.limits or {}).get(name) or (
+            float(limit.get("lower")),
+            float(limit.get("upper")),
+        )
+        assert (arm.lower[index], arm.upper[index]) == (lower, upper)
+        if given.velocity_limits is None:
+            assert arm.velocity_limits[index] == float(limit.get("velocity"))
+
+
+def test_home_is_free_and_inside_the_limits(arm):
+    model = ContactModel.build(arm, Scene())
+    assert model.contact_pair(arm.home) is None
+    assert ((arm.lower <= arm.home) & (arm.home <= arm.upper)).all()
+
+
+@pytest.mark.parametrize("name", ["panda", "ur5", "so101"])
+def test_agrees_with_mujocos_reading_of_the_urdf(name):
+    mujoco = pytest.importorskip("mujoco")
+    arm = Arm.load(name)
+    robot = ElementTree.parse(arm.urdf_path).getroot()
+    for link in robot.findall("link"):
+        for shape in ("visual", "collision"):  # kinematics alone
+            for element in link.findall(shape):
+                link.remove(element)
+    settings = ElementTree.SubElement(ElementTree.SubElement(robot, "mujoco"), "compiler")
+    settings.attrib.update(fusestatic="false", boundmass="0.01", boundinertia="0.001")
+    model = mujoco.MjModel.from_xml_string(ElementTree.tostring(robot, encoding="unicode"))
+    data = mujoco.MjData(model)
+    links = {joint.get("name"): joint.find("child").get("link") for joint in robot.findall("joint")}
+    tool = arm.specification.completed().tool_frame
+    own = arm.model.createData()
+    for q in configurations(arm, 50):
+        for joint, position in positions(arm, q).items():
+            data.qpos[model.jnt_qposadr[model.joint(joint).id]] = position
+        mujoco.mj_kinematics(model, data)
+        pin.framesForwardKinematics(arm.model, own, q)
+        for index, joint in enumerate(arm.joint_names, start=1):
+            body = data.body(links[joint])
+            np.testing.assert_allclose(own.oMi[index].translation, body.xpos, rtol=0, atol=1e-6)
+            turned = body.xmat.reshape(3, 3)
+            np.testing.assert_allclose(own.oMi[index].rotation, turned, rtol=0, atol=1e-6)
+        np.testing.assert_allclose(arm.tool_position(q), data.body(tool).xpos, rtol=0, atol=1e-6)

@@ -1,0 +1,57 @@
+"""Arms of other packages: contact in the compiled simulator against Coal's verdicts."""
+
+import numpy as np
+import pytest
+from configurations import contact_boundary, jittered, random_configurations
+from known_arms import INSTALLED, KNOWN_ARMS, simulator_among_boxes
+from reference_episodes import compare_actions
+
+from kinarm.kernels.rollout import screen
+
+pytestmark = INSTALLED
+
+
+@pytest.fixture(scope="module", params=KNOWN_ARMS)
+def simulator(request):
+    return simulator_among_boxes(request.param)
+
+
+def proven_free(simulator, configurations):
+    n = len(configurations)
+    tools, proven = np.empty((n, 3)), np.empty(n, dtype=bool)
+    shapes = simulator.world.contact_model.shapes
+    screen(0, n, simulator.arm.chain, shapes, configurations, tools, proven)
+    return proven
+
+
+def check_proof(simulator, seed, boundary, jitters, random):
+    """Ask the proof and Coal about configurations near contact and anywhere; how many those are."""
+    near = np.concatenate(contact_boundary(simulator, seed, boundary))
+    parts = [near, *(jittered(near, seed + number) for number in range(jitters))]
+    asked = np.concatenate([*parts, random_configurations(simulator, seed, random)])
+    proven = proven_free(simulator, asked)
+    touching = simulator.world.contact_model.in_contact(asked)
+    assert 0.05 < touching.mean() < 0.99
+    assert not (proven & touching).any()
+    assert proven.any()
+    return len(asked)
+
+
+def test_rollouts_equal_the_reference_path(simulator):
+    _, collision, count = compare_actions(simulator, 5, 12)
+    assert 0 < collision <= count
+
+
+def test_the_proof_never_clears_what_touches(simulator):
+    check_proof(simulator, 6, boundary=300, jitters=3, random=4000)
+
+
+@pytest.mark.slow
+def test_rollouts_equal_the_reference_path_in_thousands_of_episodes(simulator):
+    _, collision, count = compare_actions(simulator, 7, 3000)
+    assert 100 < collision <= count
+
+
+@pytest.mark.slow
+def test_the_proof_never_clears_what_touches_at_hundreds_of_thousands(simulator):
+    assert check_proof(simulator, 8, boundary=10_000, jitters=9, random=100_000) >= 200_000

@@ -1,0 +1,322 @@
+"""A URDF is reduced to the chain that carries the tool, or refused with the reason."""
+
+import math
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from kinarm.arm import Arm
+from kinarm.arm_specification import ArmSpecification
+from kinarm.errors import ArmError, KinarmError, UnknownNameError
+
+CENTRED = '<limit lower="-1" upper="1" velocity="2" effort="0"/>'
+GRIPPER = """
+<link name="finger_a"/><link name="finger_b"/>
+<joint name="open_a" type="prismatic"><parent link="tool0"/><child link="finger_a"/>
+<origin xyz="0 0.02 0" rpy="0.3 0.2 0.1"/><axis xyz="0 0.6 0.8"/>
+<limit lower="{lower}" upper="0.04" velocity="1" effort="0"/></joint>
+<joint name="open_b" type="revolute"><parent link="tool0"/><child link="finger_b"/>
+<axis xyz="0 0 2"/><limit lower="-2" upper="2" velocity="1" effort="0"/>
+<mimic joint="{leader}" multiplier="{factor}" offset="0.1"/></joint>
+"""
+
+
+def gripper(lower="0", factor="-3", leader="open_a"):
+    return GRIPPER.format(lower=lower, factor=factor, leader=leader)
+
+
+@pytest.fixture
+def gripping(make_joint, write_robot):
+    """Two axes that carry a gripper: a slide, and a joint that mimics it."""
+    return write_robot([make_joint(), make_joint(axis="0 1 0")], extra=gripper())
+
+
+def frame_pose(arm, q, name):
+    data = arm.model.createData()
+    pin.framesForwardKinematics(arm.model, data, np.asarray(q, dtype=float))
+    return data.oMf[arm.model.getFrameId(name, pin.FrameType.BODY)].homogeneous
+
+
+class TestHeldJoints:
+    def test_what_does_not_carry_the_tool_is_held_at_zero(self, gripping):
+        arm = Arm.load(gripping)
+        assert arm.joint_names == ("joint_1", "joint_2")
+        assert arm.description.held == {"open_a": 0.0, "open_b": pytest.approx(0.1)}
+        (note,) = arm.description.notes
+        assert note == "joints that do not carry the tool are held: open_a, open_b"
+
+    def test_or_as_close_to_zero_as_limits_allow(self, make_joint, write_robot):
+        path = write_robot([make_joint()], extra=gripper(lower="0.01"))
+        assert Arm.load(path).description.held["open_a"] == 0.01
+
+    @pytest.mark.parametrize("position", [-0.02, 0.0, 0.03])
+    def test_poses_are_those_of_the_whole_tree(self, gripping, position):
+        """Pinocchio reads the URDF with all its joints, one of which mimics another."""
+        arm = Arm.load(gripping, held={"open_a": position})
+        assert "held" not in " ".join(arm.description.notes) or "open_b" in arm.description.notes[0]
+        text = gripping.read_text().replace('<mimic joint="open_a"', '<ignored joint="open_a"')
+        whole = pin.buildModelFromXML(text)
+        data, q = whole.createData(), pin.neutral(whole)
+        for name, value in {"joint_1": 0.4, "joint_2": -0.7, **arm.description.held}.items():
+            q[whole.joints[whole.getJointId(name)].idx_q] = value
+        assert arm.description.held["open_b"] == pytest.approx(-3 * position + 0.1)
+        pin.framesForwardKinematics(whole, data, q)
+        for link in ("tool0", "finger_a", "finger_b"):
+            expected = data.oMf[whole.getFrameId(link, pin.FrameType.BODY)].homogeneous
+            np.testing.assert_allclose(frame_pose(arm, [0.4, -0.7], link), expected, atol=1e-12)
+
+    def test_joints_of_the_chain_can_be_held(self, make_joint, write_robot):
+        path = write_robot([make_joint(axis="0 1 0") for _ in range(3)])
+        arm, whole = Arm.load(path, held={"joint_2": 0.5}), Arm.load(path)
+        assert arm.joint_names == ("joint_1", "joint_3")
+        np.testing.assert_allclose(
+            arm.tool_position([0.2, -0.3]), whole.tool_position([0.2, 0.5, -0.3]), atol=1e-12
+        )
+
+    @pytest.mark.parametrize("what", ["held", "limits"])
+    def test_unknown_joints_are_refused(self, gripping, what):
+        value = 0.0 if what == "held" else (0.0, 1.0)
+        with pytest.raises(UnknownNameError, match=f"joint in {what} of made.urdf: 'jiont_1'"):
+            Arm.load(gripping, **{what: {"jiont_1": value}})
+
+
+class TestMimickingJoints:
+    def test_one_that_carries_the_tool_is_refused_with_the_mend(self, make_joint, write_robot):
+        follower = make_joint(limit=CENTRED + '<mimic joint="joint_1" multiplier="2"/>')
+        path = write_robot([make_joint(), follower])
+        with pytest.raises(ArmError, match="mimics 'joint_1' and carries the tool: hold"):
+            Arm.load(path)
+        arm = Arm.load(path, held={"joint_2": 0.2})
+        assert arm.joint_names == ("joint_1",)
+
+    def test_one_that_follows_a_joint_of_the_chain_is_refused(self, make_joint, write_robot):
+        path = write_robot([make_joint()], extra=gripper(leader="joint_1"))
+        with pytest.raises(ArmError, match=r"'open_b'.*mimics 'joint_1', which moves: hold it"):
+            Arm.load(path)
+        assert Arm.load(path, held={"open_b": 0.3}).description.held["open_b"] == 0.3
+
+    def test_one_that_follows_nothing_is_refused(self, make_joint, write_robot):
+        path = write_robot([make_joint()], extra=gripper(leader="nobody"))
+        with pytest.raises(ArmError, match="mimics 'nobody', which is no joint"):
+            Arm.load(path)
+
+
+class TestContinuousJoints:
+    @pytest.mark.parametrize("axis", ["1 0 0", "0 1 0", "0 0 1", "0 0.6 0.8"])
+    def test_get_a_turn_and_a_note(self, make_joint, write_robot, axis):
+        limit = '<limit velocity="1" effort="0"/>'
+        path = write_robot([make_joint("continuous", axis=axis, limit=limit), make_joint()])
+        arm = Arm.load(path)
+        assert (arm.lower[0], arm.upper[0]) == (-math.pi, math.pi)
+        (note,) = arm.description.notes
+        assert note == "joint 'joint_1' is continuous: its range is taken as -180 to 180 deg"
+
+    def test_or_the_limits_that_are_given(self, make_joint, write_robot):
+        limit = '<limit velocity="1" effort="0"/>'
+        path = write_robot([make_joint("continuous", limit=limit)])
+        arm = Arm.load(path, limits={"joint_1": (-6, 6)})
+        assert (arm.lower[0], arm.upper[0]) == (-6, 6)
+        assert arm.description.notes == ()
+
+    def test_without_a_speed_they_are_refused_unless_one_is_given(self, make_joint, write_robot):
+        path = write_robot([make_joint("continuous", limit="")])
+        with pytest.raises(ArmError, match="'joint_1'.*no velocity limit"):
+            Arm.load(path)
+        assert Arm.load(path, velocity_limits=[2]).n_joints == 1
+
+
+class TestToolFrame:
+    def test_tool0_is_taken_without_a_word(self, make_joint, write_robot):
+        arm = Arm.load(write_robot([make_joint()]))
+        assert (arm.tool_frame, arm.description.notes) == ("tool0", ())
+
+    def test_without_it_the_last_link_and_a_note(self, make_joint, write_robot):
+        arm = Arm.load(
+            write_robot([make_joint(), make_joint(axis="0 1 0"), make_joint()], tool=None)
+        )
+        assert arm.tool_frame == "link_3"
+        assert arm.description.notes == (
+            "tool frame: 'link_3', the last link of the longest chain",
+        )
+
+    def test_an_earlier_link_leaves_later_joints_out(self, make_joint, write_robot):
+        arm = Arm.load(write_robot([make_joint("prismatic"), make_joint()]), tool_frame="link_1")
+        assert arm.joint_names == ("joint_1",)
+        assert arm.description.held == {"joint_2": 0.0}
+
+    def test_an_unknown_one_lists_the_links(self, make_joint, write_robot):
+        path = write_robot([make_joint()], tool=None)
+        with pytest.raises(ArmError, match="no tool frame 'hand'.*link_0, link_1"):
+            Arm.load(path, tool_frame="hand")
+
+    def test_offset_in_the_tool_frame(self, make_joint, write_robot):
+        path = write_robot([make_joint(), make_joint(axis="0 1 0", rpy="0.3 0.2 0.1")])
+        arm, offset, q = Arm.load(path, tool_offset=(0.1, -0.2, 0.3)), (0.1, -0.2, 0.3), [0.3, 0.8]
+        pose = frame_pose(Arm.load(path), q, "tool0")
+        np.testing.assert_allclose(arm.tool_position(q), pose[:3] @ [*offset, 1], atol=1e-12)
+
+    def test_tool_that_nothing_moves(self, make_joint, write_robot):
+        path = write_robot([make_joint()], tool="0 0 0.1")
+        with pytest.raises(ArmError, match="no joint of made.urdf moves the tool frame 'tool0'"):
+            Arm.load(path)
+
+
+class TestMeshes:
+    TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+    @pytest.mark.parametrize(
+        ("name", "place"),
+        [
+            ("part.obj", "part.obj"),
+            ("meshes/part.obj", "meshes/part.obj"),
+            ("package://robot/meshes/part.obj", "robot/meshes/part.obj"),
+            ("package://robot/part.obj", "part.obj"),
+            ("package://made/part.obj", "made/part.obj"),
+        ],
+    )
+    def test_are_found_around_the_urdf(
+        self, make_joint, make_collision, write_robot, tmp_path, name, place
+    ):
+        """Beside it, in the folder of its package, or in one that is called as the package."""
+        mesh = make_collision(f'<mesh filename="{name}"/>')
+        text = write_robot([make_joint()], {1: mesh}).read_text()
+        robot = tmp_path / "robot"
+        path = robot / "own.urdf"
+        robot.mkdir()
+        path.write_text(text)
+        beside = tmp_path if place.startswith("robot/") else robot
+        (beside / place).parent.mkdir(parents=True, exist_ok=True)
+        (beside / place).write_text(self.TETRAHEDRON)
+        assert Arm.load(path).geometry.ngeoms == 1
+
+    def test_file_addresses(self, make_joint, make_collision, write_robot, tmp_path):
+        (tmp_path / "part.obj").write_text(self.TETRAHEDRON)
+        mesh = make_collision(f'<mesh filename="file://{tmp_path}/part.obj"/>')
+        assert Arm.load(write_robot([make_joint()], {1: mesh})).geometry.ngeoms == 1
+
+    @pytest.mark.parametrize("name", ["gone.stl", "package://gone/gone.stl", "file:///gone.stl"])
+    def test_missing_ones_are_named(self, make_joint, make_collision, write_robot, name):
+        path = write_robot([make_joint()], {1: make_collision(f'<mesh filename="{name}"/>')})
+        with pytest.raises(ArmError, match=r"gone\.stl' of made\.urdf is not found; package_dirs"):
+            Arm.load(path)
+
+    def test_unreadable_ones_are_named(self, make_joint, make_collision, write_robot, tmp_path):
+        (tmp_path / "part.stl").write_text("no mesh")
+        mesh = make_collision(f'<mesh filename="{tmp_path}/part.stl"/>')
+        with pytest.raises(ArmError, match=r"part\.stl"):
+            Arm.load(write_robot([make_joint()], {1: mesh}))
+
+    def test_missing_looks_do_no_harm(self, make_joint, write_robot):
+        looks = '<visual><geometry><mesh filename="gone.dae"/></geometry></visual>'
+        assert Arm.load(write_robot([make_joint()], {1: looks})).n_joints == 1
+
+
+def link(name):
+    return f'<link name="{name}"/>'
+
+
+def fixed(name, parent, child, kind="fixed"):
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f"{CENTRED}</joint>"
+    )
+
+
+class TestRefusals:
+    def test_unknown_name_lists_the_arms(self):
+        with pytest.raises(UnknownNameError, match="arm 'papier'; .*panda.*paper, .*urdf"):
+            Arm.load("papier")
+
+    @pytest.mark.parametrize("name", ["missing.urdf", "folder/robot"])
+    def test_missing_file(self, tmp_path, name):
+        with pytest.raises(ArmError, match="does not exist"):
+            Arm.load(tmp_path / name)
+
+    def test_folder(self, tmp_path):
+        with pytest.raises(ArmError, match="is a folder, not a URDF"):
+            Arm.load(tmp_path)
+
+    @pytest.mark.parametrize("text", ["", "not xml", "<robot name='x'>", "<html/>"])
+    def test_malformed_file(self, tmp_path, text):
+        path = tmp_path / "broken.urdf"
+        path.write_text(text)
+        with pytest.raises(ArmError, match=r"broken\.urdf is not a readable URDF") as caught:
+            Arm.load(path)
+        assert "\n" not in str(caught.value)
+
+    def test_binary_file(self, tmp_path):
+        path = tmp_path / "binary.urdf"
+        path.write_bytes(bytes(range(256)))
+        with pytest.raises(ArmError, match=r"binary\.urdf"):
+            Arm.load(path)
+
+    @pytest.mark.parametrize("kind", ["floating", "planar"])
+    def test_moving_base(self, make_joint, write_robot, kind):
+        path = write_robot([make_joint(kind, limit=""), make_joint()])
+        with pytest.raises(ArmError, match="'joint_1'.*the base must be fixed"):
+            Arm.load(path)
+
+    @pytest.mark.parametrize(
+        ("extra", "message"),
+        [
+            (fixed("back", "link_1", "link_0"), "form a loop: closed loops are not supported"),
+            (
+                link("a") + fixed("x", "link_0", "a") + fixed("y", "link_1", "a"),
+                "'a'.*hangs on two",
+            ),
+            (link("a") + fixed("joint_1", "link_0", "a"), "two joints are called 'joint_1'"),
+            (fixed("x", "link_0", "nobody"), "joint 'x' joins 'nobody', which is no link"),
+            (link("a") + fixed("x", "link_0", "a", "screw"), "'x'.*is 'screw': not supported"),
+        ],
+    )
+    def test_what_is_no_tree(self, make_joint, write_robot, extra, message):
+        with pytest.raises(ArmError, match=message):
+            Arm.load(write_robot([make_joint()], extra=extra))
+
+    def test_no_moving_joint(self, make_joint, write_robot):
+        path = write_robot([make_joint("fixed", limit="")])
+        with pytest.raises(ArmError, match="no moving joint"):
+            Arm.load(path)
+
+    @pytest.mark.parametrize("velocity", ["", 'velocity="0"'])
+    def test_no_rated_speed(self, make_joint, write_robot, velocity):
+        limit = f'<limit lower="-1" upper="1" {velocity} effort="0"/>'
+        path = write_robot([make_joint(limit=limit)])
+        with pytest.raises(ArmError, match="'joint_1'.*no velocity limit"):
+            Arm.load(path)
+
+    @pytest.mark.parametrize(
+        "limit",
+        [
+            "",
+            '<limit velocity="1" effort="0"/>',
+            '<limit lower="1" upper="-1" velocity="1" effort="0"/>',
+            '<limit lower="1" upper="1" velocity="1" effort="0"/>',
+        ],
+    )
+    def test_joint_without_usable_limits(self, make_joint, write_robot, limit):
+        with pytest.raises(ArmError, match=r"made\.urdf"):
+            Arm.load(write_robot([make_joint(limit=limit)]))
+
+    def test_capsules_that_the_parser_drops(self, make_joint, make_collision, write_robot):
+        shape = make_collision('<capsule radius="0.1" length="0.1"/>')
+        path = write_robot([make_joint()], {1: shape}, version="")
+        with pytest.raises(ArmError, match='capsules, which need <robot version="1.2">'):
+            Arm.load(path)
+
+    def test_without_the_package_the_extra_is_named(self, monkeypatch):
+        from importlib import metadata
+
+        def missing(name):
+            raise metadata.PackageNotFoundError(name)
+
+        monkeypatch.setattr(metadata, "distribution", missing)
+        with pytest.raises(ArmError, match=r"pip install 'kinarm\[robots\]'"):
+            Arm.load("ur5")
+
+    def test_a_file_that_the_package_lacks(self):
+        pytest.importorskip("cmeel")
+        source = "example-robot-data:ur_description/urdf/ur99.urdf"
+        with pytest.raises(KinarmError, match=r"ur99\.urdf"):
+            Arm.load(ArmSpecification(source=source))
