@@ -7,6 +7,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from kinarm.kernels.caching import ForgivingCache
 from kinarm.kernels.linking import HelperCompiler, KernelCompiler, compiled_once
 
 Array = NDArray[np.float64]
@@ -24,9 +25,11 @@ def kernel(function: Function) -> Function:
         "pipeline_class": KernelCompiler,
     }
     try:
-        return cast("Function", njit(cache=True, **options)(function))
+        compiled: Any = njit(cache=True, **options)(function)
     except RuntimeError:
         return cast("Function", njit(**options)(function))
+    compiled._cache = ForgivingCache(compiled._cache)
+    return cast("Function", compiled)
 
 
 def inlined(function: Function) -> Function:
