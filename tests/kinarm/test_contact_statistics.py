@@ -41,7 +41,9 @@ def test_shares_are_sorted_and_always_and_never_are_their_ends(model):
 
 def test_configurations_are_uniform_and_joints_that_are_not_actuated_stay_at_home(model):
     q, arm = random_configurations(model, 4000), model.arm
-    np.testing.assert_array_equal(q[:, arm.n_actuated :], arm.home[arm.n_actuated :])
+    np.testing.assert_array_equal(
+        q[:, arm.n_actuated :], np.tile(arm.home[arm.n_actuated :], (4000, 1))
+    )
     moved = slice(arm.n_actuated)
     shares = (q - arm.lower)[:, moved] / (arm.upper - arm.lower)[moved]
     assert ((shares >= 0) & (shares <= 1)).all()

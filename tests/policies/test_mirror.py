@@ -92,7 +92,7 @@ class TestIsSymmetric:
 
     def test_obstacles_count_whether_goals_lie_on_them_or_not(self):
         right, left = Scene().obstacles
-        higher = replace(right, upper=(*right.upper[:2], 0.4))
+        higher = replace(right, upper=(*right.upper[:2], 0.31))
         assert not is_symmetric(BOTH.replace(scene=Scene(obstacles=(left, higher))))
         assert not is_symmetric(BOTH.replace(scene=Scene(obstacles=(left,))))
         middle = Obstacle(name="middle", lower=(0.5, -0.2, 0), upper=(0.7, 0.2, 0.3))
