@@ -46,7 +46,7 @@ class ArmFacts:
     @property
     def speeds(self) -> str:
         """Slowest and fastest joint that is actuated."""
-        return span(self.arm.velocity_limits[: self.arm.n_actuated], self._prismatic.any())
+        return span(self.arm.velocity_limits[: self.arm.n_actuated], bool(self._prismatic.any()))
 
     @property
     def _prismatic(self) -> NDArray[np.bool_]:
@@ -113,7 +113,8 @@ def span(values: NDArray[np.float64], prismatic: bool) -> str:
 
 def _shown(values: NDArray[np.float64], prismatic: bool) -> list[float]:
     """Numbers that people read: degrees, or metres."""
-    return np.round(values if prismatic else np.rad2deg(values), 2 if prismatic else 0).tolist()
+    rounded = np.round(values if prismatic else np.rad2deg(values), 2 if prismatic else 0)
+    return [float(value) for value in rounded]
 
 
 def _frequency(share: float) -> str:

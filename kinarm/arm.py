@@ -48,6 +48,8 @@ class Arm:
         Links that may touch.
     chain : Chain
         The kinematics as flat arrays, for the compiled simulator.
+    unplaced : Arm or None
+        The same arm at the origin, if it stands elsewhere.
     """
 
     specification: ArmSpecification
@@ -58,6 +60,7 @@ class Arm:
     home: NDArray[np.float64]
     allowed_contacts: tuple[AllowedContact, ...]
     chain: Chain
+    unplaced: Arm | None = None
 
     def __post_init__(self) -> None:
         for array in (*self.chain, self.home):
@@ -147,7 +150,7 @@ class Arm:
             if part.parentJoint == 0:
                 part.placement = base * part.placement
         chain = Chain.from_model(model, self.tool_frame)
-        return replace(self, model=model, geometry=geometry, chain=chain)
+        return replace(self, model=model, geometry=geometry, chain=chain, unplaced=self)
 
     @property
     def n_joints(self) -> int:
@@ -181,7 +184,12 @@ class Arm:
 
     @cached_property
     def digest(self) -> str:
-        """Hash of everything that the simulator uses, to tell whether two arms behave alike."""
+        """Hash of everything that the simulator uses, to tell whether two arms behave alike.
+
+        Where the base stands is no part of it.
+        """
+        if self.unplaced is not None:
+            return self.unplaced.digest
         arrays = [*self.chain, self.home, np.array(self.n_actuated)]
         names = []
         for shape in self.geometry.geometryObjects:

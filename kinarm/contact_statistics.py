@@ -53,8 +53,7 @@ class ContactStatistics:
     @property
     def free(self) -> NDArray[np.bool_]:
         """Configurations at which nothing touches, shape (n_samples,)."""
-        touching: NDArray[np.bool_] = self.touching.any(axis=1)
-        return ~touching
+        return np.logical_not(self.touching.any(axis=1))
 
     @property
     def shares(self) -> dict[tuple[str, str], float]:

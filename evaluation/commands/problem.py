@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -127,7 +128,9 @@ def write_picture(path: Path, problem: "ReachProblem") -> None:
     goal = (np.array(region.lower) + np.array(region.upper)) / 2
     width, height = PICTURE_SIZE
     taken = Renderer(problem, width=width, height=height).render(problem.load_arm().home, goal)
-    write_atomically(path, lambda file: imsave(file, taken, format="png"))
+    png = BytesIO()
+    imsave(png, taken, format="png")
+    write_atomically(path, lambda file: file.write(png.getvalue()))
 
 
 def rows() -> list[tuple[str, ...]]:

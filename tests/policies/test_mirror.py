@@ -10,11 +10,17 @@ from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError
 from kinarm.observation import observation_signs
 from kinarm.policies.library import load_policy
-from kinarm.policies.mirror import commuting_weights, find_mirror, is_symmetric, task_mirror
+from kinarm.policies.mirror import (
+    commuting_weights,
+    find_mirror,
+    is_symmetric,
+    mirror_findings,
+    task_mirror,
+)
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.policy import Layer
 from kinarm.problem import PROBLEMS
-from kinarm.scene import GoalRegion, Obstacle, Scene
+from kinarm.scene import GoalRegion, Mount, Obstacle, Scene
 from kinarm.simulator import Simulator
 from kinarm.world import World
 
@@ -86,7 +92,7 @@ class TestIsSymmetric:
 
     def test_obstacles_count_whether_goals_lie_on_them_or_not(self):
         right, left = Scene().obstacles
-        higher = replace(right, upper=(*right.upper[:2], 0.4))
+        higher = replace(right, upper=(*right.upper[:2], 0.31))
         assert not is_symmetric(BOTH.replace(scene=Scene(obstacles=(left, higher))))
         assert not is_symmetric(BOTH.replace(scene=Scene(obstacles=(left,))))
         middle = Obstacle(name="middle", lower=(0.5, -0.2, 0), upper=(0.7, 0.2, 0.3))
@@ -211,3 +217,39 @@ class TestCommutingPolicy:
         np.testing.assert_array_equal(first.steps, second.steps)
         np.testing.assert_array_equal(first.collision, second.collision)
         np.testing.assert_allclose(first.paths * REVERSED, second.paths, rtol=0, atol=1e-9)
+
+
+class TestFindings:
+    """What stands against the reflection, part by part."""
+
+    def faults(self, problem):
+        return [name for name, reason in mirror_findings(World(problem)).items() if reason]
+
+    def test_the_papers_third_task_is_its_own_image(self):
+        assert self.faults(BOTH) == []
+        assert self.faults(BOTH.replace(scene="table")) == []
+        assert self.faults(BOTH.replace(scene="post")) == []
+
+    def test_a_task_on_one_side(self):
+        assert self.faults(PROBLEMS["left"]) == ["scene"]
+
+    def test_uneven_limits(self):
+        arm = Arm.load("paper", limits={"axis_1": (-3.0, 2.0)})
+        assert "limits" in self.faults(BOTH.replace(arm=arm))
+        assert (
+            mirror_findings(World(BOTH.replace(arm=arm)))["limits"] == "those of axis_1 are uneven"
+        )
+
+    def test_an_arm_that_stands_aside(self):
+        scene = replace(Scene(), mount=Mount(position=(0, 0.2, 0)))
+        faults = self.faults(BOTH.replace(scene=scene))
+        assert {"kinematics", "contact"} <= set(faults)
+        ahead = replace(Scene(), mount=Mount(position=(0.1, 0, 0.05)))
+        assert self.faults(BOTH.replace(scene=ahead)) == []
+
+    @pytest.mark.parametrize(("size", "symmetric"), [(0.05, True), (0.03, False)])
+    def test_a_post_that_is_turned_by_an_eighth(self, size, symmetric):
+        """Its image is turned the other way, which is the same for a square one alone."""
+        post = Obstacle(name="post", lower=(0.4, -size, 0), upper=(0.5, size, 1), yaw=np.pi / 4)
+        scene = replace(Scene(), obstacles=(post,))
+        assert is_symmetric(BOTH.replace(scene=scene)) == symmetric
