@@ -129,7 +129,7 @@ class EvaluationDocument:
                 check_document(content)
         except (ValueError, RecursionError) as error:
             raise InvalidInputError(
-                f"{name!r} is not an evaluation of kinarm-eval: {first_line(error)}"
+                f"{name!r} is not a complete kinarm evaluation: {first_line(error)}"
             ) from error
         if version != FORMAT_VERSION:
             raise InvalidInputError(

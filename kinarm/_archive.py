@@ -80,7 +80,8 @@ def load_archive(path: str | Path, kind: str, version: int, error: type[KinarmEr
     """
     name, wanted = repr(str(path)), f"kinarm-{kind.replace(' ', '-')}"
     with reading(name, kind, error), Path(path).open("rb") as file:
-        content = _arrays(file) if zipfile.is_zipfile(file) else {}
+        is_other = file.read(2) not in (b"", b"PK")
+        content = {} if is_other else _arrays(file)
         if "format" not in content:
             raise error(f"{name} is not a kinarm {kind}")
         held = str(content["format"])

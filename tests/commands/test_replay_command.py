@@ -222,7 +222,7 @@ def test_policies_are_no_recordings(replay, policy_folder):
 def test_damaged_evaluations(replay, tmp_path, content):
     path = tmp_path / "evaluation.json"
     path.write_text(content)
-    check_refused(replay(path), "evaluation.json", "not an evaluation")
+    check_refused(replay(path), "evaluation.json", "not a complete kinarm evaluation")
 
 
 def test_an_evaluation_that_no_longer_holds(replay, evaluation, tmp_path):
@@ -273,7 +273,7 @@ def test_an_evaluation_with_something_missing(replay, evaluation, tmp_path, path
         part = part[step]
     del part[last]
     (tmp_path / "evaluation.json").write_text(json.dumps(document))
-    check_refused(replay(tmp_path / "evaluation.json"), "evaluation.json", "not an evaluation")
+    check_refused(replay(tmp_path / "evaluation.json"), "evaluation.json", "not a complete kinarm evaluation")
 
 
 def test_an_evaluation_of_several_policies(replay, evaluation):
