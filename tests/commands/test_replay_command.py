@@ -273,7 +273,9 @@ def test_an_evaluation_with_something_missing(replay, evaluation, tmp_path, path
         part = part[step]
     del part[last]
     (tmp_path / "evaluation.json").write_text(json.dumps(document))
-    check_refused(replay(tmp_path / "evaluation.json"), "evaluation.json", "not a complete kinarm evaluation")
+    check_refused(
+        replay(tmp_path / "evaluation.json"), "evaluation.json", "not a complete kinarm evaluation"
+    )
 
 
 def test_an_evaluation_of_several_policies(replay, evaluation):
