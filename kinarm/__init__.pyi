@@ -1,4 +1,6 @@
 from .arm import Arm as Arm
+from .arm_specification import AllowedContact as AllowedContact
+from .arm_specification import ArmFile as ArmFile
 from .arm_specification import ArmSpecification as ArmSpecification
 from .arm_specification import arm_names as arm_names
 from .clearance import Clearance as Clearance
@@ -26,6 +28,8 @@ from .paths import record_path as record_path
 from .problem import PROBLEMS as PROBLEMS
 from .problem import ReachProblem as ReachProblem
 from .problem import Stepping as Stepping
+from .problem_files import problem_names as problem_names
+from .problem_files import scene_names as scene_names
 from .recording import Recording as Recording
 from .recording import load_recordings as load_recordings
 from .recording import save_recordings as save_recordings
@@ -33,6 +37,7 @@ from .reference import ReferenceSimulator as ReferenceSimulator
 from .rollouts import Rollouts as Rollouts
 from .rollouts import StepResult as StepResult
 from .scene import GoalRegion as GoalRegion
+from .scene import Mount as Mount
 from .scene import Obstacle as Obstacle
 from .scene import Scene as Scene
 from .simulator import Simulator as Simulator

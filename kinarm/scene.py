@@ -77,7 +77,7 @@ class Mount:
 
     @property
     def rotation(self) -> NDArray[np.float64]:
-        """Orientation: rotation matrix, shape (3, 3)."""
+        """Orientation, as a rotation matrix, shape (3, 3)."""
         return rotation_matrix(self.rpy)
 
 
@@ -124,7 +124,7 @@ class Obstacle:
 
     @property
     def rotation(self) -> NDArray[np.float64]:
-        """Orientation of its edges in the world: rotation matrix, shape (3, 3)."""
+        """Orientation of its edges in the world, as a rotation matrix, shape (3, 3)."""
         return rotation_matrix((0.0, 0.0, self.yaw))
 
 

@@ -40,7 +40,7 @@ def arm_page(
     Parameters
     ----------
     arm : Arm, ArmSpecification, str or Path
-        The arm, where it stands; or what `Arm.load` takes, which is mounted as the scene says.
+        The arm, where it stands; or what `kinarm.Arm.load` takes, mounted as the scene says.
     path : str or Path, optional
         Where to write the page, if at all.
     scene : Scene

@@ -28,13 +28,15 @@ def joint(kind: str, limits: str = LIMITS) -> str:
     )
 
 
+BACK = '<joint name="back" type="fixed"><parent link="a"/><child link="base"/></joint>'
+
 UNUSABLE_ROBOTS = {
     "malformed": ("<robot", "urdf"),
     "empty": ("", "urdf"),
     "no xml": ("hello", "urdf"),
     "floating base": (robot(joint("floating", "")), "fixed"),
     "no speed": (robot(joint("continuous", "")), "velocity"),
-    "loop": (robot(joint("revolute")).replace('"tool0"/></', '"base"/></'), "loop"),
+    "loop": (robot(joint("revolute")).replace("</robot>", f"{BACK}</robot>"), "loop"),
     "no limits": (robot(joint("revolute", "")), "urdf"),
     "no velocity limit": (robot(joint("revolute", LIMITS.replace('velocity="1"', ""))), "urdf"),
     "no joint": (robot(joint("fixed", "")), "urdf"),

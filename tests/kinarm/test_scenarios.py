@@ -101,9 +101,9 @@ def test_given_spread_comes_before_that_of_the_task(simulator):
     np.testing.assert_array_equal(drawn[1], near[1])
 
 
-def test_box_around_the_arm_leaves_no_start(simulator):
-    block = Obstacle(name="block", lower=(-1, -1, 0), upper=(1, 1, 2))
-    buried = changed(simulator, scene=Scene(obstacles=(block,)))
+def test_box_where_the_arm_starts_leaves_no_start(simulator):
+    block = Obstacle(name="block", lower=(0.5, -0.1, 0.6), upper=(0.7, 0.1, 0.8))
+    buried = changed(simulator, scene=Scene(obstacles=(block,)), start_spread=0)
     with pytest.raises(ProblemError, match="no contact-free start .* touches block"):
         buried.sample(np.random.default_rng(23), 3)
 

@@ -23,7 +23,6 @@ def test_defaults_are_the_papers():
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"goal_regions": ()}, "at least one goal region"),
         ({"goal_regions": ("a", "b", "a")}, "goal_regions names one twice: a, b, a"),
         ({"goal_weights": (1, 2)}, "2 goal_weights for 1 goal_regions"),
         ({"goal_weights": (0,)}, r"goal_weights must be greater than 0, got \[0.0\]"),
