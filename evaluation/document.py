@@ -1,6 +1,5 @@
 """The document of an evaluation: everything about it, to keep and to face the same trials again."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from kinarm._archive import load_json
 from kinarm._files import first_line
 from kinarm._validation import finite_array
 from kinarm.errors import InvalidInputError, UnknownNameError
@@ -22,7 +22,8 @@ from kinarm.problem import ReachProblem
 from kinarm.recording import Recording
 from kinarm.simulator import Simulator
 
-FORMAT_VERSION = 2
+KIND, FORMAT_VERSION = "evaluation", 2
+"""Kind and version of the files."""
 
 ENDS = ("outcome", "steps", "final_distance")
 """What has to be the same again."""
@@ -120,14 +121,12 @@ class EvaluationDocument:
             If the file is missing, damaged, something else, or of another version.
         """
         name = str(path)
+        content = load_json(path, KIND, InvalidInputError)
         try:
-            content = json.loads(Path(path).read_text(encoding="utf-8"))
             check_shape(content, {"protocol": {"format_version": int}, "results": list}, "it")
             version = content["protocol"]["format_version"]
             if version == FORMAT_VERSION:
                 check_document(content)
-        except OSError as error:
-            raise InvalidInputError(f"cannot read {name!r}: {error.strerror}") from error
         except (ValueError, RecursionError) as error:
             raise InvalidInputError(
                 f"{name!r} is not an evaluation of kinarm-eval: {first_line(error)}"

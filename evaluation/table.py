@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+from kinarm._console import open_console
 from kinarm.evaluation.metrics import ALWAYS, METRICS
 
 if TYPE_CHECKING:
@@ -88,10 +89,10 @@ def print_table(document: dict[str, Any], console: "Console", *, markdown: bool 
     """
     columns = [text_column("problem"), text_column("policy"), *metric_columns()]
     if markdown:
-        from rich.console import Console
-
         text = io.StringIO()
-        Console(file=text, width=1000).print(evaluation_table(document, columns, markdown=True))
+        open_console(file=text, piped_width=1000).print(
+            evaluation_table(document, columns, markdown=True)
+        )
         console.out(text.getvalue().strip(), highlight=False)
         return
     expendable = sorted((c for c in columns if c.priority < ALWAYS), key=lambda c: c.priority)

@@ -1,16 +1,25 @@
-"""The only reader and writer of ``.npz`` files: a header in JSON and arrays, without pickle."""
+"""The only reader of files with results: ``.npz`` with a header in JSON, without pickle; JSON."""
 
 import json
+import math
+import os
+import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._files import first_line, write_atomically
 from kinarm.errors import KinarmError
+
+KINDS = "biufU"
+"""Kinds of what an array may hold: truth values, whole numbers, numbers and texts."""
+
+GROWTH, SLACK = 4, 50 * 10**6
+"""How much larger than its file what is read may be: by a factor, and a number of bytes."""
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -54,7 +63,9 @@ def save_archive(
         "header": np.array(json.dumps(header, sort_keys=True)),
         **arrays,
     }
-    write = np.savez_compressed if compress else np.savez
+    # What is larger could not be told from a small file that claims to hold much.
+    small = sum(array.nbytes for array in arrays.values()) < SLACK
+    write = np.savez_compressed if compress and small else np.savez
     write_atomically(path, lambda file: write(file, **content))
 
 
@@ -69,8 +80,8 @@ def load_archive(path: str | Path, kind: str, version: int, error: type[KinarmEr
     """
     name, wanted = repr(str(path)), f"kinarm-{kind.replace(' ', '-')}"
     with reading(name, kind, error), Path(path).open("rb") as file:
-        content = np.load(file, allow_pickle=False)
-        if not isinstance(content, np.lib.npyio.NpzFile) or "format" not in content:
+        content = _arrays(file) if zipfile.is_zipfile(file) else {}
+        if "format" not in content:
             raise error(f"{name} is not a kinarm {kind}")
         held = str(content["format"])
         if held != wanted:
@@ -85,7 +96,47 @@ def load_archive(path: str | Path, kind: str, version: int, error: type[KinarmEr
         if not isinstance(header, dict):
             raise error(f"{name} is not a complete kinarm {kind}: its header is no table")
         skip = ("format", "version", "header")
-        return Archive(header, {key: content[key] for key in content.files if key not in skip})
+        return Archive(header, {key: content[key] for key in content if key not in skip})
+
+
+def load_json(path: str | Path, kind: str, error: type[KinarmError]) -> Any:
+    """Read a JSON document.
+
+    Raises
+    ------
+    KinarmError
+        Of the given type, in one line: if the file is missing or no JSON.
+    """
+    with reading(repr(str(path)), kind, error):
+        return json.loads(Path(path).read_text(encoding="utf-8"))
+
+
+def _arrays(file: IO[bytes]) -> dict[str, NDArray[Any]]:
+    """Arrays of a ``.npz`` file; whatever it claims to hold, little more than its size is read."""
+    arrays: dict[str, NDArray[Any]] = {}
+    with zipfile.ZipFile(file) as archive:
+        members = archive.infolist()
+        claimed = sum(member.file_size for member in members)
+        if claimed > GROWTH * os.fstat(file.fileno()).st_size + SLACK:
+            raise ValueError(f"it claims to hold {claimed / 1e6:.0f} MB")
+        for member in members:
+            with archive.open(member) as stored:
+                arrays[member.filename.removesuffix(".npy")] = _array(stored, member)
+    return arrays
+
+
+def _array(stored: IO[bytes], member: zipfile.ZipInfo) -> NDArray[Any]:
+    """Read one array, if it is of numbers or texts and as large as its file."""
+    version = np.lib.format.read_magic(stored)
+    read_header = getattr(np.lib.format, f"read_array_header_{version[0]}_0")
+    shape, by_column, dtype = read_header(stored)
+    size = math.prod(shape) * dtype.itemsize
+    if dtype.kind not in KINDS or min(shape, default=0) < 0:
+        raise ValueError(f"{member.filename} holds {dtype}")
+    if size != member.file_size - stored.tell():
+        raise ValueError(f"{member.filename} does not hold {shape} values")
+    array = np.frombuffer(stored.read(size), dtype=dtype) if size else np.empty(0, dtype)
+    return array.reshape(shape, order="F" if by_column else "C").copy()
 
 
 @contextmanager

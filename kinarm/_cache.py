@@ -3,9 +3,12 @@
 import hashlib
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from kinarm._archive import Arrays, load_archive, save_archive
 from kinarm._files import check_folder
@@ -26,7 +29,9 @@ def cache_folder() -> Path:
         return Path(tempfile.gettempdir()) / "kinarm"
 
 
-def cached_arrays(kind: str, version: int, made_of: bytes, make: Callable[[], Arrays]) -> Arrays:
+def cached_arrays(
+    kind: str, version: int, made_of: bytes, make: Callable[[], Mapping[str, ArrayLike]]
+) -> Arrays:
     """Look arrays up, or make and keep them.
 
     A file that cannot be read is replaced; where none can be written, nothing is kept.
@@ -45,7 +50,7 @@ def cached_arrays(kind: str, version: int, made_of: bytes, make: Callable[[], Ar
     path = cache_folder() / f"{kind}-{hashlib.sha256(made_of).hexdigest()[:24]}.npz"
     with suppress(InvalidInputError):
         return load_archive(path, kind, version, InvalidInputError).arrays
-    arrays = make()
+    arrays = {name: np.asarray(array) for name, array in make().items()}
     with suppress(OutputError):
         check_folder(path.parent)
         save_archive(path, kind, version, arrays, {})

@@ -1,6 +1,7 @@
 """What the command lines share: options from dataclasses, one-line errors, exit statuses."""
 
 import argparse
+import io
 import math
 import os
 import re
@@ -34,7 +35,18 @@ def run_command(prog: str, command: Callable[[], None]) -> NoReturn:
     Status 0 is success, 1 a failure of the machine, 2 bad input, 130 an interruption; all but
     success come with one line on standard error. A reader that closes the pipe is no failure.
     """
+    _prepare_streams()
     sys.exit(_status(prog, command))
+
+
+def _prepare_streams() -> None:
+    """Let whatever is printed be printable: on closed streams, and in encodings without it."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:  # closed before this process began
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: PTH123, SIM115
+        elif isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _status(prog: str, command: Callable[[], None]) -> int:
@@ -53,6 +65,8 @@ def _status(prog: str, command: Callable[[], None]) -> int:
     except OSError as error:
         _discard_output()
         return _report(prog, f"{error.filename or 'standard output'}: {error.strerror}", 1)
+    except MemoryError as error:
+        return _report(prog, f"out of memory: {str(error) or 'no more to be had'}", 1)
     except KeyboardInterrupt as interruption:
         # CPython remembers an interrupt within `exec`, as imports are full of, and would end
         # this process by the signal whatever it returns; it forgets it at the next `exec`.

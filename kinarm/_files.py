@@ -3,31 +3,117 @@
 Each function raises `OutputError`, in one line, where it cannot write.
 """
 
+import fcntl
+import glob
+import io
 import os
 import tempfile
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
 from kinarm.errors import OutputError
 
+HALF_WRITTEN = ".part"
+"""Ending of a file that is being written."""
+
+IN_USE = 60.0
+"""Age below which a half-written file is left alone in any case [s]."""
+
 
 def write_atomically(path: str | Path, write: Callable[[IO[bytes]], object]) -> None:
-    """Let ``write`` fill a file beside its place, which is moved there when it is complete."""
-    target = Path(path)
-    beside = target.with_name(f".{target.name}.{os.urandom(4).hex()}")
+    """Let ``write`` fill a file beside its place, which is moved there when it is complete.
+
+    A link is followed. What is no regular file, such as a device, is written to as it stands.
+    What an earlier process was killed over is swept away.
+    """
+    target = Path(os.path.realpath(path))
     try:
-        try:
-            with beside.open("xb") as file:
-                if target.exists():
-                    beside.chmod(target.stat().st_mode)
-                write(file)
-            beside.replace(target)
-        except BaseException:
-            beside.unlink(missing_ok=True)
-            raise
+        if target.exists() and not (target.is_file() or target.is_dir()):
+            _write_into(target, write)
+        else:
+            _replace(target, write)
     except OSError as error:
         raise OutputError(f"cannot write {str(path)!r}: {error.strerror}") from error
+
+
+def _write_into(target: Path, write: Callable[[IO[bytes]], object]) -> None:
+    """Write to what cannot be replaced."""
+    content = io.BytesIO()
+    write(content)
+    with target.open("wb") as file:
+        file.write(content.getvalue())
+
+
+def _replace(target: Path, write: Callable[[IO[bytes]], object]) -> None:
+    """Write beside a file, and put it in its place."""
+    beside = target.with_name(f".{target.name}.{os.urandom(4).hex()}{HALF_WRITTEN}")
+    try:
+        with beside.open("xb") as file:
+            fcntl.flock(file, fcntl.LOCK_EX)
+            if target.exists():
+                beside.chmod(target.stat().st_mode)
+            write(file)
+            file.flush()
+            os.fsync(file.fileno())
+            beside.replace(target)
+    except BaseException:
+        beside.unlink(missing_ok=True)
+        raise
+    _sweep(target)
+
+
+def _sweep(target: Path) -> None:
+    """Remove what other processes left half written, unless they are at it."""
+    for left in target.parent.glob(f".{glob.escape(target.name)}.*{HALF_WRITTEN}"):
+        with suppress(OSError):
+            if time.time() - left.stat().st_mtime < IN_USE:
+                continue
+            with left.open("rb") as file:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                left.unlink()
+
+
+@contextmanager
+def only_writer(path: str | Path) -> Iterator[None]:
+    """Keep other processes from making the same output meanwhile.
+
+    Raises
+    ------
+    OutputError
+        If another process is making it.
+    """
+    target = Path(os.path.realpath(path))
+    lock = target.with_name(f".{target.name}.lock")
+    try:
+        file = _locked(lock)
+    except BlockingIOError:
+        raise OutputError(f"another process is writing {str(path)!r}") from None
+    except OSError as error:
+        raise OutputError(f"cannot write {str(path)!r}: {error.strerror}") from error
+    with file:
+        try:
+            yield
+        finally:
+            lock.unlink(missing_ok=True)
+
+
+def _locked(lock: Path) -> IO[bytes]:
+    """Open and lock a file that its last owner may just be removing."""
+    while True:
+        file = lock.open("ab")
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if os.path.samestat(os.fstat(file.fileno()), lock.stat()):
+                return file
+        except FileNotFoundError:
+            pass
+        except BaseException:
+            file.close()
+            raise
+        file.close()
 
 
 def write_text(path: str | Path, text: str) -> None:

@@ -50,8 +50,8 @@ class ContactModel:
     """An arm in a scene, with the pairs of bodies that are tested for contact.
 
     Pairs that can tell nothing are left out: neighbours in the chain, bodies that overlap at the
-    home pose, and the mounting, that is the base and the first link against a world that they
-    never touch or always touch.
+    home pose, those that the arm's file allows, and the mounting, that is the base and the first
+    link against a world that they never touch or always touch.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class ContactModel:
         n_shapes = geometry.ngeoms
         _add_scene(geometry, scene)
         surroundings = [shape.name for shape in geometry.geometryObjects][n_shapes:]
-        candidates = _candidate_pairs(geometry, n_shapes, len(scene.obstacles))
+        candidates = _candidate_pairs(arm, geometry, n_shapes, len(scene.obstacles))
         for first, second, _ in candidates:
             geometry.addCollisionPair(pin.CollisionPair(first, second))
         dropped = _uninformative_pairs(arm, geometry, n_shapes)
@@ -216,14 +216,17 @@ def body_names(arm: Arm) -> tuple[str, ...]:
 
 
 def _candidate_pairs(
-    geometry: pin.GeometryModel, n_shapes: int, n_boxes: int
+    arm: Arm, geometry: pin.GeometryModel, n_shapes: int, n_boxes: int
 ) -> list[tuple[int, int, int]]:
-    """All pairs (first, second, kind) that move against each other, neighbours excepted."""
+    """All pairs (first, second, kind) that move against each other, but those that are allowed."""
     parent = [shape.parentJoint for shape in geometry.geometryObjects]
+    links = [shape.name.rsplit("_", 1)[0] for shape in arm.geometry.geometryObjects]
+    allowed = {frozenset(contact.links) for contact in arm.allowed_contacts}
     pairs = []
     for first in range(n_shapes):
         for second in range(first + 1, n_shapes):
-            if abs(parent[first] - parent[second]) > 1:
+            apart = abs(parent[first] - parent[second]) > 1
+            if apart and frozenset((links[first], links[second])) not in allowed:
                 a, b = sorted((first, second), key=lambda shape: parent[shape])
                 pairs.append((a, b, BETWEEN_CAPSULES))
         if parent[first] > 0:

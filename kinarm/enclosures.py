@@ -1,13 +1,17 @@
 """Rounded polytopes around collision shapes, from which the kernels prove freedom from contact."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from kinarm._cache import cached_arrays
 from kinarm.errors import ArmError
+
+VERSION = 1
+"""To be raised when the same points are enclosed by something else."""
 
 FEW, MANY = 16, 256
 """Corners of a coarse and of a fine polytope about a mesh."""
@@ -65,7 +69,16 @@ def _prism(radius: float, half_length: float) -> NDArray[np.float64]:
 
 
 def _around(points: NDArray[np.float64], most: int) -> Enclosure:
-    """Enclose the hull of points, shape (n, 3)."""
+    """Enclose the hull of points, shape (n, 3); what took long is kept in the cache folder."""
+    if len(points) <= FEW:
+        return Enclosure(**_fitted(points, most))
+    made_of = np.int64(most).tobytes() + points.tobytes()
+    fitted = cached_arrays("enclosure", VERSION, made_of, lambda: _fitted(points, most))
+    return Enclosure(fitted["corners"], float(fitted["rounding"]))
+
+
+def _fitted(points: NDArray[np.float64], most: int) -> dict[str, Any]:
+    """Corners and rounding of what encloses the hull of points."""
     from kinarm.kernels.enclosing import distances_from_hull
 
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
@@ -75,5 +88,6 @@ def _around(points: NDArray[np.float64], most: int) -> Enclosure:
         distances_from_hull(points[chosen], points, distances)
         farthest = int(distances.argmax())
         if distances[farthest] <= CLOSE_ENOUGH or len(chosen) == most:
-            return Enclosure(points[chosen], float(distances[farthest]) * (1 + 1e-9) + 1e-9)
+            rounding = float(distances[farthest]) * (1 + 1e-9) + 1e-9
+            return {"corners": points[chosen], "rounding": rounding}
         chosen.append(farthest)

@@ -19,8 +19,9 @@ def draw_scenarios(
     """Draw starts and goals.
 
     Goals are uniform over the task's regions. Each actuated joint starts uniformly within its
-    limits, scaled by the start spread, rejected until the arm touches nothing and its tool is
-    farther from the goal than the tolerance.
+    limits, scaled by the start spread, or the arm starts at one of the task's configurations;
+    starts are rejected until the arm touches nothing and its tool is farther from the goal than
+    the tolerance.
 
     Parameters
     ----------
@@ -78,6 +79,7 @@ def draw_for_each(
     spread = task.start_spread if start_spread is None else start_spread
     lower = arm.home + spread * (arm.lower - arm.home)
     extent = spread * (arm.upper - arm.lower)
+    listed = np.array(task.starts)
     goals = np.concatenate([task.draw_goals(world.problem.scene, rng, count) for rng in rngs])
     starts = np.tile(arm.home, (len(goals), 1))
     pending = np.arange(len(goals))
@@ -85,7 +87,11 @@ def draw_for_each(
         wanted = np.bincount(pending // max(count, 1), minlength=len(rngs)).tolist()
         drawn = [rng.random((n, n_actions)) for rng, n in zip(rngs, wanted, strict=True)]
         uniforms = np.concatenate(drawn)
-        tools, touching = world.screen(propose_starts(pending, uniforms, lower, extent, starts))
+        if len(listed):
+            starts[pending] = proposed = listed[(uniforms[:, 0] * len(listed)).astype(np.int64)]
+        else:
+            proposed = propose_starts(pending, uniforms, lower, extent, starts)
+        tools, touching = world.screen(proposed)
         pending = rejected_rows(pending, goals, tools, touching, task.tolerance)
         if pending.size == 0:
             return starts.reshape(len(rngs), count, arm.n_joints), goals.reshape(
@@ -93,9 +99,10 @@ def draw_for_each(
             )
     pair = world.contact_model.contact_pair(starts[pending[0]])
     reason = f"{pair[0]} touches {pair[1]}" if pair else "the tool already is at the goal"
+    source = "from task.starts" if len(listed) else f"with start_spread {spread}"
     raise ProblemError(
         f"no contact-free start away from the goal found in {START_ATTEMPTS} attempts for arm "
-        f"{arm.name!r} with start_spread {spread}; in the last one {reason}"
+        f"{arm.name!r} {source}; in the last one {reason}"
     )
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm._fields import check_fields
+from kinarm._fields import OPTIONAL, check_fields
 from kinarm._validation import whole_number
 from kinarm.errors import ProblemError
 from kinarm.scene import Scene
@@ -88,6 +88,8 @@ class ReachTask:
     start_spread : float
         Scales the range of the start configurations about the home pose; 1 is the whole range
         of every actuated joint, 0 always starts at home.
+    starts : tuple
+        Start configurations, each as likely, instead of that range [rad or m].
     reward : RewardWeights
         What is rewarded.
 
@@ -102,6 +104,7 @@ class ReachTask:
     tolerance: float = 0.05
     horizon: int = 64
     start_spread: float = 1.0
+    starts: tuple[tuple[float, ...], ...] = field(default=(), metadata=OPTIONAL)
     reward: RewardWeights = field(default_factory=RewardWeights)
 
     def __post_init__(self) -> None:

@@ -9,6 +9,7 @@ from kinarm._parallel import available_threads, run_rows
 from kinarm._validation import finite_array, whole_number
 from kinarm.collision import Contact, ContactModel
 from kinarm.episodes import Control, Episodes, Rules
+from kinarm.errors import ProblemError
 from kinarm.kernels.rollout import begin, bind, screen
 from kinarm.kernels.session import Session
 from kinarm.networks import table_control
@@ -45,6 +46,7 @@ class World:
         )
         self.arm = self.problem.load_arm()
         self.contact_model = ContactModel.build(self.arm, self.problem.scene)
+        self._check_starts()
         task, stepping = self.problem.task, self.problem.stepping
         n_tested = stepping.tested_configurations
         self.rules = Rules(
@@ -55,6 +57,17 @@ class World:
             reward=task.reward.vector,
         )
         self._shares = np.arange(1, n_tested + 1)[:, None] / n_tested
+
+    def _check_starts(self) -> None:
+        """Refuse configurations that the task lists but that nothing can start at."""
+        for number, start in enumerate(self.problem.task.starts):
+            name = f"task.starts[{number}]"
+            q = finite_array(name, start, (self.arm.n_joints,))
+            if ((q < self.arm.lower) | (q > self.arm.upper)).any():
+                raise ProblemError(f"{name} lies outside the limits: {list(start)}")
+            pair = self.contact_model.contact_pair(q)
+            if pair is not None:
+                raise ProblemError(f"{name} is in contact: {pair[0]} touches {pair[1]}")
 
     def __repr__(self) -> str:
         return f"World({self.problem!r})"

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kinarm._command_line import Parser, add_options, given_options, run_command
-from kinarm._files import check_output
+from kinarm._console import open_console
+from kinarm._files import check_output, only_writer
 from kinarm.errors import InvalidInputError, KinarmError, PolicyFileError
 from kinarm.policies.learners import (
     Learner,
@@ -86,11 +87,18 @@ class TrainRequest(ProblemOptions):
         KeyboardInterrupt
             If it is interrupted; the checkpoint is then complete, and the message says so.
         """
-        from kinarm.policies.curve import write_curve
-
         path = checkpoint_path(self.out)
         config, state = self._resumed(path) if self.resume else (self._config(path), None)
         check_output(self.out, overwrite=self.overwrite, suffix=".npz")
+        with only_writer(self.out):
+            return self._carry_out(config, state, path)
+
+    def _carry_out(
+        self, config: "TrainingConfig", state: TrainingState | None, path: Path
+    ) -> TrainingResult:
+        """Train, with a checkpoint at a path."""
+        from kinarm.policies.curve import write_curve
+
         options = {} if self.tensorboard is None else {"tensorboard": self.tensorboard}
         training = begin_training(config, **options)
         keeper = CheckpointKeeper(config, path)
@@ -195,19 +203,18 @@ class TrainingProgress:
     """A line on standard error that fits 80 columns: iterations, return, success, time left."""
 
     def __init__(self, config: "TrainingConfig") -> None:
-        from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
         from rich.table import Column
 
         learner = learner_of(config).name
         title = f"{learner} {config.recipe} {config.problem.name} seed {config.seed}"
         self._progress = Progress(
-            TextColumn(title, table_column=Column(no_wrap=True, max_width=24)),
+            TextColumn(title, markup=False, table_column=Column(no_wrap=True, max_width=24)),
             BarColumn(bar_width=6),
             TextColumn("{task.completed:.0f}/{task.total:.0f}"),
             TextColumn("{task.fields[status]}", table_column=Column(no_wrap=True)),
             TimeRemainingColumn(compact=True),
-            console=Console(stderr=True),
+            console=open_console(stderr=True),
         )
         self._task = self._progress.add_task(
             "", total=config.iterations, status="starting; may compile"

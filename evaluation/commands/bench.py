@@ -1,13 +1,13 @@
 """``kinarm-bench``: how fast everything is on this machine."""
 
 import json
-import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kinarm._command_line import run_request
+from kinarm._console import open_console
 from kinarm._files import check_folder
 from kinarm._validation import whole_number
 
@@ -105,15 +105,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _report(request: BenchmarkRequest, command: str) -> None:
     """Run a request, and print its figures."""
-    from rich.console import Console
-
     from kinarm.evaluation.measurements import table
 
     document = request.run(command)
     if request.json:
         print(json.dumps(document))
         return
-    console = Console(width=None if sys.stdout.isatty() else 110, highlight=False)
+    console = open_console(piped_width=110)
     title = f"kinarm-bench, policy {document['policy']}"
     _print_table(console, title, table.HEADER, table.rows(document))
     if "limits" in document:

@@ -1,6 +1,5 @@
 """``kinarm-compare``: learners on the same problems, judged on the same trials."""
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -8,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinarm._command_line import run_request
+from kinarm._console import open_console
 from kinarm._files import check_folder
 from kinarm._parallel import available_threads
 from kinarm._validation import whole_number
@@ -121,8 +121,6 @@ class ComparisonRequest:
             If a name is unknown, a file cannot be used, a package is missing, or a worker ends
             unexpectedly, or nothing is finished and nothing is to be trained.
         """
-        from rich.console import Console
-
         from kinarm.evaluation.comparison.document import write_all
         from kinarm.evaluation.comparison.results import Comparison
         from kinarm.evaluation.comparison.runs import load_run
@@ -139,7 +137,9 @@ class ComparisonRequest:
             comparison = Comparison({run: curve for run, curve in found.items() if curve})
             if not comparison.curves:
                 raise InvalidInputError(f"no training is finished in {str(folder)!r}")
-            with Console(stderr=True).status("bounding what could be reached, drawing figures"):
+            with open_console(stderr=True).status(
+                "bounding what could be reached, drawing figures"
+            ):
                 write_all(comparison, self.out, command or repr(self))
         except KeyboardInterrupt:
             raise KeyboardInterrupt(
@@ -151,13 +151,11 @@ class ComparisonRequest:
         self, missing: "list[PlannedRun]", folder: Path, executor: "Executor | None"
     ) -> None:
         """Carry out what is missing, and tell of every training that is finished."""
-        from rich.console import Console
-
         from kinarm.evaluation.comparison.training import carry_out
         from kinarm.evaluation.reproduction.executor import LocalExecutor
 
         jobs = min(self.jobs or available_threads(), len(missing))
-        console = Console(stderr=True, highlight=False)
+        console = open_console(stderr=True)
         work = partial(carry_out, folder=folder)
         finished = (executor or LocalExecutor(jobs)).carry_out(work, missing)
         for number, run in enumerate(finished, start=1):
@@ -171,7 +169,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _report(request: ComparisonRequest, command: str) -> None:
     """Run a request, and print its table."""
-    from rich.console import Console
     from rich.table import Table
 
     from kinarm.evaluation.comparison.document import HEADER, result_rows
@@ -179,7 +176,7 @@ def _report(request: ComparisonRequest, command: str) -> None:
     table = Table(*HEADER, header_style="bold")
     for row in result_rows(request.run(command=command)):
         table.add_row(*row)
-    Console(width=None if sys.stdout.isatty() else 160, highlight=False).print(table)
+    open_console(piped_width=160).print(table)
     print(f"written: {request.out / 'LEARNERS.md'}, with tables and figures beside it")
 
 

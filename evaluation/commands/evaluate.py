@@ -1,7 +1,6 @@
 """``kinarm-eval``: put policies to the trials and report how they did."""
 
 import json
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -9,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kinarm._command_line import run_request
+from kinarm._console import open_console
 from kinarm._files import check_output, write_text
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
@@ -279,16 +279,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _report(request: EvaluationRequest, command: str) -> None:
     """Run a request, and print the table and what it stands on, or JSON."""
-    from rich.console import Console
-
     from kinarm.evaluation.table import print_table
 
-    with Console(stderr=True).status("evaluating; the first run compiles") as status:
+    with open_console(stderr=True).status("evaluating; the first run compiles") as status:
         document = request.run(command, status.update)
     if request.json:
         print(json.dumps(document))
         return
-    console = Console(width=None if sys.stdout.isatty() else 200, highlight=False)
+    console = open_console(piped_width=200)
     print_table(document, console, markdown=request.markdown)
     if not request.markdown:
         console.print(_footnote(document), style="dim")

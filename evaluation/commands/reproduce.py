@@ -1,14 +1,15 @@
 """``kinarm-reproduce``: train what the paper trained, and see which of its claims hold."""
 
 import json
-import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinarm._command_line import run_request
+from kinarm._console import open_console
 from kinarm._files import check_folder, write_text
 from kinarm._parallel import available_threads
 from kinarm._validation import whole_number
@@ -98,8 +99,6 @@ class ReproductionRequest:
             If the extra ``ppo`` is missing, the folder holds another study or cannot be written
             to, or a worker ends unexpectedly.
         """
-        from rich.console import Console
-
         from kinarm.evaluation.reproduction.document import write_all
         from kinarm.evaluation.reproduction.results import Results
         from kinarm.evaluation.reproduction.runs import RunStore
@@ -115,7 +114,9 @@ class ReproductionRequest:
         try:
             if results.missing:
                 results = _train(results, store, self.jobs or available_threads(), executor)
-            with Console(stderr=True).status("bounding what could be reached, drawing figures"):
+            with open_console(stderr=True).status(
+                "bounding what could be reached, drawing figures"
+            ):
                 return write_all(results, store, command or repr(self))
         except KeyboardInterrupt:
             raise KeyboardInterrupt(
@@ -130,7 +131,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _report(request: ReproductionRequest, command: str) -> None:
     """Run a request, and print its verdicts."""
-    from rich.console import Console
     from rich.table import Table
 
     from kinarm.evaluation.reproduction.intervals import estimate_text
@@ -140,7 +140,7 @@ def _report(request: ReproductionRequest, command: str) -> None:
         measured = "\n".join(estimate_text(part.estimate) for part in claim.parts)
         claimed = "\n".join(f"{part.claimed} {part.threshold:g}" for part in claim.parts)
         table.add_row(claim.statement, measured, claimed, claim.verdict)
-    Console(width=None if sys.stdout.isatty() else 120, highlight=False).print(table)
+    open_console(piped_width=120).print(table)
     if request.study.warning:
         print(request.study.warning)
     print(f"written: {request.folder / 'REPRODUCTION.md'}, with tables and figures beside it")
@@ -148,12 +148,13 @@ def _report(request: ReproductionRequest, command: str) -> None:
 
 def _claim_folder(folder: Path, study: "Study") -> None:
     """Mark the folder as that of a study; refuse one that holds another."""
+    from kinarm._archive import load_json, reading
+
     marker = folder / "study.json"
     if marker.exists():
-        try:
-            held = json.loads(marker.read_bytes())["study"]
-        except (ValueError, KeyError, TypeError, OSError):
-            held = "foreign"
+        held = "foreign"
+        with suppress(InvalidInputError), reading(repr(str(marker)), "study", InvalidInputError):
+            held = str(load_json(marker, "study", InvalidInputError)["study"])
         if held != study.name:
             raise InvalidInputError(
                 f"{str(folder)!r} holds a {held} reproduction, not a {study.name} one: "
@@ -166,8 +167,6 @@ def _train(
     results: "Results", store: "RunStore", jobs: int, executor: "Executor | None"
 ) -> "Results":
     """Carry out what is missing, the longest first, and read all runs anew."""
-    from rich.console import Console
-
     from kinarm.evaluation.reproduction.executor import LocalExecutor
     from kinarm.evaluation.reproduction.progress import StudyProgress
     from kinarm.evaluation.reproduction.results import Results
@@ -175,7 +174,7 @@ def _train(
 
     study = results.study
     missing = sorted(results.missing, key=lambda training: -training.cost)
-    console = Console(stderr=True, highlight=False)
+    console = open_console(stderr=True)
     if results.runs:
         console.print(f"{len(results.runs)} of {len(study.trainings)} trainings are finished")
     jobs = min(jobs, len(missing))

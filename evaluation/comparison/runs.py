@@ -3,15 +3,18 @@
 import hashlib
 import json
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from kinarm._archive import load_json, reading
 from kinarm._fields import to_plain
 from kinarm._files import write_text
 from kinarm._validation import whole_number
+from kinarm.errors import KinarmError
 from kinarm.evaluation.comparison.learners import ComparedLearner
 from kinarm.policies.provenance import package_versions
 from kinarm.problem import ReachProblem
@@ -142,8 +145,8 @@ def save_run(folder: Path, run: PlannedRun, curve: Iterable[CurvePoint]) -> None
 
 def load_run(folder: Path, run: PlannedRun) -> tuple[CurvePoint, ...] | None:
     """Read a finished training; None if it is not finished, or its file is damaged."""
-    try:
-        entries = json.loads((folder / f"{run.name}.json").read_text(encoding="utf-8"))
+    path = folder / f"{run.name}.json"
+    with suppress(KinarmError), reading(repr(str(path)), "run", KinarmError):
+        entries = load_json(path, "run", KinarmError)
         return tuple(CurvePoint(**point) for point in entries["curve"]) or None
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        return None
+    return None

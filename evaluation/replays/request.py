@@ -7,6 +7,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from kinarm._console import open_console
 from kinarm._files import check_output
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from kinarm.viewer import ReplayPage
 
 PAGE = Path("replay.html")
+LAST_PORT = 65535
+
 SMALLEST = {"trials": 1, "worst": 1, "seed": 0, "port": 1}
 ALTERNATIVES = (("policy", "compare"), ("trial", "worst", "collisions"))
 """Fields of which one at most can be given."""
@@ -102,6 +105,8 @@ class ReplayRequest(ProblemOptions):
                 raise InvalidInputError(f"{given[0]} and {given[1]} exclude each other")
         if self.port is not None and not self.live:
             raise InvalidInputError("--port goes with --live")
+        if self.port is not None and self.port > LAST_PORT:
+            raise InvalidInputError(f"port must be at most {LAST_PORT}, got {self.port}")
         self._refuse("--live", NOT_LIVE if self.live else ())
         self._refuse("trials from a file", NOT_FROM_FILE if self.source else ())
         if self.source is not None and self.source.suffix == ".json":
@@ -154,8 +159,6 @@ class ReplayRequest(ProblemOptions):
         return chosen_recordings(self)
 
     def _write(self, report: Callable[[str], object]) -> "ReplayPage":
-        from rich.console import Console
-
         from kinarm.recording import save_recordings
         from kinarm.viewer import replay_page
 
@@ -163,7 +166,7 @@ class ReplayRequest(ProblemOptions):
         check_output(out, overwrite=self.overwrite)
         if self.record is not None:
             check_output(self.record, overwrite=self.overwrite, suffix=".npz")
-        with Console(stderr=True).status("recording; the first run compiles"):
+        with open_console(stderr=True).status("recording; the first run compiles"):
             runs = self.recordings()
             page = replay_page(runs[0], ghosts=runs[1] if len(runs) > 1 else ())
         if self.record is not None:

@@ -3,6 +3,7 @@
 import hashlib
 import json
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm._archive import load_archive, save_archive
+from kinarm._archive import load_archive, load_json, reading, save_archive
 from kinarm._files import write_text
 from kinarm.errors import KinarmError, PolicyFileError
 from kinarm.evaluation.reproduction.study import PlannedTraining, Protocol
@@ -116,15 +117,14 @@ class RunStore:
 
     def load(self, training: PlannedTraining) -> TrainedRun | None:
         """Read a finished training; None if it is not finished, incomplete or of other settings."""
-        try:
-            timing_path, run_path = self._paths(training)
-            wall_time = np.array(json.loads(timing_path.read_text()), dtype=float)
+        timing_path, run_path = self._paths(training)
+        with suppress(KinarmError), reading(repr(str(run_path)), ARCHIVE[0], KinarmError):
+            wall_time = np.array(load_json(timing_path, "timing", KinarmError), dtype=float)
             header, arrays = load_archive(run_path, *ARCHIVE, KinarmError)
-            fits = header == self._header(training)
             run = TrainedRun(**arrays, wall_time=wall_time)
-        except (OSError, KinarmError, RecursionError, TypeError, ValueError):
-            return None
-        return run if fits and len(run.wall_time) == len(run.returns) else None
+            if header == self._header(training) and len(run.wall_time) == len(run.returns):
+                return run
+        return None
 
     def _header(self, training: PlannedTraining) -> dict[str, Any]:
         """Everything that a run depends on, and the hash of its policy."""

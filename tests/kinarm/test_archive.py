@@ -3,6 +3,7 @@
 import gc
 import io
 import pickle
+import tracemalloc
 import zipfile
 
 import numpy as np
@@ -237,3 +238,50 @@ class TestReading:
     def test_lets_other_things_pass(self, raised):
         with pytest.raises(raised), reading("'a'", "policy", PolicyFileError):
             raise raised
+
+
+class TestHostileFiles:
+    """Files that claim more than they are."""
+
+    def member(self, saved, content):
+        with zipfile.ZipFile(saved, "a") as archive:
+            archive.writestr("extra.npy", content)
+
+    def test_a_bomb_is_not_inflated(self, tmp_path):
+        path = tmp_path / "bomb.npz"
+        np.savez_compressed(path, format=np.array("kinarm-test-thing"), bomb=np.zeros(10**7))
+        assert path.stat().st_size < 10**6
+        tracemalloc.start()
+        refused(path, "claims to hold 80 MB")
+        assert tracemalloc.get_traced_memory()[1] < 5e6
+        tracemalloc.stop()
+
+    @pytest.mark.parametrize("shape", ["(99999999999,)", "(3, 3)", "(-1, -6)"])
+    def test_a_shape_that_the_content_does_not_have(self, saved, shape):
+        buffer = io.BytesIO()
+        header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}"
+        header = header + " " * (117 - len(header)) + "\n"
+        buffer.write(b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little"))
+        buffer.write(header.encode() + np.zeros(6).tobytes())
+        self.member(saved, buffer.getvalue())
+        refused(saved, "extra.npy does not hold|extra.npy holds")
+
+    @pytest.mark.parametrize(
+        "array", [np.zeros(3, complex), np.zeros(2, "S4"), np.zeros(2, "M8[s]")]
+    )
+    def test_arrays_of_other_types(self, saved, array):
+        buffer = io.BytesIO()
+        np.save(buffer, array)
+        self.member(saved, buffer.getvalue())
+        refused(saved, "extra.npy holds")
+
+    def test_large_arrays_are_not_compressed_beyond_what_is_read(self, tmp_path):
+        path = tmp_path / "large.npz"
+        arrays = {"zeros": np.zeros(8 * 10**6)}
+        save_archive(path, "test thing", 3, arrays, {}, compress=True)
+        np.testing.assert_array_equal(load(path).arrays["zeros"], arrays["zeros"])
+
+    def test_columns_first_comes_back(self, saved):
+        array = np.asfortranarray(np.arange(6.0).reshape(2, 3))
+        rewritten(saved, numbers=array)
+        np.testing.assert_array_equal(load(saved).arrays["numbers"], array)

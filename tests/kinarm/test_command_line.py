@@ -275,6 +275,7 @@ class TestCommands:
         [
             ("raise BrokenPipeError", 0, ""),
             ("raise OSError(28, 'No space left', 'bread')", 1, "bake: bread: No space left\n"),
+            ("raise MemoryError('Unable to allocate')", 1, "bake: out of memory: Unable to"),
             ("raise OSError(5, 'Input/output error')", 1, "bake: standard output: Input/output"),
         ],
     )
@@ -325,3 +326,29 @@ class TestCommands:
         assert "Bake something.\n" in shown
         assert shown.endswith("try:\n  bake it\n")
         assert "--share" not in shown
+
+
+class TestStreams:
+    """Whatever standard output is, the status tells what happened."""
+
+    SCRIPT = (
+        "from kinarm._command_line import run_command\n"
+        "run_command('bake', lambda: print('br\u00f6tchen'))\n"
+    )
+
+    def run(self, command, **env):
+        script = f'"{sys.executable}" -X utf8=0 -c "$SCRIPT" {command}'
+        env = {**os.environ, "SCRIPT": self.SCRIPT, **env}
+        return subprocess.run(
+            ["/bin/sh", "-c", script], capture_output=True, env=env, timeout=60, check=False
+        )
+
+    @pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-", "<&-"])
+    def test_closed_streams(self, closed):
+        done = self.run(closed)
+        assert (done.returncode, done.stderr) == (0, b"")
+
+    def test_encodings_without_the_letter(self):
+        done = self.run("", PYTHONIOENCODING="ascii")
+        assert (done.returncode, done.stderr) == (0, b"")
+        assert done.stdout == b"br\\xf6tchen\n"

@@ -1,7 +1,11 @@
 """Atomic writing, and seeing beforehand that a file can be written."""
 
+import multiprocessing
 import os
+import signal
 import stat
+import time
+from pathlib import Path
 
 import pytest
 
@@ -9,6 +13,7 @@ from kinarm._files import (
     check_folder,
     check_output,
     first_line,
+    only_writer,
     write_atomically,
     write_text,
 )
@@ -84,6 +89,106 @@ def test_full_disk_is_reported(tmp_path):
     with pytest.raises(OutputError, match="cannot write .*No space left"):
         write_atomically(tmp_path / "file.bin", fail)
     assert list(tmp_path.iterdir()) == []
+
+
+class TestWhatIsNoPlainFile:
+    def test_a_link_stays_and_its_file_is_written(self, tmp_path):
+        real, link = tmp_path / "far" / "real.bin", tmp_path / "link.bin"
+        real.parent.mkdir()
+        link.symlink_to(real)
+        for content in (b"first", b"second"):
+            write_atomically(link, lambda file, content=content: file.write(content))
+            assert link.is_symlink()
+            assert real.read_bytes() == content
+        assert list(real.parent.iterdir()) == [real]
+
+    def test_a_device_stays_a_device(self):
+        write_atomically("/dev/null", lambda file: file.write(b"gone"))
+        assert Path("/dev/null").is_char_device()
+
+    def test_a_pipe_gets_the_content(self, tmp_path):
+        pipe = tmp_path / "pipe"
+        os.mkfifo(pipe)
+        reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+        write_atomically(pipe, lambda file: file.write(b"content"))
+        assert os.read(reader, 100) == b"content"
+        os.close(reader)
+
+
+def _write_forever(path):
+    def write(file):
+        file.write(b"half")
+        file.flush()
+        time.sleep(60)
+
+    write_atomically(path, write)
+
+
+def _hold(path, held):
+    with only_writer(path):
+        held.set()
+        time.sleep(60)
+
+
+class TestKilledProcesses:
+    def test_what_they_left_is_swept_away(self, tmp_path):
+        path = tmp_path / "file.bin"
+        process = multiprocessing.get_context("spawn").Process(target=_write_forever, args=(path,))
+        process.start()
+        while not any(left.stat().st_size for left in tmp_path.iterdir()):
+            time.sleep(0.01)
+        os.kill(process.pid, signal.SIGKILL)
+        process.join()
+        (left,) = tmp_path.iterdir()
+        write_text(path, "young leftovers stay, for their writer may be about to lock them")
+        assert left.exists()
+        os.utime(left, (0, 0))
+        write_text(path, "old ones go")
+        assert list(tmp_path.iterdir()) == [path]
+
+    def test_files_of_running_writers_stay(self, tmp_path):
+        path = tmp_path / "file.bin"
+        process = multiprocessing.get_context("spawn").Process(target=_write_forever, args=(path,))
+        process.start()
+        while not any(left.stat().st_size for left in tmp_path.iterdir()):
+            time.sleep(0.01)
+        (left,) = tmp_path.iterdir()
+        os.utime(left, (0, 0))
+        write_text(path, "new")
+        assert left.exists()
+        process.kill()
+        process.join()
+
+
+class TestOnlyWriter:
+    def test_another_process_is_refused_until_the_first_ends(self, tmp_path):
+        path, context = tmp_path / "file.bin", multiprocessing.get_context("spawn")
+        held = context.Event()
+        process = context.Process(target=_hold, args=(path, held))
+        process.start()
+        assert held.wait(30)
+        refusal = pytest.raises(OutputError, match=r"another process is writing '.*file\.bin'")
+        with refusal, only_writer(path):
+            pass
+        process.kill()
+        process.join()
+        with only_writer(path):
+            write_text(path, "free again")
+        assert list(tmp_path.iterdir()) == [path]
+
+    def test_other_outputs_are_free(self, tmp_path):
+        with only_writer(tmp_path / "one"), only_writer(tmp_path / "two"):
+            pass
+        assert list(tmp_path.iterdir()) == []
+
+    def test_an_error_frees_the_output(self, tmp_path):
+        for _ in range(2):
+            with pytest.raises(KeyError), only_writer(tmp_path / "one"):
+                raise KeyError
+
+    def test_missing_folder(self, tmp_path):
+        with pytest.raises(OutputError, match="cannot write"), only_writer(tmp_path / "a" / "b"):
+            pass
 
 
 class TestCheckFolder:
