@@ -23,6 +23,15 @@ def scheduled(value: float, schedule: Schedule, done: float) -> float:
     return value if schedule == "constant" else value * (1 - done)
 
 
+RECIPE_REACH = 1.264
+"""Reach of the arm ``paper``, in which the lengths of recipes were found [m]."""
+
+
+def relative_reach(problem: ReachProblem) -> float:
+    """Reach of a problem's arm over that of the arm ``paper``, to two digits."""
+    return round(problem.load_arm().reach / RECIPE_REACH, 2)
+
+
 POSITIVE = {"must": "be greater than 0", "holds": lambda value: value > 0}
 NOT_NEGATIVE = {"must": "not be negative", "holds": lambda value: value >= 0}
 SHARE = {"must": "lie in [0, 1]", "holds": lambda value: 0 <= value <= 1}

@@ -8,6 +8,7 @@ other. Any other network does so if it sees goals on the left in the mirror; see
 """
 
 import math
+from contextlib import suppress
 
 import numpy as np
 import pinocchio as pin
@@ -47,9 +48,7 @@ def find_mirror(world: World) -> Mirror:
     axes = np.where(along_y ^ arm.chain.prismatic, 1.0, -1.0)
     mirror = Mirror(observation_signs(arm.n_joints), axes[: arm.n_actuated])
     if not _is_mirror(mirror, axes, world):
-        raise InvalidInputError(
-            f"arm {arm.name!r} is not its own mirror image: train it without symmetric"
-        )
+        raise InvalidInputError(f"arm {arm.name!r} is not its own mirror image")
     return mirror
 
 
@@ -118,14 +117,16 @@ def _axis_signs(world: World) -> NDArray[np.float64]:
 
 
 def task_mirror(symmetric: bool, world: World) -> Mirror | None:
-    """Reflection that a policy has to commute with, if it is to and the task is its own image.
+    """Reflection that a policy has to commute with, if it is to and arm and task have one."""
+    if symmetric and is_symmetric(world.problem):
+        with suppress(InvalidInputError):
+            return find_mirror(world)
+    return None
 
-    Raises
-    ------
-    InvalidInputError
-        If the reflection does not map the arm's motions to themselves.
-    """
-    return find_mirror(world) if symmetric and is_symmetric(world.problem) else None
+
+def has_mirror(problem: ReachProblem) -> bool:
+    """Whether arm, obstacles and goals are their own mirror image."""
+    return is_symmetric(problem) and task_mirror(True, World(problem, threads=1)) is not None
 
 
 def is_symmetric(problem: ReachProblem) -> bool:

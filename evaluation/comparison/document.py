@@ -87,7 +87,7 @@ def result_rows(comparison: Comparison) -> list[list[str]]:
     rows: list[list[str]] = []
     for problem, possible in comparison.reachable.items():
         rows += [
-            [problem, *_result_cells(series)]
+            [problem, *_result_cells(series, possible)]
             for series in comparison.series
             if series.problem.name == problem
         ]
@@ -96,22 +96,25 @@ def result_rows(comparison: Comparison) -> list[list[str]]:
 
 
 HEADER = (
-    *("problem", "learner", "success % (95 %)", "seeds %", "contact %"),
+    *("problem", "learner", "success % (95 %)", "% of the oracle's", "seeds %"),
+    *("contact %", "median steps"),
     *("million steps", "minutes", "steps/s"),
     *(f"thousand steps, minutes to {level:.0%}" for level in LEVELS),
 )
 
 
-def _result_cells(series: Series) -> list[str]:
-    """What the table of results says of a learner on a problem."""
+def _result_cells(series: Series, possible: float) -> list[str]:
+    """What the table of results says of a learner on a problem, of which this share is possible."""
     low, high = series.success.ci95 or (math.nan, math.nan)
     each = " ".join(f"{100 * curve[-1].successes / series.trials:.0f}" for curve in series.curves)
     steps, seconds = series.last("environment_steps"), series.last("processor_seconds")
     return [
         series.learner.title,
         f"{100 * (series.success.value or 0):.1f} ({100 * low:.1f}..{100 * high:.1f})",
+        f"{100 * (series.success.value or 0) / max(possible, 1e-9):.1f}",
         each,
         f"{100 * (series.collision.value or 0):.1f}",
+        "" if series.median_steps is None else f"{series.median_steps:.1f}",
         f"{steps / 1e6:.2f}",
         f"{seconds / 60:.2f}",
         f"{steps / max(seconds, 1e-9):,.0f}",

@@ -53,6 +53,13 @@ class Series:
         """Share of trials in which they touched something."""
         return self._share([curve[-1].collisions for curve in self.curves])
 
+    @property
+    def median_steps(self) -> float | None:
+        """Median steps of the trials that succeeded, mean over the seeds; None if not known."""
+        known = [curve[-1].median_steps for curve in self.curves]
+        each = [steps for steps in known if steps is not None]
+        return float(np.mean(each)) if len(each) == len(known) else None
+
     def _share(self, hits: list[int]) -> Estimate:
         """Share over all seeds; as in `Estimate.share`, they are no independent evidence."""
         interval = wilson_interval(sum(hits), self.trials, len(hits))
@@ -142,6 +149,7 @@ class Comparison:
                 "success_each": [curve[-1].successes / series.trials for curve in series.curves],
                 "collision": series.collision.to_json(),
                 "median_distance": series.last("median_distance"),
+                "median_steps": series.median_steps,
                 "environment_steps": series.last("environment_steps"),
                 "seconds": series.last("seconds"),
                 "processor_seconds": series.last("processor_seconds"),

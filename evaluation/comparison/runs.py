@@ -62,6 +62,8 @@ class CurvePoint(NamedTuple):
         Trials that ended so.
     median_distance : float
         Of the final distances [m].
+    median_steps : float or None
+        Of the trials that succeeded; None if there is none, or it was not recorded.
     """
 
     environment_steps: int
@@ -70,6 +72,7 @@ class CurvePoint(NamedTuple):
     successes: int
     collisions: int
     median_distance: float
+    median_steps: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

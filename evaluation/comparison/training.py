@@ -86,6 +86,7 @@ class Judge:
         wall_time, processor_time = now - self._began
         trials = self._trials
         rollouts = trials.simulator.rollout(policy(), trials.starts, trials.goals)
+        steps = rollouts.steps[rollouts.success]
         self.curve.append(
             CurvePoint(
                 environment_steps=environment_steps,
@@ -94,6 +95,7 @@ class Judge:
                 successes=int(rollouts.success.sum()),
                 collisions=int(rollouts.collision.sum()),
                 median_distance=round(float(np.median(rollouts.distance)), 5),
+                median_steps=float(np.median(steps)) if steps.size else None,
             )
         )
         while environment_steps >= self._protocol.checkpoint(self._number):

@@ -13,6 +13,6 @@ LEARNER = Learner(
     recipes=RECIPES,
     adapt=adapted,
     begin=imported("kinarm.policies.ars.algorithm", "ARSTraining"),
-    policy=imported("kinarm.policies.ars.algorithm", "linear_policy"),
+    policy=imported("kinarm.policies.ars.algorithm", "trained_policy"),
     options=("threads",),
 )

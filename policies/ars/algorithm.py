@@ -1,20 +1,19 @@
 """Augmented Random Search (paper, Algorithm 1 and Table 1; Mania, Guy and Recht 2018)."""
 
-import math
 import time
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.kernels.lanes import LANES
 from kinarm.networks import Mirror, Networks
 from kinarm.policies.ars.config import ARSConfig
 from kinarm.policies.ars.kernels import (
     mean_and_deviation,
-    normal_pairs,
     perturbed_weights,
     weighted_sum,
 )
+from kinarm.policies.ars.networks import initial_network, network_layers, perturbed_networks
+from kinarm.policies.ars.perturbations import perturbations
 from kinarm.policies.ars.state import ARSState
 from kinarm.policies.curve import CurvePoint
 from kinarm.policies.mirror import commuting_weights, task_mirror
@@ -37,12 +36,16 @@ class ARSTraining:
         self._rng = np.random.default_rng(config.seed)
 
     def initial_state(self) -> ARSState:
-        """State before the first iteration: theta = 0, mu = 0, Sigma = I."""
+        """State before the first iteration: mu = 0, Sigma = I, and theta = 0 if it is linear."""
         n_actions, n_observations = self.simulator.n_actions, self.simulator.n_observations
+        rng = np.random.default_rng(self.config.seed)
+        theta = np.zeros((n_actions, n_observations))
+        if self.config.net_arch:
+            theta = initial_network(rng, (n_observations, *self.config.net_arch, n_actions))
         return ARSState(
-            theta=np.zeros((n_actions, n_observations)),
+            theta=theta,
             normalizer=Normalizer.empty(n_observations),
-            generator=dict(np.random.default_rng(self.config.seed).bit_generator.state),
+            generator=dict(rng.bit_generator.state),
         )
 
     def iterate(self, state: ARSState) -> ARSState:
@@ -68,10 +71,14 @@ def ars_iteration(
     if mirror is not None:
         delta *= commuting_weights(mirror)
     starts, goals = shared_scenarios(config, simulator, rng)
+    seen = policy_normalizer(config, normalizer, mirror)
+    if config.net_arch:
+        widths = (simulator.n_observations, *config.net_arch, simulator.n_actions)
+        policies = perturbed_networks(theta, config.noise * delta, seen, widths)
+    else:
+        policies = perturbed_policies(theta, config.noise * delta, seen)
     rollouts = simulator.rollout(
-        perturbed_policies(
-            theta, config.noise * delta, policy_normalizer(config, normalizer, mirror)
-        ),
+        policies,
         starts,
         goals,
         policy_index=np.repeat(np.arange(2 * N), config.episodes),
@@ -94,19 +101,6 @@ def ars_iteration(
         generator=dict(rng.bit_generator.state),
         curve=(*state.curve, point),
     )
-
-
-def perturbations(rng: np.random.Generator, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Draw independent standard normal numbers, the same bits on every machine.
-
-    Those of NumPy's generator depend on the C library's logarithm.
-    """
-    count = math.prod(shape)
-    half = -(-count // 2)
-    numbers = np.zeros((2, -(-half // LANES) * LANES))
-    numbers[:, :half] = rng.random((2, half))
-    normal_pairs(numbers.reshape(2, -1, LANES))
-    return numbers[:, :half].reshape(-1)[:count].reshape(shape)
 
 
 def shared_scenarios(
@@ -173,14 +167,17 @@ def ars_step(
     return step
 
 
-def linear_policy(config: ARSConfig, state: ARSState) -> Policy:
+def trained_policy(config: ARSConfig, state: ARSState) -> Policy:
     """Freeze a state of the training into a policy."""
     # A world takes longer to build than an iteration: only where there may be a mirror.
     mirror = task_mirror(True, World(config.problem, threads=1)) if config.symmetric else None
     normalizer = policy_normalizer(config, state.normalizer, mirror)
+    layers: tuple[Layer, ...] = (Layer(state.theta, np.zeros(len(state.theta))),)
+    if config.net_arch:
+        layers = network_layers(state.theta, (len(normalizer.mean), *config.net_arch))
     return Policy(
         mean=normalizer.mean,
         std=normalizer.std,
-        layers=(Layer(state.theta, np.zeros(len(state.theta))),),
+        layers=layers,
         provenance=Provenance.of("ars", config, state.environment_steps),
     )

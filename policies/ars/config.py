@@ -28,8 +28,10 @@ class ARSConfig(TrainingConfig):
     top_directions : int
         Perturbations b that enter the update, those with the best returns; b = N is V1 or V2.
     symmetric : bool
-        Whether the policy is to treat mirror images alike, where the task is its own mirror
-        image (``both``); see `kinarm.policies.mirror`. It halves the parameters.
+        Whether a linear policy is to treat mirror images alike, where arm and task are their
+        own mirror image (``both``); see `kinarm.policies.mirror`. It halves the parameters.
+    net_arch : tuple of int
+        Widths of hidden layers with tanh; the policy is linear if there are none.
     normalize : bool
         Whether observations are normalised (V2) or not (BRS, V1).
     scale_by_deviation : bool
@@ -48,6 +50,7 @@ class ARSConfig(TrainingConfig):
     directions: int = 24
     top_directions: int = 12
     symmetric: bool = False
+    net_arch: tuple[int, ...] = ()
     normalize: bool = True
     scale_by_deviation: bool = True
     sharing: Sharing = "none"
@@ -60,6 +63,8 @@ class ARSConfig(TrainingConfig):
                 f"top_directions must be at most directions ({self.directions}), "
                 f"got {self.top_directions}"
             )
+        if self.symmetric and self.net_arch:
+            raise InvalidInputError("symmetric is for linear policies, without net_arch")
 
     def step_size_at(self, iteration: int) -> float:
         """Learning rate of an iteration."""

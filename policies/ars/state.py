@@ -20,8 +20,8 @@ class ARSState(TrainingState):
 
     Parameters
     ----------
-    theta : ndarray, shape (n_actions, n_observations)
-        Parameters of the policy.
+    theta : ndarray, shape (n_actions, n_observations) or (1, n_parameters)
+        Parameters of a linear policy, or of a network as `kinarm.Networks` keeps them.
     normalizer : Normalizer
         Statistics mu and Sigma of the observations.
     generator : dict
@@ -40,7 +40,9 @@ class ARSState(TrainingState):
     generator: dict[str, Any]
 
     def __post_init__(self) -> None:
-        widths = {self.theta.shape[1:], self.normalizer.mean.shape, self.normalizer.squares.shape}
+        widths = {self.normalizer.mean.shape, self.normalizer.squares.shape}
+        if len(self.theta) > 1:
+            widths.add(self.theta.shape[1:])
         if len(widths) > 1 or self.theta.ndim != 2:
             raise InvalidInputError(
                 f"theta of shape {self.theta.shape} needs as many statistics, "

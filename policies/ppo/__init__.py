@@ -2,7 +2,7 @@
 
 from kinarm.policies.learners import Learner, imported
 from kinarm.policies.ppo.config import PPOConfig
-from kinarm.policies.ppo.recipes import RECIPES
+from kinarm.policies.ppo.recipes import RECIPES, adapted
 from kinarm.policies.ppo.state import PPOState
 
 LEARNER = Learner(
@@ -11,6 +11,7 @@ LEARNER = Learner(
     config=PPOConfig,
     state=PPOState,
     recipes=RECIPES,
+    adapt=adapted,
     begin=imported("kinarm.policies.ppo.learner", "PPOTraining"),
     policy=imported("kinarm.policies.ppo.actor", "actor_policy"),
     options=("tensorboard", "threads"),

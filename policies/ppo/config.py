@@ -59,9 +59,9 @@ class PPOConfig(TrainingConfig):
         Distance at which an episode of the training counts as a success; the task's if it is not
         given [m].
     symmetric : bool
-        Whether the policy is to treat mirror images alike, where the task is its own mirror
-        image (``both``); it then learns from goals on the right and from mirror images of those
-        on the left.
+        Whether the policy is to treat mirror images alike, where arm and task are their own
+        mirror image (``both``); it then learns from goals on the right and from mirror images of
+        those on the left.
     initial_start_spread : float
         Spread of the start configurations at the beginning of the training.
     widening : float

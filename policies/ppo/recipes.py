@@ -1,5 +1,9 @@
 """Settings of Proximal Policy Optimization by name."""
 
+from dataclasses import replace
+
+from kinarm.policies.config import relative_reach
+from kinarm.policies.mirror import has_mirror
 from kinarm.policies.ppo.config import PPOConfig
 from kinarm.task import RewardWeights
 
@@ -28,3 +32,23 @@ RECIPES = {
 ``paper`` has the paper's reward and otherwise the defaults of Stable-Baselines3. ``tuned`` is the
 best that we found.
 """
+
+
+def adapted(config: PPOConfig) -> PPOConfig:
+    """Adapt ``tuned`` to its problem.
+
+    Progress is rewarded in proportion to the arm's reach, and the training's tolerance is a share
+    of the task's. Where several regions are to be reached and no reflection maps one to the other,
+    progress counts five times as much: else learning hardly begins before contact is all that is
+    avoided.
+    """
+    if config.recipe != "tuned":
+        return config
+    problem = config.problem
+    alike = len(problem.task.goal_regions) == 1 or has_mirror(problem)
+    progress = (1.0 if alike else 5.0) / relative_reach(problem)
+    return replace(
+        config,
+        training_tolerance=0.6 * problem.task.tolerance,
+        reward=RewardWeights(progress=progress, success=5.0),
+    )

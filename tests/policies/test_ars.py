@@ -14,12 +14,12 @@ from kinarm.policies.ars.algorithm import (
     ARSTraining,
     ars_iteration,
     ars_step,
-    perturbations,
     perturbed_policies,
     shared_scenarios,
     top_directions,
 )
 from kinarm.policies.ars.kernels import logarithm, normal_pairs
+from kinarm.policies.ars.perturbations import perturbations
 from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
 from kinarm.policies.mirror import commuting_weights, task_mirror
 from kinarm.policies.normalizer import Normalizer

@@ -13,6 +13,7 @@ from kinarm.policies.library import load_policy
 from kinarm.policies.mirror import (
     commuting_weights,
     find_mirror,
+    has_mirror,
     is_symmetric,
     mirror_findings,
     task_mirror,
@@ -38,6 +39,15 @@ def mirror(simulator):
 def situations(simulator):
     """Observations of random situations, goals on both sides."""
     return simulator.world.observe(*simulator.sample(np.random.default_rng(0), 400))
+
+
+@pytest.fixture
+def lopsided(shipped_arms, tmp_path):
+    """The arm ``paper`` with one limit that its mirror image lacks."""
+    text = shipped_arms["paper"].urdf_path.read_text()
+    path = tmp_path / "lopsided.urdf"
+    path.write_text(re.sub('lower="[^"]*"', 'lower="-2"', text, count=1))
+    return Arm.load(path)
 
 
 def reflected(starts, goals):
@@ -71,11 +81,8 @@ class TestFindMirror:
         with pytest.raises(InvalidInputError, match="'made' is not its own mirror image"):
             find_mirror(simulators["sliding"].world)
 
-    def test_limits_count(self, shipped_arms, tmp_path):
-        text = shipped_arms["paper"].urdf_path.read_text()
-        path = tmp_path / "lopsided.urdf"
-        path.write_text(re.sub('lower="[^"]*"', 'lower="-2"', text, count=1))
-        world = World(BOTH.replace(arm=Arm.load(path)))
+    def test_limits_count(self, lopsided):
+        world = World(BOTH.replace(arm=lopsided))
         with pytest.raises(InvalidInputError, match="'lopsided' is not its own mirror image"):
             find_mirror(world)
 
@@ -114,6 +121,13 @@ class TestIsSymmetric:
         np.testing.assert_array_equal(found.observations, mirror.observations)
         assert task_mirror(False, simulator.world) is None
         assert task_mirror(True, World("left")) is None
+
+    def test_of_a_lopsided_arm_there_is_none(self, lopsided):
+        problem = BOTH.replace(arm=lopsided)
+        assert task_mirror(True, World(problem)) is None
+        assert not has_mirror(problem)
+        assert has_mirror(BOTH)
+        assert not has_mirror(PROBLEMS["left"])
 
 
 def test_statistics_are_those_of_the_data_and_its_mirror_image():

@@ -22,7 +22,7 @@ HITS = {0: (0, 4, 9), 1: (0, 5, 7), 2: (2, 3, 8)}
 
 def curve(hits):
     return tuple(
-        CurvePoint(1000 * k, 60.0 * k, 30.0 * k, successes, 1, 0.1)
+        CurvePoint(1000 * k, 60.0 * k, 30.0 * k, successes, 1, 0.1, 7.0 + k)
         for k, successes in enumerate(hits, start=1)
     )
 
@@ -88,7 +88,10 @@ def test_files(comparison, tmp_path):
     }
     assert set(document["reachable"]) == {"right", "both"}
     page = (tmp_path / "LEARNERS.md").read_text()
-    assert "| right | ARS, paper | 80.0 (49.0..94.3) | 90 70 80 | 10.0 |" in page
+    share = 80 / document["reachable"]["right"]
+    cells = f"80.0 (49.0..94.3) | {share:.1f} | 90 70 80 | 10.0 | 10.0"
+    assert f"| right | ARS, paper | {cells} |" in page
+    assert document["results"][0]["median_steps"] == 10.0
     assert "| both | oracle |" in page
     assert "gradient_steps" in page
 

@@ -1,0 +1,66 @@
+"""Small networks as policies of Augmented Random Search, all parameters in one row.
+
+Their order is that of `kinarm.Networks`: layer after layer, weights (inputs x outputs, row by row),
+then biases. tanh is between the layers.
+"""
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.networks import Networks
+from kinarm.policies.ars.perturbations import perturbations
+from kinarm.policies.normalizer import Normalizer, fold_normalizer
+from kinarm.policies.policy import Layer
+
+Numbers = NDArray[np.float64]
+
+
+def initial_network(rng: np.random.Generator, widths: Sequence[int]) -> Numbers:
+    """Draw a network that does nothing yet: its last layer and its biases are zero.
+
+    The other weights are normal numbers over the root of the layer's inputs. Parameters have the
+    shape (1, n_parameters).
+    """
+    *hidden, last = pairwise(widths)
+    parts = []
+    for n_in, n_out in hidden:
+        parts += [perturbations(rng, (n_in * n_out,)) / np.sqrt(n_in), np.zeros(n_out)]
+    return np.concatenate([*parts, np.zeros((last[0] + 1) * last[1])])[None]
+
+
+def perturbed_networks(
+    theta: Numbers, step: Numbers, normalizer: Normalizer, widths: Sequence[int]
+) -> Networks:
+    """Networks theta + step of normalised observations, then those of theta - step.
+
+    Steps have the shape (n, 1, n_parameters). The normaliser is folded in.
+    """
+    parameters = np.concatenate([theta + step, theta - step])[:, 0]
+    n_in, n_out = widths[:2]
+    weights, bias = next(_layers(parameters, widths))
+    folded = fold_normalizer(weights, bias, normalizer.mean, normalizer.std)
+    rest = parameters[:, (n_in + 1) * n_out :]
+    first = folded[0].transpose(0, 2, 1).reshape(len(parameters), -1)
+    return Networks(np.array(widths), np.concatenate([first, folded[1], rest], axis=1))
+
+
+def network_layers(theta: Numbers, inner: Sequence[int]) -> tuple[Layer, ...]:
+    """Layers of the network with these parameters, shape (1, n_parameters).
+
+    The width of the last layer follows from the others, those of observation and hidden layers.
+    """
+    rest = theta.size - sum((n_in + 1) * n_out for n_in, n_out in pairwise(inner))
+    widths = (*inner, rest // (inner[-1] + 1))
+    return tuple(Layer(weights[0], bias[0]) for weights, bias in _layers(theta, widths))
+
+
+def _layers(parameters: Numbers, widths: Sequence[int]) -> Iterator[tuple[Numbers, Numbers]]:
+    """Weights, shape (n, n_out, n_in), and biases, shape (n, n_out), of each layer."""
+    start = 0
+    for n_in, n_out in pairwise(widths):
+        weights = parameters[:, start : start + n_in * n_out].reshape(-1, n_in, n_out)
+        start += (n_in + 1) * n_out
+        yield weights.transpose(0, 2, 1), parameters[:, start - n_out : start]

@@ -1,0 +1,77 @@
+"""Networks as policies of Augmented Random Search."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinarm.errors import InvalidInputError
+from kinarm.policies import ARSConfig, train_policy
+from kinarm.policies.ars.networks import initial_network, network_layers, perturbed_networks
+from kinarm.policies.normalizer import Normalizer
+
+WIDTHS = (7, 5, 3, 2)
+TINY = ARSConfig(iterations=3, directions=4, top_directions=2, net_arch=(6,), problem="both")
+
+
+def forward(layers, inputs):
+    """Layer by layer, with tanh between them."""
+    for number, (weights, bias) in enumerate(layers):
+        inputs = weights @ (np.tanh(inputs) if number else inputs) + bias
+    return inputs
+
+
+def by_networks(networks, row, observation):
+    """What a row of `Networks` answers, read as its documentation says."""
+    layers, start = [], 0
+    for n_in, n_out in zip(networks.layers, networks.layers[1:], strict=False):
+        weights = networks.weights[row, start : start + n_in * n_out].reshape(n_in, n_out)
+        start += (n_in + 1) * n_out
+        layers.append((weights.T, networks.weights[row, start - n_out : start]))
+    return forward(layers, observation)
+
+
+def test_first_network_does_nothing_and_has_lively_inner_layers():
+    theta = initial_network(np.random.default_rng(0), (400, 100, 2))
+    assert theta.shape == (1, 401 * 100 + 101 * 2)
+    inner, last = network_layers(theta, (400, 100))
+    assert inner.weights.std() == pytest.approx(1 / 20, rel=0.02)
+    assert not any(array.any() for array in (inner.bias, last.weights, last.bias))
+
+
+def test_perturbed_networks_take_raw_observations():
+    rng = np.random.default_rng(1)
+    theta = rng.normal(size=initial_network(rng, WIDTHS).shape)
+    step = 0.1 * rng.normal(size=(3, *theta.shape))
+    data = rng.normal([1, 2, 3, 4, 5, 6, 7], [1, 2, 1, 2, 1, 2, 0], (50, 7))
+    normalizer, x = Normalizer.of(data), rng.normal(size=7)
+    scale = np.where(normalizer.std > 0, 1 / np.maximum(normalizer.std, 1e-9), 0)
+    networks = perturbed_networks(theta, step, normalizer, WIDTHS)
+    for row in range(6):
+        parameters = theta + step[row] if row < 3 else theta - step[row - 3]
+        layers = network_layers(parameters, WIDTHS[:-1])
+        expected = forward(layers, (x - normalizer.mean) * scale)
+        np.testing.assert_allclose(by_networks(networks, row, x), expected, atol=1e-12)
+
+
+def test_policy_has_the_trained_parameters():
+    result = train_policy(TINY)
+    still = np.zeros((1, *result.state.theta.shape))
+    normalizer = Normalizer(1, result.policy.mean, result.policy.std**2)
+    trained = perturbed_networks(result.state.theta, still, normalizer, (48, 6, 5))
+    networks = result.policy.networks()
+    np.testing.assert_array_equal(networks.layers, [48, 6, 5])
+    np.testing.assert_allclose(networks.weights, trained.weights[:1], rtol=1e-12, atol=1e-14)
+    assert result.state.theta[0, -6 * 5 - 5 :].any()
+
+
+def test_threads_and_interruptions_change_nothing():
+    states = []
+    whole = train_policy(TINY, threads=2, on_iteration=states.append)
+    resumed = train_policy(TINY, threads=1, state=states[0])
+    np.testing.assert_array_equal(resumed.state.theta, whole.state.theta)
+
+
+def test_symmetric_is_for_linear_policies():
+    with pytest.raises(InvalidInputError, match="symmetric is for linear policies"):
+        replace(TINY, symmetric=True)

@@ -1,0 +1,78 @@
+"""Recipes for arms of another size, and for those that are not their own mirror image."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinarm.policies import find_learner, recipe, train_policy
+from kinarm.problem import PROBLEMS
+
+SCALE = 0.5
+"""A power of two, by which lengths are scaled without rounding."""
+
+
+@pytest.fixture(scope="module")
+def half_right(shipped_arms, tmp_path_factory):
+    """The problem ``right`` with all lengths halved: those of arm, scene and tolerance."""
+    text = shipped_arms["paper"].urdf_path.read_text()
+    lengths = re.compile(r'(?<!<axis )\b(xyz|radius|length|size)="([^"]*)"')
+    path = tmp_path_factory.mktemp("half") / "half.urdf"
+    path.write_text(lengths.sub(lambda found: f'{found[1]}="{halved(found[2])}"', text))
+    right = PROBLEMS["right"]
+    parts = {
+        name: tuple(
+            replace(part, lower=shrunk(part.lower), upper=shrunk(part.upper))
+            for part in getattr(right.scene, name)
+        )
+        for name in ("obstacles", "goal_regions")
+    }
+    scene = replace(right.scene, cube_edge=SCALE * right.scene.cube_edge, **parts)
+    return right.replace(arm=path, scene=scene, tolerance=SCALE * right.task.tolerance)
+
+
+def halved(numbers):
+    return " ".join(repr(SCALE * float(number)) for number in numbers.split())
+
+
+def shrunk(point):
+    return tuple(SCALE * number for number in point)
+
+
+@pytest.mark.parametrize("learner", ["ars", "ppo"])
+@pytest.mark.parametrize("problem", sorted(PROBLEMS))
+def test_for_the_papers_arm_nothing_is_scaled(learner, problem):
+    made, named = recipe(learner, "tuned", problem=problem), find_learner(learner).recipes["tuned"]
+    assert made.reward.progress == 1.0
+    assert (made.symmetric, made.net_arch) == (named.symmetric, named.net_arch)
+    assert getattr(made, "training_tolerance", 0.03) == 0.03
+
+
+def test_progress_counts_in_the_arms_reach(half_right):
+    assert half_right.load_arm().reach == pytest.approx(SCALE * 1.263671568590896)
+    for learner in ("ars", "ppo"):
+        made = recipe(learner, "tuned", problem=half_right)
+        original = recipe(learner, "tuned", problem="right")
+        assert made.reward == replace(original.reward, progress=1 / SCALE)
+
+
+def test_ppo_learns_the_same_in_a_world_of_half_the_size(half_right):
+    pytest.importorskip("stable_baselines3")
+    small = {"iterations": 12, "n_epochs": 2, "seed": 1}
+    half = train_policy(recipe("ppo", "tuned", problem=half_right, **small))
+    whole = train_policy(recipe("ppo", "tuned", problem="right", **small))
+    for ours, theirs in zip(half.curve, whole.curve, strict=True):
+        assert ours.environment_steps == theirs.environment_steps
+        assert ours.success == pytest.approx(theirs.success, nan_ok=True)
+        assert ours.mean_return == pytest.approx(theirs.mean_return, rel=1e-4, nan_ok=True)
+    assert half.curve[-1].mean_return > half.curve[4].mean_return  # it has learnt something
+    for ours, theirs in zip(half.policy.layers, whole.policy.layers, strict=True):
+        np.testing.assert_allclose(ours.weights, theirs.weights, rtol=0, atol=1e-4)
+
+
+def test_where_no_reflection_helps_ars_trains_a_network_and_progress_counts_more():
+    lopsided = PROBLEMS["both"].replace(goal_weights=(1.0, 2.0))
+    ars, ppo = (recipe(learner, "tuned", problem=lopsided) for learner in ("ars", "ppo"))
+    assert (ars.recipe, ars.net_arch, ars.symmetric) == ("tuned", (16,), False)
+    assert (ppo.recipe, ppo.reward.progress) == ("tuned", 5.0)
