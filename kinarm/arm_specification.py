@@ -110,7 +110,9 @@ class ArmSpecification:
             return self
         below = file.arm.completed()
         given = {name: getattr(self, name) for name in init_fields(type(self)) if name != "source"}
-        given = {name: value for name, value in given.items() if value not in (None, ())}
+        given = {name: value for name, value in given.items() if value is not None}
+        if not given["package_dirs"]:
+            del given["package_dirs"]
         for name in ("held", "limits"):
             if name in given:
                 given[name] = {**(getattr(below, name) or {}), **given[name]}

@@ -7,7 +7,6 @@ get a range, and the names of meshes become paths.
 
 import math
 from collections.abc import Collection, Mapping
-from importlib import metadata
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -17,8 +16,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from kinarm._files import first_line
-from kinarm.arm_specification import PACKAGE, ArmSpecification, arm_names
+from kinarm.arm_specification import ArmSpecification
 from kinarm.errors import ArmError, InvalidInputError, UnknownNameError
+from kinarm.urdf_files import resolve_meshes
 
 USUAL_TOOL = "tool0"
 """Name of the tool frame by ROS's convention."""
@@ -69,43 +69,6 @@ class _Joint(NamedTuple):
         return None if mimic is None else mimic.get("joint")
 
 
-def find_urdf(source: str) -> Path:
-    """Resolve the source of a completed specification to a file.
-
-    Raises
-    ------
-    ArmError
-        If there is no such file.
-    UnknownNameError
-        If it is no path but a name.
-    """
-    if source.startswith(PACKAGE):
-        return _installed(source)
-    path = Path(source)
-    if path.is_file():
-        return path.resolve()
-    if path.is_dir():
-        raise ArmError(f"{source!r} is a folder, not a URDF")
-    if path.suffix == ".urdf" or path.parent != Path():
-        raise ArmError(f"URDF {source!r} does not exist")
-    raise UnknownNameError("arm", source, (*arm_names(), "path/to/robot.urdf"))
-
-
-def _installed(source: str) -> Path:
-    """Find a file of the installed package of robot descriptions."""
-    name, _, inside = source.partition(":")
-    try:
-        package = metadata.distribution(name)
-    except metadata.PackageNotFoundError:
-        raise ArmError(
-            f"{Path(inside).name} is part of the package {name}: pip install 'kinarm[robots]'"
-        ) from None
-    share = Path(str(package.locate_file(f"cmeel.prefix/share/{name}/robots")))
-    if not (share / inside).is_file():
-        raise ArmError(f"the package {name} {package.version} has no {inside}: another version?")
-    return (share / inside).resolve()
-
-
 def read_urdf(path: Path, specification: ArmSpecification) -> Description:
     """Read a URDF and reduce it to a chain.
 
@@ -153,7 +116,7 @@ def _reduced(
     free = [name for name in held if name not in asked]
     if free:
         notes += (f"joints that do not carry the tool are held: {', '.join(free)}",)
-    _resolve_meshes(robot, path, specification.package_dirs)
+    resolve_meshes(robot, path, specification.package_dirs)
     if specification.tool_offset is not None:
         tool = _add_tool_point(robot, tool, specification.tool_offset)
     return Description(
@@ -366,34 +329,3 @@ def _add_tool_point(robot: ElementTree.Element, tool: str, offset: tuple[float, 
     ElementTree.SubElement(joint, "child", link=name)
     ElementTree.SubElement(joint, "origin", xyz=" ".join(map(repr, offset)), rpy="0 0 0")
     return name
-
-
-def _resolve_meshes(robot: ElementTree.Element, path: Path, folders: Collection[str]) -> None:
-    """Replace names of meshes by paths; those that are missing are refused, if they can touch."""
-    for use in ("collision", "visual"):
-        for mesh in robot.findall(f"link/{use}/geometry/mesh"):
-            name = mesh.get("filename", "")
-            found = _mesh_path(name, path, folders)
-            if found is not None:
-                mesh.set("filename", str(found))
-            elif use == "collision":
-                raise ArmError(
-                    f"mesh {name!r} of {path.name} is not found; package_dirs names the folders "
-                    "of package:// meshes"
-                )
-
-
-def _mesh_path(name: str, path: Path, folders: Collection[str]) -> Path | None:
-    """Find a mesh in the package folders, or in one that the URDF lies in."""
-    scheme, separator, inside = name.partition("://")
-    if scheme == "file":
-        return Path(inside) if Path(inside).is_file() else None
-    if not separator:
-        beside = path.parent / name
-        return beside.resolve() if beside.is_file() else None
-    around = (*map(Path, folders), *path.parents)
-    own = (folder.parent for folder in around if folder.name == inside.partition("/")[0])
-    for folder in (*around, *own):
-        if (folder / inside).is_file():
-            return (folder / inside).resolve()
-    return None

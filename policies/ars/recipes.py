@@ -5,7 +5,6 @@ from typing import Any
 
 from kinarm.policies.ars.config import ARSConfig
 from kinarm.policies.config import relative_reach
-from kinarm.policies.mirror import has_mirror
 from kinarm.task import RewardWeights
 
 RECIPES = {
@@ -47,6 +46,8 @@ def adapted(config: ARSConfig) -> ARSConfig:
     reflection maps one to the other, a linear policy cannot turn to either side: a small network
     takes its place.
     """
+    from kinarm.policies.mirror import has_mirror  # loads Pinocchio
+
     if config.recipe != "tuned":
         return config
     scale, penalty = relative_reach(config.problem), -2.0

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 from kinarm.policies.config import relative_reach
-from kinarm.policies.mirror import has_mirror
 from kinarm.policies.ppo.config import PPOConfig
 from kinarm.task import RewardWeights
 
@@ -42,6 +41,8 @@ def adapted(config: PPOConfig) -> PPOConfig:
     progress counts five times as much: else learning hardly begins before contact is all that is
     avoided.
     """
+    from kinarm.policies.mirror import has_mirror  # loads Pinocchio
+
     if config.recipe != "tuned":
         return config
     problem = config.problem

@@ -216,7 +216,11 @@ def test_run_trials_on_a_scene_of_ones_own():
         ({"problem": "upwards"}, UnknownNameError, "available: left, right, both"),
         ({"policy": "nobody"}, UnknownNameError, "unknown policy 'nobody'"),
         ({"policy": "nobody.npz"}, PolicyFileError, "cannot read"),
-        ({"arm": "nobody"}, UnknownNameError, "available: lrmate200ic_5l, paper, paper_flange"),
+        (
+            {"arm": "nobody"},
+            UnknownNameError,
+            "available: .*lrmate200ic_5l, panda, paper, paper_flange",
+        ),
         ({"trials": 0}, InvalidInputError, "trials must be a whole number of at least 1, got 0"),
         ({"seed": -1}, InvalidInputError, "seed must be a whole number of at least 0, got -1"),
     ],

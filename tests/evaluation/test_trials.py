@@ -158,6 +158,6 @@ def test_numbers_out_of_range_are_refused(trials, seed):
 
 
 def test_a_scene_without_free_starts_is_refused():
-    block = Obstacle(name="block", lower=(-2, -2, 0), upper=(2, 2, 2))
+    block = Obstacle(name="block", lower=(0.5, -0.1, 0.6), upper=(0.7, 0.1, 0.8))
     with pytest.raises(ProblemError, match=r"no contact-free start .* touches"):
-        draw("right", scene=Scene(obstacles=(block,)))
+        draw("right", scene=Scene(obstacles=(block,)), start_spread=0.0)

@@ -8,8 +8,11 @@ from kinarm.envs.registration import ENVIRONMENTS
 from kinarm.errors import UnknownNameError
 from kinarm.policies import zoo_hyperparameters
 
-FLAT = {name for name in ENVIRONMENTS if "Goal" not in name}
-GOALS = set(ENVIRONMENTS) - FLAT
+NAMED = {name for name in ENVIRONMENTS if not name.endswith(("/Reach-v0", "/ReachGoal-v0"))}
+"""Environments of one problem; those of any have no settings that fit all."""
+
+FLAT = {name for name in NAMED if "Goal" not in name}
+GOALS = NAMED - FLAT
 ALGORITHMS = {
     "ppo": FLAT,
     "a2c": FLAT,
