@@ -5,7 +5,6 @@ looked for, without contact; that none is found proves nothing.
 """
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from kinarm.contact_statistics import ContactStatistics, random_configurations
@@ -17,11 +16,8 @@ GOALS = 100
 MANY = 0.1
 """More than this share of them without a configuration is worth a line."""
 
-CONFIGURATIONS, NEAREST, STEPS = 50_000, 32, 20
-"""Random configurations; how many of them are tried for a goal, and in how many steps."""
-
-DAMPING = 1e-3
-"""Of the steps to a goal, so that they stay small near singular configurations [m^2]."""
+CONFIGURATIONS = 50_000
+"""Random configurations that are tried for all goals."""
 
 
 def find_reachable(
@@ -29,8 +25,8 @@ def find_reachable(
 ) -> NDArray[np.bool_]:
     """Find out for which goals there is a configuration that touches nothing.
 
-    Of random configurations that are free, those whose tools are nearest to a goal are moved
-    towards it, by damped least squares.
+    One of many random configurations may bring the tool within the tolerance; for the goals that
+    are left, inverse kinematics is asked.
 
     Parameters
     ----------
@@ -54,35 +50,12 @@ def find_reachable(
     tools, touching = world.screen(q)
     if touching.all():
         ContactStatistics.sample(world.contact_model).check_movable(world.arm.name)
-    q, tools = q[~touching], tools[~touching]
-    found = []
-    for goal in goals:
-        distances = np.linalg.norm(tools - goal, axis=1)
-        nearest = np.argsort(distances, kind="stable")[:NEAREST]
-        reached = distances[nearest[0]] <= world.problem.task.tolerance
-        found.append(reached or any(_leads_to(world, q[index], goal) for index in nearest))
-    return np.array(found, dtype=bool)
-
-
-def _leads_to(world: World, start: NDArray[np.float64], goal: NDArray[np.float64]) -> bool:
-    """Whether steps from a configuration lead to one at a goal that touches nothing."""
-    arm, q = world.arm, start.copy()
-    model, data, moved = arm.model, arm.model.createData(), slice(arm.n_actuated)
-    frame = model.getFrameId(arm.tool_frame, pin.FrameType.BODY)
-    for _ in range(STEPS):
-        jacobian = pin.computeFrameJacobian(
-            model, data, q, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        )[:3, moved]
-        missing = goal - pin.updateFramePlacement(model, data, frame).translation
-        distance, tolerance = np.linalg.norm(missing), world.problem.task.tolerance
-        if distance <= tolerance and not world.contact_model.in_contact(q[None])[0]:
-            return True
-        if distance <= tolerance / 10:
-            return False
-        damped = jacobian @ jacobian.T + DAMPING * np.eye(3)
-        q[moved] += jacobian.T @ np.linalg.solve(damped, missing)
-        q = np.clip(q, arm.lower, arm.upper)
-    return False
+    tools, tolerance = tools[~touching], world.problem.task.tolerance
+    found = np.array([(np.linalg.norm(tools - goal, axis=1) <= tolerance).any() for goal in goals])
+    missing = np.flatnonzero(~found)
+    solutions = world.inverse_kinematics(goals[missing], free=True, most=256)
+    found[missing[solutions.owner]] = True
+    return found
 
 
 def reach_warning(world: World) -> str | None:
