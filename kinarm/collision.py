@@ -223,10 +223,14 @@ def _add_scene(geometry: pin.GeometryModel, scene: Scene) -> None:
         geometry.addGeometryObject(pin.GeometryObject("ground", 0, pin.SE3.Identity(), halfspace))
 
 
+def _links(arm: Arm) -> list[str]:
+    """Link of each collision shape, whose name ends in its number on it."""
+    return [shape.name.rsplit("_", 1)[0] for shape in arm.geometry.geometryObjects]
+
+
 def body_names(arm: Arm) -> tuple[str, ...]:
     """Name each collision shape after its link, numbered only where a link has several."""
-    names = [shape.name for shape in arm.geometry.geometryObjects]
-    links = [name.rsplit("_", 1)[0] for name in names]
+    names, links = [shape.name for shape in arm.geometry.geometryObjects], _links(arm)
     return tuple(
         link if links.count(link) == 1 else name for link, name in zip(links, names, strict=True)
     )
@@ -237,7 +241,7 @@ def _candidate_pairs(
 ) -> list[tuple[int, int, int]]:
     """All pairs (first, second, kind) that move against each other, but those that are allowed."""
     parent = [shape.parentJoint for shape in geometry.geometryObjects]
-    links = [shape.name.rsplit("_", 1)[0] for shape in arm.geometry.geometryObjects]
+    links = _links(arm)
     allowed = {frozenset(contact.links) for contact in arm.allowed_contacts}
     pairs = []
     for first in range(n_shapes):

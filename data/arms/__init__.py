@@ -1,1 +1,1 @@
-"""Arms, as URDF files."""
+"""Arms: arm files, and URDF files of kinarm's own."""
