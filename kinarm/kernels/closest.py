@@ -15,9 +15,10 @@ from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, Vector, helper, inlined, kernel
 from kinarm.kernels.kinematics import POSE, forward_kinematics, to_world
 from kinarm.kernels.planes import rotated_back
+from kinarm.kernels.separation import lowest_corner
 from kinarm.kernels.simplex import of_segment, of_triangle, shrink
 
-LAYOUT = "19e5c846063a"
+LAYOUT = "e6a6fcf1faac"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 CORNERS_TRIED = 64
@@ -64,15 +65,10 @@ class Bodies(NamedTuple):
 
 
 @inlined
-def lowest_corner(bodies: Bodies, body: int, poses: Array, x: float, y: float, z: float) -> int:
+def lowest_in_world(bodies: Bodies, body: int, poses: Array, x: float, y: float, z: float) -> int:
     """Row of the corner of a body that lies lowest along a vector of the world."""
     x, y, z = rotated_back(poses, bodies.link[body], x, y, z)
-    corners, found, least = bodies.corners, bodies.span[body, 0], math.inf
-    for i in range(bodies.span[body, 0], bodies.span[body, 1]):
-        height = x * corners[i, 0] + y * corners[i, 1] + z * corners[i, 2]
-        if height < least:
-            found, least = i, height
-    return found
+    return lowest_corner(bodies.corners, bodies.span, body, x, y, z)
 
 
 @inlined
@@ -101,7 +97,7 @@ def above_plane(bodies: Bodies, first: int, second: int, poses: Array, points: A
     """Distance of a body from a half-space, and where they are closest."""
     normal = bodies.corners[bodies.span[second, 0]]
     nx, ny, nz = normal[0], normal[1], normal[2]
-    corner = lowest_corner(bodies, first, poses, nx, ny, nz)
+    corner = lowest_in_world(bodies, first, poses, nx, ny, nz)
     x, y, z = corner_at(bodies, first, corner, poses)
     height = x * nx + y * ny + z * nz - bodies.rounding[second]
     radius = bodies.rounding[first]
@@ -126,8 +122,8 @@ def between(
     """
     size, norm, x, y, z = 0, math.inf, 0.0, 0.0, 1.0
     for number in range(CORNERS_TRIED):
-        low = lowest_corner(bodies, first, poses, x, y, z)
-        high = lowest_corner(bodies, second, poses, -x, -y, -z)
+        low = lowest_in_world(bodies, first, poses, x, y, z)
+        high = lowest_in_world(bodies, second, poses, -x, -y, -z)
         a, b = corner_at(bodies, first, low, poses), corner_at(bodies, second, high, poses)
         wx, wy, wz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
         if norm - (x * wx + y * wy + z * wz) / norm <= PRECISION:

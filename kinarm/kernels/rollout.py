@@ -30,7 +30,7 @@ from kinarm.kernels.session import Session, parts
 from kinarm.kernels.sharing import take_number
 from kinarm.kernels.touching import deepest_overlap, first_contact, overlaps
 
-LAYOUT = "8740e2e86a1b"
+LAYOUT = "22036f7814f7"
 """Hash of what is compiled in from other files; a test tells when to renew it.
 
 Numba's disk cache notices changes only in this file, so changing this line is what makes it
@@ -103,10 +103,8 @@ def begin(first: int, last: int, rows: NDArray[np.int64], session: Session) -> i
     """
     block, alone = session.block, session.alone
     if last - first < rows.shape[0]:
-        n_joints, n_observations = (
-            session.episodes.q.shape[1],
-            session.episodes.observation.shape[1],
-        )
+        n_joints = session.episodes.q.shape[1]
+        n_observations = session.episodes.observation.shape[1]
         n_pairs = session.shapes.planes.shape[0]
         block, alone = work_space(n_joints, 0, n_observations, n_pairs, 0, 0, 0, 0)
     return begin_blocks(first, last, rows, session, block, alone)

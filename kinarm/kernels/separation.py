@@ -7,6 +7,9 @@ differences, which is renewed by the corners that lie lowest along the way found
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from kinarm.contact_shapes import ContactShapes
 from kinarm.kernels.compiling import Array, Vector, helper, inlined
 from kinarm.kernels.planes import FINE, GAP, OFFSET, rotated_back
@@ -23,10 +26,15 @@ COARSE = 0.02
 
 
 @inlined
-def lowest_corner(shapes: ContactShapes, body: int, x: float, y: float, z: float) -> int:
-    """Row of the corner of a body that lies lowest along a vector of its joint frame."""
-    corners, found, least = shapes.corners, shapes.bodies[body, 0], math.inf
-    for i in range(shapes.bodies[body, 0], shapes.bodies[body, 1]):
+def lowest_corner(
+    corners: Array, spans: NDArray[np.int64], body: int, x: float, y: float, z: float
+) -> int:
+    """Row of the corner of a body that lies lowest along a vector of its joint frame.
+
+    The first two columns of ``spans`` are each body's first row and the one after its last.
+    """
+    found, least = spans[body, 0], math.inf
+    for i in range(spans[body, 0], spans[body, 1]):
         height = x * corners[i, 0] + y * corners[i, 1] + z * corners[i, 2]
         if height < least:
             found, least = i, height
@@ -78,8 +86,8 @@ def separate(
     for _ in range(CORNERS_TRIED):
         # The mover's corner that lies lowest, and the carrier's that lies highest.
         x, y, z = turned_back(relative, nx, ny, nz)
-        low = lowest_corner(shapes, mover, x, y, z)
-        high = lowest_corner(shapes, carrier, -nx, -ny, -nz)
+        low = lowest_corner(shapes.corners, shapes.bodies, mover, x, y, z)
+        high = lowest_corner(shapes.corners, shapes.bodies, carrier, -nx, -ny, -nz)
         x, y, z = corners[low, 0], corners[low, 1], corners[low, 2]
         wx = relative[3, 0] + relative[0, 0] * x + relative[1, 0] * y + relative[2, 0] * z
         wy = relative[3, 1] + relative[0, 1] * x + relative[1, 1] * y + relative[2, 1] * z
