@@ -21,6 +21,7 @@ from kinarm.policies.normalizer import Normalizer, input_scale
 from kinarm.policies.policy import Layer, Policy
 from kinarm.policies.provenance import Provenance
 from kinarm.simulator import Simulator
+from kinarm.streams import Stream, stream_generator
 from kinarm.world import World
 
 
@@ -33,12 +34,12 @@ class ARSTraining:
     def __init__(self, config: ARSConfig, threads: int | None = None) -> None:
         self.config, self.simulator = config, config.simulator(threads)
         self.mirror = task_mirror(config.symmetric, self.simulator.world)
-        self._rng = np.random.default_rng(config.seed)
+        self._rng = stream_generator(Stream.ARS, config.seed)
 
     def initial_state(self) -> ARSState:
         """State before the first iteration: mu = 0, Sigma = I, and theta = 0 if it is linear."""
         n_actions, n_observations = self.simulator.n_actions, self.simulator.n_observations
-        rng = np.random.default_rng(self.config.seed)
+        rng = stream_generator(Stream.ARS, self.config.seed)
         theta = np.zeros((n_actions, n_observations))
         if self.config.net_arch:
             theta = initial_network(rng, (n_observations, *self.config.net_arch, n_actions))

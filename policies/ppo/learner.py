@@ -19,6 +19,7 @@ from kinarm.policies.ppo.model import CompiledPPO
 from kinarm.policies.ppo.parameters import initial_parameters
 from kinarm.policies.ppo.state import PPOState
 from kinarm.policies.ppo.training_env import TrainingVecEnv
+from kinarm.streams import Stream, stream_generator
 
 NORMALIZED_OVER = 10_000
 """Random starts whose observations are the statistics of the normaliser."""
@@ -42,8 +43,8 @@ def seed_iteration(seed: int, iteration: int) -> tuple[np.random.Generator, np.r
 
     The first generator is for the learner, the second one for scenarios.
     """
-    learner, scenarios = np.random.SeedSequence(seed, spawn_key=(iteration,)).spawn(2)
-    return np.random.default_rng(learner), np.random.default_rng(scenarios)
+    learner = stream_generator(Stream.PPO_LEARNER, seed, iteration)
+    return learner, stream_generator(Stream.PPO_SCENARIOS, seed, iteration)
 
 
 class PPOTraining:
@@ -68,9 +69,8 @@ class PPOTraining:
         simulator = config.simulator(threads=1)
         mirror = task_mirror(config.symmetric, simulator.world)
         self.config = config
-        self.env = TrainingVecEnv(
-            simulator, config.n_envs, rng=np.random.default_rng(config.seed), mirror=mirror
-        )
+        _, scenarios = seed_iteration(config.seed, 0)
+        self.env = TrainingVecEnv(simulator, config.n_envs, rng=scenarios, mirror=mirror)
         self.model = CompiledPPO(self.env, config, threads)
         self.model.set_logger(Logger(folder=None, output_formats=outputs))
 

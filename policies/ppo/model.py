@@ -21,6 +21,7 @@ from kinarm.policies.ppo.kernels.tiles import Numbers
 from kinarm.policies.ppo.kernels.update import Descent, choose
 from kinarm.policies.ppo.networks import ActorCritic
 from kinarm.policies.ppo.update import UpdateRecords, update
+from kinarm.streams import Stream, stream_generator
 
 
 class CutShort(NamedTuple):
@@ -55,7 +56,7 @@ class CompiledPPO(PPO):
     """
 
     def __init__(self, env: VecEnv, config: PPOConfig, threads: int | None = None) -> None:
-        self.rng = np.random.default_rng(config.seed)
+        self.rng = stream_generator(Stream.PPO_LEARNER, config.seed, 0)
         self.threads = (
             available_threads() if threads is None else whole_number("threads", threads, 1)
         )

@@ -1,0 +1,36 @@
+"""Random generators by purpose: no two purposes share numbers, whatever their seeds.
+
+A generator's key is the hash of the purpose's name, followed by numbers of its own. The trials of
+an evaluation (`kinarm.evaluation.trials.trial_generator`) are older than the names: their keys
+have two numbers and are therefore other keys than those, which have four at least.
+"""
+
+import hashlib
+from enum import StrEnum
+
+import numpy as np
+
+
+class Stream(StrEnum):
+    """What random numbers are for."""
+
+    ARS = "ars"
+    PPO_LEARNER = "ppo learner"
+    PPO_SCENARIOS = "ppo scenarios"
+
+
+def stream_generator(stream: Stream, seed: int, *numbers: int) -> np.random.Generator:
+    """Random generator of one purpose.
+
+    Parameters
+    ----------
+    stream : Stream
+        The purpose.
+    seed : int
+        Seed of the whole, from 0.
+    *numbers : int
+        Which of the generators of this purpose, such as the iteration; from 0.
+    """
+    name = np.frombuffer(hashlib.sha256(stream.encode()).digest()[:16], dtype="<u4")
+    key = (*map(int, name), *numbers)
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
