@@ -4,21 +4,57 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.statistics import Estimate, bootstrap_intervals, wilson_interval
-from kinarm.policies.oracle import OracleSolutions
-from kinarm.rollouts import Rollouts
 
 LIMITS = (0.1, 0.2)
 """Distances whose shares are reported beside success [m]."""
 
 ALWAYS = float("inf")
 """Priority of columns that are never left out."""
+
+
+class Judged(Protocol):
+    """What figures of merit need of finished episodes; `kinarm.Rollouts` say what it means."""
+
+    @property
+    def distance(self) -> NDArray[np.float64]:
+        """Final distances [m]."""
+
+    @property
+    def steps(self) -> NDArray[np.int64]:
+        """Steps taken."""
+
+    @property
+    def returns(self) -> NDArray[np.float64]:
+        """Sums of rewards."""
+
+    @property
+    def success(self) -> NDArray[np.bool_]:
+        """Whether the goal was reached."""
+
+    @property
+    def collision(self) -> NDArray[np.bool_]:
+        """Whether something touched."""
+
+    def __len__(self) -> int: ...
+
+
+class Bounded(Protocol):
+    """What figures of merit need of the bounds, as the oracle's solutions have it."""
+
+    @property
+    def reachable(self) -> NDArray[np.bool_]:
+        """Whether a motion to the goal was found."""
+
+    @property
+    def steps_lower_bound(self) -> NDArray[np.int64]:
+        """Steps that are necessary."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +73,8 @@ class Outcomes:
         Resampled trials; by default each of them once.
     """
 
-    rollouts: tuple[Rollouts, ...]
-    bounds: OracleSolutions | None = None
+    rollouts: tuple[Judged, ...]
+    bounds: Bounded | None = None
     numbers: NDArray[np.int64] | None = None
 
     def _joined(self, columns: Iterable[NDArray[Any]]) -> NDArray[Any]:
@@ -88,7 +124,7 @@ class Outcomes:
         return ratio[self.success]
 
     @property
-    def _known_bounds(self) -> OracleSolutions:
+    def _known_bounds(self) -> Bounded:
         if self.bounds is None:
             raise InvalidInputError("there are no bounds: the evaluation was made without them")
         return self.bounds

@@ -57,6 +57,21 @@ def save_archive(
     OutputError
         If the file cannot be written.
     """
+    write_atomically(
+        path, lambda file: write_archive(file, kind, version, arrays, header, compress=compress)
+    )
+
+
+def write_archive(
+    file: IO[bytes],
+    kind: str,
+    version: int,
+    arrays: Arrays,
+    header: Mapping[str, Any],
+    *,
+    compress: bool = False,
+) -> None:
+    """Write what `save_archive` does to an open file."""
     content: dict[str, Any] = {
         "format": np.array(f"kinarm-{kind.replace(' ', '-')}"),
         "version": np.array(version),
@@ -66,7 +81,7 @@ def save_archive(
     # What is larger could not be told from a small file that claims to hold much.
     small = sum(array.nbytes for array in arrays.values()) < SLACK
     write = np.savez_compressed if compress and small else np.savez
-    write_atomically(path, lambda file: write(file, **content))
+    write(file, **content)
 
 
 def load_archive(path: str | Path, kind: str, version: int, error: type[KinarmError]) -> Archive:

@@ -100,6 +100,19 @@ def only_writer(path: str | Path) -> Iterator[None]:
             lock.unlink(missing_ok=True)
 
 
+def is_being_written(path: str | Path) -> bool:
+    """Whether a process is making an output as its `only_writer`."""
+    target = Path(os.path.realpath(path))
+    try:
+        with target.with_name(f".{target.name}.lock").open("rb") as file:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    return False
+
+
 def _locked(lock: Path) -> IO[bytes]:
     """Open and lock a file that its last owner may just be removing."""
     while True:

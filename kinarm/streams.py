@@ -17,6 +17,7 @@ class Stream(StrEnum):
     ARS = "ars"
     PPO_LEARNER = "ppo learner"
     PPO_SCENARIOS = "ppo scenarios"
+    STUDY = "study"
 
 
 def stream_generator(stream: Stream, seed: int, *numbers: int) -> np.random.Generator:

@@ -89,6 +89,16 @@ class TrainingConfig:
         """The problem with the reward of these settings, which is what is trained on."""
         return self.problem.replace(reward=self.reward)
 
+    @property
+    def prolongable(self) -> bool:
+        """Whether a training with more iterations begins just as this one goes."""
+        return False
+
+    @property
+    def cost(self) -> float:
+        """Rough duration of the training, to compare it with others [s of a core]."""
+        return float(self.iterations)
+
     def simulator(self, threads: int | None = None) -> "Simulator":
         """Build the simulator to train in."""
         from kinarm.simulator import Simulator

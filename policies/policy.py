@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm._archive import load_archive, reading, save_archive
+from kinarm._archive import Archive, load_archive, reading, save_archive
 from kinarm._validation import finite_array
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError
@@ -300,6 +300,11 @@ class Policy:
         OutputError
             If the file cannot be written; an existing file is then left as it was.
         """
+        content = self.content()
+        save_archive(path, "policy", FORMAT_VERSION, content.arrays, content.header)
+
+    def content(self) -> Archive:
+        """What files hold of the policy: `from_content` makes it again."""
         header = {
             "provenance": self.provenance.to_json(),
             "observation": observation_layout(),
@@ -310,7 +315,7 @@ class Policy:
             arrays |= {f"weights_{number}": layer.weights, f"bias_{number}": layer.bias}
         if self.mirror is not None:
             arrays |= {f"mirror_{name}": part for name, part in self.mirror._asdict().items()}
-        save_archive(path, "policy", FORMAT_VERSION, arrays, header)
+        return Archive(header, arrays)
 
     @classmethod
     def load(cls, path: str | Path) -> Policy:
@@ -322,24 +327,40 @@ class Policy:
             If the file is missing, truncated, not a policy, written by another version, or made
             for observations of another layout.
         """
-        header, arrays = load_archive(path, "policy", FORMAT_VERSION, PolicyFileError)
+        content = load_archive(path, "policy", FORMAT_VERSION, PolicyFileError)
         with reading(repr(str(path)), "policy", PolicyFileError):
-            if header["observation"] != observation_layout():
-                raise PolicyFileError(
-                    f"{str(path)!r} understands observations of layout "
-                    f"{header['observation']!r}, not {observation_layout()!r}"
-                )
-            n_layers = sum(name.startswith("weights_") for name in arrays)
-            signs = [f"mirror_{name}" for name in Mirror._fields]
-            mirrored = any(name in arrays for name in signs)
-            return cls(
-                mean=arrays["mean"],
-                std=arrays["std"],
-                layers=tuple(
-                    Layer(arrays[f"weights_{number}"], arrays[f"bias_{number}"])
-                    for number in range(n_layers)
-                ),
-                provenance=Provenance.from_json(header["provenance"]),
-                activations=tuple(header["activations"]),
-                mirror=Mirror(*(arrays[name] for name in signs)) if mirrored else None,
+            return cls.from_content(content, repr(str(path)))
+
+    @classmethod
+    def from_content(cls, content: Archive, where: str) -> Policy:
+        """Rebuild what `content` returned and the file ``where`` holds.
+
+        Raises
+        ------
+        PolicyFileError
+            If it was made for observations of another layout.
+        KinarmError
+            If something cannot be used.
+        KeyError
+            If something is missing.
+        """
+        header, arrays = content
+        if header["observation"] != observation_layout():
+            raise PolicyFileError(
+                f"{where} understands observations of layout "
+                f"{header['observation']!r}, not {observation_layout()!r}"
             )
+        n_layers = sum(name.startswith("weights_") for name in arrays)
+        signs = [f"mirror_{name}" for name in Mirror._fields]
+        mirrored = any(name in arrays for name in signs)
+        return cls(
+            mean=arrays["mean"],
+            std=arrays["std"],
+            layers=tuple(
+                Layer(arrays[f"weights_{number}"], arrays[f"bias_{number}"])
+                for number in range(n_layers)
+            ),
+            provenance=Provenance.from_json(header["provenance"]),
+            activations=tuple(header["activations"]),
+            mirror=Mirror(*(arrays[name] for name in signs)) if mirrored else None,
+        )

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +15,7 @@ from kinarm.errors import InvalidInputError, UnknownNameError
 if TYPE_CHECKING:
     from kinarm.evaluation.comparison.results import Comparison
     from kinarm.evaluation.comparison.runs import PlannedRun
-    from kinarm.evaluation.reproduction.executor import Executor
+    from kinarm.evaluation.running.executor import Executor
 
 EPILOG = """
 needs the extra zoo for learners of Stable-Baselines3 and sb3-contrib: pip install 'kinarm[zoo]'
@@ -151,15 +150,16 @@ class ComparisonRequest:
         self, missing: "list[PlannedRun]", folder: Path, executor: "Executor | None"
     ) -> None:
         """Carry out what is missing, and tell of every training that is finished."""
+        from kinarm.evaluation.comparison.runs import save_run
         from kinarm.evaluation.comparison.training import carry_out
-        from kinarm.evaluation.reproduction.executor import LocalExecutor
+        from kinarm.evaluation.running.local import LocalExecutor
 
         jobs = min(self.jobs or available_threads(), len(missing))
         console = open_console(stderr=True)
-        work = partial(carry_out, folder=folder)
-        finished = (executor or LocalExecutor(jobs)).carry_out(work, missing)
-        for number, run in enumerate(finished, start=1):
-            console.print(f"{number} of {len(missing)} trainings: {run.name}")
+        finished = (executor or LocalExecutor(jobs)).carry_out(carry_out, missing)
+        for count, (number, curve) in enumerate(finished, start=1):
+            save_run(folder, missing[number], curve)
+            console.print(f"{count} of {len(missing)} trainings: {missing[number].name}")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

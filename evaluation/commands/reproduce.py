@@ -17,10 +17,10 @@ from kinarm.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from kinarm.evaluation.reproduction.claims import Claim
-    from kinarm.evaluation.reproduction.executor import Executor
     from kinarm.evaluation.reproduction.results import Results
     from kinarm.evaluation.reproduction.runs import RunStore
     from kinarm.evaluation.reproduction.study import Study
+    from kinarm.evaluation.running.executor import Executor
 
 EPILOG = """
 needs the extra ppo: pip install 'kinarm[ppo]' (or --no-ppo)
@@ -133,7 +133,7 @@ def _report(request: ReproductionRequest, command: str) -> None:
     """Run a request, and print its verdicts."""
     from rich.table import Table
 
-    from kinarm.evaluation.reproduction.intervals import estimate_text
+    from kinarm.evaluation.intervals import estimate_text
 
     table = Table("claim", "measured (95 %)", "claimed", "verdict", header_style="bold")
     for claim in request.run(command=command):
@@ -167,10 +167,10 @@ def _train(
     results: "Results", store: "RunStore", jobs: int, executor: "Executor | None"
 ) -> "Results":
     """Carry out what is missing, the longest first, and read all runs anew."""
-    from kinarm.evaluation.reproduction.executor import LocalExecutor
-    from kinarm.evaluation.reproduction.progress import StudyProgress
     from kinarm.evaluation.reproduction.results import Results
     from kinarm.evaluation.reproduction.training import carry_out
+    from kinarm.evaluation.running.local import LocalExecutor
+    from kinarm.evaluation.running.progress import TaskProgress
 
     study = results.study
     missing = sorted(results.missing, key=lambda training: -training.cost)
@@ -179,10 +179,12 @@ def _train(
         console.print(f"{len(results.runs)} of {len(study.trainings)} trainings are finished")
     jobs = min(jobs, len(missing))
     threads = max(1, available_threads() // jobs)
-    work = partial(carry_out, protocol=study.protocol, folder=store.folder, threads=threads)
-    with StudyProgress(len(study.trainings), missing, jobs, console) as progress:
-        for training in (executor or LocalExecutor(jobs, threads)).carry_out(work, missing):
-            progress.finished(training)
+    work = partial(carry_out, protocol=study.protocol, threads=threads)
+    with TaskProgress(len(study.trainings), missing, jobs, console) as progress:
+        chosen = executor or LocalExecutor(jobs, threads)
+        for number, (policy, run) in chosen.carry_out(work, missing):
+            store.save(missing[number], policy, run)
+            progress.finished(missing[number])
     return Results.load(study, store)
 
 

@@ -5,7 +5,6 @@ from collections.abc import Callable
 from copy import deepcopy
 from functools import cache, partial
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from kinarm._files import first_line
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.comparison.learners import ALGORITHMS, ComparedLearner
-from kinarm.evaluation.comparison.runs import CurvePoint, PlannedRun, Protocol, save_run
+from kinarm.evaluation.comparison.runs import CurvePoint, PlannedRun, Protocol
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.learners import begin_training, learner_of, state_policy
 from kinarm.policies.policy import Policy
@@ -32,12 +31,12 @@ def trial_set(problem: ReachProblem, trials: int, seed: int) -> TrialSet:
     return TrialSet.draw(problem, trials, seed)
 
 
-def carry_out(run: PlannedRun, folder: Path) -> None:
-    """Train, judge and save to the folder of runs."""
+def carry_out(run: PlannedRun) -> list[CurvePoint]:
+    """Train and judge."""
     judge = Judge(run.problem, run.protocol)
     train = train_recipe if run.learner.is_recipe else train_sb3
     train(run, judge)
-    save_run(folder, run, judge.curve)
+    return judge.curve
 
 
 class Judge:

@@ -6,15 +6,17 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 
-def template_environment(**settings: Any) -> "Environment":
-    """Where templates are found; settings are those of Jinja's ``Environment``.
+def template_environment(*packages: str, **settings: Any) -> "Environment":
+    """Where templates are found: in some packages, and here.
+
+    Settings are those of Jinja's ``Environment``.
 
     A name that a template uses and nobody gives is an error.
     """
-    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
     return Environment(
-        loader=PackageLoader(__package__),
+        loader=ChoiceLoader([PackageLoader(name) for name in (*packages, __package__)]),
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=StrictUndefined,

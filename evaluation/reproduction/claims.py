@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.evaluation.reproduction.intervals import Term, contrast, mean_share, superiority
+from kinarm.evaluation.intervals import Term, contrast, mean_share, superiority
 from kinarm.evaluation.reproduction.results import Results
 from kinarm.evaluation.reproduction.runs import TrainedRun
 from kinarm.evaluation.reproduction.study import (

@@ -112,11 +112,8 @@ class PlannedTraining:
 
     @property
     def cost(self) -> float:
-        """Rough duration relative to other trainings, for scheduling and progress."""
-        config = self.config
-        if isinstance(config, PPOConfig):
-            return 30.0 * config.environment_steps
-        return 2.0 * config.iterations * config.directions * config.problem.task.horizon
+        """Rough duration, for scheduling and progress [s of a core]."""
+        return self.config.cost
 
     def to_json(self) -> dict[str, Any]:
         """Everything that the run depends on, save the code."""

@@ -1,13 +1,12 @@
 """Carry out one training of a study and judge what it came to."""
 
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.evaluation.reproduction.runs import RunStore, TrainedRun
+from kinarm.evaluation.reproduction.runs import TrainedRun
 from kinarm.evaluation.reproduction.study import LITERAL, PlannedTraining, Protocol
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.learners import TrainingState, learner_of, state_policy, train_policy
@@ -37,8 +36,10 @@ def snapshot_iterations(iterations: int, snapshots: int) -> NDArray[np.int64]:
     return np.unique(ends.astype(np.int64)) - 1
 
 
-def carry_out(training: PlannedTraining, protocol: Protocol, folder: Path, threads: int) -> None:
-    """Train, judge and save to the output folder; the result does not depend on the threads."""
+def carry_out(
+    training: PlannedTraining, protocol: Protocol, threads: int
+) -> tuple[Policy, TrainedRun]:
+    """Train and judge; the result does not depend on the threads."""
     _load_kernels()
     config = training.config
     trials = trial_set(config.problem, protocol.snapshot_trials, protocol.snapshot_seed)
@@ -64,7 +65,7 @@ def carry_out(training: PlannedTraining, protocol: Protocol, folder: Path, threa
         collision=final.collision,
         steps=final.steps,
     )
-    RunStore(folder, protocol).save(training, policy, run)
+    return policy, run
 
 
 def _face(policy: Policy, trials: TrialSet) -> Rollouts:

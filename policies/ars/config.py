@@ -66,6 +66,17 @@ class ARSConfig(TrainingConfig):
         if self.symmetric and self.net_arch:
             raise InvalidInputError("symmetric is for linear policies, without net_arch")
 
+    @property
+    def prolongable(self) -> bool:
+        """Whether a training with more iterations begins just as this one goes."""
+        return self.step_size_schedule == "constant"
+
+    @property
+    def cost(self) -> float:
+        """Rough duration of the training [s of a core]."""
+        episodes = 2 * self.iterations * self.directions * self.episodes
+        return 5e-7 * episodes * self.problem.task.horizon
+
     def step_size_at(self, iteration: int) -> float:
         """Learning rate of an iteration."""
         return scheduled(self.step_size, self.step_size_schedule, iteration / self.iterations)

@@ -113,6 +113,16 @@ class PPOConfig(TrainingConfig):
         """The problem with the reward and tolerance of these settings, which is trained on."""
         return self.problem.replace(reward=self.reward, tolerance=self.training_tolerance)
 
+    @property
+    def prolongable(self) -> bool:
+        """Whether a training with more iterations begins just as this one goes."""
+        return self.learning_rate_schedule == "constant" and self.widening == 0
+
+    @property
+    def cost(self) -> float:
+        """Rough duration of the training [s of a core]."""
+        return 3e-6 * self.n_epochs * self.environment_steps
+
     def learning_rate_at(self, done: float) -> float:
         """Learning rate after this share of the training."""
         return scheduled(self.learning_rate, self.learning_rate_schedule, done)

@@ -11,7 +11,16 @@ from typing import NamedTuple
 import pytest
 from oracle_calls import count_calls
 
-from kinarm.evaluation.commands import arms, bench, compare, evaluate, problem, replay, reproduce
+from kinarm.evaluation.commands import (
+    arms,
+    bench,
+    compare,
+    evaluate,
+    problem,
+    replay,
+    reproduce,
+    study,
+)
 from kinarm.policies import Policy, recipe, train, train_policy
 from kinarm.problem import PROBLEMS
 
@@ -25,6 +34,7 @@ MODULES = {
     "kinarm-compare": "kinarm.evaluation.commands.compare",
     "kinarm-problem": "kinarm.evaluation.commands.problem",
     "kinarm-reproduce": "kinarm.evaluation.commands.reproduce",
+    "kinarm-study": "kinarm.evaluation.commands.study",
 }
 MAINS = {
     "kinarm-eval": evaluate.main,
@@ -35,6 +45,7 @@ MAINS = {
     "kinarm-compare": compare.main,
     "kinarm-problem": problem.main,
     "kinarm-reproduce": reproduce.main,
+    "kinarm-study": study.main,
 }
 
 

@@ -18,6 +18,7 @@ PROGRAMS = {
     "kinarm-compare": "kinarm.evaluation.commands.compare",
     "kinarm-problem": "kinarm.evaluation.commands.problem",
     "kinarm-reproduce": "kinarm.evaluation.commands.reproduce",
+    "kinarm-study": "kinarm.evaluation.commands.study",
 }
 HEAVY = ("torch", "numba", "matplotlib", "pinocchio", "coal", "scipy", "stable_baselines3")
 

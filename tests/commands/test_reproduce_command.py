@@ -6,7 +6,6 @@ import shutil
 import signal
 import subprocess
 import time
-from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -15,8 +14,9 @@ import pytest
 
 from kinarm.errors import InvalidInputError, WorkerError
 from kinarm.evaluation.commands.reproduce import ReproductionRequest
-from kinarm.evaluation.reproduction.executor import LocalExecutor
 from kinarm.evaluation.reproduction.study import quick_study
+from kinarm.evaluation.running.executor import Finished
+from kinarm.evaluation.running.local import LocalExecutor
 
 QUICK = ("--quick", "--no-ppo", "--jobs", 2)
 needs_ppo = pytest.mark.skipif(find_spec("stable_baselines3") is None, reason="needs the extra ppo")
@@ -99,10 +99,9 @@ class InThisProcess:
         self.names = []
 
     def carry_out(self, work, tasks):
-        for task in tasks:
-            work(task)
+        for number, task in enumerate(tasks):
             self.names.append(task.name)
-            yield task
+            yield Finished(number, work(task))
 
 
 @pytest.mark.slow
@@ -187,43 +186,14 @@ def test_quick_with_ppo(run_outside, tmp_path):
     assert "| 3: both | oracle | 100.0 |" in page
 
 
-class TestWorkers:
-    def test_a_worker_that_is_killed(self):
-        tasks = LocalExecutor(2).carry_out(kill_own_process_at_seven, range(9))
-        with pytest.raises(WorkerError, match="a worker ended unexpectedly"):
-            list(tasks)
+def test_lost_workers_are_told_in_one_line(run, monkeypatch, tmp_path):
+    def fail(*_):
+        raise WorkerError("workers ended unexpectedly")
 
-    def test_its_exit_status_is_that_of_a_failed_run(self, run, monkeypatch, tmp_path):
-        def fail(*_):
-            raise WorkerError("a worker ended unexpectedly")
-
-        monkeypatch.setattr(LocalExecutor, "carry_out", fail)
-        answer = run("kinarm-reproduce", *QUICK, "--out", tmp_path)
-        assert answer.status == 1
-        assert answer.err.splitlines()[-1] == "kinarm-reproduce: a worker ended unexpectedly"
-
-    @pytest.mark.parametrize("jobs", [1, 2])
-    def test_every_task_is_done_once(self, jobs, tmp_path):
-        done = LocalExecutor(jobs).carry_out(partial(touch, tmp_path), range(6))
-        assert sorted(done) == list(range(6))
-        assert sorted(path.name for path in tmp_path.iterdir()) == [*"012345"]
-
-    def test_one_at_a_time_they_are_done_in_the_given_order(self, tmp_path):
-        assert list(LocalExecutor(1).carry_out(partial(touch, tmp_path), (3, 1, 2))) == [3, 1, 2]
-
-    def test_errors_of_a_task_are_told_as_they_are(self, tmp_path):
-        work = partial(touch, tmp_path / "missing")
-        with pytest.raises(FileNotFoundError):
-            list(LocalExecutor(2).carry_out(work, range(3)))
-
-
-def touch(folder, number):
-    (folder / str(number)).touch(exist_ok=False)
-
-
-def kill_own_process_at_seven(number):
-    if number == 7:
-        os.kill(os.getpid(), signal.SIGKILL)
+    monkeypatch.setattr(LocalExecutor, "carry_out", fail)
+    answer = run("kinarm-reproduce", *QUICK, "--out", tmp_path)
+    assert answer.status == 1
+    assert answer.err.splitlines()[-1] == "kinarm-reproduce: workers ended unexpectedly"
 
 
 class TestBadInput:

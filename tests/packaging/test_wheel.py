@@ -138,6 +138,7 @@ def test_metadata_name_the_commands_the_licence_and_no_torch(wheel):
         "kinarm-bench = kinarm.evaluation.commands.bench:main",
         "kinarm-compare = kinarm.evaluation.commands.compare:main",
         "kinarm-reproduce = kinarm.evaluation.commands.reproduce:main",
+        "kinarm-study = kinarm.evaluation.commands.study:main",
     ):
         assert line in commands
     assert "License-Expression: BSD-2-Clause" in metadata

@@ -39,22 +39,20 @@ def sb3_learner(algorithm="SAC", hindsight=True, **changes):
 
 
 class TestRecipes:
-    def test_a_training_can_be_broken_off(self, tmp_path):
+    def test_a_training_can_be_broken_off(self):
         run = planned(read_learners()["ars-paper"], steps=20_000)
-        carry_out(run, tmp_path)
-        steps = [point.environment_steps for point in load_run(tmp_path, run)]
+        steps = [point.environment_steps for point in carry_out(run)]
         assert steps == sorted(set(steps))
         assert 20_000 <= steps[-1] < 25_000
         assert len(steps) >= 7
 
-    def test_whole_training(self, tmp_path, monkeypatch):
+    def test_whole_training(self, monkeypatch):
         monkeypatch.setattr(
             "kinarm.evaluation.comparison.training.recipe",
             lambda *given, **changes: recipe(*given, **changes, iterations=5),
         )
         run = planned(read_learners()["ars-tuned"])
-        carry_out(run, tmp_path)
-        last = load_run(tmp_path, run)[-1]
+        last = carry_out(run)[-1]
         policy = train_policy(recipe("ars", "tuned", problem=EASY, seed=0, iterations=5)).policy
         outcome = evaluate(policy, trials=40)
         assert last.successes == outcome.rollouts.success.sum()
@@ -80,10 +78,9 @@ class TestStableBaselines:
             ("TD3", False, {"action_noise": 0.1, "train_on": {"reward": {"success": 5.0}}}),
         ],
     )
-    def test_off_policy(self, tmp_path, algorithm, hindsight, changes):
+    def test_off_policy(self, algorithm, hindsight, changes):
         run = planned(sb3_learner(algorithm, hindsight, **changes))
-        carry_out(run, tmp_path)
-        curve = load_run(tmp_path, run)
+        curve = carry_out(run)
         assert [point.environment_steps for point in curve] == [1000, 1260, 1300]
         assert all(point.processor_seconds > 0 for point in curve)
 

@@ -23,8 +23,9 @@ TRAINING = PlannedTraining(
 
 @pytest.fixture
 def store(tmp_path):
-    carry_out(TRAINING, PROTOCOL, tmp_path, threads=1)
-    return RunStore(tmp_path, PROTOCOL)
+    store = RunStore(tmp_path, PROTOCOL)
+    store.save(TRAINING, *carry_out(TRAINING, PROTOCOL, threads=1))
+    return store
 
 
 class TestCarryOut:
@@ -55,8 +56,8 @@ class TestCarryOut:
         """Statistics of the mirror images are part of it."""
         config = recipe("ars", "tuned", problem="both", iterations=3)
         training = PlannedTraining(purpose="ars", config=config)
-        carry_out(training, PROTOCOL, tmp_path, threads=1)
         store = RunStore(tmp_path, PROTOCOL)
+        store.save(training, *carry_out(training, PROTOCOL, threads=1))
         policy = Policy.load(store.policy_path(training))
         trials = TrialSet.draw(PROBLEMS["both"], 5, seed=1)
         last = trials.simulator.rollout(policy, trials.starts, trials.goals).distance

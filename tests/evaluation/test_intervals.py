@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from kinarm.evaluation.reproduction.intervals import (
+from kinarm.evaluation.intervals import (
     Term,
     contrast,
     estimate_text,

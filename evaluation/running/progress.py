@@ -1,26 +1,37 @@
-"""How far the trainings of a study are."""
+"""How far many tasks are."""
 
 import math
 import time
 from collections.abc import Sequence
+from typing import Protocol
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-from kinarm.evaluation.reproduction.study import PlannedTraining
 
 LINE_SECONDS = 30.0
 """How often a line is printed, at most, where there is no terminal."""
 
 
-class StudyProgress:
-    """Shows how many trainings are finished, which are running and how long the rest will take.
+class Costly(Protocol):
+    """A task as far as its progress is shown."""
+
+    @property
+    def name(self) -> str:
+        """What to call it."""
+
+    @property
+    def cost(self) -> float:
+        """Rough duration relative to other tasks."""
+
+
+class TaskProgress:
+    """Shows how many tasks are finished, which are running and how long the rest will take.
 
     Parameters
     ----------
     total : int
-        Number of trainings of the study.
-    waiting : sequence of PlannedTraining
+        Number of tasks, those that were finished before included.
+    waiting : sequence
         Those that are still to be done, in the order in which they begin.
     jobs : int
         How many run at a time.
@@ -28,9 +39,7 @@ class StudyProgress:
         Where to show it: a bar on a terminal, else a line now and then.
     """
 
-    def __init__(
-        self, total: int, waiting: Sequence[PlannedTraining], jobs: int, console: Console
-    ) -> None:
+    def __init__(self, total: int, waiting: Sequence[Costly], jobs: int, console: Console) -> None:
         self._total, self._waiting, self._jobs = total, list(waiting), jobs
         self._printed = time.monotonic()
         self._progress = Progress(
@@ -42,10 +51,10 @@ class StudyProgress:
             disable=not console.is_terminal,
             speed_estimate_period=math.inf,
         )
-        cost = sum(training.cost for training in waiting)
+        cost = sum(task.cost for task in waiting)
         self._bar = self._progress.add_task("", total=cost, finished="", running="")
 
-    def __enter__(self) -> "StudyProgress":
+    def __enter__(self) -> "TaskProgress":
         self._show(0.0)
         self._progress.start()
         return self
@@ -53,10 +62,10 @@ class StudyProgress:
     def __exit__(self, *_: object) -> None:
         self._progress.stop()
 
-    def finished(self, training: PlannedTraining) -> None:
-        """Take note of a finished training."""
-        self._waiting.remove(training)
-        self._show(training.cost)
+    def finished(self, task: Costly) -> None:
+        """Take note of a finished task."""
+        self._waiting.remove(task)
+        self._show(task.cost)
         if self._progress.disable and time.monotonic() - self._printed > LINE_SECONDS:
             self._printed = time.monotonic()
             seconds = self._progress.tasks[0].time_remaining
@@ -65,7 +74,7 @@ class StudyProgress:
 
     def _show(self, cost: float) -> None:
         """Bring the bar up to date, by the cost of what was finished just now."""
-        running = ", ".join(training.name for training in self._waiting[: self._jobs])
+        running = ", ".join(task.name for task in self._waiting[: self._jobs])
         self._progress.update(self._bar, advance=cost, finished=self._finished(), running=running)
 
     def _finished(self) -> str:

@@ -1,0 +1,98 @@
+"""Worker processes of this machine."""
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from typing import TypeVar
+
+from kinarm.errors import WorkerError
+from kinarm.evaluation.running.executor import Finished
+
+TaskT = TypeVar("TaskT")
+ResultT = TypeVar("ResultT")
+
+WATCH_SECONDS = 0.2
+"""How often a worker looks whether its parent is still there."""
+
+ATTEMPTS = 3
+"""How often workers may end unexpectedly before another task is finished."""
+
+
+@dataclass(frozen=True)
+class LocalExecutor:
+    """Worker processes of this machine, which end with this process however that ends.
+
+    Parameters
+    ----------
+    jobs : int
+        Tasks at a time; a single one is carried out by this process.
+    threads : int
+        Threads of a worker.
+    """
+
+    jobs: int
+    threads: int = 1
+
+    def carry_out(
+        self, work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT]
+    ) -> Iterator[Finished[ResultT]]:
+        """Do the work for every task, begun in the given order; yield what finishes.
+
+        What workers that ended unexpectedly had begun is done again. Abandoned or interrupted,
+        what is not finished is dropped.
+
+        Raises
+        ------
+        WorkerError
+            If workers end unexpectedly three times before another task is finished.
+        """
+        waiting, failures = dict(enumerate(tasks)), 0
+        while waiting:
+            try:
+                for finished in self._attempt(work, waiting):
+                    failures = 0
+                    del waiting[finished.number]
+                    yield finished
+            except BrokenProcessPool as error:
+                failures += 1
+                if failures == ATTEMPTS:
+                    raise WorkerError(
+                        "workers ended unexpectedly, perhaps for want of memory; "
+                        "the same command goes on with what is missing"
+                    ) from error
+
+    def _attempt(
+        self, work: Callable[[TaskT], ResultT], waiting: dict[int, TaskT]
+    ) -> Iterator[Finished[ResultT]]:
+        """Do the work for the tasks that wait, until a worker is lost."""
+        from joblib import Parallel, delayed, parallel_config
+
+        with parallel_config(
+            "loky",
+            n_jobs=self.jobs,
+            inner_max_num_threads=self.threads,
+            initializer=_prepare_worker,
+            initargs=(os.getpid(),),
+        ):
+            parallel = Parallel(return_as="generator_unordered", batch_size=1, max_nbytes=None)
+        yield from parallel(delayed(_done)(work, *item) for item in list(waiting.items()))
+
+
+def _done(work: Callable[[TaskT], ResultT], number: int, task: TaskT) -> Finished[ResultT]:
+    return Finished(number, work(task))
+
+
+def _prepare_worker(parent: int) -> None:
+    """Leave Ctrl-C to the parent, and end when it does."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, args=(parent,), daemon=True).start()
+
+
+def _end_with_parent(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(WATCH_SECONDS)
+    os._exit(1)

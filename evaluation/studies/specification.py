@@ -1,0 +1,248 @@
+"""What a study is: a file that names learners, problems, seeds and what varies."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kinarm._fields import check_fields, from_plain, read_toml, to_plain
+from kinarm._validation import whole_number
+from kinarm.errors import InvalidInputError
+from kinarm.streams import Stream, stream_generator
+
+SEVERAL = ("learners", "recipes", "problems")
+"""Entries of a file that are lists; a text stands for a list of one."""
+
+DIGITS = 6
+"""Significant digits of numbers that are drawn: more could differ between machines."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyTrials:
+    """How the policies of a study are judged.
+
+    Parameters
+    ----------
+    count : int
+        Trials that every policy faces.
+    seed : int
+        Seed of the trials.
+    per_decade : int
+        How often a policy faces them in the course of its training while the environment steps
+        grow tenfold; 0 for at the end alone.
+    first : int
+        Environment steps after which it faces them for the first time.
+    """
+
+    count: int = 1000
+    seed: int = 0
+    per_decade: int = 4
+    first: int = 10_000
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        for name, least in (("count", 1), ("seed", 0), ("per_decade", 0), ("first", 1)):
+            whole_number(name, getattr(self, name), least)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudySpecification:
+    """The trainings of a study: every learner, recipe, problem, choice and seed with every other.
+
+    Fields of settings are named as in a recipe (``step_size``, ``reward.success``), those of a
+    problem by their path (``problem.task.start_spread``, ``problem.arm``). With the name of a
+    learner in front (``ars.step_size``), they concern that learner alone.
+
+    Parameters
+    ----------
+    name : str
+        How page and folder call it.
+    learners : tuple of str
+        Names of learners.
+    recipes : tuple of str
+        Names or files of recipes.
+    problems : tuple of str
+        Names or files of problems.
+    seeds : int
+        Trainings with each setting.
+    first_seed : int
+        Seed of the first of them; the others follow.
+    trials : StudyTrials
+        How the policies are judged.
+    fixed : dict
+        Values of fields that stay.
+    grid : dict
+        Lists of values of fields; all combinations are trained.
+    random : dict
+        ``count`` combinations, drawn by ``seed`` (0), of fields with a list of values, or a table
+        of ``low``, ``high`` and, to draw the logarithm evenly, ``log = true``.
+    """
+
+    name: str
+    learners: tuple[str, ...] = ("ars",)
+    recipes: tuple[str, ...] = ("paper",)
+    problems: tuple[str, ...] = ("right",)
+    seeds: int = 1
+    first_seed: int = 0
+    trials: StudyTrials = field(default_factory=StudyTrials)
+    fixed: dict[str, Any] = field(default_factory=dict)
+    grid: dict[str, Any] = field(default_factory=dict)
+    random: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        whole_number("seeds", self.seeds, 1)
+        whole_number("first_seed", self.first_seed, 0)
+        for name in SEVERAL:
+            values = getattr(self, name)
+            if not values:
+                raise InvalidInputError(f"{name} must not be empty")
+            if len(set(values)) < len(values):
+                raise InvalidInputError(f"{name} names the same twice: {', '.join(values)}")
+        tables = {"fixed": self.fixed, "grid": self.grid, "random": self._ranges}
+        given: dict[str, str] = {}
+        for table, entries in tables.items():
+            for key in entries:
+                if key in given:
+                    raise InvalidInputError(f"{key!r} stands in {given[key]} and in {table}")
+                given[key] = table
+        for key, values in self.grid.items():
+            if not isinstance(values, list | tuple) or not values:
+                raise InvalidInputError(
+                    f"grid.{key} must be a list of at least one value, got {values!r}"
+                )
+        if self.random:
+            whole_number("random.count", self.random.get("count", 0), 1)
+            whole_number("random.seed", self.random.get("seed", 0), 0)
+            for key, entry in self._ranges.items():
+                _check_range(key, entry)
+
+    @property
+    def _ranges(self) -> dict[str, Any]:
+        """What is drawn at random, by field."""
+        return {key: entry for key, entry in self.random.items() if key not in ("count", "seed")}
+
+    def choices(self) -> Iterator[dict[str, Any]]:
+        """Every combination of the values that vary, by field."""
+        for values in product(*self.grid.values()):
+            of_grid = dict(zip(self.grid, values, strict=True))
+            for drawn in self._drawn():
+                yield {**of_grid, **drawn}
+
+    def _drawn(self) -> Iterator[dict[str, Any]]:
+        """Random combinations; the first ones stay as they are if there are to be more."""
+        if not self.random:
+            yield {}
+            return
+        for number in range(self.random["count"]):
+            rng = stream_generator(Stream.STUDY, self.random.get("seed", 0), number)
+            yield {key: _draw(entry, rng.random()) for key, entry in self._ranges.items()}
+
+    def to_json(self) -> dict[str, Any]:
+        """As a dictionary that TOML and JSON can hold."""
+        entries: dict[str, Any] = to_plain(self)
+        return entries
+
+    @classmethod
+    def from_json(cls, entries: Mapping[str, Any], where: str) -> "StudySpecification":
+        """Rebuild what `to_json` returned, or what a file holds.
+
+        Raises
+        ------
+        InvalidInputError
+            If an entry is missing, unknown or wrong; in one line that names source, key and what
+            is expected.
+        """
+        made = dict(entries)
+        for name in SEVERAL:
+            single = name.removesuffix("s")
+            if single in made and name not in made:
+                made[name] = made.pop(single)
+            if isinstance(made.get(name), str):
+                made[name] = [made[name]]
+        for table in ("fixed", "grid", "random"):
+            if isinstance(made.get(table), Mapping):
+                made[table] = dict(_flat(made[table], ranges=table == "random"))
+        return from_plain(cls, made, where)
+
+    @classmethod
+    def load(cls, path: str | Path) -> "StudySpecification":
+        """Read a study file; its name is that of the study unless it says otherwise.
+
+        Paths of problems and recipes in it are relative to it.
+
+        Raises
+        ------
+        InvalidInputError
+            If it cannot be used; in one line that names file, key and what is expected.
+        """
+        file = Path(path)
+        entries = {"name": file.stem, **read_toml(file, "study")}
+        made = cls.from_json(entries, str(file))
+        return made.resolved(file.parent)
+
+    def resolved(self, folder: Path) -> "StudySpecification":
+        """The same study, with its files found from wherever it is read."""
+
+        def found(name: str) -> str:
+            beside = folder / name
+            return str(beside.resolve()) if name.endswith(".toml") and beside.is_file() else name
+
+        return replace(
+            self,
+            recipes=tuple(map(found, self.recipes)),
+            problems=tuple(map(found, self.problems)),
+        )
+
+
+RANGE = ("low", "high", "log")
+
+
+def _check_range(key: str, entry: Any) -> None:
+    """Refuse what nothing can be drawn from."""
+    where = f"random.{key}"
+    if isinstance(entry, list | tuple):
+        if not entry:
+            raise InvalidInputError(f"{where} must be a list of at least one value, got {entry!r}")
+        return
+    given = entry if isinstance(entry, Mapping) else {}
+    low, high = given.get("low"), given.get("high")
+    if not (_is_number(low) and _is_number(high) and low < high) or set(given) - set(RANGE):
+        raise InvalidInputError(
+            f"{where} must be a list of values, or a table with low below high and perhaps log, "
+            f"got {entry!r}"
+        )
+    if given.get("log") and low <= 0:
+        raise InvalidInputError(f"{where}.low must be greater than 0 with log, got {low!r}")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _draw(entry: Any, uniform: float) -> Any:
+    """What a number from [0, 1) chooses of a list or a range; whole between whole numbers."""
+    if isinstance(entry, list | tuple):
+        return entry[int(uniform * len(entry))]
+    low, high = entry["low"], entry["high"]
+    whole = isinstance(low, int) and isinstance(high, int)
+    if entry.get("log"):
+        value = float(low * np.exp(uniform * np.log(high / low)))
+    else:
+        value = low + uniform * (high - low + whole)
+    if whole:
+        return min(int(value), high)
+    return float(f"{value:.{DIGITS}g}")
+
+
+def _flat(entries: Mapping[str, Any], *, ranges: bool, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Entries of tables within tables by their paths; tables that are ranges stay whole."""
+    for key, entry in entries.items():
+        is_range = ranges and isinstance(entry, Mapping) and set(entry) & set(RANGE)
+        if isinstance(entry, Mapping) and not is_range:
+            yield from _flat(entry, ranges=ranges, path=f"{path}{key}.")
+        else:
+            yield f"{path}{key}", entry

@@ -1,0 +1,138 @@
+"""``kinarm-study`` as users run it."""
+
+import signal
+import subprocess
+import time
+
+import numpy as np
+import pytest
+
+from kinarm.evaluation.commands.study import StudyRequest
+from kinarm.evaluation.studies.study import Study
+
+STUDY = """
+problems = ["right"]
+seeds = 3
+
+[trials]
+count = 10
+
+[fixed]
+iterations = 4
+directions = 4
+top_directions = 2
+
+[grid]
+step_size = [0.02, 0.2]
+"""
+
+
+def contents(folder):
+    paths = [*folder.glob("runs/*"), *folder.glob("bounds/*")]
+    return {str(path.relative_to(folder)): path.read_bytes() for path in paths}
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "steps.toml"
+    path.write_text(STUDY)
+    return path
+
+
+def test_from_a_file_to_a_page(run, file, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    answer = run("kinarm-study", "steps.toml", "--jobs", 1)
+    assert answer.status == 0, answer.err
+    assert answer.out.splitlines()[-1] == (
+        "written: steps/index.html, with tables and figures beside it"
+    )
+    assert "step_size=0.02" in answer.out
+    page = (tmp_path / "steps" / "index.html").read_text()
+    assert "kinarm-study steps.toml --jobs 1" in page
+    status = run("kinarm-study", "status", "steps")
+    assert (status.status, status.out) == (0, "steps: 6 of 6 trainings finished\n")
+
+
+def test_from_python(file, tmp_path):
+    study = StudyRequest(study=file, out=tmp_path / "it", jobs=1).run()
+    assert len(study) == 6
+    assert (tmp_path / "it" / "runs.csv").exists()
+
+
+def test_what_is_finished_can_be_written_without_training(run, file, tmp_path):
+    out = tmp_path / "it"
+    answer = run("kinarm-study", file, "--out", out, "--no-train")
+    assert (answer.status, answer.out) == (0, "no training is finished\n")
+    assert not out.exists()
+
+
+def test_failures(run, file, tmp_path, monkeypatch):
+    def fail(*_):
+        raise ValueError("of all things")
+
+    monkeypatch.setattr("kinarm.evaluation.studies.training.train", fail)
+    answer = run("kinarm-study", file, "--out", tmp_path / "it", "--jobs", 1)
+    assert answer.status == 1
+    assert answer.err.splitlines()[-1] == "kinarm-study: 6 of 6 trainings failed"
+    assert "failed: ars paper* right seed 0, step_size 0.02: of all things" in answer.err
+
+
+class TestBadInput:
+    @pytest.mark.parametrize(
+        ("text", "words"),
+        [
+            ("seeds = 'many'", "steps.toml: seeds must be a whole number, got 'many'"),
+            ("[grid]\nstep_size = []", "grid.step_size must be a list of at least one value"),
+            ("[grid]\nstep = [1]", "unknown field of a recipe or problem 'step'"),
+            ("[fixed]\nnoise = 'x'", "steps.toml: noise must be a number, got 'x'"),
+            ("problem = 'nowhere'", "steps.toml: unknown problem 'nowhere'"),
+            ("seeds = ", "steps.toml: not a study file: Invalid value"),
+        ],
+    )
+    def test_a_file(self, run, file, tmp_path, text, words):
+        file.write_text(text)
+        answer = run("kinarm-study", file, "--out", tmp_path / "it")
+        assert answer.status == 2
+        assert words in answer.err
+        assert len(answer.err.splitlines()) == 1
+        assert not (tmp_path / "it").exists()
+
+    def test_no_file(self, run, tmp_path):
+        answer = run("kinarm-study", tmp_path / "none.toml")
+        assert answer.status == 2
+        assert "No such file" in answer.err
+
+    def test_jobs(self, run, file):
+        answer = run("kinarm-study", file, "--jobs", 0)
+        assert answer.status == 2
+        assert "jobs must be a whole number of at least 1" in answer.err
+
+    def test_status_of_nothing(self, run, tmp_path):
+        answer = run("kinarm-study", "status", tmp_path)
+        assert answer.status == 2
+        assert "there is no study in" in answer.err
+
+
+@pytest.mark.slow
+def test_fifty_kills_at_random_moments(command, file, tmp_path):
+    """Whatever is killed, and whenever: the same command ends where one that lived does."""
+    file.write_text(STUDY.replace("seeds = 3", "seeds = 20"))
+    straight = Study(file, tmp_path / "straight").run(jobs=2)
+    rng, kills = np.random.default_rng(0), 0
+    spelled = command("kinarm-study", file, "--out", tmp_path / "it", "--jobs", 2)
+    while kills < 50:
+        process = subprocess.Popen(
+            spelled, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+        )
+        time.sleep(rng.uniform(0.05, 6.0))
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        kills += 1
+        if len(list((tmp_path / "it").glob("runs/*.npz"))) == len(straight):
+            for path in (tmp_path / "it" / "runs").iterdir():
+                if rng.random() < 0.7:
+                    path.unlink()
+    subprocess.run(spelled, check=True, capture_output=True)
+    assert contents(tmp_path / "it") == contents(tmp_path / "straight")
+    leftover = [*(tmp_path / "it").rglob("*.part"), *(tmp_path / "it").rglob("*.lock")]
+    assert leftover == []

@@ -1,0 +1,72 @@
+"""Worker processes: every task once, whatever happens to them."""
+
+import os
+import signal
+from functools import partial
+
+import pytest
+
+from kinarm.errors import WorkerError
+from kinarm.evaluation.running.local import ATTEMPTS, LocalExecutor
+
+
+def square(number):
+    return number * number
+
+
+def touch(folder, number):
+    (folder / str(number)).touch(exist_ok=False)
+
+
+def kill_own_process_at_seven(number):
+    if number == 7:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+def kill_own_process_once(folder, number):
+    """The first worker that comes to a task with an odd number does not survive it."""
+    mark = folder / str(number)
+    if number % 2 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_every_task_is_done_once(jobs, tmp_path):
+    done = LocalExecutor(jobs).carry_out(partial(touch, tmp_path), range(6))
+    assert sorted(number for number, _ in done) == list(range(6))
+    assert sorted(path.name for path in tmp_path.iterdir()) == [*"012345"]
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_results_come_with_the_number_of_their_task(jobs):
+    done = dict(LocalExecutor(jobs).carry_out(square, [3, 1, 2]))
+    assert done == {0: 9, 1: 1, 2: 4}
+
+
+def test_one_at_a_time_they_are_done_in_the_given_order():
+    assert [number for number, _ in LocalExecutor(1).carry_out(square, (3, 1, 2))] == [0, 1, 2]
+
+
+def test_nothing_to_do():
+    assert list(LocalExecutor(2).carry_out(square, [])) == []
+
+
+def test_what_lost_workers_had_begun_is_done_again(tmp_path):
+    work = partial(kill_own_process_once, tmp_path)
+    assert ATTEMPTS > 2  # tasks 1 and 3 may be lost with no other one finished in between
+    done = LocalExecutor(2).carry_out(work, range(4))
+    assert sorted(done) == [(number, number) for number in range(4)]
+
+
+def test_a_task_that_kills_every_worker():
+    tasks = LocalExecutor(2).carry_out(kill_own_process_at_seven, range(9))
+    with pytest.raises(WorkerError, match="workers ended unexpectedly"):
+        list(tasks)
+
+
+def test_errors_of_a_task_are_told_as_they_are(tmp_path):
+    work = partial(touch, tmp_path / "missing")
+    with pytest.raises(FileNotFoundError):
+        list(LocalExecutor(2).carry_out(work, range(3)))

@@ -1,0 +1,140 @@
+"""Tables, figures and the page of a study."""
+
+import csv
+import re
+
+import numpy as np
+import pytest
+from small_studies import SMALL
+
+from kinarm.evaluation.statistics import wilson_interval
+from kinarm.evaluation.studies.figures import draw_all, effects
+from kinarm.evaluation.studies.page import group_row, write_all
+from kinarm.evaluation.studies.study import Study
+from kinarm.evaluation.studies.table import share_over_seeds
+
+
+class TestTable:
+    def test_a_row_for_each_training(self, finished):
+        table = finished.table()
+        assert len(table) == 4
+        assert sorted(zip(table["seed"], table["step_size"], strict=True)) == [
+            *((0, 0.02), (0, 0.2), (1, 0.02), (1, 0.2))
+        ]
+        for row, trained in zip(table, finished, strict=True):
+            assert row["success"] == trained.outcomes.success.mean()
+            assert row["collision"] == trained.outcomes.collision.mean()
+            assert row["median_distance"] == np.median(trained.outcomes.distance)
+            assert row["environment_steps"] == trained.last.environment_steps
+        assert (table["processor_seconds"] > 0).all()
+
+    def test_texts_and_missing_values(self, tmp_path):
+        study = Study(
+            {
+                **SMALL,
+                "learners": ["ars", "ppo"],
+                "seeds": 1,
+                "fixed": {"iterations": 1, "n_envs": 2, "n_steps": 32, "batch_size": 32},
+                "grid": {"sharing": ["none", "pair"], "n_epochs": [1]},
+            },
+            tmp_path,
+        )
+        study.run(jobs=1)
+        table = study.table()
+        assert table["sharing"].tolist() == ["none", "pair", ""]
+        assert table["n_epochs"].tolist() == ["", "", "1"]
+
+    def test_nothing_finished(self, small):
+        assert len(small().table()) == 0
+        assert small().groups() == ()
+
+
+class TestGroups:
+    def test_seeds_belong_together(self, finished):
+        groups = finished.groups()
+        assert [group.label for group in groups] == ["step_size=0.02", "step_size=0.2"]
+        assert [group.hits.shape for group in groups] == [(2, 12)] * 2
+        for group in groups:
+            assert group.success.value == group.hits.mean()
+            assert group.figures["success"] == group.hits.mean()
+
+    def test_the_best_comes_first(self, finished):
+        best = finished.best(2)
+        assert best[0].relative_success >= best[1].relative_success
+
+    def test_an_interval_covers_that_over_trials(self):
+        hits = np.zeros((3, 50))
+        assert share_over_seeds(hits).ci95 == (0.0, wilson_interval(0, 50)[1])
+
+    def test_and_that_over_seeds(self):
+        hits = np.array([np.ones(50), np.zeros(50), np.ones(50)])
+        low, high = share_over_seeds(hits).ci95
+        assert (low, high) == (0.0, 1.0)
+        assert share_over_seeds(hits).value == pytest.approx(2 / 3)
+
+
+@pytest.fixture(scope="module")
+def folder(finished):
+    """Where everything is written."""
+    write_all(finished, "kinarm-study <mine>.toml")
+    return finished.store.folder
+
+
+class TestFiles:
+    def test_csv(self, folder, finished):
+        with (folder / "runs.csv").open() as file:
+            rows = list(csv.DictReader(file))
+        table = finished.table()
+        assert [row["key"] for row in rows] == table["key"].tolist()
+        assert [float(row["success"]) for row in rows] == table["success"].tolist()
+
+    def test_parquet(self, folder, finished):
+        parquet = pytest.importorskip("pyarrow.parquet")
+        read = parquet.read_table(folder / "runs.parquet")
+        assert read.column("success").to_pylist() == finished.table()["success"].tolist()
+
+    def test_the_page_fetches_nothing_and_tells_everything(self, folder, finished):
+        page = (folder / "index.html").read_text()
+        assert not re.search(r"(src|href)=\"(?!#|data:)", re.sub(r"xlink:href", "", page))
+        assert "kinarm-study &lt;mine&gt;.toml" in page
+        for group in finished.groups():
+            for cell in group_row(group):
+                assert cell in page
+        for name in ("learning_curves", "effects", "beside_bound"):
+            assert f'<section id="{name}">' in page
+            assert (folder / f"{name}.png").stat().st_size > 5000
+            assert (folder / f"{name}.svg").stat().st_size > 5000
+
+    def test_the_same_study_gives_the_same_page(self, folder, finished):
+        before = (folder / "index.html").read_bytes()
+        write_all(finished, "kinarm-study <mine>.toml")
+        assert (folder / "index.html").read_bytes() == before
+
+
+class TestFigures:
+    def test_nothing_varies(self, small):
+        study = small(grid={}, seeds=1, trials={"count": 5, "per_decade": 0}).run(jobs=1)
+        assert list(draw_all(study)) == ["beside_bound"]
+
+    def test_effects_are_means_over_the_rest(self, finished):
+        (axes,) = effects(finished).axes
+        drawn = {
+            line.get_xdata()[0]: line.get_ydata()[0]
+            for line in axes.lines
+            if line.get_marker() == "o"
+        }
+        for group in finished.groups():
+            assert drawn[group.choices["step_size"]] == pytest.approx(group.hits.mean())
+
+    def test_what_is_drawn_at_random_is_shown_training_by_training(self, small):
+        ranges = {"count": 3, "step_size": {"low": 0.01, "high": 0.1}}
+        study = small(grid={}, random=ranges, seeds=1).run(jobs=1)
+        (axes,) = effects(study).axes
+        assert sorted(line.get_xdata()[0] for line in axes.lines) == sorted(
+            study.table()["step_size"]
+        )
+
+    def test_texts_stand_side_by_side(self, small):
+        study = small(grid={"sharing": ["none", "pair", "iteration"]}, seeds=1).run(jobs=1)
+        (axes,) = effects(study).axes
+        assert [text.get_text() for text in axes.get_xticklabels()] == ["none", "pair", "iteration"]
