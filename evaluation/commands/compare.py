@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from kinarm._command_line import run_request
 from kinarm._console import open_console
 from kinarm._files import check_folder
-from kinarm._parallel import available_threads
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.evaluation.running.options import RunningOptions
 
 if TYPE_CHECKING:
     from kinarm.evaluation.comparison.results import Comparison
@@ -32,7 +32,7 @@ examples:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ComparisonRequest:
+class ComparisonRequest(RunningOptions):
     """Train learners on the same problems, and compare their success, steps and time.
 
     Parameters
@@ -51,8 +51,6 @@ class ComparisonRequest:
         Table of learners with their settings instead of the shipped one.
     out : Path
         Output folder.
-    jobs : int
-        Trainings at a time; one a processor.
     train : bool
         Train what is missing; else write what the finished trainings came to.
 
@@ -69,15 +67,14 @@ class ComparisonRequest:
     trials: int = 1000
     settings: Path | None = field(default=None, metadata={"metavar": "FILE.toml"})
     out: Path = field(default=Path("comparison"), metadata={"metavar": "DIR"})
-    jobs: int | None = None
     train: bool = True
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for name in ("seeds", "trials"):
             whole_number(name, getattr(self, name), 1)
-        for name in ("steps", "jobs"):
-            if getattr(self, name) is not None:
-                whole_number(name, getattr(self, name), 1)
+        if self.steps is not None:
+            whole_number("steps", self.steps, 1)
         if not self.problems:
             raise InvalidInputError("there is no problem to compare learners on")
 
@@ -154,9 +151,9 @@ class ComparisonRequest:
         from kinarm.evaluation.comparison.training import carry_out
         from kinarm.evaluation.running.local import LocalExecutor
 
-        jobs = min(self.jobs or available_threads(), len(missing))
+        local = LocalExecutor(min(self.at_once, len(missing)))
         console = open_console(stderr=True)
-        finished = (executor or LocalExecutor(jobs)).carry_out(carry_out, missing)
+        finished = (executor or self.elsewhere(self.out) or local).carry_out(carry_out, missing)
         for count, (number, curve) in enumerate(finished, start=1):
             save_run(folder, missing[number], curve)
             console.print(f"{count} of {len(missing)} trainings: {missing[number].name}")

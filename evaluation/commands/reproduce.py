@@ -12,8 +12,8 @@ from kinarm._command_line import run_request
 from kinarm._console import open_console
 from kinarm._files import check_folder, write_text
 from kinarm._parallel import available_threads
-from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
+from kinarm.evaluation.running.options import RunningOptions
 
 if TYPE_CHECKING:
     from kinarm.evaluation.reproduction.claims import Claim
@@ -35,15 +35,13 @@ examples:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReproductionRequest:
+class ReproductionRequest(RunningOptions):
     """Train everything that the paper trained, and judge its claims.
 
     Parameters
     ----------
     out : Path
         Output folder: reproduction, or reproduction-quick with --quick.
-    jobs : int
-        Trainings at a time; one a processor.
     quick : bool
         A smoke version of everything, whose results mean nothing.
     ppo : bool
@@ -56,13 +54,8 @@ class ReproductionRequest:
     """
 
     out: Path | None = field(default=None, metadata={"metavar": "DIR"})
-    jobs: int | None = None
     quick: bool = False
     ppo: bool = True
-
-    def __post_init__(self) -> None:
-        if self.jobs is not None:
-            whole_number("jobs", self.jobs, 1)
 
     @property
     def folder(self) -> Path:
@@ -113,7 +106,7 @@ class ReproductionRequest:
         results = Results.load(study, store)
         try:
             if results.missing:
-                results = _train(results, store, self.jobs or available_threads(), executor)
+                results = _train(results, store, self.at_once, executor or self.elsewhere(folder))
             with open_console(stderr=True).status(
                 "bounding what could be reached, drawing figures"
             ):

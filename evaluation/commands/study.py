@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from kinarm._command_line import print_table, run_request
 from kinarm._validation import whole_number
+from kinarm.evaluation.running.options import RunningOptions
 
 if TYPE_CHECKING:
     from kinarm.evaluation.running.executor import Executor
@@ -39,13 +40,14 @@ extend a study: nothing is trained twice.
 examples:
   kinarm-study steps.toml                  into the folder steps
   kinarm-study steps.toml --jobs 1         one training at a time
+  kinarm-study steps.toml --ray auto       on the Ray cluster that this machine is part of
   kinarm-study steps.toml --no-train       write what is finished so far
   kinarm-study status steps                how far it is
 """
 
 
 @dataclass(frozen=True, kw_only=True)
-class StudyRequest:
+class StudyRequest(RunningOptions):
     """Carry out the trainings of a study, and write what they came to.
 
     Parameters
@@ -54,8 +56,6 @@ class StudyRequest:
         The study file.
     out : Path
         Output folder: the file's name without its ending.
-    jobs : int
-        Trainings at a time; one a processor.
     threads : int
         Threads of a training.
     train : bool
@@ -69,14 +69,12 @@ class StudyRequest:
 
     study: Path = field(metadata={"flag": "study", "metavar": "STUDY.toml"})
     out: Path | None = field(default=None, metadata={"metavar": "DIR"})
-    jobs: int | None = None
     threads: int = 1
     train: bool = True
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         whole_number("threads", self.threads, 1)
-        if self.jobs is not None:
-            whole_number("jobs", self.jobs, 1)
 
     @property
     def folder(self) -> Path:
@@ -89,7 +87,7 @@ class StudyRequest:
         Parameters
         ----------
         executor : Executor, optional
-            Where trainings are carried out; worker processes of this machine by default.
+            Where trainings are carried out, instead of where the options say.
         command : str, optional
             What to record as the command that made the files; this request by default.
 
@@ -111,7 +109,8 @@ class StudyRequest:
         study = Study(self.study, self.folder)
         try:
             if self.train:
-                study.run(jobs=self.jobs, threads=self.threads, executor=executor)
+                chosen = executor or self.elsewhere(self.folder, self.threads)
+                study.run(jobs=self.jobs, threads=self.threads, executor=chosen)
             if len(study):
                 write_all(study, command or repr(self))
         except KeyboardInterrupt:

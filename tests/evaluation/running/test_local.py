@@ -1,35 +1,12 @@
 """Worker processes: every task once, whatever happens to them."""
 
-import os
-import signal
 from functools import partial
 
 import pytest
+from small_tasks import kill_own_process_at_seven, kill_own_process_once, square, touch
 
 from kinarm.errors import WorkerError
 from kinarm.evaluation.running.local import ATTEMPTS, LocalExecutor
-
-
-def square(number):
-    return number * number
-
-
-def touch(folder, number):
-    (folder / str(number)).touch(exist_ok=False)
-
-
-def kill_own_process_at_seven(number):
-    if number == 7:
-        os.kill(os.getpid(), signal.SIGKILL)
-
-
-def kill_own_process_once(folder, number):
-    """The first worker that comes to a task with an odd number does not survive it."""
-    mark = folder / str(number)
-    if number % 2 and not mark.exists():
-        mark.touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    return number
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
