@@ -20,4 +20,6 @@ from .report.card import write_card as write_card
 from .report.page import report_page as report_page
 from .report.page import write_report as write_report
 from .statistics import Estimate as Estimate
+from .studies.specification import StudySpecification as StudySpecification
+from .studies.study import Study as Study
 from .trials import TrialSet as TrialSet

@@ -113,7 +113,7 @@ class RayExecutor:
     def _room(self, ray: Any) -> int:
         """How many tasks the cluster is given at a time, as large as it is now."""
         processors = math.floor(ray.cluster_resources().get("CPU", 1.0) / self.threads)
-        return WAITING * max(1, processors)
+        return int(WAITING * max(1, processors))
 
     def _result(self, ray: Any, reference: Any) -> Any:
         """What a task returned, or what went wrong."""
