@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from kinarm._command_line import run_request
 from kinarm._console import open_console
 from kinarm._files import check_folder, write_text
+from kinarm._interrupts import GOES_ON, telling
 from kinarm._parallel import available_threads
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
@@ -111,17 +112,13 @@ class ReproductionRequest:
         _claim_folder(folder, study)
         store = RunStore(folder, study.protocol)
         results = Results.load(study, store)
-        try:
+        with telling(lambda: GOES_ON):
             if results.missing:
                 results = _train(results, store, self.jobs or available_threads(), executor)
             with open_console(stderr=True).status(
                 "bounding what could be reached, drawing figures"
             ):
                 return write_all(results, store, command or repr(self))
-        except KeyboardInterrupt:
-            raise KeyboardInterrupt(
-                "interrupted; what is finished is kept, and the same command goes on"
-            ) from None
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

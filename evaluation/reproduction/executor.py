@@ -1,7 +1,6 @@
 """Carry out tasks in worker processes, or wherever an executor puts them."""
 
 import os
-import signal
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -9,6 +8,7 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
+from kinarm._interrupts import kept_from_children
 from kinarm.errors import WorkerError
 
 TaskT = TypeVar("TaskT")
@@ -65,7 +65,9 @@ class LocalExecutor:
         ):
             parallel = Parallel(return_as="generator_unordered", batch_size=1, max_nbytes=None)
         try:
-            yield from parallel(delayed(_done)(work, task) for task in tasks)
+            with kept_from_children():
+                finished = parallel(delayed(_done)(work, task) for task in tasks)
+            yield from finished
         except BrokenProcessPool as error:
             raise WorkerError(
                 "a worker ended unexpectedly, perhaps for want of memory; "
@@ -80,8 +82,7 @@ def _done(work: Callable[[TaskT], object], task: TaskT) -> TaskT:
 
 
 def _prepare_worker(parent: int) -> None:
-    """Leave Ctrl-C to the parent, and end when it does."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """End when the parent does."""
     threading.Thread(target=_end_with_parent, args=(parent,), daemon=True).start()
 
 
