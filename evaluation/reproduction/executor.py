@@ -54,6 +54,8 @@ class LocalExecutor:
         WorkerError
             If a worker ends unexpectedly.
         """
+        from multiprocessing import resource_tracker
+
         from joblib import Parallel, delayed, parallel_config
 
         with parallel_config(
@@ -65,6 +67,7 @@ class LocalExecutor:
         ):
             parallel = Parallel(return_as="generator_unordered", batch_size=1, max_nbytes=None)
         try:
+            resource_tracker.ensure_running()  # where it begins, it lets signals through again
             with kept_from_children():
                 finished = parallel(delayed(_done)(work, task) for task in tasks)
             yield from finished
