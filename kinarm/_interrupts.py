@@ -18,7 +18,7 @@ TYPE_CHECKING = False  # `typing` takes longer to load than all the rest
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from sys import UnraisableHookArgs
-    from types import FrameType
+    from types import FrameType, TracebackType
     from typing import Literal
 
 REQUESTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -58,7 +58,7 @@ def _take_over() -> None:
         if signal.getsignal(request) is not signal.SIG_IGN:
             signal.signal(request, _answer)
     signal.signal(signal.SIGALRM, _answer)
-    sys.unraisablehook = _tell_unraisable
+    sys.unraisablehook, sys.excepthook = _tell_unraisable, _tell_printed
 
 
 def _answer(_: int, __: FrameType | None) -> None:
@@ -84,6 +84,14 @@ def _tell_unraisable(failure: UnraisableHookArgs) -> None:
     """Say nothing of an interruption that has no way to go; it is raised again."""
     if not isinstance(failure.exc_value, Interruption):
         sys.__unraisablehook__(failure)
+
+
+def _tell_printed(
+    kind: type[BaseException], error: BaseException, traceback: TracebackType | None
+) -> None:
+    """Say nothing of an interruption that compiled code prints in place of passing it on."""
+    if not isinstance(error, Interruption):
+        sys.__excepthook__(kind, error, traceback)
 
 
 def begin() -> None:

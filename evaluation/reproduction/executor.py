@@ -3,8 +3,10 @@
 import os
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+import warnings
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
@@ -70,12 +72,25 @@ class LocalExecutor:
             resource_tracker.ensure_running()  # where it begins, it lets signals through again
             with kept_from_children():
                 finished = parallel(delayed(_done)(work, task) for task in tasks)
-            yield from finished
+            with _closed_in_silence(finished):
+                for task in finished:  # noqa: UP028 - `yield from` would close it first
+                    yield task
         except BrokenProcessPool as error:
             raise WorkerError(
                 "a worker ended unexpectedly, perhaps for want of memory; "
                 "the same command goes on with what is missing"
             ) from error
+
+
+@contextmanager
+def _closed_in_silence(finished: Generator[TaskT, None, None]) -> Iterator[None]:
+    """Joblib warns of the tasks that are dropped where it is not asked for all."""
+    try:
+        yield
+    finally:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            finished.close()
 
 
 def _done(work: Callable[[TaskT], object], task: TaskT) -> TaskT:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -26,7 +27,7 @@ MODULES = {
     "kinarm-train": "kinarm.policies.train",
 }
 
-PATIENCE = 180.0
+PATIENCE = 300.0
 """Time after which a process counts as hanging [s]; the machine may be busy."""
 
 CLOCKS = ("seconds", "processor_seconds", "wall_time")
@@ -165,7 +166,7 @@ def left_behind(leader: int, folder: Path) -> list[str]:
     names = [path.relative_to(folder) for path in folder.rglob("*")]
     left += [f"{name.suffix} file" for name in names if name.suffix in (".part", ".lock")]
     left += ["a temporary file" for name in names if name.parts[0] == "tmp" and len(name.parts) > 1]
-    left += ["shared memory" for _ in Path("/dev/shm").glob(f"*{leader}*")]
+    left += ["shared memory" for _ in Path("/dev/shm").glob(f"*[-_]{leader}[-_]*")]
     return left
 
 
@@ -215,3 +216,17 @@ def own_cache() -> Iterator[Path]:
     with TemporaryDirectory() as folder:
         os.environ["KINARM_CACHE"] = folder
         yield Path(folder)
+
+
+def write(
+    path: Path | None, module: str, counts: dict[str, int], findings: int, parts: dict[str, Any]
+) -> None:
+    """Write the record of a campaign, with the command that made it; or print it."""
+    command = shlex.join(["python", "-m", f"tests.campaign.{module}", *sys.argv[1:]])
+    document = {"command": command, **counts, "findings": findings, "parts": parts}
+    text = json.dumps(document, indent=1) + "\n"
+    if path is None:
+        sys.stdout.write(text)
+        return
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)

@@ -4,9 +4,7 @@
 """
 
 import argparse
-import json
 import os
-import shlex
 import signal
 import subprocess
 import sys
@@ -19,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .processes import SUBJECTS, Ended, Subject, end_of, left_behind, own_cache, started
+from .processes import SUBJECTS, Ended, Subject, end_of, left_behind, own_cache, started, write
 
 REQUESTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 OTHER_WAYS = 0.2
@@ -181,18 +179,8 @@ def main() -> None:
     subjects = {name: SUBJECTS[name] for name in given.only}
     tallies = campaign(given.count, given.seed, subjects)
     total = sum(sum(tally.findings.values()) for tally in tallies.values())
-    document = {
-        "command": shlex.join(["python", "-m", "tests.campaign.signals", *sys.argv[1:]]),
-        "signals": sum(tally.runs for tally in tallies.values()),
-        "findings": total,
-        "commands": {name: asdict(tally) for name, tally in tallies.items()},
-    }
-    text = json.dumps(document, indent=1) + "\n"
-    if given.out is None:
-        sys.stdout.write(text)
-    else:
-        given.out.parent.mkdir(parents=True, exist_ok=True)
-        given.out.write_text(text)
+    counts = {"signals": sum(tally.runs for tally in tallies.values())}
+    write(given.out, "signals", counts, total, {n: asdict(t) for n, t in tallies.items()})
     sys.exit(1 if total else 0)
 
 

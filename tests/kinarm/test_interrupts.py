@@ -99,6 +99,14 @@ def test_while_it_starts_there_is_nothing_to_say(run):
             wait()
         """,
         """
+        def command():  # as compiled code does, by PyErr_Print
+            try:
+                ask()
+            except BaseException:
+                sys.excepthook(*sys.exc_info())
+            wait()
+        """,
+        """
         def command():
             try:
                 ask()
@@ -133,7 +141,14 @@ def test_while_it_starts_there_is_nothing_to_say(run):
         """,
     ],
     ids=(
-        *("within exec", "made another", "lost, and an error", "lost", "in a destructor"),
+        *(
+            "within exec",
+            "made another",
+            "lost, and an error",
+            "lost",
+            "in a destructor",
+            "printed",
+        ),
         *("thrice", "lost twice", "at exit", "with output"),
     ),
 )
