@@ -71,8 +71,12 @@ class TrialSet:
         ProblemError
             If no contact-free start exists.
         """
+        return cls.draw_in(Simulator(problem), trials, seed)
+
+    @classmethod
+    def draw_in(cls, simulator: Simulator, trials: int, seed: int) -> "TrialSet":
+        """Draw trials of the problem of a simulator, to be faced in it; see `draw`."""
         trials, seed = whole_number("trials", trials, 1), whole_number("seed", seed, 0)
-        simulator = Simulator(problem)
         drawn = [simulator.sample(trial_generator(seed, trial), 1) for trial in range(trials)]
         starts, goals = (np.concatenate(part) for part in zip(*drawn, strict=True))
         starts.flags.writeable = goals.flags.writeable = False

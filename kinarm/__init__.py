@@ -1,5 +1,8 @@
 """kinarm: learn to reach with a simulated six-axis arm, and know how good the result is."""
 
+from kinarm import _interrupts as _interrupts  # first: a command answers requests to end from here
+
+# isort: split
 from pathlib import Path
 
 import lazy_loader

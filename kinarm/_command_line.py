@@ -8,11 +8,13 @@ import re
 import shlex
 import sys
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import MISSING, Field, is_dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, NoReturn, TypeVar, get_args, get_origin, get_type_hints
 
 from kinarm._fields import alternatives, expected, init_fields, summary_of
+from kinarm._interrupts import EXIT_STATUS, begin, end, was_interrupted
 from kinarm.errors import KinarmError
 
 Request = TypeVar("Request")
@@ -30,13 +32,20 @@ class Parser(argparse.ArgumentParser):
 
 
 def run_command(prog: str, command: Callable[[], None]) -> NoReturn:
-    """Run a command line and turn its outcome into an exit status.
+    """Run a command line and turn its outcome into an exit status; here every command ends.
 
     Status 0 is success, 1 a failure of the machine, 2 bad input, 130 an interruption; all but
     success come with one line on standard error. A reader that closes the pipe is no failure.
     """
     _prepare_streams()
-    sys.exit(_status(prog, command))
+    begin()
+    try:
+        status = _run(command)
+        end()
+    except BaseException as error:
+        end()
+        status = _status_of(prog, error)
+    sys.exit(status)
 
 
 def _prepare_streams() -> None:
@@ -49,35 +58,40 @@ def _prepare_streams() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
-def _status(prog: str, command: Callable[[], None]) -> int:
+def _run(command: Callable[[], None]) -> int:
     """Run a command and flush what it printed."""
+    status = 0
     try:
-        try:
-            command()
-        except SystemExit as leaving:
-            sys.stdout.flush()
-            return leaving.code if isinstance(leaving.code, int) else 0
-        sys.stdout.flush()
-    except KinarmError as error:
-        return _report(prog, str(error), error.exit_status)
-    except BrokenPipeError:
+        command()
+    except SystemExit as leaving:
+        status = leaving.code if isinstance(leaving.code, int) else 0
+    sys.stdout.flush()
+    return status
+
+
+def _status_of(prog: str, error: BaseException) -> int:
+    """Tell of an error in one line; what is nobody's fault but kinarm's is raised again."""
+    if was_interrupted(error):
         _discard_output()
-    except OSError as error:
+        said = str(error) if isinstance(error, KeyboardInterrupt) else ""
+        return _report(prog, said or "interrupted", EXIT_STATUS)
+    if isinstance(error, KinarmError):
+        return _report(prog, str(error), error.exit_status)
+    if isinstance(error, BrokenPipeError):
+        _discard_output()
+        return 0
+    if isinstance(error, OSError):
         _discard_output()
         return _report(prog, f"{error.filename or 'standard output'}: {error.strerror}", 1)
-    except MemoryError as error:
+    if isinstance(error, MemoryError):
         return _report(prog, f"out of memory: {str(error) or 'no more to be had'}", 1)
-    except KeyboardInterrupt as interruption:
-        # CPython remembers an interrupt within `exec`, as imports are full of, and would end
-        # this process by the signal whatever it returns; it forgets it at the next `exec`.
-        exec("")
-        return _report(prog, str(interruption) or "interrupted", 130)
-    return 0
+    raise error
 
 
 def _discard_output() -> None:
     """Let what is still buffered for standard output go nowhere, so that exiting is quiet."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    with suppress(io.UnsupportedOperation):  # a stream of this process alone
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _report(prog: str, message: str, status: int) -> int:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from kinarm._command_line import Parser, add_options, given_options, run_command
 from kinarm._console import open_console
 from kinarm._files import check_output, only_writer
+from kinarm._interrupts import telling
 from kinarm.errors import InvalidInputError, KinarmError, PolicyFileError
 from kinarm.policies.learners import (
     Learner,
@@ -102,24 +103,22 @@ class TrainRequest(ProblemOptions):
         if state is None:
             _say_reach(config)
         options = {} if self.tensorboard is None else {"tensorboard": self.tensorboard}
-        training = begin_training(config, **options)
-        keeper = CheckpointKeeper(config, path)
-        with TrainingProgress(config) as progress:
+        keeper = CheckpointKeeper(config, path, state)
+        with telling(keeper.save_on_interrupt):
+            training = begin_training(config, **options)
+            with TrainingProgress(config) as progress:
 
-            def on_iteration(state: TrainingState) -> None:
-                progress.update(state)
-                keeper.update(state)
+                def on_iteration(state: TrainingState) -> None:
+                    progress.update(state)
+                    keeper.update(state)
 
-            try:
                 result = run_training(config, training, state=state, on_iteration=on_iteration)
-            except KeyboardInterrupt:
-                raise KeyboardInterrupt(keeper.save_on_interrupt()) from None
-        try:
-            result.policy.save(self.out)
-            write_curve(curve_path(self.out), result.curve)
-        except (KinarmError, KeyboardInterrupt):
-            keeper.save()
-            raise
+            try:
+                write_curve(curve_path(self.out), result.curve)
+                result.policy.save(self.out)
+            except KinarmError:
+                keeper.save()
+                raise
         path.unlink(missing_ok=True)
         return result
 
@@ -189,10 +188,9 @@ def curve_path(out: str | Path) -> Path:
 class CheckpointKeeper:
     """Saves the latest state every few seconds and on demand."""
 
-    def __init__(self, config: "TrainingConfig", path: Path) -> None:
-        self._config, self._path = config, path
+    def __init__(self, config: "TrainingConfig", path: Path, state: TrainingState | None) -> None:
+        self._config, self._path, self._state = config, path, state
         self._saved_at = time.monotonic()
-        self._state: TrainingState | None = None
 
     def update(self, state: TrainingState) -> None:
         """Take note of a state, and save it if the last checkpoint is old."""

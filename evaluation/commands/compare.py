@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from kinarm._command_line import run_request
 from kinarm._console import open_console
 from kinarm._files import check_folder
+from kinarm._interrupts import GOES_ON, telling
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.running.options import RunningOptions
@@ -126,7 +127,7 @@ class ComparisonRequest(RunningOptions):
             learner.check_installed()
         check_folder(folder)
         missing = [run for run in runs if load_run(folder, run) is None]
-        try:
+        with telling(lambda: GOES_ON):
             if missing and self.train:
                 self._train(missing, folder, executor)
             found = {run: load_run(folder, run) for run in runs}
@@ -137,10 +138,6 @@ class ComparisonRequest(RunningOptions):
                 "bounding what could be reached, drawing figures"
             ):
                 write_all(comparison, self.out, command or repr(self))
-        except KeyboardInterrupt:
-            raise KeyboardInterrupt(
-                "interrupted; what is finished is kept, and the same command goes on"
-            ) from None
         return comparison
 
     def _train(

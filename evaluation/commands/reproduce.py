@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from kinarm._command_line import run_request
 from kinarm._console import open_console
 from kinarm._files import check_folder, write_text
+from kinarm._interrupts import GOES_ON, telling
 from kinarm._parallel import available_threads
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.running.options import RunningOptions
@@ -104,17 +105,13 @@ class ReproductionRequest(RunningOptions):
         _claim_folder(folder, study)
         store = RunStore(folder, study.protocol)
         results = Results.load(study, store)
-        try:
+        with telling(lambda: GOES_ON):
             if results.missing:
                 results = _train(results, store, self.at_once, executor or self.elsewhere(folder))
             with open_console(stderr=True).status(
                 "bounding what could be reached, drawing figures"
             ):
                 return write_all(results, store, command or repr(self))
-        except KeyboardInterrupt:
-            raise KeyboardInterrupt(
-                "interrupted; what is finished is kept, and the same command goes on"
-            ) from None
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

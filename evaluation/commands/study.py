@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinarm._command_line import print_table, run_request
+from kinarm._interrupts import GOES_ON, telling
 from kinarm._validation import whole_number
 from kinarm.evaluation.running.options import RunningOptions
 
@@ -107,16 +108,12 @@ class StudyRequest(RunningOptions):
         from kinarm.evaluation.studies.study import Study
 
         study = Study(self.study, self.folder)
-        try:
+        with telling(lambda: GOES_ON):
             if self.train:
                 chosen = executor or self.elsewhere(self.folder, self.threads)
                 study.run(jobs=self.jobs, threads=self.threads, executor=chosen)
             if len(study):
                 write_all(study, command or repr(self))
-        except KeyboardInterrupt:
-            raise KeyboardInterrupt(
-                "interrupted; what is finished is kept, and the same command goes on"
-            ) from None
         return study
 
 

@@ -28,7 +28,7 @@ def fresh_recordings(entrant: Entrant, simulator: Simulator, seed: int) -> Itera
     """
     oracle = Oracle(simulator.problem)
     for number in itertools.count():
-        trials = TrialSet.draw(simulator.problem, 1, seed + number)
+        trials = TrialSet.draw_in(simulator, 1, seed + number)
         if entrant is ORACLE:  # solved here, so that no bounds are kept of every trial
             actions = oracle.solve_batch(trials.starts, trials.goals).actions
             rollouts = simulator.rollout_actions(actions, trials.starts, trials.goals, record=True)

@@ -1,14 +1,16 @@
 """Worker processes of this machine."""
 
 import os
-import signal
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+import warnings
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TypeVar
 
+from kinarm._interrupts import kept_from_children
 from kinarm.errors import WorkerError
 from kinarm.evaluation.running.executor import Finished
 
@@ -69,6 +71,8 @@ class LocalExecutor:
         self, work: Callable[[TaskT], ResultT], waiting: dict[int, TaskT]
     ) -> Iterator[Finished[ResultT]]:
         """Do the work for the tasks that wait, until a worker is lost."""
+        from multiprocessing import resource_tracker
+
         from joblib import Parallel, delayed, parallel_config
 
         with parallel_config(
@@ -79,7 +83,23 @@ class LocalExecutor:
             initargs=(os.getpid(),),
         ):
             parallel = Parallel(return_as="generator_unordered", batch_size=1, max_nbytes=None)
-        yield from parallel(delayed(_done)(work, *item) for item in list(waiting.items()))
+        resource_tracker.ensure_running()  # where it begins, it lets signals through again
+        with kept_from_children():
+            done = parallel(delayed(_done)(work, *item) for item in list(waiting.items()))
+        with _closed_in_silence(done):
+            for finished in done:  # noqa: UP028 - `yield from` would close it first
+                yield finished
+
+
+@contextmanager
+def _closed_in_silence(done: Generator[ResultT, None, None]) -> Iterator[None]:
+    """Joblib warns of the tasks that are dropped where it is not asked for all."""
+    try:
+        yield
+    finally:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            done.close()
 
 
 def _done(work: Callable[[TaskT], ResultT], number: int, task: TaskT) -> Finished[ResultT]:
@@ -87,8 +107,7 @@ def _done(work: Callable[[TaskT], ResultT], number: int, task: TaskT) -> Finishe
 
 
 def _prepare_worker(parent: int) -> None:
-    """Leave Ctrl-C to the parent, and end when it does."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """End when the parent does."""
     threading.Thread(target=_end_with_parent, args=(parent,), daemon=True).start()
 
 

@@ -1,73 +1,23 @@
-"""Meshcat's own server, in a thread of this process and for this machine alone."""
+"""A scene served to browsers of this machine while it is drawn, by a thread of this process."""
 
 import asyncio
 import errno
 import socket
 import threading
+from functools import cache
+from importlib import resources
 from typing import Any
 
-import tornado.web
-import umsgpack
 from meshcat import Visualizer
-from meshcat.servers.zmqserver import (
-    VIEWER_HTML,
-    VIEWER_ROOT,
-    StaticFileHandlerNoCache,
-    WebSocketHandler,
-    ZMQWebSocketBridge,
-)
-from tornado.httpserver import HTTPServer
 
-from kinarm.errors import OutputError
+from kinarm._validation import whole_number
+from kinarm.errors import InvalidInputError, OutputError
+from kinarm.viewer.live_scene import LiveScene
+from kinarm.viewer.live_visits import File, Reception
 
 HOST = "127.0.0.1"
-PORT = 7000
+PORT, LAST_PORT = 7000, 65535
 PORTS_TRIED = 100
-
-
-class _Socket(WebSocketHandler):
-    """A browser that watches, without the messages that Meshcat prints about it."""
-
-    def open(self, *_: str, **__: str) -> None:
-        self.bridge.websocket_pool.add(self)
-        self.bridge.send_scene(self)
-
-    def on_close(self) -> None:
-        self.bridge.websocket_pool.discard(self)
-
-
-class _Application(tornado.web.Application):
-    """Meshcat's pages, for this machine only."""
-
-    def listen(self, port: int, **settings: Any) -> HTTPServer:  # type: ignore[override]
-        listening = socket.create_server((HOST, port))  # closed again if the port is taken
-        listening.setblocking(False)
-        self.server = HTTPServer(self, **settings)
-        self.server.add_socket(listening)
-        return self.server
-
-
-class _Bridge(ZMQWebSocketBridge):
-    """Meshcat's server without its ZeroMQ port, listening to this machine only."""
-
-    def make_app(self) -> _Application:
-        files = {"path": VIEWER_ROOT, "default_filename": VIEWER_HTML}
-        return _Application(
-            [(r"/static/(.*)", StaticFileHandlerNoCache, files), (r"/", _Socket, {"bridge": self})]
-        )
-
-    def setup_zmq(self, url: str) -> tuple["_Bridge", None, str]:
-        return self, None, url
-
-    def send(self, _: bytes) -> None:
-        """Take the answers that would go to ZeroMQ."""
-
-    async def close(self) -> None:
-        """Let the browsers go, and stop listening."""
-        self.app.server.stop()
-        for watching in set(self.websocket_pool):
-            watching.ws_connection.stream.close()
-        await self.app.server.close_all_connections()
 
 
 class LiveServer:
@@ -89,31 +39,32 @@ class LiveServer:
 
     Raises
     ------
+    InvalidInputError
+        If there is no such port.
     OutputError
         If no port is free.
     """
 
     def __init__(self, port: int = PORT) -> None:
-        self.port = port
-        self._failure: OSError | None = None
-        self._started = threading.Event()
+        self._listening = _listening_socket(port)
+        self.port = self._listening.getsockname()[1]
+        self._scene = LiveScene()
+        self._reception = Reception(_files(), self._scene)
+        self._loop = asyncio.new_event_loop()
+        self._over = asyncio.Event()
         self._thread = threading.Thread(target=self._run, name="kinarm live", daemon=True)
         self._thread.start()
-        self._started.wait()
-        if self._failure is not None:
-            raise OutputError(f"cannot serve on port {port}: {self._failure.strerror}")
         self.window = Visualizer(window=self)
 
     @property
     def address(self) -> str:
         """Where a browser finds it."""
-        return f"http://{HOST}:{self.port}/static/"
+        return f"http://{HOST}:{self.port}/"
 
     def send(self, command: Any) -> None:
         """Pass a drawing command on; Meshcat calls this."""
-        described = command.lower()
-        frames = [described["type"].encode(), described["path"].encode(), umsgpack.packb(described)]
-        self._loop.call_soon_threadsafe(self._bridge.handle_zmq, frames)
+        self._scene.add(command.lower())
+        self._loop.call_soon_threadsafe(self._reception.tell)
 
     def close(self) -> None:
         """Stop serving."""
@@ -128,27 +79,45 @@ class LiveServer:
         self.close()
 
     def _run(self) -> None:
-        try:
-            asyncio.run(self._serve())
-        except OSError as error:
-            self._failure = error
-            self._started.set()
+        self._loop.set_exception_handler(_say_nothing_of_the_network)
+        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
+            runner.run(self._serve())
 
     async def _serve(self) -> None:
-        self._loop = asyncio.get_running_loop()
-        self._over = asyncio.Event()
-        self._bridge = self._listening_bridge()
-        self._started.set()
+        server = await self._reception.open(self._listening)
         await self._over.wait()
-        await self._bridge.close()
+        server.close()
+        self._reception.close()
 
-    def _listening_bridge(self) -> _Bridge:
-        """Open the port, or the next free one."""
-        last = self.port + PORTS_TRIED
-        while True:
-            try:
-                return _Bridge(zmq_url="", host=HOST, port=self.port)
-            except OSError as error:
-                if error.errno != errno.EADDRINUSE or self.port >= min(last, 65535):
-                    raise
-                self.port += 1
+
+def _say_nothing_of_the_network(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """Connections that break, and descriptors that are used up, are no news to a user."""
+    if not isinstance(context.get("exception"), OSError):
+        loop.default_exception_handler(context)
+
+
+def _listening_socket(port: int) -> socket.socket:
+    """Open the port, or the next free one."""
+    if whole_number("port", port, 0) > LAST_PORT:
+        raise InvalidInputError(f"port must be at most {LAST_PORT}, got {port}")
+    for candidate in range(port, min(port + PORTS_TRIED, LAST_PORT) + 1):
+        try:
+            return socket.create_server((HOST, candidate))
+        except OSError as error:
+            reason = error.strerror
+            if error.errno != errno.EADDRINUSE:
+                break
+    raise OutputError(f"cannot serve on port {port}: {reason}")
+
+
+@cache
+def _files() -> dict[str, File]:
+    """What a page consists of, by address."""
+    own = resources.files("kinarm.viewer")
+    page, script = own / "live_page.html", own / "live_page.js"
+    meshcat = resources.files("meshcat") / "viewer/dist/main.min.js"
+    return {
+        "/": File("text/html; charset=utf-8", page.read_bytes()),
+        "/live_page.js": File("text/javascript; charset=utf-8", script.read_bytes()),
+        "/meshcat.js": File("text/javascript; charset=utf-8", meshcat.read_bytes()),
+    }

@@ -75,16 +75,17 @@ class Mesh:
 
 def _corner_normals(corners: NDArray[np.int64], weighted: Array, flat: Array) -> Array:
     """Mean normal, at each corner of each face, of the faces that meet there without an edge."""
-    order = np.argsort(corners, kind="stable")
-    counts = np.bincount(corners)
+    empty = np.repeat(np.linalg.norm(weighted, axis=1) == 0, 3)
+    solid = np.flatnonzero(~empty)  # of a trace at rest there are none, and thousands of others
+    order = solid[np.argsort(corners[solid], kind="stable")]
+    counts = np.bincount(corners[solid], minlength=corners.max(initial=-1) + 1)
     starts = np.cumsum(counts) - counts
-    n_joined = counts[corners[order]]
-    mine, group = np.repeat(order, n_joined), np.repeat(corners[order], n_joined)
-    within = np.arange(len(group)) - np.repeat(np.cumsum(n_joined) - n_joined, n_joined)
-    theirs = order[starts[group] + within]
+    n_joined = counts[corners]
+    mine = np.repeat(np.arange(len(corners)), n_joined)
+    within = np.arange(len(mine)) - np.repeat(np.cumsum(n_joined) - n_joined, n_joined)
+    theirs = order[starts[corners[mine]] + within]
     joins = (flat[mine // 3] * flat[theirs // 3]).sum(axis=1) >= CREASE
-    empty = np.linalg.norm(weighted, axis=1) == 0
-    joins |= empty[mine // 3]  # a face without area takes any side
+    joins |= empty[mine]  # a face without area takes any side
     total = np.zeros((len(corners), 3))
     np.add.at(total, mine[joins], weighted[theirs[joins] // 3])
     unit: Array = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-30)

@@ -252,17 +252,6 @@ class TestCommands:
         assert caught.value.code == status
         assert capsys.readouterr() == ("", said)
 
-    def test_interrupt_within_exec(self, tmp_path):
-        """Run by ``python -m``, such a process would end by the signal."""
-        (tmp_path / "baking.py").write_text(
-            "from kinarm._command_line import run_command\n"
-            "run_command('bake', lambda: exec('raise KeyboardInterrupt'))\n"
-        )
-        process = subprocess.run(
-            [sys.executable, "-m", "baking"], cwd=tmp_path, capture_output=True, text=True
-        )
-        assert (process.returncode, process.stderr) == (130, "bake: interrupted\n")
-
     def test_other_errors_are_not_hidden(self):
         def command():
             raise ZeroDivisionError

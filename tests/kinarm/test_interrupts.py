@@ -1,0 +1,244 @@
+"""Requests to end, at moments that a process chooses itself."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+
+import pytest
+
+BEFORE = """
+import atexit, os, signal, sys, time
+from kinarm._command_line import run_command
+from kinarm._interrupts import telling
+from kinarm.errors import KinarmError
+
+def ask(request=signal.SIGINT):
+    os.kill(os.getpid(), request)
+    time.sleep(0)
+
+def wait():
+    while True:
+        time.sleep(0.01)
+
+def eat():
+    try:
+        ask()
+    except BaseException:
+        pass
+
+"""
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Run a script that is called as a command is; return its status, output and errors."""
+
+    def call(source, name="kinarm-bake", before=BEFORE, **settings):
+        script = tmp_path / name
+        script.write_text(before + textwrap.dedent(source))
+        done = subprocess.run(
+            [sys.executable, str(script)],
+            **{"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL), **settings},
+            env={**os.environ, "PYTHONUNBUFFERED": ""},
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+        return done.returncode, done.stdout, done.stderr
+
+    return call
+
+
+INTERRUPTED = 130, "", "bake: interrupted\n"
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_command_says_so_in_one_line(run, name):
+    assert run(f"run_command('bake', lambda: ask(signal.{name}))") == INTERRUPTED
+
+
+def test_while_it_starts_there_is_nothing_to_say(run):
+    assert run("ask()\nprint('not reached')") == (130, "", "")
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        """
+        def command():  # after an exact KeyboardInterrupt, CPython would end by the signal
+            exec("ask()")
+        """,
+        """
+        def command():  # as numpy.unique(axis=0) does
+            try:
+                ask()
+            except KeyboardInterrupt:
+                raise TypeError("not supported")
+        """,
+        """
+        def command():
+            eat()
+            raise KinarmError("bad bread")
+        """,
+        """
+        def command():
+            eat()
+            wait()
+        """,
+        """
+        class Crumb:
+            def __del__(self):
+                ask()
+
+        def command():
+            crumb = Crumb()
+            del crumb
+            wait()
+        """,
+        """
+        def command():  # as compiled code does, by PyErr_Print
+            try:
+                ask()
+            except BaseException:
+                sys.excepthook(*sys.exc_info())
+            wait()
+        """,
+        """
+        def command():
+            try:
+                ask()
+            finally:
+                ask()
+                try:
+                    raise ValueError
+                except ValueError:
+                    ask(signal.SIGTERM)
+                time.sleep(1.2)  # longer than until the next reminder
+        """,
+        """
+        def command():
+            eat()
+            eat()
+            ask()
+        """,
+        """
+        @atexit.register
+        def bye():
+            ask()
+            ask(signal.SIGTERM)
+            time.sleep(0.7)
+
+        def command():
+            ask()
+        """,
+        """
+        def command():
+            print("half a lo", end="")
+            ask()
+        """,
+    ],
+    ids=(
+        *(
+            "within exec",
+            "made another",
+            "lost, and an error",
+            "lost",
+            "in a destructor",
+            "printed",
+        ),
+        *("thrice", "lost twice", "at exit", "with output"),
+    ),
+)
+def test_however_it_comes_and_whatever_becomes_of_it(run, source):
+    assert run(textwrap.dedent(source) + "\nrun_command('bake', command)\n") == INTERRUPTED
+
+
+def test_what_is_left_is_told(run):
+    source = """
+    def command():
+        with telling(lambda: f"burnt after {minutes} min"):
+            for minutes in range(5):
+                if minutes == 3:
+                    try:
+                        ask()
+                    except KeyboardInterrupt:
+                        raise OSError
+    run_command('bake', command)
+    """
+    assert run(source) == (130, "", "bake: burnt after 3 min\n")
+
+
+def test_errors_of_other_kinds_are_not_told_as_interruptions(run):
+    source = """
+    def command():
+        with telling(lambda: "burnt"):
+            raise KinarmError("no flour")
+    run_command('bake', command)
+    """
+    assert run(source) == (2, "", "bake: no flour\n")
+
+
+def test_too_late_is_no_interruption(run):
+    source = """
+    atexit.register(ask)
+    run_command('bake', lambda: print("bread"))
+    """
+    assert run(source) == (0, "bread\n", "")
+
+
+def test_a_request_that_is_ignored_from_the_start_stays_ignored(run):
+    """As shells do for commands in the background, and nohup for SIGHUP."""
+    ignore = lambda: signal.signal(signal.SIGINT, signal.SIG_IGN)  # noqa: E731
+    source = "run_command('bake', lambda: ask() or print('bread'))"
+    assert run(source, preexec_fn=ignore) == (0, "bread\n", "")
+
+
+def test_a_reader_that_never_reads_keeps_nobody(run):
+    source = """
+    sys.stdout.reconfigure(write_through=False)
+    def command():
+        sys.stdout.write("x" * 100)
+        os.dup2(os.pipe()[1], 1)  # whose other end nobody reads
+        os.set_blocking(1, False)
+        try:
+            while True:
+                os.write(1, b"x" * 4096)
+        except BlockingIOError:
+            os.set_blocking(1, True)
+        ask()
+    run_command('bake', command)
+    """
+    assert run(source) == INTERRUPTED
+
+
+@pytest.mark.parametrize("name", ["bake", "test_kinarm"])
+def test_programs_that_only_use_kinarm_keep_their_own_ways(run, name):
+    source = """
+    import signal, sys, kinarm, kinarm._interrupts as interrupts
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    assert sys.unraisablehook is sys.__unraisablehook__
+    interrupts.begin()
+    interrupts.end()
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert interrupts.was_interrupted(KeyboardInterrupt())
+    assert not interrupts.was_interrupted(ValueError())
+    """
+    assert run(source, name, before="") == (0, "", "")
+
+
+def test_children_that_are_kept_from_it(run):
+    source = """
+    import subprocess
+    from kinarm._interrupts import kept_from_children
+    with kept_from_children():
+        child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(1)"])
+    child.send_signal(signal.SIGINT)
+    child.send_signal(signal.SIGHUP)
+    assert child.wait() == 0
+    run_command('bake', ask)
+    """
+    assert run(source) == INTERRUPTED
