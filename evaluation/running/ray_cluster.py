@@ -6,6 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
+from kinarm._interrupts import kept_from_children
 from kinarm.errors import InvalidInputError, MissingExtraError, WorkerError
 from kinarm.evaluation.running.executor import Finished
 from kinarm.evaluation.running.identity import Guarded, identity
@@ -64,7 +65,8 @@ class RayExecutor:
             import ray
         except ImportError as error:
             raise MissingExtraError("ray", "ray") from error
-        self._connect(ray)
+        with kept_from_children():
+            self._connect(ray)
         try:
             yield from self._carry_out(ray, work, tasks)
         finally:
