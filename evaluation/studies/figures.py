@@ -47,6 +47,7 @@ def learning_curves(study: "Study") -> "Figure | None":
     to the best. Dotted is what the oracle reaches. None if nobody looked during the trainings.
     """
     from matplotlib.figure import Figure
+    from matplotlib.ticker import NullFormatter
 
     problems = {
         name: [group for group in groups if any(run.curve for run in group.runs)][:LINES]
@@ -72,6 +73,7 @@ def learning_curves(study: "Study") -> "Figure | None":
         for axes in (steps, seconds):
             axes.axhline(groups[0].reachable, color="#444444", linestyle=":", lw=1)
             axes.set(ylim=(0, 1.02), title=problem, xscale="log")
+            axes.xaxis.set_minor_formatter(NullFormatter())
             axes.spines[["top", "right"]].set_visible(False)
         steps.set_ylabel("share of trials with success")
         steps.legend(frameon=False, fontsize=8, loc="upper left")
@@ -194,6 +196,7 @@ def _draw_effect(axes: "Axes", study: "Study", field: str) -> None:
         if not numeric or len(names) <= 6:
             axes.set_xticks([places[name] for name in names], names, rotation=0 if numeric else 20)
             axes.minorticks_off()
+    axes.margins(x=0.2)
     axes.set(title=shorter(field), ylim=(0, 1.02))
     axes.spines[["top", "right"]].set_visible(False)
 

@@ -8,7 +8,7 @@ from typing import Any, TypeGuard
 
 import numpy as np
 
-from kinarm._fields import check_fields, from_plain, read_toml, to_plain
+from kinarm._fields import OPTIONAL, check_fields, from_plain, read_toml, to_plain
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
 from kinarm.streams import Stream, stream_generator
@@ -88,9 +88,9 @@ class StudySpecification:
     seeds: int = 1
     first_seed: int = 0
     trials: StudyTrials = field(default_factory=StudyTrials)
-    fixed: dict[str, Any] = field(default_factory=dict)
-    grid: dict[str, Any] = field(default_factory=dict)
-    random: dict[str, Any] = field(default_factory=dict)
+    fixed: dict[str, Any] = field(default_factory=dict, metadata=OPTIONAL)
+    grid: dict[str, Any] = field(default_factory=dict, metadata=OPTIONAL)
+    random: dict[str, Any] = field(default_factory=dict, metadata=OPTIONAL)
 
     def __post_init__(self) -> None:
         check_fields(self)
