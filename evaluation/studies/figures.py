@@ -178,7 +178,8 @@ def _draw_effect(axes: "Axes", study: "Study", field: str) -> None:
         low, high = min(places.values()), max(places.values())
         if low > 0 and high / low >= 10:
             axes.set_xscale("log")
-    if field in study.specification.random and numeric:
+    drawn = (*study.specification.random, *study.specification.search)
+    if field in drawn and numeric:
         for name in names:
             for run in runs[name]:
                 share = study.finished[run].outcomes.success.mean()

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, is_dataclass, replace
 from functools import cached_property
@@ -84,8 +84,17 @@ def _hash(entries: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(entries, sort_keys=True).encode()).hexdigest()[:20]
 
 
-def planned_runs(study: StudySpecification) -> tuple[PlannedRun, ...]:
+def planned_runs(
+    study: StudySpecification, choices: Sequence[Mapping[str, Any]] | None = None
+) -> tuple[PlannedRun, ...]:
     """All trainings of a study, seed by seed, so that the first results cover everything.
+
+    Parameters
+    ----------
+    study : StudySpecification
+        The study.
+    choices : sequence of mappings, optional
+        Values of what varies, by field; those of the study by default.
 
     Raises
     ------
@@ -94,10 +103,11 @@ def planned_runs(study: StudySpecification) -> tuple[PlannedRun, ...]:
         field.
     """
     _check_fields_known(study)
+    varied = list(study.choices()) if choices is None else choices
     each = [
         setting
         for learner, name, problem in product(study.learners, study.recipes, study.problems)
-        for setting in _settings(study, learner, name, problem)
+        for setting in _settings(study, learner, name, problem, varied)
     ]
     seeds = range(study.first_seed, study.first_seed + study.seeds)
     runs = {
@@ -114,7 +124,7 @@ def _check_fields_known(study: StudySpecification) -> None:
     """Refuse a field that none of the learners has."""
     learners = {name: find_learner(name) for name in study.learners}
     available = [name for each in learners.values() for name in init_fields(each.config)]
-    for key in {**study.fixed, **next(study.choices())}:
+    for key in {**study.fixed, **next(study.choices()), **study.searched}:
         owner, _, rest = key.partition(".")
         if owner in learners:
             fields, name = tuple(init_fields(learners[owner].config)), rest.partition(".")[0]
@@ -126,13 +136,17 @@ def _check_fields_known(study: StudySpecification) -> None:
 
 
 def _settings(
-    study: StudySpecification, learner: str, name: str, problem: str
+    study: StudySpecification,
+    learner: str,
+    name: str,
+    problem: str,
+    varied: Sequence[Mapping[str, Any]],
 ) -> Iterator[tuple[TrainingConfig, dict[str, Any]]]:
     """Settings of a learner with a recipe on a problem, and what of them varies."""
     made = ReachProblem.load(problem)
     fixed = _concerning(study.fixed, learner, study.learners)
     seen = []
-    for choice in study.choices():
+    for choice in varied:
         choices = _concerning(choice, learner, study.learners)
         if choices not in seen:
             seen.append(choices)

@@ -4,20 +4,16 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
-from typing import Any, TypeGuard
-
-import numpy as np
+from typing import Any
 
 from kinarm._fields import OPTIONAL, check_fields, from_plain, read_toml, to_plain
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
+from kinarm.evaluation.studies.ranges import RANGE, check_range, draw
 from kinarm.streams import Stream, stream_generator
 
 SEVERAL = ("learners", "recipes", "problems")
 """Entries of a file that are lists; a text stands for a list of one."""
-
-DIGITS = 6
-"""Significant digits of numbers that are drawn: more could differ between machines."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,6 +75,9 @@ class StudySpecification:
     random : dict
         ``count`` combinations, drawn by ``seed`` (0), of fields with a list of values, or a table
         of ``low``, ``high`` and, to draw the logarithm evenly, ``log = true``.
+    search : dict
+        ``count`` combinations that Optuna proposes, by ``seed`` (0) and ``sampler`` (tpe), of
+        fields as in ``random``; ``pruner`` (median) says which trainings are broken off.
     """
 
     name: str
@@ -91,6 +90,7 @@ class StudySpecification:
     fixed: dict[str, Any] = field(default_factory=dict, metadata=OPTIONAL)
     grid: dict[str, Any] = field(default_factory=dict, metadata=OPTIONAL)
     random: dict[str, Any] = field(default_factory=dict, metadata=OPTIONAL)
+    search: dict[str, Any] = field(default_factory=dict, metadata=OPTIONAL)
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -102,7 +102,12 @@ class StudySpecification:
                 raise InvalidInputError(f"{name} must not be empty")
             if len(set(values)) < len(values):
                 raise InvalidInputError(f"{name} names the same twice: {', '.join(values)}")
-        tables = {"fixed": self.fixed, "grid": self.grid, "random": self._ranges}
+        tables = {
+            "fixed": self.fixed,
+            "grid": self.grid,
+            "random": _ranges(self.random),
+            "search": self.searched,
+        }
         given: dict[str, str] = {}
         for table, entries in tables.items():
             for key in entries:
@@ -114,16 +119,41 @@ class StudySpecification:
                 raise InvalidInputError(
                     f"grid.{key} must be a list of at least one value, got {values!r}"
                 )
-        if self.random:
-            whole_number("random.count", self.random.get("count", 0), 1)
-            whole_number("random.seed", self.random.get("seed", 0), 0)
-            for key, entry in self._ranges.items():
-                _check_range(key, entry)
+        for table, entries in (("random", self.random), ("search", self.search)):
+            if entries:
+                whole_number(f"{table}.count", entries.get("count", 0), 1)
+                whole_number(f"{table}.seed", entries.get("seed", 0), 0)
+                for key, entry in _ranges(entries).items():
+                    check_range(f"{table}.{key}", entry)
+        self._check_search()
+
+    def _check_search(self) -> None:
+        """Refuse what cannot be searched."""
+        if not self.search:
+            return
+        for table in ("grid", "random"):
+            if getattr(self, table):
+                raise InvalidInputError(f"search and {table} exclude each other")
+        for name in ("learners", "recipes"):
+            if len(getattr(self, name)) > 1:
+                raise InvalidInputError(
+                    f"a search has one of {name}, got {len(getattr(self, name))}"
+                )
+        for name, known in SEARCH_CHOICES.items():
+            if self.search.get(name, known[0]) not in known:
+                raise InvalidInputError(
+                    f"search.{name} must be one of {', '.join(known)}, got {self.search[name]!r}"
+                )
+        if not self.searched:
+            raise InvalidInputError("search names no field")
+        for key in self.searched:
+            if key.startswith("problem."):
+                raise InvalidInputError(f"a search is for settings of a learner, not for {key!r}")
 
     @property
-    def _ranges(self) -> dict[str, Any]:
-        """What is drawn at random, by field."""
-        return {key: entry for key, entry in self.random.items() if key not in ("count", "seed")}
+    def searched(self) -> dict[str, Any]:
+        """What is searched, by field."""
+        return _ranges(self.search)
 
     def choices(self) -> Iterator[dict[str, Any]]:
         """Every combination of the values that vary, by field."""
@@ -139,7 +169,7 @@ class StudySpecification:
             return
         for number in range(self.random["count"]):
             rng = stream_generator(Stream.STUDY, self.random.get("seed", 0), number)
-            yield {key: _draw(entry, rng.random()) for key, entry in self._ranges.items()}
+            yield {key: draw(entry, rng.random()) for key, entry in _ranges(self.random).items()}
 
     def to_json(self) -> dict[str, Any]:
         """As a dictionary that TOML and JSON can hold."""
@@ -163,9 +193,9 @@ class StudySpecification:
                 made[name] = made.pop(single)
             if isinstance(made.get(name), str):
                 made[name] = [made[name]]
-        for table in ("fixed", "grid", "random"):
+        for table in ("fixed", "grid", "random", "search"):
             if isinstance(made.get(table), Mapping):
-                made[table] = dict(_flat(made[table], ranges=table == "random"))
+                made[table] = dict(_flat(made[table], ranges=table in ("random", "search")))
         return from_plain(cls, made, where)
 
     @classmethod
@@ -198,44 +228,14 @@ class StudySpecification:
         )
 
 
-RANGE = ("low", "high", "log")
+SEARCH_CHOICES = {"sampler": ("tpe", "random", "cmaes"), "pruner": ("median", "none", "hyperband")}
+"""What can be said of a search beside count and seed; the first is the default."""
 
 
-def _check_range(key: str, entry: Any) -> None:
-    """Refuse what nothing can be drawn from."""
-    where = f"random.{key}"
-    if isinstance(entry, list | tuple):
-        if not entry:
-            raise InvalidInputError(f"{where} must be a list of at least one value, got {entry!r}")
-        return
-    given = entry if isinstance(entry, Mapping) else {}
-    low, high = given.get("low"), given.get("high")
-    if not (_is_number(low) and _is_number(high) and low < high) or set(given) - set(RANGE):
-        raise InvalidInputError(
-            f"{where} must be a list of values, or a table with low below high and perhaps log, "
-            f"got {entry!r}"
-        )
-    if given.get("log") and low <= 0:
-        raise InvalidInputError(f"{where}.low must be greater than 0 with log, got {low!r}")
-
-
-def _is_number(value: Any) -> TypeGuard[float]:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _draw(entry: Any, uniform: float) -> Any:
-    """What a number from [0, 1) chooses of a list or a range; whole between whole numbers."""
-    if isinstance(entry, list | tuple):
-        return entry[int(uniform * len(entry))]
-    low, high = entry["low"], entry["high"]
-    whole = isinstance(low, int) and isinstance(high, int)
-    if entry.get("log"):
-        value = float(low * np.exp(uniform * np.log(high / low)))
-    else:
-        value = low + uniform * (high - low + whole)
-    if whole:
-        return min(int(value), high)
-    return float(f"{value:.{DIGITS}g}")
+def _ranges(entries: Mapping[str, Any]) -> dict[str, Any]:
+    """What is drawn or searched, by field."""
+    said = ("count", "seed", *SEARCH_CHOICES)
+    return {key: entry for key, entry in entries.items() if key not in said}
 
 
 def _flat(entries: Mapping[str, Any], *, ranges: bool, path: str = "") -> Iterator[tuple[str, Any]]:

@@ -15,6 +15,7 @@ from kinarm.evaluation.running.local import LocalExecutor
 from kinarm.evaluation.running.progress import TaskProgress
 from kinarm.evaluation.studies.planning import PlannedRun, planned_runs
 from kinarm.evaluation.studies.runs import RunClock, TrainedRun, TrialBounds
+from kinarm.evaluation.studies.search import carry_out_search, searched_runs
 from kinarm.evaluation.studies.specification import StudySpecification
 from kinarm.evaluation.studies.store import SPECIFICATION, StudyStore
 from kinarm.evaluation.studies.training import BoundTask, RunTask, Start, carry_out
@@ -63,11 +64,17 @@ class Study:
             if isinstance(specification, Mapping):
                 specification = StudySpecification.from_json(specification, where)
         self.specification = specification
+        self.store = StudyStore(Path(folder))
         try:
-            self.runs = planned_runs(specification)
+            self.runs = self._planned()
         except InvalidInputError as error:
             raise InvalidInputError(f"{where}: {error}") from error
-        self.store = StudyStore(Path(folder))
+
+    def _planned(self) -> tuple[PlannedRun, ...]:
+        """The trainings: those of the specification, or those that a search came to."""
+        if self.specification.search:
+            return searched_runs(self.specification, self.store.folder)
+        return planned_runs(self.specification)
 
     @classmethod
     def load(cls, folder: str | Path) -> "Study":
@@ -160,6 +167,8 @@ class Study:
         for name in self.specification.learners:
             find_learner(name).check_installed()
         with self.store.writing(self.specification):
+            if self.specification.search:
+                carry_out_search(self.specification, self.store.folder, jobs, threads)
             self.refresh()
             tasks = self._tasks()
             jobs = max(1, min(jobs, len(tasks)))
@@ -176,6 +185,8 @@ class Study:
 
     def refresh(self) -> None:
         """Look into the folder anew."""
+        if self.specification.search:
+            self.runs = self._planned()
         for name in ("finished", "bounds"):
             self.__dict__.pop(name, None)
 

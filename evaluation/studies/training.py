@@ -3,6 +3,7 @@
 import hashlib
 import time
 import traceback
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any, NamedTuple
@@ -160,8 +161,10 @@ def find_bounds(task: BoundTask, threads: int) -> TrialBounds:
     return TrialBounds(solutions.reachable, solutions.steps_lower_bound)
 
 
-def train(task: RunTask, threads: int = 1) -> tuple[TrainedRun, RunClock]:
-    """Train and judge."""
+def train(
+    task: RunTask, threads: int = 1, on_point: Callable[[RunPoint], object] | None = None
+) -> tuple[TrainedRun, RunClock]:
+    """Train and judge; ``on_point`` is told of every point of the learning curve."""
     began = time.process_time()
     planned = task.run
     config, trials = planned.config, planned.trials
@@ -180,6 +183,8 @@ def train(task: RunTask, threads: int = 1) -> tuple[TrainedRun, RunClock]:
         if judge.is_due(state.environment_steps):
             judge.look(state, state_policy(config, state))
             times.append(earlier.seconds + state.wall_time)
+            if on_point is not None:
+                on_point(judge.curve[-1])
     policy = state_policy(config, state)
     rollouts = judge.face(policy)
     run = TrainedRun(

@@ -1,0 +1,50 @@
+"""What values are drawn from: lists, and ranges of numbers."""
+
+from collections.abc import Mapping
+from typing import Any, TypeGuard
+
+import numpy as np
+
+from kinarm.errors import InvalidInputError
+
+DIGITS = 6
+"""Significant digits of numbers that are drawn: more could differ between machines."""
+
+RANGE = ("low", "high", "log")
+
+
+def check_range(where: str, entry: Any) -> None:
+    """Refuse what nothing can be drawn from."""
+    if isinstance(entry, list | tuple):
+        if not entry:
+            raise InvalidInputError(f"{where} must be a list of at least one value, got {entry!r}")
+        return
+    given = entry if isinstance(entry, Mapping) else {}
+    low, high = given.get("low"), given.get("high")
+    if not (_is_number(low) and _is_number(high) and low < high) or set(given) - set(RANGE):
+        raise InvalidInputError(
+            f"{where} must be a list of values, or a table with low below high and perhaps log, "
+            f"got {entry!r}"
+        )
+    if given.get("log") and low <= 0:
+        raise InvalidInputError(f"{where}.low must be greater than 0 with log, got {low!r}")
+
+
+def _is_number(value: Any) -> TypeGuard[float]:
+    """Whether a value is a number; a truth value is none."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def draw(entry: Any, uniform: float) -> Any:
+    """What a number from [0, 1) chooses of a list or a range; whole between whole numbers."""
+    if isinstance(entry, list | tuple):
+        return entry[int(uniform * len(entry))]
+    low, high = entry["low"], entry["high"]
+    whole = isinstance(low, int) and isinstance(high, int)
+    if entry.get("log"):
+        value = float(low * np.exp(uniform * np.log(high / low)))
+    else:
+        value = low + uniform * (high - low + whole)
+    if whole:
+        return min(int(value), high)
+    return float(f"{value:.{DIGITS}g}")

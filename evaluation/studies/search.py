@@ -1,0 +1,234 @@
+"""Search for the best settings of a learner, by Optuna, in the folder of a study."""
+
+import math
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import tomli_w
+
+from kinarm._fields import to_plain
+from kinarm._files import first_line, write_text
+from kinarm.errors import MissingExtraError
+from kinarm.evaluation.running.local import LocalExecutor
+from kinarm.evaluation.studies.planning import PlannedRun, planned_runs
+from kinarm.evaluation.studies.runs import RunPoint, run_content
+from kinarm.evaluation.studies.specification import StudySpecification
+from kinarm.evaluation.studies.store import StudyStore
+from kinarm.evaluation.studies.training import RunTask, TaskResult, train
+from kinarm.policies.config import TrainingConfig
+from kinarm.policies.recipes import PER_TRAINING
+
+if TYPE_CHECKING:
+    import optuna
+
+JOURNAL, RECIPE = "search.journal", "best.toml"
+"""Files of a search in the folder of its study."""
+
+STUDY = "kinarm"
+"""Name of the search in its journal."""
+
+
+def open_search(
+    specification: StudySpecification, folder: Path, draws: int = 0
+) -> "optuna.study.Study":
+    """Open the search of a study, or begin it.
+
+    Parameters
+    ----------
+    specification : StudySpecification
+        The study.
+    folder : Path
+        Its folder.
+    draws : int
+        What tells the random numbers of this process from those of others.
+
+    Raises
+    ------
+    MissingExtraError
+        If Optuna is not installed.
+    """
+    try:
+        import optuna
+        from optuna.storages import JournalStorage
+        from optuna.storages.journal import JournalFileBackend
+    except ImportError as error:
+        raise MissingExtraError("optuna", "tune") from error
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    said = specification.search
+    seed = int(np.random.SeedSequence([said.get("seed", 0), draws]).generate_state(1)[0])
+    samplers: dict[str, Any] = {
+        "tpe": partial(optuna.samplers.TPESampler, constant_liar=True),
+        "random": optuna.samplers.RandomSampler,
+        "cmaes": optuna.samplers.CmaEsSampler,
+    }
+    pruners: dict[str, Any] = {
+        "median": optuna.pruners.MedianPruner,
+        "none": optuna.pruners.NopPruner,
+        "hyperband": optuna.pruners.HyperbandPruner,
+    }
+    return optuna.create_study(
+        study_name=STUDY,
+        storage=JournalStorage(JournalFileBackend(str(folder / JOURNAL))),
+        sampler=samplers[said.get("sampler", "tpe")](seed=seed),
+        pruner=pruners[said.get("pruner", "median")](),
+        direction="maximize",
+        load_if_exists=True,
+    )
+
+
+def carry_out_search(
+    specification: StudySpecification, folder: Path, jobs: int, threads: int
+) -> None:
+    """Try settings until there are as many as the study says; what was under way is tried again.
+
+    Parameters
+    ----------
+    specification : StudySpecification
+        The study.
+    folder : Path
+        Its folder, to which no other process may write.
+    jobs : int
+        Settings that are tried at a time.
+    threads : int
+        Threads of a training.
+    """
+    import optuna
+
+    # A process that was killed may have left its lock.
+    for left in folder.glob(f"{JOURNAL}.lock*"):
+        left.unlink(missing_ok=True)
+    search = open_search(specification, folder)
+    for trial in search.get_trials(deepcopy=False, states=(optuna.trial.TrialState.RUNNING,)):
+        search.tell(trial.number, state=optuna.trial.TrialState.FAIL)
+        search.enqueue_trial(trial.params)
+    missing = specification.search["count"] - len(_counted(search))
+    if missing > 0:
+        jobs = min(jobs, missing)
+        shares = [len(range(number, missing, jobs)) for number in range(jobs)]
+        work = partial(_try_settings, specification, folder, threads)
+        tasks = [(share, len(search.trials) + number) for number, share in enumerate(shares)]
+        list(LocalExecutor(jobs, threads).carry_out(work, tasks))
+    write_recipe(specification, folder)
+
+
+def _counted(search: "optuna.study.Study") -> list[Any]:
+    """What was tried to an end, or broken off."""
+    from optuna.trial import TrialState
+
+    return search.get_trials(deepcopy=False, states=(TrialState.COMPLETE, TrialState.PRUNED))
+
+
+def _try_settings(
+    specification: StudySpecification, folder: Path, threads: int, task: tuple[int, int]
+) -> None:
+    """Try a share of the settings, one after the other."""
+    import optuna
+
+    share, draws = task
+    search, store = open_search(specification, folder, draws), StudyStore(folder)
+    failed = 0
+    while share > 0:
+        trial = search.ask()
+        try:
+            success = _mean_success(specification, store, trial, threads)
+        except optuna.TrialPruned:
+            search.tell(trial, state=optuna.trial.TrialState.PRUNED)
+        except Exception as error:  # settings can be impossible: another proposal takes their place
+            trial.set_user_attr("error", first_line(error))
+            search.tell(trial, state=optuna.trial.TrialState.FAIL)
+            failed += 1
+            share += 1 if failed < FAILURES else 0
+        else:
+            search.tell(trial, success)
+        share -= 1
+
+
+FAILURES = 20
+"""Proposals of a worker that may be impossible before they count."""
+
+
+def _mean_success(
+    specification: StudySpecification, store: StudyStore, trial: Any, threads: int
+) -> float:
+    """Train with the settings of a trial on all problems with all seeds."""
+    import optuna
+
+    choices = {key: _suggest(trial, key, entry) for key, entry in specification.searched.items()}
+    shares, looks = [], 0
+
+    def on_point(point: RunPoint) -> None:
+        nonlocal looks
+        trial.report(point.success, looks)
+        looks += 1
+        if trial.should_prune():
+            raise optuna.TrialPruned
+
+    for number, run in enumerate(planned_runs(specification, [choices])):
+        trained = store.load(run)
+        if trained is None:
+            task = RunTask(run)
+            trained, clock = train(task, threads, on_point if number == 0 else None)
+            store.save(task, TaskResult(run_content(trained), clock))
+        shares.append(float(trained.outcomes.success.mean()))
+    return float(np.mean(shares))
+
+
+def _suggest(trial: Any, key: str, entry: Any) -> Any:
+    """A value from a list or a range, as Optuna proposes it."""
+    if isinstance(entry, Mapping):
+        low, high, log = entry["low"], entry["high"], bool(entry.get("log", False))
+        if isinstance(low, int) and isinstance(high, int):
+            return trial.suggest_int(key, low, high, log=log)
+        return trial.suggest_float(key, float(low), float(high), log=log)
+    # Optuna keeps plain values alone: lists are known by their place.
+    return entry[trial.suggest_categorical(key, list(range(len(entry))))]
+
+
+def searched_runs(specification: StudySpecification, folder: Path) -> tuple[PlannedRun, ...]:
+    """The trainings of the settings that were tried to the end, in their order."""
+    if not (folder / JOURNAL).exists():
+        return planned_runs(specification, [])
+    found = [
+        tried_choices(specification, trial.params) for trial in _complete(specification, folder)
+    ]
+    return planned_runs(specification, found)
+
+
+def _complete(specification: StudySpecification, folder: Path) -> list[Any]:
+    """Trials that were carried out to the end."""
+    search = open_search(specification, folder)
+    return [trial for trial in search.trials if trial.state.name == "COMPLETE"]
+
+
+def tried_choices(specification: StudySpecification, tried: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of fields that Optuna's values stand for."""
+    return {
+        key: tried[key] if isinstance(entry, Mapping) else entry[tried[key]]
+        for key, entry in specification.searched.items()
+        if key in tried
+    }
+
+
+def write_recipe(specification: StudySpecification, folder: Path) -> None:
+    """Write the best settings as a recipe file, for ``kinarm-train --recipe``.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
+    """
+    complete = _complete(specification, folder)
+    if not complete:
+        return
+    best = max(complete, key=lambda trial: trial.value if trial.value is not None else -math.inf)
+    run = planned_runs(specification, [tried_choices(specification, best.params)])[0]
+    write_text(folder / RECIPE, tomli_w.dumps(recipe_entries(run.config)))
+
+
+def recipe_entries(config: TrainingConfig) -> dict[str, Any]:
+    """Settings as a recipe file holds them: all but what differs from training to training."""
+    entries = to_plain(config)
+    return {name: entries[name] for name in entries if name not in (*PER_TRAINING, "recipe")}

@@ -1,0 +1,172 @@
+"""Searches by Optuna: as many settings as asked for, and nothing stuck after a kill."""
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import tomli_w
+from small_studies import SMALL
+
+from kinarm.errors import InvalidInputError, MissingExtraError
+from kinarm.evaluation.studies import search as searches
+from kinarm.evaluation.studies.search import open_search, recipe_entries
+from kinarm.evaluation.studies.specification import StudySpecification
+from kinarm.evaluation.studies.study import Study
+from kinarm.policies import recipe
+
+optuna = pytest.importorskip("optuna")
+pytestmark = pytest.mark.filterwarnings("ignore")  # Optuna's: what is experimental
+
+SEARCH = {
+    **{name: entry for name, entry in SMALL.items() if name not in ("grid", "seeds")},
+    "name": "search",
+    "seeds": 1,
+    "search": {
+        "count": 6,
+        "pruner": "none",
+        "step_size": {"low": 0.01, "high": 0.5, "log": True},
+        "sharing": ["none", "pair"],
+        "episodes": {"low": 1, "high": 2},
+    },
+}
+
+
+def states(study):
+    found = open_search(study.specification, study.store.folder).trials
+    return [trial.state.name for trial in found]
+
+
+@pytest.fixture
+def searched(tmp_path):
+    return Study(SEARCH, tmp_path).run(jobs=1)
+
+
+class TestSearch:
+    def test_it_tries_as_many_settings_as_asked_for(self, searched):
+        assert states(searched) == ["COMPLETE"] * 6
+        for run in searched.finished:
+            assert 0.01 <= run.config.step_size <= 0.5
+            assert run.config.sharing in ("none", "pair")
+            assert run.config.episodes in (1, 2)
+        assert len({run.config.step_size for run in searched.runs}) == len(searched) == 6
+
+    def test_values_are_the_success_of_the_policies(self, searched):
+        trials = open_search(searched.specification, searched.store.folder).trials
+        by_step_size = {run.config.step_size: each for run, each in searched.finished.items()}
+        for trial in trials:
+            trained = by_step_size[trial.params["step_size"]]
+            assert trial.value == trained.outcomes.success.mean()
+
+    def test_the_best_is_a_recipe(self, searched):
+        best = max(searched.finished.values(), key=lambda run: run.outcomes.success.mean())
+        made = recipe("ars", searched.store.folder / "best.toml", problem="right", seed=0)
+        assert made.recipe == "best"
+        success = best.outcomes.success.mean()
+        (same,) = [
+            run for run in searched.runs if recipe_entries(run.config) == recipe_entries(made)
+        ]
+        assert searched.finished[same].outcomes.success.mean() == success
+
+    def test_more_go_on(self, searched, tmp_path):
+        more = {**SEARCH, "search": {**SEARCH["search"], "count": 8}}
+        study = Study(more, tmp_path).run(jobs=2)
+        assert len(study) == 8
+        assert [run.key for run in study.runs[:6]] == [run.key for run in searched.runs]
+
+    def test_a_search_under_way_is_read(self, tmp_path):
+        study = Study(SEARCH, tmp_path)
+        assert study.runs == ()
+        assert len(study.table()) == 0
+
+    def test_what_was_under_way_is_tried_again(self, tmp_path):
+        study = Study(SEARCH, tmp_path)
+        with study.store.writing(study.specification):
+            stuck = open_search(study.specification, tmp_path).ask()
+            stuck.suggest_float("step_size", 0.01, 0.5, log=True)
+        (tmp_path / "search.journal.lock").symlink_to("nowhere")
+        study.run(jobs=1)
+        assert states(study) == ["FAIL"] + ["COMPLETE"] * 6
+        assert study.runs[0].config.step_size == stuck.params["step_size"]
+
+    def test_impossible_settings_are_replaced_by_others(self, tmp_path):
+        impossible = {"count": 3, "top_directions": {"low": 3, "high": 6}}
+        fixed = {"iterations": 3, "directions": 4}
+        study = Study({**SEARCH, "fixed": fixed, "search": impossible}, tmp_path).run(jobs=1)
+        trials = open_search(study.specification, tmp_path).trials
+        complete = [trial for trial in trials if trial.state.name == "COMPLETE"]
+        assert len(complete) == 3
+        assert {trial.params["top_directions"] for trial in complete} <= {3, 4}
+        for trial in trials:
+            if trial not in complete:
+                assert "top_directions must be at most" in trial.user_attrs["error"]
+
+    def test_poor_trainings_are_broken_off(self, tmp_path, monkeypatch):
+        class Strict(optuna.pruners.NopPruner):
+            def prune(self, study, trial):
+                return trial.number % 2 == 1 and len(trial.intermediate_values) == 1
+
+        monkeypatch.setattr(optuna.pruners, "MedianPruner", Strict)
+        entries = {name: entry for name, entry in SEARCH["search"].items() if name != "pruner"}
+        study = Study({**SEARCH, "search": entries}, tmp_path).run(jobs=1)
+        assert states(study) == ["COMPLETE", "PRUNED"] * 3
+        assert len(study) == 3
+
+
+@pytest.mark.slow
+def test_killed_at_any_time(tmp_path):
+    """No settings are stuck, and none are lost that were tried to the end."""
+    file, folder = tmp_path / "search.toml", tmp_path / "it"
+    file.write_text(tomli_w.dumps({**SEARCH, "search": {**SEARCH["search"], "count": 30}}))
+    command = [sys.executable, "-m", "kinarm.evaluation.commands.study", file, "--out", folder]
+    for seconds in (3.0, 5.0, 6.0, 7.0):
+        process = subprocess.Popen(
+            [*command, "--jobs", "2"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        time.sleep(seconds)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        time.sleep(0.5)  # in which its workers see that it is gone
+    before = set(Path(folder).glob("runs/*.npz"))
+    subprocess.run([*command, "--jobs", "2"], check=True, capture_output=True)
+    study = Study.load(folder)
+    found = states(study)
+    assert found.count("COMPLETE") == len(study) == 30
+    assert "RUNNING" not in found
+    assert "WAITING" not in found
+    assert before <= set(folder.glob("runs/*.npz"))
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"search": {"count": 2}}, "search names no field"),
+        ({"search": {"noise": [1]}}, "search.count must be a whole number of at least 1"),
+        ({"search": {"count": 2, "noise": []}}, "search.noise must be a list of at least one"),
+        ({"grid": {"noise": [1]}}, "search and grid exclude each other"),
+        ({"learners": ["ars", "ppo"]}, "a search has one of learners, got 2"),
+        ({"search": {"count": 2, "sampler": "gp", "noise": [1]}}, "search.sampler must be one of"),
+        (
+            {"search": {"count": 2, "problem.task.horizon": [1]}},
+            "a search is for settings of a learner, not for 'problem.task.horizon'",
+        ),
+    ],
+)
+def test_refused(changes, words):
+    with pytest.raises(InvalidInputError, match="^study: ") as caught:
+        StudySpecification.from_json({**SEARCH, **changes}, "study")
+    assert words in str(caught.value)
+
+
+def test_unknown_fields(tmp_path):
+    with pytest.raises(InvalidInputError, match="unknown field of a recipe or problem 'stepsize'"):
+        Study({**SEARCH, "search": {"count": 1, "stepsize": [1]}}, tmp_path)
+
+
+def test_without_the_extra(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "optuna", None)
+    specification = StudySpecification.from_json(SEARCH, "study")
+    with pytest.raises(MissingExtraError, match=r"kinarm\[tune\]"):
+        searches.open_search(specification, tmp_path)
