@@ -63,7 +63,8 @@ class PPOConfig(TrainingConfig):
         mirror image (``both``); it then learns from goals on the right and from mirror images of
         those on the left.
     initial_start_spread : float
-        Spread of the start configurations at the beginning of the training.
+        Spread of the start configurations at the beginning of the training, as a share of the
+        task's.
     widening : float
         Share of the training in which the spread grows linearly to that of the task.
     """
@@ -123,4 +124,4 @@ class PPOConfig(TrainingConfig):
         if done >= self.widening:
             return final
         grown = done / self.widening
-        return (1 - grown) * self.initial_start_spread + grown * final
+        return ((1 - grown) * self.initial_start_spread + grown) * final

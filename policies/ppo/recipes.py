@@ -1,8 +1,9 @@
 """Settings of Proximal Policy Optimization by name."""
 
 from dataclasses import replace
+from typing import Any
 
-from kinarm.policies.config import relative_reach
+from kinarm.policies.config import rewarded_per_reach
 from kinarm.policies.ppo.config import PPOConfig
 from kinarm.task import RewardWeights
 
@@ -33,23 +34,27 @@ best that we found.
 """
 
 
+UNALIKE: dict[str, Any] = {
+    "gamma": 0.95,
+    "reward": RewardWeights(progress=5.0, collision=-3.0, success=5.0),
+}
+"""What ``tuned`` is where several regions are to be reached and no reflection maps them."""
+
+
 def adapted(config: PPOConfig) -> PPOConfig:
     """Adapt ``tuned`` to its problem.
 
     Progress is rewarded in proportion to the arm's reach, and the training's tolerance is a share
-    of the task's. Where several regions are to be reached and no reflection maps one to the other,
-    progress counts five times as much: else learning hardly begins before contact is all that is
-    avoided.
+    of the task's. Where several regions are to be reached and no reflection maps one to another,
+    progress and contact count more and the future counts less: else contact is avoided long before
+    both regions are reached.
     """
     from kinarm.policies.mirror import has_mirror  # loads Pinocchio
 
     if config.recipe != "tuned":
         return config
-    problem = config.problem
-    alike = len(problem.task.goal_regions) == 1 or has_mirror(problem)
-    progress = (1.0 if alike else 5.0) / relative_reach(problem)
-    return replace(
-        config,
-        training_tolerance=0.6 * problem.task.tolerance,
-        reward=RewardWeights(progress=progress, success=5.0),
-    )
+    task, symmetric = config.problem.task, has_mirror(config.problem)
+    if len(task.goal_regions) > 1 and not symmetric:
+        config = replace(config, **UNALIKE)
+    config = replace(config, symmetric=symmetric, training_tolerance=0.6 * task.tolerance)
+    return rewarded_per_reach(config)
