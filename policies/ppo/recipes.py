@@ -35,8 +35,9 @@ best that we found.
 
 
 UNALIKE: dict[str, Any] = {
-    "gamma": 0.95,
-    "reward": RewardWeights(progress=5.0, collision=-3.0, success=5.0),
+    "initial_gamma": 0.9,
+    "initial_penalty": 0.05,
+    "reward": RewardWeights(progress=12.0, collision=-6.0, success=5.0),
 }
 """What ``tuned`` is where several regions are to be reached and no reflection maps them."""
 
@@ -46,8 +47,8 @@ def adapted(config: PPOConfig) -> PPOConfig:
 
     Progress is rewarded in proportion to the arm's reach, and the training's tolerance is a share
     of the task's. Where several regions are to be reached and no reflection maps one to another,
-    progress and contact count more and the future counts less: else contact is avoided long before
-    both regions are reached.
+    progress counts more, and the future and contact less at first: else contact is avoided long
+    before all regions are reached.
     """
     from kinarm.policies.mirror import has_mirror  # loads Pinocchio
 
