@@ -76,6 +76,6 @@ def test_where_no_reflection_helps():
     lopsided = PROBLEMS["both"].replace(goal_weights=(1.0, 2.0))
     ars, ppo = (recipe(learner, "tuned", problem=lopsided) for learner in ("ars", "ppo"))
     assert (ars.recipe, ars.net_arch, ars.symmetric) == ("tuned", (16,), False)
-    assert (ppo.recipe, ppo.reward.progress, ppo.symmetric) == ("tuned", 5.0, False)
+    assert (ppo.recipe, ppo.reward.progress, ppo.symmetric) == ("tuned", 12.0, False)
     assert ppo.gamma_at(0) < ppo.gamma_at(1)
     assert ppo.penalty_at(0) < ppo.penalty_at(1)
