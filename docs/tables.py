@@ -148,7 +148,7 @@ def recipe_table(recipes: Mapping[str, object]) -> str:
 def setting(value: object) -> str:
     """Format a setting of a recipe."""
     if value is None:
-        return "the task's"
+        return "not given"
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, RewardWeights):

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from kinarm._fields import check_fields, init_fields
 from kinarm._validation import whole_number
@@ -112,3 +112,13 @@ class TrainingConfig:
             problem = self.training_problem.replace(reward=given["reward"])
             given["reward"] = problem.task.reward
         return replace(self, **given)
+
+
+ConfigT = TypeVar("ConfigT", bound=TrainingConfig)
+
+
+def rewarded_per_reach(config: ConfigT) -> ConfigT:
+    """Let progress count per reach of the problem's arm instead of per reach of ``paper``."""
+    weights = config.training_problem.task.reward
+    progress = weights.progress / relative_reach(config.problem)
+    return replace(config, reward=replace(weights, progress=progress))

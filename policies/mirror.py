@@ -126,7 +126,18 @@ def task_mirror(symmetric: bool, world: World) -> Mirror | None:
 
 def has_mirror(problem: ReachProblem) -> bool:
     """Whether arm, obstacles and goals are their own mirror image."""
-    return is_symmetric(problem) and task_mirror(True, World(problem, threads=1)) is not None
+    return not missing_mirror(problem)
+
+
+def missing_mirror(problem: ReachProblem) -> str:
+    """Why a problem is not its own mirror image; an empty text if it is."""
+    if not is_symmetric(problem):
+        return "obstacles or goals are not their own mirror image"
+    try:
+        find_mirror(World(problem, threads=1))
+    except InvalidInputError as error:
+        return str(error)
+    return ""
 
 
 def is_symmetric(problem: ReachProblem) -> bool:

@@ -102,6 +102,7 @@ class TrainRequest(ProblemOptions):
 
         if state is None:
             _say_reach(config)
+            _say_symmetry(config)
         options = {} if self.tensorboard is None else {"tensorboard": self.tensorboard}
         keeper = CheckpointKeeper(config, path, state)
         with telling(keeper.save_on_interrupt):
@@ -173,6 +174,17 @@ def _say_reach(config: "TrainingConfig") -> None:
         line = reach_warning(World(config.problem))
         if line is not None:
             sys.stderr.write(f"{line}\n")
+
+
+def _say_symmetry(config: "TrainingConfig") -> None:
+    """Say on standard error that ``symmetric`` does nothing, if it is set and there is no mirror.
+
+    Recipes do not set it there; a user did.
+    """
+    from kinarm.policies.mirror import missing_mirror
+
+    if getattr(config, "symmetric", False) and (reason := missing_mirror(config.problem)):
+        sys.stderr.write(f"symmetric has no effect: {reason}\n")
 
 
 def checkpoint_path(out: str | Path) -> Path:

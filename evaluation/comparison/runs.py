@@ -17,6 +17,7 @@ from kinarm._validation import whole_number
 from kinarm.errors import KinarmError
 from kinarm.evaluation.comparison.learners import ComparedLearner
 from kinarm.policies.provenance import package_versions
+from kinarm.policies.recipes import PER_TRAINING, recipe
 from kinarm.problem import ReachProblem
 from kinarm.semantics import SEMANTICS
 
@@ -102,8 +103,10 @@ class PlannedRun:
     @cached_property
     def settings(self) -> dict[str, Any]:
         """Everything that the run depends on, as JSON holds it."""
+        config = to_plain(self.config) or {}
         return {
             "learner": to_plain(self.learner),
+            "recipe": {name: config[name] for name in config if name not in PER_TRAINING},
             "problem": self.problem.pinned.to_json(),
             "seed": self.seed,
             "steps": self.steps,
@@ -111,6 +114,14 @@ class PlannedRun:
             "semantics": SEMANTICS,
             "versions": package_versions(),
         }
+
+    @cached_property
+    def config(self) -> Any:
+        """Settings of the training if the learner is a recipe of kinarm's, and None otherwise."""
+        learner = self.learner
+        if not learner.is_recipe:
+            return None
+        return recipe(learner.algorithm, learner.recipe, problem=self.problem, seed=self.seed)
 
     @property
     def name(self) -> str:

@@ -17,7 +17,6 @@ from kinarm.evaluation.comparison.runs import CurvePoint, PlannedRun, Protocol
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.learners import begin_training, learner_of, state_policy
 from kinarm.policies.policy import Policy
-from kinarm.policies.recipes import recipe
 from kinarm.policies.sb3.environment import sb3_vec_env
 from kinarm.problem import ReachProblem
 
@@ -109,8 +108,7 @@ def clocks() -> NDArray[np.float64]:
 
 def train_recipe(run: PlannedRun, judge: Judge) -> None:
     """Train by a recipe of kinarm on one thread, to its end or the number of steps given."""
-    learner = run.learner
-    config = recipe(learner.algorithm, learner.recipe, problem=run.problem, seed=run.seed)
+    config = run.config
     takes_threads = "threads" in learner_of(config).options
     training = begin_training(config, **({"threads": 1} if takes_threads else {}))
     state = training.initial_state()

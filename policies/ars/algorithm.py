@@ -12,7 +12,12 @@ from kinarm.policies.ars.kernels import (
     perturbed_weights,
     weighted_sum,
 )
-from kinarm.policies.ars.networks import initial_network, network_layers, perturbed_networks
+from kinarm.policies.ars.networks import (
+    first_deviations,
+    initial_network,
+    network_layers,
+    perturbed_networks,
+)
 from kinarm.policies.ars.perturbations import perturbations
 from kinarm.policies.ars.state import ARSState
 from kinarm.policies.curve import CurvePoint
@@ -42,7 +47,8 @@ class ARSTraining:
         rng = stream_generator(Stream.ARS, self.config.seed)
         theta = np.zeros((n_actions, n_observations))
         if self.config.net_arch:
-            theta = initial_network(rng, (n_observations, *self.config.net_arch, n_actions))
+            deviations = first_deviations(self.simulator.arm.n_joints)
+            theta = initial_network(rng, deviations, (*self.config.net_arch, n_actions))
         return ARSState(
             theta=theta,
             normalizer=Normalizer.empty(n_observations),

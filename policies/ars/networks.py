@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.networks import Networks
+from kinarm.observation import part_slices
 from kinarm.policies.ars.perturbations import perturbations
 from kinarm.policies.normalizer import Normalizer, fold_normalizer
 from kinarm.policies.policy import Layer
@@ -18,17 +19,37 @@ from kinarm.policies.policy import Layer
 Numbers = NDArray[np.float64]
 
 
-def initial_network(rng: np.random.Generator, widths: Sequence[int]) -> Numbers:
+SPREAD = 1.5
+"""Standard deviation of what a unit of the first layer adds up to, for normalised observations."""
+
+
+def first_deviations(n_joints: int) -> Numbers:
+    """Standard deviations of the first layer's initial weights, shape (n_observations,).
+
+    All parts of the observation have the same say in what a unit adds up to: else the few entries
+    that tell of the goal would drown among those of the joints.
+    """
+    parts = list(part_slices(n_joints).values())
+    sizes = np.array([part.stop - part.start for part in parts])
+    deviations: Numbers = np.repeat(SPREAD / np.sqrt(len(parts) * sizes), sizes)
+    return deviations
+
+
+def initial_network(
+    rng: np.random.Generator, deviations: Numbers, widths: Sequence[int]
+) -> Numbers:
     """Draw a network that does nothing yet: its last layer and its biases are zero.
 
-    The other weights are normal numbers over the root of the layer's inputs. Parameters have the
-    shape (1, n_parameters).
+    The other weights are normal numbers: those of the first layer with a standard deviation for
+    each input, the others over the root of the layer's inputs. The widths are those of the layers
+    after the observation. Parameters have the shape (1, n_parameters).
     """
-    *hidden, last = pairwise(widths)
     parts = []
-    for n_in, n_out in hidden:
-        parts += [perturbations(rng, (n_in * n_out,)) / np.sqrt(n_in), np.zeros(n_out)]
-    return np.concatenate([*parts, np.zeros((last[0] + 1) * last[1])])[None]
+    for n_out in widths[:-1]:
+        weights = perturbations(rng, (len(deviations), n_out)) * deviations[:, None]
+        parts += [weights.ravel(), np.zeros(n_out)]
+        deviations = np.full(n_out, 1 / np.sqrt(n_out))
+    return np.concatenate([*parts, np.zeros((len(deviations) + 1) * widths[-1])])[None]
 
 
 def perturbed_networks(

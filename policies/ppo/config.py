@@ -63,9 +63,15 @@ class PPOConfig(TrainingConfig):
         mirror image (``both``); it then learns from goals on the right and from mirror images of
         those on the left.
     initial_start_spread : float
-        Spread of the start configurations at the beginning of the training.
+        Spread of the start configurations at the beginning of the training, as a share of the
+        task's.
+    initial_gamma : float, optional
+        Discount per step at the beginning of the training; ``gamma`` if it is not given.
+    initial_penalty : float
+        Share of the penalty for contact that counts at the beginning of the training; it grows
+        linearly to the whole at the end.
     widening : float
-        Share of the training in which the spread grows linearly to that of the task.
+        Share of the training in which spread and discount change linearly to what they are to be.
     """
 
     iterations: int = 600
@@ -86,6 +92,8 @@ class PPOConfig(TrainingConfig):
     training_tolerance: float | None = field(default=None, metadata=POSITIVE)
     symmetric: bool = False
     initial_start_spread: float = field(default=1.0, metadata=SHARE)
+    initial_gamma: float | None = field(default=None, metadata=SHARE)
+    initial_penalty: float = field(default=1.0, metadata=SHARE)
     widening: float = field(default=0.0, metadata=SHARE)
 
     def __post_init__(self) -> None:
@@ -129,8 +137,21 @@ class PPOConfig(TrainingConfig):
 
     def start_spread_at(self, done: float) -> float:
         """Spread of the start configurations after this share of the training."""
-        final = self.problem.task.start_spread
+        return self.problem.task.start_spread * self._widened(self.initial_start_spread, 1.0, done)
+
+    def gamma_at(self, done: float) -> float:
+        """Discount per step after this share of the training."""
+        if self.initial_gamma is None:
+            return self.gamma
+        return self._widened(self.initial_gamma, self.gamma, done)
+
+    def penalty_at(self, done: float) -> float:
+        """Share of the penalty for contact that counts after this share of the training."""
+        return self.initial_penalty + (1 - self.initial_penalty) * done
+
+    def _widened(self, initial: float, final: float, done: float) -> float:
+        """What changes from an initial to a final value, after this share of the training."""
         if done >= self.widening:
             return final
         grown = done / self.widening
-        return (1 - grown) * self.initial_start_spread + grown * final
+        return (1 - grown) * initial + grown * final

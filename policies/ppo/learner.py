@@ -104,6 +104,8 @@ class PPOTraining:
         learning_rate = config.learning_rate_at(done)
         model.lr_schedule = lambda _: learning_rate
         env.draw_from(scenarios, config.start_spread_at(done))
+        env.punish_by(config.penalty_at(done))
+        model.discount_by(config.gamma_at(done))
         model.learn(config.steps_per_iteration, reset_num_timesteps=False)
         returns, successes, simulator_time = env.take_ended()
         point = CurvePoint(

@@ -119,6 +119,10 @@ class CompiledPPO(PPO):
                     "exp_avg_sq": torch.from_numpy(second).view_as(weight),
                 }
 
+    def discount_by(self, gamma: float) -> None:
+        """From now on, discount rewards by this factor per step."""
+        self.gamma = self.rollout_buffer.gamma = gamma
+
     @property
     def _minibatches(self) -> int:
         """Steps of Adam in an epoch."""

@@ -1,8 +1,9 @@
 """Settings of Proximal Policy Optimization by name."""
 
 from dataclasses import replace
+from typing import Any
 
-from kinarm.policies.config import relative_reach
+from kinarm.policies.config import rewarded_per_reach
 from kinarm.policies.ppo.config import PPOConfig
 from kinarm.task import RewardWeights
 
@@ -33,23 +34,28 @@ best that we found.
 """
 
 
+UNALIKE: dict[str, Any] = {
+    "initial_gamma": 0.9,
+    "initial_penalty": 0.05,
+    "reward": RewardWeights(progress=12.0, collision=-6.0, success=5.0),
+}
+"""What ``tuned`` is where several regions are to be reached and no reflection maps them."""
+
+
 def adapted(config: PPOConfig) -> PPOConfig:
     """Adapt ``tuned`` to its problem.
 
     Progress is rewarded in proportion to the arm's reach, and the training's tolerance is a share
-    of the task's. Where several regions are to be reached and no reflection maps one to the other,
-    progress counts five times as much: else learning hardly begins before contact is all that is
-    avoided.
+    of the task's. Where several regions are to be reached and no reflection maps one to another,
+    progress counts more, and the future and contact less at first: else contact is avoided long
+    before all regions are reached.
     """
     from kinarm.policies.mirror import has_mirror  # loads Pinocchio
 
     if config.recipe != "tuned":
         return config
-    problem = config.problem
-    alike = len(problem.task.goal_regions) == 1 or has_mirror(problem)
-    progress = (1.0 if alike else 5.0) / relative_reach(problem)
-    return replace(
-        config,
-        training_tolerance=0.6 * problem.task.tolerance,
-        reward=RewardWeights(progress=progress, success=5.0),
-    )
+    task, symmetric = config.problem.task, has_mirror(config.problem)
+    if len(task.goal_regions) > 1 and not symmetric:
+        config = replace(config, **UNALIKE)
+    config = replace(config, symmetric=symmetric, training_tolerance=0.6 * task.tolerance)
+    return rewarded_per_reach(config)

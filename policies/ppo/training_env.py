@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from kinarm.envs.interface import Verdict
 from kinarm.episodes import Episodes
+from kinarm.kernels.reward import COLLISION
 from kinarm.networks import Mirror
 from kinarm.policies.normalizer import Normalizer, input_scale
 from kinarm.policies.ppo.state import EpisodeStates
@@ -26,6 +27,11 @@ class NormalizedInterface:
         Length of an observation.
     mirror : Mirror, optional
         Arms whose goal lies to the left are seen in it.
+
+    Attributes
+    ----------
+    penalty : float
+        Share of the penalty for contact that counts.
     """
 
     tells_terms = True
@@ -33,7 +39,7 @@ class NormalizedInterface:
     def __init__(self, n_observations: int, mirror: Mirror | None) -> None:
         unbounded = Box(-np.inf, np.inf, (n_observations,), dtype=np.float32)
         self.observation_space: Space[Any] = unbounded
-        self.mirror = mirror
+        self.mirror, self.penalty = mirror, 1.0
         self.normalize_by(Normalizer.empty(n_observations))
 
     def normalize_by(self, normalizer: Normalizer) -> None:
@@ -48,8 +54,9 @@ class NormalizedInterface:
         return shown
 
     def judge(self, episodes: Episodes, result: StepResult) -> Verdict:  # noqa: ARG002
-        """Take the simulator's reward and endings."""
-        return Verdict(result.reward, result.terminated, result.truncated)
+        """Take the simulator's reward, with a share of its penalty for contact, and endings."""
+        remitted = (1.0 - self.penalty) * result.terms[:, COLLISION]
+        return Verdict(result.reward - remitted, result.terminated, result.truncated)
 
 
 class EndedEpisodes(NamedTuple):
@@ -85,6 +92,10 @@ class TrainingVecEnv(SB3VecEnv):
     def normalize_by(self, normalizer: Normalizer) -> None:
         """From now on, normalise observations by these statistics, of what the learner sees."""
         self._shown.normalize_by(normalizer)
+
+    def punish_by(self, penalty: float) -> None:
+        """From now on, let this share of the penalty for contact count."""
+        self._shown.penalty = penalty
 
     def draw_from(self, rng: np.random.Generator, start_spread: float | None = None) -> None:
         """From now on, draw scenarios from this generator; with the task's start spread if None."""

@@ -117,6 +117,24 @@ def test_every_setting_reaches_the_training(run, tmp_path):
     assert made.config["symmetric"]
 
 
+SYMMETRIC = ("ars", "--symmetric", "--iterations", 1)
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        (SYMMETRIC, "symmetric has no effect: obstacles or goals are not their own mirror image"),
+        ((*SYMMETRIC, "--task", "both"), ""),
+        (("ars", "--recipe", "tuned", "--iterations", 1), ""),
+    ],
+)
+def test_a_setting_without_effect_is_told(run, tmp_path, options, line):
+    answer = run("kinarm-train", *options, "--out", tmp_path / "p.npz")
+    assert answer.status == 0
+    told = [each for each in answer.err.splitlines() if "symmetric" in each]
+    assert told == ([line] if line else [])
+
+
 def test_a_recipe_and_a_problem_from_files(run, tmp_path):
     PROBLEMS["left"].replace(tolerance=0.1, name="near").save(tmp_path / "near.toml")
     (tmp_path / "mine.toml").write_text('problem = "near.toml"\niterations = 3\nseed = 5\n')

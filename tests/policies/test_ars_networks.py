@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 
 from kinarm.errors import InvalidInputError
+from kinarm.observation import part_slices
 from kinarm.policies import ARSConfig, train_policy
-from kinarm.policies.ars.networks import initial_network, network_layers, perturbed_networks
+from kinarm.policies.ars.networks import (
+    first_deviations,
+    initial_network,
+    network_layers,
+    perturbed_networks,
+)
 from kinarm.policies.normalizer import Normalizer
 
 WIDTHS = (7, 5, 3, 2)
@@ -32,16 +38,29 @@ def by_networks(networks, row, observation):
 
 
 def test_first_network_does_nothing_and_has_lively_inner_layers():
-    theta = initial_network(np.random.default_rng(0), (400, 100, 2))
-    assert theta.shape == (1, 401 * 100 + 101 * 2)
-    inner, last = network_layers(theta, (400, 100))
-    assert inner.weights.std() == pytest.approx(1 / 20, rel=0.02)
-    assert not any(array.any() for array in (inner.bias, last.weights, last.bias))
+    deviations = np.repeat([0.5, 0.02], 200)
+    theta = initial_network(np.random.default_rng(0), deviations, (100, 50, 2))
+    assert theta.shape == (1, 401 * 100 + 101 * 50 + 51 * 2)
+    first, second, last = network_layers(theta, (400, 100, 50))
+    assert first.weights[:, :200].std() == pytest.approx(0.5, rel=0.02)
+    assert first.weights[:, 200:].std() == pytest.approx(0.02, rel=0.02)
+    assert second.weights.std() == pytest.approx(1 / 10, rel=0.05)
+    still = (first.bias, second.bias, last.weights, last.bias)
+    assert not any(array.any() for array in still)
+
+
+@pytest.mark.parametrize("n_joints", [5, 7])
+def test_all_parts_of_an_observation_are_heard_alike(n_joints):
+    deviations = first_deviations(n_joints)
+    parts = part_slices(n_joints).values()
+    heard = [np.square(deviations[part]).sum() for part in parts]
+    assert len(deviations) == max(part.stop for part in parts)
+    np.testing.assert_allclose(heard, 1.5**2 / len(heard))
 
 
 def test_perturbed_networks_take_raw_observations():
     rng = np.random.default_rng(1)
-    theta = rng.normal(size=initial_network(rng, WIDTHS).shape)
+    theta = rng.normal(size=initial_network(rng, np.ones(WIDTHS[0]), WIDTHS[1:]).shape)
     step = 0.1 * rng.normal(size=(3, *theta.shape))
     data = rng.normal([1, 2, 3, 4, 5, 6, 7], [1, 2, 1, 2, 1, 2, 0], (50, 7))
     normalizer, x = Normalizer.of(data), rng.normal(size=7)

@@ -16,6 +16,7 @@ from kinarm.policies.mirror import (
     has_mirror,
     is_symmetric,
     mirror_findings,
+    missing_mirror,
     task_mirror,
 )
 from kinarm.policies.normalizer import Normalizer
@@ -128,6 +129,13 @@ class TestIsSymmetric:
         assert not has_mirror(problem)
         assert has_mirror(BOTH)
         assert not has_mirror(PROBLEMS["left"])
+
+    def test_why_there_is_none(self, lopsided):
+        reasons = [missing_mirror(each) for each in (BOTH.replace(arm=lopsided), PROBLEMS["left"])]
+        assert reasons == [
+            "arm 'lopsided' is not its own mirror image",
+            "obstacles or goals are not their own mirror image",
+        ]
 
 
 def test_statistics_are_those_of_the_data_and_its_mirror_image():

@@ -1,6 +1,7 @@
 """Trainings of a comparison: judged as any policy is, and told apart by their settings."""
 
-from dataclasses import replace
+import json
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -8,13 +9,14 @@ import pytest
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation import evaluate
 from kinarm.evaluation.comparison.learners import ComparedLearner, read_learners
-from kinarm.evaluation.comparison.runs import PlannedRun, Protocol, load_run, save_run
+from kinarm.evaluation.comparison.runs import CurvePoint, PlannedRun, Protocol, load_run, save_run
 from kinarm.evaluation.comparison.training import Judge, carry_out, sb3_model, train_sb3
-from kinarm.policies import Policy, recipe, train_policy
+from kinarm.policies import Policy, find_learner, recipe, train_policy
 from kinarm.problem import PROBLEMS
 
 FALLING = {"policy": "MlpPolicy", "learning_rate": 0.01}
 PROTOCOL = Protocol(trials=40)
+POINT = CurvePoint(1000, 1.0, 1.0, 20, 3, 0.1, 17.0)
 EASY = PROBLEMS["right"].replace(name="easy", tolerance=0.4)
 
 
@@ -48,7 +50,7 @@ class TestRecipes:
 
     def test_whole_training(self, monkeypatch):
         monkeypatch.setattr(
-            "kinarm.evaluation.comparison.training.recipe",
+            "kinarm.evaluation.comparison.runs.recipe",
             lambda *given, **changes: recipe(*given, **changes, iterations=5),
         )
         run = planned(read_learners()["ars-tuned"])
@@ -143,6 +145,27 @@ class TestFiles:
     )
     def test_other_settings_are_another_file(self, other):
         assert other.name != self.RUN.name
+
+    def test_a_changed_recipe_is_another_file(self, tmp_path, monkeypatch):
+        save_run(tmp_path, self.RUN, [POINT])
+        assert load_run(tmp_path, self.RUN) == (POINT,)
+        monkeypatch.setitem(
+            find_learner("ars").recipes, "paper", recipe("ars", "paper", reward={"success": 2.0})
+        )
+        assert load_run(tmp_path, replace(self.RUN)) is None
+
+    def test_what_a_recipe_becomes_for_a_problem_is_in_the_file(self, tmp_path):
+        lopsided = PROBLEMS["both"].replace(goal_weights=(1.0, 2.0))
+        run = planned(read_learners()["ars-tuned"], problem=lopsided)
+        save_run(tmp_path, run, [POINT])
+        settings = json.loads((tmp_path / f"{run.name}.json").read_text())["settings"]["recipe"]
+        made = recipe("ars", "tuned", problem=lopsided)
+        assert settings["net_arch"] == list(made.net_arch) == [16]
+        assert settings["reward"] == asdict(made.reward)
+        assert not {"problem", "seed"} & set(settings)
+
+    def test_foreign_learners_have_no_recipe(self):
+        assert planned(sb3_learner()).settings["recipe"] == {}
 
     @pytest.mark.parametrize("damage", [b"", b"[]", b'{"curve": []}', b'{"curve": [{"x": 1}]}'])
     def test_a_damaged_file_is_none(self, tmp_path, damage):

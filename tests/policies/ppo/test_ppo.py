@@ -289,6 +289,16 @@ def test_starts_spread_out_as_configured():
     assert (moved[-1] > limit).any()
 
 
+def test_discount_of_each_iteration():
+    """The first one looks as far ahead as it is told to, the next ones farther."""
+    changing = replace(TINY, gamma=0.99, initial_gamma=0.5, widening=0.5)
+    begun, states = train_policy(replace(TINY, gamma=0.5, iterations=1)).state, []
+    train_policy(changing, on_iteration=states.append)
+    np.testing.assert_array_equal(states[0].first_moment, begun.first_moment)
+    constant = train_policy(replace(TINY, gamma=0.5, iterations=2), state=states[0]).state
+    assert (states[1].first_moment != constant.first_moment).any()
+
+
 class TestGlobalState:
     def test_random_states_and_threads_are_put_back(self):
         random.seed(1)

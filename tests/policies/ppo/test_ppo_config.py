@@ -40,6 +40,8 @@ def test_numbers_follow_from_others():
         ({"gamma": 1.5}, r"gamma must lie in \[0, 1\], got 1.5"),
         ({"gae_lambda": float("nan")}, "gae_lambda"),
         ({"initial_start_spread": -0.1}, "initial_start_spread"),
+        ({"initial_gamma": 1.1}, "initial_gamma"),
+        ({"initial_penalty": -0.5}, "initial_penalty"),
         ({"widening": 2}, "widening"),
         ({"ent_coef": -1}, "ent_coef must not be negative, got -1"),
         ({"vf_coef": float("nan")}, "vf_coef"),
@@ -63,6 +65,25 @@ def test_learning_rate():
     assert PPOConfig(learning_rate=0.01).learning_rate_at(0.25) == 0.01
     falling = PPOConfig(learning_rate=0.01, learning_rate_schedule="linear")
     assert [falling.learning_rate_at(done) for done in (0, 0.75)] == [0.01, 0.0025]
+
+
+def test_discount_widens_as_the_starts_do():
+    config = PPOConfig(gamma=0.9, initial_gamma=0.5, widening=0.5)
+    assert [config.gamma_at(done) for done in (0, 0.25, 0.5, 1)] == [0.5, 0.7, 0.9, 0.9]
+    assert PPOConfig(gamma=0.9, widening=0.5).gamma_at(0.3) == 0.9
+
+
+def test_penalty_grows_to_the_end():
+    config = PPOConfig(initial_penalty=0.2, widening=0.5)
+    assert [config.penalty_at(done) for done in (0, 0.5, 1)] == pytest.approx([0.2, 0.6, 1])
+    assert [PPOConfig().penalty_at(done) for done in (0, 0.3, 1)] == [1, 1, 1]
+
+
+def test_starts_widen_to_the_spread_of_the_task():
+    problem = PROBLEMS["right"].replace(start_spread=0.5)
+    config = PPOConfig(problem=problem, initial_start_spread=0.2, widening=0.5)
+    spreads = [config.start_spread_at(done) for done in (0, 0.25, 0.5)]
+    assert spreads == pytest.approx([0.1, 0.3, 0.5])
 
 
 def test_training_differs_from_the_problem_in_reward_and_tolerance():

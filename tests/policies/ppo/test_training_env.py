@@ -223,3 +223,20 @@ class TestMirror:
 def test_step_before_reset(make_env):
     with pytest.raises(InvalidInputError, match="never begun"):
         make_env().step(np.zeros((NUMBER, 5)))
+
+
+def test_a_share_of_the_penalty(make_env):
+    """All else is rewarded as before."""
+    whole, mild = make_env(number=60), make_env(number=60)
+    mild.punish_by(0.25)
+    rng, touched = np.random.default_rng(3), 0
+    for env in (whole, mild):
+        env.reset()
+    for _ in range(30):
+        actions = rng.uniform(-1, 1, (60, whole.simulator.n_actions))
+        (_, rewards, _, infos), (_, milder, _, _) = whole.step(actions), mild.step(actions)
+        touching = np.array([info.get("collision", False) for info in infos])
+        expected = rewards - 0.75 * REWARD.collision * touching
+        np.testing.assert_allclose(milder, expected, rtol=0, atol=1e-6)
+        touched += touching.sum()
+    assert touched > 5
