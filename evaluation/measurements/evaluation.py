@@ -1,12 +1,15 @@
 """``kinarm-eval`` as a process."""
 
 import os
+import signal
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Mapping
 
 from kinarm._cache import CACHE_VARIABLE
+from kinarm.errors import WorkerError
 
 RUN_AND_TELL = """
 import resource, subprocess, sys
@@ -15,6 +18,20 @@ subprocess.run(run, stdout=subprocess.DEVNULL, check=True)
 print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
 """
 """A small process in between: the peak memory of another one counts that which started it."""
+
+
+def _told_by(command: list[str], env: Mapping[str, str]) -> bytes:
+    """Output of processes that do not see what a terminal sends, and end if this one is to."""
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdout=pipe, env=env, start_new_session=True) as process:
+        try:
+            told, _ = process.communicate()
+        except BaseException:
+            os.killpg(process.pid, signal.SIGKILL)
+            raise
+    if process.returncode:
+        raise WorkerError("an evaluation that was to be measured ended unexpectedly")
+    return told
 
 
 def measure_evaluation() -> dict[str, float]:
@@ -29,9 +46,9 @@ def measure_evaluation() -> dict[str, float]:
         env = {**os.environ, CACHE_VARIABLE: folder}
         for _ in range(2):
             began = time.perf_counter()
-            told = subprocess.run(command, stdout=subprocess.PIPE, check=True, env=env)
+            told = _told_by(command, env)
             seconds.append(time.perf_counter() - began)
-            peaks.append(int(told.stdout))
+            peaks.append(int(told))
     before, after = seconds
     peak = max(peaks) / 1024
     return {"seconds_without_bounds": before, "seconds": after, "peak_memory_mb": peak}

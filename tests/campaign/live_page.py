@@ -19,6 +19,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
+
 from .processes import PATIENCE, Subject, own_cache, started, write
 
 CROWD = 2000
@@ -26,6 +28,9 @@ CROWD = 2000
 
 PAUSE = 0.1
 """Between polite visits [s]."""
+
+QUIET = 50
+"""Polite visits before the hostile ones."""
 
 SETTLING, STILL = 12.0, 2.0
 """Memory that changes less than that [MB] in so long [s] is settled."""
@@ -129,8 +134,9 @@ class Record:
 
     Attributes
     ----------
-    slowest_answer : float
-        Of a polite visit: until the first command of the scene was there [s].
+    undisturbed, median_answer, slowest_answer : float
+        How long polite visits took, until the first command of the scene was there: the slowest
+        before hostile ones came, and all of them meanwhile [s].
     memory, peak_memory : float
         Resident memory of the command before and at its highest [MB].
     files, files_left : int
@@ -139,6 +145,8 @@ class Record:
 
     acts: int = 0
     polite_visits: int = 0
+    undisturbed: float = 0.0
+    median_answer: float = 0.0
     slowest_answer: float = 0.0
     memory: float = 0.0
     peak_memory: float = 0.0
@@ -218,15 +226,20 @@ def campaign(count: int, seed: int, most_memory: float = 50.0) -> Record:
         folder = Path(name)
         with live_page(folder) as (pid, port):
             record.memory, record.files = _settled_memory(pid), _files(pid)
+            record.undisturbed = round(max(politely(port) for _ in range(QUIET)), 3)
+            answers: list[float] = []
             hostile = multiprocessing.get_context("spawn").Process(
                 target=pester, args=(port, count, seed)
             )
             hostile.start()
             while hostile.is_alive():
-                _visit(record, port)
+                answers += _visit(record, port)
                 time.sleep(PAUSE)
             hostile.join()
-            _visit(record, port)
+            answers += _visit(record, port)
+            record.polite_visits = len(answers)
+            record.median_answer = round(float(np.median(answers)), 3)
+            record.slowest_answer = round(max(answers), 3)
             record.files_left = _files_when_all_left(pid, record.files)
             record.peak_memory = _memory(pid, "VmHWM:")
         if record.peak_memory - record.memory > most_memory:
@@ -238,14 +251,13 @@ def campaign(count: int, seed: int, most_memory: float = 50.0) -> Record:
     return record
 
 
-def _visit(record: Record, port: int) -> None:
+def _visit(record: Record, port: int) -> list[float]:
+    """How long a polite visit takes [s]; none if it fails."""
     try:
-        seconds = politely(port)
+        return [politely(port)]
     except OSError as error:
         record.find(f"a polite visitor gets {type(error).__name__}")
-    else:
-        record.polite_visits += 1
-        record.slowest_answer = max(record.slowest_answer, round(seconds, 3))
+        return []
 
 
 def _files_when_all_left(pid: int, before: int) -> int:
