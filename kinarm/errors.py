@@ -20,9 +20,12 @@ WorkerError, which is a failure of the machine.
 
 from collections.abc import Iterable
 
+LONGEST = 1500
+"""Characters of a message; of a longer one, the middle is left out."""
+
 
 class KinarmError(Exception):
-    """Base of all errors that kinarm raises on purpose.
+    """Base of all errors that kinarm raises on purpose; what they say is one line.
 
     Attributes
     ----------
@@ -31,6 +34,12 @@ class KinarmError(Exception):
     """
 
     exit_status = 2
+
+    def __str__(self) -> str:
+        text = " ".join(super().__str__().split())
+        if len(text) <= LONGEST:
+            return text
+        return f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 :]}"
 
 
 class ArmError(KinarmError):

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from kinarm._command_line import run_request
 from kinarm._console import open_console
-from kinarm._files import check_output, write_text
+from kinarm._files import absolute, check_output, only_writer, write_text
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
 from kinarm.problem_files import problem_names
@@ -136,8 +137,22 @@ class EvaluationRequest(ProblemOptions):
         """
         from kinarm.evaluation.document import evaluation_document
 
-        evaluations = self.evaluate(tell)
-        document = evaluation_document(evaluations, repr(self) if command is None else command)
+        pairs = self._checked_pairs()
+        with ExitStack() as locks:
+            for folder in {absolute(each) for each in (self.out, self.report) if each}:
+                locks.enter_context(only_writer(folder))
+            evaluations = self._face(pairs, tell)
+            document = evaluation_document(evaluations, repr(self) if command is None else command)
+            self._write(document, evaluations, tell)
+        return document
+
+    def _write(
+        self,
+        document: dict[str, Any],
+        evaluations: "list[Evaluation]",
+        tell: Callable[[str], object],
+    ) -> None:
+        """Write what is asked for."""
         if self.report is not None:
             from kinarm.evaluation.report.page import write_report
 
@@ -154,7 +169,6 @@ class EvaluationRequest(ProblemOptions):
             write_text(self.out / DOCUMENT, json.dumps(document, indent=1))
             shown = [e for e in evaluations if e.entrant.algorithm != "oracle"] or evaluations
             save_figure(distance_histograms(shown), self.out, HISTOGRAMS)
-        return document
 
     def evaluate(self, tell: Callable[[str], object] = lambda _: None) -> "list[Evaluation]":
         """Let every chosen policy face its trials; whatever is wrong is refused before that.
@@ -169,16 +183,25 @@ class EvaluationRequest(ProblemOptions):
         KinarmError
             As for `run`.
         """
+        return self._face(self._checked_pairs(), tell)
+
+    def _checked_pairs(self) -> list[Pair]:
+        """Who faces which problem, if all of them can and the files can be written."""
+        pairs = self.pairs()
+        arms = {problem.name: problem.load_arm() for _, problem in pairs}
+        for entrant, problem in pairs:
+            entrant.check(arms[problem.name], allow_other_arm=self.allow_other_arm)
+        self._check_outputs(pairs)
+        return pairs
+
+    def _face(self, pairs: list[Pair], tell: Callable[[str], object]) -> "list[Evaluation]":
+        """Let policies face their trials, problem by problem."""
         from kinarm.evaluation.bounds import oracle_bounds
         from kinarm.evaluation.evaluation import run_trials
         from kinarm.evaluation.trials import TrialSet
 
-        pairs, evaluations = self.pairs(), []
         problems = {problem.name: problem for _, problem in pairs}
-        arms = {name: problem.load_arm() for name, problem in problems.items()}
-        for entrant, problem in pairs:
-            entrant.check(arms[problem.name], allow_other_arm=self.allow_other_arm)
-        self._check_outputs(pairs)
+        evaluations: list[Evaluation] = []
         say_choices(problems.values())
         for name, problem in problems.items():
             trials = TrialSet.draw(problem, self.trials, self.seed)
