@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import warnings
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -132,7 +133,7 @@ def parse_json(text: str) -> Any:
 def _arrays(file: IO[bytes]) -> dict[str, NDArray[Any]]:
     """Arrays of a ``.npz`` file; whatever it claims to hold, little more than its size is read."""
     arrays: dict[str, NDArray[Any]] = {}
-    with zipfile.ZipFile(file) as archive:
+    with warnings.catch_warnings(action="ignore"), zipfile.ZipFile(file) as archive:
         members = archive.infolist()
         claimed = sum(member.file_size for member in members)
         if claimed > GROWTH * os.fstat(file.fileno()).st_size + SLACK:

@@ -9,6 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm.errors import InvalidInputError
 
+MOST_TRIALS = 10_000_000
+"""Trials of a set at most: memory grows with them."""
+
 
 def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
     """Copy an argument into a contiguous float64 array.
@@ -61,10 +64,12 @@ def _matches(actual: tuple[int, ...], expected: tuple[int | None, ...]) -> bool:
     )
 
 
-def whole_number(name: str, value: object, at_least: int) -> int:
-    """Return a whole number that is large enough, or raise InvalidInputError."""
+def whole_number(name: str, value: object, at_least: int, at_most: float = math.inf) -> int:
+    """Return a whole number that is in range, or raise InvalidInputError."""
     if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < at_least:
         raise InvalidInputError(
             f"{name} must be a whole number of at least {at_least}, got {value!r}"
         )
+    if value > at_most:
+        raise InvalidInputError(f"{name} must be at most {at_most}, got {value}")
     return int(value)

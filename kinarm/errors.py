@@ -24,6 +24,14 @@ LONGEST = 1500
 """Characters of a message; of a longer one, the middle is left out."""
 
 
+def one_line(text: str) -> str:
+    """A message as one line, without the middle of one that is very long."""
+    line = " ".join(text.split())
+    if len(line) <= LONGEST:
+        return line
+    return f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}"
+
+
 class KinarmError(Exception):
     """Base of all errors that kinarm raises on purpose; what they say is one line.
 
@@ -36,10 +44,7 @@ class KinarmError(Exception):
     exit_status = 2
 
     def __str__(self) -> str:
-        text = " ".join(super().__str__().split())
-        if len(text) <= LONGEST:
-            return text
-        return f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 :]}"
+        return one_line(super().__str__())
 
 
 class ArmError(KinarmError):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from kinarm._command_line import run_request
 from kinarm._console import open_console
 from kinarm._files import absolute, check_output, only_writer, write_text
-from kinarm._validation import whole_number
+from kinarm._validation import MOST_TRIALS, whole_number
 from kinarm.errors import InvalidInputError
 from kinarm.problem_files import problem_names
 from kinarm.problem_options import ProblemOptions, say_choices
@@ -37,6 +37,9 @@ DOCUMENT, HISTOGRAMS, REPORT = "evaluation.json", "final_distance", "index.html"
 
 Pair = tuple["Entrant", "ReachProblem"]
 """Who faces what."""
+
+Tell = Callable[[str], object]
+"""Is told what is being done."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,12 +113,10 @@ class EvaluationRequest(ProblemOptions):
     markdown: bool = False
 
     def __post_init__(self) -> None:
-        whole_number("trials", self.trials, 1)
+        whole_number("trials", self.trials, 1, MOST_TRIALS)
         whole_number("seed", self.seed, 0)
 
-    def run(
-        self, command: str | None = None, tell: Callable[[str], object] = lambda _: None
-    ) -> dict[str, Any]:
+    def run(self, command: str | None = None, tell: Tell = lambda _: None) -> dict[str, Any]:
         """Evaluate, and write what is asked for.
 
         Parameters
@@ -146,12 +147,7 @@ class EvaluationRequest(ProblemOptions):
             self._write(document, evaluations, tell)
         return document
 
-    def _write(
-        self,
-        document: dict[str, Any],
-        evaluations: "list[Evaluation]",
-        tell: Callable[[str], object],
-    ) -> None:
+    def _write(self, document: dict[str, Any], evaluations: "list[Evaluation]", tell: Tell) -> None:
         """Write what is asked for."""
         if self.report is not None:
             from kinarm.evaluation.report.page import write_report
@@ -170,19 +166,8 @@ class EvaluationRequest(ProblemOptions):
             shown = [e for e in evaluations if e.entrant.algorithm != "oracle"] or evaluations
             save_figure(distance_histograms(shown), self.out, HISTOGRAMS)
 
-    def evaluate(self, tell: Callable[[str], object] = lambda _: None) -> "list[Evaluation]":
-        """Let every chosen policy face its trials; whatever is wrong is refused before that.
-
-        Parameters
-        ----------
-        tell : callable
-            Called with what is being done.
-
-        Raises
-        ------
-        KinarmError
-            As for `run`.
-        """
+    def evaluate(self, tell: Tell = lambda _: None) -> "list[Evaluation]":
+        """Let every chosen policy face its trials; as `run`, but for the files."""
         return self._face(self._checked_pairs(), tell)
 
     def _checked_pairs(self) -> list[Pair]:
@@ -194,7 +179,7 @@ class EvaluationRequest(ProblemOptions):
         self._check_outputs(pairs)
         return pairs
 
-    def _face(self, pairs: list[Pair], tell: Callable[[str], object]) -> "list[Evaluation]":
+    def _face(self, pairs: list[Pair], tell: Tell) -> "list[Evaluation]":
         """Let policies face their trials, problem by problem."""
         from kinarm.evaluation.bounds import oracle_bounds
         from kinarm.evaluation.evaluation import run_trials
@@ -297,7 +282,7 @@ class EvaluationRequest(ProblemOptions):
                 check_output(self.out / name, overwrite=self.overwrite)
 
 
-def _tell_bounds(tell: Callable[[str], object], problem: str, done: int, total: int) -> None:
+def _tell_bounds(tell: Tell, problem: str, done: int, total: int) -> None:
     """Say how far the oracle is."""
     tell(f"what could any policy reach on {problem}? {done} of {total} trials solved")
 

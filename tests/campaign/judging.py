@@ -47,7 +47,7 @@ class Judge:
     """
 
     def __enter__(self) -> "Judge":
-        self._printed = tempfile.TemporaryFile()  # noqa: SIM115
+        self._printed = tempfile.TemporaryFile()
         self._kept = os.dup(2)
         os.dup2(self._printed.fileno(), 2)
         self._calls = 0

@@ -162,9 +162,7 @@ def record(tallies: Mapping[str, Tally], given: argparse.Namespace, module: str)
         file.write(json.dumps(content, indent=1) + "\n")
 
 
-def campaign(
-    subjects: Mapping[str, MakeTry], given: argparse.Namespace, module: str
-) -> int:
+def campaign(subjects: Mapping[str, MakeTry], given: argparse.Namespace, module: str) -> int:
     """Run the inputs of every subject, show progress, record; returns how many findings."""
     chosen = {name: make for name, make in subjects.items() if name in (given.only or subjects)}
     tallies: dict[str, Tally] = {}
