@@ -164,7 +164,7 @@ def record(tallies: Mapping[str, Tally], given: argparse.Namespace, module: str)
 
 def campaign(subjects: Mapping[str, MakeTry], given: argparse.Namespace, module: str) -> int:
     """Run the inputs of every subject, show progress, record; returns how many findings."""
-    chosen = {name: make for name, make in subjects.items() if name in (given.only or subjects)}
+    chosen = {name: subjects[name] for name in given.only or subjects}
     tallies: dict[str, Tally] = {}
     for name, make_try in chosen.items():
         tally = tallies[name] = Tally()
