@@ -22,7 +22,7 @@ class Rule(NamedTuple):
 
     Attributes
     ----------
-    count : int
+    n : int
         How many.
     default : str or None
         What it is where it is left out; None if it must be there.
@@ -30,7 +30,7 @@ class Rule(NamedTuple):
         Range of each.
     """
 
-    count: int
+    n: int
     default: str | None
     least: float = -FARTHEST
     most: float = FARTHEST
@@ -127,11 +127,11 @@ def check_numbers(element: Element, where: str) -> None:
         if given is None:
             raise ArmError(f"{where}: <{element.tag}> lacks {name}")
         numbers = _numbers(given)
-        if len(numbers) != rule.count or not all(rule.least <= x <= rule.most for x in numbers):
+        if len(numbers) != rule.n or not all(rule.least <= x <= rule.most for x in numbers):
             least, most = max(rule.least, -FARTHEST), min(rule.most, FARTHEST)
-            wanted = f"{rule.count} from {least:g} to {most:g}"
+            wanted = f"{rule.n} from {least:g} to {most:g}"
             if rule.most > FARTHEST:
-                wanted = f"{rule.count} of any size"
+                wanted = f"{rule.n} of any size"
             raise ArmError(
                 f"{where}: numbers of {name} of <{element.tag}> must be {wanted}, got {given!r}"
             )

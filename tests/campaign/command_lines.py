@@ -198,7 +198,7 @@ class CommandJudge:
         self._stack = contextlib.ExitStack()
         for unused in self._program.unused:
             self._stack.enter_context(mock.patch(unused, side_effect=PreparedError))
-        self._judge = self._stack.enter_context(Judge())
+        self._judge = self._stack.enter_context(Judge(traced=0))
         for name, content in DAMAGED.items():
             Path(name).write_bytes(content)
         Path("folder").mkdir(exist_ok=True)

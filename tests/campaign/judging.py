@@ -19,7 +19,7 @@ MEMORY_FACTOR, MEMORY_SLACK = 4, 50 * 10**6
 """What a loader may take: times the size of its file, and bytes."""
 
 TRACED = 250
-"""Every input of so many is watched by tracemalloc, too."""
+"""Every input of so many is watched by tracemalloc, unless another number is given."""
 
 
 class Verdict(NamedTuple):
@@ -44,7 +44,15 @@ class Judge:
     """Calls, watches what they print, raise and take, and says what is wrong with that.
 
     To be used as a context, in a process of its own: standard error goes to a file.
+
+    Parameters
+    ----------
+    traced : int
+        Every input of so many is watched by tracemalloc, too; none if it is 0.
     """
+
+    def __init__(self, traced: int = TRACED) -> None:
+        self._traced = traced
 
     def __enter__(self) -> "Judge":
         self._printed = tempfile.TemporaryFile()
@@ -66,7 +74,7 @@ class Judge:
     def __call__(self, load: Callable[[Path], object], path: Path) -> Verdict:
         """Let a loader read a file."""
         self._calls += 1
-        traced = self._calls % TRACED == 1
+        traced = self._traced > 0 and self._calls % self._traced == 1
         limit = MEMORY_FACTOR * path.stat().st_size + MEMORY_SLACK
         before = self._memory.restart()
         if traced:

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from functools import partial
+from itertools import pairwise
 from multiprocessing.connection import Connection
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -22,8 +23,11 @@ import numpy as np
 
 from .judging import Verdict
 
-PATIENCE = 30.0
+PATIENCE = 120.0
 """Time after which a call counts as hanging [s]."""
+
+ROUNDS = (50, 10, 1)
+"""Shares of the inputs after which all subjects have had their turn, as divisors."""
 
 FORK = multiprocessing.get_context("fork")
 
@@ -75,24 +79,25 @@ def generator(seed: int, subject: str, number: int) -> np.random.Generator:
     return np.random.default_rng((seed, zlib.crc32(subject.encode()), number))
 
 
-def run_inputs(make_try: MakeTry, inputs: int) -> Iterator[tuple[int, Verdict]]:
+def run_inputs(make_try: MakeTry, inputs: int, first: int = 0) -> Iterator[tuple[int, Verdict]]:
     """Judge inputs in another process; where that ends or hangs, another one goes on.
 
     Parameters
     ----------
     make_try : callable
         Prepares a process, whose folder it is given, and returns what judges an input there.
-    inputs : int
-        How many, counted from 0.
+    inputs, first : int
+        Where the numbers of inputs end, and begin.
     """
     memory = "/dev/shm" if Path("/dev/shm").is_dir() else None  # files that need no disk
     with TemporaryDirectory(prefix="campaign-", dir=memory) as folder:
-        yield from _verdicts(partial(make_try, Path(folder)), inputs)
+        yield from _verdicts(partial(make_try, Path(folder)), first, inputs)
 
 
-def _verdicts(make_try: Callable[[], Try], inputs: int) -> Iterator[tuple[int, Verdict]]:
-    """Judge inputs in processes."""
-    number = 0
+def _verdicts(
+    make_try: Callable[[], Try], number: int, inputs: int
+) -> Iterator[tuple[int, Verdict]]:
+    """Judge inputs from a number on, in processes."""
     while number < inputs:
         ours, theirs = FORK.Pipe(duplex=False)
         process = FORK.Process(target=_work, args=(make_try, number, inputs, theirs))
@@ -164,19 +169,25 @@ def record(tallies: Mapping[str, Tally], given: argparse.Namespace, module: str)
 
 def campaign(subjects: Mapping[str, MakeTry], given: argparse.Namespace, module: str) -> int:
     """Run the inputs of every subject, show progress, record; returns how many findings."""
-    chosen = {name: subjects[name] for name in given.only or subjects}
-    tallies: dict[str, Tally] = {}
-    for name, make_try in chosen.items():
-        tally = tallies[name] = Tally()
-        for number, verdict in run_inputs(make_try, given.inputs):
-            tally.add(number, verdict)
-            if sys.stderr.isatty() and number % 100 == 0:
-                sys.stderr.write(f"\r{name}: {number} of {given.inputs}")
-        sys.stderr.write(
-            f"\r{name}: {tally.inputs} inputs, {tally.accepted} accepted, {tally.refused} refused, "
-            f"{sum(tally.findings.values())} findings, {tally.peak_memory} MB\n"
-        )
-        for finding, times in tally.findings.most_common():
-            sys.stderr.write(f"    {times} x {finding}, first {tally.examples[finding]}\n")
-        record(tallies, given, module)
+    chosen = given.only or list(subjects)
+    tallies = {name: Tally() for name in chosen}
+    ends = [given.inputs // divisor for divisor in ROUNDS]
+    for first, end in pairwise([0, *ends]):
+        for name in chosen:
+            for number, verdict in run_inputs(subjects[name], end, first):
+                tallies[name].add(number, verdict)
+                if sys.stderr.isatty() and number % 100 == 0:
+                    sys.stderr.write(f"\r{name}: {number} of {given.inputs}")
+            _tell(name, tallies[name])
+            record({name: tallies[name]}, given, module)
     return sum(len(tally.findings) for tally in tallies.values())
+
+
+def _tell(name: str, tally: Tally) -> None:
+    """Say what came of a subject so far."""
+    sys.stderr.write(
+        f"\r{name}: {tally.inputs} inputs, {tally.accepted} accepted, {tally.refused} refused, "
+        f"{sum(tally.findings.values())} findings, {tally.peak_memory} MB\n"
+    )
+    for finding, times in tally.findings.most_common():
+        sys.stderr.write(f"    {times} x {finding}, first {tally.examples[finding]}\n")

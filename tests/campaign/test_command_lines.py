@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from .command_lines import PROGRAMS, CommandJudge, command_lines, drawn_line, inside
 from .running import generator
 
-DRAWN, MADE = 60, 25
+DRAWN, MADE = 30, 12
 
 
 @pytest.mark.parametrize("name", PROGRAMS)
