@@ -148,6 +148,14 @@ def is_file(path: str | Path) -> bool:
         return False
 
 
+def is_folder(path: str | Path) -> bool:
+    """Whether there is such a folder; not, if no folder can have this name."""
+    try:
+        return Path(path).is_dir()
+    except (OSError, ValueError):
+        return False
+
+
 def absolute(path: str | Path) -> Path:
     """The absolute path without links; as it stands if no file can have this name."""
     try:

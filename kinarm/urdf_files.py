@@ -5,7 +5,7 @@ from importlib import metadata
 from pathlib import Path
 from xml.etree import ElementTree
 
-from kinarm._files import absolute, is_file
+from kinarm._files import absolute, is_file, is_folder
 from kinarm.arm_specification import PACKAGE, arm_names
 from kinarm.errors import ArmError, UnknownNameError
 
@@ -25,7 +25,7 @@ def find_urdf(source: str) -> Path:
     path = Path(source)
     if is_file(path):
         return absolute(path)
-    if path.is_dir():
+    if is_folder(path):
         raise ArmError(f"{source!r} is a folder, not a URDF")
     if path.suffix == ".urdf" or path.parent != Path():
         raise ArmError(f"URDF {source!r} does not exist")

@@ -39,6 +39,7 @@ from . import samples
 from .judging import Judge, Verdict
 from .mutations import (
     Mutation,
+    cut_bytes,
     damaged_archive,
     damaged_bytes,
     damaged_json,
@@ -297,7 +298,7 @@ LOADERS: dict[str, Loader] = {
     "VecNormalize": Loader(
         ("policies.conversion.vec_normalize.load_vec_normalize",),
         samples.sb3_statistics,
-        damaged_bytes,
+        cut_bytes,
         load_vec_normalize,
         "file.pkl",
     ),

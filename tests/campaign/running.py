@@ -8,7 +8,6 @@ import shlex
 import sys
 import traceback
 import zlib
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
@@ -57,7 +56,7 @@ class Tally:
     inputs: int = 0
     accepted: int = 0
     refused: int = 0
-    findings: Counter[str] = field(default_factory=Counter)
+    findings: dict[str, int] = field(default_factory=dict)
     examples: dict[str, int] = field(default_factory=dict)
     peak_memory: float = 0.0
 
@@ -65,7 +64,7 @@ class Tally:
         """Count a verdict."""
         self.inputs += 1
         if verdict.finding:
-            self.findings[verdict.finding] += 1
+            self.findings[verdict.finding] = self.findings.get(verdict.finding, 0) + 1
             self.examples.setdefault(verdict.finding, number)
         elif verdict.accepted:
             self.accepted += 1
@@ -162,9 +161,10 @@ def record(tallies: Mapping[str, Tally], given: argparse.Namespace, module: str)
         file.seek(0)
         kept: dict[str, Any] = json.loads(file.read() or '{"subjects": {}}')["subjects"]
         kept |= {name: asdict(tally) for name, tally in tallies.items()}
-        file.truncate(0)
         content = {"command": command, "subjects": dict(sorted(kept.items()))}
-        file.write(json.dumps(content, indent=1) + "\n")
+        text = json.dumps(content, indent=1) + "\n"
+        file.truncate(0)
+        file.write(text)
 
 
 def campaign(subjects: Mapping[str, MakeTry], given: argparse.Namespace, module: str) -> int:
@@ -189,5 +189,5 @@ def _tell(name: str, tally: Tally) -> None:
         f"\r{name}: {tally.inputs} inputs, {tally.accepted} accepted, {tally.refused} refused, "
         f"{sum(tally.findings.values())} findings, {tally.peak_memory} MB\n"
     )
-    for finding, times in tally.findings.most_common():
+    for finding, times in tally.findings.items():
         sys.stderr.write(f"    {times} x {finding}, first {tally.examples[finding]}\n")

@@ -208,7 +208,8 @@ def sb3_model() -> Any:
     from kinarm.envs import ReachEnv
 
     env = VecNormalize(DummyVecEnv([lambda: ReachEnv("right")]))
-    return PPO("MlpPolicy", env, device="cpu", n_steps=8, policy_kwargs={"net_arch": [4]})
+    settings = {"n_steps": 8, "batch_size": 8, "policy_kwargs": {"net_arch": [4]}}
+    return PPO("MlpPolicy", env, device="cpu", **settings)
 
 
 def sb3_models() -> list[bytes]:
