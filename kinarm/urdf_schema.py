@@ -47,7 +47,7 @@ RULES: dict[str, dict[str, Rule]] = {
     "box": {"size": Rule(3, None, least=1e-9)},
     "sphere": {"radius": SIZE},
     "cylinder": {"radius": SIZE, "length": SIZE},
-    "capsule": {"radius": SIZE, "length": Rule(1, None, least=0.0)},
+    "capsule": {"radius": SIZE, "length": SIZE},
     "mesh": {"scale": Rule(3, "1 1 1")},
 }
 """Attributes of elements that hold numbers."""
