@@ -8,7 +8,7 @@ PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check 
 MODULES := $(shell find kinarm policies evaluation data -name __pycache__ -prune -o -type f -print | sort | cksum | cut -d' ' -f1)
 INSTALLED = $(VENV)/.installed-$(1)-$(MODULES)
 
-.PHONY: eval test test-slow lint docs clean
+.PHONY: eval test test-slow campaign lint docs clean
 
 eval: $(call INSTALLED,core) ## evaluate all shipped policies on 200 trials a task
 	$(BIN)/kinarm-eval --trials 200
@@ -20,8 +20,14 @@ test: $(call INSTALLED,test) ## run the tests, but for the slow ones
 	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow" --cov --cov-report=term \
 		--cov-fail-under=$$($(BIN)/python -c '$(COVERAGE)')
 
+CAMPAIGN := loaders command_lines writes signals live_page
+
 test-slow: $(call INSTALLED,test) ## run the slow tests, those in a browser included
 	$(BIN)/python -m pytest -n auto --dist loadfile -m slow
+
+campaign: $(call INSTALLED,all) ## damaged files, odd arguments, failing writes, signals: hours
+	set -e; for module in $(CAMPAIGN); do \
+		$(BIN)/python -m tests.campaign.$$module --out data/results/campaign/$$module.json; done
 
 lint: $(call INSTALLED,dev) ## check style, format and types
 	$(BIN)/ruff check .

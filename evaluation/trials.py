@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm._validation import whole_number
+from kinarm._validation import MOST_TRIALS, whole_number
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.simulator import Simulator
 from kinarm.task import RewardWeights
@@ -76,7 +76,7 @@ class TrialSet:
     @classmethod
     def draw_in(cls, simulator: Simulator, trials: int, seed: int) -> "TrialSet":
         """Draw trials of the problem of a simulator, to be faced in it; see `draw`."""
-        trials, seed = whole_number("trials", trials, 1), whole_number("seed", seed, 0)
+        trials, seed = whole_number("trials", trials, 1, MOST_TRIALS), whole_number("seed", seed, 0)
         drawn = [simulator.sample(trial_generator(seed, trial), 1) for trial in range(trials)]
         starts, goals = (np.concatenate(part) for part in zip(*drawn, strict=True))
         starts.flags.writeable = goals.flags.writeable = False

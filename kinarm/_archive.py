@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import warnings
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -12,7 +13,7 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm._files import first_line, write_atomically
+from kinarm._files import first_line, read_file, write_atomically
 from kinarm.errors import KinarmError
 
 KINDS = "biufU"
@@ -20,6 +21,9 @@ KINDS = "biufU"
 
 GROWTH, SLACK = 4, 50 * 10**6
 """How much larger than its file what is read may be: by a factor, and a number of bytes."""
+
+JSON_SIZES = {"[": 90, "{": 200, ",": 36, '"': 26}
+"""Memory that a value takes at most for each of its signs [bytes]."""
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -108,7 +112,7 @@ def load_archive(path: str | Path, kind: str, version: int, error: type[KinarmEr
             raise error(
                 f"{name} has format version {found}, of {age} kinarm; this one reads {version}"
             )
-        header = json.loads(str(content["header"]))
+        header = parse_json(str(content["header"]))
         if not isinstance(header, dict):
             raise error(f"{name} is not a complete kinarm {kind}: its header is no table")
         skip = ("format", "version", "header")
@@ -124,13 +128,27 @@ def load_json(path: str | Path, kind: str, error: type[KinarmError]) -> Any:
         Of the given type, in one line: if the file is missing or no JSON.
     """
     with reading(repr(str(path)), kind, error):
-        return json.loads(Path(path).read_text(encoding="utf-8"))
+        return parse_json(read_file(path).decode())
+
+
+def parse_json(text: str) -> Any:
+    """The value of a JSON document, if it takes little more memory than the document.
+
+    Raises
+    ------
+    ValueError
+        If it is no JSON, or takes more than `GROWTH` and `SLACK` allow.
+    """
+    memory = len(text) + sum(size * text.count(sign) for sign, size in JSON_SIZES.items())
+    if memory > GROWTH * len(text) + SLACK:
+        raise ValueError(f"it would take {memory / 1e6:.0f} MB of memory")
+    return json.loads(text)
 
 
 def _arrays(file: IO[bytes]) -> dict[str, NDArray[Any]]:
     """Arrays of a ``.npz`` file; whatever it claims to hold, little more than its size is read."""
     arrays: dict[str, NDArray[Any]] = {}
-    with zipfile.ZipFile(file) as archive:
+    with warnings.catch_warnings(action="ignore"), zipfile.ZipFile(file) as archive:
         members = archive.infolist()
         claimed = sum(member.file_size for member in members)
         if claimed > GROWTH * os.fstat(file.fileno()).st_size + SLACK:

@@ -15,7 +15,7 @@ from typing import Any, Literal, NamedTuple, NoReturn, TypeVar, get_args, get_or
 
 from kinarm._fields import alternatives, expected, init_fields, summary_of
 from kinarm._interrupts import EXIT_STATUS, begin, end, was_interrupted
-from kinarm.errors import KinarmError
+from kinarm.errors import KinarmError, one_line
 
 Request = TypeVar("Request")
 
@@ -28,7 +28,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Print one line on standard error and exit."""
-        self.exit(2, f"{self.prog}: {' '.join(message.split())} (see {self.prog} --help)\n")
+        self.exit(2, f"{self.prog}: {one_line(message)} (see {self.prog} --help)\n")
 
 
 def run_command(prog: str, command: Callable[[], None]) -> NoReturn:
@@ -95,7 +95,7 @@ def _discard_output() -> None:
 
 
 def _report(prog: str, message: str, status: int) -> int:
-    sys.stderr.write(f"{prog}: {' '.join(message.split())}\n")
+    sys.stderr.write(f"{prog}: {one_line(message)}\n")
     return status
 
 

@@ -16,7 +16,7 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 
 import numpy as np
 
-from kinarm._files import first_line
+from kinarm._files import first_line, read_file
 from kinarm.errors import InvalidInputError, KinarmError
 
 T = TypeVar("T")
@@ -25,6 +25,9 @@ PARAMETER = re.compile(r"^(\w+(?:, \w+)*) :", re.MULTILINE)
 UNIT = re.compile(r"\[([^\]]+)\]$")
 field_types: Callable[[type], dict[str, Any]] = cache(get_type_hints)
 """Types of the fields of a dataclass, by name."""
+
+LARGEST = 10**6
+"""Size of a TOML file at most [bytes]: people write them."""
 
 SCALARS = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
 
@@ -69,7 +72,7 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     """
     name, text = str(path), ""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_file(path, LARGEST).decode()
         return tomllib.loads(text)
     except OSError as error:
         raise InvalidInputError(f"cannot read {what} {name!r}: {error.strerror}") from error

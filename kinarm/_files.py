@@ -1,12 +1,13 @@
-"""Writing files so that a reader never sees half of one.
+"""Writing files so that a reader never sees half of one, and reading those that end.
 
-Each function raises `OutputError`, in one line, where it cannot write.
+Each function that writes raises `OutputError`, in one line, where it cannot.
 """
 
 import fcntl
 import glob
 import io
 import os
+import stat
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -18,6 +19,9 @@ from kinarm.errors import OutputError
 
 HALF_WRITTEN = ".part"
 """Ending of a file that is being written."""
+
+ENDLESS = 10**7
+"""What is no regular file, such as a pipe, is read up to so many bytes."""
 
 IN_USE = 60.0
 """Age below which a half-written file is left alone in any case [s]."""
@@ -78,7 +82,7 @@ def _sweep(target: Path) -> None:
 
 @contextmanager
 def only_writer(path: str | Path) -> Iterator[None]:
-    """Keep other processes from making the same output meanwhile.
+    """Keep other processes from making the same output, a file or a folder, meanwhile.
 
     Raises
     ------
@@ -86,7 +90,7 @@ def only_writer(path: str | Path) -> Iterator[None]:
         If another process is making it.
     """
     target = Path(os.path.realpath(path))
-    lock = target.with_name(f".{target.name}.lock")
+    lock = target / ".lock" if target.is_dir() else target.with_name(f".{target.name}.lock")
     try:
         file = _locked(lock)
     except BlockingIOError:
@@ -129,6 +133,50 @@ def _locked(lock: Path) -> IO[bytes]:
         file.close()
 
 
+def read_file(path: str | Path, most: int = 0) -> bytes:
+    """Read a file of at most so many bytes; of any size if it is a regular one and 0 is given.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read.
+    ValueError
+        If it is larger, as what never ends is.
+    """
+    with Path(path).open("rb") as file:
+        status = os.fstat(file.fileno())
+        size = status.st_size if stat.S_ISREG(status.st_mode) else ENDLESS
+        limit = min(size, most or size)
+        content = file.read(limit + 1)
+    if len(content) > limit:
+        raise ValueError(f"it is larger than {limit / 1e6:.0f} MB")
+    return content
+
+
+def is_file(path: str | Path) -> bool:
+    """Whether there is such a file; not, if no file can have this name."""
+    try:
+        return Path(path).is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def is_folder(path: str | Path) -> bool:
+    """Whether there is such a folder; not, if no folder can have this name."""
+    try:
+        return Path(path).is_dir()
+    except (OSError, ValueError):
+        return False
+
+
+def absolute(path: str | Path) -> Path:
+    """The absolute path without links; as it stands if no file can have this name."""
+    try:
+        return Path(os.path.realpath(path))
+    except (OSError, ValueError):
+        return Path(path)
+
+
 def write_text(path: str | Path, text: str) -> None:
     """Write a text file in UTF-8, as `write_atomically` does."""
     write_atomically(path, lambda file: file.write(text.encode()))
@@ -145,10 +193,14 @@ def check_output(path: str | Path, *, overwrite: bool = False, suffix: str = "")
     It must not exist unless ``overwrite`` says so, and its name must end in ``suffix``.
     """
     file = Path(path)
-    if file.is_dir() or (suffix and file.suffix != suffix):
+    try:
+        is_folder, exists = file.is_dir(), file.exists()
+    except OSError as error:
+        raise OutputError(f"cannot write {str(path)!r}: {error.strerror}") from error
+    if is_folder or (suffix and file.suffix != suffix):
         ending = f" that ends in {suffix}" if suffix else ""
         raise OutputError(f"the output must be a file{ending}, got {str(path)!r}")
-    if file.exists() and not overwrite:
+    if exists and not overwrite:
         raise OutputError(f"{str(path)!r} exists: --overwrite replaces it (overwrite=True)")
     check_folder(file.parent)
 

@@ -9,6 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm.errors import InvalidInputError
 
+MOST_TRIALS = 10_000_000
+"""Trials of a set at most: memory grows with them."""
+
 
 def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
     """Copy an argument into a contiguous float64 array.
@@ -26,8 +29,10 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> 
     if array.shape != shape and not _matches(array.shape, shape):
         wanted = ", ".join("n" if length is None else str(length) for length in shape)
         raise InvalidInputError(f"{name} must have shape ({wanted}), got {array.shape}")
-    # A sum is finite only if all its terms are, and is found faster.
-    if not math.isfinite(array.sum()) and not np.isfinite(array).all():
+    # A sum is finite only if all its terms are, and is found faster; it may overflow.
+    with np.errstate(over="ignore", invalid="ignore"):
+        total = array.sum()
+    if not math.isfinite(total) and not np.isfinite(array).all():
         where = np.argwhere(~np.isfinite(array))[0].tolist()
         raise InvalidInputError(f"{name} must be finite, got {array[tuple(where)]} at {where}")
     return array
@@ -59,10 +64,12 @@ def _matches(actual: tuple[int, ...], expected: tuple[int | None, ...]) -> bool:
     )
 
 
-def whole_number(name: str, value: object, at_least: int) -> int:
-    """Return a whole number that is large enough, or raise InvalidInputError."""
+def whole_number(name: str, value: object, at_least: int, at_most: float = math.inf) -> int:
+    """Return a whole number that is in range, or raise InvalidInputError."""
     if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < at_least:
         raise InvalidInputError(
             f"{name} must be a whole number of at least {at_least}, got {value!r}"
         )
+    if value > at_most:
+        raise InvalidInputError(f"{name} must be at most {at_most}, got {value}")
     return int(value)

@@ -1,5 +1,6 @@
 """Pinocchio's model of an arm, and its collision shapes, from a URDF reduced to a chain."""
 
+from collections.abc import Collection
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -24,7 +25,7 @@ def build_model(description: Description) -> pin.Model:
     """
     name = description.path.name
     try:
-        model = pin.buildModelFromXML(description.text)
+        model = pin.buildModelFromXML(_kinematics(description, ()))
     except (ValueError, RuntimeError) as error:
         raise ArmError(f"{name} is not a readable URDF: {first_line(error)}") from error
     if model.njoints < 2:
@@ -34,6 +35,18 @@ def build_model(description: Description) -> pin.Model:
         if not (np.isfinite(lower) and np.isfinite(upper) and lower < upper) or upper > 1e10:
             raise ArmError(f"joint {joint!r} of {name} has no usable limits: {lower}..{upper}")
     return model
+
+
+def _kinematics(description: Description, shapes: Collection[str]) -> str:
+    """What Pinocchio is told: links with some of their shapes, and joints."""
+    robot = ElementTree.fromstring(description.text)
+    robot.attrib = {"name": "robot", "version": "1.2"}
+    for part in robot.findall("material"):
+        robot.remove(part)
+    for link in robot.findall("link"):
+        for shape in [shape for shape in link if shape.tag not in shapes]:
+            link.remove(shape)
+    return ElementTree.tostring(robot, encoding="unicode")
 
 
 def limit_velocities(
@@ -65,7 +78,8 @@ def build_shapes(description: Description, model: pin.Model) -> pin.GeometryMode
     ArmError
         If a shape cannot be loaded.
     """
-    name, robot = description.path.name, ElementTree.fromstring(description.text)
+    name = description.path.name
+    robot = ElementTree.fromstring(_kinematics(description, ("collision",)))
     hulls, declared = {}, 0
     for link in robot.findall("link"):
         for number, shape in enumerate(link.findall("collision/geometry")):

@@ -5,6 +5,7 @@ from importlib import resources
 from pathlib import Path
 
 from kinarm._fields import check_fields, from_plain, init_fields, read_toml
+from kinarm._files import absolute, is_file
 from kinarm.errors import ArmError
 
 PACKAGE = "example-robot-data:"
@@ -92,9 +93,9 @@ class ArmSpecification:
         source, path = self.source, folder / self.source
         is_path = Path(source).suffix in (".urdf", ".toml") or Path(source).parent != Path()
         known = source in arm_names() or source.startswith(PACKAGE)
-        if not known and (is_path or path.is_file()):
-            source = str(path.resolve())
-        folders = tuple(str((folder / each).resolve()) for each in self.package_dirs)
+        if not known and (is_path or is_file(path)):
+            source = str(absolute(path))
+        folders = tuple(str(absolute(folder / each)) for each in self.package_dirs)
         return replace(self, source=source, package_dirs=folders)
 
     def completed(self) -> "ArmSpecification":
@@ -174,9 +175,9 @@ class ArmFile:
         path = Path(source)
         if path.suffix != ".toml":
             return None
-        if not path.is_file():
+        if not is_file(path):
             raise ArmError(f"arm file {source!r} does not exist")
-        return cls._read(path.resolve())
+        return cls._read(absolute(path))
 
     @classmethod
     def _read(cls, path: Path) -> "ArmFile":

@@ -20,9 +20,20 @@ WorkerError, which is a failure of the machine.
 
 from collections.abc import Iterable
 
+LONGEST = 1500
+"""Characters of a message; of a longer one, the middle is left out."""
+
+
+def one_line(text: str) -> str:
+    """A message as one line, without the middle of one that is very long."""
+    line = " ".join(text.split())
+    if len(line) <= LONGEST:
+        return line
+    return f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}"
+
 
 class KinarmError(Exception):
-    """Base of all errors that kinarm raises on purpose.
+    """Base of all errors that kinarm raises on purpose; what they say is one line.
 
     Attributes
     ----------
@@ -31,6 +42,9 @@ class KinarmError(Exception):
     """
 
     exit_status = 2
+
+    def __str__(self) -> str:
+        return one_line(super().__str__())
 
 
 class ArmError(KinarmError):

@@ -12,6 +12,7 @@ from kinarm._archive import Arrays
 from kinarm._cache import cached_arrays
 from kinarm._files import first_line
 from kinarm.errors import ArmError
+from kinarm.mesh_content import check_vertices, mesh_content
 
 VERSION = 1
 """To be raised when the same mesh gets another hull."""
@@ -46,20 +47,22 @@ def hull_of_mesh(path: Path, scale: NDArray[np.float64]) -> coal.ConvexBase:
     ArmError
         If the file cannot be read as a mesh.
     """
-    content = scale.tobytes() + path.read_bytes()
+    content = scale.tobytes() + mesh_content(path)
     corners = cached_arrays("hull", VERSION, content, lambda: _corners(path, scale))["corners"]
+    check_vertices(path, corners.reshape(-1, 3))
     return _hull(corners)
 
 
 def _corners(path: Path, scale: NDArray[np.float64]) -> Arrays:
     """Corners of the hull of a mesh, or of the polytope around it."""
     try:
-        mesh = coal.MeshLoader().load(str(path), scale)
+        mesh = coal.MeshLoader(coal.BV_AABB).load(str(path), scale)
+        check_vertices(path, mesh.vertices())
         mesh.buildConvexHull(True, "Qt")
+        corners = np.array(mesh.convex.points())
+        return {"corners": enclosing_corners(corners) if len(corners) > MANY_VERTICES else corners}
     except (ValueError, RuntimeError) as error:
         raise ArmError(f"mesh {path.name} cannot be loaded: {first_line(error)}") from error
-    corners = np.array(mesh.convex.points())
-    return {"corners": enclosing_corners(corners) if len(corners) > MANY_VERTICES else corners}
 
 
 def _hull(points: NDArray[np.float64]) -> coal.ConvexBase:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from kinarm._fields import from_plain, init_fields, read_toml, summary_of, take_base, to_plain
+from kinarm._files import absolute, is_file
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.scene import Scene
@@ -97,7 +98,7 @@ def read_problem(path: Path) -> ReachProblem:
         base["task"]["goal_regions"] = []
     given = {"name": path.stem, **entries}
     problem = from_plain(ReachProblem, _merged(base, given), str(path))
-    return replace(problem, arm=problem.arm.resolved(path.resolve().parent))
+    return replace(problem, arm=problem.arm.resolved(absolute(path).parent))
 
 
 def _find_part(kind: type[Part], what: str, name: str | Path) -> Part:
@@ -123,7 +124,7 @@ def _file(what: str, name: str | Path, folder: str, others: tuple[str, ...]) -> 
     path = Path(name)
     if str(name) in shipped:
         return shipped[str(name)]
-    if path.suffix == ".toml" or path.is_file() or path.parent != Path():
+    if path.suffix == ".toml" or is_file(path) or path.parent != Path():
         return path
     available = dict.fromkeys((*others, *shipped, f"path/to/{what}.toml"))
     raise UnknownNameError(what, str(name), available)
@@ -132,7 +133,7 @@ def _file(what: str, name: str | Path, folder: str, others: tuple[str, ...]) -> 
 def _beside(path: Path, name: str) -> str | Path:
     """What a file calls another one: a name, or a path that starts at its folder."""
     beside = path.parent / name
-    return beside if beside.is_file() else name
+    return beside if is_file(beside) else name
 
 
 def _merged(below: Any, above: Any) -> Any:

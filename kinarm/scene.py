@@ -13,6 +13,9 @@ from kinarm.errors import ProblemError, UnknownNameError
 
 Point = tuple[float, float, float]
 
+FARTHEST = 1e6
+"""Coordinates, lengths and angles at most [m or rad]."""
+
 ROUNDING = 1e-12
 """Lengths that differ by less are the same [m]."""
 
@@ -21,6 +24,7 @@ def _check_box(what: str, lower: Point, upper: Point, *, flat: bool) -> None:
     """Refuse a box whose corners are not finite or that is empty; a flat one has an area."""
     if not all(math.isfinite(number) for number in (*lower, *upper)):
         raise ProblemError(f"{what} has a corner that is not finite: {lower} to {upper}")
+    _check_finite(what, (*lower, *upper))
     extents = [high - low for low, high in zip(lower, upper, strict=True)]
     if min(extents) < 0 or sum(extent > 0 for extent in extents) < (2 if flat else 3):
         wanted = "lower <= upper, and < along two axes at least" if flat else "lower < upper"
@@ -28,10 +32,12 @@ def _check_box(what: str, lower: Point, upper: Point, *, flat: bool) -> None:
 
 
 def _check_finite(what: str, numbers: Iterable[float]) -> None:
-    """Refuse numbers that are not finite."""
+    """Refuse numbers that are not finite, or so large that sums of them are not."""
     given = list(numbers)
     if not all(math.isfinite(number) for number in given):
         raise ProblemError(f"{what} must be finite, got {given}")
+    if max(map(abs, given)) > FARTHEST:
+        raise ProblemError(f"{what} must be at most {FARTHEST:g}, got {given}")
 
 
 def rotation_matrix(rpy: Point) -> NDArray[np.float64]:

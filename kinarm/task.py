@@ -11,6 +11,9 @@ from kinarm._validation import whole_number
 from kinarm.errors import ProblemError
 from kinarm.scene import Scene
 
+LONGEST_HORIZON = 1_000_000
+"""Steps of an episode at most: memory grows with them."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class RewardWeights:
@@ -122,7 +125,7 @@ class ReachTask:
             raise ProblemError(f"tolerance must be greater than 0 m, got {self.tolerance}")
         if not 0 <= self.start_spread <= 1:
             raise ProblemError(f"start_spread must lie in [0, 1], got {self.start_spread}")
-        whole_number("horizon", self.horizon, 1)
+        whole_number("horizon", self.horizon, 1, LONGEST_HORIZON)
 
     def draw_goals(self, scene: Scene, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
         """Draw goals, uniform over each region.

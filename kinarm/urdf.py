@@ -15,13 +15,18 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from kinarm._files import first_line
+from kinarm._files import first_line, read_file
 from kinarm.arm_specification import ArmSpecification
 from kinarm.errors import ArmError, InvalidInputError, UnknownNameError
 from kinarm.urdf_files import resolve_meshes
+from kinarm.urdf_schema import FARTHEST, apply_schema
+from kinarm.xml_files import parse_xml
 
 USUAL_TOOL = "tool0"
 """Name of the tool frame by ROS's convention."""
+
+LARGEST = 5 * 10**6
+"""Size of a URDF at most [bytes]."""
 
 MOVING = ("revolute", "prismatic", "continuous")
 
@@ -118,6 +123,10 @@ def _reduced(
         notes += (f"joints that do not carry the tool are held: {', '.join(free)}",)
     resolve_meshes(robot, path, specification.package_dirs)
     if specification.tool_offset is not None:
+        if not max(map(abs, specification.tool_offset)) <= FARTHEST:
+            raise ArmError(
+                f"tool_offset must be at most {FARTHEST:g} m, got {specification.tool_offset}"
+            )
         tool = _add_tool_point(robot, tool, specification.tool_offset)
     return Description(
         path=path,
@@ -132,9 +141,9 @@ def _reduced(
 def _parsed(path: Path) -> ElementTree.Element:
     """Parse the file."""
     try:
-        robot = ElementTree.parse(path).getroot()
-    except (ElementTree.ParseError, OSError, UnicodeError) as error:
-        raise ArmError(f"{path.name} is not a readable URDF: {error}") from error
+        robot = parse_xml(read_file(path, LARGEST))
+    except (OSError, ValueError) as error:
+        raise ArmError(f"{path.name} is not a readable URDF: {first_line(error)}") from error
     if robot.tag != "robot":
         raise ArmError(
             f"{path.name} is not a readable URDF: its root is <{robot.tag}>, not <robot>"
@@ -142,6 +151,7 @@ def _parsed(path: Path) -> ElementTree.Element:
     capsules = robot.find("link/collision/geometry/capsule") is not None
     if capsules and robot.get("version", "1.0") not in ("1.1", "1.2"):
         raise ArmError(f'{path.name} has capsules, which need <robot version="1.2">')
+    apply_schema(robot, path.name)
     return robot
 
 
@@ -173,9 +183,26 @@ def _joints(robot: ElementTree.Element, path: Path) -> dict[str, _Joint]:
             raise ArmError(f"joint {name!r} of {path.name} is {kind!r}: not supported")
         carried[child] = name
         found[name] = _Joint(element, name, kind, parent, child)
-    if links and len(carried) == len(links):
-        raise ArmError(f"the links of {path.name} form a loop: closed loops are not supported")
+    _check_tree(found, links, path)
     return found
+
+
+def _check_tree(joints: Mapping[str, _Joint], links: set[str | None], path: Path) -> None:
+    """Refuse links that do not hang on one link, the base."""
+    carried = {joint.child: joint.parent for joint in joints.values()}
+    roots = [link for link in links if link not in carried]
+    if links and not roots:
+        raise ArmError(f"the links of {path.name} form a loop: closed loops are not supported")
+    if len(roots) > 1:
+        names = ", ".join(sorted(map(repr, roots)))
+        raise ArmError(f"{path.name} has links that no joint joins: {names}")
+    for link in carried:
+        passed: set[str] = set()
+        while link in carried and link not in passed:
+            passed.add(link)
+            link = carried[link]
+        if link in passed:
+            raise ArmError(f"the links of {path.name} form a loop: closed loops are not supported")
 
 
 def _chain_to(link: str, joints: Mapping[str, _Joint]) -> list[_Joint]:

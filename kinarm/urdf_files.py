@@ -5,6 +5,7 @@ from importlib import metadata
 from pathlib import Path
 from xml.etree import ElementTree
 
+from kinarm._files import absolute, is_file, is_folder
 from kinarm.arm_specification import PACKAGE, arm_names
 from kinarm.errors import ArmError, UnknownNameError
 
@@ -22,9 +23,9 @@ def find_urdf(source: str) -> Path:
     if source.startswith(PACKAGE):
         return _installed(source)
     path = Path(source)
-    if path.is_file():
-        return path.resolve()
-    if path.is_dir():
+    if is_file(path):
+        return absolute(path)
+    if is_folder(path):
         raise ArmError(f"{source!r} is a folder, not a URDF")
     if path.suffix == ".urdf" or path.parent != Path():
         raise ArmError(f"URDF {source!r} does not exist")
@@ -65,13 +66,13 @@ def _mesh_path(name: str, path: Path, folders: Collection[str]) -> Path | None:
     """Find a mesh in the package folders, or in one that the URDF lies in."""
     scheme, separator, inside = name.partition("://")
     if scheme == "file":
-        return Path(inside) if Path(inside).is_file() else None
+        return Path(inside) if is_file(inside) else None
     if not separator:
         beside = path.parent / name
-        return beside.resolve() if beside.is_file() else None
+        return absolute(beside) if is_file(beside) else None
     around = (*map(Path, folders), *path.parents)
     own = (folder.parent for folder in around if folder.name == inside.partition("/")[0])
     for folder in (*around, *own):
-        if (folder / inside).is_file():
-            return (folder / inside).resolve()
+        if is_file(folder / inside):
+            return absolute(folder / inside)
     return None

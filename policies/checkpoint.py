@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kinarm._archive import Arrays, load_archive, reading, save_archive
 from kinarm._fields import from_plain, to_plain
-from kinarm.errors import PolicyFileError
+from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import TrainingState, find_learner, learner_of
 
@@ -106,7 +106,13 @@ def rebuilt(kind: Any, name: str, arrays: Arrays) -> Any:
         return tuple(record(*(t(x) for t, x in zip(types, row, strict=True))) for row in rows)
     if get_origin(kind) is dict:
         return json.loads(str(arrays[name]))
-    return kind(arrays[name]) if kind in (int, float) else arrays[name]
+    array = arrays[name]
+    if kind in (int, float):
+        return kind(array)
+    wanted = get_args(get_args(kind)[1])[0]
+    if array.dtype != wanted or not np.isfinite(array).all():
+        raise InvalidInputError(f"{name} must be finite {wanted.__name__}")
+    return array
 
 
 def _field_names(kind: Any) -> Iterable[str]:

@@ -38,20 +38,33 @@ SHARE = {"must": "lie in [0, 1]", "holds": lambda value: 0 <= value <= 1}
 """What a number must be: metadata of a field."""
 
 
+LARGEST = 1e6
+"""Numbers of settings at most; parameters would overflow with larger ones."""
+
+MANY = {"at_most": 100_000}
+"""Metadata of a whole number that memory grows with."""
+
+WIDTHS = {"at_most": 4096}
+"""Metadata of the widths of hidden layers."""
+
+
 def check_range(name: str, value: Any, demands: Mapping[str, Any]) -> None:
     """Refuse a number that is not finite or breaks what its field's metadata demand.
 
-    Whole numbers, those of tuples, too, must be ``at_least`` so large, or 1 if it is not said.
+    Whole numbers, those of tuples, too, must be ``at_least`` so large, or 1 if it is not said, and
+    ``at_most`` so large, if it is said.
     """
     if isinstance(value, tuple):
         for each in value:
             check_range(name, each, demands)
     elif type(value) is int:
-        whole_number(name, value, demands.get("at_least", 1))
+        whole_number(name, value, demands.get("at_least", 1), demands.get("at_most", math.inf))
     elif isinstance(value, float):
         must, holds = demands.get("must", "be finite"), demands.get("holds", math.isfinite)
         if not (math.isfinite(value) and holds(value)):
             raise InvalidInputError(f"{name} must {must}, got {value}")
+        if abs(value) > LARGEST:
+            raise InvalidInputError(f"{name} must be at most {LARGEST:g}, got {value}")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,6 +5,7 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 
+from kinarm._files import is_file
 from kinarm.errors import UnknownNameError
 from kinarm.policies.policy import Policy
 
@@ -56,7 +57,7 @@ def policy_files(name_or_file: str | Path) -> tuple[Path, ...]:
     if names:
         with resources.as_file(resources.files("kinarm.data") / "policies") as folder:
             return tuple(folder / f"{name}.npz" for name in names)
-    if path.exists() or path.suffix == ".npz" or path.parent != Path():
+    if is_file(path) or path.suffix == ".npz" or path.parent != Path():
         return (path,)
     groups = dict.fromkeys(group_of(name) for name in policy_names())
     raise UnknownNameError("policy", text, (*groups, "path/to/policy.npz"))

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm.errors import InvalidInputError
+
 CONSTANT_BELOW = 1e-6
 """An input whose standard deviation is smaller counts as constant and gets weight zero."""
 
@@ -42,11 +44,20 @@ class Normalizer:
         Their mean; zero before the first one.
     squares : ndarray, shape (n_observations,)
         Sum of their squared deviations from the mean.
+
+    Raises
+    ------
+    InvalidInputError
+        If the number or a sum is negative.
     """
 
     count: int
     mean: NDArray[np.float64]
     squares: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        if self.count < 0 or (self.squares < 0).any():
+            raise InvalidInputError("counts and squares of observations must not be negative")
 
     @classmethod
     def empty(cls, n_observations: int) -> "Normalizer":

@@ -23,6 +23,8 @@ from kinarm.policies.provenance import Provenance
 from kinarm.problem import ProblemLike, ReachProblem
 
 FORMAT_VERSION = 3
+LARGEST = 1e30
+"""Magnitude of statistics and weights at most: with larger ones, actions overflow."""
 
 
 class Layer(NamedTuple):
@@ -94,6 +96,8 @@ class Policy:
                 finite_array("mirror of actions", self.mirror.actions, (width,)),
             )
         for array in (mean, std, *(array for layer in layers for array in layer), *(mirror or ())):
+            if np.abs(array).max(initial=0.0) > LARGEST:
+                raise InvalidInputError(f"statistics and weights must be at most {LARGEST:g}")
             array.flags.writeable = False
         object.__setattr__(self, "mean", mean)
         object.__setattr__(self, "std", std)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from kinarm._fields import from_plain, init_fields, read_toml, take_base, to_plain
+from kinarm._files import is_file
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.policies.learners import Learner, find_learner
 from kinarm.problem import ReachProblem
@@ -88,4 +89,4 @@ def _problem_of_file(problem: object, path: Path) -> ReachProblem:
             f"{path}: problem must be the name or file of a problem, got {problem!r}"
         )
     beside = path.parent / problem
-    return ReachProblem.load(beside if beside.is_file() else problem)
+    return ReachProblem.load(beside if is_file(beside) else problem)

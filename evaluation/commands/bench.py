@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from kinarm._command_line import run_request
 from kinarm._console import open_console
-from kinarm._files import check_folder
+from kinarm._files import check_folder, only_writer
 from kinarm._validation import whole_number
 
 if TYPE_CHECKING:
@@ -81,21 +81,27 @@ class BenchmarkRequest:
         KinarmError
             If the policy cannot be used, or the folder cannot be written to.
         """
-        from kinarm.evaluation.measurements import benchmark
         from kinarm.evaluation.measurements.document import write_all
 
-        if self.out is not None:
-            check_folder(self.out)
-        document = benchmark.measure(
+        if self.out is None:
+            return self._measure()
+        check_folder(self.out)
+        with only_writer(self.out):
+            document = self._measure()
+            write_all(document, self.out, command or repr(self))
+        return document
+
+    def _measure(self) -> dict[str, Any]:
+        """Measure what is asked for."""
+        from kinarm.evaluation.measurements import benchmark
+
+        return benchmark.measure(
             self.policy,
             self.repetitions,
             ppo=self.ppo,
             limits=self.limits,
             peers=self.peers,
         )
-        if self.out is not None:
-            write_all(document, self.out, command or repr(self))
-        return document
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from kinarm._command_line import run_request
 from kinarm._console import open_console
-from kinarm._files import check_folder
+from kinarm._files import check_folder, only_writer
 from kinarm._interrupts import GOES_ON, telling
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError, UnknownNameError
@@ -115,17 +115,26 @@ class ComparisonRequest(RunningOptions):
         Raises
         ------
         KinarmError
-            If a name is unknown, a file cannot be used, a package is missing, or a worker ends
-            unexpectedly, or nothing is finished and nothing is to be trained.
+            If a name is unknown, a file cannot be used, a package is missing, another process
+            writes to the folder, a worker ends unexpectedly, or nothing is finished and nothing is
+            to be trained.
         """
+        runs = self.runs
+        for learner in {run.learner.name: run.learner for run in runs}.values():
+            learner.check_installed()
+        check_folder(self.out / "runs")
+        with only_writer(self.out):
+            return self._carry_out(runs, executor, command)
+
+    def _carry_out(
+        self, runs: "list[PlannedRun]", executor: "Executor | None", command: str | None
+    ) -> "Comparison":
+        """Train and write in a folder that no other process writes to."""
         from kinarm.evaluation.comparison.document import write_all
         from kinarm.evaluation.comparison.results import Comparison
         from kinarm.evaluation.comparison.runs import load_run
 
-        runs, folder = self.runs, self.out / "runs"
-        for learner in {run.learner.name: run.learner for run in runs}.values():
-            learner.check_installed()
-        check_folder(folder)
+        folder = self.out / "runs"
         missing = [run for run in runs if load_run(folder, run) is None]
         with telling(lambda: GOES_ON):
             if missing and self.train:

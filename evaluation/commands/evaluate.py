@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -9,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from kinarm._command_line import run_request
 from kinarm._console import open_console
-from kinarm._files import check_output, write_text
-from kinarm._validation import whole_number
+from kinarm._files import absolute, check_output, only_writer, write_text
+from kinarm._validation import MOST_TRIALS, whole_number
 from kinarm.errors import InvalidInputError
 from kinarm.problem_files import problem_names
 from kinarm.problem_options import ProblemOptions, say_choices
@@ -36,6 +37,9 @@ DOCUMENT, HISTOGRAMS, REPORT = "evaluation.json", "final_distance", "index.html"
 
 Pair = tuple["Entrant", "ReachProblem"]
 """Who faces what."""
+
+Tell = Callable[[str], object]
+"""Is told what is being done."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,12 +113,10 @@ class EvaluationRequest(ProblemOptions):
     markdown: bool = False
 
     def __post_init__(self) -> None:
-        whole_number("trials", self.trials, 1)
+        whole_number("trials", self.trials, 1, MOST_TRIALS)
         whole_number("seed", self.seed, 0)
 
-    def run(
-        self, command: str | None = None, tell: Callable[[str], object] = lambda _: None
-    ) -> dict[str, Any]:
+    def run(self, command: str | None = None, tell: Tell = lambda _: None) -> dict[str, Any]:
         """Evaluate, and write what is asked for.
 
         Parameters
@@ -136,8 +138,17 @@ class EvaluationRequest(ProblemOptions):
         """
         from kinarm.evaluation.document import evaluation_document
 
-        evaluations = self.evaluate(tell)
-        document = evaluation_document(evaluations, repr(self) if command is None else command)
+        pairs = self._checked_pairs()
+        with ExitStack() as locks:
+            for folder in {absolute(each) for each in (self.out, self.report) if each}:
+                locks.enter_context(only_writer(folder))
+            evaluations = self._face(pairs, tell)
+            document = evaluation_document(evaluations, repr(self) if command is None else command)
+            self._write(document, evaluations, tell)
+        return document
+
+    def _write(self, document: dict[str, Any], evaluations: "list[Evaluation]", tell: Tell) -> None:
+        """Write what is asked for."""
         if self.report is not None:
             from kinarm.evaluation.report.page import write_report
 
@@ -154,31 +165,28 @@ class EvaluationRequest(ProblemOptions):
             write_text(self.out / DOCUMENT, json.dumps(document, indent=1))
             shown = [e for e in evaluations if e.entrant.algorithm != "oracle"] or evaluations
             save_figure(distance_histograms(shown), self.out, HISTOGRAMS)
-        return document
 
-    def evaluate(self, tell: Callable[[str], object] = lambda _: None) -> "list[Evaluation]":
-        """Let every chosen policy face its trials; whatever is wrong is refused before that.
+    def evaluate(self, tell: Tell = lambda _: None) -> "list[Evaluation]":
+        """Let every chosen policy face its trials; as `run`, but for the files."""
+        return self._face(self._checked_pairs(), tell)
 
-        Parameters
-        ----------
-        tell : callable
-            Called with what is being done.
+    def _checked_pairs(self) -> list[Pair]:
+        """Who faces which problem, if all of them can and the files can be written."""
+        pairs = self.pairs()
+        arms = {problem.name: problem.load_arm() for _, problem in pairs}
+        for entrant, problem in pairs:
+            entrant.check(arms[problem.name], allow_other_arm=self.allow_other_arm)
+        self._check_outputs(pairs)
+        return pairs
 
-        Raises
-        ------
-        KinarmError
-            As for `run`.
-        """
+    def _face(self, pairs: list[Pair], tell: Tell) -> "list[Evaluation]":
+        """Let policies face their trials, problem by problem."""
         from kinarm.evaluation.bounds import oracle_bounds
         from kinarm.evaluation.evaluation import run_trials
         from kinarm.evaluation.trials import TrialSet
 
-        pairs, evaluations = self.pairs(), []
         problems = {problem.name: problem for _, problem in pairs}
-        arms = {name: problem.load_arm() for name, problem in problems.items()}
-        for entrant, problem in pairs:
-            entrant.check(arms[problem.name], allow_other_arm=self.allow_other_arm)
-        self._check_outputs(pairs)
+        evaluations: list[Evaluation] = []
         say_choices(problems.values())
         for name, problem in problems.items():
             trials = TrialSet.draw(problem, self.trials, self.seed)
@@ -274,7 +282,7 @@ class EvaluationRequest(ProblemOptions):
                 check_output(self.out / name, overwrite=self.overwrite)
 
 
-def _tell_bounds(tell: Callable[[str], object], problem: str, done: int, total: int) -> None:
+def _tell_bounds(tell: Tell, problem: str, done: int, total: int) -> None:
     """Say how far the oracle is."""
     tell(f"what could any policy reach on {problem}? {done} of {total} trials solved")
 

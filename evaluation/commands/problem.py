@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from kinarm._command_line import Command, print_table, run_commands
 from kinarm._files import check_output, write_atomically, write_text
-from kinarm._validation import whole_number
+from kinarm._validation import MOST_TRIALS, whole_number
 from kinarm.problem_files import problem_names
 from kinarm.problem_options import ProblemOptions, say_choices
 
@@ -81,7 +81,7 @@ class CheckRequest(ShowRequest):
     overwrite: bool = False
 
     def __post_init__(self) -> None:
-        whole_number("trials", self.trials, 1)
+        whole_number("trials", self.trials, 1, MOST_TRIALS)
         whole_number("seed", self.seed, 0)
 
     def run(self) -> "ProblemCheck":

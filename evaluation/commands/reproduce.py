@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from kinarm._command_line import run_request
 from kinarm._console import open_console
-from kinarm._files import check_folder, write_text
+from kinarm._files import check_folder, only_writer, write_text
 from kinarm._interrupts import GOES_ON, telling
 from kinarm._parallel import available_threads
 from kinarm.errors import InvalidInputError
@@ -90,18 +90,24 @@ class ReproductionRequest(RunningOptions):
         Raises
         ------
         KinarmError
-            If the extra ``ppo`` is missing, the folder holds another study or cannot be written
-            to, or a worker ends unexpectedly.
+            If the extra ``ppo`` is missing, the folder holds another study, cannot be written to or
+            is written to by another process, or a worker ends unexpectedly.
         """
-        from kinarm.evaluation.reproduction.document import write_all
-        from kinarm.evaluation.reproduction.results import Results
-        from kinarm.evaluation.reproduction.runs import RunStore
         from kinarm.policies.learners import find_learner
 
         if self.ppo:
             find_learner("ppo").check_installed()
+        check_folder(self.folder)
+        with only_writer(self.folder):
+            return self._carry_out(executor, command)
+
+    def _carry_out(self, executor: "Executor | None", command: str | None) -> "tuple[Claim, ...]":
+        """Train and write in a folder that no other process writes to."""
+        from kinarm.evaluation.reproduction.document import write_all
+        from kinarm.evaluation.reproduction.results import Results
+        from kinarm.evaluation.reproduction.runs import RunStore
+
         study, folder = self.study, self.folder
-        check_folder(folder)
         _claim_folder(folder, study)
         store = RunStore(folder, study.protocol)
         results = Results.load(study, store)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from kinarm._archive import load_json, reading
 from kinarm._fields import to_plain
 from kinarm._files import write_text
-from kinarm._validation import whole_number
+from kinarm._validation import MOST_TRIALS, whole_number
 from kinarm.errors import KinarmError
 from kinarm.evaluation.comparison.learners import ComparedLearner
 from kinarm.policies.provenance import package_versions
@@ -42,7 +42,7 @@ class Protocol:
     per_decade: int = 10
 
     def __post_init__(self) -> None:
-        whole_number("trials", self.trials, 1)
+        whole_number("trials", self.trials, 1, MOST_TRIALS)
         whole_number("seed", self.seed, 0)
 
     def checkpoint(self, number: int) -> float:

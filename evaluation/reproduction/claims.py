@@ -179,7 +179,8 @@ def bench_shares(near: NDArray[np.bool_], left: NDArray[np.bool_]) -> tuple[Esti
     """Share of hits on the better and on the worse bench of every seed's policy.
 
     Which bench is the better one is told by one half of the trials and measured on the other, and
-    the other way round: picking the larger of two noisy shares would flatter it.
+    the other way round: picking the larger of two noisy shares would flatter it. Where a bench has
+    no trials in one of the halves, there is nothing to tell.
 
     Parameters
     ----------
@@ -190,6 +191,8 @@ def bench_shares(near: NDArray[np.bool_], left: NDArray[np.bool_]) -> tuple[Esti
     """
     half = np.arange(near.shape[1]) % 2 == 0
     groups = [[part & bench for bench in (left, ~left)] for part in (half, ~half)]
+    if not all(group.any() for part in groups for group in part):
+        return Estimate(None), Estimate(None)
     shares = np.array([[[seed[g].mean() for g in part] for part in groups] for seed in near])
     order = np.argsort(-shares, axis=2, kind="stable")[:, ::-1]
     better, worse = np.moveaxis(np.take_along_axis(shares, order, axis=2).mean(axis=1), 1, 0)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._archive import load_archive, load_json, reading, save_archive
-from kinarm._files import write_text
+from kinarm._files import check_folder, write_text
 from kinarm.errors import KinarmError, PolicyFileError
 from kinarm.evaluation.reproduction.study import PlannedTraining, Protocol
 from kinarm.policies.policy import Policy
@@ -109,7 +109,7 @@ class RunStore:
         """
         timing_path, run_path = self._paths(training)
         for path in (self.policy_path(training), timing_path, run_path):
-            path.parent.mkdir(parents=True, exist_ok=True)
+            check_folder(path.parent)
         policy.save(self.policy_path(training))
         arrays = dict(vars(run))
         write_text(timing_path, json.dumps(arrays.pop("wall_time").round(4).tolist()))

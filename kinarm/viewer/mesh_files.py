@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,6 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm._cache import cached_arrays
 from kinarm._files import first_line
 from kinarm.errors import ArmError, MissingExtraError
+from kinarm.mesh_content import mesh_content
+from kinarm.urdf_schema import FARTHEST
 from kinarm.viewer.finishes import original_colour, packed_colour
 from kinarm.viewer.meshes import Mesh
 
@@ -54,7 +57,7 @@ def read_mesh_file(path: Path, scale: Sequence[float]) -> tuple[PaintedMesh, ...
     Parameters
     ----------
     path : Path
-        A file that trimesh reads: Collada, STL, OBJ, ...
+        A file of Collada, OBJ or STL.
     scale : sequence of float
         Factors along the axes.
 
@@ -65,10 +68,7 @@ def read_mesh_file(path: Path, scale: Sequence[float]) -> tuple[PaintedMesh, ...
     ArmError
         If the file cannot be read.
     """
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise ArmError(f"cannot read mesh {path.name!r}: {error.strerror}") from error
+    content = mesh_content(path)
     made_with = json.dumps([path.suffix, list(scale), TOLERANCE, _versions()])
     made_of = made_with.encode() + content
     arrays = cached_arrays("mesh", VERSION, made_of, lambda: _simplified_arrays(path, scale))
@@ -81,6 +81,7 @@ def read_mesh_file(path: Path, scale: Sequence[float]) -> tuple[PaintedMesh, ...
     )
 
 
+@cache
 def _versions() -> list[str]:
     """Versions of the packages that meshes are read and simplified with."""
     try:
@@ -121,6 +122,10 @@ def _pieces(path: Path, scale: Sequence[float]) -> list[PaintedMesh]:
         raise ArmError(f"mesh {path.name!r} cannot be read: {first_line(error)}") from error
     if not pieces:
         raise ArmError(f"mesh {path.name!r} has no triangles")
+    for piece in pieces:
+        farthest = np.abs(piece.mesh.vertices).max()
+        if not farthest <= FARTHEST:
+            raise ArmError(f"mesh {path.name!r} has a vertex {farthest:g} m away")
     return pieces
 
 

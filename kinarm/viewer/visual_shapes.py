@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from kinarm.arm import Arm
 from kinarm.errors import ArmError
+from kinarm.urdf_schema import FARTHEST, check_numbers
 from kinarm.viewer.finishes import packed_colour, shape_finish
 from kinarm.viewer.mesh_files import PaintedMesh, read_mesh_file
 from kinarm.viewer.meshes import box, capsule, cylinder
@@ -60,6 +61,7 @@ def _shapes(visual: Element, arm: Arm) -> tuple[PaintedMesh, ...]:
     shape = None if geometry is None else next(iter(geometry), None)
     if shape is None:
         raise ArmError(f"{arm.description.path.name} has a visual shape without geometry")
+    check_numbers(shape, f"a visual shape of {arm.description.path.name}")
     if shape.tag == "mesh":
         return read_mesh_file(Path(shape.get("filename", "")), _numbers(shape, "scale", (1, 1, 1)))
     if shape.tag == "box":
@@ -81,6 +83,7 @@ def _origin(visual: Element) -> pin.SE3:
     origin = visual.find("origin")
     if origin is None:
         return pin.SE3.Identity()
+    check_numbers(origin, "a visual shape")
     turn = pin.rpy.rpyToMatrix(np.array(_numbers(origin, "rpy", (0, 0, 0))))
     return pin.SE3(turn, np.array(_numbers(origin, "xyz", (0, 0, 0))))
 
@@ -100,6 +103,6 @@ def _numbers(element: Element, name: str, default: tuple[float, ...]) -> tuple[f
         numbers = tuple(float(word) for word in text.split())
     except ValueError:
         numbers = ()
-    if len(numbers) != len(default):
+    if len(numbers) != len(default) or not all(abs(number) <= FARTHEST for number in numbers):
         raise ArmError(f"<{element.tag}> has {name}={text!r}; expected {len(default)} numbers")
     return numbers

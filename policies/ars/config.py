@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from kinarm.errors import InvalidInputError
-from kinarm.policies.config import POSITIVE, Schedule, TrainingConfig, scheduled
+from kinarm.policies.config import MANY, POSITIVE, WIDTHS, Schedule, TrainingConfig, scheduled
 
 Sharing = Literal["none", "pair", "iteration"]
 
@@ -47,14 +47,14 @@ class ARSConfig(TrainingConfig):
     step_size: float = field(default=0.02, metadata=POSITIVE)
     step_size_schedule: Schedule = "constant"
     noise: float = field(default=0.03, metadata=POSITIVE)
-    directions: int = 24
+    directions: int = field(default=24, metadata=MANY)
     top_directions: int = 12
     symmetric: bool = False
-    net_arch: tuple[int, ...] = ()
+    net_arch: tuple[int, ...] = field(default=(), metadata=WIDTHS)
     normalize: bool = True
     scale_by_deviation: bool = True
     sharing: Sharing = "none"
-    episodes: int = 1
+    episodes: int = field(default=1, metadata=MANY)
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -4,9 +4,11 @@ from dataclasses import dataclass, field
 
 from kinarm.errors import InvalidInputError
 from kinarm.policies.config import (
+    MANY,
     NOT_NEGATIVE,
     POSITIVE,
     SHARE,
+    WIDTHS,
     Schedule,
     TrainingConfig,
     scheduled,
@@ -75,11 +77,11 @@ class PPOConfig(TrainingConfig):
     """
 
     iterations: int = 600
-    n_envs: int = 16
-    n_steps: int = 125
+    n_envs: int = field(default=16, metadata=MANY)
+    n_steps: int = field(default=125, metadata=MANY)
     batch_size: int = 500
     n_epochs: int = 10
-    net_arch: tuple[int, ...] = (64, 64)
+    net_arch: tuple[int, ...] = field(default=(64, 64), metadata=WIDTHS)
     learning_rate: float = field(default=3e-4, metadata=POSITIVE)
     learning_rate_schedule: Schedule = "constant"
     gamma: float = field(default=0.99, metadata=SHARE)

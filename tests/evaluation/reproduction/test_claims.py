@@ -165,6 +165,13 @@ class TestBenchShares:
         better, worse = bench_shares(even_left_and_odd_right[None], left)
         assert (better.value, worse.value) == (0.0, 1.0)
 
+    @pytest.mark.parametrize("left", [[True] * 4, [False] * 4, [True, False] * 2, [True]])
+    def test_a_bench_without_trials_tells_nothing(self, left):
+        near = np.ones((3, len(left)), dtype=bool)
+        shares = bench_shares(near, np.array(left))
+        assert shares == (Estimate(None), Estimate(None))
+        assert json.loads(json.dumps([share.to_json() for share in shares], allow_nan=False))
+
     def test_no_bench_is_better_where_both_are_alike(self):
         rng = np.random.default_rng(0)
         gaps = []

@@ -1,0 +1,239 @@
+"""Valid files of every kind, small ones: what is damaged then."""
+
+import io
+import json
+import pickle
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from kinarm.evaluation.comparison.learners import read_learners
+from kinarm.evaluation.comparison.runs import CurvePoint, PlannedRun, planned_runs, save_run
+from kinarm.evaluation.comparison.runs import Protocol as ComparisonProtocol
+from kinarm.evaluation.document import evaluation_document
+from kinarm.evaluation.entrants import find_entrants
+from kinarm.evaluation.evaluation import run_trials
+from kinarm.evaluation.reproduction.runs import RunStore, TrainedRun
+from kinarm.evaluation.reproduction.study import PlannedTraining, Study, quick_study
+from kinarm.evaluation.trials import TrialSet
+from kinarm.policies import Policy, load_policy, recipe, train_policy
+from kinarm.policies.checkpoint import save_checkpoint
+from kinarm.policies.learners import begin_training
+from kinarm.problem_files import shipped_files
+from kinarm.recording import record_rollouts, save_recordings
+
+CUBE = [(x, y, z) for x in (0.0, 0.1) for y in (0.0, 0.1) for z in (0.0, 0.1)]
+FACES = [
+    *[(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1)],
+    *[(2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)],
+]
+
+
+def written(write: Callable[[Path], object], name: str = "file.npz") -> bytes:
+    """What a function writes to a file."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / name
+        write(path)
+        return path.read_bytes()
+
+
+def policies() -> list[bytes]:
+    """A linear policy, and one with hidden layers."""
+    names = ("ars-tuned-right-seed0", "ppo-tuned-both-seed0")
+    return [written(load_policy(name).save) for name in names]
+
+
+def checkpoints() -> list[bytes]:
+    """Of Augmented Random Search and of PPO, after an iteration or before the first."""
+    found = []
+    for learner in ("ars", "ppo"):
+        config = recipe(learner, "paper", iterations=3)
+        training = begin_training(config)
+        state = training.initial_state()
+        found.append(written(lambda path, c=config, s=state: save_checkpoint(path, c, s)))
+    return found
+
+
+@cache
+def trials() -> TrialSet:
+    """Three trials."""
+    return TrialSet.draw("right", 3, 0)
+
+
+def recordings() -> list[bytes]:
+    """Of three trials."""
+    simulator = trials().simulator
+    policy = load_policy("ars-tuned-right")
+    rollouts = simulator.rollout(policy, trials().starts, trials().goals, record=True)
+    recorded = record_rollouts(simulator, rollouts, "ars")
+    return [written(lambda path: save_recordings(path, recorded))]
+
+
+def evaluations() -> list[bytes]:
+    """An ``evaluation.json`` with the oracle's bounds, and one without."""
+    found = []
+    for oracle in (True, False):
+        entrant = find_entrants("ars-tuned-right")[0]
+        document = evaluation_document(
+            [run_trials(entrant, trials(), oracle=oracle)], "kinarm-eval"
+        )
+        found.append(json.dumps(document, indent=1).encode())
+    return found
+
+
+@cache
+def planned_training() -> PlannedTraining:
+    """A training of the quick reproduction."""
+    return study().trainings[0]
+
+
+@cache
+def trained_policy() -> Policy:
+    """What a training of one iteration came to."""
+    return train_policy(recipe("ars", "paper", iterations=1)).policy
+
+
+@cache
+def study() -> Study:
+    """The quick reproduction, without PPO."""
+    return quick_study(ppo=False)
+
+
+def store(folder: Path) -> RunStore:
+    """A reproduction's folder."""
+    return RunStore(folder, study().protocol)
+
+
+def save_training(folder: Path) -> None:
+    """Write a finished training of a reproduction."""
+    n = 6
+    run = TrainedRun(
+        returns=np.linspace(0, 1, n),
+        environment_steps=1000 * np.arange(1, n + 1),
+        wall_time=np.linspace(0.1, 1, n),
+        snapshots=np.array([1, 3, 5]),
+        snapshot_distance=np.ones((3, 10), dtype=np.float32),
+        distance=np.ones(20),
+        collision=np.zeros(20, dtype=bool),
+        steps=np.full(20, 64),
+    )
+    store(folder).save(planned_training(), trained_policy(), run)
+
+
+@cache
+def planned_run() -> PlannedRun:
+    """A training of a comparison."""
+    table = read_learners()
+    return planned_runs([table["ars-paper"]], [trials().problem], 1, None, ComparisonProtocol())[0]
+
+
+def save_comparison(folder: Path) -> None:
+    """Write a finished training of a comparison."""
+    curve = [CurvePoint(1000 * k, 60.0 * k, 30.0 * k, k, 1, 0.1, 7.0 + k) for k in (1, 2, 3)]
+    save_run(folder, planned_run(), curve)
+
+
+def toml_files(folder: str, *names: str) -> list[bytes]:
+    """Files that ship."""
+    files = shipped_files(folder)
+    return [files[name].read_bytes() for name in names or files]
+
+
+def recipes() -> list[bytes]:
+    """Recipe files of both learners' shapes."""
+    return [
+        b'base = "tuned"\niterations = 20\nstep_size = 0.05\nproblem = "left"\n'
+        b"[reward]\nsuccess = 0.5\ncollision = -2.0\n",
+        b'noise = 0.1\nsharing = "pair"\nnet_arch = [8, 8]\nnormalize = false\n',
+    ]
+
+
+def urdf(name: str = "paper") -> bytes:
+    """A URDF that ships."""
+    from kinarm.arm import Arm
+
+    return Arm.load(name).urdf_path.read_bytes()
+
+
+def stl(binary: bool) -> bytes:
+    """A cube as STL."""
+    if binary:
+        facets = [(np.zeros(3), *(CUBE[i] for i in face)) for face in FACES]
+        content = b"".join(np.array(f, dtype="<f4").tobytes() + b"\x00\x00" for f in facets)
+        return b"\x00" * 80 + len(FACES).to_bytes(4, "little") + content
+    lines = []
+    for face in FACES:
+        corners = "".join("vertex {} {} {}\n".format(*CUBE[i]) for i in face)
+        lines.append(f"facet normal 0 0 0\nouter loop\n{corners}endloop\nendfacet\n")
+    return f"solid cube\n{''.join(lines)}endsolid cube\n".encode()
+
+
+def obj() -> bytes:
+    """A cube as OBJ."""
+    vertices = "".join("v {} {} {}\n".format(*corner) for corner in CUBE)
+    return (vertices + "".join("f {} {} {}\n".format(*(i + 1 for i in f)) for f in FACES)).encode()
+
+
+def dae() -> bytes:
+    """A cube as Collada."""
+    places = " ".join(str(x) for corner in CUBE for x in corner)
+    faces = " ".join(str(i) for face in FACES for i in face)
+    return (
+        '<?xml version="1.0"?>'
+        '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">'
+        '<asset><unit name="meter" meter="1"/><up_axis>Z_UP</up_axis></asset>'
+        '<library_geometries><geometry id="cube"><mesh><source id="p">'
+        f'<float_array id="pa" count="24">{places}</float_array><technique_common>'
+        '<accessor source="#pa" count="8" stride="3"><param name="X" type="float"/>'
+        '<param name="Y" type="float"/><param name="Z" type="float"/></accessor>'
+        '</technique_common></source><vertices id="v">'
+        '<input semantic="POSITION" source="#p"/></vertices><triangles count="12">'
+        f'<input semantic="VERTEX" source="#v" offset="0"/><p>{faces}</p></triangles></mesh>'
+        '</geometry></library_geometries><library_visual_scenes><visual_scene id="scene">'
+        '<node id="n"><instance_geometry url="#cube"/></node></visual_scene>'
+        '</library_visual_scenes><scene><instance_visual_scene url="#scene"/></scene></COLLADA>'
+    ).encode()
+
+
+@cache
+def sb3_model() -> Any:
+    """A small model of Stable-Baselines3 and its environment with statistics."""
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+
+    from kinarm.envs import ReachEnv
+
+    env = VecNormalize(DummyVecEnv([lambda: ReachEnv("right")]))
+    settings = {"n_steps": 8, "batch_size": 8, "policy_kwargs": {"net_arch": [4]}}
+    return PPO("MlpPolicy", env, device="cpu", **settings)
+
+
+def sb3_models() -> list[bytes]:
+    """A model's file."""
+    return [written(sb3_model().save, "model.zip")]
+
+
+def sb3_statistics() -> list[bytes]:
+    """The file of ``VecNormalize``."""
+    return [written(sb3_model().get_env().save, "vecnormalize.pkl")]
+
+
+def pickled(value: object) -> bytes:
+    """A pickle."""
+    file = io.BytesIO()
+    pickle.dump(value, file)
+    return file.getvalue()
+
+
+MODULE = b"""import numpy as np
+
+WEIGHTS = np.ones((5, 48)) / 48
+
+
+def act(observations):
+    return np.clip(observations @ WEIGHTS.T, -1, 1)
+"""

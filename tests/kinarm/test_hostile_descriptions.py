@@ -1,0 +1,67 @@
+"""Robot descriptions and meshes that claim what cannot be: refused before libraries see them."""
+
+import numpy as np
+import pytest
+
+from kinarm.arm import Arm
+from kinarm.errors import ArmError
+from kinarm.hulls import hull_of_mesh
+from kinarm.xml_files import DEEPEST, parse_xml
+
+BOMB = b'<!DOCTYPE a [<!ENTITY b "bbbbbbbbbb"><!ENTITY c "&b;&b;&b;&b;">]><robot>&c;</robot>'
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (BOMB, "entities"),
+        (b"<a>" * (DEEPEST + 1), "levels"),
+        (b'<a><b count="99999999999"/></a>', "more than it holds"),
+        (b"<a><b></a>", "mismatched tag"),
+        (b"", "no element found"),
+    ],
+)
+def test_documents_that_are_refused(content, reason):
+    with pytest.raises(ValueError, match=reason):
+        parse_xml(content)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"xyz": "0 0 1e308"}, "xyz of <origin>"),
+        ({"rpy": "nan 0 0"}, "rpy of <origin>"),
+        ({"xyz": "0 0"}, "must be 3"),
+        ({"axis": "0 0 0"}, "no axis"),
+        ({"limit": '<limit lower="-inf" upper="1" velocity="1"/>'}, "lower of <limit>"),
+    ],
+)
+def test_joints_that_are_refused(make_joint, write_robot, changes, words):
+    path = write_robot([make_joint(**changes), make_joint(axis="0 1 0")])
+    with pytest.raises(ArmError, match=f"'joint_1' of made.urdf.*{words}"):
+        Arm.load(path)
+
+
+@pytest.mark.parametrize(
+    "shape", ['<box size="1 1 -1"/>', '<sphere radius="1e308"/>', "<cone/>", "<sphere/>", ""]
+)
+def test_shapes_that_are_refused(make_joint, make_collision, write_robot, shape, capfd):
+    path = write_robot([make_joint()], {1: make_collision(shape)})
+    with pytest.raises(ArmError, match="link 'link_1' of made.urdf"):
+        Arm.load(path)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_tool_point_far_away_is_refused():
+    with pytest.raises(ArmError, match="tool_offset must be at most 10000 m"):
+        Arm.load("paper", tool_offset=(0.0, 1e308, 0.0))
+
+
+@pytest.mark.parametrize(("number", "reason"), [("nan", "away"), ("1e30", "away"), ("0", "volume")])
+def test_meshes_that_are_refused(tmp_path, number, reason):
+    corners = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, number)]
+    faces = "f 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"
+    path = tmp_path / "part.obj"
+    path.write_text("".join("v {} {} {}\n".format(*corner) for corner in corners) + faces)
+    with pytest.raises(ArmError, match=f"'part.obj'.*{reason}"):
+        hull_of_mesh(path, np.ones(3))
