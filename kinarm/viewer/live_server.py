@@ -17,6 +17,7 @@ from meshcat.servers.zmqserver import (
     ZMQWebSocketBridge,
 )
 from tornado.httpserver import HTTPServer
+from tornado.websocket import WebSocketClosedError
 
 from kinarm.errors import OutputError
 
@@ -34,6 +35,21 @@ class _Socket(WebSocketHandler):
 
     def on_close(self) -> None:
         self.bridge.websocket_pool.discard(self)
+
+    def write_message(self, message: Any, binary: bool = False) -> "asyncio.Future[None]":
+        """Send a message; a browser that has left, even while this was sent, is forgotten."""
+        try:
+            sent = super().write_message(message, binary)
+        except WebSocketClosedError:
+            sent = asyncio.get_running_loop().create_future()
+            sent.cancel()
+        sent.add_done_callback(self._sent)
+        return sent
+
+    def _sent(self, sent: "asyncio.Future[None]") -> None:
+        """Take note of how sending a message ended."""
+        if sent.cancelled() or sent.exception() is not None:
+            self.on_close()
 
 
 class _Application(tornado.web.Application):
@@ -58,6 +74,11 @@ class _Bridge(ZMQWebSocketBridge):
 
     def setup_zmq(self, url: str) -> tuple["_Bridge", None, str]:
         return self, None, url
+
+    def forward_to_websockets(self, frames: list[bytes]) -> None:
+        """Pass a drawing command on; browsers may leave meanwhile."""
+        for watching in tuple(self.websocket_pool):
+            watching.write_message(frames[2], binary=True)
 
     def send(self, _: bytes) -> None:
         """Take the answers that would go to ZeroMQ."""
