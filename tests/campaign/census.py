@@ -1,7 +1,6 @@
 """What a process holds: memory, threads, processes, ports, open files and temporary files."""
 
 import gc
-import os
 from pathlib import Path
 from typing import NamedTuple
 
@@ -65,7 +64,7 @@ def take_census(folders: list[Path], sessions: set[int]) -> Census:
 def _target(link: Path) -> str:
     """What a descriptor stands for; nothing if it is closed by now."""
     try:
-        return os.readlink(link)
+        return str(link.readlink())
     except OSError:
         return ""
 
