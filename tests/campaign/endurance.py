@@ -1,7 +1,8 @@
 """A long run: is anything left, and does memory grow?
 
 ``python -m tests.campaign.endurance --minutes 60 --out data/results/evidence/endurance.json``
-does everything in turns, takes a census after every round, and ends with 1 if something grew.
+does everything in turns, takes a census after every round, and ends with 1 if something
+grew or failed.
 """
 
 import argparse
@@ -13,6 +14,7 @@ import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from subprocess import SubprocessError
 from typing import Any
 
 import numpy as np
@@ -58,17 +60,23 @@ def _rounds(minutes: float, out: Path, folders: list[Path]) -> dict[str, Any]:
     from tests.campaign.census import take_census
     from tests.campaign.errands import ERRANDS, LongRun
 
-    began, rows = time.monotonic(), []
+    began, rows, incidents = time.monotonic(), [], []
     run = LongRun(folders[1])
     try:
         while len(rows) < LEAST_ROUNDS or time.monotonic() - began < 60 * minutes:
             for errand in ERRANDS:
-                errand(run)
+                try:
+                    errand(run)
+                except (AssertionError, OSError, TimeoutError, SubprocessError) as error:
+                    said = f"{errand.__name__}, round {run.round}: {error!r}"
+                    incidents.append(said)
+                    sys.stderr.write(f"{said}\n")
+                    run.clear()
             run.round += 1
             census = take_census(folders, run.sessions)
             elapsed = (time.monotonic() - began) / 60
             rows.append({"minutes": round(elapsed, 2), **census._asdict()})
-            document = _document(rows, run.done, minutes)
+            document = _document(rows, run.done, incidents, minutes)
             write_text(out, json.dumps(document, indent=1) + "\n")
             if sys.stderr.isatty() or run.round % 10 == 1:
                 sys.stderr.write(f"round {run.round}, {elapsed:.1f} min: {census}\n")
@@ -77,7 +85,9 @@ def _rounds(minutes: float, out: Path, folders: list[Path]) -> dict[str, Any]:
     return document
 
 
-def _document(rows: list[dict[str, Any]], done: dict[str, int], minutes: float) -> dict[str, Any]:
+def _document(
+    rows: list[dict[str, Any]], done: dict[str, int], incidents: list[str], minutes: float
+) -> dict[str, Any]:
     return {
         "kind": "kinarm endurance",
         "command": f"python -m tests.campaign.endurance --minutes {minutes:g}",
@@ -85,6 +95,7 @@ def _document(rows: list[dict[str, Any]], done: dict[str, int], minutes: float) 
         "versions": package_versions(),
         "rounds": len(rows),
         "done": dict(done),
+        "incidents": list(incidents),
         **judged(rows),
         "samples": rows,
     }
@@ -116,7 +127,7 @@ def judged(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; 1 if something grew."""
+    """Run the command line; 1 if something grew, or an errand failed."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--minutes", type=float, default=60.0, help="how long")
     parser.add_argument("--out", type=Path, required=True, metavar="FILE.json")
@@ -125,7 +136,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     verdict = ", ".join(document["grown"]) or "nothing"
     growth = document["memory_growth_mb"]
     sys.stdout.write(f"{document['rounds']} rounds; grew: {verdict}; memory {growth:+.1f} MB\n")
-    return int(bool(document["grown"]))
+    return int(bool(document["grown"] or document["incidents"]))
 
 
 if __name__ == "__main__":

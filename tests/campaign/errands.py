@@ -1,7 +1,6 @@
 """What a long run does in turns, in its own process and in others."""
 
 import asyncio
-import os
 import shutil
 import signal
 import subprocess
@@ -65,6 +64,11 @@ class LongRun:
         """Let go of everything."""
         for each in (self.single, self.batch, self.sb3, self.stage):
             each.close()
+
+    def clear(self) -> None:
+        """Remove what was written."""
+        for left in self.folder.iterdir():
+            shutil.rmtree(left) if left.is_dir() else left.unlink()
 
     def count(self, what: str, times: int = 1) -> None:
         """Note that something was done."""
@@ -138,26 +142,26 @@ def replays(run: LongRun) -> None:
 
 def live_pages(run: LongRun) -> None:
     """Move an arm on the page that lasts and on a new one, while clients come and go."""
-    passing = LiveServer(PORT)
-    assert passing.port != run.stage.server.port
-    watched = [run.stage, LiveStage(passing, PROBLEMS["left"], run.simulator.arm)]
     starts, goals = run.simulator.sample(np.random.default_rng(run.round), 2)
     policy = find_entrants("ars-tuned-left")[0].policy
     rollouts = run.simulator.rollout(policy, starts, goals, record=True)
-    ports = [stage.server.port for stage in watched]
-    clients = threading.Thread(target=asyncio.run, args=(_watch(ports),))
-    clients.start()
-    while clients.is_alive():
-        for stage in watched:
-            for path, goal in zip(rollouts.paths, goals, strict=True):
-                way = path[np.isfinite(path[:, 0])]
-                stage.begin(way[0], goal)
-                for configuration in way:
-                    stage.show(configuration)
-                stage.draw_trace([run.simulator.arm.tool_position(q) for q in way], "success")
-                stage.pace(0.05)
-    clients.join()
-    passing.close()
+    with LiveServer(PORT) as passing:
+        assert passing.port != run.stage.server.port
+        stages = [run.stage, LiveStage(passing, PROBLEMS["left"], run.simulator.arm)]
+        ports = [stage.server.port for stage in stages]
+        clients = threading.Thread(target=asyncio.run, args=(_watch(ports),))
+        clients.start()
+        while clients.is_alive():
+            for stage in stages:
+                for path, goal in zip(rollouts.paths, goals, strict=True):
+                    way = path[np.isfinite(path[:, 0])]
+                    stage.begin(way[0], goal)
+                    for configuration in way:
+                        stage.show(configuration)
+                    points = [run.simulator.arm.tool_position(q) for q in way]
+                    stage.draw_trace(points, "success")
+                    stage.pace(0.05)
+        clients.join()
     run.count("clients of a live page", 12)
 
 
@@ -184,8 +188,10 @@ def commands(run: LongRun) -> None:
     begun = _start(*train, "--iterations", "100000", "--seed", str(run.round))
     _await(lambda: out.with_suffix(".checkpoint.npz").exists(), begun)
     assert _stop(run, begun, signal.SIGINT) == 130
-    resumed = _start(*train, "--resume")
-    assert _stop(run, resumed, signal.SIGINT, after=3.0) in (130, -signal.SIGINT)
+    resumed, checkpoint = _start(*train, "--resume"), out.with_suffix(".checkpoint.npz")
+    saved = checkpoint.stat().st_mtime_ns
+    _await(lambda: checkpoint.stat().st_mtime_ns != saved, resumed)
+    assert _stop(run, resumed, signal.SIGINT) == 130
     evaluated = _start(
         *("kinarm.evaluation.commands.evaluate", "--policy", "ars-tuned-right"),
         *("--trials", "20", "--out", str(run.folder / "evaluated")),
@@ -200,8 +206,7 @@ def commands(run: LongRun) -> None:
     port = int(line.split(":")[2].split("/")[0])
     asyncio.run(_client(port, 20))
     assert _stop(run, live, signal.SIGINT) == 130
-    for left in run.folder.iterdir():
-        shutil.rmtree(left) if left.is_dir() else left.unlink()
+    run.clear()
     run.count("processes", 4)
 
 
@@ -228,15 +233,17 @@ def _await(condition: Callable[[], bool], process: "subprocess.Popen[str]") -> N
     raise TimeoutError
 
 
-def _stop(
-    run: LongRun, process: "subprocess.Popen[str]", sent: int | None = None, after: float = 0.0
-) -> int:
+def _stop(run: LongRun, process: "subprocess.Popen[str]", sent: int | None = None) -> int:
     """Wait for the end of a process, which a signal may bring about; return its status."""
-    threading.Event().wait(after)
-    if sent is not None:
-        os.kill(process.pid, sent)
-    process.communicate(timeout=PATIENCE)
     run.sessions.add(process.pid)
+    if sent is not None:
+        process.send_signal(sent)
+    try:
+        process.communicate(timeout=PATIENCE)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.communicate()
+        raise
     return process.returncode
 
 
