@@ -134,11 +134,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="where to record")
     parser.add_argument("--share", type=float, default=1.0, help="part of the whole (1)")
     parser.add_argument("--kind", choices=tuple(CHECKS), action="append", help="only this kind")
+    parser.add_argument("--name", action="append", help="only this arm or problem")
     options = parser.parse_args(arguments)
     command = "python -m tests.campaign.evidence --out FOLDER"
     command += "" if options.share == 1 else f" --share {options.share:g}"
     options.out.mkdir(parents=True, exist_ok=True)
-    wanted = [part for part in parts(options.share) if part.kind in (options.kind or CHECKS)]
+    wanted = [
+        part
+        for part in parts(options.share)
+        if part.kind in (options.kind or CHECKS) and part.name in (options.name or [part.name])
+    ]
     failures = 0
     for number, part in enumerate(wanted, start=1):
         document = gather(part, options.out, command)
