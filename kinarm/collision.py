@@ -207,8 +207,9 @@ def make_verdicts_reliable(data: pin.GeometryData) -> pin.GeometryData:
     By default Coal starts its iteration for convex hulls where the last call on the same pair
     ended, or at least its search for corners, and verdicts within its tolerance of 1e-6 m then
     depend on what was asked before. A guess that is given in the request replaces both: the pool
-    leaves it as it is, and `start_anew` puts it back. And unless it is to describe the contact, Coal may stop at a distance of some 1e-7 m
-    and call bodies apart that are centimetres deep in each other, once in some 100 000 times.
+    leaves it as it is, and `start_anew` puts it back. And unless it is to describe the contact,
+    Coal may stop at a distance of some 1e-7 m and call bodies apart that are centimetres deep in
+    each other, once in some 100 000 times.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)
