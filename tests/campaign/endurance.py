@@ -31,6 +31,9 @@ fifth after the warm-up [MB]."""
 
 LEAST_ROUNDS = 2
 
+ARENAS = "MALLOC_ARENA_MAX"
+"""Where glibc may keep an arena for every thread, memory grows with threads that are gone."""
+
 
 def run_long(minutes: float, out: Path) -> dict[str, Any]:
     """Do everything in turns for some time; the document is kept up to date.
@@ -132,6 +135,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--minutes", type=float, default=60.0, help="how long")
     parser.add_argument("--out", type=Path, required=True, metavar="FILE.json")
     options = parser.parse_args(arguments)
+    if ARENAS not in os.environ:
+        os.environ[ARENAS] = "1"
+        given = sys.argv[1:] if arguments is None else arguments
+        os.execv(sys.executable, [sys.executable, "-m", "tests.campaign.endurance", *given])
     document = run_long(options.minutes, options.out)
     verdict = ", ".join(document["grown"]) or "nothing"
     growth = document["memory_growth_mb"]
