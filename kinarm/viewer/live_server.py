@@ -38,6 +38,7 @@ class _Socket(WebSocketHandler):
 
     def write_message(self, message: Any, binary: bool = False) -> "asyncio.Future[None]":
         """Send a message; a browser that has left, even while this was sent, is forgotten."""
+        sent: asyncio.Future[None]
         try:
             sent = super().write_message(message, binary)
         except WebSocketClosedError:
