@@ -154,7 +154,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         line = f"{number}/{len(wanted)} {part.kind} {part.name}: {state}, {seconds:.0f} s\n"
         sys.stderr.write(line)
         documents = [json.loads(path.read_text()) for path in sorted(options.out.glob("*-*.json"))]
-        write_text(options.out / "EVIDENCE.md", evidence_page(documents, command))
+        kinds = [each.kind for each in parts(options.share)]
+        page = evidence_page(documents, command, {kind: kinds.count(kind) for kind in CHECKS})
+        write_text(options.out / "EVIDENCE.md", page)
     return int(failures > 0)
 
 

@@ -30,7 +30,7 @@ COLUMNS = {
 """Counts that each table shows."""
 
 
-def evidence_page(documents: Sequence[Document], command: str) -> str:
+def evidence_page(documents: Sequence[Document], command: str, wanted: dict[str, int]) -> str:
     """Write the page, in Markdown.
 
     Parameters
@@ -38,13 +38,17 @@ def evidence_page(documents: Sequence[Document], command: str) -> str:
     documents : sequence of dict
         What is recorded of the parts.
     command : str
-        What made them.
+        What made them, and makes those that are missing.
+    wanted : dict of int
+        How many parts of each kind there are when all is done.
     """
-    lines = ["# Evidence at scale", "", f"Made by `{command}`; one file a part lies beside.", ""]
+    lines = ["# Evidence", "", f"Made by `{command}`; one file a part lies beside.", ""]
     for kind, (title, rows) in TITLES.items():
         found = [document for document in documents if document["kind"] == kind]
         if found:
-            lines += [f"## {title}", "", *_table(found, rows, COLUMNS[kind]), "", *_claims(found)]
+            state = "all" if len(found) == wanted[kind] else f"{len(found)} of {wanted[kind]}"
+            lines += [f"## {title}", "", f"Parts that are done: {state}.", ""]
+            lines += [*_table(found, rows, COLUMNS[kind]), "", *_claims(found)]
     return "\n".join(lines)
 
 
