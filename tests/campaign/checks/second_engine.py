@@ -52,15 +52,17 @@ class SecondEngine:
             touching[row] = data.ncon > 0
         return touching
 
-    def distance(self, configuration: NDArray[np.float64]) -> float:
-        """Distance of the closest pair, negative if it overlaps; `FARTHEST` at most [m]."""
+    def distance(self, configuration: NDArray[np.float64], pair: int) -> float:
+        """Distance of a tested pair, negative if it overlaps; `FARTHEST` at most [m]."""
         self._data.qpos[:] = configuration
         self._mujoco.mj_kinematics(self._model, self._data)
-        line = np.zeros(6)
-        return min(
-            self._mujoco.mj_geomDistance(self._model, self._data, *pair, FARTHEST, line)
-            for pair in self._pairs
-        )
+        names, line = self._pairs[pair], np.zeros(6)
+        return float(self._mujoco.mj_geomDistance(self._model, self._data, *names, FARTHEST, line))
+
+    def depth(self, configuration: NDArray[np.float64]) -> float:
+        """How deep the deepest of the contacts is that are found, 0 without one [m]."""
+        self.in_contact(configuration[None])
+        return -float(self._data.contact.dist.min(initial=0.0))
 
 
 def _described(world: World) -> str:

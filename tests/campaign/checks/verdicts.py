@@ -132,14 +132,20 @@ def _ask_second_engine(
         return
     truth, other = simulator.world.contact_model.in_contact(asked), engine.in_contact(asked)
     differing = np.flatnonzero(truth != other)
-    distances = np.array([engine.distance(asked[row]) for row in differing])
-    alone = truth[differing]
+    alone, named = truth[differing], simulator.world.contact_model.first_in_contact
+    # Of the pair that Coal names, or of the contacts that MuJoCo finds.
+    distances = np.array(
+        [
+            engine.distance(q, int(named(q) or 0)) if coal else engine.depth(q)
+            for q, coal in zip(asked[differing], alone, strict=True)
+        ]
+    )
     tally.count("configurations of the second engine", len(asked))
     tally.count("touching", truth.sum())
     tally.count("touching for Coal alone", alone.sum())
     tally.count("touching for MuJoCo alone", (~alone).sum())
     tally.largest("gap where Coal alone sees contact [m]", distances[alone].max(initial=0.0))
-    tally.largest("depth where Coal alone sees none [m]", -distances[~alone].min(initial=0.0))
+    tally.largest("depth where Coal alone sees none [m]", distances[~alone].max(initial=0.0))
     agree = np.ones(len(asked), dtype=bool)
     agree[differing] = np.abs(distances) <= MARGIN
     claim = f"engines agree, but for {MARGIN:g} m about contact"
