@@ -27,8 +27,8 @@ from tests.campaign.checks.tally import Tally
 from tests.campaign.checks.verdicts import check_verdicts
 from tests.campaign.evidence_page import evidence_page
 
-STEPS, CONFIGURATIONS, TRIALS = 1_000_000_000, 10_000_000, 1_000_000
-"""How much evidence there is in all."""
+WHOLE = {"steps": 1_000_000_000, "contact": 10_000_000, "floors": 1_000_000}
+"""How many steps, configurations and trials there are in all, by kind."""
 
 SEED = 14
 
@@ -87,11 +87,11 @@ def parts(share: float) -> list[Part]:
     arms = arm_names()
     scenes = [*arms, *(name for name in problem_names() if name not in PROBLEMS)]
     sizes = {
-        "steps": dict.fromkeys(arms, 0.4 * STEPS / (len(arms) - len(SHIPPED)))
-        | dict.fromkeys(SHIPPED, 0.6 * STEPS / len(SHIPPED)),
-        "contact": dict.fromkeys(scenes, CONFIGURATIONS / len(scenes)),
-        "floors": dict.fromkeys(FACED, 0.75 * TRIALS / len(FACED))
-        | dict.fromkeys(FITTING, 0.25 * TRIALS / len(FITTING)),
+        "steps": dict.fromkeys(arms, 0.4 * WHOLE["steps"] / (len(arms) - len(SHIPPED)))
+        | dict.fromkeys(SHIPPED, 0.6 * WHOLE["steps"] / len(SHIPPED)),
+        "contact": dict.fromkeys(scenes, WHOLE["contact"] / len(scenes)),
+        "floors": dict.fromkeys(FACED, 0.75 * WHOLE["floors"] / len(FACED))
+        | dict.fromkeys(FITTING, 0.25 * WHOLE["floors"] / len(FITTING)),
     }
     return [
         Part(kind, name, -int(-share * size // 1))
@@ -154,8 +154,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         line = f"{number}/{len(wanted)} {part.kind} {part.name}: {state}, {seconds:.0f} s\n"
         sys.stderr.write(line)
         documents = [json.loads(path.read_text()) for path in sorted(options.out.glob("*-*.json"))]
-        kinds = [each.kind for each in parts(options.share)]
-        page = evidence_page(documents, command, {kind: kinds.count(kind) for kind in CHECKS})
+        page = evidence_page(documents, WHOLE)
         write_text(options.out / "EVIDENCE.md", page)
     return int(failures > 0)
 

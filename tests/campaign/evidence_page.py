@@ -30,24 +30,24 @@ COLUMNS = {
 """Counts that each table shows."""
 
 
-def evidence_page(documents: Sequence[Document], command: str, wanted: dict[str, int]) -> str:
+def evidence_page(documents: Sequence[Document], wanted: dict[str, int]) -> str:
     """Write the page, in Markdown.
 
     Parameters
     ----------
     documents : sequence of dict
         What is recorded of the parts.
-    command : str
-        What made them, and makes those that are missing.
     wanted : dict of int
-        How many parts of each kind there are when all is done.
+        How many steps, configurations and trials there are when all is done, by kind.
     """
-    lines = ["# Evidence", "", f"Made by `{command}`; one file a part lies beside.", ""]
+    lines = ["# Evidence", "", "One file a part lies beside this page.", ""]
     for kind, (title, rows) in TITLES.items():
         found = [document for document in documents if document["kind"] == kind]
         if found:
-            state = "all" if len(found) == wanted[kind] else f"{len(found)} of {wanted[kind]}"
-            lines += [f"## {title}", "", f"Parts that are done: {state}.", ""]
+            unit = COLUMNS[kind][0]
+            done = sum(document["counts"][unit] for document in found)
+            state = f"Recorded: {done:,} {unit} of the {wanted[kind]:,} that are planned."
+            lines += [f"## {title}", "", state, ""]
             lines += [*_table(found, rows, COLUMNS[kind]), "", *_claims(found)]
     return "\n".join(lines)
 

@@ -41,13 +41,20 @@ def listens(port):
         return probe.connect_ex(("127.0.0.1", port)) == 0
 
 
+def leave(browser):
+    """Close the connection at once, without a word."""
+    if browser.protocol is not None:
+        browser.protocol.stream.close()
+    browser.close()
+
+
 async def received(port, last):
     """What a browser is sent, up to a message of a type and path."""
     browser, messages = await websocket_connect(f"ws://127.0.0.1:{port}/"), []
     while not messages or (messages[-1]["type"], messages[-1]["path"]) != last:
         answer = await asyncio.wait_for(browser.read_message(), PATIENCE)
         messages.append(umsgpack.unpackb(answer))
-    browser.close()
+    leave(browser)
     return messages
 
 
@@ -104,8 +111,7 @@ def test_browsers_that_leave_in_the_middle_are_forgotten(server, stage):
         for _ in range(8):
             browser = await websocket_connect(f"ws://127.0.0.1:{server.port}/")
             await asyncio.wait_for(browser.read_message(), PATIENCE)
-            browser.protocol.stream.close()  # without a word
-            browser.close()
+            leave(browser)
 
     asyncio.run(come_and_leave())
 
@@ -126,6 +132,7 @@ def test_closing_lets_browsers_go(server, stage):
         await asyncio.to_thread(stage.close)
         while await asyncio.wait_for(browser.read_message(), PATIENCE) is not None:
             pass
+        leave(browser)
 
     asyncio.run(stay())
     assert not listens(server.port)
