@@ -14,7 +14,7 @@ eval: $(call INSTALLED,core) ## evaluate all shipped policies on 200 trials a ta
 	$(BIN)/kinarm-eval --trials 200
 
 # Without the libraries of the extra zoo, what needs them cannot be covered.
-COVERAGE := from importlib.util import find_spec; print(90 if find_spec("sb3_contrib") else 80)
+COVERAGE := from importlib.util import find_spec; print(95 if find_spec("sb3_contrib") else 85)
 
 test: $(call INSTALLED,test) ## run the tests, but for the slow ones
 	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow" --cov --cov-report=term \

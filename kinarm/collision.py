@@ -24,6 +24,9 @@ from kinarm.scene import Scene
 CLOSE, OFTEN, CLOSENESS_SAMPLES = 0.025, 0.05, 200
 """A pair is close if it is nearer than this [m] at more than this share of so many samples."""
 
+GUESS, HINT = np.array([1.0, 0.0, 0.0]), np.zeros(2, dtype=np.int32)
+"""Where Coal's searches start: direction between two shapes, and numbers of corners."""
+
 MOUNT_SAMPLES = 721
 """Positions of the first joint at which the mounting is tested."""
 
@@ -184,11 +187,13 @@ class ContactModel:
         configuration : ndarray, shape (n_joints,)
             Joint positions [rad or m].
         """
-        data, geometry_data, results = self._workspace
-        if not pin.computeCollisions(
-            self.arm.model, data, self.geometry, geometry_data, configuration, True
-        ):
+        if not self.in_contact(configuration[None])[0]:
             return None
+        data, geometry_data, results = self._workspace
+        start_anew(geometry_data.collisionRequests)
+        pin.computeCollisions(
+            self.arm.model, data, self.geometry, geometry_data, configuration, True
+        )
         # Pairs are tested in order up to the first in contact; later results are of other calls.
         return next(index for index, result in enumerate(results) if result.isCollision())
 
@@ -200,16 +205,25 @@ def make_verdicts_reliable(data: pin.GeometryData) -> pin.GeometryData:
     """Make verdicts of Coal reliable and a function of the configuration alone; return the data.
 
     By default Coal starts its iteration for convex hulls where the last call on the same pair
-    ended, and verdicts close to contact then depend on what was asked before. And unless it is to
-    describe the contact, it may stop at a distance of some 1e-7 m and call bodies apart that are
-    centimetres deep in each other, once in some 100 000 times.
+    ended, or at least its search for corners, and verdicts within its tolerance of 1e-6 m then
+    depend on what was asked before. A guess that is given in the request replaces both: the pool
+    leaves it as it is, and `start_anew` puts it back. And unless it is to describe the contact,
+    Coal may stop at a distance of some 1e-7 m and call bodies apart that are centimetres deep in
+    each other, once in some 100 000 times.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)
         for request in data.collisionRequests:
             request.enable_cached_gjk_guess = False
+            request.gjk_initial_guess = coal.GJKInitialGuess.CachedGuess
             request.enable_contact = True
     return data
+
+
+def start_anew(requests: Iterable[coal.CollisionRequest]) -> None:
+    """Let Coal's next searches start where all do, not where the last ones ended."""
+    for request in requests:
+        request.cached_gjk_guess, request.cached_support_func_guess = GUESS, HINT
 
 
 def _add_scene(geometry: pin.GeometryModel, scene: Scene) -> None:
@@ -268,6 +282,7 @@ def _touching(
 ) -> set[int]:
     """Indices, among those of some pairs, that are in contact at a configuration."""
     pin.updateGeometryPlacements(arm.model, data, geometry, geometry_data, q)
+    start_anew(geometry_data.collisionRequests[index] for index in pairs)
     return {index for index in pairs if pin.computeCollision(geometry, geometry_data, index)}
 
 

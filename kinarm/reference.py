@@ -14,7 +14,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm.arm import Arm
-from kinarm.collision import make_verdicts_reliable
+from kinarm.collision import make_verdicts_reliable, start_anew
 from kinarm.simulator import Simulator
 
 
@@ -148,6 +148,7 @@ class ReferenceSimulator:
         model, geometry = self.arm.model, self.contact_model.geometry
         for k in range(1, self.tested + 1):
             tested = target if k == self.tested else q + k / self.tested * (target - q)
+            start_anew(self._geometry_data.collisionRequests)
             if pin.computeCollisions(
                 model, self._data, geometry, self._geometry_data, tested, True
             ):

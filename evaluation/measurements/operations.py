@@ -29,7 +29,9 @@ def measure_operations(policy_name: str) -> dict[str, Any]:
     return counts
 
 
-def count_operations(policy_name: str, episodes: int = EPISODES) -> dict[str, Any]:
+def count_operations(  # pragma: no cover - runs in a process of its own
+    policy_name: str, episodes: int = EPISODES
+) -> dict[str, Any]:
     """Run a policy with counters, and divide them by the steps taken.
 
     Idle lanes count as busy ones, since the machine is as busy with them.

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from kinarm.errors import InvalidInputError
+from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.bounds import bounds_document
 from kinarm.evaluation.document import EvaluationDocument, evaluation_document
 from kinarm.evaluation.entrants import ORACLE, Entrant
@@ -347,3 +347,39 @@ def test_two_problems_of_one_name_are_refused(skilled):
         evaluation_document(both, "")
     named = evaluate(skilled, PROBLEMS["right"].replace(name="lax", tolerance=0.1), trials=2)
     assert len(evaluation_document([both[0], named], "")["protocol"]["problems"]) == 2
+
+
+class TestChoosing:
+    """Results of one document, by policy and problem."""
+
+    @pytest.fixture
+    def document(self):
+        names = [("zero", "left", None), ("a-seed0", "left", "left"), ("a-seed1", "left", "left")]
+        names += [("a-seed0", "right", "left")]
+        rows = [dict(zip(("policy", "problem", "trained_on"), row, strict=True)) for row in names]
+        return EvaluationDocument("made.json", {}, rows)
+
+    def test_by_name_and_by_group(self, document):
+        assert document.result("a-seed1", "left")["policy"] == "a-seed1"
+        assert document.result("a", "right") is document.results[3]
+        assert document.result("a", None) is document.results[1]
+
+    def test_the_only_one_that_was_trained_needs_no_name(self, document):
+        assert document.result(None, "right") is document.results[3]
+
+    def test_several_are_named(self, document):
+        with pytest.raises(InvalidInputError) as caught:
+            document.result(None, "left")
+        assert str(caught.value).endswith("a-seed0 on left, a-seed1 on left")
+
+    def test_none_on_this_problem(self, document):
+        with pytest.raises(InvalidInputError, match="none on this problem"):
+            document.result(None, "both")
+
+    def test_an_unknown_policy_is_told_what_there_is(self, document):
+        with pytest.raises(UnknownNameError) as caught:
+            document.result("b", "left")
+        assert caught.value.available == ("zero", "a-seed0", "a-seed1")
+
+    def test_says_what_it_holds(self, document):
+        assert repr(document) == "EvaluationDocument('made.json', 4 results)"

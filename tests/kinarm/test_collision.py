@@ -16,6 +16,7 @@ from kinarm.collision import (
     WITH_GROUND,
     ContactModel,
     make_verdicts_reliable,
+    start_anew,
 )
 from kinarm.episodes import COLLISION, PAUSED
 from kinarm.kernels.rollout import advance, screen
@@ -44,12 +45,12 @@ def in_contact(simulator, configurations):
     """Ask Coal one configuration at a time, without a broad phase."""
     model, geometry = simulator.arm.model, simulator.world.contact_model.geometry
     data, geometry_data = model.createData(), make_verdicts_reliable(geometry.createData())
-    return np.array(
-        [
-            pin.computeCollisions(model, data, geometry, geometry_data, q, True)
-            for q in configurations
-        ]
-    )
+    verdicts = []
+    for q in configurations:
+        start_anew(geometry_data.collisionRequests)
+        touches = pin.computeCollisions(model, data, geometry, geometry_data, q, True)
+        verdicts.append(touches)
+    return np.array(verdicts)
 
 
 class TestPairs:

@@ -48,6 +48,18 @@ def test_the_proof_never_clears_what_touches(simulator):
     check_proof(simulator, 6, boundary=300, jitters=3, random=4000)
 
 
+def test_verdicts_do_not_depend_on_what_was_asked_before(simulator):
+    model = simulator.world.contact_model
+    near = np.concatenate(contact_boundary(simulator, 9, 250))
+    near = np.concatenate([near, *(jittered(near, seed) for seed in range(2))])
+    expected = model.in_contact(near)
+    for seed in range(4):
+        order = np.random.default_rng(seed).permutation(len(near))
+        np.testing.assert_array_equal(model.in_contact(near[order]), expected[order])
+    for row in np.random.default_rng(4).permutation(len(near)):
+        assert (model.first_in_contact(near[row]) is not None) == expected[row]
+
+
 @pytest.mark.slow
 def test_rollouts_equal_the_reference_path_in_thousands_of_episodes(simulator):
     _, collision, count = compare_actions(simulator, 7, 3000)

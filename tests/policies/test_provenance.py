@@ -71,3 +71,22 @@ def test_a_seed_may_be_unknown(provenance):
     unknown = replace(provenance, seed=None)
     assert "seed" not in unknown.to_json()
     assert Provenance.from_json(unknown.to_json()) == unknown
+
+
+@pytest.fixture
+def anew():
+    """What is looked up once in a process is looked up again, before and after."""
+    source_commit.cache_clear()
+    yield
+    source_commit.cache_clear()
+
+
+def test_without_git_the_commit_is_unknown(anew, monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    assert source_commit() == ""
+
+
+def test_outside_of_a_clone_the_commit_is_unknown(anew, monkeypatch, tmp_path):
+    installed = tmp_path / "kinarm" / "policies" / "provenance.py"
+    monkeypatch.setattr("kinarm.policies.provenance.__file__", str(installed))
+    assert source_commit() == ""

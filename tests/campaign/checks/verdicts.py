@@ -1,0 +1,166 @@
+"""Verdicts of contact: the kernels' proofs against Coal, and Coal against a second engine."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.kernels.rollout import screen
+from kinarm.problem import ReachProblem
+from kinarm.simulator import Simulator
+from tests.campaign.checks.second_engine import MARGIN, SecondEngine, is_installed
+from tests.campaign.checks.tally import Tally
+from tests.helpers.configurations import contact_boundary, jittered
+
+Array = NDArray[np.float64]
+
+LOT = 20_000
+"""Configurations that are judged together."""
+
+JITTERS = 9
+"""Configurations around each end of a pair at the boundary of contact, besides the end itself."""
+
+
+def check_verdicts(problem: ReachProblem, configurations: int, seed: int) -> Tally:
+    """Compare verdicts at so many configurations or a few more, half of them near contact.
+
+    Half are those that were tested for contact in episodes of random actions; a third are within
+    1e-10 to about 0.1 rad of the boundary of contact; the others were tested in steps that begin
+    there.
+    """
+    tally, simulator = Tally(), Simulator(problem, threads=1)
+    rng = np.random.default_rng(seed)
+    engine = SecondEngine(simulator.world) if is_installed() else None
+    lot = min(LOT, -(-configurations // 5))
+    while tally.counts.get("configurations", 0) < configurations:
+        for _ in range(2):
+            asked = _tested_in_episodes(tally, simulator, rng, lot)
+            _ask_second_engine(tally, engine, simulator, asked)
+        near = _near_contact(simulator, rng, 2 * lot)
+        _check_screening(tally, simulator, near)
+        _ask_second_engine(tally, engine, simulator, near)
+        asked = _tested_from(tally, simulator, rng, near, lot)
+        _ask_second_engine(tally, engine, simulator, asked)
+    return tally
+
+
+def _near_contact(simulator: Simulator, rng: np.random.Generator, count: int) -> Array:
+    """Configurations at and around the boundary of contact."""
+    pairs = -(-count // (2 * (JITTERS + 1)))
+    ends = np.concatenate(contact_boundary(simulator, _seed(rng), pairs))
+    around = [jittered(ends, _seed(rng)) for _ in range(JITTERS)]
+    return np.concatenate([ends, *around])
+
+
+def _seed(rng: np.random.Generator) -> int:
+    return int(rng.integers(2**32))
+
+
+def _check_screening(tally: Tally, simulator: Simulator, asked: Array) -> None:
+    """Check the proofs for single configurations."""
+    n, shapes = len(asked), simulator.world.contact_model.shapes
+    tools, free, touching = np.empty((n, 3)), np.empty(n, dtype=bool), np.empty(n, dtype=bool)
+    screen(0, n, simulator.arm.chain, shapes, np.ascontiguousarray(asked), tools, free, touching)
+    truth = simulator.world.contact_model.in_contact(asked)
+    _claim(tally, "what is proven free touches nothing", (~truth)[free], asked[free])
+    _claim(tally, "what is proven to touch does", truth[touching], asked[touching])
+    tally.count("configurations", n)
+    tally.count("near contact", n)
+    tally.count("decided without Coal", (free | touching).sum())
+
+
+def _tested_in_episodes(
+    tally: Tally, simulator: Simulator, rng: np.random.Generator, count: int
+) -> Array:
+    """Run episodes of random actions, and check what became of every tested configuration."""
+    horizon, tested = simulator.task.horizon, simulator.world.rules.tested
+    parts, found = [], 0
+    while found < count:
+        n = max(count // (64 * tested), 1)
+        starts, goals = simulator.sample(rng, n)
+        drawn = rng.uniform(-1.5, 1.5, (n, -(-horizon // 4), simulator.n_actions))
+        actions = np.repeat(drawn, 4, axis=1)[:, :horizon]
+        done = simulator.rollout_actions(actions, starts, goals, record=True)
+        last = done.steps[:, None] - 1
+        step = np.arange(horizon)
+        ends = done.paths[:, 1:].copy()
+        refused = (step == last) & done.collision[:, None]
+        ends[refused] = done.targets[done.collision]
+        taken = step <= last
+        ways = simulator.world.substeps(done.paths[:, :-1][taken], ends[taken])
+        parts.append(_check_ways(tally, simulator, ways, refused[taken]))
+        found += len(parts[-1])
+    return np.concatenate(parts)
+
+
+def _tested_from(
+    tally: Tally, simulator: Simulator, rng: np.random.Generator, near: Array, count: int
+) -> Array:
+    """Take one step from free configurations near contact, large or small."""
+    arm = simulator.arm
+    allowed = ((near >= arm.lower) & (near <= arm.upper)).all(axis=1)
+    free = near[allowed & ~simulator.world.contact_model.in_contact(near)]
+    starts = free[rng.integers(len(free), size=-(-count // simulator.world.rules.tested))]
+    size = 10.0 ** rng.uniform(-9, 0, (len(starts), 1))
+    episodes = simulator.reset(starts, np.full((len(starts), 3), 10.0))  # nothing reaches it
+    actions = size * rng.normal(size=(len(starts), simulator.n_actions))
+    refused = simulator.step(episodes, actions).collision
+    ways = simulator.world.substeps(starts, episodes.target)
+    tally.count("near contact", ways.shape[0] * ways.shape[1])
+    return _check_ways(tally, simulator, ways, refused)
+
+
+def _check_ways(
+    tally: Tally, simulator: Simulator, ways: Array, refused: NDArray[np.bool_]
+) -> Array:
+    """Check that steps were refused where they touch something, and nowhere else."""
+    asked = ways.reshape(-1, ways.shape[2])
+    truth = simulator.world.contact_model.in_contact(asked).reshape(ways.shape[:2]).any(axis=1)
+    _claim(tally, "a step that was made touches nothing", (~truth)[~refused], ways[~refused])
+    _claim(tally, "a step that was refused touches something", truth[refused], ways[refused])
+    tally.count("configurations", len(asked))
+    tally.count("steps refused", refused.sum())
+    return asked
+
+
+def _ask_second_engine(
+    tally: Tally,
+    engine: SecondEngine | None,
+    simulator: Simulator,
+    asked: Array,
+) -> None:
+    """Compare Coal's verdicts with the second engine's."""
+    if engine is None:
+        return
+    truth, other = simulator.world.contact_model.in_contact(asked), engine.in_contact(asked)
+    differing = np.flatnonzero(truth != other)
+    alone, named = truth[differing], simulator.world.contact_model.first_in_contact
+    # Of the pair that Coal names, or of the contacts that MuJoCo finds.
+    distances = np.array(
+        [
+            engine.distance(q, int(named(q) or 0)) if coal else engine.depth(q)
+            for q, coal in zip(asked[differing], alone, strict=True)
+        ]
+    )
+    tally.count("configurations of the second engine", len(asked))
+    tally.count("touching", truth.sum())
+    tally.count("touching for Coal alone", alone.sum())
+    tally.count("touching for MuJoCo alone", (~alone).sum())
+    tally.largest("gap where Coal alone sees contact [m]", distances[alone].max(initial=0.0))
+    tally.largest("depth where Coal alone sees none [m]", distances[~alone].max(initial=0.0))
+    agree = np.ones(len(asked), dtype=bool)
+    agree[differing] = np.abs(distances) <= MARGIN
+    claim = f"engines agree, but for {MARGIN:g} m about contact"
+    _claim(tally, claim, agree, asked, dict(zip(differing.tolist(), distances, strict=True)))
+
+
+def _claim(
+    tally: Tally,
+    claim: str,
+    holds: NDArray[np.bool_],
+    asked: Array,
+    distances: dict[int, float] | None = None,
+) -> None:
+    def describe(row: int) -> dict[str, object]:
+        found = {} if distances is None else {"distance": float(distances[row])}
+        return {"configuration": asked[row].tolist(), **found}
+
+    tally.check(claim, holds, describe)

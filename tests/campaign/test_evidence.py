@@ -1,0 +1,137 @@
+"""A small share of the evidence, and whether it would notice a lie."""
+
+import json
+
+import numpy as np
+import pytest
+
+from tests.campaign import evidence
+from tests.campaign.census import Census, take_census
+from tests.campaign.checks import steps, verdicts
+from tests.campaign.checks.second_engine import MARGIN, SecondEngine
+from tests.campaign.checks.tally import Tally
+from tests.campaign.endurance import judged
+from tests.helpers.configurations import random_configurations
+
+
+def check(kind, name, size, tmp_path):
+    """Do a part, and look at it twice."""
+    part = evidence.Part(kind, name, size)
+    document = evidence.gather(part, tmp_path, "test")
+    assert document["failed"]
+    assert not any(document["failed"].values()), document["examples"]
+    written = part.file(tmp_path)
+    before = written.stat().st_mtime_ns
+    assert evidence.gather(part, tmp_path, "test") == json.loads(written.read_text())
+    assert written.stat().st_mtime_ns == before
+    return document["counts"]
+
+
+def test_steps_hold_together(tmp_path):
+    counts = check("steps", "paper", 60_000, tmp_path)
+    assert counts["steps"] >= 60_000
+    assert counts["successes as fast as is proven possible"] > 0
+    assert counts["steps of the reference"] > 0
+
+
+def test_verdicts_are_those_of_coal(tmp_path):
+    counts = check("contact", "post-paper", 3000, tmp_path)
+    assert counts["configurations"] >= 3000
+    assert counts["steps refused"] > 0
+    assert counts["decided without Coal"] > 0
+
+
+def test_no_policy_beats_what_is_proven(tmp_path):
+    counts = check("floors", "both", 960, tmp_path)
+    assert counts["trials"] == 960
+    assert counts["successes"] > 100
+
+
+def test_a_floor_that_is_too_high_is_noticed(monkeypatch):
+    monkeypatch.setattr(steps.Oracle, "solve_batch", raised(steps.Oracle.solve_batch))
+    tally = steps.check_steps(evidence.Part("steps", "paper", 1).problem, 20_000, 0)
+    assert tally.failed["no success is faster than is proven possible"] > 0
+    assert {"start", "goal", "batch"} <= tally.examples[-1].keys()
+
+
+def raised(solve_batch):
+    """Bounds that claim a step too much."""
+
+    def solve(self, *scenarios):
+        solutions = solve_batch(self, *scenarios)
+        return type(solutions)(
+            **{**solutions.arrays(), "steps_lower_bound": solutions.steps_lower_bound + 1}
+        )
+
+    return solve
+
+
+def test_a_proof_that_lies_is_noticed(monkeypatch):
+    def screen(first, last, chain, shapes, configurations, tools, free, touching):
+        free[...], touching[...] = True, False
+
+    monkeypatch.setattr(verdicts, "screen", screen)
+    tally = verdicts.check_verdicts(evidence.Part("contact", "paper", 1).problem, 600, 0)
+    assert tally.failed["what is proven free touches nothing"] > 0
+    assert tally.failed["what is proven to touch does"] == 0
+
+
+def test_the_second_engine_sees_what_coal_sees(simulators):
+    pytest.importorskip("mujoco")
+    for simulator in (simulators["paper"], simulators["sliding"], simulators["mesh"]):
+        engine, model = SecondEngine(simulator.world), simulator.world.contact_model
+        asked = random_configurations(simulator, 3, 400)
+        truth = model.in_contact(asked)
+        np.testing.assert_array_equal(engine.in_contact(asked), truth)
+        assert 0 < truth.sum() < len(asked)
+        assert all(engine.depth(q) > 0 for q in asked[truth])
+        assert not any(engine.depth(q) for q in asked[~truth])
+        closest = simulator.world.clearance(asked)
+        for row in np.flatnonzero(~truth & (closest.distance < 0.01))[:20]:
+            pair = model.pair_names.index(tuple(closest.bodies[row].tolist()))
+            found = engine.distance(asked[row], pair)
+            assert found == pytest.approx(closest.distance[row], abs=MARGIN)
+
+
+def test_tally_describes_the_first_failures():
+    tally = Tally()
+    tally.check("claim", [True, False, False], lambda row: {"row": row})
+    tally.check("claim", np.zeros(10, dtype=bool))
+    assert (tally.checked, tally.failed) == ({"claim": 13}, {"claim": 12})
+    assert [example["case"] for example in tally.examples] == [1, 2, 0, 1, 2]
+    assert tally.examples[0] == {"claim": "claim", "case": 1, "row": 1}
+
+
+def test_parts_add_up_to_the_whole():
+    parts = evidence.parts(1.0)
+    sums = {kind: sum(part.size for part in parts if part.kind == kind) for kind in evidence.CHECKS}
+    assert sums["steps"] >= 10**9
+    assert sums["contact"] >= 10**7
+    assert sums["floors"] >= 10**6
+    assert {part.name for part in parts if part.kind == "steps"} == set(evidence.arm_names())
+
+
+def test_census_counts_what_is_held(tmp_path):
+    before = take_census([tmp_path], set())
+    with (tmp_path / "left").open("w"):
+        during = take_census([tmp_path], set())
+    assert (during.files, during.descriptors) == (before.files + 1, before.descriptors + 1)
+    assert during.resident > 10
+
+
+@pytest.mark.parametrize(
+    ("name", "by", "grown"),
+    [("descriptors", 1, True), ("resident", 0.5, False), ("threads", 0, False)],
+)
+def test_growth_is_noticed(name, by, grown):
+    rows = [dict.fromkeys(Census._fields, 5) for _ in range(20)]
+    for number, row in enumerate(rows):
+        row[name] += by * number
+    assert judged(rows)["grown"] == ([name] if grown else [])
+
+
+def test_memory_may_not_grow_beyond_its_bound():
+    rows = [dict.fromkeys(Census._fields, 5) for _ in range(20)]
+    for number, row in enumerate(rows):
+        row["resident"] += 2 * number
+    assert judged(rows)["grown"] == ["resident"]

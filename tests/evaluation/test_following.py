@@ -1,0 +1,107 @@
+"""Fresh trials that are followed on a live page, and the page that is asked for."""
+
+import itertools
+import socket
+
+import numpy as np
+import pytest
+
+from kinarm.evaluation import ReplayRequest
+from kinarm.evaluation.entrants import ORACLE, find_entrants
+from kinarm.evaluation.replays import following
+from kinarm.evaluation.replays.following import follow, fresh_recordings
+from kinarm.evaluation.trials import TrialSet
+from kinarm.policies.oracle import Oracle
+from kinarm.simulator import Simulator
+from kinarm.viewer.live_server import LiveServer
+
+
+@pytest.fixture
+def no_waiting(monkeypatch):
+    waited = []
+    monkeypatch.setattr(following.time, "sleep", waited.append)
+    return waited
+
+
+@pytest.fixture
+def port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@pytest.fixture(scope="module")
+def left():
+    return Simulator("left", threads=1)
+
+
+def listens(port):
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
+
+
+def test_every_trial_is_that_of_the_next_seed(left):
+    (entrant,) = find_entrants("zero")
+    found = list(itertools.islice(fresh_recordings(entrant, left, 5), 3))
+    assert [recording.trial for recording in found] == [0, 1, 2]
+    for seed, recording in enumerate(found, start=5):
+        trials = TrialSet.draw("left", 1, seed)
+        np.testing.assert_array_equal(recording.states[0], trials.starts[0])
+        np.testing.assert_array_equal(recording.goal, trials.goals[0])
+        assert recording.outcome == "truncated"
+
+
+def test_the_oracle_reaches_goals_in_the_steps_that_it_finds(left):
+    (recording,) = itertools.islice(fresh_recordings(ORACLE, left, 2), 1)
+    trials = TrialSet.draw("left", 1, 2)
+    solution = Oracle("left").solve(trials.starts[0], trials.goals[0])
+    assert recording.outcome == "success"
+    assert recording.steps == solution.steps
+    np.testing.assert_array_equal(recording.states, solution.path)
+
+
+def test_following_takes_its_time_and_hands_out_what_is_over(left, no_waiting, port):
+    (entrant,) = find_entrants("zero")
+    recordings = list(itertools.islice(fresh_recordings(entrant, left, 0), 2))
+    with LiveServer(port) as server:
+        seen = []
+        for recording in follow(server, left, recordings):
+            seen.append(recording)
+            assert len(no_waiting) == len(seen) * 65 + len(seen) - 1
+    assert seen == recordings
+    slowed = following.SLOWDOWN * left.problem.stepping.time_step
+    assert set(no_waiting) == {slowed, following.REST}
+
+
+class EnoughError(Exception):
+    """Nobody wants to see more."""
+
+
+def stop_after(lines, count):
+    def report(line):
+        lines.append(line)
+        if len(lines) == count:
+            raise EnoughError
+
+    return report
+
+
+def test_live_request_serves_until_it_is_stopped(no_waiting, monkeypatch, port):
+    lines, opened = [], []
+    monkeypatch.setattr("kinarm.evaluation.replays.request.webbrowser.open", opened.append)
+    request = ReplayRequest(policy="zero", problem="left", live=True, port=port)
+    with pytest.raises(EnoughError):
+        request.run(stop_after(lines, 3))
+    assert opened == [f"http://127.0.0.1:{port}/static/"]
+    assert lines[0] == f"zero at {opened[0]} (stop with Ctrl-C)"
+    assert [line.split(",")[0] for line in lines[1:]] == ["left 0", "left 1"]
+    assert not listens(port)
+
+
+def test_live_request_says_where_it_goes_instead(no_waiting, port):
+    lines = []
+    request = ReplayRequest(policy="zero", problem="left", live=True, port=port, browser=False)
+    with LiveServer(port), pytest.raises(EnoughError):
+        request.run(stop_after(lines, 2))
+    assert lines[0].startswith(f"port {port} is in use: taking ")
+    assert f":{port}/" not in lines[1]
