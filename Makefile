@@ -20,7 +20,7 @@ test: $(call INSTALLED,test) ## run the tests, but for the slow ones
 	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow" --cov --cov-report=term \
 		--cov-fail-under=$$($(BIN)/python -c '$(COVERAGE)')
 
-CAMPAIGN := loaders command_lines writes signals live_page
+CAMPAIGN := loaders command_lines writes signals kills live_page
 
 test-slow: $(call INSTALLED,test) ## run the slow tests, those in a browser included
 	$(BIN)/python -m pytest -n auto --dist loadfile -m slow
