@@ -41,6 +41,8 @@ class BenchmarkRequest:
         Count the operations of a step and say where time goes as well, a minute or two.
     peers : bool
         Measure other simulators and learners beside kinarm as well, a few minutes.
+    studies : bool
+        Time studies by one and two processes as well, a few minutes.
     out : Path
         Output folder, for a document and a page.
     json : bool
@@ -57,6 +59,7 @@ class BenchmarkRequest:
     ppo: bool = False
     limits: bool = False
     peers: bool = False
+    studies: bool = False
     out: Path | None = field(default=None, metadata={"metavar": "DIR"})
     json: bool = False
 
@@ -101,6 +104,7 @@ class BenchmarkRequest:
             ppo=self.ppo,
             limits=self.limits,
             peers=self.peers,
+            studies=self.studies,
         )
 
 

@@ -16,6 +16,7 @@ from kinarm.evaluation.measurements.peers.measuring import measure_peers
 from kinarm.evaluation.measurements.pictures import measure_pictures
 from kinarm.evaluation.measurements.robots import measure_robots
 from kinarm.evaluation.measurements.rollouts import measure_reference, measure_rollouts
+from kinarm.evaluation.measurements.studies import measure_studies
 from kinarm.evaluation.measurements.training import measure_ppo, measure_training
 from kinarm.policies.library import load_policy
 from kinarm.policies.provenance import package_versions, source_commit
@@ -35,6 +36,7 @@ def measure(
     ppo: bool = False,
     limits: bool = False,
     peers: bool = False,
+    studies: bool = False,
 ) -> dict[str, Any]:
     """Measure everything that a `BenchmarkRequest` asks for."""
     policy = load_policy(policy_name)
@@ -67,6 +69,8 @@ def measure(
     }
     if ppo:
         document["ppo_training"] = measure_ppo(problem)
+    if studies:
+        document["studies"] = measure_studies()
     if limits:
         document["limits"] = measure_limits(policy_name, policy, document["attainable"])
     if peers:

@@ -40,7 +40,23 @@ def rows(document: dict[str, Any]) -> Iterator[Row]:
         what = f"kinarm-eval --trials 200, bounds {known}"
         yield what, f"{evaluation[name]:.1f} s", memory
     yield ()
+    if "studies" in document:
+        yield from study_rows(document["studies"])
+        yield ()
     yield from _attainable_rows(document["attainable"])
+
+
+def study_rows(studies: dict[str, Any]) -> Iterator[Row]:
+    """What studies take beside their trainings."""
+    yield (
+        f"study of {studies['trainings']} trainings of Table 1",
+        f"{studies['table_1_seconds']:.0f} s",
+    )
+    for learner, ratio in studies["speed_up"].items():
+        yield f"a study with {learner}, two processes over one", f"{ratio:.2f} x"
+    yield "share of a study that is no training", f"{100 * studies['overhead']:.1f} %"
+    kilobytes = f"{studies['bytes_each'] / 1e3:.0f} kB each"
+    yield f"reading {studies['loaded']} trainings", f"{studies['load_seconds']:.2f} s", kilobytes
 
 
 def _rollout_row(what: str, row: dict[str, Any]) -> Row:

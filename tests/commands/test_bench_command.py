@@ -54,6 +54,15 @@ DOCUMENT = {
         "environment_steps": 1_200_000,
         "simulator_share": 0.0721,
     },
+    "studies": {
+        "trainings": 200,
+        "table_1_seconds": 143.2,
+        "speed_up": {"ars": 1.87, "ppo": 1.93},
+        "overhead": 0.0261,
+        "loaded": 1000,
+        "load_seconds": 1.234,
+        "bytes_each": 4321.0,
+    },
     "limits": {
         "operations": {
             "total": 2100.0,
@@ -120,8 +129,8 @@ def test_table_shows_every_figure(run, monkeypatch):
     monkeypatch.setattr(
         benchmark, "measure", lambda *_, **options: asked.append(options) or DOCUMENT
     )
-    answer = run("kinarm-bench", "--ppo", "--limits", "--peers")
-    assert asked == [{"ppo": True, "limits": True, "peers": True}]
+    answer = run("kinarm-bench", "--ppo", "--limits", "--peers", "--studies")
+    assert asked == [{"ppo": True, "limits": True, "peers": True, "studies": True}]
     for figure in (
         "1,234,567",
         "2,345,678",
@@ -133,6 +142,12 @@ def test_table_shows_every_figure(run, monkeypatch):
         "53 pictures/s",
         "5,001",
         "247 x",
+        "143 s",
+        "1.87 x",
+        "1.93 x",
+        "2.6 %",
+        "1.23 s",
+        "4 kB each",
         "1.250 %",
         "1.52",
         "6.5 s",
