@@ -89,8 +89,7 @@ def only_writer(path: str | Path) -> Iterator[None]:
     OutputError
         If another process is making it.
     """
-    target = Path(os.path.realpath(path))
-    lock = target / ".lock" if target.is_dir() else target.with_name(f".{target.name}.lock")
+    lock = _lock_of(path)
     try:
         file = _locked(lock)
     except BlockingIOError:
@@ -106,15 +105,20 @@ def only_writer(path: str | Path) -> Iterator[None]:
 
 def is_being_written(path: str | Path) -> bool:
     """Whether a process is making an output as its `only_writer`."""
-    target = Path(os.path.realpath(path))
     try:
-        with target.with_name(f".{target.name}.lock").open("rb") as file:
+        with _lock_of(path).open("rb") as file:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         return True
     except OSError:
         return False
     return False
+
+
+def _lock_of(path: str | Path) -> Path:
+    """The file that is locked while an output is made."""
+    target = Path(os.path.realpath(path))
+    return target / ".lock" if target.is_dir() else target.with_name(f".{target.name}.lock")
 
 
 def _locked(lock: Path) -> IO[bytes]:

@@ -6,7 +6,6 @@ from datetime import datetime, timedelta
 from typing import TYPE_CHECKING
 
 from kinarm._files import is_being_written
-from kinarm.evaluation.studies.store import SPECIFICATION
 
 if TYPE_CHECKING:
     from kinarm.evaluation.studies.study import Study
@@ -52,7 +51,7 @@ class StudyStatus:
             done=len(finished),
             remaining=len(study.runs) - len(finished),
             failed=tuple((run.name, error) for run, error in study.failures.items()),
-            running=is_being_written(store.folder / SPECIFICATION),
+            running=is_being_written(store.folder),
             rate=60 * (len(times) - 1) / passed if passed > 0 else None,
         )
 

@@ -69,7 +69,7 @@ class StudyStore:
         """
         check_folder(self.folder)
         marker = self.folder / SPECIFICATION
-        with only_writer(marker):
+        with only_writer(self.folder):
             if marker.exists():
                 held = StudySpecification.load(marker).name
                 if held != study.name:

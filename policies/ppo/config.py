@@ -126,7 +126,8 @@ class PPOConfig(TrainingConfig):
     @property
     def prolongable(self) -> bool:
         """Whether a training with more iterations begins just as this one goes."""
-        return self.learning_rate_schedule == "constant" and self.widening == 0
+        unchanging = self.widening == 0 and self.initial_penalty == 1
+        return self.learning_rate_schedule == "constant" and unchanging
 
     @property
     def cost(self) -> float:
