@@ -2,11 +2,15 @@
 
 import tempfile
 import time
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from kinarm.evaluation.studies.planning import planned_runs
+from kinarm.evaluation.studies.runs import RunClock
 from kinarm.evaluation.studies.study import Study
+from kinarm.evaluation.studies.training import RunTask, TaskResult
 
 TABLE_1: dict[str, Any] = {
     "name": "table 1",
@@ -33,6 +37,9 @@ SHORT: dict[str, Any] = {
 }
 """A thousand trainings that take no time, to see what reading them takes."""
 
+PLANNED, KEPT = 5000, 200
+"""Trainings by which planning and keeping are timed."""
+
 FEW = 24
 """Trainings of Table 1 by which one and two processes are compared."""
 
@@ -46,7 +53,7 @@ def measure_studies() -> dict[str, Any]:
         ``table_1_seconds`` and ``trainings`` of the study of Table 1 by two processes;
         ``speed_up`` of two processes over one, by learner; ``overhead``, the share of a study by
         one process that is no training; ``load_seconds`` of ``loaded`` finished trainings, and
-        ``bytes_each`` of them.
+        ``bytes_each`` of them; ``planned_per_second`` trainings, and ``kept_per_second``.
     """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -66,6 +73,10 @@ def measure_studies() -> dict[str, Any]:
         loaded = len(Study.load(short.store.folder).table())
         seconds = time.perf_counter() - began
         sizes = [short.store.run_path(run).stat().st_size for run in short.runs]
+        began = time.perf_counter()
+        planned = planned_runs(replace(short.specification, seeds=PLANNED))
+        keys = {run.key for run in planned}
+        planning = time.perf_counter() - began
         return {
             "trainings": TABLE_1["seeds"],
             "table_1_seconds": whole,
@@ -74,7 +85,20 @@ def measure_studies() -> dict[str, Any]:
             "loaded": loaded,
             "load_seconds": seconds,
             "bytes_each": sum(sizes) / len(sizes),
+            "planned_per_second": len(keys) / planning,
+            "kept_per_second": _kept_per_second(short),
         }
+
+
+def _kept_per_second(study: Study) -> float:
+    """How many finished trainings the driver writes to its folder a second."""
+    run, store = study.runs[0], study.store
+    clock = RunClock(0.0, 0.0, ())
+    result = TaskResult(store.run_path(run).read_bytes(), clock)
+    began = time.perf_counter()
+    for _ in range(KEPT):
+        store.save(RunTask(run), result)
+    return KEPT / (time.perf_counter() - began)
 
 
 def _timed(specification: dict[str, Any], folder: Path, jobs: int) -> tuple[float, Study]:

@@ -56,6 +56,8 @@ def study_rows(studies: dict[str, Any]) -> Iterator[Row]:
         yield f"a study with {learner}, two processes over one", f"{ratio:.2f} x"
     yield "share of a study that is no training", f"{100 * studies['overhead']:.1f} %"
     kilobytes = f"{studies['bytes_each'] / 1e3:.0f} kB each"
+    for what in ("planned", "kept"):
+        yield f"trainings {what} by one process", f"{studies[f'{what}_per_second']:,.0f} a second"
     yield f"reading {studies['loaded']} trainings", f"{studies['load_seconds']:.2f} s", kilobytes
 
 

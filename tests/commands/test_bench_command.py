@@ -62,6 +62,8 @@ DOCUMENT = {
         "loaded": 1000,
         "load_seconds": 1.234,
         "bytes_each": 4321.0,
+        "planned_per_second": 3456.7,
+        "kept_per_second": 234.5,
     },
     "limits": {
         "operations": {
@@ -148,6 +150,8 @@ def test_table_shows_every_figure(run, monkeypatch):
         "2.6 %",
         "1.23 s",
         "4 kB each",
+        "3,457 a second",
+        "234 a second",
         "1.250 %",
         "1.52",
         "6.5 s",

@@ -11,6 +11,8 @@ def test_all_of_it_is_measured(monkeypatch):
     monkeypatch.setattr(studies, "TABLE_1", {**studies.TABLE_1, **small})
     monkeypatch.setattr(studies, "SHORT", {**studies.SHORT, "seeds": 5})
     monkeypatch.setattr(studies, "FEW", 2)
+    monkeypatch.setattr(studies, "PLANNED", 10)
+    monkeypatch.setattr(studies, "KEPT", 3)
     monkeypatch.setattr(studies, "find_spec", lambda _: None)
     measured = studies.measure_studies()
     assert measured["trainings"] == 3
@@ -18,4 +20,5 @@ def test_all_of_it_is_measured(monkeypatch):
     assert list(measured["speed_up"]) == ["ars"]
     assert measured["overhead"] < 1
     assert 1000 < measured["bytes_each"] < 50_000
-    assert measured["load_seconds"] > 0
+    for name in ("load_seconds", "planned_per_second", "kept_per_second"):
+        assert measured[name] > 0
