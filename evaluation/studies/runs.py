@@ -160,8 +160,8 @@ def bounds_content(bounds: TrialBounds) -> bytes:
     return file.getvalue()
 
 
-def load_bounds(path: Path) -> TrialBounds:
-    """Read the file of bounds.
+def load_bounds(path: Path, count: int) -> TrialBounds:
+    """Read the file of bounds of so many trials.
 
     Raises
     ------
@@ -170,7 +170,7 @@ def load_bounds(path: Path) -> TrialBounds:
     """
     arrays = load_archive(path, *BOUNDS_ARCHIVE, InvalidInputError).arrays
     with reading(repr(str(path)), BOUNDS_ARCHIVE[0], InvalidInputError):
-        return TrialBounds(**arrays)
+        return TrialBounds(**_each_trials(arrays, BOUND_KINDS, count))
 
 
 def timeless(state: TrainingState) -> TrainingState:
@@ -218,10 +218,34 @@ def load_run(path: Path, planned: PlannedRun) -> TrainedRun:
             settings=header["settings"],
             curve=tuple(_point(row) for row in arrays["curve"].tolist()),
             last=RunPoint(**header["last"]),
-            outcomes=TrialOutcomes(**_parts(arrays, OUTCOMES)),
+            outcomes=TrialOutcomes(
+                **_each_trials(_parts(arrays, OUTCOMES), OUTCOME_KINDS, planned.trials.count)
+            ),
             policy=Policy.from_content(policy, repr(str(path))),
             state=state,
         )
+
+
+OUTCOME_KINDS = {"distance": "f", "steps": "i", "returns": "f", "success": "b", "collision": "b"}
+BOUND_KINDS = {"reachable": "b", "steps_lower_bound": "i"}
+"""Kinds of arrays with an entry for each trial: numbers, whole numbers and truth values."""
+
+
+def _each_trials(
+    arrays: Mapping[str, NDArray[Any]], kinds: Mapping[str, str], count: int
+) -> dict[str, NDArray[Any]]:
+    """Arrays that are to have an entry for each of so many trials.
+
+    Raises
+    ------
+    ValueError
+        If one is missing, or of another kind or shape.
+    """
+    for name, kind in kinds.items():
+        array = arrays[name]
+        if array.dtype.kind != kind or array.shape != (count,):
+            raise ValueError(f"{name} is not of {count} trials")
+    return {name: arrays[name] for name in kinds}
 
 
 def _point(row: list[float]) -> RunPoint:

@@ -153,5 +153,5 @@ class StudyStore:
     def bounds(self, task: BoundTask) -> TrialBounds | None:
         """Read bounds; None if they are not known, or their file is damaged."""
         with suppress(InvalidInputError):
-            return load_bounds(self.bounds_path(task))
+            return load_bounds(self.bounds_path(task), task.trials.count)
         return None

@@ -20,12 +20,22 @@ from unittest import mock
 from hypothesis import strategies as st
 
 from kinarm._command_line import Parser, add_options
-from kinarm.evaluation.commands import arms, bench, compare, evaluate, problem, replay, reproduce
+from kinarm.evaluation.commands import (
+    arms,
+    bench,
+    compare,
+    evaluate,
+    problem,
+    replay,
+    reproduce,
+    study,
+)
 from kinarm.evaluation.replays.request import ReplayRequest
 from kinarm.policies import train
 
 from .judging import Judge, Verdict, unfit
 from .mutations import Rng, pick
+from .processes import STUDY
 from .running import Try, campaign, generator, options
 
 LARGE = 20_000
@@ -136,6 +146,12 @@ PROGRAMS: dict[str, Program] = {
         lambda: _flags(reproduce.ReproductionRequest),
         (["--quick"], ["--no-ppo"], ["--out", "out"]),
         ("kinarm.evaluation.commands.reproduce.ReproductionRequest._carry_out",),
+    ),
+    "kinarm-study": Program(
+        study.main,
+        lambda: _flags(study.StudyRequest),
+        ([STUDY], [STUDY, "--out", "out"], [STUDY, "--no-train"], ["status", "out"]),
+        ("kinarm.evaluation.studies.study.Study.run",),
     ),
     "kinarm-train": Program(
         train.main,

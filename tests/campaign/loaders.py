@@ -7,8 +7,8 @@ import os
 import pickle
 import sys
 import warnings
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -18,6 +18,7 @@ import numpy as np
 
 from kinarm._cache import CACHE_VARIABLE, cached_arrays
 from kinarm.arm import Arm
+from kinarm.errors import KinarmError
 from kinarm.evaluation import bounds
 from kinarm.evaluation.commands.reproduce import _claim_folder
 from kinarm.evaluation.comparison.learners import read_learners
@@ -35,8 +36,9 @@ from kinarm.recording import load_recordings
 from kinarm.viewer.mesh_files import read_mesh_file
 from kinarm.viewer.visual_shapes import visual_parts
 
-from . import samples
+from . import samples, studies
 from .judging import Judge, Verdict
+from .loader import Loader
 from .mutations import (
     Mutation,
     cut_bytes,
@@ -52,34 +54,6 @@ from .running import Try, campaign, generator, options
 
 LARGE = 100_000
 """Inputs of the recorded run."""
-
-
-@dataclass(frozen=True)
-class Loader:
-    """Something that reads files.
-
-    Parameters
-    ----------
-    reads : tuple of str
-        Functions of the project in which the reading takes place.
-    samples : callable
-        Makes the content of valid files.
-    mutate : callable
-        Damages such a content.
-    load : callable
-        Reads a file, and makes of it what a command would.
-    file : str
-        Where the file lies in its folder.
-    prepare : callable
-        Fills the folder with what lies beside the file.
-    """
-
-    reads: tuple[str, ...]
-    samples: Callable[[], Sequence[bytes]]
-    mutate: Mutation
-    load: Callable[[Path], object]
-    file: str = "file.npz"
-    prepare: Callable[[Path], object] = lambda folder: None
 
 
 def _policy(path: Path) -> None:
@@ -351,7 +325,7 @@ def _save_cached(path: Path) -> None:
     save_archive(path, "thing", 1, {"corners": np.array(samples.CUBE)}, {})
 
 
-LOADERS |= _mesh_loaders()
+LOADERS |= _mesh_loaders() | studies.LOADERS
 
 
 def make_try(name: str, seed: int, folder: Path) -> Try:
@@ -363,6 +337,9 @@ def make_try(name: str, seed: int, folder: Path) -> Try:
     if not kept.exists():
         kept.write_bytes(pickle.dumps(loader.samples()))
     contents = pickle.loads(kept.read_bytes())
+    path.write_bytes(contents[0])
+    with suppress(KinarmError):
+        loader.load(path)  # what is imported and compiled once is no file's
     judge = Judge().__enter__()
 
     def try_input(number: int) -> Verdict:

@@ -24,6 +24,7 @@ MODULES = {
     "kinarm-problem": "kinarm.evaluation.commands.problem",
     "kinarm-replay": "kinarm.evaluation.commands.replay",
     "kinarm-reproduce": "kinarm.evaluation.commands.reproduce",
+    "kinarm-study": "kinarm.evaluation.commands.study",
     "kinarm-train": "kinarm.policies.train",
 }
 
@@ -57,6 +58,7 @@ class Subject(NamedTuple):
         return [*(module if as_module else [str(script)]), *self.arguments]
 
 
+STUDY = str(Path(__file__).with_name("study.toml"))
 TRAINING = ("--directions", "2", "--top-directions", "2", "--iterations", "2000")
 SMALL_PPO = ("--n-envs", "8", "--n-steps", "50", "--batch-size", "50", "--iterations", "200")
 
@@ -91,6 +93,7 @@ SUBJECTS: dict[str, Subject] = {
     "reproduce": Subject(
         "kinarm-reproduce", ("--quick", "--no-ppo", "--jobs", "2", "--out", "out"), 15.0
     ),
+    "study": Subject("kinarm-study", (STUDY, "--jobs", "2", "--out", "out"), 12.0),
     "train, ars": Subject("kinarm-train", ("ars", "--out", "p.npz", *TRAINING)),
     "train, ppo": Subject("kinarm-train", ("ppo", "--out", "p.npz", *SMALL_PPO), 12.0),
 }

