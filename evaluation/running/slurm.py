@@ -90,6 +90,8 @@ class SlurmExecutor:
             for job in jobs:
                 with suppress(Exception):
                     job.cancel(check=False)
+                    if self.cluster == "local":
+                        job.wait()
 
     def _submit(self, submitit: Any, bundles: "Sequence[Bundle]") -> list[Any]:
         """Hand an array of bundles to the cluster."""
@@ -113,11 +115,17 @@ class SlurmExecutor:
         try:
             return list(job.result())
         except submitit.core.utils.FailedJobError as error:
-            lines = str(error).strip().splitlines()
             raise WorkerError(
-                f"job {job.job_id} failed: {lines[-1] if lines else 'no result'}; its log is "
+                f"job {job.job_id} failed: {_reason(str(error))}; its log is "
                 f"{str(job.paths.stderr)!r}, and the same command goes on with what is missing"
             ) from error
+
+
+def _reason(said: str) -> str:
+    """What submitit says of a failed job, in a line: the last one of the traceback, if any."""
+    _, _, traced = said.partition("Traceback (most recent call last):\n")
+    lines = [line for line in (traced or said).splitlines() if line and not line.startswith(" ")]
+    return next((line for line in lines if not line.startswith("-")), "no result")
 
 
 @dataclass

@@ -3,6 +3,7 @@
 import asyncio
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import threading
@@ -13,7 +14,6 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from tornado.websocket import websocket_connect
 
 from kinarm.evaluation import TrialSet, evaluate, find_entrants, oracle_bounds, record
 from kinarm.policies import load_checkpoint, recipe, save_checkpoint, sb3_vec_env, train_policy
@@ -172,13 +172,17 @@ async def _watch(ports: list[int]) -> None:
 
 
 async def _client(port: int, messages: int) -> None:
-    """Take some messages of a page, and leave; the first one, without saying so."""
-    connection = await websocket_connect(f"ws://127.0.0.1:{port}/")
-    for _ in range(messages):
-        await asyncio.wait_for(connection.read_message(), PATIENCE)
+    """Take some commands of a scene, and leave; after a single one, without saying so."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    writer.write(f"GET /scene HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode())
+    async with asyncio.timeout(PATIENCE):
+        await reader.readuntil(b"\r\n\r\n")
+        for _ in range(messages):
+            (length,) = struct.unpack("<I", await reader.readexactly(4))
+            await reader.readexactly(length)
     if messages == 1:
-        connection.protocol.stream.close()
-    connection.close()
+        writer.transport.abort()
+    writer.close()
 
 
 def commands(run: LongRun) -> None:
