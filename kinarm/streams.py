@@ -1,7 +1,7 @@
 """Random generators by purpose: no two purposes share numbers, whatever their seeds.
 
 A generator's key is the hash of the purpose's name, followed by numbers of its own. The trials of
-an evaluation (`kinarm.evaluation.trials.trial_generator`) are older than the names: their keys
+an evaluation (``kinarm.evaluation.trials.trial_generator``) are older than the names: their keys
 have two numbers and are therefore other keys than those, which have four at least.
 """
 

@@ -110,7 +110,7 @@ class TrainedRun:
     Attributes
     ----------
     settings : mapping
-        What was trained: `PlannedRun.settings`.
+        What was trained, as the planned run tells.
     curve : tuple of RunPoint
         The policy in the course of the training, as often as the trials say.
     last : RunPoint
