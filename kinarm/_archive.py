@@ -88,8 +88,15 @@ def write_archive(
     write(file, **content)
 
 
-def load_archive(path: str | Path, kind: str, version: int, error: type[KinarmError]) -> Archive:
-    """Read what `save_archive` wrote.
+def load_archive(
+    path: str | Path,
+    kind: str,
+    version: int,
+    error: type[KinarmError],
+    *,
+    unless: tuple[str, ...] = (),
+) -> Archive:
+    """Read what `save_archive` wrote, but for arrays whose names begin as those in ``unless``.
 
     Raises
     ------
@@ -100,7 +107,7 @@ def load_archive(path: str | Path, kind: str, version: int, error: type[KinarmEr
     name, wanted = repr(str(path)), f"kinarm-{kind.replace(' ', '-')}"
     with reading(name, kind, error), Path(path).open("rb") as file:
         is_other = file.read(2) not in (b"", b"PK")
-        content = {} if is_other else _arrays(file)
+        content = {} if is_other else _arrays(file, unless)
         if "format" not in content:
             raise error(f"{name} is not a kinarm {kind}")
         held = str(content["format"])
@@ -145,8 +152,11 @@ def parse_json(text: str) -> Any:
     return json.loads(text)
 
 
-def _arrays(file: IO[bytes]) -> dict[str, NDArray[Any]]:
-    """Arrays of a ``.npz`` file; whatever it claims to hold, little more than its size is read."""
+def _arrays(file: IO[bytes], unless: tuple[str, ...]) -> dict[str, NDArray[Any]]:
+    """Arrays of a ``.npz`` file, but for those whose names begin as some.
+
+    Whatever it claims to hold, little more than its size is read.
+    """
     arrays: dict[str, NDArray[Any]] = {}
     with warnings.catch_warnings(action="ignore"), zipfile.ZipFile(file) as archive:
         members = archive.infolist()
@@ -154,6 +164,8 @@ def _arrays(file: IO[bytes]) -> dict[str, NDArray[Any]]:
         if claimed > GROWTH * os.fstat(file.fileno()).st_size + SLACK:
             raise ValueError(f"it claims to hold {claimed / 1e6:.0f} MB")
         for member in members:
+            if unless and member.filename.startswith(unless):
+                continue
             with archive.open(member) as stored:
                 arrays[member.filename.removesuffix(".npy")] = _array(stored, member)
     return arrays

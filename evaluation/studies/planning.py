@@ -34,11 +34,14 @@ class PlannedRun:
         How it is judged.
     choices : mapping
         What of it varies in the study, by field.
+    entries : mapping, optional
+        The settings as JSON holds them, where they are known already.
     """
 
     config: TrainingConfig
     trials: StudyTrials
     choices: Mapping[str, Any]
+    entries: Mapping[str, Any] | None = None
 
     @property
     def learner(self) -> str:
@@ -50,7 +53,7 @@ class PlannedRun:
         """Everything that its results depend on, as JSON holds it."""
         return {
             "learner": self.learner,
-            "config": to_plain(self.config),
+            "config": to_plain(self.config) if self.entries is None else self.entries,
             "trials": to_plain(self.trials),
             "semantics": SEMANTICS,
         }
@@ -110,14 +113,18 @@ def planned_runs(
         for setting in _settings(study, learner, name, problem, varied)
     ]
     seeds = range(study.first_seed, study.first_seed + study.seeds)
-    runs = {
-        run.key: run
-        for seed, (config, choices) in product(seeds, each)
-        for run in [
-            PlannedRun(config=replace(config, seed=seed), trials=study.trials, choices=choices)
-        ]
-    }
-    return tuple(runs.values())
+    plain = [to_plain(config) for config, _ in each]
+    planned = (
+        PlannedRun(
+            config=replace(config, seed=seed),
+            trials=study.trials,
+            choices=choices,
+            entries={**entries, "seed": seed},
+        )
+        for seed in seeds
+        for (config, choices), entries in zip(each, plain, strict=True)
+    )
+    return tuple({run.key: run for run in planned}.values())
 
 
 def _check_fields_known(study: StudySpecification) -> None:

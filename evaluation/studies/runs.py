@@ -117,21 +117,31 @@ class TrainedRun:
         The trained policy.
     outcomes : TrialOutcomes
         The trained policy in every trial.
-    policy : Policy
-        The trained policy.
-    state : TrainingState or None
-        Where a longer training can go on; kept if its iterations are those of this one.
     """
 
     settings: Mapping[str, Any]
     curve: tuple[RunPoint, ...]
     last: RunPoint
     outcomes: TrialOutcomes
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WholeRun(TrainedRun):
+    """What a training came to, and what it left.
+
+    Attributes
+    ----------
+    policy : Policy
+        The trained policy.
+    state : TrainingState or None
+        Where a longer training can go on; kept if its iterations are those of this one.
+    """
+
     policy: Policy
     state: TrainingState | None = None
 
 
-def run_content(run: TrainedRun) -> bytes:
+def run_content(run: WholeRun) -> bytes:
     """A run as its file holds it; equal runs give equal bytes."""
     policy = run.policy.content()
     arrays = {
@@ -189,7 +199,8 @@ def planned_run(path: Path) -> PlannedRun:
     KinarmError
         If the file is missing or damaged, or its settings cannot be used.
     """
-    header, _ = load_archive(path, *ARCHIVE, InvalidInputError)
+    arrays = (f"{STATE}.", POLICY, OUTCOMES)
+    header, _ = load_archive(path, *ARCHIVE, InvalidInputError, unless=arrays)
     with reading(repr(str(path)), ARCHIVE[0], InvalidInputError):
         settings = header["settings"]
         config = from_plain(find_learner(settings["learner"]).config, settings["config"], str(path))
@@ -198,32 +209,45 @@ def planned_run(path: Path) -> PlannedRun:
 
 
 def load_run(path: Path, planned: PlannedRun) -> TrainedRun:
-    """Read the file of a run.
+    """Read the file of a run, but for policy and state.
 
     Raises
     ------
     InvalidInputError
         If it is missing, damaged or of another training.
     """
+    content = load_archive(path, *ARCHIVE, InvalidInputError, unless=(f"{STATE}.", POLICY))
+    with reading(repr(str(path)), ARCHIVE[0], InvalidInputError):
+        return TrainedRun(**_results(path, planned, content))
+
+
+def load_whole_run(path: Path, planned: PlannedRun) -> WholeRun:
+    """Read the file of a run; raises as `load_run` does."""
     content = load_archive(path, *ARCHIVE, InvalidInputError)
     with reading(repr(str(path)), ARCHIVE[0], InvalidInputError):
         header, arrays = content
-        if header["settings"] != planned.settings:
-            raise InvalidInputError(f"{str(path)!r} is of another training")
-        policy = Archive(header["policy"], _parts(arrays, POLICY))
-        state = None
+        policy, state = Archive(header["policy"], _parts(arrays, POLICY)), None
         if any(name.startswith(f"{STATE}.") for name in arrays):
             state = rebuilt(find_learner(planned.learner).state, STATE, arrays)
-        return TrainedRun(
-            settings=header["settings"],
-            curve=tuple(_point(row) for row in arrays["curve"].tolist()),
-            last=RunPoint(**header["last"]),
-            outcomes=TrialOutcomes(
-                **_each_trials(_parts(arrays, OUTCOMES), OUTCOME_KINDS, planned.trials.count)
-            ),
+        return WholeRun(
+            **_results(path, planned, content),
             policy=Policy.from_content(policy, repr(str(path))),
             state=state,
         )
+
+
+def _results(path: Path, planned: PlannedRun, content: Archive) -> dict[str, Any]:
+    """What a file says of what a training came to."""
+    header, arrays = content
+    if header["settings"] != planned.settings:
+        raise InvalidInputError(f"{str(path)!r} is of another training")
+    outcomes = _parts(arrays, OUTCOMES)
+    return {
+        "settings": header["settings"],
+        "curve": tuple(_point(row) for row in arrays["curve"].tolist()),
+        "last": RunPoint(**header["last"]),
+        "outcomes": TrialOutcomes(**_each_trials(outcomes, OUTCOME_KINDS, planned.trials.count)),
+    }
 
 
 OUTCOME_KINDS = {"distance": "f", "steps": "i", "returns": "f", "success": "b", "collision": "b"}

@@ -17,8 +17,10 @@ from kinarm.evaluation.studies.runs import (
     RunClock,
     TrainedRun,
     TrialBounds,
+    WholeRun,
     load_bounds,
     load_run,
+    load_whole_run,
     planned_run,
 )
 from kinarm.evaluation.studies.specification import StudySpecification
@@ -113,7 +115,7 @@ class StudyStore:
 
     def shorter_runs(
         self, lineages: Collection[str]
-    ) -> dict[str, list[tuple[PlannedRun, TrainedRun]]]:
+    ) -> dict[str, list[tuple[PlannedRun, WholeRun]]]:
         """Finished trainings, whichever study they were for, that differ in iterations alone.
 
         Parameters
@@ -126,12 +128,14 @@ class StudyStore:
         dict
             By these hashes, the trainings whose state is kept.
         """
-        found: dict[str, list[tuple[PlannedRun, TrainedRun]]] = {}
+        found: dict[str, list[tuple[PlannedRun, WholeRun]]] = {}
         for path in sorted((self.folder / "runs").glob("*.npz")):
             with suppress(KinarmError):
                 planned = planned_run(path)
                 if planned.lineage in lineages and planned.key == path.stem:
-                    found.setdefault(planned.lineage, []).append((planned, load_run(path, planned)))
+                    found.setdefault(planned.lineage, []).append(
+                        (planned, load_whole_run(path, planned))
+                    )
         return found
 
     def made(self, run: PlannedRun) -> dict[str, Any]:

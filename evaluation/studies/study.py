@@ -14,7 +14,7 @@ from kinarm.evaluation.running.executor import Executor
 from kinarm.evaluation.running.local import LocalExecutor
 from kinarm.evaluation.running.progress import TaskProgress
 from kinarm.evaluation.studies.planning import PlannedRun, planned_runs
-from kinarm.evaluation.studies.runs import RunClock, TrainedRun, TrialBounds
+from kinarm.evaluation.studies.runs import RunClock, TrainedRun, TrialBounds, load_whole_run
 from kinarm.evaluation.studies.search import carry_out_search, searched_runs
 from kinarm.evaluation.studies.specification import StudySpecification
 from kinarm.evaluation.studies.store import SPECIFICATION, StudyStore
@@ -217,8 +217,14 @@ class Study:
         return starts
 
     def policy(self, run: PlannedRun) -> Policy:
-        """The policy of a finished training, with versions and commit that made it."""
-        trained, made = self.finished[run], self.store.made(run)
+        """The policy of a finished training, with versions and commit that made it.
+
+        Raises
+        ------
+        InvalidInputError
+            If the training is not finished, or its file is damaged.
+        """
+        trained, made = load_whole_run(self.store.run_path(run), run), self.store.made(run)
         known = {name: made[name] for name in ("versions", "commit") if name in made}
         provenance = replace(trained.policy.provenance, **known)
         return replace(trained.policy, provenance=provenance)

@@ -15,9 +15,9 @@ from kinarm.evaluation.studies.planning import PlannedRun
 from kinarm.evaluation.studies.runs import (
     RunClock,
     RunPoint,
-    TrainedRun,
     TrialBounds,
     TrialOutcomes,
+    WholeRun,
     bounds_content,
     run_content,
 )
@@ -163,7 +163,7 @@ def find_bounds(task: BoundTask, threads: int) -> TrialBounds:
 
 def train(
     task: RunTask, threads: int = 1, on_point: Callable[[RunPoint], object] | None = None
-) -> tuple[TrainedRun, RunClock]:
+) -> tuple[WholeRun, RunClock]:
     """Train and judge; ``on_point`` is told of every point of the learning curve."""
     began = time.process_time()
     planned = task.run
@@ -187,7 +187,7 @@ def train(
                 on_point(judge.curve[-1])
     policy = state_policy(config, state)
     rollouts = judge.face(policy)
-    run = TrainedRun(
+    run = WholeRun(
         settings=planned.settings,
         curve=tuple(judge.curve),
         last=point_of(state, rollouts),

@@ -4,7 +4,7 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from kinarm.evaluation.studies.runs import load_bounds, load_run, planned_run
+from kinarm.evaluation.studies.runs import load_bounds, load_whole_run, planned_run
 from kinarm.evaluation.studies.specification import StudySpecification
 from kinarm.evaluation.studies.study import Study
 
@@ -60,7 +60,7 @@ KEY = Study(SMALL, Path()).runs[0].key
 def _load_run(path: Path) -> None:
     study = _study(path)
     planned = planned_run(path)
-    load_run(path, planned)
+    load_whole_run(path, planned)
     len(study.table())
 
 
@@ -87,7 +87,11 @@ LOADERS = {
         "file.toml",
     ),
     "study run": Loader(
-        ("evaluation.studies.runs.load_run", "evaluation.studies.runs.planned_run"),
+        (
+            "evaluation.studies.runs.load_run",
+            "evaluation.studies.runs.load_whole_run",
+            "evaluation.studies.runs.planned_run",
+        ),
         lambda: [_files()["runs"]],
         damaged_archive,
         _load_run,

@@ -46,7 +46,7 @@ class TestResults:
             steps = policy.provenance.environment_steps
             assert trained.last.environment_steps == steps
             np.testing.assert_array_equal(
-                trained.policy.layers[0].weights, policy.layers[0].weights
+                finished.policy(run).layers[0].weights, policy.layers[0].weights
             )
 
     def test_bounds_are_those_of_the_oracle(self, finished):
