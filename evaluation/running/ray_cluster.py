@@ -1,6 +1,7 @@
 """A Ray cluster as executor."""
 
 import math
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -79,9 +80,10 @@ class RayExecutor:
             ray.init(num_cpus=self.jobs, **{**quiet, "include_dashboard": False})
             return
         try:
-            if not self.address.startswith("ray://") and self.address != "auto":
-                _knock(self.address)
-            ray.init(address=self.address, **quiet)
+            if self.address != "auto":
+                _knock(self.address.removeprefix("ray://"))
+            with warnings.catch_warnings(action="ignore"):  # one line says it
+                ray.init(address=self.address, **quiet)
         except (ConnectionError, OSError, RuntimeError, TimeoutError, ValueError) as error:
             raise InvalidInputError(
                 f"no Ray cluster answers at {self.address!r}: give the address of one, auto "
