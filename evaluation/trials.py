@@ -2,7 +2,7 @@
 
 import hashlib
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,3 +100,9 @@ class TrialSet:
         rules = self.problem.replace(reward=RewardWeights())
         content = rules.digest.encode() + numbers.tobytes()
         return hashlib.sha256(content).hexdigest()[:16]
+
+
+@cache
+def trial_set(problem: ReachProblem, trials: int, seed: int) -> TrialSet:
+    """Trials of a problem, drawn once in a process."""
+    return TrialSet.draw(problem, trials, seed)

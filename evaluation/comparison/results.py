@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.comparison.learners import ComparedLearner
 from kinarm.evaluation.comparison.runs import CurvePoint, PlannedRun
-from kinarm.evaluation.comparison.training import trial_set
 from kinarm.evaluation.statistics import Estimate, wilson_interval
+from kinarm.evaluation.trials import trial_set
 from kinarm.problem import ReachProblem
 
 LEVELS = (0.5, 0.8)

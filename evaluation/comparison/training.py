@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 from copy import deepcopy
-from functools import cache, partial
+from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,7 @@ from kinarm._files import first_line
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.comparison.learners import ALGORITHMS, ComparedLearner
 from kinarm.evaluation.comparison.runs import CurvePoint, PlannedRun, Protocol
-from kinarm.evaluation.trials import TrialSet
+from kinarm.evaluation.trials import trial_set
 from kinarm.policies.learners import begin_training, learner_of, state_policy
 from kinarm.policies.policy import Policy
 from kinarm.policies.sb3.environment import sb3_vec_env
@@ -22,12 +22,6 @@ from kinarm.problem import ReachProblem
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
-
-
-@cache
-def trial_set(problem: ReachProblem, trials: int, seed: int) -> TrialSet:
-    """Trials of a problem, drawn once in a process."""
-    return TrialSet.draw(problem, trials, seed)
 
 
 def carry_out(run: PlannedRun) -> list[CurvePoint]:

@@ -8,25 +8,19 @@ from numpy.typing import NDArray
 
 from kinarm.evaluation.reproduction.runs import TrainedRun
 from kinarm.evaluation.reproduction.study import LITERAL, PlannedTraining, Protocol
-from kinarm.evaluation.trials import TrialSet
+from kinarm.evaluation.trials import TrialSet, trial_set
 from kinarm.policies.learners import TrainingState, learner_of, state_policy, train_policy
 from kinarm.policies.policy import Policy
 from kinarm.problem import ReachProblem
 from kinarm.rollouts import Rollouts
 
 
-@cache
-def trial_set(problem: ReachProblem, trials: int, seed: int) -> TrialSet:
-    """Trials of a problem, drawn once in a process.
+def final_trials(problem: ReachProblem, protocol: Protocol) -> TrialSet:
+    """Trials that final policies face.
 
     Those of the paper's tasks are crossed where spread and seed are the same: trial by trial, all
     tasks have the same start, and goals at the same place of the left or of the right bench.
     """
-    return TrialSet.draw(problem, trials, seed)
-
-
-def final_trials(problem: ReachProblem, protocol: Protocol) -> TrialSet:
-    """Trials that final policies face."""
     return trial_set(problem, protocol.trials, protocol.seed)
 
 

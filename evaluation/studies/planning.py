@@ -193,7 +193,8 @@ def _config(
             of_recipe.setdefault(outer, {})[inner] = value
         else:
             of_recipe[key] = value
-    return recipe(learner, name, problem=problem.pinned, **of_recipe)  # type: ignore[no-any-return]
+    config: TrainingConfig = recipe(learner, name, problem=problem.pinned, **of_recipe)
+    return config
 
 
 @contextmanager

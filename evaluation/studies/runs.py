@@ -98,9 +98,9 @@ class RunClock(NamedTuple):
         Wall time of the training at each point of the learning curve [s].
     """
 
-    seconds: float
-    processor_seconds: float
-    points: tuple[float, ...]
+    seconds: float = 0.0
+    processor_seconds: float = 0.0
+    points: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -187,7 +187,7 @@ class Study:
         """Look into the folder anew."""
         if self.specification.search:
             self.runs = self._planned()
-        for name in ("finished", "bounds"):
+        for name in ("finished", "bounds", "_groups"):
             self.__dict__.pop(name, None)
 
     def _tasks(self) -> Sequence[RunTask | BoundTask]:
@@ -211,9 +211,9 @@ class Study:
             if before:
                 planned, trained = max(before, key=lambda each: each[1].last.iteration)
                 made = self.store.made(planned)
-                times = [made.get(name, default) for name, default in NO_TIME.items()]
+                clock = RunClock(**{name: made[name] for name in RunClock._fields if name in made})
                 if trained.state is not None:
-                    starts[run] = Start(trained.state, trained.curve, RunClock(*times))
+                    starts[run] = Start(trained.state, trained.curve, clock)
         return starts
 
     def policy(self, run: PlannedRun) -> Policy:
@@ -231,6 +231,10 @@ class Study:
 
     def groups(self) -> "tuple[Group, ...]":
         """The finished trainings, those with the same settings but for the seed together."""
+        return self._groups
+
+    @cached_property
+    def _groups(self) -> "tuple[Group, ...]":
         from kinarm.evaluation.studies.table import group_runs
 
         return group_runs(self)
@@ -245,7 +249,3 @@ class Study:
         """The settings with the largest success over what the oracle reaches, best first."""
         ordered = sorted(self.groups(), key=lambda group: -group.relative_success)
         return tuple(ordered[:count])
-
-
-NO_TIME: Mapping[str, Any] = {"seconds": 0.0, "processor_seconds": 0.0, "points": ()}
-"""What is assumed of a training whose times are not known."""

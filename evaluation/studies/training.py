@@ -5,7 +5,7 @@ import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +22,7 @@ from kinarm.evaluation.studies.runs import (
     run_content,
 )
 from kinarm.evaluation.studies.specification import StudyTrials
-from kinarm.evaluation.trials import TrialSet
+from kinarm.evaluation.trials import trial_set
 from kinarm.policies.learners import (
     TrainingState,
     begin_training,
@@ -34,12 +34,6 @@ from kinarm.policies.policy import Policy
 from kinarm.problem import ReachProblem
 from kinarm.rollouts import Rollouts
 from kinarm.semantics import SEMANTICS
-
-
-@cache
-def trial_set(problem: ReachProblem, count: int, seed: int) -> TrialSet:
-    """Trials of a problem, drawn once in a process."""
-    return TrialSet.draw(problem, count, seed)
 
 
 class Start(NamedTuple):
@@ -174,7 +168,7 @@ def train(
     training = begin_training(config, **options)
     state: TrainingState
     if task.start is None:
-        state, earlier = training.initial_state(), RunClock(0.0, 0.0, ())
+        state, earlier = training.initial_state(), RunClock()
     else:
         state, judge.curve, earlier = task.start.state, [*task.start.curve], task.start.clock
     times = [*earlier.points]

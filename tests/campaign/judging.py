@@ -105,7 +105,8 @@ class Judge:
         text = os.read(2, 200).decode("utf-8", "replace")
         os.ftruncate(2, 0)
         os.lseek(2, 0, os.SEEK_SET)
-        return f"prints {text.splitlines()[0][:120]!r}"
+        line = text.splitlines()[0].rpartition("site-packages/")[2]  # of no machine in particular
+        return f"prints {line[:120]!r}"
 
 
 def unfit(message: str) -> str:

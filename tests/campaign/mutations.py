@@ -171,8 +171,8 @@ def nested(content: bytes, rng: Rng) -> bytes:
     return content[:place] + opening * DEEP + content[place:]
 
 
-def damaged_toml(content: bytes, rng: Rng) -> bytes:
-    """A TOML document with values of other kinds, nested without end, or damaged as a text."""
+def damaged_blindly(content: bytes, rng: Rng) -> bytes | None:
+    """A document damaged as bytes, as a text or by nesting, in two of five cases; else none."""
     kind = int(rng.integers(10))
     if kind == 0:
         return damaged_bytes(content, rng)
@@ -180,6 +180,13 @@ def damaged_toml(content: bytes, rng: Rng) -> bytes:
         return damaged_text(content, rng)
     if kind == 3:
         return nested(content, rng)
+    return None
+
+
+def damaged_toml(content: bytes, rng: Rng) -> bytes:
+    """A TOML document with values of other kinds, nested without end, or damaged as a text."""
+    if (blindly := damaged_blindly(content, rng)) is not None:
+        return blindly
     value = damaged_value(tomllib.loads(content.decode()), rng)
     try:
         return tomli_w.dumps(_for_toml(value)).encode("utf-8", "surrogatepass")
@@ -198,13 +205,8 @@ def _for_toml(value: Any) -> Any:
 
 def damaged_xml(content: bytes, rng: Rng) -> bytes:
     """An XML document with attributes, elements and texts changed, dropped, doubled or moved."""
-    kind = int(rng.integers(10))
-    if kind == 0:
-        return damaged_bytes(content, rng)
-    if kind <= 2:
-        return damaged_text(content, rng)
-    if kind == 3:
-        return nested(content, rng)
+    if (blindly := damaged_blindly(content, rng)) is not None:
+        return blindly
     root = ElementTree.fromstring(content)
     for _ in range(int(rng.integers(1, 3))):
         elements = list(root.iter())
