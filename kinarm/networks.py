@@ -71,6 +71,21 @@ class Mirror(NamedTuple):
         left = self.on_the_left(observations)
         return np.where(left[:, None], observations * self.observations, observations)
 
+    def scenarios_from_the_right(
+        self, starts: NDArray[np.float64], goals: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Reflect those starts, shape (n, n_joints), and goals, shape (n, 3), that lie to the left.
+
+        Joints that are not actuated stay as they are.
+        """
+        left = goals[:, 1] > 0
+        joints = np.ones(starts.shape[1])
+        joints[: len(self.actions)] = self.actions
+        signs = np.where(left[:, None], joints, 1.0), np.where(left, -1.0, 1.0)
+        reflected = goals.copy()
+        reflected[:, 1] *= signs[1]
+        return starts * signs[0], reflected
+
 
 @dataclass(frozen=True, eq=False)
 class Networks:

@@ -117,8 +117,8 @@ def _axis_signs(world: World) -> NDArray[np.float64]:
 
 
 def task_mirror(symmetric: bool, world: World) -> Mirror | None:
-    """Reflection that a policy has to commute with, if it is to and arm and task have one."""
-    if symmetric and is_symmetric(world.problem):
+    """Reflection that a policy has to commute with, if it is to and arm and obstacles have one."""
+    if symmetric and obstacles_are_symmetric(world.problem):
         with suppress(InvalidInputError):
             return find_mirror(world)
     return None
@@ -140,17 +140,21 @@ def missing_mirror(problem: ReachProblem) -> str:
     return ""
 
 
+def obstacles_are_symmetric(problem: ReachProblem) -> bool:
+    """Whether the reflection maps the obstacles to themselves."""
+    boxes = [(each, (each.lower, each.upper)) for each in problem.scene.obstacles]
+    obstacles = {(*ends, _turned(box, box.yaw)) for box, ends in boxes}
+    return obstacles == {(*_reflected(*ends), _turned(box, -box.yaw)) for box, ends in boxes}
+
+
 def is_symmetric(problem: ReachProblem) -> bool:
     """Whether the reflection maps obstacles and goals, with their weights, to themselves."""
     task, scene = problem.task, problem.scene
     weights = task.goal_weights or (1.0,) * len(task.goal_regions)
     regions = [scene.goal_region(name) for name in task.goal_regions]
     goals = {(region.lower, region.upper, w) for region, w in zip(regions, weights, strict=True)}
-    boxes = [(each, (each.lower, each.upper)) for each in scene.obstacles]
-    obstacles = {(*ends, _turned(box, box.yaw)) for box, ends in boxes}
-    return goals == {(*_reflected(lower, upper), w) for lower, upper, w in goals} and (
-        obstacles == {(*_reflected(*ends), _turned(box, -box.yaw)) for box, ends in boxes}
-    )
+    reflected = {(*_reflected(lower, upper), w) for lower, upper, w in goals}
+    return goals == reflected and obstacles_are_symmetric(problem)
 
 
 def _turned(box: Obstacle, yaw: float) -> float:

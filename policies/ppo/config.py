@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass, field
 
+from kinarm._fields import OPTIONAL
 from kinarm.errors import InvalidInputError
+from kinarm.failed_scenarios import LARGEST_REPLAY, Replay
 from kinarm.policies.config import (
     MANY,
     NOT_NEGATIVE,
@@ -74,6 +76,10 @@ class PPOConfig(TrainingConfig):
         linearly to the whole at the end.
     widening : float
         Share of the training in which spread and discount change linearly to what they are to be.
+    replay_share : float
+        Probability that an episode begins where an earlier one failed; see `kinarm.Replay`.
+    replay_size : int
+        Failed scenarios that are kept.
     """
 
     iterations: int = 600
@@ -97,6 +103,8 @@ class PPOConfig(TrainingConfig):
     initial_gamma: float | None = field(default=None, metadata=SHARE)
     initial_penalty: float = field(default=1.0, metadata=SHARE)
     widening: float = field(default=0.0, metadata=SHARE)
+    replay_share: float = field(default=0.0, metadata={**SHARE, **OPTIONAL})
+    replay_size: int = field(default=8192, metadata={"at_most": LARGEST_REPLAY, **OPTIONAL})
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -122,6 +130,13 @@ class PPOConfig(TrainingConfig):
     def training_problem(self) -> ReachProblem:
         """The problem with the reward and tolerance of these settings, which is trained on."""
         return self.problem.replace(reward=self.reward, tolerance=self.training_tolerance)
+
+    @property
+    def replay(self) -> Replay | None:
+        """How failed scenarios are replayed, if they are."""
+        if not self.replay_share:
+            return None
+        return Replay(share=self.replay_share, size=self.replay_size)
 
     @property
     def prolongable(self) -> bool:

@@ -70,7 +70,10 @@ class PPOTraining:
         mirror = task_mirror(config.symmetric, simulator.world)
         self.config = config
         _, scenarios = seed_iteration(config.seed, 0)
-        self.env = TrainingVecEnv(simulator, config.n_envs, rng=scenarios, mirror=mirror)
+        replay = config.replay
+        self.env = TrainingVecEnv(
+            simulator, config.n_envs, rng=scenarios, mirror=mirror, replay=replay
+        )
         self.model = CompiledPPO(self.env, config, threads)
         self.model.set_logger(Logger(folder=None, output_formats=outputs))
 
@@ -79,9 +82,8 @@ class PPOTraining:
         config, env = self.config, self.env
         rng, scenarios = seed_iteration(config.seed, 0)
         simulator = env.simulator
-        observations = simulator.world.observe(*simulator.sample(scenarios, NORMALIZED_OVER))
-        if env.mirror is not None:
-            observations = env.mirror.from_the_right(observations)
+        env.draw_from(scenarios)
+        observations = simulator.world.observe(*env.sample(NORMALIZED_OVER))
         env.draw_from(scenarios, config.start_spread_at(0.0))
         env.reset()
         widths = (simulator.n_observations, config.net_arch, simulator.n_actions)
@@ -92,6 +94,7 @@ class PPOTraining:
             second_moment=np.zeros_like(parameters),
             normalizer=Normalizer.of(observations),
             episodes=env.states(),
+            failed=env.failed,
         )
 
     def iterate(self, state: PPOState) -> PPOState:
@@ -122,6 +125,7 @@ class PPOTraining:
             second_moment=second_moment,
             normalizer=state.normalizer,
             episodes=env.states(),
+            failed=env.failed,
             curve=(*state.curve, point),
             simulator_time=state.simulator_time + simulator_time,
         )
@@ -140,5 +144,5 @@ class PPOTraining:
         model.load_vectors(state.parameters, moments, state.iteration * config.n_epochs)
         model.num_timesteps = state.environment_steps
         self.env.normalize_by(state.normalizer)
-        model._last_obs = self.env.restore(state.episodes)
+        model._last_obs = self.env.restore(state.episodes, state.failed)
         model._last_episode_starts = state.episodes.steps == 0

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.errors import InvalidInputError
+from kinarm.failed_scenarios import FailedScenarios
 from kinarm.policies.learners import TrainingState
 from kinarm.policies.normalizer import Normalizer
 
@@ -24,12 +25,18 @@ class EpisodeStates(NamedTuple):
         Steps taken.
     total : ndarray, shape (n,)
         Sums of rewards so far.
+    start : ndarray, shape (n, n_joints)
+        Configurations in which they began [rad or m].
+    replayed : ndarray of bool, shape (n,)
+        Whether they began where an earlier one had failed.
     """
 
     q: NDArray[np.float64]
     goal: NDArray[np.float64]
     steps: NDArray[np.int64]
     total: NDArray[np.float64]
+    start: NDArray[np.float64]
+    replayed: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,6 +53,8 @@ class PPOState(TrainingState):
         Statistics by which observations are normalised.
     episodes : EpisodeStates
         The episodes that are under way.
+    failed : FailedScenarios
+        What may be replayed.
     simulator_time : float
         Time spent in the simulator so far [s].
     curve : tuple of CurvePoint
@@ -62,6 +71,7 @@ class PPOState(TrainingState):
     second_moment: NDArray[np.float32]
     normalizer: Normalizer
     episodes: EpisodeStates
+    failed: FailedScenarios
     simulator_time: float = 0.0
 
     def __post_init__(self) -> None:

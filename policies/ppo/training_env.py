@@ -1,4 +1,4 @@
-"""The environment of a PPO training: normalised, mirrored, and to be resumed."""
+"""The environment of a PPO training: normalised, on one side, and to be resumed."""
 
 import time
 from typing import Any, NamedTuple
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from kinarm.envs.interface import Verdict
 from kinarm.episodes import Episodes
+from kinarm.failed_scenarios import FailedScenarios, Replay, Scenarios
 from kinarm.kernels.reward import COLLISION
 from kinarm.networks import Mirror
 from kinarm.policies.normalizer import Normalizer, input_scale
@@ -19,14 +20,12 @@ from kinarm.simulator import Simulator
 
 
 class NormalizedInterface:
-    """The simulator's observation, mirrored and normalised, and its own reward.
+    """The simulator's observation, normalised, and its own reward.
 
     Parameters
     ----------
     n_observations : int
         Length of an observation.
-    mirror : Mirror, optional
-        Arms whose goal lies to the left are seen in it.
 
     Attributes
     ----------
@@ -36,10 +35,10 @@ class NormalizedInterface:
 
     tells_terms = True
 
-    def __init__(self, n_observations: int, mirror: Mirror | None) -> None:
+    def __init__(self, n_observations: int) -> None:
         unbounded = Box(-np.inf, np.inf, (n_observations,), dtype=np.float32)
         self.observation_space: Space[Any] = unbounded
-        self.mirror, self.penalty = mirror, 1.0
+        self.penalty = 1.0
         self.normalize_by(Normalizer.empty(n_observations))
 
     def normalize_by(self, normalizer: Normalizer) -> None:
@@ -48,8 +47,6 @@ class NormalizedInterface:
 
     def observe(self, observations: NDArray[np.float64]) -> NDArray[np.float32]:
         """Observations as the learner sees them."""
-        if self.mirror is not None:
-            observations = self.mirror.from_the_right(observations)
         shown: NDArray[np.float32] = ((observations - self._mean) * self._scale).astype(np.float32)
         return shown
 
@@ -70,9 +67,9 @@ class EndedEpisodes(NamedTuple):
 class TrainingVecEnv(SB3VecEnv):
     """The environment for Stable-Baselines3 as kinarm's own trainings use it.
 
-    One generator, given to `draw_from`, draws starts and goals of all arms. With a mirror, an arm
-    whose goal lies to the left is seen in the mirror, and its actions are reflected likewise, so
-    that a learner only ever meets goals to the right.
+    One generator, given to `draw_from`, draws starts and goals of all arms. With a mirror, those
+    with goals to the left are reflected, so that a learner only ever meets goals to the right.
+    What is recorded of episodes that ended leaves out those that replayed a failed scenario.
     """
 
     def __init__(
@@ -82,11 +79,12 @@ class TrainingVecEnv(SB3VecEnv):
         *,
         rng: np.random.Generator,
         mirror: Mirror | None = None,
+        replay: Replay | None = None,
     ) -> None:
         self.mirror = mirror
-        self._shown = NormalizedInterface(simulator.n_observations, mirror)
+        self._shown = NormalizedInterface(simulator.n_observations)
         self._record = EndedEpisodes([], [], 0.0)
-        super().__init__(simulator, num_envs, self._shown)
+        super().__init__(simulator, num_envs, self._shown, replay=replay)
         self.draw_from(rng)
 
     def normalize_by(self, normalizer: Normalizer) -> None:
@@ -99,18 +97,16 @@ class TrainingVecEnv(SB3VecEnv):
 
     def draw_from(self, rng: np.random.Generator, start_spread: float | None = None) -> None:
         """From now on, draw scenarios from this generator; with the task's start spread if None."""
-        self._rng, self._start_spread = rng, start_spread
+        self._chooser, self._start_spread = rng, start_spread
 
-    def _draw(self, rows: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _draw_new(self, rows: NDArray[np.int64]) -> Scenarios:
         """Starts and goals from the one generator."""
-        return self.simulator.sample(self._rng, rows.size, start_spread=self._start_spread)
+        return self.sample(rows.size)
 
-    def step_async(self, actions: NDArray[Any]) -> None:
-        """Take note of the actions, given what the learner saw, as the simulator needs them."""
-        if self.mirror is not None:
-            left = self.mirror.on_the_left(self._begun_episodes().observation)
-            actions = np.where(left[:, None], actions * self.mirror.actions, actions)
-        super().step_async(actions)
+    def sample(self, count: int) -> Scenarios:
+        """Draw starts and goals as a learner meets them, without replay."""
+        drawn = self.simulator.sample(self._chooser, count, start_spread=self._start_spread)
+        return drawn if self.mirror is None else self.mirror.scenarios_from_the_right(*drawn)
 
     def step_wait(self) -> StepReturn:
         """Move every arm for one time step, and keep a record of it."""
@@ -118,8 +114,9 @@ class TrainingVecEnv(SB3VecEnv):
         outcome = super().step_wait()
         for row in np.flatnonzero(outcome[2]).tolist():
             info = outcome[3][row]
-            self._record.returns.append(info["episode"]["r"])
-            self._record.successes.append(info["is_success"])
+            if not info.get("replayed", False):
+                self._record.returns.append(info["episode"]["r"])
+                self._record.successes.append(info["is_success"])
         spent = self._record.time + time.perf_counter() - began
         self._record = self._record._replace(time=spent)
         return outcome
@@ -133,13 +130,24 @@ class TrainingVecEnv(SB3VecEnv):
         """Copy what the running episodes depend on."""
         episodes = self._begun_episodes()
         return EpisodeStates(
-            episodes.q.copy(), episodes.goal.copy(), episodes.steps.copy(), self._returns.copy()
+            q=episodes.q.copy(),
+            goal=episodes.goal.copy(),
+            steps=episodes.steps.copy(),
+            total=self._returns.copy(),
+            start=self._starts.copy(),
+            replayed=self._replayed.copy(),
         )
 
-    def restore(self, states: EpisodeStates) -> NDArray[np.float32]:
+    @property
+    def failed(self) -> FailedScenarios:
+        """What may be replayed."""
+        return self._failed
+
+    def restore(self, states: EpisodeStates, failed: FailedScenarios) -> NDArray[np.float32]:
         """Go on with episodes that `states` described; returns their observations."""
         episodes = self.simulator.reset(states.q, states.goal)
         episodes.steps[:], episodes.total[:] = states.steps, states.total
         shown: NDArray[np.float32] = self._begin(episodes)
-        self._returns[:] = states.total
+        self._returns[:], self._failed = states.total, failed
+        self._starts[:], self._replayed[:] = states.start, states.replayed
         return shown

@@ -14,10 +14,12 @@ from kinarm.envs.interface import Interface, Observations, one_by_one
 from kinarm.envs.lifecycle import Lifecycle
 from kinarm.envs.reach import action_space, environment_metadata, pick_scenario
 from kinarm.envs.rendering import EnvPictures
-from kinarm.episodes import Episodes
+from kinarm.episodes import SUCCESS, Episodes
 from kinarm.errors import InvalidInputError
+from kinarm.failed_scenarios import FailedScenarios, Replay, Scenarios
 from kinarm.scenarios import ScenarioStream
 from kinarm.simulator import Simulator
+from kinarm.streams import Stream, stream_generator
 
 StepReturn = tuple[Observations, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]
 Indices = int | Iterable[int] | None
@@ -40,6 +42,9 @@ class SB3VecEnv(Lifecycle, VecEnv):
         What is shown of it.
     spec : EnvSpec, optional
         Of the single environment, if it is registered.
+    replay : Replay, optional
+        How scenarios of episodes that ended without success are replayed; never, if it is not
+        given.
     render_mode, **picture
         As for `kinarm.ReachEnv`: mode, ``width``, ``height`` and ``camera`` of pictures.
 
@@ -48,7 +53,8 @@ class SB3VecEnv(Lifecycle, VecEnv):
     The info of an episode that ended holds what Stable-Baselines3 and its wrappers look for:
     ``terminal_observation``, ``TimeLimit.truncated``, ``is_success`` and what ``Monitor`` adds,
     ``episode`` (return ``r``, length ``l``, time ``t`` since the environment was made [s]); besides
-    ``collision`` and ``distance`` [m]. That of a move that was refused holds ``collision``. All
+    ``collision`` and ``distance`` [m], and with replay ``replayed``: whether the episode began where
+    an earlier one had failed. That of a move that was refused holds ``collision``. All
     other infos are empty, which saves time.
 
     The arms share this object and its interface: ``get_attr`` reads from them, ``env_method`` calls
@@ -62,6 +68,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
         interface: Interface,
         *,
         spec: EnvSpec | None = None,
+        replay: Replay | None = None,
         render_mode: str | None = None,
         **picture: Any,
     ) -> None:
@@ -71,6 +78,10 @@ class SB3VecEnv(Lifecycle, VecEnv):
         super().__init__(num_envs, interface.observation_space, action_space(simulator))
         self.metadata = environment_metadata(simulator)
         self._streams: dict[int, ScenarioStream] = {}
+        self._replay, self._chooser = replay, np.random.default_rng()
+        self._failed = FailedScenarios.none(simulator.arm.n_joints)
+        self._starts = np.empty((num_envs, simulator.arm.n_joints))
+        self._replayed = np.zeros(num_envs, dtype=bool)
         self._actions = np.zeros((num_envs, simulator.n_actions))
         self._returns = np.zeros(num_envs)
         self._made = time.time()
@@ -94,6 +105,9 @@ class SB3VecEnv(Lifecycle, VecEnv):
         for row, seed in enumerate(self._seeds):
             if seed is not None:
                 self._streams[row] = self._stream(seed)
+        if self._seeds[0] is not None:
+            self._chooser = stream_generator(Stream.REPLAY, self._seeds[0])
+            self._failed = FailedScenarios.none(self.simulator.arm.n_joints)
         starts, goals = self._draw(np.arange(self.num_envs))
         for row, options in enumerate(self._options):
             starts[row], goals[row] = pick_scenario(options, starts[row], goals[row])
@@ -104,12 +118,22 @@ class SB3VecEnv(Lifecycle, VecEnv):
     def _begin(self, episodes: Episodes) -> Observations:
         """Go on with these episodes, of all arms."""
         self._episodes = episodes
+        self._starts[:] = episodes.q
         self._returns[:] = 0.0
         self._announce(episodes, np.arange(self.num_envs))
         return self.interface.observe(episodes.observation)
 
-    def _draw(self, rows: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Starts and goals of the next episodes of some arms, each from its own stream."""
+    def _draw(self, rows: NDArray[np.int64]) -> Scenarios:
+        """Starts and goals of the next episodes of some arms: new ones, or failed ones again."""
+        if self._replay is None:
+            return self._draw_new(rows)
+        scenarios, self._replayed[rows] = self._failed.mixed(
+            self._replay.share, self._chooser, rows.size, lambda new: self._draw_new(rows[new])
+        )
+        return scenarios
+
+    def _draw_new(self, rows: NDArray[np.int64]) -> Scenarios:
+        """Starts and goals for some arms, each from its own stream."""
         scenarios = []
         for row in rows.tolist():
             if row not in self._streams:
@@ -175,7 +199,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
         finals = one_by_one(self.interface.observe(episodes.observation[rows]), rows.size)
         elapsed = round(time.time() - self._made, 6)
         columns = (*reasons, episodes.distance, self._returns, episodes.steps)
-        return [
+        infos = [
             {
                 "terminal_observation": final,
                 "TimeLimit.truncated": truncated,
@@ -188,10 +212,19 @@ class SB3VecEnv(Lifecycle, VecEnv):
                 finals, *(column[rows].tolist() for column in columns), strict=True
             )
         ]
+        if self._replay is not None:
+            for info, replayed in zip(infos, self._replayed[rows].tolist(), strict=True):
+                info["replayed"] = replayed
+        return infos
 
     def _renew(self, episodes: Episodes, rows: NDArray[np.int64]) -> None:
         """Replace episodes that ended."""
-        episodes.q[rows], episodes.goal[rows] = self._draw(rows)
+        if self._replay is not None:
+            failed = rows[episodes.status[rows] != SUCCESS]
+            scenarios = self._starts[failed], episodes.goal[failed]
+            self._failed = self._failed.followed_by(*scenarios, self._replay.size)
+        self._starts[rows], episodes.goal[rows] = self._draw(rows)
+        episodes.q[rows] = self._starts[rows]
         self.simulator.begin(episodes, rows)
         self._returns[rows] = 0.0
         self._announce(episodes, rows)

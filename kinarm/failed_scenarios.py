@@ -1,0 +1,118 @@
+"""Replay of failed scenarios: episodes of a training that begin where earlier ones failed.
+
+A policy that reaches most goals meets few scenarios that it can still learn from. A training may
+therefore draw a share of its scenarios from those of the last episodes that failed. What it learns
+on is then no longer what it is judged by: failed scenarios are met more often than they occur. An
+evaluation never replays any.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm._fields import check_fields
+from kinarm._validation import whole_number
+from kinarm.errors import InvalidInputError
+
+Scenarios = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Starts, shape (n, n_joints) [rad or m], and goals, shape (n, 3) [m]."""
+
+LARGEST_REPLAY = 1_000_000
+"""Scenarios that can be kept."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Replay:
+    """How failed scenarios are replayed.
+
+    Parameters
+    ----------
+    share : float
+        Probability that an episode replays a failed scenario, once there is one; 0 replays none.
+    size : int
+        Failures that are kept: the last ones. A scenario that is failed again is kept once more,
+        so what is failed often is replayed often, and what is mastered is forgotten.
+
+    Raises
+    ------
+    InvalidInputError
+        If the share is no probability, or the size not positive.
+    """
+
+    share: float = field(default=0.5)
+    size: int = 8192
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if not 0 <= self.share <= 1:
+            raise InvalidInputError(f"share must lie in [0, 1], got {self.share}")
+        whole_number("size", self.size, 1, LARGEST_REPLAY)
+
+
+class FailedScenarios(NamedTuple):
+    """Scenarios of the last episodes that failed, the oldest first.
+
+    Attributes
+    ----------
+    starts : ndarray, shape (n, n_joints)
+        Configurations [rad or m].
+    goals : ndarray, shape (n, 3)
+        Goal positions [m].
+    """
+
+    starts: NDArray[np.float64]
+    goals: NDArray[np.float64]
+
+    @classmethod
+    def none(cls, n_joints: int) -> "FailedScenarios":
+        """Before the first failure."""
+        return cls(np.empty((0, n_joints)), np.empty((0, 3)))
+
+    def followed_by(
+        self, starts: NDArray[np.float64], goals: NDArray[np.float64], size: int
+    ) -> "FailedScenarios":
+        """Add newer ones; the last ``size`` remain."""
+        parts = zip(self, (starts, goals), strict=True)
+        return FailedScenarios(*(np.concatenate(pair)[-size:] for pair in parts))
+
+    def mixed(
+        self,
+        share: float,
+        rng: np.random.Generator,
+        count: int,
+        draw: Callable[[NDArray[np.int64]], Scenarios],
+    ) -> tuple[Scenarios, NDArray[np.bool_]]:
+        """Draw scenarios, a share of them from these.
+
+        Parameters
+        ----------
+        share : float
+            Probability that a scenario is one of these.
+        rng : numpy.random.Generator
+            Decides which of them. It is not asked if none can be.
+        count : int
+            How many.
+        draw : callable
+            Draws those that are new, given their places among all, in ascending order.
+
+        Returns
+        -------
+        scenarios : tuple of ndarray
+            Starts, shape (count, n_joints), and goals, shape (count, 3).
+        replayed : ndarray of bool, shape (count,)
+            Which are failed ones.
+        """
+        every = np.arange(count)
+        if not share or not len(self.goals):
+            return draw(every), np.zeros(count, dtype=bool)
+        chance, choice = rng.random((2, count))
+        replayed = chance < share
+        picked = (choice * len(self.goals)).astype(np.int64)
+        starts, goals = self.starts[picked], self.goals[picked]
+        new = every[~replayed]
+        if new.size:
+            starts[new], goals[new] = draw(new)
+        return (starts, goals), replayed
