@@ -16,7 +16,7 @@ class CurvePoint(NamedTuple):
     ----------
     mean_return, std_return : float
         Mean and standard deviation of the returns of the iteration's episodes; for PPO, of those
-        that ended in it (NaN if none did).
+        that ended in it. Episodes that replayed a failed scenario do not count; NaN if none does.
     success : float
         Share of these episodes that reached the goal.
     environment_steps : int

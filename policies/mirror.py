@@ -2,9 +2,8 @@
 
 The reflection y -> -y maps the right bench to the left one and an arm that is symmetric about its
 x-z plane to itself, with joints that turn about x or z reversed. In kinarm's observations and
-actions it only changes signs. A linear policy commutes with it exactly if its weights vanish
-wherever the signs of input and output disagree: it then does on one bench what it does on the
-other. Any other network does so if it sees goals on the left in the mirror; see `kinarm.Networks`.
+actions it only changes signs. A policy that sees goals on the left in the mirror, and whose actions
+are then reflected, does on one bench exactly what it does on the other; see `kinarm.Networks`.
 """
 
 import math
@@ -28,11 +27,6 @@ MIRRORED_CONFIGURATIONS = 2000
 """Configurations at which `mirror_findings` compares contact."""
 
 REFLECTION = (1.0, -1.0, 1.0)
-
-
-def commuting_weights(mirror: Mirror) -> NDArray[np.bool_]:
-    """Where a linear policy that commutes with a reflection may have weights."""
-    return np.outer(mirror.actions, mirror.observations) > 0
 
 
 def find_mirror(world: World) -> Mirror:

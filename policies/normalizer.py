@@ -77,17 +77,6 @@ class Normalizer:
             return np.ones_like(self.mean)
         return np.sqrt(self.squares / self.count)
 
-    def mirrored(self, signs: NDArray[np.float64]) -> "Normalizer":
-        """Statistics of the observations together with their mirror images.
-
-        Parameters
-        ----------
-        signs : ndarray, shape (n_observations,)
-            Signs that the reflection gives to the entries of an observation.
-        """
-        mean = np.where(signs > 0, self.mean, 0.0)
-        return Normalizer(self.count, mean, self.squares + self.count * (self.mean - mean) ** 2)
-
     def updated(self, moments: NDArray[np.float64], counts: NDArray[np.int64]) -> "Normalizer":
         """Add the observations of a batch of episodes (Chan's parallel update).
 

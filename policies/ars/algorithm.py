@@ -5,6 +5,7 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm.failed_scenarios import FailedScenarios
 from kinarm.networks import Mirror, Networks
 from kinarm.policies.ars.config import ARSConfig
 from kinarm.policies.ars.kernels import (
@@ -19,9 +20,10 @@ from kinarm.policies.ars.networks import (
     perturbed_networks,
 )
 from kinarm.policies.ars.perturbations import perturbations
+from kinarm.policies.ars.scenarios import draw_shared, failed_after
 from kinarm.policies.ars.state import ARSState
 from kinarm.policies.curve import CurvePoint
-from kinarm.policies.mirror import commuting_weights, task_mirror
+from kinarm.policies.mirror import task_mirror
 from kinarm.policies.normalizer import Normalizer, input_scale
 from kinarm.policies.policy import Layer, Policy
 from kinarm.policies.provenance import Provenance
@@ -53,6 +55,7 @@ class ARSTraining:
             theta=theta,
             normalizer=Normalizer.empty(n_observations),
             generator=dict(rng.bit_generator.state),
+            failed=FailedScenarios.none(self.simulator.arm.n_joints),
         )
 
     def iterate(self, state: ARSState) -> ARSState:
@@ -69,16 +72,15 @@ def ars_iteration(
 ) -> ARSState:
     """One pass through the loop of Algorithm 1.
 
-    With a mirror, the policy commutes with it. The statistics are frozen within an iteration: they
-    are updated at its end with all observations of its episodes. A generator can be lent.
+    With a mirror, scenarios with goals to the left are met reflected. The statistics are frozen
+    within an iteration: they are updated at its end with all observations of its episodes. A
+    generator can be lent.
     """
     began, rng = time.perf_counter(), state.random_generator(rng)
     N, theta, normalizer = config.directions, state.theta, state.normalizer
     delta = perturbations(rng, (N, *theta.shape))
-    if mirror is not None:
-        delta *= commuting_weights(mirror)
-    starts, goals = shared_scenarios(config, simulator, rng)
-    seen = policy_normalizer(config, normalizer, mirror)
+    scenarios = draw_shared(config, simulator, rng, state.failed, mirror)
+    seen = policy_normalizer(config, normalizer)
     if config.net_arch:
         widths = (simulator.n_observations, *config.net_arch, simulator.n_actions)
         policies = perturbed_networks(theta, config.noise * delta, seen, widths)
@@ -86,19 +88,18 @@ def ars_iteration(
         policies = perturbed_policies(theta, config.noise * delta, seen)
     rollouts = simulator.rollout(
         policies,
-        starts,
-        goals,
+        *scenarios.of_all_episodes,
         policy_index=np.repeat(np.arange(2 * N), config.episodes),
         shift=normalizer.mean,
     )
     returns = rollouts.returns.reshape(2, N, config.episodes).mean(axis=2)
     theta = theta + ars_step(config, delta, returns, config.step_size_at(state.iteration))
     normalizer = normalizer.updated(rollouts.moments, rollouts.steps)
-    mean_return, std_return = mean_and_deviation(rollouts.returns)
+    mean_return, std_return, success = scenarios.outcome_of_new(rollouts)
     point = CurvePoint(
         mean_return=mean_return,
         std_return=std_return,
-        success=int(np.count_nonzero(rollouts.success)) / len(rollouts),
+        success=success,
         environment_steps=normalizer.count,
         wall_time=state.wall_time + time.perf_counter() - began,
     )
@@ -106,29 +107,14 @@ def ars_iteration(
         theta=theta,
         normalizer=normalizer,
         generator=dict(rng.bit_generator.state),
+        failed=failed_after(config, state.failed, scenarios, rollouts),
         curve=(*state.curve, point),
     )
 
 
-def shared_scenarios(
-    config: ARSConfig, simulator: Simulator, rng: np.random.Generator
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Draw the starts and goals of an iteration's episodes, shared as configured.
-
-    They come in the order sign, direction, episode: 2 N times ``episodes`` rows.
-    """
-    copies = {"none": 1, "pair": 2, "iteration": 2 * config.directions}[config.sharing]
-    starts, goals = simulator.sample(rng, 2 * config.directions * config.episodes // copies)
-    if copies == 1:
-        return starts, goals
-    return np.tile(starts, (copies, 1)), np.tile(goals, (copies, 1))
-
-
-def policy_normalizer(config: ARSConfig, seen: Normalizer, mirror: Mirror | None) -> Normalizer:
+def policy_normalizer(config: ARSConfig, seen: Normalizer) -> Normalizer:
     """Statistics by which the policy normalises its inputs; empty if it does not."""
-    if not config.normalize:
-        return Normalizer.empty(len(seen.mean))
-    return seen if mirror is None else seen.mirrored(mirror.observations)
+    return seen if config.normalize else Normalizer.empty(len(seen.mean))
 
 
 def perturbed_policies(
@@ -178,7 +164,7 @@ def trained_policy(config: ARSConfig, state: ARSState) -> Policy:
     """Freeze a state of the training into a policy."""
     # A world takes longer to build than an iteration: only where there may be a mirror.
     mirror = task_mirror(True, World(config.problem, threads=1)) if config.symmetric else None
-    normalizer = policy_normalizer(config, state.normalizer, mirror)
+    normalizer = policy_normalizer(config, state.normalizer)
     layers: tuple[Layer, ...] = (Layer(state.theta, np.zeros(len(state.theta))),)
     if config.net_arch:
         layers = network_layers(state.theta, (len(normalizer.mean), *config.net_arch))
@@ -187,4 +173,5 @@ def trained_policy(config: ARSConfig, state: ARSState) -> Policy:
         std=normalizer.std,
         layers=layers,
         provenance=Provenance.of("ars", config, state.environment_steps),
+        mirror=mirror,
     )

@@ -3,8 +3,18 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
+from kinarm._fields import OPTIONAL
 from kinarm.errors import InvalidInputError
-from kinarm.policies.config import MANY, POSITIVE, WIDTHS, Schedule, TrainingConfig, scheduled
+from kinarm.failed_scenarios import LARGEST_REPLAY
+from kinarm.policies.config import (
+    MANY,
+    POSITIVE,
+    SHARE,
+    WIDTHS,
+    Schedule,
+    TrainingConfig,
+    scheduled,
+)
 
 Sharing = Literal["none", "pair", "iteration"]
 
@@ -28,8 +38,9 @@ class ARSConfig(TrainingConfig):
     top_directions : int
         Perturbations b that enter the update, those with the best returns; b = N is V1 or V2.
     symmetric : bool
-        Whether a linear policy is to treat mirror images alike, where arm and task are their
-        own mirror image (``both``); see `kinarm.policies.mirror`. It halves the parameters.
+        Whether the policy is to treat mirror images alike, where arm and obstacles are their own
+        mirror image; it then learns from goals on the right and from mirror images of those on
+        the left.
     net_arch : tuple of int
         Widths of hidden layers with tanh; the policy is linear if there are none.
     normalize : bool
@@ -41,6 +52,11 @@ class ARSConfig(TrainingConfig):
         of a perturbation, or all perturbations of an iteration.
     episodes : int
         Episodes whose mean return judges a perturbed policy.
+    replay_share : float
+        Probability that a scenario is one that at least half of the policies that faced it
+        failed; see `kinarm.failed_scenarios`.
+    replay_size : int
+        Failed scenarios that are kept.
     """
 
     iterations: int = 800
@@ -55,6 +71,8 @@ class ARSConfig(TrainingConfig):
     scale_by_deviation: bool = True
     sharing: Sharing = "none"
     episodes: int = field(default=1, metadata=MANY)
+    replay_share: float = field(default=0.0, metadata={**SHARE, **OPTIONAL})
+    replay_size: int = field(default=512, metadata={"at_most": LARGEST_REPLAY, **OPTIONAL})
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -63,8 +81,6 @@ class ARSConfig(TrainingConfig):
                 f"top_directions must be at most directions ({self.directions}), "
                 f"got {self.top_directions}"
             )
-        if self.symmetric and self.net_arch:
-            raise InvalidInputError("symmetric is for linear policies, without net_arch")
 
     @property
     def prolongable(self) -> bool:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.errors import InvalidInputError
+from kinarm.failed_scenarios import FailedScenarios
 from kinarm.policies.learners import TrainingState
 from kinarm.policies.normalizer import Normalizer
 
@@ -26,6 +27,8 @@ class ARSState(TrainingState):
         Statistics mu and Sigma of the observations.
     generator : dict
         State of the random generator.
+    failed : FailedScenarios
+        What may be replayed.
     curve : tuple of CurvePoint
         One point per finished iteration.
 
@@ -38,6 +41,7 @@ class ARSState(TrainingState):
     theta: NDArray[np.float64]
     normalizer: Normalizer
     generator: dict[str, Any]
+    failed: FailedScenarios
 
     def __post_init__(self) -> None:
         widths = {self.normalizer.mean.shape, self.normalizer.squares.shape}

@@ -63,8 +63,8 @@ class PPOConfig(TrainingConfig):
         Distance at which an episode of the training counts as a success; the task's if it is not
         given [m].
     symmetric : bool
-        Whether the policy is to treat mirror images alike, where arm and task are their own
-        mirror image (``both``); it then learns from goals on the right and from mirror images of
+        Whether the policy is to treat mirror images alike, where arm and obstacles are their own
+        mirror image; it then learns from goals on the right and from mirror images of
         those on the left.
     initial_start_spread : float
         Spread of the start configurations at the beginning of the training, as a share of the
@@ -77,7 +77,8 @@ class PPOConfig(TrainingConfig):
     widening : float
         Share of the training in which spread and discount change linearly to what they are to be.
     replay_share : float
-        Probability that an episode begins where an earlier one failed; see `kinarm.Replay`.
+        Probability that an episode begins where an earlier one failed; see
+        `kinarm.failed_scenarios`.
     replay_size : int
         Failed scenarios that are kept.
     """

@@ -53,9 +53,9 @@ class SB3VecEnv(Lifecycle, VecEnv):
     The info of an episode that ended holds what Stable-Baselines3 and its wrappers look for:
     ``terminal_observation``, ``TimeLimit.truncated``, ``is_success`` and what ``Monitor`` adds,
     ``episode`` (return ``r``, length ``l``, time ``t`` since the environment was made [s]); besides
-    ``collision`` and ``distance`` [m], and with replay ``replayed``: whether the episode began where
-    an earlier one had failed. That of a move that was refused holds ``collision``. All
-    other infos are empty, which saves time.
+    ``collision`` and ``distance`` [m], and with replay ``replayed``: whether the episode began
+    where an earlier one had failed. That of a move that was refused holds ``collision``. All other
+    infos are empty, which saves time.
 
     The arms share this object and its interface: ``get_attr`` reads from them, ``env_method`` calls
     methods of the interface such as ``compute_reward``, and ``set_attr`` sets for all arms.
