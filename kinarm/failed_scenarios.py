@@ -66,6 +66,18 @@ class FailedScenarios(NamedTuple):
     starts: NDArray[np.float64]
     goals: NDArray[np.float64]
 
+    def check(self) -> None:
+        """Refuse starts and goals that are not as many.
+
+        Raises
+        ------
+        InvalidInputError
+            If they are not.
+        """
+        shapes = self.starts.shape, self.goals.shape
+        if [len(shape) for shape in shapes] != [2, 2] or len(self.starts) != len(self.goals):
+            raise InvalidInputError(f"failed scenarios have the shapes {shapes[0]}, {shapes[1]}")
+
     @classmethod
     def none(cls, n_joints: int) -> "FailedScenarios":
         """Before the first failure."""

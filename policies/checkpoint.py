@@ -15,7 +15,7 @@ from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import TrainingState, find_learner, learner_of
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 
 
 class Checkpoint(NamedTuple):

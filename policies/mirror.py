@@ -111,27 +111,39 @@ def _axis_signs(world: World) -> NDArray[np.float64]:
 
 
 def task_mirror(symmetric: bool, world: World) -> Mirror | None:
-    """Reflection that a policy has to commute with, if it is to and arm and obstacles have one."""
+    """Reflection that a policy has to commute with, if it is to and arm and obstacles have one.
+
+    Where the goals lie does not matter: those on the left are seen in the mirror.
+    """
     if symmetric and obstacles_are_symmetric(world.problem):
         with suppress(InvalidInputError):
             return find_mirror(world)
     return None
 
 
-def has_mirror(problem: ReachProblem) -> bool:
-    """Whether arm, obstacles and goals are their own mirror image."""
-    return not missing_mirror(problem)
-
-
 def missing_mirror(problem: ReachProblem) -> str:
-    """Why a problem is not its own mirror image; an empty text if it is."""
-    if not is_symmetric(problem):
-        return "obstacles or goals are not their own mirror image"
+    """Why arm and obstacles are not their own mirror image; an empty text if they are."""
+    if not obstacles_are_symmetric(problem):
+        return "obstacles are not their own mirror image"
     try:
         find_mirror(World(problem, threads=1))
     except InvalidInputError as error:
         return str(error)
     return ""
+
+
+def different_regions(problem: ReachProblem, symmetric: bool) -> int:
+    """How many goal regions a policy meets, which sees those on the left in the mirror or not."""
+    regions = [problem.scene.goal_region(name) for name in problem.task.goal_regions]
+    boxes = [(region.lower, region.upper) for region in regions]
+    if symmetric:
+        boxes = [_reflected(*box) if box[0][1] >= 0 else box for box in boxes]
+    return len(set(boxes))
+
+
+def has_mirror(problem: ReachProblem) -> bool:
+    """Whether arm, obstacles and goals are their own mirror image."""
+    return is_symmetric(problem) and not missing_mirror(problem)
 
 
 def obstacles_are_symmetric(problem: ReachProblem) -> bool:

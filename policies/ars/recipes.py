@@ -39,24 +39,20 @@ NETWORK: dict[str, Any] = {
 }
 """What ``tuned`` is where it trains a network."""
 
-ALIKE = {"reward": RewardWeights(collision=-1.0, success=0.5)}
-"""What ``tuned`` is where a reflection maps one goal region to another."""
-
 
 def adapted(config: ARSConfig) -> ARSConfig:
     """Adapt ``tuned`` to its problem.
 
-    Progress is rewarded in proportion to the arm's reach. On two benches, policies trained with
-    the double penalty reached fewer goals. Where several regions are to be reached and no
-    reflection maps one to another, a linear policy cannot turn to either side: a small network
-    takes its place, whose many parameters need more directions.
+    Progress is rewarded in proportion to the arm's reach. Where several regions are to be reached
+    and no reflection maps one to another, a linear policy cannot turn to either side: a small
+    network takes its place, whose many parameters need more directions.
     """
-    from kinarm.policies.mirror import has_mirror  # loads Pinocchio
+    from kinarm.policies.mirror import different_regions, missing_mirror  # loads Pinocchio
 
     if config.recipe != "tuned":
         return config
-    symmetric = has_mirror(config.problem)
+    symmetric = not missing_mirror(config.problem)
     config = replace(config, symmetric=symmetric)
-    if len(config.problem.task.goal_regions) > 1:
-        config = replace(config, **(ALIKE if symmetric else NETWORK))
+    if different_regions(config.problem, symmetric) > 1:
+        config = replace(config, **NETWORK)
     return rewarded_per_reach(config)

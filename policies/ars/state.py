@@ -52,6 +52,7 @@ class ARSState(TrainingState):
                 f"theta of shape {self.theta.shape} needs as many statistics, "
                 f"got {self.normalizer.mean.shape} and {self.normalizer.squares.shape}"
             )
+        self.failed.check()
         _PROBE.state = self.generator
 
     def random_generator(self, reused: np.random.Generator | None = None) -> np.random.Generator:

@@ -50,12 +50,12 @@ def adapted(config: PPOConfig) -> PPOConfig:
     progress counts more, and the future and contact less at first: else contact is avoided long
     before all regions are reached.
     """
-    from kinarm.policies.mirror import has_mirror  # loads Pinocchio
+    from kinarm.policies.mirror import different_regions, missing_mirror  # loads Pinocchio
 
     if config.recipe != "tuned":
         return config
-    task, symmetric = config.problem.task, has_mirror(config.problem)
-    if len(task.goal_regions) > 1 and not symmetric:
+    task, symmetric = config.problem.task, not missing_mirror(config.problem)
+    if different_regions(config.problem, symmetric) > 1:
         config = replace(config, **UNALIKE)
     config = replace(config, symmetric=symmetric, training_tolerance=0.6 * task.tolerance)
     return rewarded_per_reach(config)

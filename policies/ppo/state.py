@@ -86,6 +86,7 @@ class PPOState(TrainingState):
             raise InvalidInputError(
                 f"episodes have the shapes {[array.shape for array in self.episodes]}"
             )
+        self.failed.check()
         mean, squares = self.normalizer.mean, self.normalizer.squares
         if mean.shape != squares.shape or mean.ndim != 1:
             raise InvalidInputError(f"statistics have the shapes {mean.shape}, {squares.shape}")

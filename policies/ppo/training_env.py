@@ -97,7 +97,11 @@ class TrainingVecEnv(SB3VecEnv):
 
     def draw_from(self, rng: np.random.Generator, start_spread: float | None = None) -> None:
         """From now on, draw scenarios from this generator; with the task's start spread if None."""
-        self._chooser, self._start_spread = rng, start_spread
+        self._rng, self._start_spread = rng, start_spread
+
+    def _draw(self, rows: NDArray[np.int64]) -> Scenarios:
+        """The one generator decides about replays, too."""
+        return self._new_or_failed(rows, self._rng)
 
     def _draw_new(self, rows: NDArray[np.int64]) -> Scenarios:
         """Starts and goals from the one generator."""
@@ -105,7 +109,7 @@ class TrainingVecEnv(SB3VecEnv):
 
     def sample(self, count: int) -> Scenarios:
         """Draw starts and goals as a learner meets them, without replay."""
-        drawn = self.simulator.sample(self._chooser, count, start_spread=self._start_spread)
+        drawn = self.simulator.sample(self._rng, count, start_spread=self._start_spread)
         return drawn if self.mirror is None else self.mirror.scenarios_from_the_right(*drawn)
 
     def step_wait(self) -> StepReturn:

@@ -9,6 +9,7 @@ from numpy.typing import DTypeLike
 from kinarm._validation import whole_number
 from kinarm.envs.registration import ENVIRONMENTS
 from kinarm.errors import UnknownNameError
+from kinarm.failed_scenarios import Replay
 from kinarm.policies.learners import find_learner
 from kinarm.problem import ProblemLike
 
@@ -25,6 +26,8 @@ def sb3_vec_env(
     observation_dtype: DTypeLike = "float32",
     reward_type: str | None = None,
     threads: int | None = None,
+    replay_share: float = 0.0,
+    replay_size: int = 8192,
     render_mode: str | None = None,
     width: int = 480,
     height: int = 360,
@@ -51,6 +54,12 @@ def sb3_vec_env(
         Makes any problem goal-conditioned; see `kinarm.ReachGoalEnv`.
     threads : int, optional
         As for `kinarm.Simulator`.
+    replay_share : float
+        Probability that an episode begins where an earlier one ended without success, with the
+        same goal; infos tell which did (``replayed``). A policy then learns on harder scenarios
+        than it is judged by: evaluate it in an environment without.
+    replay_size : int
+        How many of the last failures are kept.
     render_mode, width, height, camera
         As for `kinarm.ReachEnv`.
     **overrides
@@ -73,6 +82,7 @@ def sb3_vec_env(
     whole_number("n_envs", n_envs, 1)
     if seed is not None:
         whole_number("seed", seed, 0)
+    replay = Replay(share=replay_share, size=replay_size)
     goals = {} if reward_type is None else {"reward_type": reward_type}
     settings = {"observation_dtype": observation_dtype, **goals, **overrides}
     single = _single_environment(problem, settings)
@@ -83,6 +93,7 @@ def sb3_vec_env(
         n_envs,
         single.interface,
         spec=single.spec,
+        replay=replay if replay_share else None,
         render_mode=render_mode,
         **picture,
     )

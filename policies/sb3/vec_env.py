@@ -124,11 +124,15 @@ class SB3VecEnv(Lifecycle, VecEnv):
         return self.interface.observe(episodes.observation)
 
     def _draw(self, rows: NDArray[np.int64]) -> Scenarios:
-        """Starts and goals of the next episodes of some arms: new ones, or failed ones again."""
+        """Starts and goals of the next episodes of some arms."""
+        return self._new_or_failed(rows, self._chooser)
+
+    def _new_or_failed(self, rows: NDArray[np.int64], rng: np.random.Generator) -> Scenarios:
+        """Starts and goals for some arms, new ones or failed ones again, as a generator decides."""
         if self._replay is None:
             return self._draw_new(rows)
         scenarios, self._replayed[rows] = self._failed.mixed(
-            self._replay.share, self._chooser, rows.size, lambda new: self._draw_new(rows[new])
+            self._replay.share, rng, rows.size, lambda new: self._draw_new(rows[new])
         )
         return scenarios
 

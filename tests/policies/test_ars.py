@@ -1,6 +1,8 @@
 """Augmented Random Search: the update by hand, its known traps, and exact resuming."""
 
 from dataclasses import replace
+from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from numba import njit
 from scipy import stats
 
 from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.failed_scenarios import FailedScenarios
 from kinarm.kernels.lanes import LANES
 from kinarm.policies import ARSConfig, Policy, state_policy, train_policy
 from kinarm.policies.ars.algorithm import (
@@ -15,13 +18,13 @@ from kinarm.policies.ars.algorithm import (
     ars_iteration,
     ars_step,
     perturbed_policies,
-    shared_scenarios,
     top_directions,
 )
 from kinarm.policies.ars.kernels import logarithm, normal_pairs
 from kinarm.policies.ars.perturbations import perturbations
+from kinarm.policies.ars.scenarios import Scenarios, draw_shared, failed_after
 from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
-from kinarm.policies.mirror import commuting_weights, task_mirror
+from kinarm.policies.mirror import task_mirror
 from kinarm.policies.normalizer import Normalizer
 from kinarm.problem import PROBLEMS
 from kinarm.reference import ReferenceSimulator
@@ -189,6 +192,11 @@ class TestPolicies:
         np.testing.assert_array_equal(networks.weights[1, :240].reshape(48, 5), (theta - step).T)
 
 
+def drawn(config, simulator, rng):
+    """Scenarios of an iteration before any was failed."""
+    return draw_shared(config, simulator, rng, FailedScenarios.none(simulator.arm.n_joints))
+
+
 class TestIteration:
     @pytest.mark.parametrize("normalize", [True, False])
     @pytest.mark.parametrize("sharing", ["none", "iteration"])
@@ -202,7 +210,7 @@ class TestIteration:
         rng = np.random.default_rng()
         rng.bit_generator.state = state.generator
         delta = perturbations(rng, (4, 5, 48))
-        starts, goals = shared_scenarios(config, simulator, rng)
+        starts, goals = drawn(config, simulator, rng).of_all_episodes
         mean, std = state.normalizer.mean, state.normalizer.std
         scale = np.where(std < 1e-6, 0, 1 / np.where(std < 1e-6, 1, std))
         if not normalize:
@@ -276,7 +284,7 @@ class TestIteration:
 class TestScenarios:
     def draw(self, sharing, simulator, **settings):
         config = replace(TINY, sharing=sharing, **settings)
-        starts, goals = shared_scenarios(config, simulator, np.random.default_rng(12))
+        starts, goals = drawn(config, simulator, np.random.default_rng(12)).of_all_episodes
         table = np.concatenate([starts, goals], axis=1)
         return table.reshape(2, config.directions, config.episodes, 9)
 
@@ -297,8 +305,56 @@ class TestScenarios:
     def test_iterations_draw_anew(self, tiny_simulator):
         config = replace(TINY, sharing="iteration")
         rng = np.random.default_rng(13)
-        first, second = (shared_scenarios(config, tiny_simulator, rng)[1] for _ in range(2))
+        first, second = (drawn(config, tiny_simulator, rng).goals for _ in range(2))
         assert not np.array_equal(first, second)
+
+    def test_with_a_mirror_all_goals_lie_on_the_right(self):
+        """What was drawn on the right is as drawn; the rest is its image, free of contact, too."""
+        config = replace(TINY, problem="both", symmetric=True, episodes=20)
+        simulator = config.simulator(threads=1)
+        rngs = [np.random.default_rng(14) for _ in range(2)]
+        plain = drawn(config, simulator, rngs[0])
+        failed = FailedScenarios.none(simulator.arm.n_joints)
+        mirror = task_mirror(True, simulator.world)
+        folded = draw_shared(config, simulator, rngs[1], failed, mirror)
+        left = plain.goals[:, 1] > 0
+        assert 0.3 < left.mean() < 0.7
+        np.testing.assert_array_equal(folded.goals[:, 1], -np.abs(plain.goals[:, 1]))
+        np.testing.assert_array_equal(folded.starts[~left], plain.starts[~left])
+        signs = [-1, 1, 1, -1, 1, 1]  # the last joint is held
+        np.testing.assert_array_equal(folded.starts[left], plain.starts[left] * signs)
+        assert not simulator.world.screen(folded.starts)[1].any()
+
+    def test_failed_ones_are_kept_and_come_again(self, tiny_simulator):
+        config = replace(TINY, sharing="iteration", episodes=30, replay_share=0.5, replay_size=20)
+        states = run(config, tiny_simulator, 6)
+        met = [set(map(tuple, state.failed.goals)) for state in states]
+        sizes = [len(state.failed.goals) for state in states]
+        assert sizes[0] == 0
+        assert sizes[-1] == 20
+        again = [len(before & after) for before, after in pairwise(met)]
+        assert sum(again) > 5
+        for state in states[1:]:
+            assert not tiny_simulator.world.screen(state.failed.starts)[1].any()
+
+    def test_what_at_least_half_of_the_policies_miss_counts_as_failed(self):
+        starts, goals = np.arange(12.0).reshape(2, 6), np.arange(6.0).reshape(2, 3)
+        scenarios = Scenarios(starts, goals, np.zeros(2, dtype=bool), copies=4)
+        config = replace(TINY, replay_share=0.5)
+        for reached, kept in (((2, 3), [0]), ((3, 4), []), ((0, 1), [0, 1])):
+            success = np.arange(4)[:, None] < reached
+            rollouts = SimpleNamespace(success=success.reshape(-1))
+            failed = failed_after(config, FailedScenarios.none(6), scenarios, rollouts)
+            np.testing.assert_array_equal(failed.goals, goals[kept])
+
+    def test_the_curve_leaves_replayed_ones_out(self):
+        scenarios = Scenarios(np.zeros((3, 6)), np.zeros((3, 3)), np.array([0, 1, 0], bool), 2)
+        rollouts = SimpleNamespace(
+            returns=np.array([1.0, 9, 3, 5, 9, 7]), success=np.array([1, 0, 0, 1, 0, 1], bool)
+        )
+        assert scenarios.outcome_of_new(rollouts) == (4.0, np.sqrt(5.0), 0.75)
+        replayed = scenarios._replace(replayed=np.ones(3, dtype=bool))
+        assert np.isnan(replayed.outcome_of_new(rollouts)).all()
 
 
 class TestTraining:
@@ -429,6 +485,18 @@ class TestResume:
         resumed = train_policy(config, state=load_checkpoint(tmp_path / "run.ckpt")[1])
         assert_same_policy(resumed.policy, whole.policy)
 
+    def test_equals_with_replay(self, tmp_path):
+        config = replace(TINY, replay_share=0.5, replay_size=40, episodes=2)
+        seen = []
+        train_policy(config, on_iteration=seen.append)
+        save_checkpoint(tmp_path / "run.ckpt", config, seen[2])
+        rest = []
+        train_policy(
+            config, state=load_checkpoint(tmp_path / "run.ckpt")[1], on_iteration=rest.append
+        )
+        assert len(seen[-1].failed.goals) == 40
+        assert_same_state(rest[-1], seen[-1])
+
     def test_wall_time_goes_on(self, tiny_simulator):
         state = run(TINY, tiny_simulator, 2)[-1]
         late = replace(state, curve=(*state.curve[:-1], state.curve[-1]._replace(wall_time=1000.0)))
@@ -501,8 +569,8 @@ class TestMirror:
         mirror = task_mirror(True, World(config.problem))
         for state in states:
             policy = state_policy(config, state)
-            np.testing.assert_array_equal(policy.mean[mirror.observations < 0], 0)
-            assert (policy.layers[0].weights[~commuting_weights(mirror)] == 0).all()
+            np.testing.assert_array_equal(policy.mirror.observations, mirror.observations)
+            np.testing.assert_array_equal(policy.mirror.actions, mirror.actions)
 
     def test_the_last_one_is_the_result(self):
         config = replace(TINY, problem="both", symmetric=True)

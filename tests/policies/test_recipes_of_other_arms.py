@@ -46,7 +46,7 @@ def test_for_the_papers_arm_nothing_is_scaled(learner, problem):
     made, named = recipe(learner, "tuned", problem=problem), find_learner(learner).recipes["tuned"]
     assert made.reward.progress == 1.0
     assert made.net_arch == named.net_arch
-    assert made.symmetric == (problem == "both")
+    assert made.symmetric
     assert getattr(made, "training_tolerance", 0.03) == 0.03
 
 
@@ -73,9 +73,21 @@ def test_ppo_learns_the_same_in_a_world_of_half_the_size(half_right):
 
 
 def test_where_no_reflection_helps():
-    lopsided = PROBLEMS["both"].replace(goal_weights=(1.0, 2.0))
+    scene = PROBLEMS["both"].scene
+    lopsided = PROBLEMS["both"].replace(scene=replace(scene, obstacles=scene.obstacles[:1]))
     ars, ppo = (recipe(learner, "tuned", problem=lopsided) for learner in ("ars", "ppo"))
     assert (ars.recipe, ars.net_arch, ars.symmetric) == ("tuned", (16,), False)
     assert (ppo.recipe, ppo.reward.progress, ppo.symmetric) == ("tuned", 12.0, False)
     assert ppo.gamma_at(0) < ppo.gamma_at(1)
     assert ppo.penalty_at(0) < ppo.penalty_at(1)
+
+
+def test_regions_that_are_images_of_each_other_count_once():
+    """However often each is drawn; where none is the other's image, both count."""
+    uneven = recipe("ars", "tuned", problem=PROBLEMS["both"].replace(goal_weights=(1.0, 2.0)))
+    assert (uneven.symmetric, uneven.net_arch) == (True, ())
+    scene = PROBLEMS["both"].scene
+    right, left = scene.goal_regions
+    shorter = replace(left, upper=(left.upper[0] - 0.1, *left.upper[1:]))
+    unlike = PROBLEMS["both"].replace(scene=replace(scene, goal_regions=(right, shorter)))
+    assert recipe("ars", "tuned", problem=unlike).net_arch == (16,)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from kinarm.errors import PolicyFileError
+from kinarm.failed_scenarios import FailedScenarios
 from kinarm.policies import (
     CurvePoint,
     Normalizer,
@@ -34,7 +35,10 @@ def state():
             goal=rng.normal(size=(3, 3)),
             steps=np.array([0, 5, 63]),
             total=rng.normal(size=3),
+            start=rng.normal(size=(3, 6)),
+            replayed=np.array([False, True, False]),
         ),
+        failed=FailedScenarios(rng.normal(size=(4, 6)), rng.normal(size=(4, 3))),
         curve=(
             CurvePoint(float("nan"), float("nan"), float("nan"), 12, 0.5),
             CurvePoint(0.25, 0.5, 0.125, 24, 0.75),
@@ -72,7 +76,8 @@ def test_round_trip(saved, state):
     for name in ("parameters", "first_moment", "second_moment"):
         first, second = getattr(loaded, name), getattr(state, name)
         assert (first.dtype, first.tobytes()) == (second.dtype, second.tobytes())
-    for first, second in zip(loaded.episodes, state.episodes, strict=True):
+    parts = zip((*loaded.episodes, *loaded.failed), (*state.episodes, *state.failed), strict=True)
+    for first, second in parts:
         assert (first.dtype, first.tobytes()) == (second.dtype, second.tobytes())
     assert loaded.normalizer.count == 1000
     assert loaded.normalizer.mean.tobytes() == state.normalizer.mean.tobytes()

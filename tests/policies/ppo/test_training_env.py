@@ -10,6 +10,7 @@ from stable_baselines3.common.vec_env import VecCheckNan
 
 from kinarm.envs import ReachEnv
 from kinarm.errors import InvalidInputError
+from kinarm.failed_scenarios import Replay
 from kinarm.policies.mirror import find_mirror
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.ppo.training_env import TrainingVecEnv
@@ -31,7 +32,7 @@ def normalizer():
 
 @pytest.fixture
 def make_env(normalizer):
-    def make(seed=0, *, number=NUMBER, mirrored=False, **settings):
+    def make(seed=0, *, number=NUMBER, mirrored=False, replay=None, **settings):
         overrides = {"reward": REWARD, "tolerance": 0.5, **settings}
         simulator = Simulator(PROBLEMS["both"].replace(**overrides), threads=1)
         env = TrainingVecEnv(
@@ -39,6 +40,7 @@ def make_env(normalizer):
             number,
             rng=np.random.default_rng(seed),
             mirror=find_mirror(simulator.world) if mirrored else None,
+            replay=replay,
         )
         env.normalize_by(normalizer)
         return env
@@ -143,7 +145,7 @@ def test_restored_episodes_go_on_as_if_nothing_had_happened(make_env):
     for _ in range(40):
         seen = env.step(rng.uniform(-1, 1, (NUMBER, 5)))[0]
     other = make_env(99)
-    np.testing.assert_array_equal(other.restore(env.states()), seen)
+    np.testing.assert_array_equal(other.restore(env.states(), env.failed), seen)
     env.draw_from(np.random.default_rng(5))
     other.draw_from(np.random.default_rng(5))
     ended = 0
@@ -184,30 +186,15 @@ def test_what_ended_holds_every_episode_once(make_env):
 
 
 class TestMirror:
-    def test_goals_always_lie_to_the_right(self, make_env, normalizer):
-        env = make_env(mirrored=True, number=50)
-        goal_y = env.reset()[:, 1] * normalizer.std[1] + normalizer.mean[1]
-        assert (goal_y < -0.5).all()
-        assert (env.states().goal[:, 1] > 0).any()
-
-    def test_mirror_images_look_and_fare_alike(self, make_env):
-        """The same situation and its mirror image, under the same actions."""
-        first, second = make_env(mirrored=True), make_env(mirrored=True)
-        first.reset()
-        states = first.states()
-        image = states._replace(q=states.q * AXES, goal=states.goal * [1, -1, 1])
-        second.restore(image)
-        running = np.ones(NUMBER, dtype=bool)
-        rng = np.random.default_rng(1)
-        for _ in range(20):
-            actions = rng.uniform(-1, 1, (NUMBER, 5))
-            a, b = first.step(actions), second.step(actions)
-            np.testing.assert_array_equal(a[2][running], b[2][running])
-            running &= ~a[2]
-            np.testing.assert_allclose(a[0][running], b[0][running], rtol=0, atol=1e-5)
-            np.testing.assert_allclose(a[1][running], b[1][running], rtol=0, atol=1e-6)
-        moved = first.states().q - states.q
-        assert (np.abs(moved[:, 0]) > 0.01).any()
+    def test_goals_always_lie_to_the_right(self, make_env):
+        plain, mirrored = make_env(number=50), make_env(number=50, mirrored=True)
+        plain.reset(), mirrored.reset()
+        drawn, met = plain.states(), mirrored.states()
+        left = drawn.goal[:, 1] > 0
+        assert 10 < left.sum() < 40
+        image = np.where(left[:, None], drawn.q * AXES, drawn.q)
+        np.testing.assert_array_equal(met.q[:, :5], image[:, :5])  # the last joint is held
+        np.testing.assert_array_equal(met.goal[:, 1], -np.abs(drawn.goal[:, 1]))
 
     def test_right_goals_are_untouched(self, make_env):
         plain, mirrored = make_env(number=30), make_env(number=30, mirrored=True)
@@ -218,6 +205,66 @@ class TestMirror:
         first, second = plain.step(actions), mirrored.step(actions)
         for k in range(3):
             np.testing.assert_array_equal(first[k][right], second[k][right])
+
+
+class TestReplay:
+    """Episodes that begin where earlier ones failed."""
+
+    SIZE = 30
+
+    def play(self, env, steps, seed=6):
+        """Infos of all episodes that end, each with where it began and what for."""
+        rng, ended = np.random.default_rng(seed), []
+        begun = env.states()
+        for _ in range(steps):
+            before = begun
+            infos = env.step(rng.uniform(-1, 1, (env.num_envs, 5)))[3]
+            begun = env.states()
+            for row, info in enumerate(infos):
+                if "episode" in info:
+                    ended.append((info, (*before.start[row], *before.goal[row])))
+        return ended
+
+    @pytest.fixture
+    def env(self, make_env):
+        env = make_env(11, number=40, replay=Replay(share=0.5, size=self.SIZE))
+        env.reset()
+        return env
+
+    def test_the_last_failures_are_kept(self, env):
+        ended = self.play(env, 60)
+        failed = [scenario for info, scenario in ended if not info["is_success"]]
+        assert self.SIZE < len(failed) < len(ended)
+        np.testing.assert_array_equal(np.hstack(env.failed), failed[-self.SIZE :])
+
+    def test_a_share_begins_where_one_failed(self, env):
+        failed, replays = set(), 0
+        ended = self.play(env, 150)
+        for info, scenario in ended:
+            assert info["replayed"] == (scenario in failed)
+            replays += info["replayed"]
+            if not info["is_success"]:
+                failed.add(scenario)
+        assert 0.35 < replays / len(ended) < 0.55
+
+    def test_the_record_leaves_them_out(self, env):
+        ended = [info for info, _ in self.play(env, 100)]
+        new = [info for info in ended if not info["replayed"]]
+        assert 0 < len(new) < len(ended)
+        record = env.take_ended()
+        assert record.successes == [info["is_success"] for info in new]
+        assert record.returns == [info["episode"]["r"] for info in new]
+
+    def test_restored_it_goes_on_as_if_nothing_had_happened(self, env, make_env):
+        self.play(env, 50)
+        other = make_env(99, number=40, replay=Replay(share=0.5, size=self.SIZE))
+        other.restore(env.states(), env.failed)
+        for each in (env, other):
+            each.draw_from(np.random.default_rng(8))
+        for first, second in zip(self.play(env, 50), self.play(other, 50), strict=True):
+            assert first[1] == second[1]
+            assert first[0]["replayed"] == second[0]["replayed"]
+        np.testing.assert_array_equal(np.hstack(env.failed), np.hstack(other.failed))
 
 
 def test_step_before_reset(make_env):

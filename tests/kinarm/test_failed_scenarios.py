@@ -1,0 +1,87 @@
+"""Which scenarios are replayed, and how often."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from kinarm.errors import InvalidInputError
+from kinarm.failed_scenarios import FailedScenarios, Replay
+
+
+def numbered(*numbers):
+    """Scenarios whose numbers all entries hold."""
+    column = np.array(numbers, dtype=float)[:, None]
+    return np.repeat(column, 6, axis=1), np.repeat(column, 3, axis=1)
+
+
+def numbers(scenarios):
+    starts, goals = scenarios
+    assert (starts == starts[:, :1]).all()
+    np.testing.assert_array_equal(starts[:, 0], goals[:, 0])
+    return starts[:, 0].tolist()
+
+
+def fail_to_draw(places):
+    raise AssertionError(places)
+
+
+def test_the_last_ones_are_kept_and_repeated_ones_more_than_once():
+    failed = FailedScenarios.none(6)
+    for entered, kept in (
+        ((1, 2), [1, 2]),
+        ((3, 2), [1, 2, 3, 2]),
+        ((4,), [2, 3, 2, 4]),
+        ((), [2, 3, 2, 4]),
+        ((5, 6, 7, 8, 9), [6, 7, 8, 9]),
+    ):
+        failed = failed.followed_by(*numbered(*entered), 4)
+        assert numbers(failed) == kept
+
+
+def test_before_the_first_failure_all_are_new_and_no_number_is_drawn():
+    rng = np.random.default_rng(0)
+    scenarios, replayed = FailedScenarios.none(6).mixed(
+        0.5, rng, 3, lambda places: numbered(*places)
+    )
+    assert numbers(scenarios) == [0, 1, 2]
+    assert not replayed.any()
+    failed = FailedScenarios(*numbered(7, 8))
+    assert not failed.mixed(0.0, rng, 3, lambda places: numbered(*places))[1].any()
+    assert rng.random() == np.random.default_rng(0).random()
+
+
+def test_a_share_comes_again_each_as_often_as_it_is_kept():
+    failed = FailedScenarios(*numbered(-1, -2, -2, -2))
+    rng, n = np.random.default_rng(3), 20_000
+    scenarios, replayed = failed.mixed(0.3, rng, n, lambda places: numbered(*places))
+    found = np.array(numbers(scenarios))
+    assert stats.binomtest(int(replayed.sum()), n, 0.3).pvalue > 1e-3
+    np.testing.assert_array_equal(found[~replayed], np.flatnonzero(~replayed))
+    twos = int((found[replayed] == -2).sum())
+    assert stats.binomtest(twos, int(replayed.sum()), 0.75).pvalue > 1e-3
+
+
+def test_all_can_come_again():
+    failed = FailedScenarios(*numbered(-1, -2))
+    scenarios, replayed = failed.mixed(1.0, np.random.default_rng(1), 50, fail_to_draw)
+    assert replayed.all()
+    assert set(numbers(scenarios)) == {-1, -2}
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"share": 1.5}, r"share must lie in \[0, 1\], got 1.5"),
+        ({"share": float("nan")}, "share"),
+        ({"size": 0}, "size must be a whole number of at least 1"),
+        ({"size": 10**9}, "size must be"),
+    ],
+)
+def test_bad_settings(settings, message):
+    with pytest.raises(InvalidInputError, match=message):
+        Replay(**settings)
+
+
+def test_shapes_have_to_agree():
+    with pytest.raises(InvalidInputError, match="failed scenarios have the shapes"):
+        FailedScenarios(np.zeros((2, 6)), np.zeros((3, 3))).check()
