@@ -10,4 +10,4 @@ Raise it in the commit that changes such a number on purpose, and record the gol
 the tests do). Finished trainings are then made anew.
 """
 
-SEMANTICS = "3"
+SEMANTICS = "4"

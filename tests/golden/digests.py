@@ -90,14 +90,16 @@ def rollout_digests() -> dict[str, str]:
 def ars_digests() -> dict[str, str]:
     """Ten iterations of Augmented Random Search."""
     found = {}
-    for name in ("paper", "tuned", "brs"):
+    again = {"replay_share": 0.5}
+    for name, changes in (("paper", {}), ("tuned", {}), ("tuned", again), ("brs", {})):
         for task in TASKS:
             states: list[ARSState] = []
-            config = replace(recipe("ars", name, problem=task, seed=2), iterations=10)
+            made = recipe("ars", name, problem=task, seed=2)
+            config = replace(made, iterations=10, **changes)
             result = train_policy(config, on_iteration=states.append)
             state = states[-1]
             curve = [point[:4] for point in state.curve]
-            found[f"ars {name} {task}"] = digest(
+            found[f"ars {name} {task}{' replay' if changes else ''}"] = digest(
                 [
                     *(state.theta, state.normalizer.mean, state.normalizer.squares, curve),
                     *result.policy.networks().weights,
@@ -111,17 +113,23 @@ def ppo_digests() -> dict[str, str]:
     from kinarm.policies.ppo.state import PPOState
 
     found = {}
-    for name, task in (("paper", "right"), ("tuned", "left"), ("tuned", "both")):
+    again = {"replay_share": 0.5}
+    for name, task, changes in (
+        ("paper", "right", {}),
+        ("tuned", "left", {}),
+        ("tuned", "both", {}),
+        ("tuned", "right", again),
+    ):
         states: list[PPOState] = []
         train_policy(
-            replace(recipe("ppo", name, problem=task, seed=2), iterations=3),
+            replace(recipe("ppo", name, problem=task, seed=2), iterations=3, **changes),
             on_iteration=states.append,
         )
         state = states[-1]
-        found[f"ppo {name} {task}"] = digest(
+        found[f"ppo {name} {task}{' replay' if changes else ''}"] = digest(
             [
                 *(state.parameters, state.first_moment, state.second_moment),
-                *(state.normalizer.mean, state.normalizer.squares, *state.episodes),
+                *(state.normalizer.mean, state.normalizer.squares, *state.episodes[:4]),
                 np.nan_to_num([point[:4] for point in state.curve]),
             ]
         )

@@ -41,6 +41,7 @@ TINY = PPOConfig(
 CONFIGS = {
     "plain": TINY,
     "symmetric": replace(TINY, symmetric=True),
+    "replay": replace(TINY, replay_share=0.5, replay_size=10),
     "right": replace(
         TINY, problem="right", reward=RewardWeights(success=1.0), training_tolerance=0.3
     ),
@@ -51,7 +52,8 @@ def assert_same_states(first, second):
     """Bit for bit, apart from the clock."""
     for name in ("parameters", "first_moment", "second_moment"):
         assert getattr(first, name).tobytes() == getattr(second, name).tobytes(), name
-    for a, b in zip(first.episodes, second.episodes, strict=True):
+    parts = (*first.episodes, *first.failed), (*second.episodes, *second.failed)
+    for a, b in zip(*parts, strict=True):
         assert a.tobytes() == b.tobytes()
     assert first.normalizer.mean.tobytes() == second.normalizer.mean.tobytes()
     assert first.normalizer.squares.tobytes() == second.normalizer.squares.tobytes()
@@ -234,10 +236,11 @@ class TestResult:
 def predicted(training, observations):
     """What Stable-Baselines3 itself would do, given raw observations."""
     env = training.env
-    actions, _ = training.model.predict(env.interface.observe(observations), deterministic=True)
     if env.mirror is None:
-        return actions
-    left = observations[:, 1] > 0
+        return training.model.predict(env.interface.observe(observations), deterministic=True)[0]
+    seen = env.interface.observe(env.mirror.from_the_right(observations))
+    actions, _ = training.model.predict(seen, deterministic=True)
+    left = env.mirror.on_the_left(observations)
     return np.where(left[:, None], actions * env.mirror.actions, actions)
 
 

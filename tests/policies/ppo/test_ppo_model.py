@@ -90,12 +90,12 @@ def begun(config, iterations=2, threads=1):
     return training, state
 
 
-def collect(model, env, n_steps, episodes):
-    """The buffer after a rollout that begins with these episodes."""
+def collect(model, env, n_steps, state):
+    """The buffer after a rollout that begins with the episodes of a state."""
     _, callback = model._setup_learn(0, None, reset_num_timesteps=False)
     env.draw_from(np.random.default_rng(8))
-    model._last_obs = env.restore(episodes)
-    model._last_episode_starts = episodes.steps == 0
+    model._last_obs = env.restore(state.episodes, state.failed)
+    model._last_episode_starts = state.episodes.steps == 0
     assert model.collect_rollouts(env, callback, model.rollout_buffer, n_steps)
     return model.rollout_buffer
 
@@ -107,12 +107,12 @@ def test_rollout(config, monkeypatch):
     model, env = training.model, training.env
     twin, noise = plain_twin(training), np.random.default_rng(7)
     model.rng = np.random.default_rng(7)
-    ours = collect(model, env, config.n_steps, state.episodes)
+    ours = collect(model, env, config.n_steps, state)
     monkeypatch.setattr(
         "torch.distributions.normal._standard_normal",
         lambda shape, **_: torch.tensor(noise.standard_normal(shape), dtype=torch.float32),
     )
-    theirs = collect(twin, env, config.n_steps, state.episodes)
+    theirs = collect(twin, env, config.n_steps, state)
     names = ("observations", "actions", "rewards", "episode_starts", "values", "log_probs")
     for name in (*names, "advantages", "returns"):
         first, second = getattr(ours, name), getattr(theirs, name)
@@ -130,7 +130,7 @@ def test_update(config, monkeypatch):
     """Parameters, moments and logs, with the same minibatches in both."""
     training, state = begun(config)
     model, order = training.model, np.random.default_rng(3)
-    collect(model, training.env, config.n_steps, state.episodes)
+    collect(model, training.env, config.n_steps, state)
     twin = plain_twin(training)
     twin.rollout_buffer = copy.deepcopy(model.rollout_buffer)
     monkeypatch.setattr("numpy.random.permutation", order.permutation)
@@ -187,7 +187,7 @@ class TestModel:
         training.model.save(tmp_path / "model.zip")
         plain = PPO.load(tmp_path / "model.zip", device="cpu")
         assert type(plain) is PPO
-        seen = training.env.restore(state.episodes)
+        seen = training.env.restore(state.episodes, state.failed)
         for first, second in zip(
             training.model.predict(seen, deterministic=True)[:1],
             plain.predict(seen, deterministic=True)[:1],
