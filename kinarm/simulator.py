@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -113,6 +114,12 @@ class Simulator:
     def step_limit(self) -> NDArray[np.float64]:
         """Largest move of each actuated joint in a step, shape (n_actions,) [rad or m]."""
         return self.world.rules.step_limit.copy()
+
+    def with_tolerance(self, tolerance: float) -> Simulator:
+        """Another simulator of the same world, for other episodes, with another tolerance [m]."""
+        other = copy(self)
+        other.world = self.world.with_tolerance(tolerance)
+        return other
 
     def sample(
         self, rng: np.random.Generator, count: int, *, start_spread: float | None = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from functools import cached_property
 
 import numpy as np
@@ -77,6 +78,13 @@ class World:
 
     def __repr__(self) -> str:
         return f"World({self.problem!r})"
+
+    def with_tolerance(self, tolerance: float) -> World:
+        """The same world with another tolerance [m], in which nothing is built anew."""
+        other = copy(self)
+        other.problem = self.problem.replace(tolerance=tolerance)
+        other.rules = self.rules._replace(tolerance=float(tolerance))
+        return other
 
     @cached_property
     def frames(self) -> Frames:

@@ -1,5 +1,6 @@
 """Settings of Proximal Policy Optimization."""
 
+import math
 from dataclasses import dataclass, field
 
 from kinarm._fields import OPTIONAL
@@ -16,6 +17,9 @@ from kinarm.policies.config import (
     scheduled,
 )
 from kinarm.problem import ReachProblem
+
+SETTLED = 0.9
+"""Share of a training after which noise and tolerance are what they are to be at the end."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,9 +63,13 @@ class PPOConfig(TrainingConfig):
         Gradients are shortened to this norm.
     log_std_init : float
         Logarithm of the standard deviation of the actions at the beginning.
+    final_log_std : float, optional
+        What it is at the end: it then changes linearly. It is learnt if this is not given.
     training_tolerance : float, optional
         Distance at which an episode of the training counts as a success; the task's if it is not
         given [m].
+    initial_tolerance : float, optional
+        That distance at the beginning of the training, from which it changes geometrically [m].
     symmetric : bool
         Whether the policy is to treat mirror images alike, where arm and obstacles are their own
         mirror image; it then learns from goals on the right and from mirror images of
@@ -98,7 +106,9 @@ class PPOConfig(TrainingConfig):
     vf_coef: float = field(default=0.5, metadata=NOT_NEGATIVE)
     max_grad_norm: float = field(default=0.5, metadata=POSITIVE)
     log_std_init: float = 0.0
+    final_log_std: float | None = field(default=None, metadata=OPTIONAL)
     training_tolerance: float | None = field(default=None, metadata=POSITIVE)
+    initial_tolerance: float | None = field(default=None, metadata={**POSITIVE, **OPTIONAL})
     symmetric: bool = False
     initial_start_spread: float = field(default=1.0, metadata=SHARE)
     initial_gamma: float | None = field(default=None, metadata=SHARE)
@@ -142,8 +152,9 @@ class PPOConfig(TrainingConfig):
     @property
     def prolongable(self) -> bool:
         """Whether a training with more iterations begins just as this one goes."""
-        unchanging = self.widening == 0 and self.initial_penalty == 1
-        return self.learning_rate_schedule == "constant" and unchanging
+        settled = self.widening == 0 and self.initial_penalty == 1
+        unset = self.final_log_std is None and self.initial_tolerance is None
+        return self.learning_rate_schedule == "constant" and settled and unset
 
     @property
     def cost(self) -> float:
@@ -163,6 +174,20 @@ class PPOConfig(TrainingConfig):
         if self.initial_gamma is None:
             return self.gamma
         return self._widened(self.initial_gamma, self.gamma, done)
+
+    def log_std_at(self, done: float) -> float | None:
+        """Logarithm of the deviation of actions after this share of the training, if it is set."""
+        if self.final_log_std is None:
+            return None
+        settled = min(1.0, done / SETTLED)
+        return (1 - settled) * self.log_std_init + settled * self.final_log_std
+
+    def tolerance_at(self, done: float) -> float:
+        """Distance that counts as a success after this share of the training [m]."""
+        final = self.training_problem.task.tolerance
+        initial = final if self.initial_tolerance is None else self.initial_tolerance
+        # Rounded, for powers differ between C libraries in the last bits.
+        return round(initial * math.pow(final / initial, min(1.0, done / SETTLED)), 9)
 
     def penalty_at(self, done: float) -> float:
         """Share of the penalty for contact that counts after this share of the training."""

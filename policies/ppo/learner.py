@@ -85,6 +85,7 @@ class PPOTraining:
         env.draw_from(scenarios)
         observations = simulator.world.observe(*env.sample(NORMALIZED_OVER))
         env.draw_from(scenarios, config.start_spread_at(0.0))
+        env.reach_within(config.tolerance_at(0.0))
         env.reset()
         widths = (simulator.n_observations, config.net_arch, simulator.n_actions)
         parameters = initial_parameters(rng, *widths, config.log_std_init)
@@ -102,12 +103,14 @@ class PPOTraining:
         began = time.perf_counter()
         config, model, env = self.config, self.model, self.env
         done = state.iteration / config.iterations
+        self.env.reach_within(config.tolerance_at(done))
         self.load(state)
         model.rng, scenarios = seed_iteration(config.seed, state.iteration + 1)
         learning_rate = config.learning_rate_at(done)
         model.lr_schedule = lambda _: learning_rate
         env.draw_from(scenarios, config.start_spread_at(done))
         env.punish_by(config.penalty_at(done))
+        model.act_with(config.log_std_at(done))
         model.discount_by(config.gamma_at(done))
         model.learn(config.steps_per_iteration, reset_num_timesteps=False)
         returns, successes, simulator_time = env.take_ended()

@@ -123,6 +123,12 @@ class CompiledPPO(PPO):
         """From now on, discount rewards by this factor per step."""
         self.gamma = self.rollout_buffer.gamma = gamma
 
+    def act_with(self, log_std: float | None) -> None:
+        """Set the logarithm of the standard deviation of actions, if one is given."""
+        if log_std is not None:
+            with torch.no_grad():
+                self.policy.log_std.fill_(log_std)
+
     @property
     def _minibatches(self) -> int:
         """Steps of Adam in an epoch."""

@@ -95,6 +95,11 @@ class TrainingVecEnv(SB3VecEnv):
         """From now on, let this share of the penalty for contact count."""
         self._shown.penalty = penalty
 
+    def reach_within(self, tolerance: float) -> None:
+        """Count this distance as a success in episodes that are begun or restored from now on."""
+        if tolerance != self.simulator.task.tolerance:
+            self.simulator = self.simulator.with_tolerance(tolerance)
+
     def draw_from(self, rng: np.random.Generator, start_spread: float | None = None) -> None:
         """From now on, draw scenarios from this generator; with the task's start spread if None."""
         self._rng, self._start_spread = rng, start_spread

@@ -15,6 +15,7 @@ from kinarm.errors import InvalidInputError, StartInContactError, UnknownNameErr
 from kinarm.kernels.rollout import advance, begin, screen
 from kinarm.networks import Mirror, Networks
 from kinarm.observation import observation_signs
+from kinarm.problem import PROBLEMS
 from kinarm.reference import ReferenceSimulator
 from kinarm.scene import Scene
 from kinarm.simulator import Simulator
@@ -491,3 +492,22 @@ def test_list_of_policies(simulator, scenarios):
     networks = linear_policies(simulator, 600, 25)
     listed = [Wrapped(Networks(networks.layers, row[None])) for row in networks.weights]
     assert_identical(simulator.rollout(networks, *scenarios), simulator.rollout(listed, *scenarios))
+
+
+def test_with_another_tolerance_it_is_as_if_built_so():
+    simulator = Simulator("right", threads=1)
+    other, built = (
+        simulator.with_tolerance(0.3),
+        Simulator(PROBLEMS["right"].replace(tolerance=0.3), threads=1),
+    )
+    assert other.problem == built.problem
+    draws = [each.sample(np.random.default_rng(4), 60) for each in (other, built)]
+    for first, second in zip(*draws, strict=True):
+        np.testing.assert_array_equal(first, second)
+    actions = np.random.default_rng(5).uniform(-1, 1, (60, 64, 5))
+    found, expected, plain = (
+        each.rollout_actions(actions, *draws[0]) for each in (other, built, simulator)
+    )
+    np.testing.assert_array_equal(found.steps, expected.steps)
+    np.testing.assert_array_equal(found.success, expected.success)
+    assert found.success.sum() > plain.success.sum()

@@ -79,6 +79,24 @@ def test_penalty_grows_to_the_end():
     assert [PPOConfig().penalty_at(done) for done in (0, 0.3, 1)] == [1, 1, 1]
 
 
+def test_noise_is_learnt_or_falls_to_the_end():
+    assert PPOConfig(log_std_init=-1.0).log_std_at(0.5) is None
+    config = PPOConfig(log_std_init=-1.0, final_log_std=-3.0)
+    assert [config.log_std_at(done) for done in (0, 0.45, 0.9, 1)] == pytest.approx(
+        [-1, -2, -3, -3]
+    )
+
+
+def test_tolerance_falls_geometrically():
+    config = PPOConfig(training_tolerance=0.005, initial_tolerance=0.08)
+    expected = [0.08, 0.02, 0.005, 0.005]
+    assert [config.tolerance_at(done) for done in (0, 0.45, 0.9, 1)] == pytest.approx(expected)
+    plain = [
+        PPOConfig(**settings).tolerance_at(0.3) for settings in ({}, {"training_tolerance": 0.03})
+    ]
+    assert plain == [0.05, 0.03]
+
+
 def test_starts_widen_to_the_spread_of_the_task():
     problem = PROBLEMS["right"].replace(start_spread=0.5)
     config = PPOConfig(problem=problem, initial_start_spread=0.2, widening=0.5)
@@ -93,6 +111,8 @@ def test_starts_widen_to_the_spread_of_the_task():
         {"widening": 0.5},
         {"initial_penalty": 0.5},
         {"widening": 0.3, "initial_gamma": 0.9},
+        {"final_log_std": -2.0},
+        {"initial_tolerance": 0.2},
     ],
 )
 def test_a_longer_training_begins_alike_only_where_nothing_changes_in_its_course(changes):

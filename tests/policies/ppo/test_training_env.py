@@ -207,6 +207,25 @@ class TestMirror:
             np.testing.assert_array_equal(first[k][right], second[k][right])
 
 
+def test_tolerance_can_change_between_restored_states(make_env):
+    """All else goes on; episodes end as in an environment that was made with it."""
+    env, built = make_env(tolerance=0.05), make_env(tolerance=0.7)
+    env.reset()
+    states = env.states()
+    env.reach_within(0.7)
+    np.testing.assert_array_equal(*(each.restore(states, env.failed) for each in (env, built)))
+    rng, reached = np.random.default_rng(9), 0
+    for each in (env, built):
+        each.draw_from(np.random.default_rng(10))
+    for _ in range(80):
+        actions = rng.uniform(-1, 1, (NUMBER, 5))
+        first, second = env.step(actions), built.step(actions)
+        for k in range(3):
+            np.testing.assert_array_equal(first[k], second[k])
+        reached += sum(info.get("is_success", False) for info in first[3])
+    assert reached > 0
+
+
 class TestReplay:
     """Episodes that begin where earlier ones failed."""
 
