@@ -17,6 +17,7 @@ from kinarm.policies.ars.networks import (
     first_deviations,
     initial_network,
     network_layers,
+    parameters_of,
     perturbed_networks,
 )
 from kinarm.policies.ars.perturbations import perturbations
@@ -27,6 +28,7 @@ from kinarm.policies.mirror import task_mirror
 from kinarm.policies.normalizer import Normalizer, input_scale
 from kinarm.policies.policy import Layer, Policy
 from kinarm.policies.provenance import Provenance
+from kinarm.policies.warm_start import starting_policy, statistics
 from kinarm.simulator import Simulator
 from kinarm.streams import Stream, stream_generator
 from kinarm.world import World
@@ -44,16 +46,27 @@ class ARSTraining:
         self._rng = stream_generator(Stream.ARS, config.seed)
 
     def initial_state(self) -> ARSState:
-        """State before the first iteration: mu = 0, Sigma = I, and theta = 0 if it is linear."""
+        """State before the first iteration: mu = 0, Sigma = I, and theta = 0 if it is linear.
+
+        Or those of the policy to begin with.
+        """
         n_actions, n_observations = self.simulator.n_actions, self.simulator.n_observations
         rng = stream_generator(Stream.ARS, self.config.seed)
-        theta = np.zeros((n_actions, n_observations))
-        if self.config.net_arch:
+        normalizer = Normalizer.empty(n_observations)
+        widths = (n_observations, *self.config.net_arch, n_actions)
+        if self.config.initial_policy is not None:
+            policy = starting_policy(self.config.initial_policy, widths)
+            theta = parameters_of(policy)
+            if self.config.normalize:
+                normalizer = statistics(policy)
+        elif self.config.net_arch:
             deviations = first_deviations(self.simulator.arm.n_joints)
-            theta = initial_network(rng, deviations, (*self.config.net_arch, n_actions))
+            theta = initial_network(rng, deviations, widths[1:])
+        else:
+            theta = np.zeros((n_actions, n_observations))
         return ARSState(
             theta=theta,
-            normalizer=Normalizer.empty(n_observations),
+            normalizer=normalizer,
             generator=dict(rng.bit_generator.state),
             failed=FailedScenarios.none(self.simulator.arm.n_joints),
         )

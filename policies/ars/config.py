@@ -57,6 +57,9 @@ class ARSConfig(TrainingConfig):
         failed; see `kinarm.failed_scenarios`.
     replay_size : int
         Failed scenarios that are kept.
+    initial_policy : str, optional
+        Name or file of a policy that the training begins with, of the same layers; it may be for
+        another problem or arm.
     """
 
     iterations: int = 800
@@ -73,6 +76,7 @@ class ARSConfig(TrainingConfig):
     episodes: int = field(default=1, metadata=MANY)
     replay_share: float = field(default=0.0, metadata={**SHARE, **OPTIONAL})
     replay_size: int = field(default=512, metadata={"at_most": LARGEST_REPLAY, **OPTIONAL})
+    initial_policy: str | None = field(default=None, metadata=OPTIONAL)
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -10,11 +10,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm.errors import InvalidInputError
 from kinarm.networks import Networks
 from kinarm.observation import part_slices
 from kinarm.policies.ars.perturbations import perturbations
 from kinarm.policies.normalizer import Normalizer, fold_normalizer
-from kinarm.policies.policy import Layer
+from kinarm.policies.policy import Layer, Policy
 
 Numbers = NDArray[np.float64]
 
@@ -85,3 +86,21 @@ def _layers(parameters: Numbers, widths: Sequence[int]) -> Iterator[tuple[Number
         weights = parameters[:, start : start + n_in * n_out].reshape(-1, n_in, n_out)
         start += (n_in + 1) * n_out
         yield weights.transpose(0, 2, 1), parameters[:, start - n_out : start]
+
+
+def parameters_of(policy: Policy) -> Numbers:
+    """Parameters of a policy as a training has them: a linear one has no bias.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is linear and has one.
+    """
+    if len(policy.layers) > 1:
+        return np.concatenate(
+            [part for weights, bias in policy.layers for part in (weights.T.ravel(), bias)]
+        )[None]
+    weights, bias = policy.layers[0]
+    if bias.any():
+        raise InvalidInputError("initial_policy has a bias, which linear policies of ARS have not")
+    return np.array(weights)

@@ -89,6 +89,9 @@ class PPOConfig(TrainingConfig):
         `kinarm.failed_scenarios`.
     replay_size : int
         Failed scenarios that are kept.
+    initial_policy : str, optional
+        Name or file of a policy that the training begins with, of the same layers; it may be for
+        another problem or arm.
     """
 
     iterations: int = 600
@@ -116,6 +119,7 @@ class PPOConfig(TrainingConfig):
     widening: float = field(default=0.0, metadata=SHARE)
     replay_share: float = field(default=0.0, metadata={**SHARE, **OPTIONAL})
     replay_size: int = field(default=8192, metadata={"at_most": LARGEST_REPLAY, **OPTIONAL})
+    initial_policy: str | None = field(default=None, metadata=OPTIONAL)
 
     def __post_init__(self) -> None:
         super().__post_init__()

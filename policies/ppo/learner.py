@@ -16,9 +16,10 @@ from kinarm.policies.mirror import task_mirror
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.ppo.config import PPOConfig
 from kinarm.policies.ppo.model import CompiledPPO
-from kinarm.policies.ppo.parameters import initial_parameters
+from kinarm.policies.ppo.parameters import initial_parameters, split_parameters
 from kinarm.policies.ppo.state import PPOState
 from kinarm.policies.ppo.training_env import TrainingVecEnv
+from kinarm.policies.warm_start import starting_policy, statistics
 from kinarm.streams import Stream, stream_generator
 
 NORMALIZED_OVER = 10_000
@@ -89,11 +90,19 @@ class PPOTraining:
         env.reset()
         widths = (simulator.n_observations, config.net_arch, simulator.n_actions)
         parameters = initial_parameters(rng, *widths, config.log_std_init)
+        normalizer = Normalizer.of(observations)
+        if config.initial_policy is not None:
+            n_observations, hidden, n_actions = widths
+            policy = starting_policy(config.initial_policy, (n_observations, *hidden, n_actions))
+            normalizer = statistics(policy)
+            actor = split_parameters(parameters, *widths).actor
+            for layer, (weights, bias) in zip(policy.layers, actor, strict=True):
+                weights[:], bias[:] = layer
         return PPOState(
             parameters=parameters,
             first_moment=np.zeros_like(parameters),
             second_moment=np.zeros_like(parameters),
-            normalizer=Normalizer.of(observations),
+            normalizer=normalizer,
             episodes=env.states(),
             failed=env.failed,
         )

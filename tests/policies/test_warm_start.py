@@ -1,0 +1,80 @@
+"""Trainings that begin with a policy do at first what the policy does."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.policies import ARSConfig, PPOConfig, load_policy, state_policy
+from kinarm.policies.learners import begin_training
+from kinarm.policies.policy import Layer
+from kinarm.problem import PROBLEMS
+from kinarm.simulator import Simulator
+
+
+def first_policy(config):
+    """What a training takes for its policy before the first iteration."""
+    return state_policy(config, begin_training(config).initial_state())
+
+
+@pytest.fixture
+def network_file(tmp_path, make_policy):
+    path = tmp_path / "network.npz"
+    make_policy(9, seed=3).save(path)
+    return str(path)
+
+
+def same_deeds(first, second, problem="left"):
+    simulator = Simulator(problem, threads=1)
+    starts, goals = simulator.sample(np.random.default_rng(6), 60)
+    found, expected = (
+        simulator.rollout(replace(policy, mirror=None), starts, goals, record=True)
+        for policy in (first, second)
+    )
+    np.testing.assert_array_equal(found.steps, expected.steps)
+    np.testing.assert_allclose(found.paths, expected.paths, rtol=0, atol=1e-4)
+
+
+def test_ars_begins_with_a_linear_policy():
+    config = ARSConfig(problem="left", initial_policy="ars-tuned-right-seed1")
+    same_deeds(first_policy(config), load_policy("ars-tuned-right-seed1"))
+
+
+def test_ars_begins_with_a_network(network_file):
+    config = ARSConfig(problem="left", initial_policy=network_file, net_arch=(9,))
+    same_deeds(first_policy(config), load_policy(network_file))
+
+
+def test_ppo_begins_with_an_actor():
+    pytest.importorskip("stable_baselines3")
+    name = "ppo-tuned-right-seed2"
+    config = PPOConfig(problem="left", initial_policy=name, net_arch=(64, 64, 64))
+    same_deeds(first_policy(config), load_policy(name))
+
+
+def test_another_arm_will_do():
+    config = ARSConfig(
+        problem=PROBLEMS["right"].replace(arm="lrmate200ic_5l"),
+        initial_policy="ars-tuned-right-seed1",
+        iterations=1,
+    )
+    weights = load_policy("ars-tuned-right-seed1").layers[0].weights
+    np.testing.assert_array_equal(first_policy(config).layers[0].weights, weights)
+
+
+def test_others_are_refused(tmp_path, network_file):
+    with pytest.raises(UnknownNameError, match="nothing-like-it"):
+        first_policy(ARSConfig(initial_policy="nothing-like-it"))
+    message = r"initial_policy '.*network.npz' has layers 48-9-5, the training 48-5"
+    with pytest.raises(InvalidInputError, match=message):
+        first_policy(ARSConfig(initial_policy=network_file))
+    relu = replace(load_policy(network_file), activations=("relu", "linear"))
+    relu.save(tmp_path / "relu.npz")
+    with pytest.raises(InvalidInputError, match="has the functions relu, linear; those of the"):
+        first_policy(ARSConfig(initial_policy=str(tmp_path / "relu.npz"), net_arch=(9,)))
+    linear = load_policy("ars-tuned-right-seed1")
+    biased = replace(linear, layers=(Layer(linear.layers[0].weights, np.ones(5)),))
+    biased.save(tmp_path / "biased.npz")
+    with pytest.raises(InvalidInputError, match="has a bias"):
+        first_policy(ARSConfig(initial_policy=str(tmp_path / "biased.npz")))
