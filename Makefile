@@ -17,13 +17,13 @@ eval: $(call INSTALLED,core) ## evaluate all shipped policies on 200 trials a ta
 COVERAGE := from importlib.util import find_spec; print(95 if find_spec("sb3_contrib") else 85)
 
 test: $(call INSTALLED,test) ## run the tests, but for the slow ones
-	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow" --cov --cov-report=term \
+	$(BIN)/python -m pytest -n auto --dist loadfile --durations=25 -m "not slow" --cov --cov-report=term \
 		--cov-fail-under=$$($(BIN)/python -c '$(COVERAGE)')
 
 CAMPAIGN := loaders command_lines writes signals kills live_page
 
 test-slow: $(call INSTALLED,test) ## run the slow tests, those in a browser included
-	$(BIN)/python -m pytest -n auto --dist loadfile -m slow
+	$(BIN)/python -m pytest -n auto --dist loadfile --durations=25 -m slow
 
 campaign: $(call INSTALLED,all) ## damaged files, odd arguments, failing writes, signals: hours
 	set -e; for module in $(CAMPAIGN); do \
