@@ -155,7 +155,9 @@ class TestFiles:
         assert load_run(tmp_path, replace(self.RUN)) is None
 
     def test_what_a_recipe_becomes_for_a_problem_is_in_the_file(self, tmp_path):
-        lopsided = PROBLEMS["both"].replace(goal_weights=(1.0, 2.0))
+        scene = PROBLEMS["both"].scene
+        one_bench = replace(scene, obstacles=scene.obstacles[:1])
+        lopsided = PROBLEMS["both"].replace(scene=one_bench)
         run = planned(read_learners()["ars-tuned"], problem=lopsided)
         save_run(tmp_path, run, [POINT])
         settings = json.loads((tmp_path / f"{run.name}.json").read_text())["settings"]["recipe"]
