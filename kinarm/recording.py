@@ -198,7 +198,7 @@ def record_rollouts(
     policy: str,
     numbers: Sequence[int] | None = None,
     *,
-    steps_lower_bound: Callable[[int], int] | None = None,
+    steps_lower_bound: Callable[[int], int | None] | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> list[Recording]:
     """Turn rollouts into recordings.
@@ -214,7 +214,7 @@ def record_rollouts(
     numbers : sequence of int, optional
         Which rollouts; all by default. A rollout's number becomes that of the trial.
     steps_lower_bound : callable, optional
-        Gives the proven number of steps of a trial.
+        Gives the proven number of steps of a trial, or None.
     provenance : dict, optional
         Where they come from, in terms that JSON can hold.
 

@@ -1,6 +1,7 @@
 """Record what entrants do in trials."""
 
 from collections.abc import Sequence
+from functools import partial
 
 from kinarm.evaluation.entrants import Entrant
 from kinarm.evaluation.trials import TrialSet
@@ -28,7 +29,7 @@ def record(
     numbers : sequence of int, optional
         Trials to keep, in this order; all by default.
     bounds : OracleSolutions, optional
-        What `oracle_bounds` knows about the trials, to show beside what was done.
+        What the oracle knows about the trials, or the first ones, to show beside what was done.
     allow_other_arm : bool
         Whether a policy may face an arm that it was not trained for.
 
@@ -46,7 +47,7 @@ def record(
         entrant.run(trials, record=True),
         entrant.name,
         numbers,
-        steps_lower_bound=None if bounds is None else lambda n: int(bounds.steps_lower_bound[n]),
+        steps_lower_bound=None if bounds is None else partial(_lower_bound, bounds),
         provenance={
             "trial_seed": trials.seed,
             "policy": made,
@@ -54,3 +55,8 @@ def record(
             "commit": source_commit(),
         },
     )
+
+
+def _lower_bound(bounds: OracleSolutions, trial: int) -> int | None:
+    """Proven number of steps of a trial, if the oracle was asked about it."""
+    return int(bounds.steps_lower_bound[trial]) if trial < len(bounds) else None
