@@ -20,7 +20,6 @@ from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.library import group_of
 from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.problem import ReachProblem
-from kinarm.recording import Recording
 from kinarm.simulator import Simulator
 
 KIND, FORMAT_VERSION = "evaluation", 3
@@ -216,20 +215,26 @@ class EvaluationDocument:
         oracle = self.protocol["problems"][problem]["oracle"]
         return oracle["trials"]["steps_lower_bound"] if oracle else None
 
-    def check_same(self, row: dict[str, Any], recordings: list[Recording]) -> None:
-        """See that recordings end as the evaluation says.
+    def check_same(self, row: dict[str, Any], ends: Sequence[tuple[str, int, float]]) -> None:
+        """See that trials end as the evaluation says.
+
+        Parameters
+        ----------
+        row : dict
+            The result of a policy.
+        ends : sequence of (str, int, float)
+            Outcomes, steps and final distances [m], of all its trials.
 
         Raises
         ------
         InvalidInputError
             If one does not: policy or simulator have changed since.
         """
-        ends = list(zip(*(row["outcomes"][part] for part in ENDS), strict=True))
-        for recording in recordings:
-            end = (recording.outcome, recording.steps, recording.final_distance)
-            if len(ends) != len(recordings) or end != ends[recording.trial]:
+        said = list(zip(*(row["outcomes"][part] for part in ENDS), strict=True))
+        for trial, end in enumerate(ends):
+            if len(ends) != len(said) or end != said[trial]:
                 raise InvalidInputError(
-                    f"trial {recording.trial} of {recording.policy!r} ends otherwise than in "
+                    f"trial {trial} of {row['policy']!r} ends otherwise than in "
                     f"{self.name!r}: the policy or kinarm has changed, evaluate again"
                 )
 

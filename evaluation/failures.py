@@ -33,6 +33,11 @@ class Cause(NamedTuple):
         return f"{self.pair[0]} touches {self.pair[1]} {when}"
 
 
+def is_early(collision: bool, steps: int) -> bool:
+    """Whether a trial ended in contact within the first `EARLY_STEPS` steps."""
+    return collision and steps <= EARLY_STEPS
+
+
 def failure_causes(rollouts: Rollouts, contacts: Sequence[Pair | None]) -> dict[int, Cause]:
     """Causes of the trials that failed, by their numbers.
 
@@ -43,9 +48,10 @@ def failure_causes(rollouts: Rollouts, contacts: Sequence[Pair | None]) -> dict[
     contacts : sequence
         The bodies that touched, per trial, as `Simulator.contact_pairs` names them.
     """
-    early = rollouts.steps <= EARLY_STEPS
     return {
-        trial: Cause(contacts[trial], bool(rollouts.collision[trial] and early[trial]))
+        trial: Cause(
+            contacts[trial], is_early(bool(rollouts.collision[trial]), int(rollouts.steps[trial]))
+        )
         for trial in np.flatnonzero(~rollouts.success).tolist()
     }
 

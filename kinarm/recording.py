@@ -243,7 +243,7 @@ def record_rollouts(
                 states=states,
                 distances=world.distances(states, np.tile(goal, (len(states), 1))),
                 goal=goal,
-                outcome=_outcome(rollouts, number),
+                outcome=outcome_of(rollouts, number),
                 contact=touch.pair if touch else None,
                 contact_point=touch.point if touch else None,
                 refused=touch.configuration if touch else None,
@@ -254,7 +254,8 @@ def record_rollouts(
     return recordings
 
 
-def _outcome(rollouts: Rollouts, number: int) -> str:
+def outcome_of(rollouts: Rollouts, number: int) -> str:
+    """How one of the rollouts ended: one of `OUTCOMES`."""
     if rollouts.success[number]:
         return "success"
     return "collision" if rollouts.collision[number] else "truncated"

@@ -8,6 +8,7 @@ from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle.solution import OracleSolutions
 from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.recording import Recording, record_rollouts
+from kinarm.rollouts import Rollouts
 
 
 def record(
@@ -41,10 +42,22 @@ def record(
         If the policy was trained for another arm and that is not allowed.
     """
     entrant.check(trials.simulator.arm, allow_other_arm=allow_other_arm)
+    return recordings_of(entrant, trials, entrant.run(trials, record=True), numbers, bounds=bounds)
+
+
+def recordings_of(
+    entrant: Entrant,
+    trials: TrialSet,
+    rollouts: Rollouts,
+    numbers: Sequence[int] | None = None,
+    *,
+    bounds: OracleSolutions | None = None,
+) -> list[Recording]:
+    """What an entrant did, as recordings; rollouts kept the configurations, else as `record`."""
     made = entrant.policy.provenance.to_json() if entrant.policy else None
     return record_rollouts(
         trials.simulator,
-        entrant.run(trials, record=True),
+        rollouts,
         entrant.name,
         numbers,
         steps_lower_bound=None if bounds is None else partial(_lower_bound, bounds),
