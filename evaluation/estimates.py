@@ -39,12 +39,13 @@ def estimate_metrics(outcomes: Outcomes) -> dict[str, Estimate]:
 
 def _of_shares(outcomes: Outcomes, known: Mapping[str, Metric]) -> dict[str, Interval | None]:
     """Intervals of the metrics that are shares of trials."""
-    seeds, intervals = len(outcomes.rollouts), {}
-    for name, metric in known.items():
-        if metric.hits is not None:
-            hits = metric.hits(outcomes).reshape(seeds, -1)
-            intervals[name] = share_over_seeds(hits).ci95
-    return intervals
+    each = np.arange(len(outcomes.rollouts[0]))[:, None]
+    seeds = [outcomes.of_seed(seed).resampled(each) for seed in range(len(outcomes.rollouts))]
+    return {
+        name: share_over_seeds(np.array([metric.formula(seed) for seed in seeds])).ci95
+        for name, metric in known.items()
+        if metric.interval == "Wilson"
+    }
 
 
 def _bootstrapped(outcomes: Outcomes, known: Mapping[str, Metric]) -> dict[str, Interval | None]:
@@ -65,10 +66,10 @@ def _bootstrapped(outcomes: Outcomes, known: Mapping[str, Metric]) -> dict[str, 
     if seeds == 1:
         return dict(zip(formulas, map(percentile_interval, found), strict=True))
     each = np.stack([figures(outcomes.of_seed(seed)) for seed in range(seeds)], axis=-1)
-    return {
-        name: student(
-            float(formulas[name](outcomes)),
-            [(of_seeds.var(ddof=1) / seeds, seeds - 1), (of_trials.var(ddof=1), trials - 1)],
-        ).ci95
-        for name, of_seeds, of_trials in zip(formulas, each, found, strict=True)
-    }
+    intervals = {}
+    for name, of_seeds, of_trials in zip(formulas, each, found, strict=True):
+        value = float(formulas[name](outcomes))
+        parts = [(of_seeds.var(ddof=1) / seeds, seeds - 1), (of_trials.var(ddof=1), trials - 1)]
+        low, high = student(value, parts).ci95 or (value, value)
+        intervals[name] = (max(low, 0.0) if known[name].unit == "m" else low, high)
+    return intervals

@@ -37,9 +37,8 @@ class Metric:
     unit : str
         ``"%"`` for shares, which are kept as fractions and shown in per cent.
     interval : ``"Wilson"``, ``"bootstrap"`` or None
-        How its 95 % interval is made. Wilson's is for shares of trials.
-    hits : callable, optional
-        Of a share: from `Outcomes` to whether each trial hit.
+        How its 95 % interval is made. Wilson's is for shares of trials, whose formula is asked
+        about each trial by itself as well.
     needs_bounds : bool
         Whether it compares with the oracle.
     needs_held : bool
@@ -63,7 +62,6 @@ class Metric:
     formula: Callable[[Outcomes], Any]
     unit: str = ""
     interval: Literal["Wilson", "bootstrap"] | None = None
-    hits: Callable[[Outcomes], NDArray[np.bool_]] | None = None
     needs_bounds: bool = False
     needs_held: bool = False
     heading: str = ""
@@ -89,7 +87,6 @@ def share_of(
     return Metric(
         meaning=f"share of trials {meaning}",
         formula=lambda trials: hits(trials).mean(axis=-1),
-        hits=hits,
         unit="%",
         interval="Wilson",
         heading=heading,
@@ -231,7 +228,7 @@ METRICS: dict[str, Metric] = {
         priority=0.5,
     ),
     "truncated": share_of(
-        "that ran out of steps", lambda trials: trials.truncated, "out of steps %", priority=0.5
+        "that ran out of steps", lambda trials: trials.truncated, "out of time %", priority=0.5
     ),
     "mean_steps": Metric(
         meaning="mean length of the episodes", formula=lambda trials: trials.steps.mean()

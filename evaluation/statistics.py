@@ -4,7 +4,7 @@ Written out here, because SciPy's statistics take longer to load than a policy t
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -76,16 +76,6 @@ def _wilson_interval(hits: int, trials: int) -> Interval:
     centre = (2 * trials * share + z**2) / spread
     half = z / spread * math.sqrt(4 * trials * share * (1 - share) + z**2)
     return centre - half if hits > 0 else 0.0, centre + half if hits < trials else 1.0
-
-
-def performance_profile(
-    distances: NDArray[np.float64], limits: Iterable[float]
-) -> tuple[Estimate, ...]:
-    """Shares of trials whose final distance is at most each of some limits [m].
-
-    Distances [m] have shape (n_trials,) or (n_seeds, n_trials); see `Estimate.share`.
-    """
-    return tuple(Estimate.share(distances <= limit) for limit in limits)
 
 
 def resampled_figures(

@@ -226,7 +226,7 @@ class Player {
 
   press(event) {
     const tag = event.target.tagName;
-    const own = { SELECT: () => true, INPUT: (key) => key !== " " && key.length > 1, BUTTON: (key) => key === " " || key === "Enter" };
+    const own = { SELECT: () => true, INPUT: (key) => key !== " " && key.length > 1, BUTTON: (key) => key === " " || key === "Enter", SUMMARY: (key) => key === " " || key === "Enter" };
     if (event.ctrlKey || event.metaKey || event.altKey || (own[tag] && own[tag](event.key))) {
       return;
     }

@@ -16,10 +16,12 @@ class TrialList {
     const rows = new Map();
     data.groups.forEach((name, index) => {
       if (!rows.has(name)) {
-        const title = make("h2", {}, name);
+        const group = make("details");
+        const title = make("summary", {}, name);
         title.append(make("small", {}, String(sizes.get(name))));
         rows.set(name, make("div", { class: "chips", role: "group", "aria-label": name }));
-        element("list-groups").append(title, rows.get(name));
+        group.append(title, rows.get(name));
+        element("list-groups").append(group);
       }
       const number = data.trials[index].trial;
       const chip = make("button", { type: "button", class: "chip", "aria-label": `Trial ${number}` }, String(number));
@@ -50,10 +52,14 @@ class TrialList {
     }
   }
 
-  /** Mark the trial that is played. */
+  /** Mark the trial that is played, and open its group. */
   mark(index) {
+    if (!this.chips.length) {
+      return;
+    }
     this.chips.forEach((chip, k) => chip.setAttribute("aria-current", String(k === index)));
     this.marked = this.chips[index];
+    this.marked.closest("details").open = true;
     this.reveal();
   }
 

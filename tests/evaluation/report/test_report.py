@@ -48,7 +48,7 @@ class TestTable:
         assert cells["success %"] == [f"{rate:.1f}", f"{low:.1f}\N{EN DASH}{high:.1f}"]
         assert cells["of oracle %"] == [f"{100 * pooled['relative_success']['value']:.1f}"]
         worst, best = (100 * spread["success"][end] for end in ("min", "max"))
-        assert cells["over seeds %"] == [f"{worst:.1f}\N{EN DASH}{best:.1f}", "3 seeds"]
+        assert cells["worst..best seed %"] == [f"{worst:.1f}\N{EN DASH}{best:.1f}", "3 seeds"]
         assert cells["median m"][0] == f"{pooled['median_distance']['value']:.3f}"
         assert cells["contact %"] == [f"{100 * pooled['collision']['value']:.1f}"]
         assert cells["step ratio"] == [
