@@ -1,9 +1,11 @@
 """The shipped policies, and loading by name, group or file."""
 
 import json
+from pathlib import Path
 
 import pytest
 
+import kinarm.data
 from kinarm.errors import InvalidInputError, PolicyFileError, UnknownNameError
 from kinarm.policies import library
 from kinarm.policies.library import (
@@ -111,6 +113,7 @@ def ranked(shipped):
         "both": {"ppo-both": 0.7},
     }
     (shipped / "ranking.json").write_text(json.dumps({"success": success}))
+    (shipped.parent / "arms").symlink_to(Path(kinarm.data.__file__).parent / "arms")
     library._successes.cache_clear()
     yield shipped
     library._successes.cache_clear()
