@@ -1,7 +1,7 @@
 """Why trials fail: what touched, and how early, or that the steps ran out."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -75,3 +75,8 @@ def failure_rows(members: Sequence[tuple[Rollouts, Sequence[Pair | None]]]) -> l
         }
         for cause, count in sorted(counts.items(), key=lambda item: (-item[1], str(item[0])))
     ]
+
+
+def cause_words(row: Mapping[str, Any]) -> str:
+    """The cause of one of the `failure_rows`, in words."""
+    return str(Cause(row["contact"] and tuple(row["contact"]), row["early"]))

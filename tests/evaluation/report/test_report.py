@@ -83,6 +83,20 @@ class TestTable:
             assert f"reached by {row['policy']} " in card
 
 
+class TestCauses:
+    def test_causes_of_the_failures_are_those_of_the_document(self, page, document):
+        rows = content(page).findall(".//section[@id='right']//table[@class='plain']/tbody/tr")
+        told = {text_of(row.find("th")): [text_of(c) for c in row.findall("td")] for row in rows}
+        (pooled,) = document["pooled"]
+        failed, causes = told["made-right"]
+        assert int(failed) == sum(each["trials"] for each in pooled["failures"])
+        first = pooled["failures"][0]
+        words = "out of time" if first["contact"] is None else " touches ".join(first["contact"])
+        assert causes.startswith(f"{100 * first['trials'] / int(failed):.0f} % {words}")
+        hidden = max(len(pooled["failures"]) - 6, 0)
+        assert causes.endswith(f"and {hidden} more") == bool(hidden)
+
+
 class TestWorst:
     def test_failures_come_first_and_the_farthest_of_them(self, right):
         chosen = worst_trials(right)
