@@ -17,10 +17,10 @@ from kinarm.evaluation import METRICS
 from kinarm.evaluation.commands import arms, problem
 from kinarm.evaluation.commands.bench import BenchmarkRequest
 from kinarm.evaluation.commands.compare import ComparisonRequest
-from kinarm.evaluation.commands.evaluate import EvaluationRequest
 from kinarm.evaluation.commands.replay import ReplayRequest
 from kinarm.evaluation.commands.reproduce import ReproductionRequest
 from kinarm.evaluation.reproduction.tables import markdown
+from kinarm.evaluation.request import EvaluationRequest
 from kinarm.observation import OBSERVATION, part_slices
 from kinarm.policies import find_learner
 from kinarm.policies.train import TrainRequest

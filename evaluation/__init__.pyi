@@ -1,5 +1,4 @@
 from .bounds import oracle_bounds as oracle_bounds
-from .commands.evaluate import EvaluationRequest as EvaluationRequest
 from .document import EvaluationDocument as EvaluationDocument
 from .document import evaluation_document as evaluation_document
 from .entrants import Entrant as Entrant
@@ -12,13 +11,14 @@ from .figures import distance_histograms as distance_histograms
 from .figures import save_figure as save_figure
 from .metrics import METRICS as METRICS
 from .metrics import Metric as Metric
-from .metrics import Outcomes as Outcomes
+from .outcomes import Outcomes as Outcomes
 from .replays.recorder import record as record
 from .replays.request import ReplayRequest as ReplayRequest
 from .report.card import policy_card as policy_card
 from .report.card import write_card as write_card
 from .report.page import report_page as report_page
 from .report.page import write_report as write_report
+from .request import EvaluationRequest as EvaluationRequest
 from .statistics import Estimate as Estimate
 from .studies.specification import StudySpecification as StudySpecification
 from .studies.study import Study as Study

@@ -35,6 +35,11 @@ TRIAL_BOUNDS = (
 )
 """What documents hold of every trial."""
 
+MOST_BOUNDED = 2000
+"""Trials whose bounds are looked for beside policies that face more: the first ones."""
+
+_bounded: WeakKeyDictionary[TrialSet, TrialSet] = WeakKeyDictionary()
+
 _known: WeakKeyDictionary[TrialSet, OracleSolutions] = WeakKeyDictionary()
 
 
@@ -62,6 +67,24 @@ def oracle_bounds(trials: TrialSet, on_progress: Progress | None = None) -> Orac
             _save(path, solutions)
         _known[trials] = solutions
     return _known[trials]
+
+
+def bounded_trials(trials: TrialSet) -> TrialSet:
+    """The first `MOST_BOUNDED` trials, or all where there are no more or all bounds are known.
+
+    A proof takes a thousand times as long as a policy's trial, and the figures made of proofs need
+    no more of them.
+    """
+    if len(trials) <= MOST_BOUNDED or trials in _known:
+        return trials
+    if trials not in _bounded:
+        _bounded[trials] = trials.chosen(range(MOST_BOUNDED))
+    return _bounded[trials]
+
+
+def first_bounds(trials: TrialSet, on_progress: Progress | None = None) -> OracleSolutions:
+    """What the oracle knows about the `bounded_trials`; parameters as of `oracle_bounds`."""
+    return oracle_bounds(bounded_trials(trials), on_progress)
 
 
 @cache
@@ -120,6 +143,7 @@ def _delete_least_recently_used(folder: Path) -> None:
 def bounds_document(solutions: OracleSolutions) -> dict[str, Any]:
     """What the oracle knows about a set of trials, as a dictionary that JSON can hold.
 
+    ``bounded`` is their number.
     ``unsolved`` are the trials that no motion was found for, and why; ``gap`` is that between
     ``steps`` and ``steps_lower_bound`` of the others, and ``tight_share`` the share of trials whose
     number of steps is proven.
@@ -127,6 +151,7 @@ def bounds_document(solutions: OracleSolutions) -> dict[str, Any]:
     missed = np.flatnonzero(~solutions.reachable)
     gap = (solutions.steps - solutions.steps_lower_bound)[solutions.reachable]
     return {
+        "bounded": len(solutions),
         "success": Estimate.share(solutions.reachable).to_json(),
         "unsolved": [
             {"trial": int(trial), "reason": str(solutions.reasons[trial])} for trial in missed

@@ -1,5 +1,6 @@
 """The document of an evaluation: everything about it, to keep and to face the same trials again."""
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,11 +20,13 @@ from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.library import group_of
 from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.problem import ReachProblem
-from kinarm.recording import Recording
 from kinarm.simulator import Simulator
 
-KIND, FORMAT_VERSION = "evaluation", 2
+KIND, FORMAT_VERSION = "evaluation", 3
 """Kind and version of the files."""
+
+READABLE = (2, FORMAT_VERSION)
+"""Versions that can be read: 2 lacks failures, trials that go on, and bounds of a part."""
 
 ENDS = ("outcome", "steps", "final_distance")
 """What has to be the same again."""
@@ -60,10 +63,12 @@ def evaluation_document(evaluations: Sequence[Evaluation], command: str) -> dict
             "command": command,
             "trials": len(any_set),
             "seed": any_set.seed,
+            "hold": any(each.held is not None for each in evaluations),
             "intervals": {
                 "level": LEVEL,
                 "shares": "Wilson",
                 "distances": "percentile bootstrap over trials",
+                "pooled": "Student, over training seeds and trials",
                 "resamples": RESAMPLES,
                 "bootstrap_seed": BOOTSTRAP_SEED,
             },
@@ -74,6 +79,18 @@ def evaluation_document(evaluations: Sequence[Evaluation], command: str) -> dict
         "results": [evaluation.to_json() for evaluation in evaluations],
         "pooled": [pooled.to_json() for pooled in pool(evaluations)],
     }
+
+
+def document_text(value: Any, indent: str = "\n") -> str:
+    """A document as JSON: objects over several lines, but lists of numbers or words on one."""
+    if isinstance(value, list) and any(isinstance(each, Mapping) for each in value):
+        entries, ends = [document_text(each, indent + " ") for each in value], "[]"
+    elif isinstance(value, Mapping):
+        entries = [f"{json.dumps(key)}: {document_text(value[key], indent + ' ')}" for key in value]
+        ends = "{}"
+    else:
+        return json.dumps(value)
+    return f"{ends[0]}{indent} {f',{indent} '.join(entries)}{indent}{ends[1]}"
 
 
 def _problem_entry(evaluation: Evaluation) -> dict[str, Any]:
@@ -125,15 +142,16 @@ class EvaluationDocument:
         try:
             check_shape(content, {"protocol": {"format_version": int}, "results": list}, "it")
             version = content["protocol"]["format_version"]
-            if version == FORMAT_VERSION:
+            if version in READABLE:
                 check_document(content)
         except (ValueError, RecursionError) as error:
             raise InvalidInputError(
                 f"{name!r} is not a complete kinarm evaluation: {first_line(error)}"
             ) from error
-        if version != FORMAT_VERSION:
+        if version not in READABLE:
+            readable = " and ".join(map(str, READABLE))
             raise InvalidInputError(
-                f"{name!r} has format version {version}; this kinarm reads {FORMAT_VERSION}"
+                f"{name!r} has format version {version}; this kinarm reads {readable}"
             )
         return cls(name, content["protocol"], content["results"])
 
@@ -193,24 +211,30 @@ class EvaluationDocument:
         return trials
 
     def floors(self, problem: str) -> list[int] | None:
-        """Proven numbers of steps of a problem's trials, if the evaluation had them."""
+        """Proven numbers of steps of a problem's first trials, if the evaluation had them."""
         oracle = self.protocol["problems"][problem]["oracle"]
         return oracle["trials"]["steps_lower_bound"] if oracle else None
 
-    def check_same(self, row: dict[str, Any], recordings: list[Recording]) -> None:
-        """See that recordings end as the evaluation says.
+    def check_same(self, row: dict[str, Any], ends: Sequence[tuple[str, int, float]]) -> None:
+        """See that trials end as the evaluation says.
+
+        Parameters
+        ----------
+        row : dict
+            The result of a policy.
+        ends : sequence of (str, int, float)
+            Outcomes, steps and final distances [m], of all its trials.
 
         Raises
         ------
         InvalidInputError
             If one does not: policy or simulator have changed since.
         """
-        ends = list(zip(*(row["outcomes"][part] for part in ENDS), strict=True))
-        for recording in recordings:
-            end = (recording.outcome, recording.steps, recording.final_distance)
-            if len(ends) != len(recordings) or end != ends[recording.trial]:
+        said = list(zip(*(row["outcomes"][part] for part in ENDS), strict=True))
+        for trial, end in enumerate(ends):
+            if len(ends) != len(said) or end != said[trial]:
                 raise InvalidInputError(
-                    f"trial {recording.trial} of {recording.policy!r} ends otherwise than in "
+                    f"trial {trial} of {row['policy']!r} ends otherwise than in "
                     f"{self.name!r}: the policy or kinarm has changed, evaluate again"
                 )
 

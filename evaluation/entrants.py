@@ -176,11 +176,12 @@ def find_entrants(
     Parameters
     ----------
     name_or_file : str or Path
-        A baseline, ``"oracle"``, a shipped policy, a group of them (all training seeds), a
-        policy file, a model of Stable-Baselines3 (.zip) or ``"module:function"``. A model and a
-        module run code: open only those that you trust.
+        A baseline, ``"oracle"``, a shipped policy, a group of them (all training seeds),
+        ``"best"``, a policy file, a model of Stable-Baselines3 (.zip) or ``"module:function"``. A
+        model and a module run code: open only those that you trust.
     problem : ReachProblem, str or Path, optional
-        What a model is for, as its file does not say; others say it themselves.
+        What a model is for, as its file does not say, or the best shipped policy; others say it
+        themselves.
 
     Raises
     ------
@@ -189,7 +190,8 @@ def find_entrants(
     PolicyFileError
         If a file cannot be used.
     InvalidInputError
-        If a model cannot be converted or its problem is not given, or a module cannot be imported.
+        If a model cannot be converted or its problem is not given, a module cannot be imported,
+        or no policy ships for the problem.
     """
     text = str(name_or_file)
     if text in UNTRAINED_ENTRANTS:
@@ -199,7 +201,7 @@ def find_entrants(
     if is_import_path(text):
         return (_imported_entrant(text),)
     try:
-        paths = policy_files(name_or_file)
+        paths = policy_files(name_or_file, problem)
     except UnknownNameError as error:
         available = (*UNTRAINED_ENTRANTS, *error.available, "path/to/model.zip", "module:function")
         raise UnknownNameError(error.kind, error.given, available) from None

@@ -10,10 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.errors import InvalidInputError
-from kinarm.evaluation.bounds import oracle_bounds
+from kinarm.evaluation.bounds import first_bounds
 from kinarm.evaluation.entrants import Entrant, find_entrants
+from kinarm.evaluation.estimates import estimate_metrics
+from kinarm.evaluation.failures import failure_rows
+from kinarm.evaluation.held import Held, held_trials
 from kinarm.evaluation.imported import Predictor, policy_function
-from kinarm.evaluation.metrics import Outcomes, estimate_metrics
+from kinarm.evaluation.intervals import share_over_seeds
+from kinarm.evaluation.outcomes import Outcomes
 from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle.solution import OracleSolutions
@@ -36,13 +40,16 @@ class Evaluation:
     rollouts : Rollouts
         What it did.
     bounds : OracleSolutions or None
-        What any policy could do, if that was asked for.
+        What any policy could do in the trials, or in the first ones, if that was asked for.
+    held : Held or None
+        What it did where success did not end the trials, if that was asked for.
     """
 
     entrant: Entrant
     trials: TrialSet
     rollouts: Rollouts
     bounds: OracleSolutions | None = None
+    held: Held | None = None
 
     @property
     def problem(self) -> ReachProblem:
@@ -52,7 +59,7 @@ class Evaluation:
     @cached_property
     def metrics(self) -> dict[str, Estimate]:
         """Every figure of merit by its name in `kinarm.evaluation.METRICS`."""
-        return estimate_metrics(Outcomes((self.rollouts,), self.bounds))
+        return estimate_metrics(_outcomes((self,)))
 
     @property
     def success(self) -> Estimate:
@@ -82,7 +89,7 @@ class Evaluation:
         InvalidInputError
             If the evaluation was made without bounds.
         """
-        return Outcomes((self.rollouts,), self.bounds).step_ratio
+        return _outcomes((self,)).step_ratio
 
     @property
     def outcomes(self) -> tuple[str, ...]:
@@ -93,7 +100,7 @@ class Evaluation:
     def to_json(self) -> dict[str, Any]:
         """Figures of merit and every trial, as a dictionary that JSON can hold."""
         return {
-            **_row_head(self.entrant.name, self, self.metrics, training_seed=self.entrant.seed),
+            **_row_head(self.entrant.name, (self,), self.metrics, training_seed=self.entrant.seed),
             "note": self.entrant.note,
             "outcomes": {
                 "final_distance": self.rollouts.distance.tolist(),
@@ -101,6 +108,7 @@ class Evaluation:
                 "outcome": list(self.outcomes),
                 "contact": [list(pair) if pair else None for pair in self.contacts],
             },
+            **({"held": self.held.to_json()} if self.held else {}),
         }
 
     def __repr__(self) -> str:
@@ -129,9 +137,13 @@ class PooledEvaluation:
 
     @cached_property
     def metrics(self) -> dict[str, Estimate]:
-        """Every figure of merit over all seeds; intervals are those of the trials they share."""
-        rollouts = tuple(member.rollouts for member in self.members)
-        return estimate_metrics(Outcomes(rollouts, self.members[0].bounds))
+        """Every figure of merit over all seeds; intervals are about other trainings and trials."""
+        return estimate_metrics(_outcomes(self.members))
+
+    @property
+    def worst(self) -> Evaluation:
+        """The training seed with the lowest success."""
+        return min(self.members, key=lambda member: int(member.rollouts.success.sum()))
 
     @property
     def spread(self) -> dict[str, dict[str, Any]]:
@@ -150,24 +162,40 @@ class PooledEvaluation:
         return {
             **_row_head(
                 self.name,
-                self.members[0],
+                self.members,
                 self.metrics,
                 members=[member.entrant.name for member in self.members],
                 training_seeds=[member.entrant.seed for member in self.members],
             ),
             "spread": self.spread,
+            "worst_seed": {
+                "policy": self.worst.entrant.name,
+                "training_seed": self.worst.entrant.seed,
+                "success": self.worst.success.to_json(),
+            },
         }
 
     def __repr__(self) -> str:
-        success = Estimate.share(np.array([member.rollouts.success for member in self.members]))
+        success = share_over_seeds(np.array([each.rollouts.success for each in self.members]))
         summary = _summary(self.name, self.members[0].trials, success)
         return f"PooledEvaluation({len(self.members)} seeds of {summary})"
 
 
+def _outcomes(members: Sequence[Evaluation]) -> Outcomes:
+    """What one or several training seeds did in the same trials."""
+    return Outcomes(
+        tuple(member.rollouts for member in members),
+        members[0].bounds,
+        tuple(member.held for member in members if member.held),
+        members[0].problem.stepping.time_step,
+    )
+
+
 def _row_head(
-    name: str, evaluation: Evaluation, metrics: dict[str, Estimate], **seeds: Any
+    name: str, evaluations: Sequence[Evaluation], metrics: dict[str, Estimate], **seeds: Any
 ) -> dict[str, Any]:
-    """What a row of a document is about, and its figures."""
+    """What a row of a document is about, its figures, and why its trials failed."""
+    evaluation = evaluations[0]
     entrant = evaluation.entrant
     return {
         "policy": name,
@@ -178,6 +206,7 @@ def _row_head(
         **seeds,
         "trials": len(evaluation.trials),
         "metrics": {key: estimate.to_json() for key, estimate in metrics.items()},
+        "failures": failure_rows([(each.rollouts, each.contacts) for each in evaluations]),
     }
 
 
@@ -194,6 +223,7 @@ def evaluate(
     *,
     allow_other_arm: bool = False,
     oracle: bool = False,
+    hold: bool = False,
     **overrides: Any,
 ) -> Evaluation:
     """Put one policy to the trials (paper, section 3.3: 200 random goals, 64 steps each).
@@ -213,7 +243,10 @@ def evaluate(
     allow_other_arm : bool
         Whether a policy may face an arm that it was not trained for.
     oracle : bool
-        Whether to bound what any policy could do in the trials; see `Evaluation.bounds`.
+        Whether to bound what any policy could do in the trials, the first 2000 at most.
+    hold : bool
+        Whether to let it face them once more, where success does not end a trial; see
+        `Evaluation.held`.
     **overrides
         Changes of the problem, such as ``tolerance``; see `kinarm.ReachProblem.replace`.
 
@@ -229,7 +262,7 @@ def evaluate(
     if faced is None:
         raise InvalidInputError(f"{entrant.name!r} was not trained for a problem: name one")
     trial_set = TrialSet.draw(ReachProblem.load(faced).replace(**overrides), trials, seed)
-    return run_trials(entrant, trial_set, allow_other_arm, oracle=oracle)
+    return run_trials(entrant, trial_set, allow_other_arm, oracle=oracle, hold=hold)
 
 
 def _entrant_of(
@@ -247,7 +280,12 @@ def _entrant_of(
 
 
 def run_trials(
-    entrant: Entrant, trials: TrialSet, allow_other_arm: bool = False, *, oracle: bool = False
+    entrant: Entrant,
+    trials: TrialSet,
+    allow_other_arm: bool = False,
+    *,
+    oracle: bool = False,
+    hold: bool = False,
 ) -> Evaluation:
     """Let an entrant face a set of trials; see `evaluate`.
 
@@ -258,8 +296,14 @@ def run_trials(
         not those of this arm.
     """
     entrant.check(trials.simulator.arm, allow_other_arm=allow_other_arm)
-    bounds = oracle_bounds(trials) if oracle else None
-    return Evaluation(entrant, trials, entrant.run(trials), bounds)
+    rollouts = entrant.run(trials)
+    return Evaluation(
+        entrant,
+        trials,
+        rollouts,
+        first_bounds(trials) if oracle else None,
+        held_trials(entrant, trials) if hold else None,
+    )
 
 
 def pool(evaluations: Sequence[Evaluation]) -> tuple[PooledEvaluation, ...]:

@@ -1,12 +1,12 @@
 """Intervals over training seeds and trials at once."""
 
 from collections.abc import Hashable, Iterable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.evaluation.statistics import LEVEL, Estimate
+from kinarm.evaluation.statistics import LEVEL, Estimate, wilson_interval
 
 
 def estimate_text(estimate: Estimate) -> str:
@@ -63,7 +63,7 @@ def student(value: float, components: Iterable[tuple[float, int]]) -> Estimate:
     They are estimated variances that add up to that of the statistic, and their degrees of
     freedom; without any freedom in one of them there is no interval.
     """
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
     variances, freedom = (np.array(part, dtype=float) for part in zip(*components, strict=True))
     if not freedom.all():
@@ -72,7 +72,7 @@ def student(value: float, components: Iterable[tuple[float, int]]) -> Estimate:
     if not total:
         return Estimate(value, (value, value))
     effective = total**2 / float((variances**2 / freedom).sum())
-    reach = float(t.ppf((1 + LEVEL) / 2, effective)) * total**0.5
+    reach = float(stdtrit(effective, (1 + LEVEL) / 2)) * total**0.5
     return Estimate(value, (value - reach, value + reach))
 
 
@@ -95,6 +95,25 @@ def mean_share(shares: NDArray[np.float64], n_trials: int) -> Estimate:
     components = [(_mean_variance(shares), len(shares) - 1), (binomial, n_trials - 1)]
     ci95 = student(value, components).ci95
     return Estimate(value, ci95 and (max(ci95[0], 0.0), min(ci95[1], 1.0)))
+
+
+def share_over_seeds(hits: NDArray[Any]) -> Estimate:
+    """A share of trials and its 95 % interval.
+
+    That of one seed is Wilson's, about other trials. That of several covers those over seeds and
+    trials (`contrast`), which knows nothing where all seeds agree, and over trials alone.
+
+    Parameters
+    ----------
+    hits : ndarray, shape (n_seeds, n_trials)
+        Whether a trial hit, or the share of several trainings in which it did.
+    """
+    share = float(hits.mean())
+    low, high = wilson_interval(round(share * hits.shape[1]), hits.shape[1])
+    if len(hits) > 1:
+        crossed = contrast([Term(1.0, hits.astype(np.float64))]).ci95 or (share, share)
+        low, high = min(low, crossed[0]), max(high, crossed[1])
+    return Estimate(share, (max(low, 0.0), min(high, 1.0)))
 
 
 def superiority(pairs: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> Estimate:

@@ -1,133 +1,26 @@
 """The figures of merit in one table, which documents, tables, reports and the docs read."""
 
 import math
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any, Literal, Protocol
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.errors import InvalidInputError
-from kinarm.evaluation.statistics import Estimate, bootstrap_intervals, wilson_interval
+from kinarm.evaluation.outcomes import EARLY_STEPS, HELD_STEPS, Outcomes
 
 LIMITS = (0.1, 0.2)
 """Distances whose shares are reported beside success [m]."""
 
+CLOSE = (0.02, 0.01, 0.005)
+"""Distances whose shares are reported where success does not end a trial [m]."""
+
+HELD_WITHIN = 0.01
+"""A goal counts as held if the tool stays within this distance to the end [m]."""
+
 ALWAYS = float("inf")
 """Priority of columns that are never left out."""
-
-
-class Judged(Protocol):
-    """What figures of merit need of finished episodes; `kinarm.Rollouts` say what it means."""
-
-    @property
-    def distance(self) -> NDArray[np.float64]:
-        """Final distances [m]."""
-
-    @property
-    def steps(self) -> NDArray[np.int64]:
-        """Steps taken."""
-
-    @property
-    def returns(self) -> NDArray[np.float64]:
-        """Sums of rewards."""
-
-    @property
-    def success(self) -> NDArray[np.bool_]:
-        """Whether the goal was reached."""
-
-    @property
-    def collision(self) -> NDArray[np.bool_]:
-        """Whether something touched."""
-
-    def __len__(self) -> int: ...
-
-
-class Bounded(Protocol):
-    """What figures of merit need of the bounds, as the oracle's solutions have it."""
-
-    @property
-    def reachable(self) -> NDArray[np.bool_]:
-        """Whether a motion to the goal was found."""
-
-    @property
-    def steps_lower_bound(self) -> NDArray[np.int64]:
-        """Steps that are necessary."""
-
-
-@dataclass(frozen=True, eq=False)
-class Outcomes:
-    """What one or several training seeds did in the same trials.
-
-    Their arrays are joined along the last axis, shape (..., n_seeds * n_trials).
-
-    Attributes
-    ----------
-    rollouts : tuple of Rollouts
-        One per training seed.
-    bounds : OracleSolutions or None
-        What any policy could do in the trials, if that is known.
-    numbers : ndarray of int, shape (..., n_trials), optional
-        Resampled trials; by default each of them once.
-    """
-
-    rollouts: tuple[Judged, ...]
-    bounds: Bounded | None = None
-    numbers: NDArray[np.int64] | None = None
-
-    def _joined(self, columns: Iterable[NDArray[Any]]) -> NDArray[Any]:
-        chosen = [column if self.numbers is None else column[self.numbers] for column in columns]
-        return np.concatenate(chosen, axis=-1)
-
-    @cached_property
-    def distance(self) -> NDArray[np.float64]:
-        """Final distances [m]."""
-        return self._joined(rollouts.distance for rollouts in self.rollouts)
-
-    @cached_property
-    def ordered_distance(self) -> NDArray[np.float64]:
-        """Final distances along the last axis, the smallest first [m]."""
-        return np.sort(self.distance, axis=-1)
-
-    @cached_property
-    def steps(self) -> NDArray[np.int64]:
-        """Steps taken."""
-        return self._joined(rollouts.steps for rollouts in self.rollouts)
-
-    @cached_property
-    def returns(self) -> NDArray[np.float64]:
-        """Sums of rewards."""
-        return self._joined(rollouts.returns for rollouts in self.rollouts)
-
-    @cached_property
-    def success(self) -> NDArray[np.bool_]:
-        """Whether a trial ended within the tolerance, without contact."""
-        return self._joined(rollouts.success for rollouts in self.rollouts)
-
-    @cached_property
-    def collision(self) -> NDArray[np.bool_]:
-        """Whether a trial ended in contact."""
-        return self._joined(rollouts.collision for rollouts in self.rollouts)
-
-    @cached_property
-    def reachable(self) -> NDArray[np.bool_]:
-        """Whether the oracle found a motion to the goal."""
-        return self._joined(self._known_bounds.reachable for _ in self.rollouts)
-
-    @cached_property
-    def step_ratio(self) -> NDArray[np.float64]:
-        """Steps taken over those proven necessary, of the trials that succeeded, one axis."""
-        necessary = self._joined(self._known_bounds.steps_lower_bound for _ in self.rollouts)
-        ratio: NDArray[np.float64] = self.steps / necessary
-        return ratio[self.success]
-
-    @property
-    def _known_bounds(self) -> Bounded:
-        if self.bounds is None:
-            raise InvalidInputError("there are no bounds: the evaluation was made without them")
-        return self.bounds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,9 +37,12 @@ class Metric:
     unit : str
         ``"%"`` for shares, which are kept as fractions and shown in per cent.
     interval : ``"Wilson"``, ``"bootstrap"`` or None
-        How its 95 % interval is made. Wilson's is for shares of trials.
+        How its 95 % interval is made. Wilson's is for shares of trials, whose formula is asked
+        about each trial by itself as well.
     needs_bounds : bool
         Whether it compares with the oracle.
+    needs_held : bool
+        Whether it is about trials that go on after success.
     heading : str
         Heading of its column in tables; without one it is in documents alone.
     digits : int
@@ -154,7 +50,7 @@ class Metric:
     shows_interval : bool
         Whether the interval is shown, too.
     beside : tuple of str, optional
-        Label and name of another metric that is shown in the same column.
+        Name of another metric that is shown in the same column, and how, such as ``"{} s"``.
     spread_heading : str
         Heading of a column for its range over training seeds, if there is to be one.
     priority : float
@@ -167,6 +63,7 @@ class Metric:
     unit: str = ""
     interval: Literal["Wilson", "bootstrap"] | None = None
     needs_bounds: bool = False
+    needs_held: bool = False
     heading: str = ""
     digits: int = 3
     shows_interval: bool = False
@@ -183,16 +80,40 @@ class Metric:
         return f"{self.write(low)}..{self.write(high)}"
 
 
-def share_within(limit: float) -> Metric:
-    """Share of trials that end within a distance [m]."""
+def share_of(
+    meaning: str, hits: Callable[[Outcomes], NDArray[np.bool_]], heading: str = "", **shown: Any
+) -> Metric:
+    """Share of trials that hit."""
     return Metric(
-        meaning=f"share of trials with a final distance of at most {limit:g} m; contact allowed",
-        formula=lambda trials: (trials.distance <= limit).mean(axis=-1),
+        meaning=f"share of trials {meaning}",
+        formula=lambda trials: hits(trials).mean(axis=-1),
         unit="%",
         interval="Wilson",
-        heading=f"<= {limit:g} m",
+        heading=heading,
         digits=1,
+        **shown,
+    )
+
+
+def share_within(limit: float) -> Metric:
+    """Share of trials that end within a distance [m]."""
+    return share_of(
+        f"with a final distance of at most {limit:g} m; contact allowed",
+        lambda trials: trials.distance <= limit,
+        f"<= {limit:g} m",
         priority=1,
+    )
+
+
+def share_closer(limit: float) -> Metric:
+    """Share of trials whose closest approach is within a distance [m], if they go on."""
+    return share_of(
+        f"that come within {1000 * limit:g} mm of the goal, if success does not end them; "
+        "without contact at any time",
+        lambda trials: (trials.closest <= limit) & ~trials.held_collision,
+        f"<= {1000 * limit:g} mm",
+        needs_held=True,
+        priority=14,
     )
 
 
@@ -206,6 +127,19 @@ def distance_metric(
         unit="m",
         interval="bootstrap",
         heading=heading,
+        **shown,
+    )
+
+
+def approach_metric(meaning: str, formula: Callable[[Outcomes], Any], **shown: Any) -> Metric:
+    """A statistic of the closest approach."""
+    return Metric(
+        meaning=f"{meaning} of the closest approach after any step, if success does not end a "
+        "trial; contact ends it",
+        formula=formula,
+        unit="m",
+        interval="bootstrap",
+        needs_held=True,
         **shown,
     )
 
@@ -232,23 +166,23 @@ def middle_half(ordered: NDArray[np.float64]) -> NDArray[np.float64]:
     return ordered[..., n // 4 : n - n // 4]
 
 
+def median_or_none(values: NDArray[Any]) -> Any:
+    """Median of values; None where there are none."""
+    return np.median(values) if values.size else None
+
+
 METRICS: dict[str, Metric] = {
-    "success": Metric(
-        meaning="share of trials that ended within the tolerance, without contact",
-        formula=lambda trials: trials.success.mean(axis=-1),
-        unit="%",
-        interval="Wilson",
-        heading="success %",
-        digits=1,
+    "success": share_of(
+        "that ended within the tolerance, without contact",
+        lambda trials: trials.success,
+        "success %",
         shows_interval=True,
-        spread_heading="over seeds %",
+        spread_heading="worst..best seed %",
         priority=ALWAYS,
     ),
     "relative_success": Metric(
         meaning="success over that of the oracle",
-        formula=lambda trials: (
-            trials.success.mean() / trials.reachable.mean() if trials.reachable.any() else None
-        ),
+        formula=lambda trials: trials.relative_success,
         unit="%",
         needs_bounds=True,
         heading="of oracle %",
@@ -261,7 +195,7 @@ METRICS: dict[str, Metric] = {
         lambda trials: median(trials.ordered_distance),
         "median m",
         shows_interval=True,
-        priority=ALWAYS,
+        priority=12,
     ),
     "mean_distance": distance_metric(
         "mean", lambda trials: trials.distance.mean(axis=-1), "mean m", priority=2
@@ -281,14 +215,20 @@ METRICS: dict[str, Metric] = {
         formula=lambda trials: trials.distance.max(),
         unit="m",
     ),
-    "collision": Metric(
-        meaning="share of trials that ended in contact: obstacles, the ground or the arm itself",
-        formula=lambda trials: trials.collision.mean(axis=-1),
-        unit="%",
-        interval="Wilson",
-        heading="contact %",
-        digits=1,
+    "collision": share_of(
+        "that ended in contact: obstacles, the ground or the arm itself",
+        lambda trials: trials.collision,
+        "contact %",
         priority=6,
+    ),
+    "early_collision": share_of(
+        f"that ended in contact within the first {EARLY_STEPS} steps",
+        lambda trials: trials.early_collision,
+        "early contact %",
+        priority=0.5,
+    ),
+    "truncated": share_of(
+        "that ran out of steps", lambda trials: trials.truncated, "out of time %", priority=0.5
     ),
     "mean_steps": Metric(
         meaning="mean length of the episodes", formula=lambda trials: trials.steps.mean()
@@ -298,15 +238,29 @@ METRICS: dict[str, Metric] = {
         formula=lambda trials: np.median(trials.steps),
         heading="steps",
         digits=0,
+        priority=0.2,
+    ),
+    "steps_to_success": Metric(
+        meaning="steps of the trials that succeeded: median",
+        formula=lambda trials: median_or_none(trials.steps_to_success),
+        heading="steps to reach",
+        digits=0,
+        beside=("time_to_success", "{} s"),
         priority=3,
+    ),
+    "time_to_success": Metric(
+        meaning="the same as time: steps by their duration",
+        formula=lambda trials: median_or_none(trials.steps_to_success * trials.time_step),
+        unit="s",
+        digits=2,
     ),
     "step_ratio": Metric(
         meaning="steps over the number proven necessary, of the trials that succeeded: median",
-        formula=lambda trials: np.median(trials.step_ratio) if trials.step_ratio.size else None,
+        formula=lambda trials: median_or_none(trials.step_ratio),
         needs_bounds=True,
         heading="step ratio",
         digits=2,
-        beside=("p95", "step_ratio_p95"),
+        beside=("step_ratio_p95", "p95 {}"),
         priority=8,
     ),
     "step_ratio_p95": Metric(
@@ -317,29 +271,32 @@ METRICS: dict[str, Metric] = {
         needs_bounds=True,
         digits=2,
     ),
+    **{f"closer_than_{1000 * limit:g}_mm": share_closer(limit) for limit in CLOSE},
+    "held": share_of(
+        f"whose last {HELD_STEPS} steps stay within {1000 * HELD_WITHIN:g} mm of the goal, if "
+        "success does not end them; without contact",
+        lambda trials: (trials.farthest_at_end <= HELD_WITHIN) & ~trials.held_collision,
+        "held %",
+        needs_held=True,
+        shows_interval=True,
+        priority=15,
+    ),
+    "median_approach": approach_metric(
+        "median",
+        lambda trials: median(trials.ordered_closest),
+        heading="closest m",
+        beside=("p95_approach", "p95 {}"),
+        priority=13,
+    ),
+    "p95_approach": approach_metric(
+        "95th percentile", lambda trials: quantile(trials.ordered_closest, 0.95)
+    ),
+    "held_collision": share_of(
+        "that touch something if success does not end them",
+        lambda trials: trials.held_collision,
+        "held contact %",
+        needs_held=True,
+        priority=8.5,
+    ),
 }
 """All figures of merit by their name in documents. A new one is one entry here."""
-
-
-def estimate_metrics(outcomes: Outcomes) -> dict[str, Estimate]:
-    """Work out all `METRICS`, with their intervals; without bounds, some stay empty."""
-    bounded = outcomes.bounds is not None
-    known = {name: each for name, each in METRICS.items() if bounded or not each.needs_bounds}
-    bootstrapped = [name for name, metric in known.items() if metric.interval == "bootstrap"]
-
-    def resampled_figures(numbers: NDArray[np.int64]) -> NDArray[np.float64]:
-        resampled = replace(outcomes, numbers=numbers)
-        return np.stack([known[name].formula(resampled) for name in bootstrapped])
-
-    trials, seeds = len(outcomes.rollouts[0]), len(outcomes.rollouts)
-    intervals = dict(zip(bootstrapped, bootstrap_intervals(trials, resampled_figures), strict=True))
-    estimates = dict.fromkeys(METRICS, Estimate(None))
-    for name, metric in known.items():
-        value = metric.formula(outcomes)
-        if value is None or np.isnan(value):
-            continue
-        interval = intervals.get(name)
-        if metric.interval == "Wilson":
-            interval = wilson_interval(round(value * trials * seeds), trials, seeds)
-        estimates[name] = Estimate(float(value), interval)
-    return estimates

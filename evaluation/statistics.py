@@ -4,7 +4,7 @@ Written out here, because SciPy's statistics take longer to load than a policy t
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -78,37 +78,28 @@ def _wilson_interval(hits: int, trials: int) -> Interval:
     return centre - half if hits > 0 else 0.0, centre + half if hits < trials else 1.0
 
 
-def performance_profile(
-    distances: NDArray[np.float64], limits: Iterable[float]
-) -> tuple[Estimate, ...]:
-    """Shares of trials whose final distance is at most each of some limits [m].
-
-    Distances [m] have shape (n_trials,) or (n_seeds, n_trials); see `Estimate.share`.
-    """
-    return tuple(Estimate.share(distances <= limit) for limit in limits)
-
-
-def bootstrap_intervals(
+def resampled_figures(
     trials: int, figures: Callable[[NDArray[np.int64]], NDArray[np.float64]]
-) -> list[Interval | None]:
-    """Seeded percentile intervals of some figures over resamples of the trials.
+) -> NDArray[np.float64]:
+    """Some figures of resamples of the trials, shape (n_figures, n_resamples); seeded.
 
     Parameters
     ----------
     trials : int
-        Number of trials. A single one tells nothing about the spread: None for every figure.
+        Number of trials.
     figures : callable
-        From numbers of trials, shape (n_resamples, trials) or (trials,), to the figures of each
-        resample, shape (n_figures, n_resamples) or (n_figures,).
+        From numbers of trials, shape (n_resamples, trials), to the figures of each resample,
+        shape (n_figures, n_resamples).
     """
-    if trials == 1:
-        return [None] * len(figures(np.arange(1)))
     few = RESAMPLES * trials <= NUMBERS_AT_ONCE
     pieces = _few_resamples(trials) if few else _resamples(trials)
-    ordered = np.sort(np.concatenate([figures(piece) for piece in pieces], axis=-1), axis=-1)
-    tail = (1 - LEVEL) / 2
-    ends = (_quantile(ordered, share).tolist() for share in (tail, 1 - tail))
-    return list(zip(*ends, strict=True))
+    return np.concatenate([figures(piece) for piece in pieces], axis=-1)
+
+
+def percentile_interval(figures: NDArray[np.float64]) -> Interval:
+    """What encloses 95 % of the figures of all resamples, shape (n_resamples,)."""
+    ordered, tail = np.sort(figures), (1 - LEVEL) / 2
+    return float(_quantile(ordered, tail)), float(_quantile(ordered, 1 - tail))
 
 
 def _resamples(trials: int) -> Iterator[NDArray[np.int64]]:

@@ -63,8 +63,8 @@ def metric_cell(name: str, row: dict[str, Any]) -> Cell:
     if metric.shows_interval and estimate["ci95"]:
         beside = metric.write_range(*estimate["ci95"])
     if metric.beside:
-        label, other = metric.beside
-        beside = f"{label} {METRICS[other].write(row['metrics'][other]['value'])}"
+        other, words = metric.beside
+        beside = words.format(METRICS[other].write(row["metrics"][other]["value"]))
     return Cell(metric.write(estimate["value"]), beside)
 
 
@@ -85,9 +85,13 @@ def text_column(key: str) -> Column:
 def print_table(document: dict[str, Any], console: "Console", *, markdown: bool = False) -> None:
     """Print the figures of a document, without the less important columns if space is scarce.
 
-    Markdown is always printed with all columns.
+    Markdown is always printed with all columns that say something.
     """
-    columns = [text_column("problem"), text_column("policy"), *metric_columns()]
+    rows = [
+        row for problem in document["protocol"]["problems"] for row in table_rows(document, problem)
+    ]
+    figures = [c for c in metric_columns() if any(c.cell(row).value for row in rows)]
+    columns = [text_column("problem"), text_column("policy"), *figures]
     if markdown:
         text = io.StringIO()
         open_console(file=text, piped_width=1000).print(

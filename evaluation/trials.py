@@ -1,7 +1,8 @@
 """The trials: starts and goals that every policy faces alike."""
 
 import hashlib
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
@@ -9,8 +10,12 @@ from numpy.typing import NDArray
 
 from kinarm._validation import MOST_TRIALS, whole_number
 from kinarm.problem import ProblemLike, ReachProblem
+from kinarm.scenarios import draw_for_each
 from kinarm.simulator import Simulator
 from kinarm.task import RewardWeights
+
+LOT = 4096
+"""Trials that are drawn together."""
 
 
 def trial_generator(seed: int, trial: int, stream: int = 0) -> np.random.Generator:
@@ -77,10 +82,23 @@ class TrialSet:
     def draw_in(cls, simulator: Simulator, trials: int, seed: int) -> "TrialSet":
         """Draw trials of the problem of a simulator, to be faced in it; see `draw`."""
         trials, seed = whole_number("trials", trials, 1, MOST_TRIALS), whole_number("seed", seed, 0)
-        drawn = [simulator.sample(trial_generator(seed, trial), 1) for trial in range(trials)]
-        starts, goals = (np.concatenate(part) for part in zip(*drawn, strict=True))
+        lots = (range(first, min(first + LOT, trials)) for first in range(0, trials, LOT))
+        drawn = [
+            draw_for_each(simulator.world, [trial_generator(seed, trial) for trial in lot], 1)
+            for lot in lots
+        ]
+        starts, goals = (np.concatenate(part)[:, 0] for part in zip(*drawn, strict=True))
         starts.flags.writeable = goals.flags.writeable = False
         return cls(simulator, seed, starts, goals)
+
+    def chosen(self, numbers: Sequence[int]) -> "TrialSet":
+        """Some of the trials, in the order of their numbers that are given."""
+        rows = list(numbers)
+        return replace(self, starts=self.starts[rows], goals=self.goals[rows])
+
+    def with_tolerance(self, tolerance: float) -> "TrialSet":
+        """The same starts and goals, which count as reached at another distance [m]."""
+        return replace(self, simulator=Simulator(self.problem.replace(tolerance=tolerance)))
 
     def __len__(self) -> int:
         return len(self.starts)

@@ -198,7 +198,7 @@ def record_rollouts(
     policy: str,
     numbers: Sequence[int] | None = None,
     *,
-    steps_lower_bound: Callable[[int], int] | None = None,
+    steps_lower_bound: Callable[[int], int | None] | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> list[Recording]:
     """Turn rollouts into recordings.
@@ -214,7 +214,7 @@ def record_rollouts(
     numbers : sequence of int, optional
         Which rollouts; all by default. A rollout's number becomes that of the trial.
     steps_lower_bound : callable, optional
-        Gives the proven number of steps of a trial.
+        Gives the proven number of steps of a trial, or None.
     provenance : dict, optional
         Where they come from, in terms that JSON can hold.
 
@@ -243,7 +243,7 @@ def record_rollouts(
                 states=states,
                 distances=world.distances(states, np.tile(goal, (len(states), 1))),
                 goal=goal,
-                outcome=_outcome(rollouts, number),
+                outcome=outcome_of(rollouts, number),
                 contact=touch.pair if touch else None,
                 contact_point=touch.point if touch else None,
                 refused=touch.configuration if touch else None,
@@ -254,7 +254,8 @@ def record_rollouts(
     return recordings
 
 
-def _outcome(rollouts: Rollouts, number: int) -> str:
+def outcome_of(rollouts: Rollouts, number: int) -> str:
+    """How one of the rollouts ended: one of `OUTCOMES`."""
     if rollouts.success[number]:
         return "success"
     return "collision" if rollouts.collision[number] else "truncated"

@@ -1,13 +1,21 @@
 """The policies that ship with kinarm, and loading by name, group or file."""
 
+import json
 import re
 from functools import cache
 from importlib import resources
 from pathlib import Path
 
 from kinarm._files import is_file
-from kinarm.errors import UnknownNameError
+from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.policies.policy import Policy
+from kinarm.problem import ProblemLike, ReachProblem
+
+BEST = "best"
+"""Stands for the best shipped policy for a problem."""
+
+RANKING = "ranking.json"
+"""What the shipped policies reach, beside them: see `kinarm.evaluation.ranking`."""
 
 _SEED_SUFFIX = re.compile(r"-seed\d+$")
 
@@ -26,33 +34,84 @@ def group_of(name: str) -> str:
     return _SEED_SUFFIX.sub("", name)
 
 
-def load_policy(name_or_file: str | Path) -> Policy:
+def best_policy(problem: ProblemLike | None) -> str:
+    """Name of the shipped policy that reaches most goals of a problem.
+
+    What they reach was measured when they were shipped, with the success that they were trained
+    for; another tolerance, horizon, reward or spread of the starts does not change the choice.
+
+    Parameters
+    ----------
+    problem : ReachProblem, str or Path
+        The problem, its name or its file.
+
+    Raises
+    ------
+    InvalidInputError
+        If no problem is given, or no policy ships for its arm, scene and goals.
+    """
+    if problem is None:
+        raise InvalidInputError(f"{BEST!r} is the best policy for a problem: name a --problem")
+    wanted, shipped = ReachProblem.load(problem), _successes()
+    for trained_for, successes in shipped.items():
+        if _differ_in_nothing_else(ReachProblem.load(trained_for), wanted):
+            return max(sorted(successes), key=lambda name: successes[name])
+    raise InvalidInputError(
+        f"no shipped policy is for the arm, scene and goals of problem {wanted.name!r}: "
+        f"they are for {', '.join(shipped)}"
+    )
+
+
+def _differ_in_nothing_else(one: ReachProblem, other: ReachProblem) -> bool:
+    """Whether two problems have the same arm, scene and goals."""
+    same_place = one.arm_digest == other.arm_digest and one.scene == other.scene
+    return same_place and set(one.task.goal_regions) == set(other.task.goal_regions)
+
+
+@cache
+def _successes() -> dict[str, dict[str, float]]:
+    """What the shipped policies reach of the problem that they are for, by problem and name."""
+    text = (resources.files("kinarm.data") / "policies" / RANKING).read_text(encoding="utf-8")
+    ranked: dict[str, dict[str, float]] = json.loads(text)["success"]
+    return ranked
+
+
+def load_policy(name_or_file: str | Path, problem: ProblemLike | None = None) -> Policy:
     """Load a shipped policy by name, or any policy from a file.
 
     Parameters
     ----------
     name_or_file : str or Path
-        Name of a shipped policy; name of a group, for its first seed; or path of a file.
+        Name of a shipped policy; name of a group, for its first seed; ``"best"``; or path of a
+        file.
+    problem : ReachProblem, str or Path, optional
+        What the best one is for.
 
     Raises
     ------
     UnknownNameError
         If it is neither a name nor a file.
+    InvalidInputError
+        If it is ``"best"`` and no policy ships for the problem.
     PolicyFileError
         If the file cannot be used.
     """
-    return Policy.load(policy_files(name_or_file)[0])
+    return Policy.load(policy_files(name_or_file, problem)[0])
 
 
-def policy_files(name_or_file: str | Path) -> tuple[Path, ...]:
-    """Files behind a policy's name, a group's name or a path.
+def policy_files(name_or_file: str | Path, problem: ProblemLike | None = None) -> tuple[Path, ...]:
+    """Files behind a policy's name, a group's name, ``"best"`` or a path; see `load_policy`.
 
     Raises
     ------
     UnknownNameError
         If it is none of these.
+    InvalidInputError
+        If it is ``"best"`` and no policy ships for the problem.
     """
     text, path = str(name_or_file), Path(name_or_file)
+    if text == BEST:
+        text = best_policy(problem)
     names = [name for name in policy_names() if text in (name, group_of(name))]
     if names:
         with resources.as_file(resources.files("kinarm.data") / "policies") as folder:
@@ -60,4 +119,4 @@ def policy_files(name_or_file: str | Path) -> tuple[Path, ...]:
     if is_file(path) or path.suffix == ".npz" or path.parent != Path():
         return (path,)
     groups = dict.fromkeys(group_of(name) for name in policy_names())
-    raise UnknownNameError("policy", text, (*groups, "path/to/policy.npz"))
+    raise UnknownNameError("policy", text, (BEST, *groups, "path/to/policy.npz"))

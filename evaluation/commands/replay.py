@@ -10,6 +10,7 @@ examples:
   kinarm-replay --policy ars-tuned-right --trials 5       the first five trials
   kinarm-replay --policy ars-tuned-right --worst 5        the worst of 200
   kinarm-replay results/evaluation.json --collisions      what an evaluation collided in
+  kinarm-replay --policy best --problem right --failures  why it fails, of 10000 trials
   kinarm-replay --compare ppo-tuned-both oracle           two on the same trials, one as a ghost
   kinarm-replay --policy my_policy.npz --record mine.npz  keep the recordings as well
   kinarm-replay mine.npz                                  and play them later

@@ -1,42 +1,64 @@
 """What can be replayed: trials faced now, those of an evaluation again, or recordings of a file."""
 
+from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.document import EvaluationDocument
-from kinarm.evaluation.entrants import Entrant, find_entrants
+from kinarm.evaluation.entrants import ORACLE, Entrant, find_entrants
 from kinarm.evaluation.imported import is_import_path
-from kinarm.evaluation.replays.recorder import record
 from kinarm.evaluation.replays.request import ReplayRequest
+from kinarm.evaluation.replays.runs import FacedRun, RecordedRun, Run
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.library import group_of
+from kinarm.policies.library import BEST, group_of
 from kinarm.problem import ReachProblem
 from kinarm.problem_options import ProblemOptions
 from kinarm.recording import Recording, load_recordings
 
-PLAYED, SEARCHED = 5, 200
-"""Trials that are played by default, and trials among which some are looked for."""
+PLAYED, SEARCHED, FAILING = 5, 200, 10_000
+"""Trials that are played by default, among which some, and among which failures are looked for."""
 
-Runs = list[list[Recording]]
-"""Recordings of one policy, or of two in the same trials."""
+MOST_FAILURES = 500
+"""Failures that a page holds at most."""
 
-LowerBounds = Callable[[Sequence[int]], Sequence[int]]
+LowerBounds = Callable[[Sequence[int]], Sequence[int | None]]
 """Gives the numbers of steps proven necessary in some trials, by their positions."""
 
 
 @dataclass(frozen=True)
 class Candidates:
-    """Recordings to choose from, and how many are played where nothing says which.
+    """What one policy did, or two in the same trials, and how many are played by default.
 
-    Without `LowerBounds`, what the recordings say of them is kept.
+    Without `LowerBounds`, what the recordings say of them is kept. Without `TrialSet`, nothing
+    else can face them.
     """
 
-    runs: Runs
+    runs: Sequence[Run]
     lower_bounds: LowerBounds | None
     played: int
+    trials: TrialSet | None = None
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """What is played.
+
+    Attributes
+    ----------
+    runs : list
+        Recordings of one policy, or of two in the same trials.
+    groups : list of str
+        What each trial is listed under, if they are in groups.
+    heading : str
+        What the list is of.
+    """
+
+    runs: list[list[Recording]]
+    groups: list[str] = field(default_factory=list)
+    heading: str = ""
 
 
 def first_entrant(name: str | None, problem: ReachProblem | None = None) -> Entrant:
@@ -76,7 +98,8 @@ def stated_problem(options: ProblemOptions) -> ReachProblem | None:
 
 def find_candidates(request: ReplayRequest) -> Candidates:
     """Make or read the recordings to choose from."""
-    names = request.compare or (request.policy,)
+    default = BEST if request.failures and request.source is None else None
+    names = request.compare or (request.policy or default,)
     if request.source is None:
         return _fresh_candidates(request, names)
     if request.source.suffix == ".json":
@@ -88,10 +111,11 @@ def _fresh_candidates(request: ReplayRequest, names: Sequence[str | None]) -> Ca
     """Let policies face trials that are drawn now."""
     entrants = [first_entrant(name, stated_problem(request)) for name in names]
     searched = request.trial or request.worst or request.collisions
-    count = request.trials or (SEARCHED if searched else PLAYED)
+    count = request.trials or (FAILING if request.failures else SEARCHED if searched else PLAYED)
     trials = TrialSet.draw(faced_problem(entrants, request), count, request.seed or 0)
-    runs = [record(each, trials, allow_other_arm=request.allow_other_arm) for each in entrants]
-    return Candidates(runs, _solved_bounds(trials), count)
+    options = {"allow_other_arm": request.allow_other_arm}
+    runs = [FacedRun.of(entrant, trials, **options) for entrant in entrants]
+    return Candidates(runs, _solved_bounds(trials), count, trials)
 
 
 def _evaluated_candidates(
@@ -99,30 +123,34 @@ def _evaluated_candidates(
 ) -> Candidates:
     """Let policies face the trials of an evaluation again."""
     document = EvaluationDocument.load(path)
-    runs: Runs = []
+    chosen = []
     for name in names:
         entrant = None
         if name is not None and (Path(name).suffix in (".npz", ".zip") or is_import_path(name)):
             faced = problem or next(iter(document.protocol["problems"]))
             entrant = first_entrant(name, document.problem(faced))
         row = document.result(entrant.name if entrant else name, problem)
-        problem, trials = row["problem"], document.trials(row["problem"])
-        recordings = record(entrant or first_entrant(row["policy"]), trials, allow_other_arm=True)
-        document.check_same(row, recordings)
-        runs.append(recordings)
+        problem = row["problem"]
+        chosen.append((row, entrant or first_entrant(row["policy"])))
+    faced = min(len(row["outcomes"]["steps"]) for row, _ in chosen)
+    trials = document.trials(problem).chosen(range(faced))
+    runs = []
+    for row, entrant in chosen:
+        run = FacedRun.of(entrant, trials, allow_other_arm=True)
+        document.check_same(row, run.ends)
+        runs.append(run)
     known = document.floors(trials.problem.name)
     if known is None:
-        return Candidates(runs, _solved_bounds(trials), PLAYED)
-    return Candidates(runs, lambda numbers: [known[number] for number in numbers], PLAYED)
+        return Candidates(runs, _solved_bounds(trials), PLAYED, trials)
+    floors = dict(enumerate(known))
+    return Candidates(runs, lambda numbers: list(map(floors.get, numbers)), PLAYED, trials)
 
 
 def _solved_bounds(trials: TrialSet) -> LowerBounds:
     """Let the oracle solve no more trials than are played."""
 
     def lower_bounds(numbers: Sequence[int]) -> Sequence[int]:
-        rows = list(numbers)
-        part = replace(trials, starts=trials.starts[rows], goals=trials.goals[rows])
-        return [int(steps) for steps in oracle_bounds(part).steps_lower_bound]
+        return oracle_bounds(trials.chosen(numbers)).steps_lower_bound.tolist()
 
     return lower_bounds
 
@@ -135,18 +163,18 @@ def _recorded_candidates(
     if arm is not None:
         moved = (each.problem.replace(arm=replace(each.problem.arm, source=arm)) for each in found)
         found = [replace(each, problem=new) for each, new in zip(found, moved, strict=True)]
-    runs: Runs = []
+    runs = []
     for name in names:
         run = [each for each in found if name in (None, each.policy, group_of(each.policy))]
         if name is not None and not run:
             raise UnknownNameError("policy", name, dict.fromkeys(each.policy for each in found))
-        runs.append(run)
-    if not runs[0]:
+        runs.append(RecordedRun(run))
+    if not runs[0].recordings:
         raise InvalidInputError(f"{str(path)!r} holds no recording that fits")
-    return Candidates(runs, None, len(runs[0]))
+    return Candidates(runs, None, len(runs[0].recordings))
 
 
-def chosen_recordings(request: ReplayRequest) -> Runs:
+def chosen_recordings(request: ReplayRequest) -> Chosen:
     """What a request asks for, with what is proven of it; the first run decides.
 
     Raises
@@ -156,6 +184,8 @@ def chosen_recordings(request: ReplayRequest) -> Runs:
     """
     candidates = find_candidates(request)
     first = candidates.runs[0]
+    if request.failures:
+        return _failures(candidates, oracle=request.oracle)
     if request.trial:
         positions = _positions_of(request.trial, first)
     elif request.collisions:
@@ -163,9 +193,16 @@ def chosen_recordings(request: ReplayRequest) -> Runs:
     elif request.worst is not None:
         positions = _positions_of_worst(request.worst, first)
     else:
-        positions = list(range(len(first)))[: candidates.played]
-    runs = [[run[position] for position in positions] for run in candidates.runs]
-    if candidates.lower_bounds is None or not request.oracle:
+        positions = list(range(len(first.numbers)))[: candidates.played]
+    return Chosen(_recorded(candidates, positions, oracle=request.oracle))
+
+
+def _recorded(
+    candidates: Candidates, positions: Sequence[int], *, oracle: bool
+) -> list[list[Recording]]:
+    """Recordings of some trials, with their lower bounds if the oracle is asked."""
+    runs = [run.recorded(positions) for run in candidates.runs]
+    if candidates.lower_bounds is None or not oracle:
         return runs
     bounds = candidates.lower_bounds(positions)
     return [
@@ -174,8 +211,39 @@ def chosen_recordings(request: ReplayRequest) -> Runs:
     ]
 
 
-def _positions_of(trials: Sequence[int], recordings: Sequence[Recording]) -> list[int]:
-    numbers = [recording.trial for recording in recordings]
+def _failures(candidates: Candidates, *, oracle: bool) -> Chosen:
+    """All trials that failed, in groups by their cause, beside what the oracle does in them."""
+    first = candidates.runs[0]
+    causes, total = first.causes, len(first.numbers)
+    if not causes:
+        raise InvalidInputError(f"none of the {total} trials failed")
+    if len(causes) > MOST_FAILURES:
+        raise InvalidInputError(
+            f"{len(causes)} of {total} trials failed, a page holds {MOST_FAILURES} at most: ask "
+            "for fewer --trials"
+        )
+    frequency = Counter(causes.values())
+    rank = sorted(frequency, key=lambda cause: (-frequency[cause], str(cause)))
+    positions = sorted(causes, key=lambda position: (rank.index(causes[position]), position))
+    runs = _recorded(candidates, positions, oracle=oracle)
+    if oracle and len(runs) == 1 and candidates.trials is not None:
+        runs.append(_oracle_ghosts(candidates.trials, positions))
+    recording = runs[0][0]
+    heading = (
+        f"{recording.policy}: {len(causes)} of {total} trials of {recording.problem.name} failed"
+    )
+    return Chosen(runs, [str(causes[position]) for position in positions], heading)
+
+
+def _oracle_ghosts(trials: TrialSet, numbers: Sequence[int]) -> list[Recording]:
+    """What the oracle does in some trials, under their numbers."""
+    run = FacedRun.of(ORACLE, trials.chosen(numbers), allow_other_arm=True)
+    recordings = run.recorded(range(len(numbers)))
+    return [replace(each, trial=number) for each, number in zip(recordings, numbers, strict=True)]
+
+
+def _positions_of(trials: Sequence[int], run: Run) -> list[int]:
+    numbers = list(run.numbers)
     for trial in trials:
         if trial not in numbers:
             raise InvalidInputError(
@@ -184,17 +252,17 @@ def _positions_of(trials: Sequence[int], recordings: Sequence[Recording]) -> lis
     return [k for trial in trials for k, number in enumerate(numbers) if number == trial]
 
 
-def _positions_of_collisions(recordings: Sequence[Recording]) -> list[int]:
-    collided = [k for k, each in enumerate(recordings) if each.outcome == "collision"]
+def _positions_of_collisions(run: Run) -> list[int]:
+    collided = [k for k, (outcome, *_) in enumerate(run.ends) if outcome == "collision"]
     if not collided:
-        raise InvalidInputError(f"none of the {len(recordings)} trials ended in contact")
+        raise InvalidInputError(f"none of the {len(run.numbers)} trials ended in contact")
     return collided
 
 
-def _positions_of_worst(count: int, recordings: Sequence[Recording]) -> list[int]:
-    if count > len(recordings):
+def _positions_of_worst(count: int, run: Run) -> list[int]:
+    if count > len(run.numbers):
         raise InvalidInputError(
-            f"--worst {count} asks for more trials than there are: {len(recordings)}"
+            f"--worst {count} asks for more trials than there are: {len(run.numbers)}"
         )
-    farthest = sorted(range(len(recordings)), key=lambda k: -recordings[k].final_distance)
-    return farthest[:count]
+    ends = run.ends
+    return sorted(range(len(ends)), key=lambda k: -ends[k][2])[:count]

@@ -1,12 +1,14 @@
 """Record what entrants do in trials."""
 
 from collections.abc import Sequence
+from functools import partial
 
 from kinarm.evaluation.entrants import Entrant
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle.solution import OracleSolutions
 from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.recording import Recording, record_rollouts
+from kinarm.rollouts import Rollouts
 
 
 def record(
@@ -28,7 +30,7 @@ def record(
     numbers : sequence of int, optional
         Trials to keep, in this order; all by default.
     bounds : OracleSolutions, optional
-        What `oracle_bounds` knows about the trials, to show beside what was done.
+        What the oracle knows about the trials, or the first ones, to show beside what was done.
     allow_other_arm : bool
         Whether a policy may face an arm that it was not trained for.
 
@@ -40,13 +42,25 @@ def record(
         If the policy was trained for another arm and that is not allowed.
     """
     entrant.check(trials.simulator.arm, allow_other_arm=allow_other_arm)
+    return recordings_of(entrant, trials, entrant.run(trials, record=True), numbers, bounds=bounds)
+
+
+def recordings_of(
+    entrant: Entrant,
+    trials: TrialSet,
+    rollouts: Rollouts,
+    numbers: Sequence[int] | None = None,
+    *,
+    bounds: OracleSolutions | None = None,
+) -> list[Recording]:
+    """What an entrant did, as recordings; rollouts kept the configurations, else as `record`."""
     made = entrant.policy.provenance.to_json() if entrant.policy else None
     return record_rollouts(
         trials.simulator,
-        entrant.run(trials, record=True),
+        rollouts,
         entrant.name,
         numbers,
-        steps_lower_bound=None if bounds is None else lambda n: int(bounds.steps_lower_bound[n]),
+        steps_lower_bound=None if bounds is None else partial(_lower_bound, bounds),
         provenance={
             "trial_seed": trials.seed,
             "policy": made,
@@ -54,3 +68,8 @@ def record(
             "commit": source_commit(),
         },
     )
+
+
+def _lower_bound(bounds: OracleSolutions, trial: int) -> int | None:
+    """Proven number of steps of a trial, if the oracle was asked about it."""
+    return int(bounds.steps_lower_bound[trial]) if trial < len(bounds) else None

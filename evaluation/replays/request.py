@@ -1,6 +1,7 @@
 """What a replay is asked for."""
 
 import webbrowser
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from itertools import chain
@@ -15,7 +16,6 @@ from kinarm.errors import InvalidInputError
 from kinarm.problem_options import ProblemOptions, say_choices
 
 if TYPE_CHECKING:
-    from kinarm.evaluation.replays.candidates import Runs
     from kinarm.recording import Recording
     from kinarm.viewer import ReplayPage
 
@@ -23,10 +23,12 @@ PAGE = Path("replay.html")
 LAST_PORT = 65535
 
 SMALLEST = {"trials": 1, "worst": 1, "seed": 0, "port": 1}
-ALTERNATIVES = (("policy", "compare"), ("trial", "worst", "collisions"))
+ALTERNATIVES = (("policy", "compare"), ("trial", "worst", "collisions", "failures"))
 """Fields of which one at most can be given."""
 
-NOT_LIVE = ("source", "compare", "trial", "worst", "collisions", "trials", "out", "record")
+NOT_LIVE = (
+    *("source", "compare", "trial", "worst", "collisions", "failures", "trials", "out", "record"),
+)
 NOT_FROM_FILE = (
     *("tool_frame", "package_dirs", "task", "scene", "tolerance", "horizon", "start_spread"),
     *("seed", "trials"),
@@ -43,7 +45,7 @@ class ReplayRequest(ProblemOptions):
     source : Path
         File to take trials from: evaluation.json of kinarm-eval, or recordings (.npz).
     policy : str
-        Shipped policy or recipe (its first seed), random, zero, oracle, .npz file,
+        Shipped policy or recipe (its first seed), best, random, zero, oracle, .npz file,
         Stable-Baselines3's model.zip (runs its code: only if you trust it), or module:function.
     compare : tuple of str
         Two policies on the same trials, the second as a ghost.
@@ -53,6 +55,9 @@ class ReplayRequest(ProblemOptions):
         Play so many that ended farthest away.
     collisions : bool
         Play the trials that ended in contact.
+    failures : bool
+        Play all trials that failed, in groups by cause, beside the oracle (of 10000 trials, by
+        the best policy).
     trials : int
         Trials in all (5; or 200 to choose from).
     seed : int
@@ -86,6 +91,7 @@ class ReplayRequest(ProblemOptions):
     trial: tuple[int, ...] = field(default=(), metadata={"repeat": True})
     worst: int | None = None
     collisions: bool = False
+    failures: bool = False
     trials: int | None = None
     seed: int | None = None
     allow_other_arm: bool = False
@@ -150,7 +156,7 @@ class ReplayRequest(ProblemOptions):
             return None
         return self._write(report)
 
-    def recordings(self) -> "Runs":
+    def recordings(self) -> "list[list[Recording]]":
         """Make or read what is to be played: a list for the policy, or one for each of two.
 
         Raises
@@ -160,9 +166,10 @@ class ReplayRequest(ProblemOptions):
         """
         from kinarm.evaluation.replays.candidates import chosen_recordings
 
-        return chosen_recordings(self)
+        return chosen_recordings(self).runs
 
     def _write(self, report: Callable[[str], object]) -> "ReplayPage":
+        from kinarm.evaluation.replays.candidates import chosen_recordings
         from kinarm.recording import save_recordings
         from kinarm.viewer import replay_page
 
@@ -171,17 +178,23 @@ class ReplayRequest(ProblemOptions):
         if self.record is not None:
             check_output(self.record, overwrite=self.overwrite, suffix=".npz")
         with open_console(stderr=True).status("recording; the first run compiles"):
-            runs = self.recordings()
+            chosen = chosen_recordings(self)
+            runs, groups = chosen.runs, chosen.groups
             if self.source is None:
                 say_choices([runs[0][0].problem])
-            page = replay_page(runs[0], ghosts=runs[1] if len(runs) > 1 else ())
+            ghosts = runs[1] if len(runs) > 1 else ()
+            page = replay_page(runs[0], ghosts=ghosts, groups=groups, heading=chosen.heading)
         if self.record is not None:
             save_recordings(self.record, [recording for run in runs for recording in run])
         page.save(out)
         for note in dict.fromkeys(normalization_note(run[0]) for run in runs):
             if note:
                 report(note)
-        for trial in zip(*runs, strict=True):
+        if groups:
+            report(chosen.heading)
+            for group, count in Counter(groups).items():
+                report(f"{count:5d}  {group}")
+        for trial in zip(*runs, strict=True) if not groups else ():
             for recording in trial:
                 report(described(recording))
         report(f"written: {out}, {len(page.html) / 1e6:.1f} MB, plays offline in any browser")

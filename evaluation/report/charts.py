@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.evaluation.figures import BIN_WIDTH
+from kinarm.evaluation.intervals import share_over_seeds
 from kinarm.evaluation.metrics import LIMITS
 from kinarm.evaluation.report.groups import Group, ProblemResults
 from kinarm.evaluation.report.svg import Drawing, draw, style
-from kinarm.evaluation.statistics import performance_profile
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -100,7 +100,7 @@ def profile_with_band(
     group: Group, limits: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Shares of a group's trials within some distances, and the ends of their intervals."""
-    profile = performance_profile(group.distances, limits)
+    profile = [share_over_seeds(group.distances <= limit) for limit in limits]
     rates, low, high = np.array([(share.value, *(share.ci95 or ())) for share in profile]).T
     return rates, low, high
 

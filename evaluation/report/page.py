@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from kinarm._files import check_folder, write_text
 from kinarm.evaluation.evaluation import Evaluation
+from kinarm.evaluation.failures import cause_words
+from kinarm.evaluation.outcomes import EARLY_STEPS
 from kinarm.evaluation.report import maps
 from kinarm.evaluation.report.charts import histogram_chart, profile_chart
 from kinarm.evaluation.report.groups import ProblemResults, group_results
@@ -17,6 +19,9 @@ from kinarm.viewer import replay_page
 
 if TYPE_CHECKING:
     from jinja2 import Template
+
+MOST_CAUSES = 6
+"""Causes of failures that are told of a policy."""
 
 
 def write_report(
@@ -97,6 +102,9 @@ def page_template() -> "Template":
         profile_chart=profile_chart,
         histogram_chart=histogram_chart,
         shown_columns=shown_columns,
+        cause_words=cause_words,
+        early_steps=EARLY_STEPS,
+        most_causes=MOST_CAUSES,
     )
     return environment.get_template("page.html")
 

@@ -77,6 +77,8 @@ def describe_outcome(worst: WorstTrial) -> str:
 def oracle_steps(results: ProblemResults, trial: int) -> str:
     """Steps of the oracle's motion, and how many are proven to be necessary if they are fewer."""
     bounds = results.entry["oracle"]["trials"]
+    if trial >= len(bounds["reachable"]):
+        return "not asked"
     if not bounds["reachable"][trial]:
         return "not reached"
     steps, proven = bounds["steps"][trial], bounds["steps_lower_bound"][trial]

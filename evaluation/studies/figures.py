@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.evaluation.figures import COLOURS, DASHES
+from kinarm.evaluation.intervals import share_over_seeds
 from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.studies.planning import PlannedRun
 from kinarm.evaluation.studies.runs import TrainedRun
-from kinarm.evaluation.studies.table import Group, identity, share_over_seeds, shorter, shown
+from kinarm.evaluation.studies.table import Group, identity, shorter, shown
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from kinarm._files import write_atomically, write_text
 from kinarm.errors import MissingExtraError
-from kinarm.evaluation.intervals import Term, contrast
-from kinarm.evaluation.metrics import METRICS, Outcomes
-from kinarm.evaluation.statistics import Estimate, wilson_interval
+from kinarm.evaluation.intervals import share_over_seeds
+from kinarm.evaluation.metrics import METRICS
+from kinarm.evaluation.outcomes import Outcomes
+from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.studies.planning import PlannedRun
 from kinarm.evaluation.studies.runs import TrainedRun, TrialBounds
 from kinarm.policies.config import TrainingConfig
@@ -77,25 +78,6 @@ class Group:
     def figures(self) -> dict[str, float]:
         """The figures of merit over all seeds; NaN where there is nothing to tell."""
         return figures_of(Outcomes(tuple(run.outcomes for run in self.runs), self.bounds))
-
-
-def share_over_seeds(hits: NDArray[Any]) -> Estimate:
-    """A share of trials and its 95 % interval.
-
-    The interval covers those over seeds and trials (`contrast`), which knows nothing where all
-    seeds agree, and over trials alone (Wilson's).
-
-    Parameters
-    ----------
-    hits : ndarray, shape (n_seeds, n_trials)
-        Whether a trial hit, or the share of several trainings in which it did.
-    """
-    share = float(hits.mean())
-    low, high = wilson_interval(round(share * hits.shape[1]), hits.shape[1])
-    if len(hits) > 1:
-        crossed = contrast([Term(1.0, hits.astype(np.float64))]).ci95 or (share, share)
-        low, high = min(low, crossed[0]), max(high, crossed[1])
-    return Estimate(share, (max(low, 0.0), min(high, 1.0)))
 
 
 def figures_of(outcomes: Outcomes) -> dict[str, float]:

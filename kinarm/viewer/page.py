@@ -20,6 +20,8 @@ def replay_page(
     path: str | Path | None = None,
     *,
     ghosts: Sequence[Recording] = (),
+    groups: Sequence[str] = (),
+    heading: str = "",
 ) -> ReplayPage:
     """Make a page that plays recordings; the same recordings make the same page.
 
@@ -31,6 +33,11 @@ def replay_page(
         Where to write the page, if at all.
     ghosts : sequence of Recording
         What another policy did in the same trials, to be shown in the same scene.
+    groups : sequence of str
+        What each recording is listed under, if there is to be a list; those of a group follow
+        each other.
+    heading : str
+        What stands above the list.
 
     Raises
     ------
@@ -43,7 +50,11 @@ def replay_page(
     """
     chosen = [recordings] if isinstance(recordings, Recording) else list(recordings)
     _check_recordings(chosen, ghosts)
-    page = ReplayPage(_replay_html(chosen, ghosts))
+    if groups and len(groups) != len(chosen):
+        raise InvalidInputError(
+            f"there must be a group for each recording: {len(groups)} for {len(chosen)}"
+        )
+    page = ReplayPage(_replay_html(chosen, ghosts, groups, heading))
     if path is not None:
         page.save(path)
     return page
@@ -74,7 +85,12 @@ def _check_recordings(recordings: Sequence[Recording], ghosts: Sequence[Recordin
             )
 
 
-def _replay_html(recordings: Sequence[Recording], ghosts: Sequence[Recording]) -> str:
+def _replay_html(
+    recordings: Sequence[Recording],
+    ghosts: Sequence[Recording],
+    groups: Sequence[str],
+    heading: str,
+) -> str:
     """Page of recordings that can share one."""
     arm = recordings[0].problem.load_arm()
     trials = [[run for run in runs if run is not None] for runs in zip_longest(recordings, ghosts)]
@@ -83,6 +99,6 @@ def _replay_html(recordings: Sequence[Recording], ghosts: Sequence[Recording]) -
         "player",
         f"{' and '.join(policies)} · kinarm replay",
         replay_commands(trials, arm),
-        player_data(trials, arm),
-        ("replay_stage", "player"),
+        player_data(trials, arm, groups, heading),
+        ("replay_stage", "trial_list", "player"),
     )

@@ -75,10 +75,18 @@ class Player {
     this.speed = 0.25;
     this.playing = false;
     this.calm = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+    const groups = new Map();
     data.trials.forEach((trial, index) => {
       const words = BADGES[trial.runs[0].outcome][0].toLowerCase();
-      element("trial").append(make("option", { value: index }, `${trial.problem} ${trial.trial}: ${words}`));
+      const name = data.groups[index];
+      if (name && !groups.has(name)) {
+        groups.set(name, make("optgroup", { label: name }));
+        element("trial").append(groups.get(name));
+      }
+      (groups.get(name) || element("trial")).append(make("option", { value: index }, `${trial.problem} ${trial.trial}: ${words}`));
     });
+    this.list = new TrialList(data, (index) => this.select(index));
+    element("list-key").hidden = !data.groups.length;
     element("trial-choice").hidden = data.trials.length < 2;
     this.connect();
     this.setTheme(window.matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
@@ -96,6 +104,7 @@ class Player {
     fillCard(this.trial, this.data.swatch);
     this.stage.select(this.index);
     element("trial").value = this.index;
+    this.list.mark(this.index);
     element("frame").max = this.frames;
     drawPlot(this.trial, this.frames, this.data.colours);
     this.show(0);
@@ -217,7 +226,7 @@ class Player {
 
   press(event) {
     const tag = event.target.tagName;
-    const own = { SELECT: () => true, INPUT: (key) => key !== " " && key.length > 1, BUTTON: (key) => key === " " || key === "Enter" };
+    const own = { SELECT: () => true, INPUT: (key) => key !== " " && key.length > 1, BUTTON: (key) => key === " " || key === "Enter", SUMMARY: (key) => key === " " || key === "Enter" };
     if (event.ctrlKey || event.metaKey || event.altKey || (own[tag] && own[tag](event.key))) {
       return;
     }
@@ -230,6 +239,7 @@ class Player {
       End: () => this.seek(this.frames),
       p: () => this.select(this.index - 1),
       n: () => this.select(this.index + 1),
+      l: () => this.list.toggle(),
       ",": () => faster(-1),
       ".": () => faster(1),
       r: () => this.stage.look(this.stage.side),

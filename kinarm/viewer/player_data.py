@@ -9,13 +9,20 @@ from kinarm.viewer.arm_data import arm_data
 from kinarm.viewer.surroundings import OUTCOME_COLOURS, TRACE_SIDES
 
 
-def player_data(trials: Sequence[Sequence[Recording]], arm: Arm) -> dict[str, Any]:
-    """Describe an arm and what it did in one or two recordings of each trial."""
+def player_data(
+    trials: Sequence[Sequence[Recording]],
+    arm: Arm,
+    groups: Sequence[str] = (),
+    heading: str = "",
+) -> dict[str, Any]:
+    """Describe an arm, what it did in one or two recordings of each trial, and their list."""
     return {
         **arm_data(arm, trials[0][0].problem.scene),
         "traceIndices": 6 * TRACE_SIDES,
         "colours": {name: f"#{colour:06x}" for name, colour in OUTCOME_COLOURS.items()},
         "trials": [_trial_data(runs) for runs in trials],
+        "groups": list(groups),
+        "heading": heading,
     }
 
 

@@ -220,3 +220,73 @@ def test_it_plays_by_itself_and_a_ghost_comes_along(open_page, recorded, tmp_pat
     assert names == ["wave", "other"]
     assert not watched.page.locator("#trial-choice").is_visible()
     assert watched.complaints == []
+
+
+GROUPS = ("hand touches bench within 3 steps", "out of time", "out of time")
+
+
+@pytest.fixture
+def listed(open_page, recorded, tmp_path):
+    """Open a page whose trials are listed in two groups."""
+
+    def opened(size=(1280, 800)):
+        path = tmp_path / "listed.html"
+        replay_page(recorded, path, groups=GROUPS, heading="wave: 3 of 24 trials failed")
+        return open_page(path, size)
+
+    return opened
+
+
+def test_trials_are_listed_in_groups(listed, recorded):
+    watched = listed()
+    page = watched.page
+    assert page.locator("#list-heading").inner_text() == "wave: 3 of 24 trials failed"
+    groups = page.locator("#list-groups details")
+    assert [" ".join(each.split()) for each in groups.locator("summary").all_inner_texts()] == [
+        f"{GROUPS[0]} 1",
+        f"{GROUPS[1]} 2",
+    ]
+    assert [each.get_attribute("open") is not None for each in groups.all()] == [True, False]
+    page.locator("summary", has_text="out of time").click()
+    page.get_by_role("button", name=f"Trial {recorded[2].trial}", exact=True).click()
+    assert watched.state["index"] == 2
+    marked = page.locator('.chip[aria-current="true"]').all_inner_texts()
+    assert marked == [str(recorded[2].trial)]
+    page.keyboard.press("p")
+    assert page.locator('.chip[aria-current="true"]').all_inner_texts() == [str(recorded[1].trial)]
+    labels = page.eval_on_selector_all("#trial optgroup", "all => all.map(each => each.label)")
+    assert labels == list(dict.fromkeys(GROUPS))
+    assert watched.complaints == []
+
+
+def test_the_list_is_hidden_and_shown(listed):
+    page = listed().page
+    panel, button = page.locator("#trial-list"), page.locator("#list")
+    assert panel.is_visible()
+    page.keyboard.press("l")
+    assert not panel.is_visible()
+    assert button.get_attribute("aria-expanded") == "false"
+    button.click()
+    assert panel.is_visible()
+
+
+def test_on_a_phone_the_list_waits_until_it_is_asked_for(listed):
+    watched = listed((390, 844))
+    page = watched.page
+    panel = page.locator("#trial-list")
+    assert not panel.is_visible()
+    page.locator("#list").click()
+    box = panel.bounding_box()
+    assert box["x"] >= 0
+    assert box["x"] + box["width"] <= 390
+    assert box["y"] + box["height"] <= page.locator("#dock").bounding_box()["y"]
+    page.locator(".chip").first.click()
+    assert not panel.is_visible()
+
+
+def test_without_groups_there_is_no_list(watched):
+    assert not watched.page.locator("#list").is_visible()
+    assert not watched.page.locator("#trial-list").is_visible()
+    watched.page.keyboard.press("l")
+    assert not watched.page.locator("#trial-list").is_visible()
+    assert watched.complaints == []

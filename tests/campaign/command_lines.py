@@ -124,7 +124,7 @@ PROGRAMS: dict[str, Program] = {
         evaluate.main,
         lambda: _flags(evaluate.EvaluationRequest),
         (["--policy", "zero"], ["--trials", "2"], ["--policy", "ars-tuned-right", "--out", "out"]),
-        ("kinarm.evaluation.commands.evaluate.EvaluationRequest._face",),
+        ("kinarm.evaluation.request.EvaluationRequest._face",),
     ),
     "kinarm-problem": Program(
         problem.main,

@@ -1,7 +1,6 @@
 """Valid files of every kind, small ones: what is damaged then."""
 
 import io
-import json
 import pickle
 from collections.abc import Callable
 from functools import cache
@@ -14,7 +13,7 @@ import numpy as np
 from kinarm.evaluation.comparison.learners import read_learners
 from kinarm.evaluation.comparison.runs import CurvePoint, PlannedRun, planned_runs, save_run
 from kinarm.evaluation.comparison.runs import Protocol as ComparisonProtocol
-from kinarm.evaluation.document import evaluation_document
+from kinarm.evaluation.document import document_text, evaluation_document
 from kinarm.evaluation.entrants import find_entrants
 from kinarm.evaluation.evaluation import run_trials
 from kinarm.evaluation.reproduction.runs import RunStore, TrainedRun
@@ -74,14 +73,12 @@ def recordings() -> list[bytes]:
 
 
 def evaluations() -> list[bytes]:
-    """An ``evaluation.json`` with the oracle's bounds, and one without."""
+    """An ``evaluation.json`` with the oracle's bounds, one without, one with held trials."""
     found = []
-    for oracle in (True, False):
+    for parts in ({"oracle": True}, {}, {"hold": True}):
         entrant = find_entrants("ars-tuned-right")[0]
-        document = evaluation_document(
-            [run_trials(entrant, trials(), oracle=oracle)], "kinarm-eval"
-        )
-        found.append(json.dumps(document, indent=1).encode())
+        document = evaluation_document([run_trials(entrant, trials(), **parts)], "kinarm-eval")
+        found.append(document_text(document).encode())
     return found
 
 

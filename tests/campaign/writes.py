@@ -40,7 +40,7 @@ def evaluations() -> list[Evaluation]:
 def _evaluate() -> None:
     """Write what an evaluation came to."""
     found = evaluations()
-    faced = "kinarm.evaluation.commands.evaluate.EvaluationRequest._face"
+    faced = "kinarm.evaluation.request.EvaluationRequest._face"
     with mock.patch(faced, return_value=found):
         evaluate.main(
             [

@@ -1,15 +1,22 @@
 """``kinarm-eval``: what it prints, what it writes, and that both are what the library computes."""
 
 import json
+from io import StringIO
 
 import numpy as np
 import pytest
 from documents import faced, relative_success
+from refusals import check_refused
+from rich.console import Console
 
 from kinarm.errors import InvalidInputError
+from kinarm.evaluation import bounds
 from kinarm.evaluation.bounds import bounds_document
-from kinarm.evaluation.commands.evaluate import EvaluationRequest
+from kinarm.evaluation.document import EvaluationDocument
 from kinarm.evaluation.evaluation import evaluate
+from kinarm.evaluation.request import EvaluationRequest
+from kinarm.evaluation.table import print_table
+from kinarm.policies.library import best_policy
 from kinarm.problem import PROBLEMS
 
 FILES = {"evaluation.json", "final_distance.png", "final_distance.svg"}
@@ -281,3 +288,93 @@ def test_a_problem_file(evaluated, policy_folder, tmp_path):
     entries = document["protocol"]["problems"]
     assert entries["lax"]["problem"]["task"]["tolerance"] == 0.3
     assert entries["lax"]["starts"] == entries["right"]["starts"]
+
+
+def test_held_trials_are_told_beside_the_others(run, evaluated, policy_folder):
+    arguments = ("--policy", policy_folder / "mine-seed0.npz", "--trials", 6)
+    plain, held = evaluated(*arguments), evaluated(*arguments, "--hold")
+    assert (plain["protocol"]["hold"], held["protocol"]["hold"]) == (False, True)
+    for before, after in zip(plain["results"], held["results"], strict=True):
+        assert before["metrics"]["held"] == {"value": None, "ci95": None}
+        assert 0 <= after["metrics"]["held"]["value"] <= 1
+        assert before["outcomes"] == after["outcomes"]
+        assert len(after["held"]["closest"]) == 6
+    answer = run("kinarm-eval", *arguments, "--hold")
+    for words in ("held %", "<= 5 mm", "closest m", "success does not end", "aims at 5 mm"):
+        assert words in " ".join(answer.out.split())
+    assert "held %" not in run("kinarm-eval", *arguments).out
+
+
+def test_held_figures_fit_a_narrow_terminal():
+    document = EvaluationRequest(
+        policies=("zero",), problem="left", trials=3, hold=True, oracle=False
+    ).run()
+    console = Console(file=StringIO(), width=80)
+    print_table(document, console)
+    lines = console.file.getvalue().splitlines()
+    assert max(map(len, lines)) <= 80
+    assert "held %" in lines[1]
+
+
+def test_the_best_shipped_policy_by_name(evaluated):
+    document = evaluated("--policy", "best", "--task", "right", "--trials", 2, "--no-oracle")
+    assert faced(document) == [(best_policy("right"), "right")]
+
+
+def test_the_best_of_each_problem(evaluated):
+    arguments = ("--policy", "best", "--tolerance", 0.04, "--trials", 1, "--no-oracle")
+    expected = [(best_policy(problem), problem) for problem in PROBLEMS]
+    assert faced(evaluated(*arguments)) == expected
+    some = evaluated(*arguments, "--problem", "left", "--problem", "both", "--policy", "zero")
+    assert faced(some) == [
+        (best_policy("left"), "left"),
+        ("zero", "left"),
+        (best_policy("both"), "both"),
+        ("zero", "both"),
+    ]
+    assert {entry["problem"]["task"]["tolerance"] for entry in problems_of(some)} == {0.04}
+
+
+def problems_of(document):
+    return document["protocol"]["problems"].values()
+
+
+@pytest.mark.parametrize("option", [("--arm", "paper_flange"), ("--scene", "table")])
+def test_no_best_policy_for_other_arms_and_scenes(run, option):
+    arguments = ("--policy", "best", "--problem", "right", *option, "--trials", 2)
+    check_refused(run("kinarm-eval", *arguments), "no shipped policy is for", "left, right")
+
+
+def test_of_many_trials_the_first_are_bounded(run, evaluated, monkeypatch):
+    monkeypatch.setattr(bounds, "MOST_BOUNDED", 4)
+    arguments = ("--policy", "zero", "--problem", "left", "--trials", 9)
+    document = evaluated(*arguments)
+    assert [row["trials"] for row in document["results"]] == [9, 4]
+    assert document["protocol"]["problems"]["left"]["oracle"]["bounded"] == 4
+    said = " ".join(run("kinarm-eval", *arguments).out.split())
+    assert "are of the first 4 trials of 9; --policy oracle bounds all" in said
+    whole = evaluated(*arguments, "--policy", "oracle")
+    assert [row["trials"] for row in whole["results"]] == [9, 9]
+    assert whole["protocol"]["problems"]["left"]["oracle"]["bounded"] == 9
+
+
+def test_the_report_of_more_trials_than_are_bounded(run, policy_folder, tmp_path, monkeypatch):
+    monkeypatch.setattr(bounds, "MOST_BOUNDED", 4)
+    arguments = ("--policy", policy_folder / "mine-seed0.npz", "--trials", 9, "--hold")
+    files = ("--report", tmp_path, "--out", tmp_path, "--card", tmp_path / "card.md")
+    answer = run("kinarm-eval", *arguments, *files)
+    assert (answer.status, answer.err) == (0, "")
+    assert "not asked" in (tmp_path / "index.html").read_text(encoding="utf-8")
+    document = EvaluationDocument.load(tmp_path / "evaluation.json")
+    assert len(document.floors("right")) == 4
+    page = (*arguments[:2], "--worst", 9, "--out", tmp_path / "worst.html")
+    replayed = run("kinarm-replay", tmp_path / "evaluation.json", *page)
+    assert replayed.out.count("proven necessary") == 4
+
+
+def test_kept_documents_are_compact(tmp_path):
+    request = EvaluationRequest(policies=("zero",), problem="left", trials=60, out=tmp_path)
+    document = json.loads(json.dumps(request.run()))
+    text = (tmp_path / "evaluation.json").read_text()
+    assert json.loads(text) == document
+    assert len(text.splitlines()) < 1000

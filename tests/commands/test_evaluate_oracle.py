@@ -5,8 +5,8 @@ import json
 import pytest
 from documents import faced, relative_success
 
-from kinarm.evaluation.commands.evaluate import EvaluationRequest
 from kinarm.evaluation.evaluation import evaluate
+from kinarm.evaluation.request import EvaluationRequest
 
 
 def test_the_oracle_alone(evaluated):

@@ -1,6 +1,7 @@
 """``kinarm-replay``: pages from policies, evaluations and recordings, and a live one."""
 
 import json
+from collections import Counter
 from dataclasses import replace as changed_to
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from refusals import check_refused
 
 from kinarm.arm import Arm
 from kinarm.evaluation import ReplayRequest
+from kinarm.policies.library import best_policy
 from kinarm.recording import load_recordings, save_recordings
 
 QUICK = ("--no-oracle",)
@@ -149,6 +151,12 @@ def test_another_arm(replay):
         (("--policy", "zero", "--problem", "left", "--collisions"), ["none of the 200 trials"]),
         (("--policy", "zero", "--problem", "left", "--port", "7001"), ["--live"]),
         (("--policy", "zero", "--problem", "left", "--live"), ["--out", "--live"]),
+        (("--failures",), ["'best'", "name a --problem"]),
+        (("--policy", "oracle", "--problem", "left", "--failures", "--trials", "9"), ["none of"]),
+        (("--policy", "zero", "--problem", "left", "--failures"), ["10000 of 10000", "--trials"]),
+        (("--policy", "zero", "--worst", "3", "--failures"), ["--worst", "--failures"]),
+        (("--policy", "zero", "--problem", "left", "--failures", "--live"), ["--failures"]),
+        (("--policy", "best"), ["'best'", "name a --problem"]),
         (("--policy", "zero", "--worst", "0"), ["worst", "at least 1"]),
         (("missing.npz",), ["missing.npz", "No such file"]),
         (("missing.json",), ["missing.json", "No such file"]),
@@ -235,7 +243,7 @@ def test_an_evaluation_that_no_longer_holds(replay, evaluation, tmp_path):
         path.write_text(json.dumps(copy))
         return replay(path, "--policy", "random", *QUICK)
 
-    assert document["protocol"]["format_version"] == 2
+    assert document["protocol"]["format_version"] == 3
     check_refused(changed(lambda d: d["protocol"].update(format_version=9)), "format version 9")
 
     def right(document):
@@ -284,3 +292,66 @@ def test_an_evaluation_of_several_policies(replay, evaluation):
 
 
 # The live page
+
+
+def test_all_failures_in_groups_beside_the_oracle(replay, evaluation, policy_folder, tmp_path):
+    said = outcomes(evaluation, "random")
+    kinds = zip(said["outcome"], said["contact"], said["steps"], strict=True)
+    expected = {
+        number: "out of time"
+        if contact is None
+        else f"{' touches '.join(contact)} {'within' if steps <= 3 else 'after'} 3 steps"
+        for number, (outcome, contact, steps) in enumerate(kinds)
+        if outcome != "success"
+    }
+    kept = tmp_path / "kept.npz"
+    options = ("--problem", "right", "--trials", 12, "--seed", 4, "--record", kept)
+    answer = replay("--policy", "random", "--failures", *options)
+    first, *lines, last = answer.out.splitlines()
+    assert first == f"random: {len(expected)} of 12 trials of right failed"
+    counts = {line[7:]: int(line[:5]) for line in lines}
+    assert counts == dict(Counter(expected.values()))
+    assert list(counts.values()) == sorted(counts.values(), reverse=True)
+    assert "written" in last
+    recorded = load_recordings(kept)
+    played, ghosts = (
+        [each for each in recorded if (each.policy == "oracle") == ghost] for ghost in (False, True)
+    )
+    assert [each.trial for each in played] == [each.trial for each in ghosts]
+    assert sorted(each.trial for each in played) == sorted(expected)
+    ranks = [list(counts).index(expected[each.trial]) for each in played]
+    assert ranks == sorted(ranks)
+    for one, ghost in zip(played, ghosts, strict=True):
+        assert one.same_trial(ghost)
+        assert one.steps_lower_bound <= ghost.steps
+    assert {each.outcome for each in ghosts} == {"success"}
+
+
+def test_failures_of_an_evaluation_and_of_recordings(replay, evaluation, recordings, tmp_path):
+    ends = outcomes(evaluation, "random")["outcome"]
+    failed = len(ends) - ends.count("success")
+    answer = replay(evaluation, "--policy", "random", "--failures", *QUICK)
+    assert answer.out.startswith(f"random: {failed} of 12 trials of right failed")
+    kept = load_recordings(recordings)
+    missed = sum(each.outcome != "success" for each in kept)
+    answer = replay(recordings, "--failures", "--overwrite")
+    if missed:
+        assert f"{missed} of {len(kept)} trials of right failed" in answer.out
+    else:
+        check_refused(answer, "none of the 4 trials failed")
+
+
+def test_failures_are_those_of_the_best_policy_by_default(replay):
+    answer = replay("--failures", "--problem", "right", "--trials", 60, *QUICK)
+    assert answer.out.startswith(f"{best_policy('right')}: ")
+
+
+def test_documents_of_version_2_are_read(replay, evaluation, tmp_path):
+    document = json.loads(evaluation.read_text())
+    document["protocol"]["format_version"] = 2
+    del document["protocol"]["hold"]
+    for row in document["results"]:
+        del row["failures"]
+    (tmp_path / "evaluation.json").write_text(json.dumps(document))
+    answer = replay(tmp_path / "evaluation.json", "--policy", "random", "--trial", 3, *QUICK)
+    assert played(answer) == [3]

@@ -1,7 +1,6 @@
 """Shares and intervals against formulas written out here."""
 
 import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -16,9 +15,14 @@ from kinarm.evaluation.statistics import (
     NUMBERS_AT_ONCE,
     RESAMPLES,
     Estimate,
-    bootstrap_intervals,
-    performance_profile,
+    percentile_interval,
+    resampled_figures,
 )
+
+
+def bootstrap_intervals(trials, figures):
+    return [percentile_interval(each) for each in resampled_figures(trials, figures)]
+
 
 Z = 1.959963984540054
 """97.5 % quantile of the normal distribution."""
@@ -99,18 +103,6 @@ def test_pooled_share_is_no_surer_than_one_trial_set():
 def test_pooled_share_of_equal_seeds_is_that_of_one():
     hits = np.arange(40) % 3 == 0
     assert Estimate.share(np.stack([hits] * 4)) == Estimate.share(hits)
-
-
-@pytest.mark.parametrize("shape", [(40,), (3, 40)])
-def test_profile_is_the_share_within_each_limit(shape):
-    distances = np.random.default_rng(2).exponential(0.3, shape)
-    limits = [0.0, 0.1, 0.3, float(distances.max())]
-    profile = performance_profile(distances, limits)
-    assert profile == tuple(Estimate.share(distances <= limit) for limit in limits)
-    assert (profile[0].value, profile[-1].value) == (0, 1)
-    for lower, upper in pairwise(profile):
-        assert lower.value <= upper.value
-        assert lower.ci95 <= upper.ci95
 
 
 def test_share_as_json():

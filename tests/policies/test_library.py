@@ -1,13 +1,30 @@
 """The shipped policies, and loading by name, group or file."""
 
+import json
+from pathlib import Path
+
 import pytest
 
-from kinarm.errors import PolicyFileError, UnknownNameError
+import kinarm.data
+from kinarm.errors import InvalidInputError, PolicyFileError, UnknownNameError
 from kinarm.policies import library
-from kinarm.policies.library import group_of, load_policy, policy_files, policy_names
+from kinarm.policies.library import (
+    best_policy,
+    group_of,
+    load_policy,
+    policy_files,
+    policy_names,
+)
 from kinarm.problem import PROBLEMS
+from kinarm.problem_options import ProblemOptions
 
 NAMES = ("ars-paper-left-seed0", "ars-tuned-right-seed0", "ars-tuned-right-seed10", "ppo-both")
+
+OTHERS = [
+    ProblemOptions(problem="right", arm="paper_flange").resolve(),
+    ProblemOptions(problem="right", scene="table").resolve(),
+]
+"""An arm and a scene that no policy ships for."""
 
 
 @pytest.fixture
@@ -51,10 +68,10 @@ def test_load_by_path(shipped, make_policy, tmp_path):
 
 def test_unknown_name_lists_the_groups(shipped):
     with pytest.raises(UnknownNameError) as caught:
-        load_policy("ars-best")
+        load_policy("ars-mine")
     message = str(caught.value)
-    assert "unknown policy 'ars-best'" in message
-    assert "ars-paper-left, ars-tuned-right, ppo-both, path/to/policy.npz" in message
+    assert "unknown policy 'ars-mine'" in message
+    assert "best, ars-paper-left, ars-tuned-right, ppo-both, path/to/policy.npz" in message
 
 
 def test_missing_file_is_no_unknown_name(shipped, tmp_path):
@@ -86,3 +103,46 @@ def test_every_shipped_policy_loads_and_fits_its_arm(shipped_arms):
         assert made.problem.first_difference(PROBLEMS[made.problem.name]) is None
         assert made.problem.arm.digest == PROBLEMS[made.problem.name].arm_digest
         assert name == f"{made.algorithm}-{made.recipe}-{made.problem.name}-seed{made.seed}"
+
+
+@pytest.fixture
+def ranked(shipped):
+    """Some of them are ranked, on two problems."""
+    success = {
+        "right": {NAMES[1]: 0.8, NAMES[2]: 0.9},
+        "both": {"ppo-both": 0.7},
+    }
+    (shipped / "ranking.json").write_text(json.dumps({"success": success}))
+    (shipped.parent / "arms").symlink_to(Path(kinarm.data.__file__).parent / "arms")
+    library._successes.cache_clear()
+    yield shipped
+    library._successes.cache_clear()
+
+
+def test_the_best_policy_is_the_one_that_reaches_most(ranked, make_policy):
+    assert best_policy("right") == "ars-tuned-right-seed10"
+    assert best_policy(PROBLEMS["both"]) == "ppo-both"
+    loaded = load_policy("best", "right")
+    assert loaded.mean.tobytes() == make_policy(seed=2).mean.tobytes()
+    assert [file.stem for file in policy_files("best", "both")] == ["ppo-both"]
+
+
+def test_tolerance_horizon_reward_and_starts_do_not_change_the_best(ranked):
+    changed = PROBLEMS["right"].replace(tolerance=0.01, horizon=100, start_spread=0.5, name="mine")
+    assert best_policy(changed) == "ars-tuned-right-seed10"
+
+
+@pytest.mark.parametrize("problem", OTHERS)
+def test_other_arms_and_scenes_have_no_best_policy(ranked, problem):
+    with pytest.raises(InvalidInputError, match="no shipped policy is for .*: they are for right"):
+        best_policy(problem)
+
+
+def test_goals_on_another_bench_have_no_best_policy(ranked):
+    with pytest.raises(InvalidInputError, match="goals of problem 'left'"):
+        load_policy("best", "left")
+
+
+def test_the_best_is_for_a_problem(ranked):
+    with pytest.raises(InvalidInputError, match="'best' is the best policy for a problem: name a"):
+        load_policy("best")

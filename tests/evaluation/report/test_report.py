@@ -48,7 +48,7 @@ class TestTable:
         assert cells["success %"] == [f"{rate:.1f}", f"{low:.1f}\N{EN DASH}{high:.1f}"]
         assert cells["of oracle %"] == [f"{100 * pooled['relative_success']['value']:.1f}"]
         worst, best = (100 * spread["success"][end] for end in ("min", "max"))
-        assert cells["over seeds %"] == [f"{worst:.1f}\N{EN DASH}{best:.1f}", "3 seeds"]
+        assert cells["worst..best seed %"] == [f"{worst:.1f}\N{EN DASH}{best:.1f}", "3 seeds"]
         assert cells["median m"][0] == f"{pooled['median_distance']['value']:.3f}"
         assert cells["contact %"] == [f"{100 * pooled['collision']['value']:.1f}"]
         assert cells["step ratio"] == [
@@ -81,6 +81,22 @@ class TestTable:
             card = re.search(rf'<a href="#{task}" class="card">.*?</a>', page, re.DOTALL)[0]
             assert f">{100 * row['metrics']['success']['value']:.1f}<" in card
             assert f"reached by {row['policy']} " in card
+
+
+class TestCauses:
+    def test_causes_of_the_failures_are_those_of_the_document(self, page, document):
+        rows = content(page).findall(".//section[@id='right']//dl/div")
+        told = dict(text_of(row.find("dt")).split(": ") for row in rows)
+        causes = {text_of(row.find("dt")).split(":")[0]: text_of(row.find("dd")) for row in rows}
+        (pooled,) = document["pooled"]
+        failed = sum(each["trials"] for each in pooled["failures"])
+        assert told["made-right"] == f"{failed} failures"
+        first = pooled["failures"][0]
+        words = "out of time" if first["contact"] is None else " touches ".join(first["contact"])
+        share = f"{100 * first['trials'] / failed:.0f} %"
+        assert causes["made-right"].startswith(f"{share} {words}")
+        hidden = max(len(pooled["failures"]) - 6, 0)
+        assert causes["made-right"].endswith(f"and {hidden} more") == bool(hidden)
 
 
 class TestWorst:

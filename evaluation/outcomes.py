@@ -1,0 +1,242 @@
+"""What one or several training seeds did in the same trials."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.errors import InvalidInputError
+
+EARLY_STEPS = 3
+"""Contact within so many steps is early: the arm started close to what it touches."""
+
+HELD_STEPS = 10
+"""Last steps of a trial over which the goal is to be held."""
+
+
+class Judged(Protocol):
+    """What figures of merit need of finished episodes; `kinarm.Rollouts` say what it means."""
+
+    @property
+    def distance(self) -> NDArray[np.float64]:
+        """Final distances [m]."""
+
+    @property
+    def steps(self) -> NDArray[np.int64]:
+        """Steps taken."""
+
+    @property
+    def returns(self) -> NDArray[np.float64]:
+        """Sums of rewards."""
+
+    @property
+    def success(self) -> NDArray[np.bool_]:
+        """Whether the goal was reached."""
+
+    @property
+    def collision(self) -> NDArray[np.bool_]:
+        """Whether something touched."""
+
+    def __len__(self) -> int: ...
+
+
+class Bounded(Protocol):
+    """What figures of merit need of the bounds, as the oracle's solutions have it."""
+
+    @property
+    def reachable(self) -> NDArray[np.bool_]:
+        """Whether a motion to the goal was found."""
+
+    @property
+    def steps_lower_bound(self) -> NDArray[np.int64]:
+        """Steps that are necessary."""
+
+
+class HeldJudged(Protocol):
+    """What figures of merit need of trials that went on after success; see `Held`."""
+
+    @property
+    def closest(self) -> NDArray[np.float64]:
+        """Closest approach [m]."""
+
+    @property
+    def farthest_at_end(self) -> NDArray[np.float64]:
+        """Largest distance in the last steps [m]."""
+
+    @property
+    def collision(self) -> NDArray[np.bool_]:
+        """Whether something touched."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outcomes:
+    """What one or several training seeds did in the same trials.
+
+    Their arrays are joined along the last axis, shape (..., n_seeds * n_trials).
+
+    Attributes
+    ----------
+    rollouts : tuple of Rollouts
+        One per training seed.
+    bounds : OracleSolutions or None
+        What any policy could do in the trials, or in the first ones, if that is known.
+    held : tuple of Held
+        What they did where success did not end the trials, if that is known.
+    time_step : float
+        Duration of a step [s].
+    numbers : ndarray of int, shape (..., n_trials), optional
+        Resampled trials; by default each of them once.
+    origin : Outcomes, optional
+        What was resampled.
+    """
+
+    rollouts: tuple[Judged, ...]
+    bounds: Bounded | None = None
+    held: tuple[HeldJudged, ...] = ()
+    time_step: float = float("nan")
+    numbers: NDArray[np.int64] | None = None
+    origin: "Outcomes | None" = None
+
+    def resampled(self, numbers: NDArray[np.int64]) -> "Outcomes":
+        """The same of resampled trials, by their numbers, shape (..., n_trials)."""
+        return replace(self, numbers=numbers, origin=self)
+
+    def of_seed(self, seed: int) -> "Outcomes":
+        """What one of the training seeds did."""
+        one = slice(seed, seed + 1)
+        return replace(self, rollouts=self.rollouts[one], held=self.held[one])
+
+    def _joined(self, columns: Iterable[NDArray[Any]]) -> NDArray[Any]:
+        chosen = [column if self.numbers is None else column[self.numbers] for column in columns]
+        return np.concatenate(chosen, axis=-1)
+
+    @cached_property
+    def distance(self) -> NDArray[np.float64]:
+        """Final distances [m]."""
+        return self._joined(rollouts.distance for rollouts in self.rollouts)
+
+    @cached_property
+    def ordered_distance(self) -> NDArray[np.float64]:
+        """Final distances along the last axis, the smallest first [m]."""
+        return self._ordered("distance")
+
+    @cached_property
+    def ordered_closest(self) -> NDArray[np.float64]:
+        """Closest approaches along the last axis, the smallest first [m]."""
+        return self._ordered("closest")
+
+    def _ordered(self, name: str) -> NDArray[np.float64]:
+        if self.origin is None or self.numbers is None:
+            return np.sort(getattr(self, name), axis=-1)
+        order, ordered = self.origin.order_of(name)
+        return _resampled_in_order(ordered, order, self.numbers)
+
+    def order_of(self, name: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Positions of the values of an array, the smallest first, and these values."""
+        if name not in self._orders:
+            values = getattr(self, name)
+            order = np.argsort(values, axis=-1)
+            self._orders[name] = order, values[order]
+        return self._orders[name]
+
+    @cached_property
+    def _orders(self) -> dict[str, tuple[NDArray[np.int64], NDArray[np.float64]]]:
+        return {}
+
+    @cached_property
+    def closest(self) -> NDArray[np.float64]:
+        """Closest approaches where success did not end the trials [m]."""
+        return self._joined(held.closest for held in self.held)
+
+    @cached_property
+    def farthest_at_end(self) -> NDArray[np.float64]:
+        """Largest distances in the last steps of those trials [m]."""
+        return self._joined(held.farthest_at_end for held in self.held)
+
+    @cached_property
+    def held_collision(self) -> NDArray[np.bool_]:
+        """Whether those trials ended in contact."""
+        return self._joined(held.collision for held in self.held)
+
+    @cached_property
+    def steps(self) -> NDArray[np.int64]:
+        """Steps taken."""
+        return self._joined(rollouts.steps for rollouts in self.rollouts)
+
+    @cached_property
+    def steps_to_success(self) -> NDArray[np.int64]:
+        """Steps taken in the trials that succeeded, one axis."""
+        return self.steps[self.success]
+
+    @cached_property
+    def returns(self) -> NDArray[np.float64]:
+        """Sums of rewards."""
+        return self._joined(rollouts.returns for rollouts in self.rollouts)
+
+    @cached_property
+    def success(self) -> NDArray[np.bool_]:
+        """Whether a trial ended within the tolerance, without contact."""
+        return self._joined(rollouts.success for rollouts in self.rollouts)
+
+    @cached_property
+    def collision(self) -> NDArray[np.bool_]:
+        """Whether a trial ended in contact."""
+        return self._joined(rollouts.collision for rollouts in self.rollouts)
+
+    @property
+    def early_collision(self) -> NDArray[np.bool_]:
+        """Whether it did within the first `EARLY_STEPS` steps."""
+        return self.collision & (self.steps <= EARLY_STEPS)
+
+    @property
+    def truncated(self) -> NDArray[np.bool_]:
+        """Whether a trial ran out of steps."""
+        return ~(self.success | self.collision)
+
+    @property
+    def relative_success(self) -> float | None:
+        """Success over that of the oracle in the trials that it was asked about."""
+        reachable = self._known_bounds.reachable
+        succeeded = [rollouts.success[: len(reachable)] for rollouts in self.rollouts]
+        return float(np.mean(succeeded) / reachable.mean()) if reachable.any() else None
+
+    @cached_property
+    def step_ratio(self) -> NDArray[np.float64]:
+        """Steps over those proven necessary, of trials that succeeded and are bounded, one axis."""
+        necessary = self._known_bounds.steps_lower_bound
+        bounded = slice(len(necessary))
+        ratios = [
+            (rollouts.steps[bounded] / necessary)[rollouts.success[bounded]]
+            for rollouts in self.rollouts
+        ]
+        return np.concatenate(ratios)
+
+    @property
+    def _known_bounds(self) -> Bounded:
+        if self.bounds is None:
+            raise InvalidInputError("there are no bounds: the evaluation was made without them")
+        return self.bounds
+
+
+def _resampled_in_order(
+    ordered: NDArray[np.float64], order: NDArray[np.int64], numbers: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Values of resampled trials in order, from values in order: counted, not sorted again.
+
+    Parameters
+    ----------
+    ordered, order : ndarray, shape (n_seeds * n_trials,)
+        Values, the smallest first, and their positions before.
+    numbers : ndarray of int, shape (..., n_trials)
+        Resampled trials.
+    """
+    n_trials = numbers.shape[-1]
+    rows = numbers.reshape(-1, n_trials)
+    starts = n_trials * np.arange(len(rows))[:, None]
+    counts = np.bincount((rows + starts).ravel(), minlength=rows.size).reshape(rows.shape)
+    times = counts[:, order % n_trials]
+    values = np.repeat(np.tile(ordered, len(rows)), times.ravel())
+    return values.reshape(*numbers.shape[:-1], len(ordered))

@@ -1,0 +1,44 @@
+"""What the shipped policies reach: ``python -m kinarm.evaluation.ranking`` measures it.
+
+It is run after policies have been shipped, in the clone that holds them, and writes the file from
+which `kinarm.policies.library.best_policy` names the best one. The trials are of a seed of their
+own, so that nobody chooses a policy by the trials that it is then judged by.
+"""
+
+import json
+from collections.abc import Iterable
+from importlib import resources
+from typing import Any
+
+from kinarm._files import write_text
+from kinarm.evaluation.trials import trial_set
+from kinarm.policies.library import RANKING, load_policy, policy_names
+
+TRIALS, SEED = 10_000, 20_161
+
+
+def ranking(names: Iterable[str], trials: int = TRIALS) -> dict[str, Any]:
+    """Share of trials in which policies succeed on the problem that they are for.
+
+    Returns
+    -------
+    dict
+        ``trials``, ``seed``, and ``success``: of each policy by its name, by problem.
+    """
+    success: dict[str, dict[str, float]] = {}
+    for name in names:
+        policy = load_policy(name)
+        problem, faced = policy.problem, trial_set(policy.problem, trials, SEED)
+        rollouts = faced.simulator.rollout(policy, faced.starts, faced.goals)
+        success.setdefault(problem.name, {})[name] = float(rollouts.success.mean())
+    return {"trials": trials, "seed": SEED, "success": success}
+
+
+def main() -> None:
+    """Measure all shipped policies, and write the file beside them."""
+    with resources.as_file(resources.files("kinarm.data") / "policies") as folder:
+        write_text(folder / RANKING, json.dumps(ranking(policy_names()), indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,31 @@
+"""What ships beside the policies tells what they reach, of all of them."""
+
+import json
+from importlib import resources
+
+import pytest
+
+from kinarm.evaluation.ranking import SEED, TRIALS, ranking
+from kinarm.policies import policy_names
+from kinarm.policies.library import RANKING, best_policy
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    text = (resources.files("kinarm.data") / "policies" / RANKING).read_text(encoding="utf-8")
+    return json.loads(text)
+
+
+def test_every_shipped_policy_is_ranked(recorded):
+    """After shipping others: ``python -m kinarm.evaluation.ranking``."""
+    named = [name for successes in recorded["success"].values() for name in successes]
+    assert sorted(named) == sorted(policy_names())
+    assert (recorded["trials"], recorded["seed"]) == (TRIALS, SEED)
+
+
+def test_the_best_are_measured_again(recorded):
+    for problem, successes in recorded["success"].items():
+        best = best_policy(problem)
+        again = ranking([best])["success"][problem]
+        assert again == {best: successes[best]}
+        assert successes[best] == max(successes.values())
