@@ -296,7 +296,7 @@ class Simulator:
 
     def _start(self, episodes: Episodes, rows: NDArray[np.int64], session: Session) -> None:
         """Start some episodes; see `begin`."""
-        if not run_rows(begin, len(rows), len(rows), self.threads, rows, session):
+        if not run_rows(_begin_some, len(rows), len(rows), self.threads, rows, session):
             return
         contacts = self.world.contact_model
         paused = rows[episodes.status[rows] == PAUSED]
@@ -329,7 +329,7 @@ class Simulator:
 
     def _advance(self, session: Session, episodes: Episodes, work: int) -> None:
         """Advance episodes to their stop, asking Coal about every step that is in doubt."""
-        while run_together(advance, work, self.threads, session):
+        while run_together(advance, work, self.threads, session.of_thread):
             paused = np.flatnonzero(episodes.status == PAUSED)
             self.judged += judge_steps(self.world, session, episodes, paused)
             resumed = paused[episodes.cleared[paused]]
@@ -345,3 +345,8 @@ class Simulator:
                 "actions", policy(episodes.observation[running]), (running.sum(), self.n_actions)
             )
             self._step(episodes, actions)
+
+
+def _begin_some(first: int, last: int, rows: NDArray[np.int64], session: Session) -> int:
+    """Begin some of the rows, with work space that no other thread uses."""
+    return begin(first, last, rows, session if last - first == len(rows) else session.another())

@@ -1,10 +1,16 @@
 """Boxes of configurations: a stack of those that wait, and a block of them in lanes."""
 
+from functools import cache
 from typing import NamedTuple
+
+from numba import types
 
 from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, inlined
-from kinarm.kernels.lanes import as_numbers
+from kinarm.kernels.kinematics import POSE
+from kinarm.kernels.lanes import as_numbers, lanes
+from kinarm.kernels.records import Layout
+from kinarm.policies.oracle.kernels.overlap import ENDS
 
 WAITING = 4096
 """Boxes that can wait at a time; halving eight until they are too small takes fewer."""
@@ -45,6 +51,8 @@ class Boxes(NamedTuple):
         in: step, scale, slope, least and bend.
     ends : (n_shapes, ENDS)
         Capsules in the world.
+    lever : (n,) of numbers, not of lanes
+        How far each joint moves the tool, or what counts as that [m/rad, or m/m].
     """
 
     lower: Array
@@ -61,6 +69,24 @@ class Boxes(NamedTuple):
     turns: Array
     model: Array
     ends: Array
+    lever: Array
+
+
+@cache
+def layout(n: int, n_joints: int, n_shapes: int) -> Layout:
+    """How `Boxes` lie in memory."""
+    shapes = {
+        **dict.fromkeys(("lower", "upper", "half"), (n,)),
+        **dict.fromkeys(("q", "tried"), (1, n_joints)),
+        **dict.fromkeys(("poses", "between"), (n_joints + 1, POSE)),
+        **dict.fromkeys(("proven", "share"), (1,)),
+        "distance": (2,),
+        **dict.fromkeys(("jacobian", "turns"), (3, n)),
+        "model": (MODEL, max(n, 3)),
+        "ends": (n_shapes, ENDS),
+    }
+    numbers = {"lever": (types.float64, (n,))}
+    return Layout("Boxes", {name: (lanes, shape) for name, shape in shapes.items()} | numbers)
 
 
 @inlined

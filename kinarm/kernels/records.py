@@ -1,0 +1,248 @@
+"""Arrays and numbers by one address: what a kernel would otherwise take apart, array by array.
+
+Numba hands a named tuple over as everything that is in it, from Python to a kernel, and from a
+kernel to each helper. A `Record` is a table of addresses, shapes and numbers, made once. Kernels
+take its own address, and see what is in it as attributes, like those of the named tuple.
+"""
+
+import hashlib
+import struct
+from collections.abc import Mapping
+from ctypes import addressof, c_char
+from functools import cache
+from math import prod
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import from_dtype, types
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import (
+    NativeValue,
+    infer_getattr,
+    lower_getattr_generic,
+    models,
+    register_model,
+    unbox,
+)
+from numpy.typing import NDArray
+
+from kinarm.kernels.lanes import LANES, lanes
+
+WORD = ir.IntType(64)
+"""What a table consists of: addresses, lengths, whole numbers and the bits of other numbers."""
+
+NOTHING = c_char * 0
+
+
+class RecordType(types.Type):
+    """Numba's type of a record: names and types of what is in it."""
+
+    def __init__(self, name: str, fields: tuple[tuple[str, types.Type], ...]) -> None:
+        self.fields = dict(fields)
+        self.places, end = {}, 0
+        for field, kind in fields:
+            self.places[field] = end
+            end += 1 + (kind.ndim if isinstance(kind, types.Array) else 0)
+        self.length = end
+        # The name becomes part of the names of all functions that take such a record.
+        digest = hashlib.sha256(repr(fields).encode()).hexdigest()
+        super().__init__(f"{name}-{digest[:12]}")
+
+
+class Record:
+    """Named arrays, numbers and records, for kernels; `recorded` and `Layout` make them.
+
+    What is in an array may change, but not which array it is.
+
+    Attributes
+    ----------
+    address : int
+        Where the table is.
+    """
+
+    def __init__(self, kind: RecordType, words: NDArray[np.int64], values: Any) -> None:
+        self._numba_type_, self._words, self._values = kind, words, values
+        self.address = _address(words)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return getattr(self._values, name)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return recorded, (self._values,)
+
+
+def recorded(values: Any) -> Any:
+    """Record of a named tuple of arrays, records and numbers, which it keeps alive.
+
+    Kernels and helpers take it in the tuple's stead. All entries of an array have to lie side by
+    side, in C order.
+    """
+    return Record(*table(values), values)
+
+
+def table(values: Any) -> tuple[RecordType, NDArray[np.int64]]:
+    """Type and table of the record of a named tuple."""
+    words: list[int] = []
+    kinds: list[Any] = []
+    for value in values:
+        if isinstance(value, np.ndarray):
+            kinds.append((value.dtype.char, value.ndim))
+            words += (_address(value), *value.shape)
+        elif isinstance(value, Record):
+            kinds.append(value._numba_type_)
+            words.append(value.address)
+        elif isinstance(value, float):
+            kinds.append(types.float64)
+            words += struct.unpack("q", struct.pack("d", value))
+        else:
+            kinds.append(types.int64)
+            words.append(int(value))
+    return _record_type(type(values), *kinds), np.array(words, dtype=np.int64)
+
+
+class Layout:
+    """How arrays lie side by side in one buffer.
+
+    Parameters
+    ----------
+    name : str
+        Name of the type.
+    shapes : mapping
+        Per array the type of its entries, `lanes`, float64 or int64, and its shape.
+    """
+
+    def __init__(self, name: str, shapes: Mapping[str, tuple[types.Type, tuple[int, ...]]]) -> None:
+        words: list[int] = []
+        self._arrays: list[int] = []
+        end = 0
+        for entry, shape in shapes.values():
+            self._arrays.append(len(words))
+            words += (end, *shape)
+            end += 8 * prod(shape) * (LANES if entry == lanes else 1)
+        self._words, self._size = np.array(words, dtype=np.int64), end // 8
+        kinds = [
+            (field, _array_type(entry, len(shape))) for field, (entry, shape) in shapes.items()
+        ]
+        self._kind = RecordType(name, tuple(kinds))
+
+    def record(self) -> Any:
+        """Record of new arrays, which are zero."""
+        buffer, words = np.zeros(self._size), self._words.copy()
+        words[self._arrays] += _address(buffer)
+        return WorkSpace(self._kind, words, buffer, self)
+
+
+class WorkSpace(Record):
+    """Record of arrays that lie side by side in a buffer; copies of it begin anew."""
+
+    def __init__(
+        self,
+        kind: RecordType,
+        words: NDArray[np.int64],
+        buffer: NDArray[np.float64],
+        layout: Layout,
+    ) -> None:
+        super().__init__(kind, words, ())
+        self.buffer, self._layout = buffer, layout
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return self._layout.record, ()
+
+
+def _address(array: NDArray[Any]) -> int:
+    """Where an array begins; its entries have to lie side by side."""
+    try:
+        return addressof(NOTHING.from_buffer(array))
+    except TypeError:  # It is read-only, or has gaps.
+        if not array.flags.c_contiguous:
+            raise
+    address: int = array.__array_interface__["data"][0]
+    return address
+
+
+@cache
+def _array_type(entry: types.Type, ndim: int) -> types.Array:
+    # Lanes need not lie where their size would have it.
+    return types.Array(entry, ndim, "C", aligned=entry != lanes)
+
+
+@cache
+def _record_type(named: Any, *kinds: Any) -> RecordType:
+    """Type of the record of a named tuple, whose arrays are given by their types and axes."""
+    fields = zip(named._fields, kinds, strict=True)
+    return RecordType(
+        named.__name__,
+        tuple(
+            (name, _array_type(from_dtype(np.dtype(kind[0])), kind[1]))
+            if isinstance(kind, tuple)
+            else (name, kind)
+            for name, kind in fields
+        ),
+    )
+
+
+@register_model(RecordType)
+class _RecordModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: types.Type) -> None:
+        super().__init__(manager, kind, WORD.as_pointer())
+
+
+@unbox(RecordType)
+def _unboxed(_: RecordType, value: Any, c: Any) -> NativeValue:
+    """Take the address of a record."""
+    address = c.pyapi.object_getattr_string(value, "address")
+    pointer = c.pyapi.long_as_voidptr(address)
+    c.pyapi.decref(address)
+    return NativeValue(c.builder.bitcast(pointer, WORD.as_pointer()))
+
+
+@infer_getattr
+class _RecordAttribute(AttributeTemplate):
+    key = RecordType
+
+    def generic_resolve(self, record: RecordType, name: str) -> types.Type | None:
+        """Type of what a record holds by a name."""
+        return record.fields.get(name)
+
+
+@lower_getattr_generic(RecordType)
+def _held(context: Any, builder: Any, record: RecordType, table: Any, name: str) -> Any:
+    """Read from the table. Nothing counts references: the record keeps alive what is in it."""
+    kind, place = record.fields[name], record.places[name]
+
+    def word(offset: int, form: Any) -> Any:
+        where = builder.gep(table, [WORD(place + offset)])
+        value = builder.load(builder.bitcast(where, form.as_pointer()))
+        # Tables never change, whatever else is written.
+        value.set_metadata("invariant.load", builder.module.add_metadata([]))
+        return value
+
+    if isinstance(kind, RecordType):
+        # What lies in a table may be read ahead of loops, whether they read it or not.
+        inner, whole = word(0, WORD.as_pointer()), builder.module.add_metadata
+        inner.set_metadata("dereferenceable", whole([WORD(8 * kind.length)]))
+        inner.set_metadata("align", whole([WORD(8)]))
+        return inner
+    if not isinstance(kind, types.Array):
+        return word(0, context.get_value_type(kind))
+    from numba.np.arrayobj import make_array, populate_array
+
+    made = make_array(kind)(context, builder)
+    entry = context.get_data_type(kind.dtype)
+    width = WORD(context.get_abi_sizeof(entry))
+    shape = [word(1 + axis, WORD) for axis in range(kind.ndim)]
+    strides = [width]
+    for length in shape[:0:-1]:
+        strides.insert(0, builder.mul(strides[0], length))
+    populate_array(
+        made,
+        data=word(0, entry.as_pointer()),
+        shape=shape,
+        strides=strides,
+        itemsize=width,
+        meminfo=None,
+    )
+    return made._getvalue()
