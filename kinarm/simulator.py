@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm._parallel import run_rows, run_together
 from kinarm._validation import finite_array
 from kinarm.arm import Arm
-from kinarm.batches import Batch, IdleBatch
+from kinarm.batches import Batch, IdleBatch, begin_some
 from kinarm.episodes import PAUSED, RUNNING, Episodes
 from kinarm.errors import InvalidInputError, StartInContactError
 from kinarm.judging import judge_steps
-from kinarm.kernels.rollout import advance, allow_one_step, begin, results_of_step
+from kinarm.kernels.rollout import advance, allow_one_step, results_of_step
 from kinarm.kernels.session import Session
 from kinarm.networks import CompiledPolicy, Networks, network_control, table_control
 from kinarm.problem import ProblemLike, ReachProblem
@@ -296,7 +296,7 @@ class Simulator:
 
     def _start(self, episodes: Episodes, rows: NDArray[np.int64], session: Session) -> None:
         """Start some episodes; see `begin`."""
-        if not run_rows(_begin_some, len(rows), len(rows), self.threads, rows, session):
+        if not run_rows(begin_some, len(rows), len(rows), self.threads, rows, session):
             return
         contacts = self.world.contact_model
         paused = rows[episodes.status[rows] == PAUSED]
@@ -345,8 +345,3 @@ class Simulator:
                 "actions", policy(episodes.observation[running]), (running.sum(), self.n_actions)
             )
             self._step(episodes, actions)
-
-
-def _begin_some(first: int, last: int, rows: NDArray[np.int64], session: Session) -> int:
-    """Begin some of the rows, with work space that no other thread uses."""
-    return begin(first, last, rows, session if last - first == len(rows) else session.another())

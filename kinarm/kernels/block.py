@@ -167,17 +167,11 @@ def layouts(
         "relative": (4, 3),
         "simplex": (4, 3),
     }
+    in_lanes = {name: (lanes, shape) for name, shape in block.items()}
+    numbers = {name: (types.float64, shape) for name, shape in alone.items()}
     return (
-        Layout(
-            "Block",
-            {name: (lanes, shape) for name, shape in block.items()}
-            | {"row": (types.int64, (LANES,))},
-        ),
-        Layout(
-            "Alone",
-            {name: (types.float64, shape) for name, shape in alone.items()}
-            | {"listed": (types.int64, (n_pairs + 1, 2))},
-        ),
+        Layout("Block", {**in_lanes, "row": (types.int64, (LANES,))}),
+        Layout("Alone", {**numbers, "listed": (types.int64, (n_pairs + 1, 2))}),
     )
 
 

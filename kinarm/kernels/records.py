@@ -85,6 +85,7 @@ def recorded(values: Any) -> Any:
 
 def table(values: Any) -> tuple[RecordType, NDArray[np.int64]]:
     """Type and table of the record of a named tuple."""
+    named: Any = type(values)
     words: list[int] = []
     kinds: list[Any] = []
     for value in values:
@@ -100,7 +101,7 @@ def table(values: Any) -> tuple[RecordType, NDArray[np.int64]]:
         else:
             kinds.append(types.int64)
             words.append(int(value))
-    return _record_type(type(values), *kinds), np.array(words, dtype=np.int64)
+    return _record_type(named, *kinds), np.array(words, dtype=np.int64)
 
 
 class Layout:
@@ -154,8 +155,9 @@ class WorkSpace(Record):
 
 def _address(array: NDArray[Any]) -> int:
     """Where an array begins; its entries have to lie side by side."""
+    given: Any = array
     try:
-        return addressof(NOTHING.from_buffer(array))
+        return addressof(NOTHING.from_buffer(given))
     except TypeError:  # It is read-only, or has gaps.
         if not array.flags.c_contiguous:
             raise
@@ -199,13 +201,18 @@ def _unboxed(_: RecordType, value: Any, c: Any) -> NativeValue:
     return NativeValue(c.builder.bitcast(pointer, WORD.as_pointer()))
 
 
-@infer_getattr
-class _RecordAttribute(AttributeTemplate):
-    key = RecordType
+def _field_type(_: Any, record: RecordType, name: str) -> types.Type | None:
+    """Type of what a record holds by a name."""
+    return record.fields.get(name)
 
-    def generic_resolve(self, record: RecordType, name: str) -> types.Type | None:
-        """Type of what a record holds by a name."""
-        return record.fields.get(name)
+
+infer_getattr(
+    type(
+        "RecordAttribute",
+        (AttributeTemplate,),
+        {"key": RecordType, "generic_resolve": _field_type},
+    )
+)
 
 
 @lower_getattr_generic(RecordType)

@@ -85,8 +85,8 @@ def layout(n: int, n_joints: int, n_shapes: int) -> Layout:
         "model": (MODEL, max(n, 3)),
         "ends": (n_shapes, ENDS),
     }
-    numbers = {"lever": (types.float64, (n,))}
-    return Layout("Boxes", {name: (lanes, shape) for name, shape in shapes.items()} | numbers)
+    arrays = {name: (lanes, shape) for name, shape in shapes.items()}
+    return Layout("Boxes", {**arrays, "lever": (types.float64, (n,))})
 
 
 @inlined
