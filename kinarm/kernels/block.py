@@ -12,7 +12,9 @@ from kinarm.episodes import Control, Episodes
 from kinarm.kernels.compiling import Array, inlined
 from kinarm.kernels.kinematics import POSE
 from kinarm.kernels.lanes import LANES, as_numbers, lanes
-from kinarm.kernels.records import Layout
+from kinarm.kernels.records import Fixed, Layout
+
+ONE = Fixed(1)
 
 
 class Block(NamedTuple):
@@ -139,39 +141,39 @@ def layouts(
         Entries of the observation that are summed, all or none.
     """
     block = {
-        "q": (1, n_joints),
-        "target": (1, n_joints),
-        "goal": (1, 3),
-        "observation": (1, n_observations),
-        "seen": (1, n_observations),
-        "before": (n_joints + 1, POSE),
-        "after": (n_joints + 1, POSE),
-        "planes": (n_pairs + 1, PLANE),
+        "q": (ONE, n_joints),
+        "target": (ONE, n_joints),
+        "goal": (ONE, Fixed(3)),
+        "observation": (ONE, n_observations),
+        "seen": (ONE, n_observations),
+        "before": (n_joints + 1, Fixed(POSE)),
+        "after": (n_joints + 1, Fixed(POSE)),
+        "planes": (n_pairs + 1, Fixed(PLANE)),
         "height": (n_pairs,),
         "bend": (n_pairs,),
         "bound": (n_pairs,),
         "twist": (n_actuated, n_actuated),
-        "action": (1, n_actuated),
-        "hidden": (2, widest),
+        "action": (ONE, n_actuated),
+        "hidden": (Fixed(2), widest),
         "weights": (own,),
-        **dict.fromkeys(("distance", "total", "steps", "stop", "alive", "judged"), (1,)),
-        "terms": (1, n_terms),
+        **dict.fromkeys(("distance", "total", "steps", "stop", "alive", "judged"), (ONE,)),
+        "terms": (ONE, n_terms),
         "first": (summed,),
         "second": (summed,),
     }
     alone = {
-        "q": (1, n_joints),
-        "before": (n_joints + 1, POSE),
-        "after": (n_joints + 1, POSE),
-        "plane": (1, PLANE),
-        "relative": (4, 3),
-        "simplex": (4, 3),
+        "q": (ONE, n_joints),
+        "before": (n_joints + 1, Fixed(POSE)),
+        "after": (n_joints + 1, Fixed(POSE)),
+        "plane": (ONE, Fixed(PLANE)),
+        "relative": (Fixed(4), Fixed(3)),
+        "simplex": (Fixed(4), Fixed(3)),
     }
     in_lanes = {name: (lanes, shape) for name, shape in block.items()}
     numbers = {name: (types.float64, shape) for name, shape in alone.items()}
     return (
-        Layout("Block", {**in_lanes, "row": (types.int64, (LANES,))}),
-        Layout("Alone", {**numbers, "listed": (types.int64, (n_pairs + 1, 2))}),
+        Layout("Block", {**in_lanes, "row": (types.int64, (Fixed(LANES),))}),
+        Layout("Alone", {**numbers, "listed": (types.int64, (n_pairs + 1, Fixed(2)))}),
     )
 
 

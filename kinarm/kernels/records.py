@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from ctypes import addressof, c_char
 from functools import cache
 from math import prod
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -32,21 +33,33 @@ from kinarm.kernels.lanes import LANES, lanes
 WORD = ir.IntType(64)
 """What a table consists of: addresses, lengths, whole numbers and the bits of other numbers."""
 
+CACHE_LINE = 8 * LANES
+"""Bytes of a line of the cache, and of a number in lanes."""
+
 NOTHING = c_char * 0
 
 
-class RecordType(types.Type):
-    """Numba's type of a record: names and types of what is in it."""
+class Fixed(int):
+    """A length that belongs to the type of an array, so that kernels are compiled for it."""
 
-    def __init__(self, name: str, fields: tuple[tuple[str, types.Type], ...]) -> None:
-        self.fields = dict(fields)
+
+class RecordType(types.Type):
+    """Numba's type of a record: names and types of what is in it, and lengths that are fixed."""
+
+    def __init__(
+        self,
+        name: str,
+        fields: tuple[tuple[str, types.Type], ...],
+        fixed: Mapping[str, tuple[int | None, ...]] = MappingProxyType({}),
+    ) -> None:
+        self.fields, self.fixed = dict(fields), dict(fixed)
         self.places, end = {}, 0
         for field, kind in fields:
             self.places[field] = end
             end += 1 + (kind.ndim if isinstance(kind, types.Array) else 0)
         self.length = end
         # The name becomes part of the names of all functions that take such a record.
-        digest = hashlib.sha256(repr(fields).encode()).hexdigest()
+        digest = hashlib.sha256(repr((fields, self.fixed)).encode()).hexdigest()
         super().__init__(f"{name}-{digest[:12]}")
 
 
@@ -112,7 +125,8 @@ class Layout:
     name : str
         Name of the type.
     shapes : mapping
-        Per array the type of its entries, `lanes`, float64 or int64, and its shape.
+        Per array the type of its entries, `lanes`, float64 or int64, and its shape, of which
+        some lengths may be `Fixed`.
     """
 
     def __init__(self, name: str, shapes: Mapping[str, tuple[types.Type, tuple[int, ...]]]) -> None:
@@ -127,12 +141,17 @@ class Layout:
         kinds = [
             (field, _array_type(entry, len(shape))) for field, (entry, shape) in shapes.items()
         ]
-        self._kind = RecordType(name, tuple(kinds))
+        fixed = {
+            field: tuple(int(length) if isinstance(length, Fixed) else None for length in shape)
+            for field, (_, shape) in shapes.items()
+        }
+        self._kind = RecordType(name, tuple(kinds), fixed)
 
     def record(self) -> Any:
         """Record of new arrays, which are zero."""
-        buffer, words = np.zeros(self._size), self._words.copy()
-        words[self._arrays] += _address(buffer)
+        buffer, words = np.zeros(self._size + LANES), self._words.copy()
+        # Lanes that begin where a line of the cache does lie in one line.
+        words[self._arrays] += -(-_address(buffer) // CACHE_LINE) * CACHE_LINE
         return WorkSpace(self._kind, words, buffer, self)
 
 
@@ -240,7 +259,10 @@ def _held(context: Any, builder: Any, record: RecordType, table: Any, name: str)
     made = make_array(kind)(context, builder)
     entry = context.get_data_type(kind.dtype)
     width = WORD(context.get_abi_sizeof(entry))
-    shape = [word(1 + axis, WORD) for axis in range(kind.ndim)]
+    shape = [
+        word(1 + axis, WORD) if length is None else WORD(length)
+        for axis, length in enumerate(record.fixed.get(name, (None,) * kind.ndim))
+    ]
     strides = [width]
     for length in shape[:0:-1]:
         strides.insert(0, builder.mul(strides[0], length))

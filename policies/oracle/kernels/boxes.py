@@ -9,7 +9,7 @@ from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, inlined
 from kinarm.kernels.kinematics import POSE
 from kinarm.kernels.lanes import as_numbers, lanes
-from kinarm.kernels.records import Layout
+from kinarm.kernels.records import Fixed, Layout
 from kinarm.policies.oracle.kernels.overlap import ENDS
 
 WAITING = 4096
@@ -77,13 +77,13 @@ def layout(n: int, n_joints: int, n_shapes: int) -> Layout:
     """How `Boxes` lie in memory."""
     shapes = {
         **dict.fromkeys(("lower", "upper", "half"), (n,)),
-        **dict.fromkeys(("q", "tried"), (1, n_joints)),
-        **dict.fromkeys(("poses", "between"), (n_joints + 1, POSE)),
-        **dict.fromkeys(("proven", "share"), (1,)),
-        "distance": (2,),
-        **dict.fromkeys(("jacobian", "turns"), (3, n)),
-        "model": (MODEL, max(n, 3)),
-        "ends": (n_shapes, ENDS),
+        **dict.fromkeys(("q", "tried"), (Fixed(1), n_joints)),
+        **dict.fromkeys(("poses", "between"), (n_joints + 1, Fixed(POSE))),
+        **dict.fromkeys(("proven", "share"), (Fixed(1),)),
+        "distance": (Fixed(2),),
+        **dict.fromkeys(("jacobian", "turns"), (Fixed(3), n)),
+        "model": (Fixed(MODEL), max(n, 3)),
+        "ends": (n_shapes, Fixed(ENDS)),
     }
     arrays = {name: (lanes, shape) for name, shape in shapes.items()}
     return Layout("Boxes", {**arrays, "lever": (types.float64, (n,))})

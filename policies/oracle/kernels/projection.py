@@ -13,9 +13,9 @@ from kinarm.kernels.compiling import Array, Vector, inlined, lean_kernel
 from kinarm.kernels.kinematics import POSE, place, point_jacobian, to_world
 from kinarm.kernels.lanes import LANES, as_numbers, lane_bits, lanes, select
 from kinarm.kernels.limits import take_out_blocked, take_step
-from kinarm.kernels.records import Layout
+from kinarm.kernels.records import Fixed, Layout
 
-LAYOUT = "34eb0b784a1f"
+LAYOUT = "f997755e732b"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 ITERATIONS = 24
@@ -67,17 +67,17 @@ class Moving(NamedTuple):
 def layout(n_joints: int, n: int) -> Layout:
     """How `Moving` lies in memory."""
     shapes = {
-        "q": (1, n_joints),
+        "q": (Fixed(1), n_joints),
         "lower": (n,),
         "upper": (n,),
-        "goal": (3,),
-        **dict.fromkeys(("radius", "distance", "iteration"), (1,)),
-        "poses": (n_joints + 1, POSE),
-        "jacobian": (3, n),
+        "goal": (Fixed(3),),
+        **dict.fromkeys(("radius", "distance", "iteration"), (Fixed(1),)),
+        "poses": (n_joints + 1, Fixed(POSE)),
+        "jacobian": (Fixed(3), n),
         "step": (n,),
     }
     arrays = {name: (lanes, shape) for name, shape in shapes.items()}
-    return Layout("Moving", {**arrays, "rows": (types.int64, (LANES,))})
+    return Layout("Moving", {**arrays, "rows": (types.int64, (Fixed(LANES),))})
 
 
 @inlined
