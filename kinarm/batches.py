@@ -33,10 +33,10 @@ class Batch(NamedTuple):
     ) -> "Batch":
         """Allocate episodes at their starts, yet to be begun; see `Episodes.allocate`."""
         n_pairs, horizon = len(world.contact_model.shapes.pairs), world.problem.task.horizon
-        episodes = Episodes.allocate(
+        episodes, known = Episodes.allocate(
             starts, goals, n_pairs=n_pairs, horizon=horizon, record=record, shift=shift
         )
-        return cls(control, episodes, world.session(control, episodes))
+        return cls(control, episodes, world.session(control, known))
 
     def refill(self, control: Control, starts: Array, goals: Array, shift: Array | None) -> bool:
         """Take in other networks, starts and goals, if they are as many and of the same form."""

@@ -397,7 +397,7 @@ class World:
         q = finite_array("configurations", configurations, (None, self.arm.n_joints))
         goal = finite_array("goals", goals, (len(q), 3))
         n_pairs = len(self.contact_model.shapes.pairs)
-        episodes = Episodes.allocate(q, goal, n_pairs=n_pairs, horizon=1)
+        episodes, known = Episodes.allocate(q, goal, n_pairs=n_pairs, horizon=1)
         at_rest = table_control(np.zeros((len(q), 1, self.n_actions)))
-        begin(0, len(q), np.arange(len(q)), self.session(at_rest, episodes))
+        begin(0, len(q), np.arange(len(q)), self.session(at_rest, known))
         return episodes

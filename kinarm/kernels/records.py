@@ -26,6 +26,7 @@ from numba.extending import (
     register_model,
     unbox,
 )
+from numba.np.numpy_support import as_dtype
 from numpy.typing import NDArray
 
 from kinarm.kernels.lanes import LANES, lanes
@@ -72,28 +73,30 @@ class Record:
     ----------
     address : int
         Where the table is.
+    values : named tuple
+        What it is a record of.
     """
 
     def __init__(self, kind: RecordType, words: NDArray[np.int64], values: Any) -> None:
-        self._numba_type_, self._words, self._values = kind, words, values
+        self._numba_type_, self._words, self.values = kind, words, values
         self.address = _address(words)
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
+        if name.startswith("_") or name == "values":
             raise AttributeError(name)
-        return getattr(self._values, name)
+        return getattr(self.values, name)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return recorded, (self._values,)
+        return recorded, (self.values,)
 
 
 def recorded(values: Any) -> Any:
     """Record of a named tuple of arrays, records and numbers, which it keeps alive.
 
     Kernels and helpers take it in the tuple's stead. All entries of an array have to lie side by
-    side, in C order.
+    side, in C order. What is a record already stays one.
     """
-    return Record(*table(values), values)
+    return values if isinstance(values, Record) else Record(*table(values), values)
 
 
 def table(values: Any) -> tuple[RecordType, NDArray[np.int64]]:
@@ -104,7 +107,7 @@ def table(values: Any) -> tuple[RecordType, NDArray[np.int64]]:
     for value in values:
         if isinstance(value, np.ndarray):
             kinds.append((value.dtype.char, value.ndim))
-            words += (_address(value), *value.shape)
+            words += (_address(value) if value.size else 0, *value.shape)
         elif isinstance(value, Record):
             kinds.append(value._numba_type_)
             words.append(value.address)
@@ -125,34 +128,52 @@ class Layout:
     name : str
         Name of the type.
     shapes : mapping
-        Per array the type of its entries, `lanes`, float64 or int64, and its shape, of which
-        some lengths may be `Fixed`.
+        Per array the type of its entries, `lanes`, float64, int64 or boolean, and its shape, of
+        which some lengths may be `Fixed`.
     """
 
     def __init__(self, name: str, shapes: Mapping[str, tuple[types.Type, tuple[int, ...]]]) -> None:
         words: list[int] = []
-        self._arrays: list[int] = []
+        moved: list[bool] = []
+        self._views: list[tuple[tuple[int, ...], Any, int]] = []
         end = 0
         for entry, shape in shapes.values():
-            self._arrays.append(len(words))
+            size = 8 * LANES if entry == lanes else as_dtype(entry).itemsize
+            if entry != lanes:
+                self._views.append((shape, as_dtype(entry), end))
             words += (end, *shape)
-            end += 8 * prod(shape) * (LANES if entry == lanes else 1)
+            moved += (True, *(False for _ in shape))
+            end += -(-size * prod(shape) // 8) * 8
         self._words, self._size = np.array(words, dtype=np.int64), end // 8
+        self._moved = np.array(moved, dtype=np.int64)
         kinds = [
             (field, _array_type(entry, len(shape))) for field, (entry, shape) in shapes.items()
         ]
         fixed = {
             field: tuple(int(length) if isinstance(length, Fixed) else None for length in shape)
             for field, (_, shape) in shapes.items()
+            if any(isinstance(length, Fixed) for length in shape)
         }
         self._kind = RecordType(name, tuple(kinds), fixed)
 
     def record(self) -> Any:
         """Record of new arrays, which are zero."""
-        buffer, words = np.zeros(self._size + LANES), self._words.copy()
-        # Lanes that begin where a line of the cache does lie in one line.
-        words[self._arrays] += -(-_address(buffer) // CACHE_LINE) * CACHE_LINE
+        words, buffer = self._placed()
         return WorkSpace(self._kind, words, buffer, self)
+
+    def record_of(self, named: Any) -> Any:
+        """Record of a named tuple of new arrays, which are zero; none may be of lanes."""
+        words, buffer = self._placed()
+        views = [np.ndarray(shape, dtype, buffer, start) for shape, dtype, start in self._views]
+        return Record(self._kind, words, named(*views))
+
+    def _placed(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """A table, and the buffer that it leads to."""
+        buffer = np.zeros(self._size + LANES)
+        start = _address(buffer)
+        # Lanes that begin where a line of the cache does lie in one line.
+        shift = -start % CACHE_LINE
+        return self._words + (start + shift) * self._moved, buffer[shift // 8 :][: self._size]
 
 
 class WorkSpace(Record):

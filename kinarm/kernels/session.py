@@ -42,33 +42,34 @@ class Session(Record):
 
     def __init__(
         self,
-        chain: Chain,
-        shapes: ContactShapes,
-        rules: Rules,
-        control: Control,
-        episodes: Episodes,
+        chain: Any,
+        shapes: Any,
+        rules: Any,
+        control: Any,
+        episodes: Any,
     ) -> None:
-        n_observations = episodes.observation.shape[1]
+        weights, layers = control.values.weights, control.values.layers.tolist()
+        q, observation = episodes.values.q, episodes.values.observation
         space = work_space(
-            n_joints=episodes.q.shape[1],
-            n_actuated=rules.step_limit.shape[0],
-            n_observations=n_observations,
-            n_pairs=episodes.planes.shape[1],
-            n_terms=rules.reward.shape[0],
-            widest=int(control.layers[1:].max(initial=1)),
-            own=control.weights.shape[1] if control.weights.shape[0] > 1 else 0,
-            summed=n_observations if episodes.moments.shape[0] > 0 else 0,
+            n_joints=q.shape[1],
+            n_actuated=rules.values.step_limit.shape[0],
+            n_observations=observation.shape[1],
+            n_pairs=episodes.values.planes.shape[1],
+            n_terms=rules.values.reward.shape[0],
+            widest=max(layers[1:], default=1),
+            own=weights.shape[1] if weights.shape[0] > 1 else 0,
+            summed=observation.shape[1] if len(episodes.values.moments) > 0 else 0,
         )
         parts = Parts(chain, shapes, rules, control, episodes, *space)
         super().__init__(*table(parts), parts)
         self._others: list[Session] = []
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Session, (self.chain, self.shapes, self.rules, self.control, self.episodes)
+        return Session, self.values[:5]
 
     def another(self) -> "Session":
         """A session of the same, with work space of its own."""
-        return Session(self.chain, self.shapes, self.rules, self.control, self.episodes)
+        return Session(*self.values[:5])
 
     def of_thread(self, number: int) -> "Session":
         """Which session one of several threads is to use, counted from 0: this one, or another."""

@@ -10,7 +10,7 @@ from numba import njit, types
 
 from kinarm.kernels.compiling import inlined, lean_kernel
 from kinarm.kernels.lanes import LANES, as_numbers, lanes
-from kinarm.kernels.records import Layout, recorded
+from kinarm.kernels.records import CACHE_LINE, Fixed, Layout, recorded
 
 
 class Inner(NamedTuple):
@@ -119,3 +119,28 @@ def test_arrays_of_a_layout_lie_side_by_side(n):
     )
     np.testing.assert_array_equal(words, expected)
     assert not other.buffer.any()
+    assert space.buffer.ctypes.data % CACHE_LINE == 0
+
+
+def test_lengths_that_are_fixed_belong_to_the_type():
+    shapes = [{"numbers": (types.float64, (2, last))} for last in (3, Fixed(3), Fixed(4))]
+    free, fixed, other = (Layout("Space", shape) for shape in shapes)
+    assert len({layout.record()._numba_type_ for layout in (free, fixed, other)}) == 3
+
+    @njit
+    def shape_and_strides(space):
+        return space.numbers.shape, space.numbers.strides
+
+    assert shape_and_strides(free.record()) == ((2, 3), (24, 8))
+    assert shape_and_strides(fixed.record()) == ((2, 3), (24, 8))
+
+
+def test_a_layout_makes_named_tuples_of_arrays():
+    shapes = {"numbers": (types.float64, (2, 3, 4)), "flags": (types.boolean, (2,))}
+    record = Layout("Inner", shapes).record_of(Inner)
+    values = record.values
+    values.numbers[:], values.flags[:] = np.arange(24.0).reshape(2, 3, 4), (True, False)
+    assert record._numba_type_ == recorded(values)._numba_type_
+    assert recorded(record) is record
+    assert read_all(as_record(outer()._replace(inner=record))) == read_all(outer())
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(record)).numbers, values.numbers)
