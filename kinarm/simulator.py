@@ -265,9 +265,9 @@ class Simulator:
         """Copy starts and goals, or refuse them as `reset` does."""
         q = finite_array("starts", starts, (None, self.arm.n_joints))
         goal = finite_array("goals", goals, (len(q), 3))
-        outside = ((q < self.arm.lower) | (q > self.arm.upper)).any(axis=1)
+        outside = (q < self.arm.lower) | (q > self.arm.upper)
         if outside.any():
-            index = int(outside.argmax())
+            index = int(outside.any(axis=1).argmax())
             raise InvalidInputError(f"start {index} lies outside the limits: {q[index].tolist()}")
         return q, goal
 

@@ -26,6 +26,7 @@ from kinarm.kernels.session import Session
 from kinarm.networks import table_control
 from kinarm.observation import observation_size
 from kinarm.problem import ProblemLike, ReachProblem
+from kinarm.task import Goals
 
 
 class World:
@@ -84,10 +85,20 @@ class World:
     def __repr__(self) -> str:
         return f"World({self.problem!r})"
 
+    def __getstate__(self) -> dict[str, Any]:
+        # A copy may get other rules, and has work space of its own.
+        kept = {name: value for name, value in self.__dict__.items() if name != "records"}
+        return kept | {"_idle": []}
+
     @cached_property
     def frames(self) -> Frames:
         """Frames that `poses` and `jacobians` know; ``frames.names`` lists them."""
         return Frames(self.arm)
+
+    @cached_property
+    def goals(self) -> Goals:
+        """Where the task's goals lie."""
+        return self.problem.task.goals_in(self.problem.scene)
 
     @cached_property
     def records(self) -> tuple[Chain, ContactShapes, Rules]:
