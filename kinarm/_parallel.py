@@ -40,19 +40,22 @@ def run_rows(
     return sum(done.result() or 0 for done in ranges)
 
 
-def run_together(kernel: Callable[..., int], work: int, threads: int, *arrays: Any) -> int:
-    """Call ``kernel(counters, *arrays)`` on several threads; add up what it returns.
+def run_together(
+    kernel: Callable[..., int], work: int, threads: int, given: Callable[[int], Any]
+) -> int:
+    """Call ``kernel(counters, given(thread))`` on several threads; add up what it returns.
 
-    The kernels share out the rows among them by two counters, zero at first, so that none is left
-    with more than the others. The calling thread is one of them, and the only one for little
-    ``work``, estimated in episode steps. A thread that comes too late is not waited for.
+    The kernels share out the rows among them by a counter, zero at first, so that none is left
+    with more than the others. The calling thread is one of them, that of number 0, and the only
+    one for little ``work``, estimated in episode steps. A thread that comes too late is not waited
+    for.
     """
-    counters = np.zeros(2, dtype=np.int64)
+    counters = np.zeros(1, dtype=np.int64)
     if threads == 1 or work < SHARED_STEPS:
-        return kernel(counters, *arrays)
+        return kernel(counters, given(0))
     pool = _thread_pool(os.getpid(), threads)
-    helpers = [pool.submit(kernel, counters, *arrays) for _ in range(threads - 1)]
-    total = kernel(counters, *arrays)
+    helpers = [pool.submit(kernel, counters, given(thread)) for thread in range(1, threads)]
+    total = kernel(counters, given(0))
     return total + sum(helper.result() for helper in helpers if not helper.cancel())
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.episodes import Control, Episodes
+from kinarm.kernels.rollout import begin
 from kinarm.kernels.session import Session
 from kinarm.world import World
 
@@ -32,10 +33,10 @@ class Batch(NamedTuple):
     ) -> "Batch":
         """Allocate episodes at their starts, yet to be begun; see `Episodes.allocate`."""
         n_pairs, horizon = len(world.contact_model.shapes.pairs), world.problem.task.horizon
-        episodes = Episodes.allocate(
+        episodes, known = Episodes.allocate(
             starts, goals, n_pairs=n_pairs, horizon=horizon, record=record, shift=shift
         )
-        return cls(control, episodes, world.session(control, episodes))
+        return cls(control, episodes, world.session(control, known))
 
     def refill(self, control: Control, starts: Array, goals: Array, shift: Array | None) -> bool:
         """Take in other networks, starts and goals, if they are as many and of the same form."""
@@ -82,6 +83,11 @@ class IdleBatch:
     def keep(self, batch: Batch) -> None:
         """Keep a batch that is no longer in use, instead of any other."""
         self._kept[:] = [batch]
+
+
+def begin_some(first: int, last: int, rows: NDArray[np.int64], session: Session) -> int:
+    """Begin some of the rows, with work space that no other thread uses."""
+    return begin(first, last, rows, session if last - first == len(rows) else session.another())
 
 
 def _arrays(control: Control) -> list[NDArray[Any]]:

@@ -1,11 +1,14 @@
 """Arrays that the simulator hands to the compiled kernels: rules, actions and episodes."""
 
-from typing import NamedTuple
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
 from kinarm.contact_shapes import PLANE
+from kinarm.kernels.records import Layout
 from kinarm.observation import observation_size
 from kinarm.task import REWARD_TERMS
 
@@ -142,32 +145,42 @@ class Episodes(NamedTuple):
         horizon: int,
         record: bool = False,
         shift: NDArray[np.float64] | None = None,
-    ) -> "Episodes":
-        """Allocate episodes at their starts; the kernel ``begin`` fills in the rest.
+    ) -> "tuple[Episodes, Any]":
+        """Allocate episodes at their starts, and what kernels know them by, in one buffer.
 
-        ``record`` keeps the configurations visited, and a ``shift``, shape (n_observations,),
-        collects sums of the observations about this point.
+        The kernel ``begin`` fills in the rest. ``record`` keeps the configurations visited, and a
+        ``shift``, shape (n_observations,), collects sums of the observations about this point.
         """
         n, n_joints = starts.shape
-        n_observations = observation_size(n_joints)
-        collected = 0 if shift is None else n
-        recorded = (n, horizon + 1) if record else (0, 0)
-        return cls(
-            status=np.zeros(n, dtype=np.int64),
-            steps=np.zeros(n, dtype=np.int64),
-            stop=np.full(n, horizon, dtype=np.int64),
-            q=np.array(starts),
-            target=np.array(starts),
-            doubt=np.zeros(n, dtype=np.int64),
-            touched=np.zeros(n, dtype=np.int64),
-            cleared=np.zeros(n, dtype=bool),
-            planes=np.zeros((n, n_pairs, PLANE)),
-            goal=np.array(goals),
-            observation=np.zeros((n, n_observations)),
-            distance=np.zeros(n),
-            terms=np.zeros((n, len(REWARD_TERMS))),
-            total=np.zeros(n),
-            moments=np.zeros((collected, 2, n_observations)),
-            shift=np.zeros(n_observations) if shift is None else np.array(shift),
-            path=np.full((*recorded, n_joints), np.nan),
-        )
+        layout = episodes_layout(n, n_joints, n_pairs, horizon if record else 0, shift is not None)
+        known = layout.record_of(cls)
+        episodes: Episodes = known.values
+        episodes.stop[:] = horizon
+        episodes.q[:], episodes.target[:], episodes.goal[:] = starts, starts, goals
+        episodes.path[:] = np.nan
+        if shift is not None:
+            episodes.shift[:] = shift
+        return episodes, known
+
+
+@lru_cache(maxsize=64)
+def episodes_layout(n: int, n_joints: int, n_pairs: int, horizon: int, collects: bool) -> Layout:
+    """How `Episodes` lie in memory; a horizon of 0 keeps no paths."""
+    n_observations = observation_size(n_joints)
+    path = (n, horizon + 1, n_joints) if horizon else (0, 0, n_joints)
+    shapes: dict[str, tuple[types.Type, tuple[int, ...]]] = {
+        **dict.fromkeys(("status", "steps", "stop"), (types.int64, (n,))),
+        **dict.fromkeys(("q", "target"), (types.float64, (n, n_joints))),
+        **dict.fromkeys(("doubt", "touched"), (types.int64, (n,))),
+        "cleared": (types.boolean, (n,)),
+        "planes": (types.float64, (n, n_pairs, PLANE)),
+        "goal": (types.float64, (n, 3)),
+        "observation": (types.float64, (n, n_observations)),
+        "distance": (types.float64, (n,)),
+        "terms": (types.float64, (n, len(REWARD_TERMS))),
+        "total": (types.float64, (n,)),
+        "moments": (types.float64, (n if collects else 0, 2, n_observations)),
+        "shift": (types.float64, (n_observations,)),
+        "path": (types.float64, path),
+    }
+    return Layout("Episodes", shapes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal, NamedTuple, Protocol, get_args, runtime_checkable
 
 import numpy as np
@@ -121,8 +122,8 @@ class Networks:
         widths = np.asarray(self.layers)
         if widths.ndim != 1 or len(widths) < 2 or (widths < 1).any():
             raise InvalidInputError(f"layers must hold at least two widths, got {self.layers}")
-        n_parameters = int(((widths[:-1] + 1) * widths[1:]).sum())
         object.__setattr__(self, "layers", widths.astype(np.int64))
+        n_parameters = sum((n_in + 1) * n_out for n_in, n_out in pairwise(self.layers.tolist()))
         weights = finite_array("weights", self.weights, (None, n_parameters))
         object.__setattr__(self, "weights", weights)
         activations = checked_activations(self.activations, len(widths) - 1)

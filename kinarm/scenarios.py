@@ -81,7 +81,7 @@ def draw_for_each(
     lower = arm.home + spread * (arm.lower - arm.home)
     extent = spread * (arm.upper - arm.lower)
     source = rngs[0] if len(rngs) == 1 else cast("np.random.Generator", _Sources(rngs))
-    goals = task.draw_goals(world.problem.scene, source, count * len(rngs))
+    goals = world.goals.draw(source, count * len(rngs))
     listed = np.array(task.starts)
     starts = np.empty((len(goals), arm.n_joints))
     starts[:] = arm.home

@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm._parallel import run_rows, run_together
 from kinarm._validation import finite_array
 from kinarm.arm import Arm
-from kinarm.batches import Batch, IdleBatch
+from kinarm.batches import Batch, IdleBatch, begin_some
 from kinarm.episodes import PAUSED, RUNNING, Episodes
 from kinarm.errors import InvalidInputError, StartInContactError
 from kinarm.judging import judge_steps
-from kinarm.kernels.rollout import advance, allow_one_step, begin, results_of_step
+from kinarm.kernels.rollout import advance, allow_one_step, results_of_step
 from kinarm.kernels.session import Session
 from kinarm.networks import CompiledPolicy, Networks, network_control, table_control
 from kinarm.problem import ProblemLike, ReachProblem
@@ -272,9 +272,9 @@ class Simulator:
         """Copy starts and goals, or refuse them as `reset` does."""
         q = finite_array("starts", starts, (None, self.arm.n_joints))
         goal = finite_array("goals", goals, (len(q), 3))
-        outside = ((q < self.arm.lower) | (q > self.arm.upper)).any(axis=1)
+        outside = (q < self.arm.lower) | (q > self.arm.upper)
         if outside.any():
-            index = int(outside.argmax())
+            index = int(outside.any(axis=1).argmax())
             raise InvalidInputError(f"start {index} lies outside the limits: {q[index].tolist()}")
         return q, goal
 
@@ -303,7 +303,7 @@ class Simulator:
 
     def _start(self, episodes: Episodes, rows: NDArray[np.int64], session: Session) -> None:
         """Start some episodes; see `begin`."""
-        if not run_rows(begin, len(rows), len(rows), self.threads, rows, session):
+        if not run_rows(begin_some, len(rows), len(rows), self.threads, rows, session):
             return
         contacts = self.world.contact_model
         paused = rows[episodes.status[rows] == PAUSED]
@@ -336,7 +336,7 @@ class Simulator:
 
     def _advance(self, session: Session, episodes: Episodes, work: int) -> None:
         """Advance episodes to their stop, asking Coal about every step that is in doubt."""
-        while run_together(advance, work, self.threads, session):
+        while run_together(advance, work, self.threads, session.of_thread):
             paused = np.flatnonzero(episodes.status == PAUSED)
             self.judged += judge_steps(self.world, session, episodes, paused)
             resumed = paused[episodes.cleared[paused]]

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field, fields
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +75,35 @@ REWARD_TERMS = tuple(item.name for item in fields(RewardWeights) if item.name !=
 """Names of the reward terms, in the order of `kinarm.kernels.reward`."""
 
 
+class Goals(NamedTuple):
+    """Where goals lie.
+
+    Attributes
+    ----------
+    lower : ndarray, shape (n_regions, 3)
+        Lower corners of the regions [m].
+    extent : ndarray, shape (n_regions, n_moving)
+        Their edges along the axes along which any has one [m].
+    moving : ndarray of int, shape (n_moving,)
+        These axes.
+    ends : ndarray, shape (n_regions - 1,)
+        Where in [0, 1) the share of each region ends.
+    """
+
+    lower: NDArray[np.float64]
+    extent: NDArray[np.float64]
+    moving: NDArray[np.int64]
+    ends: NDArray[np.float64]
+
+    def draw(self, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
+        """Draw goals; see `ReachTask.draw_goals`."""
+        uniforms = rng.random((count, 1 + len(self.moving)))
+        chosen = self.ends.searchsorted(uniforms[:, 0], side="right")
+        goals: NDArray[np.float64] = self.lower[chosen]
+        goals[:, self.moving] += uniforms[:, 1:] * self.extent[chosen]
+        return goals
+
+
 @dataclass(frozen=True, kw_only=True)
 class ReachTask:
     """Bring the tool to a goal.
@@ -144,14 +174,13 @@ class ReachTask:
         ndarray, shape (count, 3)
             Goal points in the world [m].
         """
+        return self.goals_in(scene).draw(rng, count)
+
+    def goals_in(self, scene: Scene) -> "Goals":
+        """Where in a scene goals lie."""
         regions = [scene.goal_region(name) for name in self.goal_regions]
         lower, upper = np.array([(r.lower, r.upper) for r in regions]).transpose(1, 0, 2)
-        extent = upper - lower
-        moving = np.flatnonzero(extent.any(axis=0))
-        uniforms = rng.random((count, 1 + len(moving)))
         weights = self.goal_weights or (1.0,) * len(regions)
+        moving = np.flatnonzero((upper - lower).any(axis=0))
         ends = np.cumsum(weights[:-1]) / sum(weights)
-        chosen = np.searchsorted(ends, uniforms[:, 0], side="right")
-        goals: NDArray[np.float64] = lower[chosen]
-        goals[:, moving] += uniforms[:, 1:] * extent[chosen][:, moving]
-        return goals
+        return Goals(lower, (upper - lower)[:, moving], moving, ends)

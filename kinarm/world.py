@@ -4,24 +4,30 @@ from __future__ import annotations
 
 from copy import copy
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import available_threads, run_rows
 from kinarm._validation import finite_array, one_or_many, whole_number
+from kinarm.chain import Chain
 from kinarm.clearance import Clearance, Closeness
 from kinarm.collision import Contact, ContactModel
+from kinarm.contact_shapes import ContactShapes
 from kinarm.episodes import Control, Episodes, Rules
 from kinarm.errors import ProblemError
 from kinarm.frames import Frames
 from kinarm.inverse_kinematics import InverseSolutions, solve
+from kinarm.kernels.block import Alone, Block, work_space
 from kinarm.kernels.frames import move_frame, place_frame
-from kinarm.kernels.rollout import begin, bind, screen
+from kinarm.kernels.records import recorded
+from kinarm.kernels.rollout import begin, screen
 from kinarm.kernels.session import Session
 from kinarm.networks import table_control
 from kinarm.observation import observation_size
 from kinarm.problem import ProblemLike, ReachProblem
+from kinarm.task import Goals
 
 
 class World:
@@ -63,6 +69,7 @@ class World:
             horizon=int(task.horizon),
             reward=task.reward.vector,
         )
+        self._idle: list[tuple[Block, Alone]] = []
         self._shares = np.arange(1, n_tested + 1)[:, None] / n_tested
 
     def _check_starts(self) -> None:
@@ -86,10 +93,27 @@ class World:
         other.rules = self.rules._replace(tolerance=float(tolerance))
         return other
 
+    def __getstate__(self) -> dict[str, Any]:
+        # A copy may get other rules, and has work space of its own.
+        kept = {name: value for name, value in self.__dict__.items() if name != "records"}
+        return kept | {"_idle": []}
+
     @cached_property
     def frames(self) -> Frames:
         """Frames that `poses` and `jacobians` know; ``frames.names`` lists them."""
         return Frames(self.arm)
+
+    @cached_property
+    def goals(self) -> Goals:
+        """Where the task's goals lie."""
+        return self.problem.task.goals_in(self.problem.scene)
+
+    @cached_property
+    def records(self) -> tuple[Chain, ContactShapes, Rules]:
+        """What kernels know of chain, shapes and rules, by their addresses."""
+        parts = (self.arm.chain, self.contact_model.shapes, self.rules)
+        chain, shapes, rules = (recorded(part) for part in parts)
+        return chain, shapes, rules
 
     @property
     def n_observations(self) -> int:
@@ -146,13 +170,26 @@ class World:
 
     def screened(self, q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """As `screen`, for finite configurations in a contiguous array."""
-        n = len(q)
-        tools, free, touching = np.empty((n, 3)), np.empty(n, dtype=bool), np.empty(n, dtype=bool)
-        arrays = (self.arm.chain, self.contact_model.shapes, q, tools, free, touching)
-        if run_rows(screen, n, n, self.threads, *arrays) < n:
+        tools, free, touching, n_proven = self.proven(q)
+        if n_proven < len(q):
             doubtful = ~(free | touching)
             touching[doubtful] = self.contact_model.in_contact(q[doubtful])
         return tools, touching
+
+    def proven(
+        self, q: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], int]:
+        """What kernels know of finite configurations: Coal has to judge the others.
+
+        Tool points [m], which configurations surely are free, which surely touch, and how many
+        these are together.
+        """
+        n = len(q)
+        tools, free, touching = np.empty((n, 3)), np.empty(n, dtype=bool), np.empty(n, dtype=bool)
+        chain, shapes, _ = self.records
+        arrays = (chain, shapes, q, tools, free, touching)
+        n_proven = run_rows(self._screen_some, n, n, self.threads, *arrays)
+        return tools, free, touching, n_proven
 
     def poses(self, configurations: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
         """Poses of a frame, compiled.
@@ -357,7 +394,18 @@ class World:
 
     def session(self, control: Control, episodes: Episodes) -> Session:
         """Bind episodes, and where their actions come from, for the kernels."""
-        return bind(self.arm.chain, self.contact_model.shapes, self.rules, control, episodes)
+        return Session(*self.records, recorded(control), recorded(episodes))
+
+    def _screen_some(self, first: int, last: int, *arrays: Any) -> int:
+        """Screen some rows, with work space that no other thread uses."""
+        try:
+            block, alone = self._idle.pop()
+        except IndexError:
+            n_pairs = len(self.contact_model.shapes.pairs)
+            block, alone = work_space(n_joints=self.arm.n_joints, n_pairs=n_pairs)
+        proven = screen(first, last, block, alone, *arrays)
+        self._idle.append((block, alone))
+        return proven
 
     @cached_property
     def _closeness(self) -> Closeness:
@@ -368,7 +416,7 @@ class World:
         q = finite_array("configurations", configurations, (None, self.arm.n_joints))
         goal = finite_array("goals", goals, (len(q), 3))
         n_pairs = len(self.contact_model.shapes.pairs)
-        episodes = Episodes.allocate(q, goal, n_pairs=n_pairs, horizon=1)
+        episodes, known = Episodes.allocate(q, goal, n_pairs=n_pairs, horizon=1)
         at_rest = table_control(np.zeros((len(q), 1, self.n_actions)))
-        begin(0, len(q), np.arange(len(q)), self.session(at_rest, episodes))
+        begin(0, len(q), np.arange(len(q)), self.session(at_rest, known))
         return episodes

@@ -1,16 +1,20 @@
 """A block of episodes, side by side in lanes, and how episodes get into it and out again."""
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
 from kinarm.contact_shapes import PLANE
 from kinarm.episodes import Control, Episodes
-from kinarm.kernels.carving import carve_lanes, carve_numbers
-from kinarm.kernels.compiling import Array, inlined, unit
+from kinarm.kernels.compiling import Array, inlined
 from kinarm.kernels.kinematics import POSE
-from kinarm.kernels.lanes import LANES, as_numbers
+from kinarm.kernels.lanes import LANES, as_numbers, lanes
+from kinarm.kernels.records import Fixed, Layout
+
+ONE = Fixed(1)
 
 
 class Block(NamedTuple):
@@ -49,6 +53,8 @@ class Block(NamedTuple):
         1 where there is an episode, and where its step under way was judged already; else 0.
     terms : (1, n_terms)
         Weighted terms of the last reward.
+    row : (LANES,) of whole numbers, not of lanes
+        Which episode is in a lane; -1 where none is.
     first, second : (n_observations,) or (0,)
         Sums of the observations acted upon, less the shift, and of their squares.
     """
@@ -77,6 +83,7 @@ class Block(NamedTuple):
     terms: Array
     first: Array
     second: Array
+    row: NDArray[np.int64]
 
 
 class Alone(NamedTuple):
@@ -105,76 +112,69 @@ class Alone(NamedTuple):
     listed: NDArray[np.int64]
 
 
-@inlined
-def numbers_needed(
-    n_joints: int,
-    n_actuated: int,
-    n_observations: int,
-    n_pairs: int,
-    n_terms: int,
-    widest: int,
-    own: int,
-    summed: int,
-) -> int:
-    """Numbers that a block and the space for a single episode take together."""
-    placed = (n_joints + 1) * POSE
-    lanes = 2 * n_joints + 3 + 2 * n_observations + 2 * placed + (n_pairs + 1) * PLANE
-    lanes += 3 * n_pairs + (n_actuated + 1) * n_actuated + 2 * widest + own + 6 + n_terms
-    return (lanes + 2 * summed) * LANES + n_joints + 2 * placed + PLANE + 24
+def work_space(**sizes: int) -> tuple[Block, Alone]:
+    """Records of a block, and of the space for a single episode; sizes are those of `layouts`."""
+    block, alone = layouts(**sizes)
+    return block.record(), alone.record()
 
 
-@unit
-def work_space(
+@cache
+def layouts(
     n_joints: int,
-    n_actuated: int,
-    n_observations: int,
-    n_pairs: int,
-    n_terms: int,
-    widest: int,
-    own: int,
-    summed: int,
-) -> tuple[Block, Alone]:
-    """Allocate a block, and the space for a single episode, both out of one buffer."""
-    space = np.zeros(
-        numbers_needed(n_joints, n_actuated, n_observations, n_pairs, n_terms, widest, own, summed)
+    n_actuated: int = 0,
+    n_observations: int = 0,
+    n_pairs: int = 0,
+    n_terms: int = 0,
+    widest: int = 0,
+    own: int = 0,
+    summed: int = 0,
+) -> tuple[Layout, Layout]:
+    """How `Block` and `Alone` lie in memory.
+
+    Parameters
+    ----------
+    n_joints, n_actuated, n_observations, n_pairs, n_terms, widest : int
+        Sizes of arm, scene, reward and networks; 0 of what a kernel does without.
+    own : int
+        Parameters of an episode's network, if not all have the same.
+    summed : int
+        Entries of the observation that are summed, all or none.
+    """
+    block = {
+        "q": (ONE, n_joints),
+        "target": (ONE, n_joints),
+        "goal": (ONE, Fixed(3)),
+        "observation": (ONE, n_observations),
+        "seen": (ONE, n_observations),
+        "before": (n_joints + 1, Fixed(POSE)),
+        "after": (n_joints + 1, Fixed(POSE)),
+        "planes": (n_pairs + 1, Fixed(PLANE)),
+        "height": (n_pairs,),
+        "bend": (n_pairs,),
+        "bound": (n_pairs,),
+        "twist": (n_actuated, n_actuated),
+        "action": (ONE, n_actuated),
+        "hidden": (Fixed(2), widest),
+        "weights": (own,),
+        **dict.fromkeys(("distance", "total", "steps", "stop", "alive", "judged"), (ONE,)),
+        "terms": (ONE, n_terms),
+        "first": (summed,),
+        "second": (summed,),
+    }
+    alone = {
+        "q": (ONE, n_joints),
+        "before": (n_joints + 1, Fixed(POSE)),
+        "after": (n_joints + 1, Fixed(POSE)),
+        "plane": (ONE, Fixed(PLANE)),
+        "relative": (Fixed(4), Fixed(3)),
+        "simplex": (Fixed(4), Fixed(3)),
+    }
+    in_lanes = {name: (lanes, shape) for name, shape in block.items()}
+    numbers = {name: (types.float64, shape) for name, shape in alone.items()}
+    return (
+        Layout("Block", {**in_lanes, "row": (types.int64, (Fixed(LANES),))}),
+        Layout("Alone", {**numbers, "listed": (types.int64, (n_pairs + 1, Fixed(2)))}),
     )
-    used = np.zeros(1, dtype=np.int64)
-    block = Block(
-        q=carve_lanes(space, used, (1, n_joints)),
-        target=carve_lanes(space, used, (1, n_joints)),
-        goal=carve_lanes(space, used, (1, 3)),
-        observation=carve_lanes(space, used, (1, n_observations)),
-        seen=carve_lanes(space, used, (1, n_observations)),
-        before=carve_lanes(space, used, (n_joints + 1, POSE)),
-        after=carve_lanes(space, used, (n_joints + 1, POSE)),
-        planes=carve_lanes(space, used, (n_pairs + 1, PLANE)),
-        height=carve_lanes(space, used, (n_pairs,)),
-        bend=carve_lanes(space, used, (n_pairs,)),
-        bound=carve_lanes(space, used, (n_pairs,)),
-        twist=carve_lanes(space, used, (n_actuated, n_actuated)),
-        action=carve_lanes(space, used, (1, n_actuated)),
-        hidden=carve_lanes(space, used, (2, widest)),
-        weights=carve_lanes(space, used, (own,)),
-        distance=carve_lanes(space, used, (1,)),
-        total=carve_lanes(space, used, (1,)),
-        steps=carve_lanes(space, used, (1,)),
-        stop=carve_lanes(space, used, (1,)),
-        alive=carve_lanes(space, used, (1,)),
-        judged=carve_lanes(space, used, (1,)),
-        terms=carve_lanes(space, used, (1, n_terms)),
-        first=carve_lanes(space, used, (summed,)),
-        second=carve_lanes(space, used, (summed,)),
-    )
-    alone = Alone(
-        q=carve_numbers(space, used, (1, n_joints)),
-        before=carve_numbers(space, used, (n_joints + 1, POSE)),
-        after=carve_numbers(space, used, (n_joints + 1, POSE)),
-        plane=carve_numbers(space, used, (1, PLANE)),
-        relative=carve_numbers(space, used, (4, 3)),
-        simplex=carve_numbers(space, used, (4, 3)),
-        listed=np.zeros((n_pairs + 1, 2), dtype=np.int64),
-    )
-    return block, alone
 
 
 @inlined

@@ -18,7 +18,16 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 def kernel(function: Function) -> Function:
     """Compile a function that Python calls, into the disk cache where there can be one."""
-    options: dict[str, Any] = {
+    return _called_by_python(function)
+
+
+def lean_kernel(function: Function) -> Function:
+    """Compile such a function that allocates nothing: without reference counts, it is shorter."""
+    return _called_by_python(function, _nrt=False)
+
+
+def _called_by_python(function: Function, **more: Any) -> Function:
+    options: dict[str, Any] = more | {
         "nogil": True,
         "error_model": "numpy",
         "no_cfunc_wrapper": True,
@@ -40,11 +49,6 @@ def inlined(function: Function) -> Function:
 def helper(function: Function) -> Function:
     """Compile a long helper that allocates nothing: called, it is compiled only once."""
     return _linked(function, _nrt=False)
-
-
-def unit(function: Function) -> Function:
-    """Compile a function that allocates what it returns, for kernels."""
-    return _linked(function)
 
 
 def _linked(function: Function, **more: Any) -> Function:

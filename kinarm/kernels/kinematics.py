@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, Vector, helper, inlined
 from kinarm.kernels.elementary import sine_cosine
 
@@ -70,6 +71,13 @@ def forward_kinematics(
             poses[c, 15] += configurations[row, k] * (
                 poses[c, 10] * ax + poses[c, 11] * ay + poses[c, 12] * az
             )
+
+
+@inlined
+def place(chain: Chain, configurations: Array, poses: Array) -> None:
+    """Fill in the world poses at the first row of the configurations; see `forward_kinematics`."""
+    prismatic, translation, rotation = chain.prismatic, chain.translation, chain.rotation
+    forward_kinematics(prismatic, translation, rotation, chain.axis, configurations, 0, poses)
 
 
 @inlined

@@ -12,7 +12,7 @@ from kinarm.chain import Chain
 from kinarm.contact_shapes import GROUND, PLANE, ContactShapes
 from kinarm.kernels.block import Alone, Block
 from kinarm.kernels.compiling import Array, helper, inlined
-from kinarm.kernels.kinematics import POSE, forward_kinematics
+from kinarm.kernels.kinematics import POSE, place
 from kinarm.kernels.lanes import any_lane, as_numbers, select
 from kinarm.kernels.planes import EVERYDAY, FINE, GAP, height_above, propose
 from kinarm.kernels.separation import separate
@@ -232,10 +232,3 @@ def take_poses(lane: int, poses: Array, single: Array) -> None:
     for frame in range(single.shape[0]):
         for i in range(POSE):
             single[frame, i] = numbers[frame, i, lane]
-
-
-@helper
-def place(chain: Chain, q: Array, poses: Array) -> None:
-    """Fill in the poses of a single configuration, shape (1, n_joints)."""
-    prismatic, translation, rotation, axes = chain[:4]
-    forward_kinematics(prismatic, translation, rotation, axes, q, 0, poses)

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.contact_shapes import PLANE, ContactShapes
-from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Control, Episodes, Rules
+from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Episodes, Rules
 from kinarm.kernels.acting import choose_actions, shared_policy
-from kinarm.kernels.block import Alone, Block, put_back, take_in, work_space
-from kinarm.kernels.compiling import Array, inlined, kernel, unit
-from kinarm.kernels.kinematics import forward_kinematics, to_world
+from kinarm.kernels.block import Alone, Block, put_back, take_in
+from kinarm.kernels.compiling import Array, inlined, lean_kernel
+from kinarm.kernels.kinematics import place, to_world
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.observing import observe
 from kinarm.kernels.planes import GAP
@@ -26,11 +26,11 @@ from kinarm.kernels.proof import (
     stands_free,
 )
 from kinarm.kernels.reward import add_reward
-from kinarm.kernels.session import Session, parts
+from kinarm.kernels.session import Session
 from kinarm.kernels.sharing import take_number
 from kinarm.kernels.touching import deepest_overlap, first_contact, overlaps
 
-LAYOUT = "22036f7814f7"
+LAYOUT = "e6146535c92e"
 """Hash of what is compiled in from other files; a test tells when to renew it.
 
 Numba's disk cache notices changes only in this file, so changing this line is what makes it
@@ -38,10 +38,12 @@ compile anew.
 """
 
 
-@kernel
+@lean_kernel
 def screen(
     first: int,
     last: int,
+    block: Block,
+    alone: Alone,
     chain: Chain,
     shapes: ContactShapes,
     configurations: Array,
@@ -53,26 +55,6 @@ def screen(
 
     Returns of how many one of both is proven; Coal has to judge the others.
     """
-    block, alone = work_space(configurations.shape[1], 0, 0, shapes.planes.shape[0], 0, 0, 0, 0)
-    return screen_blocks(
-        first, last, chain, shapes, configurations, tools, free, touching, block, alone
-    )
-
-
-@inlined
-def screen_blocks(
-    first: int,
-    last: int,
-    chain: Chain,
-    shapes: ContactShapes,
-    configurations: Array,
-    tools: Array,
-    free: NDArray[np.bool_],
-    touching: NDArray[np.bool_],
-    block: Block,
-    alone: Alone,
-) -> int:
-    """Screen configurations block by block."""
     n_joints, tool = configurations.shape[1], chain.tool
     q, points, n_proven = as_numbers(block.q), as_numbers(block.goal), 0
     for start in range(first, last, LANES):
@@ -81,7 +63,7 @@ def screen_blocks(
             row = start + min(lane, filled - 1)
             for joint in range(n_joints):
                 q[0, joint, lane] = configurations[row, joint]
-        place_arms(chain, block)
+        place(chain, block.q, block.after)
         touched = lane_bits(overlaps(deepest_overlap(shapes, block.after)))
         apart = stand(shapes, touched, filled, block, alone)
         x, y, z = to_world(block.after, n_joints, tool[0], tool[1], tool[2])
@@ -95,32 +77,14 @@ def screen_blocks(
     return n_proven
 
 
-@kernel
+@lean_kernel
 def begin(first: int, last: int, rows: NDArray[np.int64], session: Session) -> int:
     """Start episodes ``rows[first]`` to ``rows[last - 1]`` at their ``q`` and ``goal``.
 
     An episode whose start is not proven contact-free is left paused; returns how many are.
     """
     block, alone = session.block, session.alone
-    if last - first < rows.shape[0]:
-        n_joints = session.episodes.q.shape[1]
-        n_observations = session.episodes.observation.shape[1]
-        n_pairs = session.shapes.planes.shape[0]
-        block, alone = work_space(n_joints, 0, n_observations, n_pairs, 0, 0, 0, 0)
-    return begin_blocks(first, last, rows, session, block, alone)
-
-
-@inlined
-def begin_blocks(
-    first: int,
-    last: int,
-    rows: NDArray[np.int64],
-    session: Session,
-    block: Block,
-    alone: Alone,
-) -> int:
-    """Start episodes block by block."""
-    chain, shapes, _, _, episodes = parts(session)
+    chain, shapes, episodes = session.chain, session.shapes, session.episodes
     q, planes, path = episodes.q, episodes.planes, episodes.path
     n_joints, n_observations = q.shape[1], episodes.observation.shape[1]
     n_pairs = shapes.planes.shape[0]
@@ -135,7 +99,7 @@ def begin_blocks(
                 starts[0, joint, lane] = q[e, joint]
             for axis in range(3):
                 goals[0, axis, lane] = episodes.goal[e, axis]
-        place_arms(chain, block)
+        place(chain, block.q, block.after)
         free = stand(shapes, 0, filled, block, alone)
         block.distance[0] = observe(chain.tool, block.after, block.goal, 0, block.observation)
         for lane in range(filled):
@@ -160,13 +124,6 @@ def begin_blocks(
 
 
 @inlined
-def place_arms(chain: Chain, block: Block) -> None:
-    """Place the arms of a block at their configurations."""
-    prismatic, translation, rotation, axes = chain[:4]
-    forward_kinematics(prismatic, translation, rotation, axes, block.q, 0, block.after)
-
-
-@inlined
 def stand(shapes: ContactShapes, touched: int, filled: int, block: Block, alone: Alone) -> int:
     """Bits of the arms that are proven free of contact; ``touched`` are those that are not."""
     free = lane_bits(is_apart(propose_planes(shapes, block.after, block)))
@@ -177,41 +134,7 @@ def stand(shapes: ContactShapes, touched: int, filled: int, block: Block, alone:
     return free
 
 
-@kernel
-def bind(
-    chain: Chain, shapes: ContactShapes, rules: Rules, control: Control, episodes: Episodes
-) -> Session:
-    """Bind a session, whose arrays stay those given."""
-    block, alone = space_for(shapes, rules, control, episodes)
-    return Session(chain, shapes, rules, control, episodes, block, alone)
-
-
-@unit
-def space_for(
-    shapes: ContactShapes,
-    rules: Rules,
-    control: Control,
-    episodes: Episodes,
-) -> tuple[Block, Alone]:
-    """Allocate what it takes to advance episodes."""
-    n_episodes = episodes.status.shape[0]
-    own = control.weights.shape[1] if shared_policy(n_episodes, control) < 0 else 0
-    n_observations, widest = episodes.observation.shape[1], 1
-    for layer in range(1, control.layers.shape[0]):
-        widest = max(widest, control.layers[layer])
-    return work_space(
-        episodes.q.shape[1],
-        rules.step_limit.shape[0],
-        n_observations,
-        shapes.planes.shape[0],
-        rules.reward.shape[0],
-        widest,
-        own,
-        n_observations if episodes.moments.shape[0] > 0 else 0,
-    )
-
-
-@kernel
+@lean_kernel
 def advance(counters: NDArray[np.int64], session: Session) -> int:
     """Advance the running episodes, a block at a time.
 
@@ -219,31 +142,19 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
     free of contact nor proven to touch; then the next one takes its place in the block. Returns
     how many paused.
 
-    Several threads may do so together: the counters, zero at first, tell which episode is the next
-    one, and how many threads have come.
+    Several threads may do so together, each with a session of its own: the first of the counters,
+    zero at first, tells which episode is the next one.
     """
+    chain, shapes, rules = session.chain, session.shapes, session.rules
+    control, episodes = session.control, session.episodes
     block, alone = session.block, session.alone
-    if take_number(counters, 1) > 0:
-        block, alone = space_for(session.shapes, session.rules, session.control, session.episodes)
-    row = np.full(LANES, -1)
-    return advance_blocks(counters, session, row, block, alone)
-
-
-@inlined
-def advance_blocks(
-    counters: NDArray[np.int64],
-    session: Session,
-    row: NDArray[np.int64],
-    block: Block,
-    alone: Alone,
-) -> int:
-    """Advance episodes block by block; ``row`` tells which are in the lanes, -1 where none is."""
-    chain, shapes, rules, control, episodes = parts(session)
-    prismatic, translation, rotation, axes, tool, lower, upper = chain[:7]
+    tool, lower, upper, row = chain.tool, chain.lower, chain.upper, block.row
     n_joints, n_actuated = episodes.q.shape[1], rules.step_limit.shape[0]
     n_episodes, n_pairs = episodes.status.shape[0], shapes.planes.shape[0]
     shared, summed = shared_policy(n_episodes, control), block.first.shape[0]
     before, poses = block.before, block.after
+    for lane in range(LANES):
+        row[lane] = -1
     waiting, n_alive, n_paused, changed = 0, 0, 0, True
     while True:
         for lane in range(row.shape[0]):
@@ -267,11 +178,11 @@ def advance_blocks(
             moved = min(max(moved, lower[axis]), upper[axis])
             block.target[0, axis] = select(fresh, moved, block.target[0, axis])
         before, poses = poses, before
-        forward_kinematics(prismatic, translation, rotation, axes, block.target, 0, poses)
+        place(chain, block.target, poses)
         unproven = ~is_apart(prove_step(shapes, rules.tested, poses, block)) & fresh
         if any_lane(unproven):
             if changed:
-                forward_kinematics(prismatic, translation, rotation, axes, block.q, 0, before)
+                place(chain, block.q, before)
             least = renew_planes(shapes, rules.tested, unproven, before, poses, block)
             unproven = unproven & ~is_apart(least)
         if any_lane(unproven):
@@ -339,7 +250,7 @@ def next_waiting(counters: NDArray[np.int64], episodes: Episodes) -> int:
             return e
 
 
-@kernel
+@lean_kernel
 def allow_one_step(session: Session) -> bool:
     """Let every episode go on by one step; returns whether all its actions are finite."""
     steps, stop, actions = session.episodes.steps, session.episodes.stop, session.control.actions
@@ -351,7 +262,7 @@ def allow_one_step(session: Session) -> bool:
     return nothing == 0.0
 
 
-@kernel
+@lean_kernel
 def results_of_step(
     session: Session, numbers: Array, flags: NDArray[np.bool_], contact: NDArray[np.int64]
 ) -> None:
@@ -373,7 +284,7 @@ def results_of_step(
         contact[e] = episodes.touched[e] if refused else 0
 
 
-@kernel
+@lean_kernel
 def refuse(rows: NDArray[np.int64], session: Session) -> None:
     """End episodes whose step Coal found to touch something."""
     for index in range(rows.shape[0]):

@@ -1,35 +1,16 @@
-"""Everything that a batch of episodes needs, bound into one object.
+"""Everything that a batch of episodes needs, bound into one object."""
 
-Numba takes apart every array that Python hands to a kernel, which for short calls costs more than
-the call. A session is taken apart once.
-"""
-
-from collections.abc import Callable
-from typing import Any, cast
-
-from numba import types
-from numba.core import cgutils
-from numba.core.runtime.context import NRTContext
-from numba.experimental import structref
-from numba.extending import intrinsic
+from typing import Any, NamedTuple
 
 from kinarm.chain import Chain
 from kinarm.contact_shapes import ContactShapes
 from kinarm.episodes import Control, Episodes, Rules
-from kinarm.kernels.block import Alone, Block
+from kinarm.kernels.block import Alone, Block, work_space
+from kinarm.kernels.records import Record, table
 
 
-@structref.register
-class SessionType(types.StructRef):
-    """Numba's type of a `Session`."""
-
-
-class Session(structref.StructRefProxy):
-    """Arm, scene, rules, source of actions and episodes; kernels see them as its attributes.
-
-    One thread at a time may use its block of lanes, and the space for a single episode; others
-    need space of their own.
-    """
+class Parts(NamedTuple):
+    """What kernels see as the attributes of a `Session`: records of it."""
 
     chain: Chain
     shapes: ContactShapes
@@ -40,29 +21,58 @@ class Session(structref.StructRefProxy):
     alone: Alone
 
 
-structref.define_proxy(Session, SessionType, list(Session.__annotations__))
+class Session(Record):
+    """Arm, scene, rules, source of actions and episodes, and work space.
 
+    One thread at a time may use it; others need `another`.
 
-def _parts(_: Any, session: SessionType) -> Any:
-    """What a session binds, work space apart, without counting references.
-
-    For helpers, which hold none: a kernel that takes the attributes counts those of every array.
+    Parameters
+    ----------
+    chain, shapes, rules, control, episodes
+        Records.
     """
-    own = ("block", "alone")
-    fields = {name: kind for name, kind in session.field_dict.items() if name not in own}
 
-    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        data = session.get_data_type()
-        held = cgutils.create_struct_proxy(session)(context, builder, value=arguments[0])
-        place = NRTContext(context, enabled=True).meminfo_data(builder, held.meminfo)
-        kind = context.data_model_manager[data].get_value_type().as_pointer()
-        place = builder.bitcast(place, kind)
-        bound = cgutils.create_struct_proxy(data, kind="data")(context, builder, ref=place)
-        values = [getattr(bound, name) for name in fields]
-        return context.make_tuple(builder, signature.return_type, values)
+    chain: Chain
+    shapes: ContactShapes
+    rules: Rules
+    control: Control
+    episodes: Episodes
+    block: Block
+    alone: Alone
 
-    return types.Tuple(list(fields.values()))(session), code
+    def __init__(
+        self,
+        chain: Any,
+        shapes: Any,
+        rules: Any,
+        control: Any,
+        episodes: Any,
+    ) -> None:
+        weights, layers = control.values.weights, control.values.layers.tolist()
+        q, observation = episodes.values.q, episodes.values.observation
+        space = work_space(
+            n_joints=q.shape[1],
+            n_actuated=rules.values.step_limit.shape[0],
+            n_observations=observation.shape[1],
+            n_pairs=episodes.values.planes.shape[1],
+            n_terms=rules.values.reward.shape[0],
+            widest=max(layers[1:], default=1),
+            own=weights.shape[1] if weights.shape[0] > 1 else 0,
+            summed=observation.shape[1] if len(episodes.values.moments) > 0 else 0,
+        )
+        parts = Parts(chain, shapes, rules, control, episodes, *space)
+        super().__init__(*table(parts), parts)
+        self._others: list[Session] = []
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Session, self.values[:5]
 
-Parts = tuple[Chain, ContactShapes, Rules, Control, Episodes]
-parts = cast("Callable[[Session], Parts]", intrinsic(_parts))
+    def another(self) -> "Session":
+        """A session of the same, with work space of its own."""
+        return Session(*self.values[:5])
+
+    def of_thread(self, number: int) -> "Session":
+        """Which session one of several threads is to use, counted from 0: this one, or another."""
+        while len(self._others) < number:
+            self._others.append(self.another())
+        return self._others[number - 1] if number else self

@@ -12,10 +12,10 @@ from kinarm.contact_shapes import BETWEEN_CAPSULES, GROUND, PLANE, WITH_GROUND, 
 from kinarm.kernels.block import Alone, Block
 from kinarm.kernels.compiling import Array, helper, inlined
 from kinarm.kernels.distance import between_segments, closest_to_box, turned_back
-from kinarm.kernels.kinematics import to_world
+from kinarm.kernels.kinematics import place, to_world
 from kinarm.kernels.lanes import as_numbers
 from kinarm.kernels.planes import FINE, height_above
-from kinarm.kernels.proof import MARGIN, is_apart, place
+from kinarm.kernels.proof import MARGIN, is_apart
 from kinarm.kernels.separation import separate
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array
 from kinarm.policies.oracle.kernels.approach import ArmInScene, search
-from kinarm.policies.oracle.kernels.boxes import ROUNDING, WAITING
+from kinarm.policies.oracle.kernels.boxes import ROUNDING, WAITING, Boxes, layout
 
 
 def bound_steps(
@@ -36,7 +36,8 @@ def bound_steps(
     does in ``most``; and such configurations as ``witnesses``. A search may examine as many boxes
     as are in the budget.
     """
-    best, stack, limits = np.empty(starts.shape[1]), work_space(len(step_limit)), step_limit.copy()
+    best, limits = np.empty(starts.shape[1]), step_limit.copy()
+    space = work_space(arm, len(step_limit))
     for row in range(first, last):
         start, goal = starts[row].copy(), (*goals[row].tolist(),)
         few, many, all_at_once = int(fewest[row]), int(most[row]), not contact
@@ -45,7 +46,7 @@ def bound_steps(
             limit = many if all_at_once else few
             box = within_steps(arm.chain, start, limits, limit)
             inputs = (arm, start, goal, limits, few, limit, tolerance, np.inf, contact, budget)
-            complete, steps, _, _ = search(*inputs, *box, best, stack)
+            complete, steps, _, _ = search(*inputs, *box, best, *space)
             if steps <= limit:
                 witnesses[row] = best
             if complete:
@@ -80,11 +81,11 @@ def bound_distance(
     found; joints beyond those of the boxes stay as in ``starts``.
     """
     n = lower.shape[1]
-    unlimited, stack = np.full(n, np.inf), work_space(n)
+    unlimited, space = np.full(n, np.inf), work_space(arm, n)
     for row in range(first, last):
         box, goal = (lower[row].copy(), upper[row].copy()), (*goals[row].tolist(),)
         inputs = (arm, starts[row].copy(), goal, unlimited, n, n, 0.0, resolution, contact, budget)
-        _, _, found, proven = search(*inputs, *box, configurations[row], stack)
+        _, _, found, proven = search(*inputs, *box, configurations[row], *space)
         distances[row] = proven, found
 
 
@@ -95,6 +96,7 @@ def within_steps(chain: Chain, start: Array, step_limit: Array, steps: int) -> t
     return np.maximum(chain.lower[:n], lower), np.minimum(chain.upper[:n], upper)
 
 
-def work_space(n: int) -> Array:
-    """Space for the boxes of n joints that wait."""
-    return np.empty((WAITING, 2 * n + 1))
+def work_space(arm: ArmInScene, n: int) -> tuple[Array, Boxes]:
+    """Space for the boxes of n joints that wait, and for those that are examined."""
+    n_joints, n_shapes = len(arm.chain.lower), len(arm.shapes.link)
+    return np.empty((WAITING, 2 * n + 1)), layout(n, n_joints, n_shapes).record()

@@ -5,7 +5,7 @@ Kinematics and Jacobian are those of the Pinocchio model, flattened for the comp
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm._parallel import run_rows
 from kinarm._validation import finite_array, whole_number
 from kinarm.errors import InvalidInputError
-from kinarm.policies.oracle.kernels.projection import damped_least_squares
+from kinarm.policies.oracle.kernels.projection import damped_least_squares, layout
 from kinarm.policies.oracle.motion import steps_between
 from kinarm.simulator import Simulator
 from kinarm.spread import evenly_spread
@@ -144,9 +144,17 @@ def project(
     the goal it may rest [m].
     """
     ended, distances = configurations.copy(), np.empty(len(configurations))
-    arrays = (simulator.arm.chain, owner, *box, goals, radius, ended, distances)
-    run_rows(damped_least_squares, len(ended), 4 * len(ended), simulator.threads, *arrays)
+    chain, _, _ = simulator.world.records
+    arrays = (chain, owner, *box, goals, radius, ended, distances)
+    run_rows(_project_some, len(ended), 4 * len(ended), simulator.threads, *arrays)
     return ended, distances
+
+
+def _project_some(first: int, last: int, *arrays: Any) -> None:
+    """Move some of the configurations, with work space that no other thread uses."""
+    chain, _, lower = arrays[:3]
+    moving = layout(len(chain.lower), lower.shape[1]).record()
+    damped_least_squares(first, last, moving, *arrays)
 
 
 def step_box(

@@ -28,6 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import run_rows
 from kinarm._validation import finite_array, one_or_many
+from kinarm.kernels.records import recorded
 from kinarm.motion_bounds import MotionBounds
 from kinarm.policies.oracle.bounding import bound_distance, bound_steps
 from kinarm.policies.oracle.inverse import inverse_kinematics, step_box
@@ -78,9 +79,9 @@ class Oracle:
 
     def __init__(self, problem: ProblemLike, *, threads: int | None = None) -> None:
         self.simulator = Simulator(problem, threads=threads)
-        chain, n = self.simulator.arm.chain, self.simulator.n_actions
-        shapes = self.simulator.world.contact_model.shapes
-        self._arm = ArmInScene(chain, MotionBounds.of(chain, n), shapes)
+        chain, shapes, _ = self.simulator.world.records
+        bounds = MotionBounds.of(self.simulator.arm.chain, self.simulator.n_actions)
+        self._arm = recorded(ArmInScene(chain, recorded(bounds), shapes))
 
     def __repr__(self) -> str:
         return f"Oracle({self.simulator.problem!r})"

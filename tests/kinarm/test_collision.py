@@ -19,7 +19,7 @@ from kinarm.collision import (
     start_anew,
 )
 from kinarm.episodes import COLLISION, PAUSED
-from kinarm.kernels.rollout import advance, screen
+from kinarm.kernels.rollout import advance
 from kinarm.networks import table_control
 from kinarm.reference import ReferenceSimulator
 from kinarm.scene import Obstacle, Scene
@@ -33,10 +33,7 @@ def proven_free(simulator, configurations):
 
 def screened(simulator, configurations):
     """Which configurations the kernel proves free, and which it proves to touch."""
-    n = len(configurations)
-    tools, free, touching = np.empty((n, 3)), np.empty(n, dtype=bool), np.empty(n, dtype=bool)
-    shapes = simulator.world.contact_model.shapes
-    proven = screen(0, n, simulator.arm.chain, shapes, configurations, tools, free, touching)
+    _, free, touching, proven = simulator.world.proven(configurations)
     assert proven == (free | touching).sum()
     return free, touching
 

@@ -6,8 +6,6 @@ from configurations import contact_boundary, jittered, random_configurations
 from known_arms import INSTALLED, KNOWN_ARMS, simulator_among_boxes
 from reference_episodes import compare_actions
 
-from kinarm.kernels.rollout import screen
-
 pytestmark = INSTALLED
 
 
@@ -18,10 +16,7 @@ def simulator(request):
 
 def proven(simulator, configurations):
     """Which configurations the kernel calls free, and which touching."""
-    n = len(configurations)
-    tools, free, touching = np.empty((n, 3)), np.empty(n, dtype=bool), np.empty(n, dtype=bool)
-    shapes = simulator.world.contact_model.shapes
-    screen(0, n, simulator.arm.chain, shapes, configurations, tools, free, touching)
+    _, free, touching, _ = simulator.world.proven(configurations)
     return free, touching
 
 

@@ -20,7 +20,7 @@ KERNELS = {
     for path in sorted(Path(import_module(package).__file__).parent.glob("*.py"))
 }
 SOURCES = {name: path.read_text(encoding="utf-8") for name, path in KERNELS.items()}
-CACHED = [name for name, text in SOURCES.items() if "\n@kernel\n" in text]
+CACHED = [name for name, text in SOURCES.items() if re.search(r"^@(lean_)?kernel$", text, re.M)]
 
 
 def imported_names(source):

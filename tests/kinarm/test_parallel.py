@@ -58,7 +58,7 @@ class TestTogether:
                 done += 1
 
         counts = np.zeros(500, dtype=int)
-        assert run_together(kernel, work, threads, counts) == 500
+        assert run_together(kernel, work, threads, lambda thread: counts) == 500
         np.testing.assert_array_equal(counts, 1)
         assert threading.current_thread() in seen
         assert len(seen) <= at_most
@@ -66,26 +66,26 @@ class TestTogether:
     def test_a_thread_that_comes_too_late_is_not_waited_for(self):
         busy, free = [threading.Event() for _ in range(2)]
 
-        def block(counters):
+        def block(counters, thread):
             busy.set()
             free.wait()
             return 0
 
-        others = threading.Thread(target=run_together, args=(block, 10**6, 5))
+        others = threading.Thread(target=run_together, args=(block, 10**6, 5, int))
         others.start()
         busy.wait()
         try:
-            assert run_together(lambda counters: 1, 10**6, 5) >= 1
+            assert run_together(lambda counters, thread: 1, 10**6, 5, int) >= 1
         finally:
             free.set()
             others.join()
 
     def test_failure_of_a_thread_reaches_the_caller(self):
-        def fail(counters):
+        def fail(counters, thread):
             raise RuntimeError("no")
 
         with pytest.raises(RuntimeError, match="no"):
-            run_together(fail, 10**6, 2)
+            run_together(fail, 10**6, 2, int)
 
 
 def test_at_least_one_thread():

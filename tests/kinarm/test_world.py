@@ -1,5 +1,8 @@
 """What can be asked about configurations, held against Pinocchio and Coal."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 from configurations import contact_boundary, random_configurations
@@ -39,6 +42,18 @@ def test_threads_do_not_matter(simulator):
     alone, together = (World(simulator.problem, threads=n).screen(q) for n in (1, 3))
     np.testing.assert_array_equal(alone[0], together[0])
     np.testing.assert_array_equal(alone[1], together[1])
+
+
+@pytest.mark.parametrize("copied", [copy.copy, lambda world: pickle.loads(pickle.dumps(world))])
+def test_a_copy_can_take_other_rules(simulator, copied):
+    world = World(simulator.problem, threads=1)
+    q = random_configurations(simulator, 4, 200)
+    known = world.screen(q), world.records
+    other = copied(world)
+    other.rules = world.rules._replace(tolerance=0.3)
+    assert other.records[2].tolerance == 0.3
+    assert known[1][2].tolerance == world.records[2].tolerance == world.rules.tolerance
+    np.testing.assert_array_equal(other.screen(q)[1], known[0][1])
 
 
 class TestObserve:

@@ -15,9 +15,9 @@ import numpy as np
 
 from kinarm.chain import Chain
 from kinarm.contact_shapes import ContactShapes
-from kinarm.kernels.compiling import Array, Vector, inlined, kernel
-from kinarm.kernels.kinematics import POSE, point_jacobian
-from kinarm.kernels.lanes import LANES, any_lane, as_lanes, as_numbers, lane_bits
+from kinarm.kernels.compiling import Array, Vector, lean_kernel
+from kinarm.kernels.kinematics import point_jacobian
+from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits
 from kinarm.motion_bounds import MotionBounds
 from kinarm.policies.oracle.kernels.box_bound import (
     closest_step,
@@ -27,7 +27,6 @@ from kinarm.policies.oracle.kernels.box_bound import (
     trim,
 )
 from kinarm.policies.oracle.kernels.boxes import (
-    MODEL,
     ROUNDING,
     WAITING,
     Boxes,
@@ -36,9 +35,9 @@ from kinarm.policies.oracle.kernels.boxes import (
     take_in,
     within_steps,
 )
-from kinarm.policies.oracle.kernels.overlap import ENDS, overlaps
+from kinarm.policies.oracle.kernels.overlap import overlaps
 
-LAYOUT = "699a6d4d9385"
+LAYOUT = "47c1db320a9c"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 
@@ -50,7 +49,7 @@ class ArmInScene(NamedTuple):
     shapes: ContactShapes
 
 
-@kernel
+@lean_kernel
 def search(
     arm: ArmInScene,
     start: Array,
@@ -66,6 +65,7 @@ def search(
     upper: Array,
     best: Array,
     stack: Array,
+    block: Boxes,
 ) -> tuple[bool, int, float, float]:
     """Search a box for the configuration that reaches a goal in the fewest steps, or is closest.
 
@@ -78,7 +78,7 @@ def search(
 
     ``best``, shape (n_joints,), takes what was found; joints beyond the n-th stay as at the start.
     The box shrinks with every configuration that takes fewer steps. ``stack``, shape
-    (WAITING, 2 n + 1), is work space.
+    (WAITING, 2 n + 1), and the block are work space.
 
     Returns
     -------
@@ -89,66 +89,10 @@ def search(
     distance, proven : float
         That of the closest configuration found, and a lower bound over the box [m].
     """
-    n, n_joints = lower.shape[0], start.shape[0]
-    block = Boxes(
-        lower=as_lanes(np.zeros((n, LANES))),
-        upper=as_lanes(np.zeros((n, LANES))),
-        half=as_lanes(np.zeros((n, LANES))),
-        q=as_lanes(np.zeros((1, n_joints, LANES))),
-        tried=as_lanes(np.zeros((1, n_joints, LANES))),
-        poses=as_lanes(np.zeros((n_joints + 1, POSE, LANES))),
-        between=as_lanes(np.zeros((n_joints + 1, POSE, LANES))),
-        proven=as_lanes(np.zeros((1, LANES))),
-        distance=as_lanes(np.zeros((2, LANES))),
-        share=as_lanes(np.zeros((1, LANES))),
-        jacobian=as_lanes(np.zeros((3, n, LANES))),
-        turns=as_lanes(np.zeros((3, n, LANES))),
-        model=as_lanes(np.zeros((MODEL, max(n, 3), LANES))),
-        ends=as_lanes(np.zeros((arm.shapes.link.shape[0], ENDS, LANES))),
-    )
-    return search_lanes(
-        arm,
-        start,
-        goal,
-        step_limit,
-        fewest,
-        most,
-        enough,
-        resolution,
-        contact,
-        budget,
-        lower,
-        upper,
-        best,
-        stack,
-        np.zeros(n),
-        block,
-    )
-
-
-@inlined
-def search_lanes(
-    arm: ArmInScene,
-    start: Array,
-    goal: Vector,
-    step_limit: Array,
-    fewest: int,
-    most: int,
-    enough: float,
-    resolution: float,
-    contact: bool,
-    budget: int,
-    lower: Array,
-    upper: Array,
-    best: Array,
-    stack: Array,
-    lever: Array,
-    block: Boxes,
-) -> tuple[bool, int, float, float]:
-    """Search a box; see `search`, which allocates the block and space for ``lever``, shape (n,)."""
-    chain, bounds, shapes = arm
+    chain, bounds, shapes = arm.chain, arm.bounds, arm.shapes
     n, n_joints = lower.shape[0], start.shape[0]
     jacobian, turns, ends, model = block.jacobian, block.turns, block.ends, block.model
+    lever = block.lever
     offset, step, scale = model[0], model[1], model[2]
     slope, least, bend = model[3], model[4], model[5]
     places = (as_numbers(block.q), as_numbers(block.tried))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, Vector, helper, inlined
-from kinarm.kernels.kinematics import forward_kinematics, to_world
+from kinarm.kernels.kinematics import place, to_world
 from kinarm.kernels.lanes import select
 from kinarm.motion_bounds import MotionBounds
 
@@ -33,8 +33,8 @@ NEGLIGIBLE = 1e-12
 @helper
 def offset_from_goal(chain: Chain, q: Array, goal: Vector, poses: Array, offset: Array) -> float:
     """Fill in poses and the vector from the goal to the tool; return its length [m]."""
-    prismatic, translation, rotation, axis, tool = chain[:5]
-    forward_kinematics(prismatic, translation, rotation, axis, q, 0, poses)
+    tool = chain.tool
+    place(chain, q, poses)
     x, y, z = to_world(poses, q.shape[1], tool[0], tool[1], tool[2])
     x, y, z = x - goal[0], y - goal[1], z - goal[2]
     offset[0], offset[1], offset[2] = x, y, z

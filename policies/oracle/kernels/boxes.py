@@ -1,10 +1,16 @@
 """Boxes of configurations: a stack of those that wait, and a block of them in lanes."""
 
+from functools import cache
 from typing import NamedTuple
+
+from numba import types
 
 from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, inlined
-from kinarm.kernels.lanes import as_numbers
+from kinarm.kernels.kinematics import POSE
+from kinarm.kernels.lanes import as_numbers, lanes
+from kinarm.kernels.records import Fixed, Layout
+from kinarm.policies.oracle.kernels.overlap import ENDS
 
 WAITING = 4096
 """Boxes that can wait at a time; halving eight until they are too small takes fewer."""
@@ -45,6 +51,8 @@ class Boxes(NamedTuple):
         in: step, scale, slope, least and bend.
     ends : (n_shapes, ENDS)
         Capsules in the world.
+    lever : (n,) of numbers, not of lanes
+        How far each joint moves the tool, or what counts as that [m/rad, or m/m].
     """
 
     lower: Array
@@ -61,6 +69,24 @@ class Boxes(NamedTuple):
     turns: Array
     model: Array
     ends: Array
+    lever: Array
+
+
+@cache
+def layout(n: int, n_joints: int, n_shapes: int) -> Layout:
+    """How `Boxes` lie in memory."""
+    shapes = {
+        **dict.fromkeys(("lower", "upper", "half"), (n,)),
+        **dict.fromkeys(("q", "tried"), (Fixed(1), n_joints)),
+        **dict.fromkeys(("poses", "between"), (n_joints + 1, Fixed(POSE))),
+        **dict.fromkeys(("proven", "share"), (Fixed(1),)),
+        "distance": (Fixed(2),),
+        **dict.fromkeys(("jacobian", "turns"), (Fixed(3), n)),
+        "model": (Fixed(MODEL), max(n, 3)),
+        "ends": (n_shapes, Fixed(ENDS)),
+    }
+    arrays = {name: (lanes, shape) for name, shape in shapes.items()}
+    return Layout("Boxes", {**arrays, "lever": (types.float64, (n,))})
 
 
 @inlined

@@ -70,7 +70,7 @@ def deepest_share(a: Vector, b: Vector, lower: Vector, upper: Vector) -> float:
 @inlined
 def place_capsules(shapes: ContactShapes, poses: Array, ends: Array) -> None:
     """Fill in where the capsules are in the world, shape (n_shapes, ENDS)."""
-    link, capsules = shapes[:2]
+    link, capsules = shapes.link, shapes.capsules
     for i in range(link.shape[0]):
         a = to_world(poses, link[i], capsules[i, 0], capsules[i, 1], capsules[i, 2])
         b = to_world(poses, link[i], capsules[i, 3], capsules[i, 4], capsules[i, 5])
@@ -98,8 +98,8 @@ def overlaps(
     (n_shapes, ENDS), and the Jacobian, shape (3, n), are work space.
     """
     prismatic, axes = chain.prismatic, chain.axis
-    link, capsules, boxes, pairs, travel, exact = shapes[:6]
-    turns = shapes.turns
+    link, capsules, boxes, turns = shapes.link, shapes.capsules, shapes.boxes, shapes.turns
+    pairs, travel, exact = shapes.pairs, shapes.travel, shapes.exact
     n = half.shape[0]
     place_capsules(shapes, poses, ends)
     proven: bool = wanted & (half[0] < 0.0)

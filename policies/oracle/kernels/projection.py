@@ -1,18 +1,21 @@
 """Inverse kinematics: configurations moved until they bring the tool to a goal, within limits."""
 
 import math
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
 from kinarm.chain import Chain
-from kinarm.kernels.compiling import Array, Vector, inlined, kernel
-from kinarm.kernels.kinematics import POSE, forward_kinematics, point_jacobian, to_world
-from kinarm.kernels.lanes import LANES, as_lanes, as_numbers, lane_bits, select
+from kinarm.kernels.compiling import Array, Vector, inlined, lean_kernel
+from kinarm.kernels.kinematics import POSE, place, point_jacobian, to_world
+from kinarm.kernels.lanes import LANES, as_numbers, lane_bits, lanes, select
 from kinarm.kernels.limits import take_out_blocked, take_step
+from kinarm.kernels.records import Fixed, Layout
 
-LAYOUT = "c34528a491cb"
+LAYOUT = "4d56413a697d"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 ITERATIONS = 24
@@ -43,6 +46,8 @@ class Moving(NamedTuple):
         How fast the tool moves per unit speed of each joint [m/rad, or m/m].
     step : (n,)
         Where the joints go next [rad or m].
+    rows : (LANES,) of whole numbers, not of lanes
+        Which configurations are in the lanes.
     """
 
     q: Array
@@ -55,6 +60,24 @@ class Moving(NamedTuple):
     poses: Array
     jacobian: Array
     step: Array
+    rows: NDArray[np.int64]
+
+
+@cache
+def layout(n_joints: int, n: int) -> Layout:
+    """How `Moving` lies in memory."""
+    shapes = {
+        "q": (Fixed(1), n_joints),
+        "lower": (n,),
+        "upper": (n,),
+        "goal": (Fixed(3),),
+        **dict.fromkeys(("radius", "distance", "iteration"), (Fixed(1),)),
+        "poses": (n_joints + 1, Fixed(POSE)),
+        "jacobian": (Fixed(3), n),
+        "step": (n,),
+    }
+    arrays = {name: (lanes, shape) for name, shape in shapes.items()}
+    return Layout("Moving", {**arrays, "rows": (types.int64, (Fixed(LANES),))})
 
 
 @inlined
@@ -92,10 +115,11 @@ def move(moving: Moving, vector: Vector, jacobian: Array, step: Array) -> None:
     take_step(q, lower, upper, step)
 
 
-@kernel
+@lean_kernel
 def damped_least_squares(
     first: int,
     last: int,
+    moving: Moving,
     chain: Chain,
     owner: NDArray[np.int64],
     lower: Array,
@@ -112,52 +136,7 @@ def damped_least_squares(
     joints; the others stay) belongs to each, and ``radius`` at which distance it is left [m]. A row
     that has ended makes room in its lane for the next one.
     """
-    n_joints, n = configurations.shape[1], lower.shape[1]
-    moving = Moving(
-        q=as_lanes(np.zeros((1, n_joints, LANES))),
-        lower=as_lanes(np.zeros((n, LANES))),
-        upper=as_lanes(np.zeros((n, LANES))),
-        goal=as_lanes(np.zeros((3, LANES))),
-        radius=as_lanes(np.zeros((1, LANES))),
-        distance=as_lanes(np.zeros((1, LANES))),
-        iteration=as_lanes(np.zeros((1, LANES))),
-        poses=as_lanes(np.zeros((n_joints + 1, POSE, LANES))),
-        jacobian=as_lanes(np.zeros((3, n, LANES))),
-        step=as_lanes(np.zeros((n, LANES))),
-    )
-    project_lanes(
-        first,
-        last,
-        chain,
-        owner,
-        lower,
-        upper,
-        goals,
-        radius,
-        configurations,
-        distances,
-        moving,
-        np.full(LANES, -1),
-    )
-
-
-@inlined
-def project_lanes(
-    first: int,
-    last: int,
-    chain: Chain,
-    owner: NDArray[np.int64],
-    lower: Array,
-    upper: Array,
-    goals: Array,
-    radius: Array,
-    configurations: Array,
-    distances: Array,
-    moving: Moving,
-    rows: NDArray[np.int64],
-) -> None:
-    """Move configurations; see `damped_least_squares`. ``rows`` tells which are in the lanes."""
-    prismatic, translation, rotation, axis, tool = chain[:5]
+    tool, rows = chain.tool, moving.rows
     n_joints, n = configurations.shape[1], lower.shape[1]
     poses, jacobian, step = moving.poses, moving.jacobian, moving.step
     # The numbers in the lanes.
@@ -183,7 +162,7 @@ def project_lanes(
                 free &= ~(1 << lane)
         if n_moving == 0:
             return
-        forward_kinematics(prismatic, translation, rotation, axis, moving.q, 0, poses)
+        place(chain, moving.q, poses)
         point = to_world(poses, n_joints, tool[0], tool[1], tool[2])
         x, y, z = moving.goal[0] - point[0], moving.goal[1] - point[1], moving.goal[2] - point[2]
         distance = math.sqrt(x * x + y * y + z * z)
@@ -199,6 +178,6 @@ def project_lanes(
         free |= ended_bits
         # Aimed at half the radius, a step that falls short still arrives. What has ended stays.
         share = select(ended, 0.0, 1.0 - 0.5 * moving.radius[0] / distance)
-        point_jacobian(prismatic, axis, poses, point, jacobian)
+        point_jacobian(chain.prismatic, chain.axis, poses, point, jacobian)
         move(moving, (share * x, share * y, share * z), jacobian, step)
         moving.iteration[0] += 1.0

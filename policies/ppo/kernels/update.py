@@ -30,7 +30,7 @@ from kinarm.policies.ppo.kernels.loss import (
 )
 from kinarm.policies.ppo.kernels.tiles import LANES, ROWS, Numbers
 
-LAYOUT = "87c5caf4edb1"
+LAYOUT = "4c80f2100e44"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 

@@ -23,11 +23,9 @@ FUNCTIONS = {
 
 
 @njit
-def act_all(control, observations, actions):
-    n, n_observations = observations.shape
-    shared, widest = shared_policy(n, control), control.layers.max()
-    own = control.weights.shape[1] if shared < 0 else 0
-    block, _ = work_space(0, actions.shape[1], n_observations, 0, 0, widest, own, 0)
+def act_all(control, block, observations, actions):
+    n = len(observations)
+    shared, own = shared_policy(n, control), len(block.weights)
     given, weights = as_numbers(block.observation), as_numbers(block.weights)
     chosen, row = as_numbers(block.action), np.full(LANES, -1)
     for start in range(0, n, LANES):
@@ -45,7 +43,14 @@ def compiled(networks, observations):
     count, widths = len(observations), (networks.layers[0], networks.layers[-1])
     control = network_control(networks, None, count, widths)
     actions = np.full((count, widths[1]), np.nan)
-    act_all(control, observations, actions)
+    block, _ = work_space(
+        n_joints=0,
+        n_actuated=widths[1],
+        n_observations=widths[0],
+        widest=max(control.layers),
+        own=control.weights.shape[1] if len(control.weights) > 1 else 0,
+    )
+    act_all(control, block, observations, actions)
     return actions
 
 

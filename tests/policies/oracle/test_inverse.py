@@ -9,7 +9,7 @@ from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError
 from kinarm.policies import inverse_kinematics
 from kinarm.policies.oracle.inverse import project, solve_within, step_box
-from kinarm.policies.oracle.kernels.projection import damped_least_squares
+from kinarm.policies.oracle.kernels.projection import damped_least_squares, layout
 from kinarm.policies.oracle.motion import steps_between
 from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
@@ -284,8 +284,9 @@ class TestLanes:
     def test_other_rows_are_left_alone(self, any_simulator, rows):
         begun, owner, box, goals, radius = rows
         ended, distances = begun.copy(), np.full(90, -1.0)
-        chain = any_simulator.arm.chain
-        damped_least_squares(20, 31, chain, owner, *box, goals, radius, ended, distances)
+        chain, moving = any_simulator.world.records[0], layout(begun.shape[1], box[0].shape[1])
+        arrays = (owner, *box, goals, radius, ended, distances)
+        damped_least_squares(20, 31, moving.record(), chain, *arrays)
         expected, away = project(any_simulator, begun, owner, box, goals, radius)
         moved = np.isin(np.arange(90), np.arange(20, 31))
         np.testing.assert_array_equal(ended, np.where(moved[:, None], expected, begun))

@@ -8,6 +8,7 @@ import pytest
 from scipy.optimize import minimize
 
 from kinarm.arm import Arm
+from kinarm.kernels.records import recorded
 from kinarm.motion_bounds import MotionBounds
 from kinarm.policies.oracle.bounding import bound_distance, bound_steps
 from kinarm.policies.oracle.inverse import project, solve_within, step_box
@@ -30,9 +31,9 @@ GRID = 10_001
 
 def known(simulator):
     """What the kernels know of an arm in a scene."""
-    chain = simulator.arm.chain
-    bounds = MotionBounds.of(chain, simulator.n_actions)
-    return ArmInScene(chain, bounds, simulator.world.contact_model.shapes)
+    chain, shapes, _ = simulator.world.records
+    bounds = MotionBounds.of(simulator.arm.chain, simulator.n_actions)
+    return recorded(ArmInScene(chain, recorded(bounds), shapes))
 
 
 def prove_steps(simulator, starts, goals, *, contact=False, budget=BUDGET, fewest=1, most=None):

@@ -1,0 +1,298 @@
+"""Arrays and numbers by one address: what a kernel would otherwise take apart, array by array.
+
+Numba hands a named tuple over as everything that is in it, from Python to a kernel, and from a
+kernel to each helper. A `Record` is a table of addresses, shapes and numbers, made once. Kernels
+take its own address, and see what is in it as attributes, like those of the named tuple.
+"""
+
+import hashlib
+import struct
+from collections.abc import Mapping
+from ctypes import addressof, c_char
+from functools import cache
+from math import prod
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import from_dtype, types
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import (
+    NativeValue,
+    infer_getattr,
+    lower_getattr_generic,
+    models,
+    register_model,
+    unbox,
+)
+from numba.np.numpy_support import as_dtype
+from numpy.typing import NDArray
+
+from kinarm.kernels.lanes import LANES, lanes
+
+WORD = ir.IntType(64)
+"""What a table consists of: addresses, lengths, whole numbers and the bits of other numbers."""
+
+CACHE_LINE = 8 * LANES
+"""Bytes of a line of the cache, and of a number in lanes."""
+
+NOTHING = c_char * 0
+
+
+class Fixed(int):
+    """A length that belongs to the type of an array, so that kernels are compiled for it."""
+
+
+class RecordType(types.Type):
+    """Numba's type of a record: names and types of what is in it, and lengths that are fixed."""
+
+    def __init__(
+        self,
+        name: str,
+        fields: tuple[tuple[str, types.Type], ...],
+        fixed: Mapping[str, tuple[int | None, ...]] = MappingProxyType({}),
+    ) -> None:
+        self.fields, self.fixed = dict(fields), dict(fixed)
+        self.places, end = {}, 0
+        for field, kind in fields:
+            self.places[field] = end
+            end += 1 + (kind.ndim if isinstance(kind, types.Array) else 0)
+        self.length = end
+        # The name becomes part of the names of all functions that take such a record.
+        digest = hashlib.sha256(repr((fields, self.fixed)).encode()).hexdigest()
+        super().__init__(f"{name}-{digest[:12]}")
+
+
+class Record:
+    """Named arrays, numbers and records, for kernels; `recorded` and `Layout` make them.
+
+    What is in an array may change, but not which array it is.
+
+    Attributes
+    ----------
+    address : int
+        Where the table is.
+    values : named tuple
+        What it is a record of.
+    """
+
+    def __init__(self, kind: RecordType, words: NDArray[np.int64], values: Any) -> None:
+        self._numba_type_, self._words, self.values = kind, words, values
+        self.address = _address(words)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_") or name == "values":
+            raise AttributeError(name)
+        return getattr(self.values, name)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return recorded, (self.values,)
+
+
+def recorded(values: Any) -> Any:
+    """Record of a named tuple of arrays, records and numbers, which it keeps alive.
+
+    Kernels and helpers take it in the tuple's stead. All entries of an array have to lie side by
+    side, in C order. What is a record already stays one.
+    """
+    return values if isinstance(values, Record) else Record(*table(values), values)
+
+
+def table(values: Any) -> tuple[RecordType, NDArray[np.int64]]:
+    """Type and table of the record of a named tuple."""
+    named: Any = type(values)
+    words: list[int] = []
+    kinds: list[Any] = []
+    for value in values:
+        if isinstance(value, np.ndarray):
+            kinds.append((value.dtype.char, value.ndim))
+            words += (_address(value) if value.size else 0, *value.shape)
+        elif isinstance(value, Record):
+            kinds.append(value._numba_type_)
+            words.append(value.address)
+        elif isinstance(value, float):
+            kinds.append(types.float64)
+            words += struct.unpack("q", struct.pack("d", value))
+        else:
+            kinds.append(types.int64)
+            words.append(int(value))
+    return _record_type(named, *kinds), np.array(words, dtype=np.int64)
+
+
+class Layout:
+    """How arrays lie side by side in one buffer.
+
+    Parameters
+    ----------
+    name : str
+        Name of the type.
+    shapes : mapping
+        Per array the type of its entries, `lanes`, float64, int64 or boolean, and its shape, of
+        which some lengths may be `Fixed`.
+    """
+
+    def __init__(self, name: str, shapes: Mapping[str, tuple[types.Type, tuple[int, ...]]]) -> None:
+        words: list[int] = []
+        moved: list[bool] = []
+        self._views: list[tuple[tuple[int, ...], Any, int]] = []
+        end = 0
+        for entry, shape in shapes.values():
+            size = 8 * LANES if entry == lanes else as_dtype(entry).itemsize
+            if entry != lanes:
+                self._views.append((shape, as_dtype(entry), end))
+            words += (end, *shape)
+            moved += (True, *(False for _ in shape))
+            end += -(-size * prod(shape) // 8) * 8
+        self._words, self._size = np.array(words, dtype=np.int64), end // 8
+        self._moved = np.array(moved, dtype=np.int64)
+        kinds = [
+            (field, _array_type(entry, len(shape))) for field, (entry, shape) in shapes.items()
+        ]
+        fixed = {
+            field: tuple(int(length) if isinstance(length, Fixed) else None for length in shape)
+            for field, (_, shape) in shapes.items()
+            if any(isinstance(length, Fixed) for length in shape)
+        }
+        self._kind = RecordType(name, tuple(kinds), fixed)
+
+    def record(self) -> Any:
+        """Record of new arrays, which are zero."""
+        words, buffer = self._placed()
+        return WorkSpace(self._kind, words, buffer, self)
+
+    def record_of(self, named: Any) -> Any:
+        """Record of a named tuple of new arrays, which are zero; none may be of lanes."""
+        words, buffer = self._placed()
+        views = [np.ndarray(shape, dtype, buffer, start) for shape, dtype, start in self._views]
+        return Record(self._kind, words, named(*views))
+
+    def _placed(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """A table, and the buffer that it leads to."""
+        buffer = np.zeros(self._size + LANES)
+        start = _address(buffer)
+        # Lanes that begin where a line of the cache does lie in one line.
+        shift = -start % CACHE_LINE
+        return self._words + (start + shift) * self._moved, buffer[shift // 8 :][: self._size]
+
+
+class WorkSpace(Record):
+    """Record of arrays that lie side by side in a buffer; copies of it begin anew."""
+
+    def __init__(
+        self,
+        kind: RecordType,
+        words: NDArray[np.int64],
+        buffer: NDArray[np.float64],
+        layout: Layout,
+    ) -> None:
+        super().__init__(kind, words, ())
+        self.buffer, self._layout = buffer, layout
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return self._layout.record, ()
+
+
+def _address(array: NDArray[Any]) -> int:
+    """Where an array begins; its entries have to lie side by side."""
+    given: Any = array
+    try:
+        return addressof(NOTHING.from_buffer(given))
+    except TypeError:  # It is read-only, or has gaps.
+        if not array.flags.c_contiguous:
+            raise
+    address: int = array.__array_interface__["data"][0]
+    return address
+
+
+@cache
+def _array_type(entry: types.Type, ndim: int) -> types.Array:
+    # Lanes need not lie where their size would have it.
+    return types.Array(entry, ndim, "C", aligned=entry != lanes)
+
+
+@cache
+def _record_type(named: Any, *kinds: Any) -> RecordType:
+    """Type of the record of a named tuple, whose arrays are given by their types and axes."""
+    fields = zip(named._fields, kinds, strict=True)
+    return RecordType(
+        named.__name__,
+        tuple(
+            (name, _array_type(from_dtype(np.dtype(kind[0])), kind[1]))
+            if isinstance(kind, tuple)
+            else (name, kind)
+            for name, kind in fields
+        ),
+    )
+
+
+@register_model(RecordType)
+class _RecordModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: types.Type) -> None:
+        super().__init__(manager, kind, WORD.as_pointer())
+
+
+@unbox(RecordType)
+def _unboxed(_: RecordType, value: Any, c: Any) -> NativeValue:
+    """Take the address of a record."""
+    address = c.pyapi.object_getattr_string(value, "address")
+    pointer = c.pyapi.long_as_voidptr(address)
+    c.pyapi.decref(address)
+    return NativeValue(c.builder.bitcast(pointer, WORD.as_pointer()))
+
+
+def _field_type(_: Any, record: RecordType, name: str) -> types.Type | None:
+    """Type of what a record holds by a name."""
+    return record.fields.get(name)
+
+
+infer_getattr(
+    type(
+        "RecordAttribute",
+        (AttributeTemplate,),
+        {"key": RecordType, "generic_resolve": _field_type},
+    )
+)
+
+
+@lower_getattr_generic(RecordType)
+def _held(context: Any, builder: Any, record: RecordType, table: Any, name: str) -> Any:
+    """Read from the table. Nothing counts references: the record keeps alive what is in it."""
+    kind, place = record.fields[name], record.places[name]
+
+    def word(offset: int, form: Any) -> Any:
+        where = builder.gep(table, [WORD(place + offset)])
+        value = builder.load(builder.bitcast(where, form.as_pointer()))
+        # Tables never change, whatever else is written.
+        value.set_metadata("invariant.load", builder.module.add_metadata([]))
+        return value
+
+    if isinstance(kind, RecordType):
+        # What lies in a table may be read ahead of loops, whether they read it or not.
+        inner, whole = word(0, WORD.as_pointer()), builder.module.add_metadata
+        inner.set_metadata("dereferenceable", whole([WORD(8 * kind.length)]))
+        inner.set_metadata("align", whole([WORD(8)]))
+        return inner
+    if not isinstance(kind, types.Array):
+        return word(0, context.get_value_type(kind))
+    from numba.np.arrayobj import make_array, populate_array
+
+    made = make_array(kind)(context, builder)
+    entry = context.get_data_type(kind.dtype)
+    width = WORD(context.get_abi_sizeof(entry))
+    shape = [
+        word(1 + axis, WORD) if length is None else WORD(length)
+        for axis, length in enumerate(record.fixed.get(name, (None,) * kind.ndim))
+    ]
+    strides = [width]
+    for length in shape[:0:-1]:
+        strides.insert(0, builder.mul(strides[0], length))
+    populate_array(
+        made,
+        data=word(0, entry.as_pointer()),
+        shape=shape,
+        strides=strides,
+        itemsize=width,
+        meminfo=None,
+    )
+    return made._getvalue()

@@ -1,0 +1,146 @@
+"""Records: named tuples and work space that kernels find by one address."""
+
+import copy
+import pickle
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from numba import njit, types
+
+from kinarm.kernels.compiling import inlined, lean_kernel
+from kinarm.kernels.lanes import LANES, as_numbers, lanes
+from kinarm.kernels.records import CACHE_LINE, Fixed, Layout, recorded
+
+
+class Inner(NamedTuple):
+    numbers: np.ndarray
+    flags: np.ndarray
+
+
+class Outer(NamedTuple):
+    inner: Inner
+    count: int
+    factor: float
+    empty: np.ndarray
+
+
+def outer():
+    inner = Inner(np.arange(24.0).reshape(2, 3, 4), np.array([True, False]))
+    return Outer(inner, -7, 0.1, np.zeros((0, 5), dtype=np.int64))
+
+
+def as_record(values):
+    return recorded(values._replace(inner=recorded(values.inner)))
+
+
+@inlined
+def read(values):
+    numbers = values.inner.numbers
+    total = 0.0
+    for i in range(numbers.shape[0]):
+        for j in range(numbers.shape[1]):
+            row = numbers[i, j]
+            for k in range(row.shape[0]):
+                total += row[k] * (i + 10 * j + 100 * k)
+    shape, first = values.empty.shape, values.inner.flags[0]
+    return total, numbers.size, numbers.strides[0], shape, first, values.count * values.factor
+
+
+@lean_kernel
+def read_all(values):
+    return read(values)
+
+
+@lean_kernel
+def write(values):
+    values.inner.numbers[1, 2, 3] = -1.0
+
+
+def test_kernels_read_records_as_they_read_named_tuples():
+    assert read_all(as_record(outer())) == read_all(outer())
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
+def test_copies_have_arrays_of_their_own(copied):
+    record = as_record(outer())
+    other = copied(record)
+    write(other)
+    assert other.inner.numbers[1, 2, 3] == -1.0
+    assert record.inner.numbers[1, 2, 3] == 23.0
+    assert read_all(record) == read_all(outer())
+
+
+def test_records_keep_arrays_alive():
+    records = [as_record(outer()) for _ in range(50)]
+    assert {read_all(record) for record in records} == {read_all(outer())}
+
+
+def test_records_of_one_form_share_a_type():
+    record, other = as_record(outer()), as_record(outer())
+    assert record._numba_type_ is other._numba_type_
+    flat = recorded(Inner(np.zeros(3), np.zeros(2, dtype=bool)))
+    assert flat._numba_type_ != record.inner._numba_type_
+
+
+def test_read_only_arrays_are_read():
+    values = outer()
+    values.inner.numbers.flags.writeable = False
+    assert read_all(as_record(values)) == read_all(outer())
+
+
+def test_arrays_with_gaps_are_refused():
+    with pytest.raises(TypeError):
+        recorded(Inner(np.zeros((4, 4))[:, ::2], np.zeros(2, dtype=bool)))
+
+
+def test_unknown_names():
+    record = as_record(outer())
+    with pytest.raises(AttributeError, match="missing"):
+        _ = record.missing
+
+
+@njit
+def fill(space):
+    as_numbers(space.first)[:], space.second[:], as_numbers(space.third)[:] = 1.0, 2, 3.0
+    return as_numbers(space.first).shape, space.second.shape, as_numbers(space.third).shape
+
+
+@pytest.mark.parametrize("n", [0, 1, 4])
+def test_arrays_of_a_layout_lie_side_by_side(n):
+    shapes = {"first": (lanes, (n, 2)), "second": (types.int64, (3, n)), "third": (lanes, (1,))}
+    layout = Layout("Space", shapes)
+    space, other = layout.record(), layout.record()
+    assert fill(space) == ((n, 2, LANES), (3, n), (1, LANES))
+    counts = [2 * n * LANES, 3 * n, LANES]
+    words = np.frombuffer(space.buffer, dtype=np.int64)
+    expected = np.repeat(
+        [np.float64(1.0).view(np.int64), 2, np.float64(3.0).view(np.int64)], counts
+    )
+    np.testing.assert_array_equal(words, expected)
+    assert not other.buffer.any()
+    assert space.buffer.ctypes.data % CACHE_LINE == 0
+
+
+def test_lengths_that_are_fixed_belong_to_the_type():
+    shapes = [{"numbers": (types.float64, (2, last))} for last in (3, Fixed(3), Fixed(4))]
+    free, fixed, other = (Layout("Space", shape) for shape in shapes)
+    assert len({layout.record()._numba_type_ for layout in (free, fixed, other)}) == 3
+
+    @njit
+    def shape_and_strides(space):
+        return space.numbers.shape, space.numbers.strides
+
+    assert shape_and_strides(free.record()) == ((2, 3), (24, 8))
+    assert shape_and_strides(fixed.record()) == ((2, 3), (24, 8))
+
+
+def test_a_layout_makes_named_tuples_of_arrays():
+    shapes = {"numbers": (types.float64, (2, 3, 4)), "flags": (types.boolean, (2,))}
+    record = Layout("Inner", shapes).record_of(Inner)
+    values = record.values
+    values.numbers[:], values.flags[:] = np.arange(24.0).reshape(2, 3, 4), (True, False)
+    assert record._numba_type_ == recorded(values)._numba_type_
+    assert recorded(record) is record
+    assert read_all(as_record(outer()._replace(inner=record))) == read_all(outer())
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(record)).numbers, values.numbers)
