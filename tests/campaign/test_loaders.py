@@ -54,7 +54,13 @@ OTHERS = {
 OWN_DATA = (
     *("kinarm.viewer.html_page", "kinarm.viewer.live", "evaluation.report", "evaluation.replays"),
     *("evaluation.measurements", "evaluation.reproduction.document", "policies.learners"),
-    *("policies.sb3", "policies.ppo", "evaluation.comparison.training", "kinarm.envs"),
+    *(
+        "policies.library",
+        "policies.sb3",
+        "policies.ppo",
+        "evaluation.comparison.training",
+        "kinarm.envs",
+    ),
 )
 """Modules that read nothing but what ships with kinarm, or what they wrote."""
 
