@@ -66,7 +66,7 @@ def _bootstrapped(outcomes: Outcomes, known: Mapping[str, Metric]) -> dict[str, 
     if seeds == 1:
         return dict(zip(formulas, map(percentile_interval, found), strict=True))
     each = np.stack([figures(outcomes.of_seed(seed)) for seed in range(seeds)], axis=-1)
-    intervals = {}
+    intervals: dict[str, tuple[float, float] | None] = {}
     for name, of_seeds, of_trials in zip(formulas, each, found, strict=True):
         value = float(formulas[name](outcomes))
         parts = [(of_seeds.var(ddof=1) / seeds, seeds - 1), (of_trials.var(ddof=1), trials - 1)]

@@ -98,7 +98,7 @@ class TrialSet:
 
     def with_tolerance(self, tolerance: float) -> "TrialSet":
         """The same starts and goals, which count as reached at another distance [m]."""
-        return replace(self, simulator=Simulator(self.problem.replace(tolerance=tolerance)))
+        return replace(self, simulator=self.simulator.with_tolerance(tolerance))
 
     def __len__(self) -> int:
         return len(self.starts)

@@ -133,7 +133,7 @@ def _evaluated_candidates(
         problem = row["problem"]
         chosen.append((row, entrant or first_entrant(row["policy"])))
     faced = min(len(row["outcomes"]["steps"]) for row, _ in chosen)
-    trials = document.trials(problem).chosen(range(faced))
+    trials = document.trials(str(problem)).chosen(range(faced))
     runs = []
     for row, entrant in chosen:
         run = FacedRun.of(entrant, trials, allow_other_arm=True)
@@ -150,7 +150,8 @@ def _solved_bounds(trials: TrialSet) -> LowerBounds:
     """Let the oracle solve no more trials than are played."""
 
     def lower_bounds(numbers: Sequence[int]) -> Sequence[int]:
-        return oracle_bounds(trials.chosen(numbers)).steps_lower_bound.tolist()
+        floors: list[int] = oracle_bounds(trials.chosen(numbers)).steps_lower_bound.tolist()
+        return floors
 
     return lower_bounds
 
