@@ -221,10 +221,9 @@ def alternatives(hint: Any) -> tuple[Any, ...]:
     return (hint,)
 
 
-@cache
-def init_fields(kind: type) -> Mapping[str, Field[Any]]:
+def init_fields(kind: type) -> dict[str, Field[Any]]:
     """Fields of a dataclass that can be given, by name."""
-    return types.MappingProxyType({item.name: item for item in fields(kind) if item.init})
+    return {item.name: item for item in fields(kind) if item.init}
 
 
 @cache

@@ -34,12 +34,15 @@ def test_documents_that_are_refused(content, reason):
         ({"xyz": "0 0"}, "must be 3"),
         ({"axis": "0 0 0"}, "no axis"),
         ({"limit": '<limit lower="-inf" upper="1" velocity="1"/>'}, "lower of <limit>"),
+        ({"limit": '<limit lower="1" upper="-1" velocity="1"/>'}, "no usable limits: 1.0..-1.0"),
+        ({"limit": '<limit upper="1e308" velocity="1"/>'}, "no usable limits"),
     ],
 )
-def test_joints_that_are_refused(make_joint, write_robot, changes, words):
+def test_joints_that_are_refused(make_joint, write_robot, changes, words, capfd):
     path = write_robot([make_joint(**changes), make_joint(axis="0 1 0")])
     with pytest.raises(ArmError, match=f"'joint_1' of made.urdf.*{words}"):
         Arm.load(path)
+    assert capfd.readouterr() == ("", "")
 
 
 @pytest.mark.parametrize(
