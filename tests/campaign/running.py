@@ -161,8 +161,11 @@ def record(tallies: Mapping[str, Tally], given: argparse.Namespace, module: str)
     """Write what came of subjects, with the command; what other processes write is kept."""
     if given.out is None:
         return
-    arguments = ["--inputs", str(given.inputs), "--seed", str(given.seed), "--out", str(given.out)]
-    command = shlex.join(["python", "-m", f"tests.campaign.{module}", *arguments])
+    told = {name: getattr(given, name, None) for name in ("inputs", "seconds", "seed", "out")}
+    arguments = [
+        word for name, value in told.items() if value is not None for word in (f"--{name}", value)
+    ]
+    command = shlex.join(["python", "-m", f"tests.campaign.{module}", *map(str, arguments)])
     given.out.parent.mkdir(parents=True, exist_ok=True)
     with given.out.open("a+") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
@@ -189,12 +192,12 @@ def campaign(subjects: Mapping[str, MakeTry], given: argparse.Namespace, module:
                 tallies[name].add(number, verdict)
                 if sys.stderr.isatty() and number % 100 == 0:
                     sys.stderr.write(f"\r{name}: {number} of {given.inputs}")
-            _tell(name, tallies[name])
+            tell(name, tallies[name])
             record({name: tallies[name]}, given, module)
     return sum(len(tallies[name].findings) for name in chosen)
 
 
-def _tell(name: str, tally: Tally) -> None:
+def tell(name: str, tally: Tally) -> None:
     """Say what came of a subject so far."""
     sys.stderr.write(
         f"\r{name}: {tally.inputs} inputs, {tally.accepted} accepted, {tally.refused} refused, "

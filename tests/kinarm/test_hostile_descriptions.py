@@ -34,6 +34,7 @@ def test_documents_that_are_refused(content, reason):
         ({"xyz": "0 0"}, "must be 3"),
         ({"axis": "0 0 0"}, "no axis"),
         ({"limit": '<limit lower="-inf" upper="1" velocity="1"/>'}, "lower of <limit>"),
+        ({"limit": '<limit upper="1" velocity="-1e308"/>'}, "must be 1 of at least 0"),
         ({"limit": '<limit lower="1" upper="-1" velocity="1"/>'}, "no usable limits: 1.0..-1.0"),
         ({"limit": '<limit upper="1e308" velocity="1"/>'}, "no usable limits"),
     ],

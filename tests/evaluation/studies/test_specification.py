@@ -106,7 +106,10 @@ class TestChoices:
     [
         ({"seeds": 0}, "seeds must be a whole number of at least 1, got 0"),
         ({"seeds": 2**63}, "seeds must be at most 100000, got 9223372036854775808"),
-        ({"random": {"count": 10**6, "noise": [1]}}, "random.count must be at most 100000, got 1000000"),
+        (
+            {"random": {"count": 10**6, "noise": [1]}},
+            "random.count must be at most 100000, got 1000000",
+        ),
         (
             {"seeds": 1000, "grid": {"noise": [1, 2], "step_size": [0.1] * 100}},
             "a study has at most 100,000 trainings, this one 200,000",
