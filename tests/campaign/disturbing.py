@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from .processes import own_cache, write
+from .record_page import write_page
 
 
 @dataclass
@@ -95,6 +96,7 @@ def main(
         counts = {module: sum(tally.disturbances for tally in tallies.values())}
         parts = {name: asdict(tally) for name, tally in tallies.items()}
         write(given.out, module, counts, findings_of(tallies), parts)
+        write_page(given.out, parts)
         sys.stderr.write(f"{counts[module]} {module}, {findings_of(tallies)} findings\n")
 
     sys.exit(findings_of(campaign(given.count, given.seed, given.only, tell)) > 0)

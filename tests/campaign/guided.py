@@ -23,7 +23,7 @@ import kinarm.simulator
 
 with atheris.instrument_imports(include=["kinarm"]):
     import kinarm.evaluation.document
-    import kinarm.recording
+    import kinarm.recording  # noqa: F401
 
 from .judging import Judge, Verdict
 from .loaders import LOADERS

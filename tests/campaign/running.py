@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from .judging import Verdict
+from .record_page import write_page
 
 PATIENCE = 120.0
 """Time after which a call counts as hanging [s]."""
@@ -176,6 +177,7 @@ def record(tallies: Mapping[str, Tally], given: argparse.Namespace, module: str)
         text = json.dumps(content, indent=1) + "\n"
         file.truncate(0)
         file.write(text)
+        write_page(given.out, kept)
 
 
 def campaign(subjects: Mapping[str, MakeTry], given: argparse.Namespace, module: str) -> int:
