@@ -6,10 +6,18 @@ from pathlib import Path
 from typing import Any
 
 TITLES = {
-    "peak_memory": "memory of a call, at most [MB]",
+    "peak_memory": "memory at its highest [MB]",
     "slowest_end": "slowest end [s]",
     "before_kinarm": "in Python's own start",
     "ends": "ran to their end",
+    "acts": "hostile visits",
+    "polite_visits": "polite visits",
+    "undisturbed": "page and scene before, slowest [s]",
+    "median_answer": "meanwhile, median [s]",
+    "slowest_answer": "slowest [s]",
+    "memory": "memory before [MB]",
+    "files": "open files before",
+    "files_left": "after",
 }
 """Titles of columns that are not called as in the record."""
 
@@ -27,8 +35,9 @@ def record_page(parts: Mapping[str, Mapping[str, Any]]) -> str:
         ["", *(TITLES.get(column, column) for column in columns)],
         ["---"] * (1 + len(columns)),
         *([name, *map(_cell, row.values())] for name, row in rows.items()),
-        ["**all**", *map(_cell, total.values())],
     ]
+    if len(rows) > 1:
+        lines.append(["**all**", *map(_cell, total.values())])
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 

@@ -9,7 +9,7 @@ def test_counts_are_summed_and_measures_are_compared():
         "policy": {"inputs": 50, "findings": {}, "examples": {}, "peak_memory": 0.25},
     }
     assert record_page(parts).splitlines() == [
-        "|  | inputs | memory of a call, at most [MB] | findings |",
+        "|  | inputs | memory at its highest [MB] | findings |",
         "| --- | --- | --- | --- |",
         "| policy | 50 | 0.25 | 0 |",
         "| urdf | 2,000 | 3.5 | 3 |",
