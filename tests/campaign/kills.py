@@ -134,19 +134,31 @@ def killed(
     with TemporaryDirectory() as name:
         folder = Path(name)
         for _ in range(kills):
-            with started(run.words(folder), folder) as process:
-                time.sleep(rng.uniform(0, wanted.seconds))
-                tally.kills += process.poll() is None
-                process.kill()
-                process.wait()
-                for left in left_behind(process.pid, folder):
-                    if left in ("a process", "shared memory"):
-                        tally.find(f"leaves {left}")
-            _let_age(folder)
-        _to_its_end(run, folder, tally)
+            if _ends_before(rng.uniform(0, 0.6 * wanted.seconds), run, folder, tally):
+                break
+        else:
+            _to_its_end(run, folder, tally)
         tally.ends += 1
         if made_by(run, folder) != wanted.made:
             tally.find("other results")
+
+
+def _ends_before(seconds: float, run: LongRun, folder: Path, tally: KillTally) -> bool:
+    """Kill a run after some time; whether it has ended by then, since it goes on each time."""
+    with started(run.words(folder), folder) as process:
+        time.sleep(seconds)
+        status = process.poll()
+        if status is None:
+            process.kill()
+            process.wait()
+            tally.kills += 1
+            for left in left_behind(process.pid, folder):
+                if left in ("a process", "shared memory"):
+                    tally.find(f"leaves {left}")
+            _let_age(folder)
+        elif status:
+            tally.find(f"ends with status {status}", err=(folder / "err").read_text()[-2000:])
+    return status is not None
 
 
 def _to_its_end(run: LongRun, folder: Path, tally: KillTally) -> float:
