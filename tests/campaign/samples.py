@@ -152,7 +152,8 @@ def recipes() -> list[bytes]:
     ]
 
 
-SMALL_URDF = b"""<robot name="made" version="1.2">
+SMALL_URDF = b"""<?xml version="1.0" encoding="utf-8"?>
+<robot name="made" version="1.2">
 <material name="red"><color rgba="1 0 0 1"/></material>
 <link name="base"><collision><origin xyz="0 0 .1"/>
 <geometry><box size=".2 .2 .2"/></geometry></collision></link>

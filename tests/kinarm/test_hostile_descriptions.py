@@ -20,6 +20,9 @@ BOMB = b'<!DOCTYPE a [<!ENTITY b "bbbbbbbbbb"><!ENTITY c "&b;&b;&b;&b;">]><robot
         (b'<a><b count="99999999999"/></a>', "more than it holds"),
         (b"<a><b></a>", "mismatched tag"),
         (b"", "no element found"),
+        (b'<?xml version="1.0" encoding="xyz"?><a/>', "unknown encoding"),
+        (b'<?xml version="1.0" encoding="hex"?><a/>', "not a text encoding"),
+        (b'<?xml version="1.0" encoding="utf-7"?><a/>', "not supported"),
     ],
 )
 def test_documents_that_are_refused(content, reason):
