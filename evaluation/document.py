@@ -239,8 +239,8 @@ class EvaluationDocument:
                 )
 
 
-EACH, NULL = "*", type(None)
-"""Key that stands for every key of an object, and the type of what is not there."""
+EACH, ENTRY, NULL = "*", "[]", type(None)
+"""Keys that stand for every key of an object and every entry of a list, and the type of null."""
 
 SHAPE = {
     "protocol": {
@@ -256,7 +256,7 @@ SHAPE = {
         },
     },
     "results": {
-        EACH: {
+        ENTRY: {
             "policy": str,
             "problem": str,
             "trained_on": (str, NULL),
@@ -301,8 +301,12 @@ def check_shape(value: Any, shape: Any, where: str) -> None:
         if not isinstance(value, shape):
             raise InvalidInputError(f"{where} is of the wrong kind")
         return
-    if EACH in shape and isinstance(value, list):
-        value = {str(number): entry for number, entry in enumerate(value)}
+    if ENTRY in shape:
+        if not isinstance(value, list):
+            raise InvalidInputError(f"{where} is no list")
+        for number, entry in enumerate(value):
+            check_shape(entry, shape[ENTRY], f"{where}.{number}")
+        return
     if not isinstance(value, Mapping):
         raise InvalidInputError(f"{where} is no object")
     for key in value if EACH in shape else shape:

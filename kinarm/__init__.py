@@ -7,14 +7,15 @@ from pathlib import Path
 
 import lazy_loader
 
-from kinarm.envs.registration import register_environments
-
 __version__ = "0.1.0"
 
 # What there is stands in __init__.pyi, and is imported when it is first used.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
-register_environments()
+if not _interrupts.is_command():  # a command starts in two thirds of the time without Gymnasium
+    from kinarm.envs.registration import register_environments
+
+    register_environments()
 
 _root = Path(__file__).resolve().parent.parent
 if (_root / "pyproject.toml").is_file():

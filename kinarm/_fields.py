@@ -153,7 +153,7 @@ def check_fields(given: Any) -> None:
 
 def _value(hint: Any, entry: Any, where: str, path: str, kind: type) -> Any:
     """Convert a value to what a type hint asks for."""
-    if hint is Any:
+    if hint is Any or (type(entry) is hint and hint is not float):
         return entry
     choices = alternatives(hint)
     if isinstance(entry, np.ndarray | np.generic):
@@ -213,6 +213,7 @@ def expected(hint: Any) -> str:
     return SCALARS.get(hint, "a path")
 
 
+@cache
 def alternatives(hint: Any) -> tuple[Any, ...]:
     """Types of a union without None, or the type itself."""
     if get_origin(hint) in (Union, types.UnionType):

@@ -42,7 +42,7 @@ _phase: Literal["foreign", "starting", "running", "ending"] = "foreign"
 _requested = False
 
 
-def _is_command() -> bool:
+def is_command() -> bool:
     """Whether this process is a command of kinarm: by its script, or by ``python -m kinarm.x``."""
     program = sys.argv[0] if sys.argv else ""
     if program == "-m":  # so it stands while Python looks for the module
@@ -137,5 +137,5 @@ def kept_from_children() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-if _is_command():
+if is_command():
     _take_over()

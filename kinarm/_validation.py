@@ -24,7 +24,7 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> 
     """
     try:
         array = np.array(value, dtype=np.float64, order="C")
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidInputError(f"{name} must be numbers: {error}") from error
     if array.shape != shape and not _matches(array.shape, shape):
         wanted = ", ".join("n" if length is None else str(length) for length in shape)

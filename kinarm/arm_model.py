@@ -21,7 +21,7 @@ def build_model(description: Description) -> pin.Model:
     Raises
     ------
     ArmError
-        If Pinocchio cannot read the description, or a joint has no usable limits.
+        If Pinocchio cannot read the description, or nothing moves.
     """
     name = description.path.name
     try:
@@ -30,10 +30,6 @@ def build_model(description: Description) -> pin.Model:
         raise ArmError(f"{name} is not a readable URDF: {first_line(error)}") from error
     if model.njoints < 2:
         raise ArmError(f"{name} has no moving joint")
-    for index, joint in enumerate(list(model.names)[1:]):
-        lower, upper = model.lowerPositionLimit[index], model.upperPositionLimit[index]
-        if not (np.isfinite(lower) and np.isfinite(upper) and lower < upper) or upper > 1e10:
-            raise ArmError(f"joint {joint!r} of {name} has no usable limits: {lower}..{upper}")
     return model
 
 

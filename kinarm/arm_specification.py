@@ -1,6 +1,7 @@
 """Which arm: its name or file and what of it is used, without the libraries that read it."""
 
 from dataclasses import dataclass, field, replace
+from functools import cache
 from importlib import resources
 from pathlib import Path
 
@@ -12,6 +13,7 @@ PACKAGE = "example-robot-data:"
 """What a source begins with that lies in the installed package of that name."""
 
 
+@cache
 def arm_names() -> tuple[str, ...]:
     """Names of the arms that ship with kinarm, or whose package it knows."""
     folder = resources.files("kinarm.data") / "arms"

@@ -2,8 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 from importlib import resources
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeVar, cast
 
 from kinarm._fields import from_plain, init_fields, read_toml, summary_of, take_base, to_plain
@@ -16,10 +18,11 @@ from kinarm.task import ReachTask
 Part = TypeVar("Part", Scene, ReachTask)
 
 
-def shipped_files(folder: str) -> dict[str, Path]:
+@cache
+def shipped_files(folder: str) -> Mapping[str, Path]:
     """Files of a folder of kinarm's data, such as ``"scenes"``, by name."""
     with resources.as_file(resources.files("kinarm.data") / folder) as path:
-        return {file.stem: file for file in sorted(path.glob("*.toml"))}
+        return MappingProxyType({file.stem: file for file in sorted(path.glob("*.toml"))})
 
 
 def problem_names() -> tuple[str, ...]:

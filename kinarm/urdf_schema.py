@@ -42,7 +42,11 @@ ANY = {"least": -sys.float_info.max, "most": sys.float_info.max}
 RULES: dict[str, dict[str, Rule]] = {
     "origin": {"xyz": Rule(3, "0 0 0"), "rpy": Rule(3, "0 0 0")},
     "axis": {"xyz": Rule(3, "1 0 0")},
-    "limit": {name: Rule(1, "0", **ANY) for name in ("lower", "upper", "velocity")},
+    "limit": {
+        "lower": Rule(1, "0", **ANY),
+        "upper": Rule(1, "0", **ANY),
+        "velocity": Rule(1, "0", least=0.0, most=sys.float_info.max),
+    },
     "mimic": {"multiplier": Rule(1, "1"), "offset": Rule(1, "0")},
     "box": {"size": Rule(3, None, least=1e-9)},
     "sphere": {"radius": SIZE},
@@ -131,7 +135,7 @@ def check_numbers(element: Element, where: str) -> None:
             least, most = max(rule.least, -FARTHEST), min(rule.most, FARTHEST)
             wanted = f"{rule.n} from {least:g} to {most:g}"
             if rule.most > FARTHEST:
-                wanted = f"{rule.n} of any size"
+                wanted = f"{rule.n} of {'any size' if rule.least < 0 else 'at least 0'}"
             raise ArmError(
                 f"{where}: numbers of {name} of <{element.tag}> must be {wanted}, got {given!r}"
             )

@@ -58,5 +58,5 @@ def check_xml(content: bytes) -> None:
     parser.EndElementHandler = leave
     try:
         parser.Parse(content, True)
-    except expat.ExpatError as error:
+    except (expat.ExpatError, LookupError) as error:  # the latter of an unknown encoding
         raise ValueError(str(error)) from error

@@ -150,14 +150,14 @@ def _settings(
     varied: Sequence[Mapping[str, Any]],
 ) -> Iterator[tuple[TrainingConfig, dict[str, Any]]]:
     """Settings of a learner with a recipe on a problem, and what of them varies."""
-    made = ReachProblem.load(problem)
+    found = ReachProblem.load(problem)
     fixed = _concerning(study.fixed, learner, study.learners)
-    seen = []
+    seen = set()
     for choice in varied:
         choices = _concerning(choice, learner, study.learners)
-        if choices not in seen:
-            seen.append(choices)
-            yield _config(learner, name, made, {**fixed, **choices}), choices
+        if (key := repr(sorted(choices.items()))) not in seen:
+            seen.add(key)
+            yield _config(learner, name, found, {**fixed, **choices}), choices
 
 
 def _concerning(

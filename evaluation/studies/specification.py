@@ -1,5 +1,6 @@
 """What a study is: a file that names learners, problems, seeds and what varies."""
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import product
@@ -7,10 +8,16 @@ from pathlib import Path
 from typing import Any
 
 from kinarm._fields import OPTIONAL, check_fields, from_plain, read_toml, to_plain
-from kinarm._validation import whole_number
+from kinarm._validation import MOST_TRIALS, whole_number
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.studies.ranges import RANGE, check_range, draw
 from kinarm.streams import Stream, stream_generator
+
+MOST_TRAININGS = 100_000
+"""Trainings of a study at most: all of them are planned before the first begins."""
+
+MOST_FACINGS = 1000
+"""How often a policy faces the trials per decade of its training, at most."""
 
 SEVERAL = ("learners", "recipes", "problems")
 """Entries of a file that are lists; a text stands for a list of one."""
@@ -40,8 +47,10 @@ class StudyTrials:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        for name, least in (("count", 1), ("seed", 0), ("per_decade", 0), ("first", 1)):
-            whole_number(name, getattr(self, name), least)
+        whole_number("count", self.count, 1, MOST_TRIALS)
+        whole_number("seed", self.seed, 0)
+        whole_number("per_decade", self.per_decade, 0, MOST_FACINGS)
+        whole_number("first", self.first, 1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +103,7 @@ class StudySpecification:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        whole_number("seeds", self.seeds, 1)
+        whole_number("seeds", self.seeds, 1, MOST_TRAININGS)
         whole_number("first_seed", self.first_seed, 0)
         for name in SEVERAL:
             values = getattr(self, name)
@@ -121,11 +130,22 @@ class StudySpecification:
                 )
         for table, entries in (("random", self.random), ("search", self.search)):
             if entries:
-                whole_number(f"{table}.count", entries.get("count", 0), 1)
+                whole_number(f"{table}.count", entries.get("count", 0), 1, MOST_TRAININGS)
                 whole_number(f"{table}.seed", entries.get("seed", 0), 0)
                 for key, entry in _ranges(entries).items():
                     check_range(f"{table}.{key}", entry)
+        if self.size > MOST_TRAININGS:
+            raise InvalidInputError(
+                f"a study has at most {MOST_TRAININGS:,} trainings, this one {self.size:,}"
+            )
         self._check_search()
+
+    @property
+    def size(self) -> int:
+        """Trainings that it asks for, those that turn out to be the same included."""
+        several = (*(getattr(self, name) for name in SEVERAL), *self.grid.values())
+        drawn = self.random.get("count", 1) * self.search.get("count", 1)
+        return int(math.prod(map(len, several)) * drawn * self.seeds)
 
     def _check_search(self) -> None:
         """Refuse what cannot be searched."""

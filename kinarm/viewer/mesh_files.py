@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Sequence
 from functools import cache
 from importlib import metadata
@@ -28,6 +29,8 @@ UNKNOWN = -1
 
 VERSION = 1
 """Of what is kept of a file; to be raised when the same file makes other triangles."""
+
+logging.getLogger("trimesh").addHandler(logging.NullHandler())  # else it prints its warnings
 
 READERS = ("trimesh", "pycollada", "fast-simplification")
 """Packages of the extra ``robots`` that meshes are read and simplified with."""
@@ -104,6 +107,7 @@ def _simplified_arrays(path: Path, scale: Sequence[float]) -> dict[str, ArrayLik
     return arrays
 
 
+@np.errstate(all="ignore")  # what is not finite is refused at its end
 def _pieces(path: Path, scale: Sequence[float]) -> list[PaintedMesh]:
     """Triangles of a file by node and material."""
     import trimesh

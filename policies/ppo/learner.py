@@ -130,11 +130,16 @@ class PPOTraining:
             environment_steps=model.num_timesteps,
             wall_time=state.wall_time + time.perf_counter() - began,
         )
-        first_moment, second_moment = model.moments()
+        vectors = (model.parameters(), *model.moments())
+        if not all(np.isfinite(vector).all() for vector in vectors):
+            raise InvalidInputError(
+                f"iteration {state.iteration + 1} diverged: the parameters are no longer finite; "
+                f"learning_rate is {learning_rate:g}, a smaller one may help"
+            )
         return PPOState(
-            parameters=model.parameters(),
-            first_moment=first_moment,
-            second_moment=second_moment,
+            parameters=vectors[0],
+            first_moment=vectors[1],
+            second_moment=vectors[2],
             normalizer=state.normalizer,
             episodes=env.states(),
             failed=env.failed,

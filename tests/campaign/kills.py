@@ -3,25 +3,24 @@
 ``python -m tests.campaign.kills --count 40 --out data/results/campaign/kills.json``
 """
 
-import argparse
 import os
 import sys
 import time
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
 
-from .processes import SMALL_PPO, Subject, end_of, left_behind, own_cache, results, started, write
+from .disturbing import Tally, Tell, main, take_turns, tell_nobody
+from .processes import SMALL_PPO, Subject, end_of, left_behind, results, started
 
 AGED = 120.0
 """Half-written files of a process that was killed are made to look so much older [s]."""
 
 FREQUENT = """
-import sys
 from kinarm.policies import train
 train.CHECKPOINT_SECONDS = 0.05
 train.main()
@@ -48,11 +47,11 @@ class LongRun(NamedTuple):
     when: str = ""
     made: str = ""
 
-    def words(self, folder: Path, begun: Path) -> list[str]:
+    def words(self, folder: Path) -> list[str]:
         """The command line in a folder, with what makes it go on if there is something."""
         program = self.subject.spelled(as_module=False)
         if self.subject.program == "kinarm-train":  # one that saves checkpoints all the time
-            program = [sys.executable, str(begun), *self.subject.arguments]
+            program = [sys.executable, "-c", FREQUENT, *self.subject.arguments]
         goes_on = self.when and list(folder.glob(self.when))
         return [*program, *(self.resume if goes_on else ())]
 
@@ -91,18 +90,29 @@ RUNS: dict[str, LongRun] = {
 
 
 @dataclass
-class Tally:
-    """What came of the kills of one run."""
+class KillTally(Tally):
+    """What came of the kills of one run.
+
+    Attributes
+    ----------
+    ends, kills : int
+        How often it came to its end, and was killed.
+    """
 
     ends: int = 0
     kills: int = 0
-    findings: dict[str, int] = field(default_factory=dict)
-    examples: dict[str, str] = field(default_factory=dict)
 
-    def find(self, what: str, err: str = "") -> None:
-        """Take note of something that is wrong."""
-        self.findings[what] = self.findings.get(what, 0) + 1
-        self.examples.setdefault(what, err[-2000:])
+    @property
+    def disturbances(self) -> int:
+        """Kills."""
+        return self.kills
+
+
+class Undisturbed(NamedTuple):
+    """What a run made that nobody killed, and how long it took [s]."""
+
+    made: dict[str, bytes]
+    seconds: float
 
 
 def made_by(run: LongRun, folder: Path) -> dict[str, bytes]:
@@ -110,34 +120,54 @@ def made_by(run: LongRun, folder: Path) -> dict[str, bytes]:
     return {name: made for name, made in results(folder).items() if name.startswith(run.made)}
 
 
-def killed(run: LongRun, kills: int, rng: np.random.Generator, tally: Tally, begun: Path) -> None:
+def undisturbed(run: LongRun, tally: KillTally) -> Undisturbed:
+    """Let a run come to its end."""
+    with TemporaryDirectory() as folder:
+        seconds = _to_its_end(run, Path(folder), tally)
+        return Undisturbed(made_by(run, Path(folder)), seconds)
+
+
+def killed(
+    run: LongRun, kills: int, rng: np.random.Generator, tally: KillTally, wanted: Undisturbed
+) -> None:
     """Kill a run several times, let it go on to its end, and compare it with an undisturbed one."""
-    with TemporaryDirectory() as first, TemporaryDirectory() as second:
-        undisturbed, folder = Path(first), Path(second)
-        seconds = _to_its_end(run, undisturbed, tally, begun)
+    with TemporaryDirectory() as name:
+        folder = Path(name)
         for _ in range(kills):
-            with started(run.words(folder, begun), folder) as process:
-                time.sleep(rng.uniform(0, seconds))
-                tally.kills += process.poll() is None
-                process.kill()
-                process.wait()
-                for left in left_behind(process.pid, folder):
-                    if left in ("a process", "shared memory"):
-                        tally.find(f"leaves {left}")
-            _let_age(folder)
-        _to_its_end(run, folder, tally, begun)
+            if _ends_before(rng.uniform(0, 0.6 * wanted.seconds), run, folder, tally):
+                break
+        else:
+            _to_its_end(run, folder, tally)
         tally.ends += 1
-        if made_by(run, folder) != made_by(run, undisturbed):
+        if made_by(run, folder) != wanted.made:
             tally.find("other results")
 
 
-def _to_its_end(run: LongRun, folder: Path, tally: Tally, begun: Path) -> float:
+def _ends_before(seconds: float, run: LongRun, folder: Path, tally: KillTally) -> bool:
+    """Kill a run after some time; whether it has ended by then, since it goes on each time."""
+    with started(run.words(folder), folder) as process:
+        time.sleep(seconds)
+        status = process.poll()
+        if status is None:
+            process.kill()
+            process.wait()
+            tally.kills += 1
+            for left in left_behind(process.pid, folder):
+                if left in ("a process", "shared memory"):
+                    tally.find(f"leaves {left}")
+            _let_age(folder)
+        elif status:
+            tally.find(f"ends with status {status}", err=(folder / "err").read_text()[-2000:])
+    return status is not None
+
+
+def _to_its_end(run: LongRun, folder: Path, tally: KillTally) -> float:
     """Let a run end; return how long it took [s]."""
     began = time.monotonic()
-    with started(run.words(folder, begun), folder) as process:
+    with started(run.words(folder), folder) as process:
         ended = end_of(process, folder, began)
         if ended.status != 0:
-            tally.find(f"ends with status {ended.status}", ended.err)
+            tally.find(f"ends with status {ended.status}", err=ended.err[-2000:])
         for left in left_behind(process.pid, folder):
             tally.find(f"leaves {left}")
     return ended.seconds
@@ -150,34 +180,19 @@ def _let_age(folder: Path) -> None:
         os.utime(path, (then, then))
 
 
-def campaign(count: int, seed: int, runs: Mapping[str, LongRun], each: int = 4) -> dict[str, Tally]:
+def campaign(
+    count: int, seed: int, names: Iterable[str], tell: Tell = tell_nobody, each: int = 4
+) -> dict[str, KillTally]:
     """Kill runs in turn, so many times in all, and ``each`` time before one ends."""
-    rng = np.random.default_rng(seed)
-    tallies = {name: Tally() for name in runs}
-    with own_cache() as cache:
-        begun = cache / "kinarm-train"
-        begun.write_text(FREQUENT)
-        for number in range(-(-count // each)):
-            name = [*runs][number % len(runs)]
-            killed(runs[name], each, rng, tallies[name], begun)
-    return tallies
+    known: dict[str, Undisturbed] = {}
 
+    def disturb(name: str, rng: np.random.Generator, tally: KillTally) -> None:
+        known[name] = known.get(name) or undisturbed(RUNS[name], tally)
+        killed(RUNS[name], each, rng, tally, known[name])
 
-def main() -> None:
-    """Run the large campaign."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=40)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--only", nargs="+", default=[*RUNS], choices=RUNS)
-    parser.add_argument("--out", type=Path)
-    given = parser.parse_args()
-    tallies = campaign(given.count, given.seed, {name: RUNS[name] for name in given.only})
-    counts = {"kills": sum(tally.kills for tally in tallies.values())}
-    findings = sum(sum(tally.findings.values()) for tally in tallies.values())
-    parts = {name: asdict(tally) for name, tally in tallies.items()}
-    write(given.out, "kills", counts, findings, parts)
-    sys.exit(1 if findings else 0)
+    tallies = {name: KillTally() for name in names}
+    return take_turns(-(-count // each), seed, tallies, disturb, tell)
 
 
 if __name__ == "__main__":
-    main()
+    main("kills", 40, [*RUNS], campaign)

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from .processes import PATIENCE, Subject, own_cache, started, write
+from .record_page import write_page
 
 CROWD = 2000
 """Connections that hostile visitors keep open at a time."""
@@ -278,6 +279,8 @@ def main() -> None:
     record = campaign(given.count, given.seed)
     parts: dict[str, Any] = asdict(record)
     write(given.out, "live_page", {"visits": record.acts}, sum(record.findings.values()), parts)
+    if given.out:
+        write_page(given.out, {"live page": parts})
     sys.exit(1 if record.findings else 0)
 
 

@@ -3,6 +3,7 @@
 A file is refused in one line, or read; nothing else may come of it.
 """
 
+import gc
 import os
 import pickle
 import sys
@@ -241,7 +242,7 @@ LOADERS: dict[str, Loader] = {
     ),
     "urdf": Loader(
         ("kinarm.urdf._parsed",),
-        lambda: [samples.urdf()],
+        samples.urdfs,
         damaged_xml,
         _arm,
         "file.urdf",
@@ -340,6 +341,7 @@ def make_try(name: str, seed: int, folder: Path) -> Try:
     path.write_bytes(contents[0])
     with suppress(KinarmError):
         loader.load(path)  # what is imported and compiled once is no file's
+    gc.freeze()  # nor need it be looked through again and again
     judge = Judge().__enter__()
 
     def try_input(number: int) -> Verdict:

@@ -6,7 +6,8 @@ import math
 import re
 import tomllib
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from typing import Any
 from xml.etree import ElementTree
 
@@ -239,8 +240,7 @@ def damaged_archive(content: bytes, rng: Rng) -> bytes:
     """A ``.npz`` file whose parts are valid, but other ones; or whose bytes are damaged."""
     if rng.integers(5) == 0:
         return damaged_bytes(content, rng)
-    with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        members = {name: archive.read(name) for name in archive.namelist()}
+    members = {**_members(content)}
     for name in rng.permutation(list(members))[: int(rng.integers(1, 3))].tolist():
         kind = int(rng.integers(10))
         if name == "header.npy":
@@ -261,6 +261,13 @@ def damaged_archive(content: bytes, rng: Rng) -> bytes:
         for name, data in members.items():
             archive.writestr(zipfile.ZipInfo(name), data)
     return written.getvalue()
+
+
+@cache
+def _members(content: bytes) -> Mapping[str, bytes]:
+    """The members of a valid archive."""
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
 
 
 def _damaged_header(member: bytes, rng: Rng) -> bytes:

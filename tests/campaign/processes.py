@@ -31,6 +31,9 @@ MODULES = {
 PATIENCE = 300.0
 """Time after which a process counts as hanging [s]; the machine may be busy."""
 
+FOREIGN = "torchinductor_"
+"""What the name of PyTorch's cache begins with, of which there is one a user."""
+
 CLOCKS = ("seconds", "processor_seconds", "wall_time")
 
 
@@ -168,7 +171,8 @@ def left_behind(leader: int, folder: Path) -> list[str]:
     left = ["a process"] if session(leader) else []
     names = [path.relative_to(folder) for path in folder.rglob("*")]
     left += [f"{name.suffix} file" for name in names if name.suffix in (".part", ".lock")]
-    left += ["a temporary file" for name in names if name.parts[0] == "tmp" and len(name.parts) > 1]
+    temporary = [name.parts[1] for name in names if name.parts[0] == "tmp" and len(name.parts) > 1]
+    left += ["a temporary file" for name in temporary if not name.startswith(FOREIGN)]
     left += ["shared memory" for _ in Path("/dev/shm").glob(f"*[-_]{leader}[-_]*")]
     return left
 

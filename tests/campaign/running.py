@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from functools import partial
-from itertools import pairwise
 from multiprocessing.connection import Connection
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,11 +20,12 @@ from typing import Any
 import numpy as np
 
 from .judging import Verdict
+from .record_page import write_page
 
 PATIENCE = 120.0
 """Time after which a call counts as hanging [s]."""
 
-ROUNDS = (50, 10, 1)
+ROUNDS = (50, 10, 3, 1)
 """Shares of the inputs after which all subjects have had their turn, as divisors."""
 
 FORK = multiprocessing.get_context("fork")
@@ -146,15 +146,27 @@ def options(about: str, inputs: int) -> argparse.ArgumentParser:
     parser.add_argument("--only", nargs="+", default=[], metavar="SUBJECT")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path, metavar="FILE.json")
+    parser.add_argument("--resume", action="store_true", help="go on with what FILE.json records")
     return parser
+
+
+def recorded(given: argparse.Namespace) -> dict[str, Tally]:
+    """What a record says of subjects, if it is to go on."""
+    if not (given.resume and given.out and given.out.exists()):
+        return {}
+    subjects = json.loads(given.out.read_text())["subjects"]
+    return {name: Tally(**entries) for name, entries in subjects.items()}
 
 
 def record(tallies: Mapping[str, Tally], given: argparse.Namespace, module: str) -> None:
     """Write what came of subjects, with the command; what other processes write is kept."""
     if given.out is None:
         return
-    arguments = ["--inputs", str(given.inputs), "--seed", str(given.seed), "--out", str(given.out)]
-    command = shlex.join(["python", "-m", f"tests.campaign.{module}", *arguments])
+    told = {name: getattr(given, name, None) for name in ("inputs", "seconds", "seed", "out")}
+    arguments = [
+        word for name, value in told.items() if value is not None for word in (f"--{name}", value)
+    ]
+    command = shlex.join(["python", "-m", f"tests.campaign.{module}", *map(str, arguments)])
     given.out.parent.mkdir(parents=True, exist_ok=True)
     with given.out.open("a+") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
@@ -165,25 +177,29 @@ def record(tallies: Mapping[str, Tally], given: argparse.Namespace, module: str)
         text = json.dumps(content, indent=1) + "\n"
         file.truncate(0)
         file.write(text)
+        write_page(given.out, kept)
 
 
 def campaign(subjects: Mapping[str, MakeTry], given: argparse.Namespace, module: str) -> int:
     """Run the inputs of every subject, show progress, record; returns how many findings."""
     chosen = given.only or list(subjects)
-    tallies = {name: Tally() for name in chosen}
+    tallies = {name: Tally() for name in chosen} | recorded(given)
     ends = [given.inputs // divisor for divisor in ROUNDS]
-    for first, end in pairwise([0, *ends]):
+    for end in ends:
         for name in chosen:
+            first = tallies[name].inputs
+            if first >= end:
+                continue
             for number, verdict in run_inputs(subjects[name], end, first):
                 tallies[name].add(number, verdict)
                 if sys.stderr.isatty() and number % 100 == 0:
                     sys.stderr.write(f"\r{name}: {number} of {given.inputs}")
-            _tell(name, tallies[name])
+            tell(name, tallies[name])
             record({name: tallies[name]}, given, module)
-    return sum(len(tally.findings) for tally in tallies.values())
+    return sum(len(tallies[name].findings) for name in chosen)
 
 
-def _tell(name: str, tally: Tally) -> None:
+def tell(name: str, tally: Tally) -> None:
     """Say what came of a subject so far."""
     sys.stderr.write(
         f"\r{name}: {tally.inputs} inputs, {tally.accepted} accepted, {tally.refused} refused, "

@@ -149,11 +149,37 @@ def recipes() -> list[bytes]:
     ]
 
 
+SMALL_URDF = b"""<?xml version="1.0" encoding="utf-8"?>
+<robot name="made" version="1.2">
+<material name="red"><color rgba="1 0 0 1"/></material>
+<link name="base"><collision><origin xyz="0 0 .1"/>
+<geometry><box size=".2 .2 .2"/></geometry></collision></link>
+<link name="arm"><visual><geometry><cylinder radius=".05" length=".3"/></geometry>
+<material name="red"/></visual><collision><origin xyz="0 0 .2" rpy="0 .1 0"/>
+<geometry><capsule radius=".05" length=".2"/></geometry></collision></link>
+<link name="hand"><collision><geometry><sphere radius=".06"/></geometry></collision>
+<collision><geometry><cylinder radius=".05" length=".1"/></geometry></collision></link>
+<link name="tool0"/>
+<joint name="turn" type="continuous"><parent link="base"/><child link="arm"/>
+<origin xyz="0 0 .5" rpy="0 0 0"/><axis xyz="0 0 1"/><limit velocity="3" effort="0"/></joint>
+<joint name="lift" type="revolute"><parent link="arm"/><child link="hand"/>
+<origin xyz="0 0 .4" rpy="0 0 0"/><axis xyz="0 1 0"/>
+<limit lower="-2" upper="2" velocity="3" effort="0"/></joint>
+<joint name="mount" type="fixed"><parent link="hand"/><child link="tool0"/>
+<origin xyz="0.2 0 0"/></joint></robot>
+"""
+
+
 def urdf(name: str = "paper") -> bytes:
     """A URDF that ships."""
     from kinarm.arm import Arm
 
     return Arm.load(name).urdf_path.read_bytes()
+
+
+def urdfs() -> list[bytes]:
+    """Small ones for the most part: they are damaged and read faster."""
+    return [*[SMALL_URDF] * 7, urdf()]
 
 
 def stl(binary: bool) -> bytes:

@@ -3,21 +3,20 @@
 ``python -m tests.campaign.signals --count 500 --out data/results/campaign/signals.json``
 """
 
-import argparse
 import os
 import signal
 import subprocess
-import sys
 import time
-from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from .processes import SUBJECTS, Ended, Subject, end_of, left_behind, own_cache, started, write
+from .disturbing import Tally, Tell, main, take_turns, tell_nobody
+from .processes import SUBJECTS, Ended, Subject, end_of, left_behind, started
 
 REQUESTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 OTHER_WAYS = 0.2
@@ -116,8 +115,18 @@ def finding(program: str, ended: Ended, left: Iterable[str]) -> str:
 
 
 @dataclass
-class Tally:
-    """What came of the signals to one command."""
+class SignalTally(Tally):
+    """What came of the signals to one command.
+
+    Attributes
+    ----------
+    runs, interrupted, finished, before_kinarm : int
+        How many there were; ended as asked; were over before; and were in Python's own start.
+    slowest_end : float
+        From the last signal to the end [s].
+    kinds : dict of str to int
+        How many there were of each kind.
+    """
 
     runs: int = 0
     interrupted: int = 0
@@ -125,42 +134,33 @@ class Tally:
     before_kinarm: int = 0
     slowest_end: float = 0.0
     kinds: dict[str, int] = field(default_factory=dict)
-    findings: dict[str, int] = field(default_factory=dict)
-    examples: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+    @property
+    def disturbances(self) -> int:
+        """Runs that were sent signals."""
+        return self.runs
 
 
 def campaign(
-    count: int, seed: int, subjects: Mapping[str, Subject], *, quiet: bool = False
-) -> dict[str, Tally]:
+    count: int, seed: int, names: Iterable[str], tell: Tell = tell_nobody
+) -> dict[str, SignalTally]:
     """Disturb commands in turn, so many times in all."""
-    rng = np.random.default_rng(seed)
-    tallies = {name: Tally() for name in subjects}
-    with own_cache():
-        for number in range(count):
-            name = [*subjects][number % len(subjects)]
-            disturbance = random_disturbance(rng, subjects[name].seconds)
-            with TemporaryDirectory() as folder:
-                ended, left = disturbed(subjects[name], disturbance, Path(folder))
-            _take_note(tallies[name], subjects[name], disturbance, ended, left)
-            if not quiet and sys.stderr.isatty():
-                sys.stderr.write(f"\r{number + 1} of {count}")
-    return tallies
+    return take_turns(count, seed, {name: SignalTally() for name in names}, _disturb, tell)
 
 
-def _take_note(
-    tally: Tally, subject: Subject, disturbance: Disturbance, ended: Ended, left: list[str]
-) -> None:
+def _disturb(name: str, rng: np.random.Generator, tally: SignalTally) -> None:
+    """Disturb a command once, and take note of how it ends."""
+    subject = SUBJECTS[name]
+    disturbance = random_disturbance(rng, subject.seconds)
+    with TemporaryDirectory() as folder:
+        ended, left = disturbed(subject, disturbance, Path(folder))
     tally.runs += 1
     tally.kinds[disturbance.kind] = tally.kinds.get(disturbance.kind, 0) + 1
     if before_kinarm(ended, disturbance.request):
         tally.before_kinarm += 1
-        return
-    found = finding(subject.program, ended, left)
-    if found:
-        tally.findings[found] = tally.findings.get(found, 0) + 1
-        tally.examples.setdefault(
-            found, {**disturbance._asdict(), "request": disturbance.request.name, "err": ended.err}
-        )
+    elif found := finding(subject.program, ended, left):
+        how = {**disturbance._asdict(), "request": disturbance.request.name}
+        tally.find(found, **how, err=ended.err)
     elif ended.status == 130:
         tally.interrupted += 1
         tally.slowest_end = max(tally.slowest_end, round(ended.seconds, 2))
@@ -168,21 +168,5 @@ def _take_note(
         tally.finished += 1
 
 
-def main() -> None:
-    """Run the large campaign."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=500)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--only", nargs="+", default=[*SUBJECTS], choices=SUBJECTS)
-    parser.add_argument("--out", type=Path)
-    given = parser.parse_args()
-    subjects = {name: SUBJECTS[name] for name in given.only}
-    tallies = campaign(given.count, given.seed, subjects)
-    total = sum(sum(tally.findings.values()) for tally in tallies.values())
-    counts = {"signals": sum(tally.runs for tally in tallies.values())}
-    write(given.out, "signals", counts, total, {n: asdict(t) for n, t in tallies.items()})
-    sys.exit(1 if total else 0)
-
-
 if __name__ == "__main__":
-    main()
+    main("signals", 500, [*SUBJECTS], campaign)

@@ -1,11 +1,13 @@
 """Readers of what lies in the folder of a study."""
 
+from copy import copy
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from kinarm.evaluation.studies.runs import load_bounds, load_whole_run, planned_run
 from kinarm.evaluation.studies.specification import StudySpecification
+from kinarm.evaluation.studies.store import StudyStore
 from kinarm.evaluation.studies.study import Study
 
 from .loader import Loader
@@ -19,7 +21,7 @@ SMALL = {
 
 FILE = b"""
 learner = "ars"
-problems = ["right", "left"]
+problems = ["right"]
 seeds = 2
 
 [trials]
@@ -31,10 +33,10 @@ reward.success = 2.0
 
 [grid]
 step_size = [0.01, 0.02]
-"problem.task.start_spread" = [0.2, 1.0]
+"problem.task.start_spread" = [0.2]
 
 [random]
-count = 2
+count = 1
 noise = { low = 0.01, high = 0.1, log = true }
 sharing = ["none", "pair"]
 """
@@ -50,11 +52,15 @@ def _files() -> dict[str, bytes]:
         return {path.parent.name: path.read_bytes() for path in paths}
 
 
+PLANNED = Study(SMALL, Path())
+KEY = PLANNED.runs[0].key
+
+
 def _study(path: Path) -> Study:
-    return Study(SMALL, path.parents[1])
-
-
-KEY = Study(SMALL, Path()).runs[0].key
+    """A study that knows its trainings, and nothing else yet."""
+    study = copy(PLANNED)
+    study.store = StudyStore(path.parents[1])
+    return study
 
 
 def _load_run(path: Path) -> None:

@@ -13,7 +13,7 @@ QUICK = ("arms", "eval, printed", "replay, live", "train, ars")
 
 @pytest.mark.slow
 def test_a_few_signals_to_some_commands():
-    tallies = campaign(8, seed=0, subjects={name: SUBJECTS[name] for name in QUICK}, quiet=True)
+    tallies = campaign(8, seed=0, names=QUICK)
     assert {name: tally.examples for name, tally in tallies.items()} == {name: {} for name in QUICK}
     assert all(tally.runs == 2 for tally in tallies.values())
 

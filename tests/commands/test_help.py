@@ -43,6 +43,13 @@ def test_help_loads_nothing_heavy(program):
     assert done.returncode == 0, done.stderr
 
 
+def test_a_command_starts_without_gymnasium():
+    program = [sys.executable, "-X", "importtime", "-m", PROGRAMS["kinarm-eval"], "--help"]
+    done = subprocess.run(program, capture_output=True, text=True, check=True)
+    assert "kinarm._command_line" in done.stderr
+    assert "gymnasium" not in done.stderr
+
+
 @pytest.mark.parametrize("learner", ["ars", "ppo"])
 def test_learners_have_help_of_their_own(run, learner):
     answer = run("kinarm-train", learner, "--help")

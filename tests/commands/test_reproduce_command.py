@@ -11,12 +11,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_up_runs import made_up
 
 from kinarm.errors import InvalidInputError, WorkerError
 from kinarm.evaluation.commands.reproduce import ReproductionRequest
+from kinarm.evaluation.reproduction.runs import RunStore
 from kinarm.evaluation.reproduction.study import quick_study
 from kinarm.evaluation.running.executor import Finished
 from kinarm.evaluation.running.local import LocalExecutor
+from kinarm.policies import load_policy
 
 QUICK = ("--quick", "--no-ppo", "--jobs", 2)
 needs_ppo = pytest.mark.skipif(find_spec("stable_baselines3") is None, reason="needs the extra ppo")
@@ -184,6 +187,26 @@ def test_quick_with_ppo(run_outside, tmp_path):
     page = (tmp_path / "reproduction-quick" / "REPRODUCTION.md").read_text()
     assert "| 3: both | PPO, 2 seeds |" in page
     assert "| 3: both | oracle | 100.0 |" in page
+
+
+@pytest.mark.parametrize("near", [True, False])
+def test_finished_trainings_are_summed_up_without_another_one(run, tmp_path, near):
+    """All figures, tables and verdicts, of made-up trainings that ended near their goals or not."""
+    study = quick_study(ppo=False)
+    store = RunStore(tmp_path, study.protocol)
+    distance = np.full(study.protocol.trials, 0.04 if near else 0.5)
+    for training in study.trainings:
+        store.save(training, load_policy("ars-tuned-right"), made_up(distance))
+    answer = run("kinarm-reproduce", *QUICK, "--out", tmp_path)
+    assert answer.status == 0, answer.err
+    page = (tmp_path / "REPRODUCTION.md").read_text()
+    document = json.loads((tmp_path / "claims.json").read_text())
+    verdicts = {claim["name"]: claim["verdict"] for claim in document["readings"][0]["claims"]}
+    assert verdicts["ars-right"] == ("holds" if near else "does not hold")
+    assert f"**{verdicts['ars-right']}**" in page
+    assert ("Under no reading" in page) is not near
+    assert len((tmp_path / "runs.csv").read_text().splitlines()) == 1 + len(study.trainings)
+    assert list(tmp_path.glob("figure2.*"))
 
 
 def test_lost_workers_are_told_in_one_line(run, monkeypatch, tmp_path):

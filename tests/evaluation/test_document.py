@@ -325,6 +325,12 @@ def test_a_document_is_read_as_it_was_written(stored, evaluations):
             "results.1 has .* different lengths",
         ),
         (lambda d: d["results"].insert(0, 3), "results.0 is no object"),
+        (lambda d: d.update(results={}), "results is of the wrong kind"),
+        (lambda d: d["protocol"].update(problems=[]), "protocol.problems is no object"),
+        (
+            lambda d: d["protocol"]["problems"]["left"]["goals"][0].__setitem__(0, 10**400),
+            "goals of 'left' must be numbers: int too large",
+        ),
         (lambda d: d["protocol"].update(format_version=9), "format version 9; this kinarm reads"),
     ],
 )

@@ -1,5 +1,6 @@
 """Policies that are not kinarm's own: models of Stable-Baselines3, and modules of a user's."""
 
+import subprocess
 import sys
 
 import numpy as np
@@ -60,6 +61,15 @@ class TestModule:
         (entrant,) = find_entrants(f"{module}:shipped")
         assert isinstance(entrant.policy, Policy)
         assert entrant.problem.name == "right"
+
+    def test_it_may_make_an_environment_by_its_id(self, tmp_path):
+        """Commands do not register environments before they are needed."""
+        made = 'import gymnasium\ngymnasium.make("kinarm/ReachRight-v0")\nact = len\n'
+        (tmp_path / "making.py").write_text(made)
+        words = ["--policy", "making:act", "--problem", "right", "--trials", "1", "--no-oracle"]
+        program = [sys.executable, "-m", "kinarm.evaluation.commands.evaluate", *words]
+        done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert "cannot import" not in done.stderr, done.stderr
 
     def test_an_object_that_predicts(self):
         class Still:

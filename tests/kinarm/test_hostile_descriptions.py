@@ -6,6 +6,7 @@ import pytest
 from kinarm.arm import Arm
 from kinarm.errors import ArmError
 from kinarm.hulls import hull_of_mesh
+from kinarm.urdf_schema import MOST_LINKS
 from kinarm.xml_files import DEEPEST, parse_xml
 
 BOMB = b'<!DOCTYPE a [<!ENTITY b "bbbbbbbbbb"><!ENTITY c "&b;&b;&b;&b;">]><robot>&c;</robot>'
@@ -19,6 +20,9 @@ BOMB = b'<!DOCTYPE a [<!ENTITY b "bbbbbbbbbb"><!ENTITY c "&b;&b;&b;&b;">]><robot
         (b'<a><b count="99999999999"/></a>', "more than it holds"),
         (b"<a><b></a>", "mismatched tag"),
         (b"", "no element found"),
+        (b'<?xml version="1.0" encoding="xyz"?><a/>', "unknown encoding"),
+        (b'<?xml version="1.0" encoding="hex"?><a/>', "not a text encoding"),
+        (b'<?xml version="1.0" encoding="utf-7"?><a/>', "not supported"),
     ],
 )
 def test_documents_that_are_refused(content, reason):
@@ -34,12 +38,49 @@ def test_documents_that_are_refused(content, reason):
         ({"xyz": "0 0"}, "must be 3"),
         ({"axis": "0 0 0"}, "no axis"),
         ({"limit": '<limit lower="-inf" upper="1" velocity="1"/>'}, "lower of <limit>"),
+        ({"limit": '<limit upper="1" velocity="-1e308"/>'}, "must be 1 of at least 0"),
+        ({"limit": '<limit lower="1" upper="-1" velocity="1"/>'}, "no usable limits: 1.0..-1.0"),
+        ({"limit": '<limit upper="1e308" velocity="1"/>'}, "no usable limits"),
     ],
 )
-def test_joints_that_are_refused(make_joint, write_robot, changes, words):
+def test_joints_that_are_refused(make_joint, write_robot, changes, words, capfd):
     path = write_robot([make_joint(**changes), make_joint(axis="0 1 0")])
     with pytest.raises(ArmError, match=f"'joint_1' of made.urdf.*{words}"):
         Arm.load(path)
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("extra", "words"),
+    [
+        ("<joint/>", "a joint has no name"),
+        ("<link/>", "a link has no name"),
+        ('<link name="link_0"/>', "two links are called 'link_0'"),
+        ("".join(f'<link name="more_{n}"/>' for n in range(MOST_LINKS)), "links: more than"),
+        (
+            '<joint name="joint_1" type="fixed">'
+            '<parent link="link_0"/><child link="link_1"/></joint>',
+            "two joints are called 'joint_1'",
+        ),
+        (
+            '<link name="a"/><link name="b"/>'
+            '<joint name="ab" type="fixed"><parent link="a"/><child link="b"/></joint>'
+            '<joint name="ba" type="fixed"><parent link="b"/><child link="a"/></joint>',
+            "form a loop",
+        ),
+    ],
+)
+def test_robots_that_are_refused(make_joint, write_robot, extra, words):
+    path = write_robot([make_joint()], extra=extra)
+    with pytest.raises(ArmError, match=f"made.urdf.*{words}"):
+        Arm.load(path)
+
+
+def test_of_several_shapes_of_one_element_the_first_counts(make_joint, make_collision, write_robot):
+    both = make_collision('<sphere radius="0.1"/><box size="9 9 9"/>')
+    arm = Arm.load(write_robot([make_joint()], {1: both}))
+    assert arm.description.text.count("<sphere") == 1
+    assert "<box" not in arm.description.text
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Meshes of robots: what files say is what is seen, simplified within a bound, read once."""
 
 import struct
+from contextlib import suppress
 
 import coal
 import numpy as np
@@ -149,6 +150,18 @@ class TestFiles:
             read_mesh_file(path, (1, 1, 1))
         with pytest.raises(ArmError, match="cannot read mesh 'none.stl': No such file"):
             read_mesh_file(tmp_path / "none.stl", (1, 1, 1))
+
+    @pytest.mark.parametrize("damage", ["vertex inf 0 0", "facet normal 1e308 0 -1e308"])
+    def test_damage_makes_no_noise(self, tmp_path, damage, recwarn, capfd):
+        """NumPy and trimesh would warn."""
+        facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop"
+        line = next(each for each in facet.split("\n") if each[:4] == damage[:4])
+        path = tmp_path / "damaged.stl"
+        path.write_text(f"solid a\n{facet.replace(line, damage, 1)}\nendfacet\nendsolid a\n")
+        with suppress(ArmError):
+            read_mesh_file(path, (1, 1, 1))
+        assert capfd.readouterr() == ("", "")
+        assert not recwarn.list
 
 
 class TestSimplification:

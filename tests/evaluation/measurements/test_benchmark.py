@@ -5,6 +5,7 @@ import subprocess
 import time
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -67,6 +68,20 @@ def rates(document) -> list[dict[str, float]]:
 
 def test_document_is_plain_json(document):
     assert json.loads(json.dumps(document, allow_nan=False)) == document
+
+
+def test_more_is_measured_where_it_is_asked_for(monkeypatch):
+    fast = [{"batch": benchmark.HEADLINE_BATCH, "steps_per_second": {"median": 6.0}}]
+    for name in [name for name in vars(benchmark) if name.startswith("measure_")]:
+        found = SimpleNamespace(name=name, median=3.0, _asdict=dict)
+        answer = fast if name == "measure_rollouts" else found
+        monkeypatch.setattr(benchmark, name, lambda *_, answer=answer: answer)
+    plain = benchmark.measure("ars-tuned-right", 1)
+    more = dict.fromkeys(("ppo", "limits", "peers", "studies"), True)
+    everything = benchmark.measure("ars-tuned-right", 1, **more)
+    assert plain["speed_up_over_reference"] == 2.0
+    assert set(everything) - set(plain) == {"ppo_training", "limits", "peers", "studies"}
+    assert everything["studies"].name == "measure_studies"
 
 
 def test_rates_are_positive(document):

@@ -105,6 +105,15 @@ class TestChoices:
     ("entries", "words"),
     [
         ({"seeds": 0}, "seeds must be a whole number of at least 1, got 0"),
+        ({"seeds": 2**63}, "seeds must be at most 100000, got 9223372036854775808"),
+        (
+            {"random": {"count": 10**6, "noise": [1]}},
+            "random.count must be at most 100000, got 1000000",
+        ),
+        (
+            {"seeds": 1000, "grid": {"noise": [1, 2], "step_size": [0.1] * 100}},
+            "a study has at most 100,000 trainings, this one 200,000",
+        ),
         ({"learners": []}, "learners must not be empty"),
         ({"problems": ["right", "right"]}, "problems names the same twice: right, right"),
         ({"grid": {"noise": []}}, "grid.noise must be a list of at least one value, got []"),
@@ -121,6 +130,8 @@ class TestChoices:
             "random.noise.low must be greater than 0 with log, got 0",
         ),
         ({"trials": {"count": 0}}, "trials: count must be a whole number of at least 1"),
+        ({"trials": {"count": 10**8}}, "trials: count must be at most 10000000, got 100000000"),
+        ({"trials": {"per_decade": 10**4}}, "trials: per_decade must be at most 1000, got 10000"),
         ({"trials": {"cuont": 5}}, "unknown key 'trials.cuont'; available: count"),
         ({"sedes": 5}, "unknown key 'sedes'; available: name, learners"),
         ({"grid": 5}, "grid must be a table, got 5"),

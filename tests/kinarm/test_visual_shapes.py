@@ -1,0 +1,50 @@
+"""What robots look like, of shapes that their descriptions name."""
+
+import numpy as np
+import pytest
+
+from kinarm.arm import Arm
+from kinarm.errors import ArmError
+from kinarm.viewer.visual_shapes import visual_parts
+
+
+def seen(write_robot, make_joint, visual):
+    """Parts of a robot whose base has a visual element."""
+    arm = Arm.load(write_robot([make_joint()], {0: f"<visual>{visual}</visual>"}))
+    return list(visual_parts(arm))
+
+
+@pytest.mark.parametrize(
+    ("shape", "extents"),
+    [
+        ('<box size=".1 .2 .3"/>', (0.1, 0.2, 0.3)),
+        ('<sphere radius=".1"/>', (0.2, 0.2, 0.2)),
+        ('<cylinder radius=".1" length=".5"/>', (0.2, 0.2, 0.5)),
+        ('<capsule radius=".1" length=".5"/>', (0.2, 0.2, 0.7)),
+    ],
+)
+def test_shapes_have_their_sizes_and_places(write_robot, make_joint, shape, extents):
+    visual = f'<origin xyz="0 0 1" rpy="0 0 0"/><geometry>{shape}</geometry>'
+    (part,) = seen(write_robot, make_joint, visual)
+    vertices = part.mesh.vertices
+    np.testing.assert_allclose(np.ptp(vertices, axis=0), extents, atol=2e-3)
+    np.testing.assert_allclose(vertices.max(axis=0) + vertices.min(axis=0), (0, 0, 2), atol=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("visual", "words"),
+    [
+        ("", "without geometry"),
+        ("<geometry/>", "without geometry"),
+        ("<geometry><cone/></geometry>", "shape <cone>: not supported"),
+        ('<geometry><box size="1 1"/></geometry>', "numbers of size of <box> must be 3"),
+        (
+            '<geometry><sphere radius="1"/></geometry>'
+            '<material name="m"><color rgba="x"/></material>',
+            "<color> has rgba='x'; expected 4 numbers",
+        ),
+    ],
+)
+def test_what_cannot_be_shown(write_robot, make_joint, visual, words):
+    with pytest.raises(ArmError, match=words):
+        seen(write_robot, make_joint, visual)
