@@ -50,7 +50,7 @@ def test_states_where_the_policy_comes_from(card, skilled, document):
         f"| seed | {made.seed} |",
         f"| environment steps | {made.environment_steps:,} |",
         "| `reward.success` | 0.5 |",
-        "| network | layers 48-5, functions linear |",
+        "| network | layers 48-5, functions linear; sees goals on the left in the mirror |",
         f"| digest of the problem | `{skilled.problem.digest}` |",
         "kinarm-eval --policy mine.npz --card mine.md",
         document["protocol"]["versions"]["numpy"],

@@ -304,7 +304,8 @@ def test_texts_of_evaluations_are_one_readable_line(evaluations, trials):
 
 
 def test_a_policy_that_does_not_fit_is_refused_before_bounds_are_solved(skilled, monkeypatch):
-    narrow = replace(skilled, mean=skilled.mean[1:], std=skilled.std[1:], layers=fewer(skilled))
+    statistics = {"mean": skilled.mean[1:], "std": skilled.std[1:]}
+    narrow = replace(skilled, **statistics, layers=fewer(skilled), mirror=None)
     monkeypatch.setattr(Oracle, "solve_batch", None)
     with pytest.raises(PolicyFileError, match=r"maps 47 observations to 5 actions; arm 'paper'"):
         evaluate(narrow, trials=2, seed=77, oracle=True)
