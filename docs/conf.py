@@ -62,7 +62,8 @@ nitpick_ignore_regex = [
         r"NDArray|ndarray|np\.\w+",
     ),  # NumPy's, where annotations are kept as they are written
     (r"py:class", r".*\.[A-Z]\w*T"),  # type variables
-    (r"py:class", r"kinarm\.kernels\.session\.Session"),  # what only kernels look into
+    # What only kernels look into.
+    (r"py:class", r"kinarm\.(kernels\.session\.Session|episodes\.Rules|task\.Goals)"),
 ]
 
 sphinx_gallery_conf = {

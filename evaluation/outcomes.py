@@ -188,7 +188,7 @@ class Outcomes:
 
     @property
     def early_collision(self) -> NDArray[np.bool_]:
-        """Whether it did within the first `EARLY_STEPS` steps."""
+        """Whether it did within the first three steps."""
         return self.collision & (self.steps <= EARLY_STEPS)
 
     @property
