@@ -25,10 +25,26 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **options)
+        self.add_argument(
+            "--version", action=_ShowVersion, nargs=0, help="show kinarm's version and exit"
+        )
 
     def error(self, message: str) -> NoReturn:
         """Print one line on standard error and exit."""
         self.exit(2, f"{self.prog}: {one_line(message)} (see {self.prog} --help)\n")
+
+
+class _ShowVersion(argparse.Action):
+    """Print the version of kinarm, which is looked up only then, and exit."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(default=argparse.SUPPRESS, **options)
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from importlib.metadata import version
+
+        sys.stdout.write(f"kinarm {version('kinarm')}\n")
+        parser.exit()
 
 
 def run_command(prog: str, command: Callable[[], None]) -> NoReturn:

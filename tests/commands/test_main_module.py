@@ -1,0 +1,52 @@
+"""``python -m kinarm``, and the version that every command tells."""
+
+import subprocess
+import sys
+from importlib import metadata
+
+import pytest
+
+from kinarm.__main__ import COMMANDS
+
+SCRIPTS = {
+    script.name: script.value.removesuffix(":main")
+    for script in metadata.distribution("kinarm").entry_points
+    if script.group == "console_scripts"
+}
+
+
+def type_in(*words):
+    command = [sys.executable, "-m", "kinarm", *words]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_it_knows_all_commands_and_no_other():
+    assert {f"kinarm-{name}": module for name, (module, _) in COMMANDS.items()} == SCRIPTS
+
+
+def test_without_a_command_it_lists_them():
+    done = type_in()
+    assert (done.returncode, done.stderr) == (0, "")
+    assert all(name in done.stdout for name in SCRIPTS)
+    assert all(len(line) <= 80 for line in done.stdout.splitlines())
+
+
+def test_it_runs_the_command_that_is_named():
+    done = type_in("problem", "list")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "shelf-panda" in done.stdout
+    assert "usage: kinarm-eval" in type_in("eval", "--help").stdout
+
+
+def test_an_unknown_command_is_refused_in_one_line():
+    done = type_in("fly")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.count("\n") == 1
+    assert "invalid choice: 'fly' (choose from " in done.stderr
+
+
+@pytest.mark.parametrize("program", SCRIPTS)
+def test_every_command_tells_the_version(run, program):
+    answer = run(program, "--version")
+    assert (answer.status, answer.err) == (0, "")
+    assert answer.out == f"kinarm {metadata.version('kinarm')}\n"
