@@ -1,7 +1,11 @@
 """Terminals as the commands use them."""
 
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import IO, TYPE_CHECKING
+
+from kinarm._compilation import COMPILING, told_of_compilation
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -27,3 +31,24 @@ def open_console(
     return Console(
         stderr=stderr, file=file, width=width, markup=False, emoji=False, highlight=False
     )
+
+
+@contextmanager
+def working(doing: str) -> Iterator[Callable[[str], object]]:
+    """Say on standard error what a command is doing, while it does it, if that is a terminal.
+
+    Yields a function by which it says something else. While kernels are compiled, it says so.
+    """
+    said = doing
+    with open_console(stderr=True).status(doing) as status:
+
+        def say(text: str) -> None:
+            nonlocal said
+            said = text
+            status.update(text)
+
+        def tell(begins: bool) -> None:
+            status.update(f"{said}; {COMPILING}" if begins else said)
+
+        with told_of_compilation(tell):
+            yield say

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kinarm._command_line import Parser, add_options, given_options, run_command
+from kinarm._compilation import told_of_compilation
 from kinarm._console import open_console
 from kinarm._files import check_output, only_writer
 from kinarm._interrupts import telling
@@ -244,16 +245,21 @@ class TrainingProgress:
             TimeRemainingColumn(compact=True),
             console=open_console(stderr=True),
         )
-        self._task = self._progress.add_task(
-            "", total=config.iterations, status="starting; may compile"
-        )
+        self._task = self._progress.add_task("", total=config.iterations, status="starting")
+        self._listening = told_of_compilation(self._compiling)
 
     def __enter__(self) -> "TrainingProgress":
         self._progress.start()
+        self._listening.__enter__()
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._listening.__exit__(None, None, None)
         self._progress.stop()
+
+    def _compiling(self, begins: bool) -> None:
+        """Show that kernels are compiled, which is before the first iteration."""
+        self._progress.update(self._task, status="compiling, once" if begins else "starting")
 
     def update(self, state: TrainingState) -> None:
         """Show the latest iteration."""

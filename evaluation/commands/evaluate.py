@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from kinarm._command_line import run_request
-from kinarm._console import open_console
+from kinarm._console import open_console, working
 from kinarm.evaluation.request import DOCUMENT, REPORT, EvaluationRequest
 
 EPILOG = """
@@ -36,8 +36,8 @@ def _report(request: EvaluationRequest, command: str) -> None:
     """Run a request, and print the table and what it stands on, or JSON."""
     from kinarm.evaluation.table import print_table
 
-    with open_console(stderr=True).status("evaluating; the first run compiles") as status:
-        document = request.run(command, status.update)
+    with working("evaluating") as say:
+        document = request.run(command, say)
     if request.json:
         print(json.dumps(document))
         return

@@ -93,7 +93,7 @@ class CheckRequest(ShowRequest):
             If a name, file or number cannot be used, the arm cannot move, or a file cannot be
             written.
         """
-        from kinarm._console import open_console
+        from kinarm._console import working
         from kinarm.evaluation.problem_check import ProblemCheck
         from kinarm.world import World
 
@@ -103,12 +103,12 @@ class CheckRequest(ShowRequest):
                 check_output(path, overwrite=self.overwrite, suffix=suffix)
         say_choices([problem])
         world = World(problem)
-        with open_console(stderr=True).status("checking; the first run compiles") as status:
+        with working("checking") as say:
             check = ProblemCheck.of(
                 world,
                 self.trials,
                 self.seed,
-                lambda done, total: status.update(f"{done} of {total} trials solved"),
+                lambda done, total: say(f"{done} of {total} trials solved"),
             )
         if self.json is not None:
             write_text(self.json, json.dumps(check.to_json(), indent=1))

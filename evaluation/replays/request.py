@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinarm._command_line import option_name
-from kinarm._console import open_console
+from kinarm._console import working
 from kinarm._files import check_output
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
@@ -177,7 +177,7 @@ class ReplayRequest(ProblemOptions):
         check_output(out, overwrite=self.overwrite)
         if self.record is not None:
             check_output(self.record, overwrite=self.overwrite, suffix=".npz")
-        with open_console(stderr=True).status("recording; the first run compiles"):
+        with working("recording"):
             chosen = chosen_recordings(self)
             runs, groups = chosen.runs, chosen.groups
             if self.source is None:

@@ -13,6 +13,8 @@ from numba import types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 
+from kinarm._compilation import compiling
+
 WITHOUT = {
     "WithLifting",
     "InlineClosureLikes",
@@ -43,7 +45,8 @@ class KernelCompiler(CompilerBase):
         collects = gc.isenabled()
         gc.disable()
         try:
-            return super().compile_extra(func)
+            with compiling():
+                return super().compile_extra(func)
         finally:
             if collects:
                 gc.enable()

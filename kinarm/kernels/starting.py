@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import Array, kernel
 
-LAYOUT = "e6806e55e4f8"
+LAYOUT = "fd406dba5c9e"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 

@@ -30,7 +30,7 @@ from kinarm.policies.ppo.kernels.loss import (
 )
 from kinarm.policies.ppo.kernels.tiles import LANES, ROWS, Numbers
 
-LAYOUT = "4c80f2100e44"
+LAYOUT = "beacc6d4dfb4"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 
