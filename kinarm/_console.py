@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import IO, TYPE_CHECKING
 
-from kinarm._compilation import COMPILING, told_of_compilation
+from kinarm.kernels.notices import COMPILING, told_of_compilation
 
 if TYPE_CHECKING:
     from rich.console import Console

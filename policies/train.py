@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kinarm._command_line import Parser, add_options, given_options, run_command
-from kinarm._compilation import told_of_compilation
 from kinarm._console import open_console
 from kinarm._files import check_output, only_writer
 from kinarm._interrupts import telling
 from kinarm.errors import InvalidInputError, KinarmError, PolicyFileError
+from kinarm.kernels.notices import told_of_compilation
 from kinarm.policies.learners import (
     Learner,
     TrainingResult,

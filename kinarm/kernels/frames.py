@@ -8,7 +8,7 @@ from kinarm.kernels.jacobian import spatial_jacobian
 from kinarm.kernels.kinematics import POSE, forward_kinematics, to_world
 from kinarm.kernels.planes import rotated
 
-LAYOUT = "b65bc912f4d1"
+LAYOUT = "90bd0446c1db"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 

@@ -13,7 +13,7 @@ from numba import types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 
-from kinarm._compilation import compiling
+from kinarm.kernels.notices import compiling
 
 WITHOUT = {
     "WithLifting",

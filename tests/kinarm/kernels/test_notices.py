@@ -8,9 +8,9 @@ import sys
 import numpy as np
 import pytest
 
-from kinarm._compilation import COMPILING, compiling, told_of_compilation
 from kinarm._console import working
 from kinarm.kernels.compiling import inlined, kernel
+from kinarm.kernels.notices import COMPILING, compiling, told_of_compilation
 
 
 def test_a_kernel_is_told_of_once_and_its_helpers_are_not():
