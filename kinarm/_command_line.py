@@ -7,6 +7,7 @@ import os
 import re
 import shlex
 import sys
+import textwrap
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import MISSING, Field, is_dataclass
@@ -19,12 +20,15 @@ from kinarm.errors import KinarmError, one_line
 
 Request = TypeVar("Request")
 
+EXAMPLE = re.compile(r"  (\S.*?) {2,}(\S.*)$")
+"""A line of help with an example and its meaning."""
+
 
 class Parser(argparse.ArgumentParser):
     """An argument parser that reports bad usage in one line and exits with status 2."""
 
     def __init__(self, **options: Any) -> None:
-        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **options)
+        super().__init__(formatter_class=_HelpFormatter, **options)
         self.add_argument(
             "--version", action=_ShowVersion, nargs=0, help="show kinarm's version and exit"
         )
@@ -32,6 +36,30 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Print one line on standard error and exit."""
         self.exit(2, f"{self.prog}: {one_line(message)} (see {self.prog} --help)\n")
+
+
+class _HelpFormatter(argparse.HelpFormatter):
+    """Wraps paragraphs, and leaves lines that are indented as they are, if they are short enough.
+
+    An example that is not has its meaning on a line of its own.
+    """
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        blocks = (block.strip("\n") for block in re.split(r"\n{2,}", text.strip("\n")))
+        return "\n\n".join(self._block(block, width, indent) for block in blocks)
+
+    def _block(self, block: str, width: int, indent: str) -> str:
+        """A paragraph, or lines of which some are indented."""
+        if "\n " not in block and not block.startswith(" "):
+            return textwrap.fill(block, width, initial_indent=indent, subsequent_indent=indent)
+        lines: list[str] = []
+        for line in block.splitlines():
+            example = EXAMPLE.match(line)
+            if example and len(line) > width:
+                lines += [f"  {example[1]}", f"      {example[2]}"]
+            else:
+                lines.append(line)
+        return "\n".join(indent + line for line in lines)
 
 
 class _ShowVersion(argparse.Action):

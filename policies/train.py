@@ -38,9 +38,10 @@ CIRCUMSTANCES = ("problem", "seed", "recipe")
 
 EPILOG = """
 examples:
-  kinarm-train {name} --task right --out right.npz                    the paper's settings
-  kinarm-train {name} --problem my.toml --recipe tuned --out my.npz   a problem of your own
-  kinarm-train {name} --out my.npz --resume                           go on where it stopped
+  kinarm-train {name} --recipe tuned --out right.npz   the best settings that we found
+  kinarm-train {name} --out right.npz                  the paper's settings
+  kinarm-train {name} --recipe tuned --problem my.toml --out my.npz   a problem of your own
+  kinarm-train {name} --out my.npz --resume   go on where it stopped
 """
 
 

@@ -150,3 +150,21 @@ def write_into_closed_pipe(arguments: list[str], unbuffered: str) -> str:
     ) as process:
         process.stdout.close()
         return process.stderr.read()
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        *((program,) for program in PROGRAMS),
+        *(("kinarm-train", learner) for learner in ("ars", "ppo")),
+        *(("kinarm-problem", command) for command in ("list", "show", "check")),
+        *(("kinarm-arms", command) for command in ("list", "show")),
+        ("kinarm-study", "status"),
+    ],
+    ids=" ".join,
+)
+def test_help_fits_a_terminal_of_80_columns(run, words, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    answer = run(*words, "--help")
+    assert answer.status == 0
+    assert [line for line in answer.out.splitlines() if len(line) > 80] == []
