@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinarm.errors import InvalidInputError
 from kinarm.observation import part_slices
 from kinarm.policies import ARSConfig, train_policy
 from kinarm.policies.ars.networks import (
@@ -15,6 +14,7 @@ from kinarm.policies.ars.networks import (
     perturbed_networks,
 )
 from kinarm.policies.normalizer import Normalizer
+from kinarm.simulator import Simulator
 
 WIDTHS = (7, 5, 3, 2)
 TINY = ARSConfig(iterations=3, directions=4, top_directions=2, net_arch=(6,), problem="both")
@@ -91,6 +91,12 @@ def test_threads_and_interruptions_change_nothing():
     np.testing.assert_array_equal(resumed.state.theta, whole.state.theta)
 
 
-def test_symmetric_is_for_linear_policies():
-    with pytest.raises(InvalidInputError, match="symmetric is for linear policies"):
-        replace(TINY, symmetric=True)
+def test_symmetric_networks_see_goals_on_the_left_in_the_mirror():
+    policy = train_policy(replace(TINY, symmetric=True, problem="both")).policy
+    simulator = Simulator("both", threads=1)
+    starts, goals = simulator.sample(np.random.default_rng(0), 40)
+    signs = np.array([-1, 1, 1, -1, 1, -1])
+    first = simulator.rollout(policy, starts, goals)
+    second = simulator.rollout(policy, starts * signs, goals * [1, -1, 1])
+    np.testing.assert_array_equal(first.steps, second.steps)
+    np.testing.assert_allclose(first.distance, second.distance, rtol=0, atol=1e-9)
