@@ -7,7 +7,7 @@ evaluation never replays any.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +17,7 @@ from kinarm._fields import check_fields
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
 
-Scenarios = tuple[NDArray[np.float64], NDArray[np.float64]]
+StartsAndGoals = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Starts, shape (n, n_joints) [rad or m], and goals, shape (n, 3) [m]."""
 
 LARGEST_REPLAY = 1_000_000
@@ -42,7 +42,7 @@ class Replay:
         If the share is no probability, or the size not positive.
     """
 
-    share: float = field(default=0.5)
+    share: float = 0.5
     size: int = 8192
 
     def __post_init__(self) -> None:
@@ -95,8 +95,8 @@ class FailedScenarios(NamedTuple):
         share: float,
         rng: np.random.Generator,
         count: int,
-        draw: Callable[[NDArray[np.int64]], Scenarios],
-    ) -> tuple[Scenarios, NDArray[np.bool_]]:
+        draw: Callable[[NDArray[np.int64]], StartsAndGoals],
+    ) -> tuple[StartsAndGoals, NDArray[np.bool_]]:
         """Draw scenarios, a share of them from these.
 
         Parameters

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from kinarm.envs.interface import Verdict
 from kinarm.episodes import Episodes
-from kinarm.failed_scenarios import FailedScenarios, Replay, Scenarios
+from kinarm.failed_scenarios import FailedScenarios, Replay, StartsAndGoals
 from kinarm.kernels.reward import COLLISION
 from kinarm.networks import Mirror
 from kinarm.policies.normalizer import Normalizer, input_scale
@@ -104,15 +104,15 @@ class TrainingVecEnv(SB3VecEnv):
         """From now on, draw scenarios from this generator; with the task's start spread if None."""
         self._rng, self._start_spread = rng, start_spread
 
-    def _draw(self, rows: NDArray[np.int64]) -> Scenarios:
+    def _draw(self, rows: NDArray[np.int64]) -> StartsAndGoals:
         """The one generator decides about replays, too."""
         return self._new_or_failed(rows, self._rng)
 
-    def _draw_new(self, rows: NDArray[np.int64]) -> Scenarios:
+    def _draw_new(self, rows: NDArray[np.int64]) -> StartsAndGoals:
         """Starts and goals from the one generator."""
         return self.sample(rows.size)
 
-    def sample(self, count: int) -> Scenarios:
+    def sample(self, count: int) -> StartsAndGoals:
         """Draw starts and goals as a learner meets them, without replay."""
         drawn = self.simulator.sample(self._rng, count, start_spread=self._start_spread)
         return drawn if self.mirror is None else self.mirror.scenarios_from_the_right(*drawn)

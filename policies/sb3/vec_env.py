@@ -16,7 +16,7 @@ from kinarm.envs.reach import action_space, environment_metadata, pick_scenario
 from kinarm.envs.rendering import EnvPictures
 from kinarm.episodes import SUCCESS, Episodes
 from kinarm.errors import InvalidInputError
-from kinarm.failed_scenarios import FailedScenarios, Replay, Scenarios
+from kinarm.failed_scenarios import FailedScenarios, Replay, StartsAndGoals
 from kinarm.scenarios import ScenarioStream
 from kinarm.simulator import Simulator
 from kinarm.streams import Stream, stream_generator
@@ -123,11 +123,11 @@ class SB3VecEnv(Lifecycle, VecEnv):
         self._announce(episodes, np.arange(self.num_envs))
         return self.interface.observe(episodes.observation)
 
-    def _draw(self, rows: NDArray[np.int64]) -> Scenarios:
+    def _draw(self, rows: NDArray[np.int64]) -> StartsAndGoals:
         """Starts and goals of the next episodes of some arms."""
         return self._new_or_failed(rows, self._chooser)
 
-    def _new_or_failed(self, rows: NDArray[np.int64], rng: np.random.Generator) -> Scenarios:
+    def _new_or_failed(self, rows: NDArray[np.int64], rng: np.random.Generator) -> StartsAndGoals:
         """Starts and goals for some arms, new ones or failed ones again, as a generator decides."""
         if self._replay is None:
             return self._draw_new(rows)
@@ -136,7 +136,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
         )
         return scenarios
 
-    def _draw_new(self, rows: NDArray[np.int64]) -> Scenarios:
+    def _draw_new(self, rows: NDArray[np.int64]) -> StartsAndGoals:
         """Starts and goals for some arms, each from its own stream."""
         scenarios = []
         for row in rows.tolist():

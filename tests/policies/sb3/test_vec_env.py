@@ -293,3 +293,41 @@ class TestPictures:
         env.reset()
         with pytest.warns(UserWarning, match="has to be the same"):
             assert env.render("rgb_array") is None
+
+
+class TestReplay:
+    """Episodes that begin where earlier ones ended without success, if that is asked for."""
+
+    def play(self, env, steps=120):
+        """Goals and infos of the episodes that end."""
+        rng, ended = np.random.default_rng(1), []
+        env.reset()
+        for _ in range(steps):
+            goals = env._episodes.goal.copy()
+            infos = env.step(rng.uniform(-1, 1, (env.num_envs, 5)))[3]
+            ended += [(tuple(goals[k]), info) for k, info in enumerate(infos) if "episode" in info]
+        return ended
+
+    @pytest.mark.parametrize("env_id", [FLAT, GOALS])
+    def test_a_share_is_replayed_and_infos_say_so(self, env_id):
+        env = sb3_vec_env(env_id, 20, seed=3, replay_share=0.5, horizon=12, tolerance=0.3)
+        failed, replays = set(), []
+        for goal, info in self.play(env):
+            assert info["replayed"] == (goal in failed)
+            replays.append(info["replayed"])
+            if not info["is_success"]:
+                failed.add(goal)
+        assert 0.3 < np.mean(replays) < 0.6
+
+    def test_same_seed_same_run(self):
+        first, second = (
+            self.play(sb3_vec_env(FLAT, 10, seed=4, replay_share=0.5), 80) for _ in range(2)
+        )
+        assert [goal for goal, _ in first] == [goal for goal, _ in second]
+        env = sb3_vec_env(FLAT, 10, seed=4, replay_share=0.5)
+        self.play(env, 80)
+        env.seed(4)
+        assert [goal for goal, _ in self.play(env, 80)] == [goal for goal, _ in first]
+
+    def test_without_it_nothing_is_said(self):
+        assert "replayed" not in self.play(sb3_vec_env(FLAT, 10, seed=4), 40)[0][1]
