@@ -13,10 +13,11 @@ import os
 import signal
 import sys
 from contextlib import contextmanager
+from itertools import pairwise
 
 TYPE_CHECKING = False  # `typing` takes longer to load than all the rest
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
     from sys import UnraisableHookArgs
     from types import FrameType, TracebackType
     from typing import Literal
@@ -43,11 +44,21 @@ _requested = False
 
 
 def is_command() -> bool:
-    """Whether this process is a command of kinarm: by its script, or by ``python -m kinarm.x``."""
+    """Whether this process is a command of kinarm: by its script, or by ``python -m kinarm``."""
     program = sys.argv[0] if sys.argv else ""
     if program == "-m":  # so it stands while Python looks for the module
-        return any(word.removeprefix("-m").startswith("kinarm.") for word in sys.orig_argv)
+        return _module(sys.orig_argv).partition(".")[0] == "kinarm"
     return os.path.basename(program).startswith("kinarm-") and program in sys.orig_argv  # noqa: PTH119
+
+
+def _module(words: Sequence[str]) -> str:
+    """The module that a command line of Python names by ``-m``, which may follow other letters."""
+    for option, word in pairwise([*words, ""]):
+        if option.startswith("-m") and len(option) > 2:
+            return option[2:]
+        if option.startswith("-") and not option.startswith("--") and option.endswith("m"):
+            return word
+    return ""
 
 
 def _take_over() -> None:

@@ -32,7 +32,11 @@ def set_signals(monkeypatch):
         ("mine.py", ["python", "mine.py"], False),
         ("-m", ["python", "-m", "kinarm.policies.train"], True),
         ("-m", ["python", "-mkinarm.policies.train"], True),
+        ("-m", ["python", "-m", "kinarm", "eval"], True),
+        ("-m", ["python", "-X", "importtime", "-Im", "kinarm"], True),
         ("-m", ["python", "-m", "pytest"], False),
+        ("-m", ["python", "-m", "pytest", "kinarm"], False),
+        ("-m", ["python", "-m", "kinarmor"], False),
         (None, ["python"], False),
     ],
 )
