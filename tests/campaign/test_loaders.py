@@ -27,6 +27,7 @@ READING_CALLS = {
 """Names of functions that read files, or make something of their content."""
 
 OTHERS = {
+    "kinarm.__main__.main": "imports kinarm's own modules",
     "kinarm._archive.load_archive": "reads for those that are named",
     "kinarm._archive.load_json": "reads for those that are named",
     "kinarm._archive.parse_json": "reads for those that are named",

@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.kernels.rollout import screen
 from kinarm.problem import ReachProblem
 from kinarm.simulator import Simulator
 from tests.campaign.checks.second_engine import MARGIN, SecondEngine, is_installed
@@ -56,9 +55,8 @@ def _seed(rng: np.random.Generator) -> int:
 
 def _check_screening(tally: Tally, simulator: Simulator, asked: Array) -> None:
     """Check the proofs for single configurations."""
-    n, shapes = len(asked), simulator.world.contact_model.shapes
-    tools, free, touching = np.empty((n, 3)), np.empty(n, dtype=bool), np.empty(n, dtype=bool)
-    screen(0, n, simulator.arm.chain, shapes, np.ascontiguousarray(asked), tools, free, touching)
+    n = len(asked)
+    _, free, touching, _ = simulator.world.proven(np.ascontiguousarray(asked))
     truth = simulator.world.contact_model.in_contact(asked)
     _claim(tally, "what is proven free touches nothing", (~truth)[free], asked[free])
     _claim(tally, "what is proven to touch does", truth[touching], asked[touching])
