@@ -53,10 +53,16 @@ def _seed(rng: np.random.Generator) -> int:
     return int(rng.integers(2**32))
 
 
+def _proven(simulator: Simulator, asked: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which configurations kernels prove to be free, and which to touch something."""
+    _, free, touching, _ = simulator.world.proven(np.ascontiguousarray(asked))
+    return free, touching
+
+
 def _check_screening(tally: Tally, simulator: Simulator, asked: Array) -> None:
     """Check the proofs for single configurations."""
     n = len(asked)
-    _, free, touching, _ = simulator.world.proven(np.ascontiguousarray(asked))
+    free, touching = _proven(simulator, asked)
     truth = simulator.world.contact_model.in_contact(asked)
     _claim(tally, "what is proven free touches nothing", (~truth)[free], asked[free])
     _claim(tally, "what is proven to touch does", truth[touching], asked[touching])
