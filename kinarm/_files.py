@@ -23,7 +23,7 @@ HALF_WRITTEN = ".part"
 ENDLESS = 10**7
 """What is no regular file, such as a pipe, is read up to so many bytes."""
 
-IN_USE = 60.0
+IN_USE = 2.0
 """Age below which a half-written file is left alone in any case [s]."""
 
 
