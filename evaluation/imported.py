@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._files import first_line
-from kinarm.envs.registration import register_environments
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.policies.policy import Policy
 from kinarm.simulator import PolicyFunction
@@ -49,7 +48,7 @@ def imported_policy(name: str) -> Policy | PolicyFunction:
     module_name, _, attribute = name.partition(":")
     if str(Path.cwd()) not in sys.path:
         sys.path.insert(0, str(Path.cwd()))
-    register_environments()  # the module may make one by its id
+    import_module("kinarm.envs")  # the module may make one by its id
     try:
         module = import_module(module_name)
     except Exception as error:  # a module can raise anything

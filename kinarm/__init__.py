@@ -13,9 +13,7 @@ __version__ = "0.1.0"
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 if not _interrupts.is_command():  # a command starts in two thirds of the time without Gymnasium
-    from kinarm.envs.registration import register_environments
-
-    register_environments()
+    from kinarm import envs as envs  # which registers the environments
 
 _root = Path(__file__).resolve().parent.parent
 if (_root / "pyproject.toml").is_file():

@@ -168,3 +168,22 @@ def test_help_fits_a_terminal_of_80_columns(run, words, monkeypatch):
     answer = run(*words, "--help")
     assert answer.status == 0
     assert [line for line in answer.out.splitlines() if len(line) > 80] == []
+
+
+AS_A_COMMAND = """
+import sys
+sys.argv[0], sys.orig_argv = "-m", ["python", "-m", "kinarm"]
+import kinarm
+assert "gymnasium" not in sys.modules
+import kinarm.{module}
+import gymnasium
+gymnasium.make("kinarm/ReachRight-v0").reset(seed=0)
+"""
+
+
+@pytest.mark.parametrize("module", ["envs", "evaluation.measurements.environments"])
+def test_what_makes_environments_in_a_command_has_their_ids(module):
+    pytest.importorskip("stable_baselines3")
+    code = AS_A_COMMAND.format(module=module)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
