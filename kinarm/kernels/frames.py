@@ -8,7 +8,7 @@ from kinarm.kernels.jacobian import spatial_jacobian
 from kinarm.kernels.kinematics import POSE, forward_kinematics, to_world
 from kinarm.kernels.planes import rotated
 
-LAYOUT = "90bd0446c1db"
+LAYOUT = "b886eb9f28ae"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 

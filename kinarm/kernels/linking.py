@@ -52,6 +52,28 @@ class KernelCompiler(CompilerBase):
                 gc.enable()
 
 
+class LeanCompiler(KernelCompiler):
+    """Compiles a kernel into a `LeanLibrary`."""
+
+    def compile_extra(self, func: Callable[..., Any]) -> Any:
+        """Compile a kernel, and the helpers that it calls."""
+        codegen = self.state.targetctx.codegen()
+        self.state.library = LeanLibrary(codegen, func.__qualname__)
+        self.state.library.enable_object_caching()
+        return super().compile_extra(func)
+
+
+class LeanLibrary(JITCodeLibrary):
+    """Code of a kernel in lanes, optimised once; Numba does so twice, to prune reference counts.
+
+    LLVM does not look for loops to make vectors of: lanes are vectors already.
+    """
+
+    def _optimize_final_module(self) -> None:
+        passes, builder = self._codegen._module_pass_manager(loop_vectorize=False)
+        passes.run(self._final_module, builder)
+
+
 class HelperCompiler(KernelCompiler):
     """Compiles what only kernels call, into a `LinkedLibrary`."""
 
