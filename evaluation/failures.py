@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kinarm.evaluation.outcomes import EARLY_STEPS
+from kinarm.evaluation.outcomes import EARLY_STEPS, is_early
 from kinarm.rollouts import Rollouts
 
 Pair = tuple[str, str]
@@ -33,11 +33,6 @@ class Cause(NamedTuple):
         return f"{self.pair[0]} touches {self.pair[1]} {when}"
 
 
-def is_early(collision: bool, steps: int) -> bool:
-    """Whether a trial ended in contact within the first `EARLY_STEPS` steps."""
-    return collision and steps <= EARLY_STEPS
-
-
 def failure_causes(rollouts: Rollouts, contacts: Sequence[Pair | None]) -> dict[int, Cause]:
     """Causes of the trials that failed, by their numbers.
 
@@ -48,10 +43,9 @@ def failure_causes(rollouts: Rollouts, contacts: Sequence[Pair | None]) -> dict[
     contacts : sequence
         The bodies that touched, per trial, as `Simulator.contact_pairs` names them.
     """
+    early = is_early(rollouts.collision, rollouts.steps)
     return {
-        trial: Cause(
-            contacts[trial], is_early(bool(rollouts.collision[trial]), int(rollouts.steps[trial]))
-        )
+        trial: Cause(contacts[trial], bool(early[trial]))
         for trial in np.flatnonzero(~rollouts.success).tolist()
     }
 

@@ -189,7 +189,8 @@ class Outcomes:
     @property
     def early_collision(self) -> NDArray[np.bool_]:
         """Whether it did within the first three steps."""
-        return self.collision & (self.steps <= EARLY_STEPS)
+        early: NDArray[np.bool_] = is_early(self.collision, self.steps)
+        return early
 
     @property
     def truncated(self) -> NDArray[np.bool_]:
@@ -219,6 +220,11 @@ class Outcomes:
         if self.bounds is None:
             raise InvalidInputError("there are no bounds: the evaluation was made without them")
         return self.bounds
+
+
+def is_early(collision: Any, steps: Any) -> Any:
+    """Whether trials, one or an array of them, ended in contact within the first few steps."""
+    return collision & (steps <= EARLY_STEPS)
 
 
 def _resampled_in_order(

@@ -80,12 +80,10 @@ class Mirror(NamedTuple):
         Joints that are not actuated stay as they are.
         """
         left = goals[:, 1] > 0
-        joints = np.ones(starts.shape[1])
-        joints[: len(self.actions)] = self.actions
-        signs = np.where(left[:, None], joints, 1.0), np.where(left, -1.0, 1.0)
-        reflected = goals.copy()
-        reflected[:, 1] *= signs[1]
-        return starts * signs[0], reflected
+        starts, goals = starts.copy(), goals.copy()
+        starts[left, : len(self.actions)] *= self.actions
+        goals[left, 1] *= -1.0
+        return starts, goals
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 
 from kinarm.contact_statistics import random_configurations
 from kinarm.errors import InvalidInputError
+from kinarm.failed_scenarios import StartsAndGoals
 from kinarm.networks import Mirror
 from kinarm.observation import observation_signs
 from kinarm.problem import ReachProblem
 from kinarm.scene import Obstacle, Point
+from kinarm.simulator import Simulator
 from kinarm.world import World
 
 TESTED_CONFIGURATIONS = 16
@@ -119,6 +121,19 @@ def task_mirror(symmetric: bool, world: World) -> Mirror | None:
         with suppress(InvalidInputError):
             return find_mirror(world)
     return None
+
+
+def sample_seen(
+    mirror: Mirror | None,
+    simulator: Simulator,
+    rng: np.random.Generator,
+    count: int,
+    *,
+    start_spread: float | None = None,
+) -> StartsAndGoals:
+    """Draw scenarios as a training meets them: with a mirror, those on the left reflected."""
+    drawn = simulator.sample(rng, count, start_spread=start_spread)
+    return drawn if mirror is None else mirror.scenarios_from_the_right(*drawn)
 
 
 def missing_mirror(problem: ReachProblem) -> str:

@@ -6,7 +6,8 @@ from functools import cached_property
 from typing import Protocol
 
 from kinarm.evaluation.entrants import Entrant
-from kinarm.evaluation.failures import Cause, failure_causes, is_early
+from kinarm.evaluation.failures import Cause, failure_causes
+from kinarm.evaluation.outcomes import is_early
 from kinarm.evaluation.replays.recorder import recordings_of
 from kinarm.evaluation.trials import TrialSet
 from kinarm.recording import Recording, outcome_of

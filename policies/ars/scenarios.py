@@ -6,10 +6,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.failed_scenarios import FailedScenarios
+from kinarm.failed_scenarios import FailedScenarios, StartsAndGoals
 from kinarm.networks import Mirror
 from kinarm.policies.ars.config import ARSConfig
 from kinarm.policies.ars.kernels import mean_and_deviation
+from kinarm.policies.mirror import sample_seen
 from kinarm.rollouts import Rollouts
 from kinarm.simulator import Simulator
 
@@ -38,7 +39,7 @@ class Scenarios(NamedTuple):
     copies: int
 
     @property
-    def of_all_episodes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def of_all_episodes(self) -> StartsAndGoals:
         """Starts and goals of all episodes."""
         if self.copies == 1:
             return self.starts, self.goals
@@ -71,9 +72,8 @@ def draw_shared(
     """
     copies = {"none": 1, "pair": 2, "iteration": 2 * config.directions}[config.sharing]
 
-    def draw(places: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        drawn = simulator.sample(rng, len(places))
-        return drawn if mirror is None else mirror.scenarios_from_the_right(*drawn)
+    def draw(places: NDArray[np.int64]) -> StartsAndGoals:
+        return sample_seen(mirror, simulator, rng, len(places))
 
     count = 2 * config.directions * config.episodes // copies
     (starts, goals), replayed = failed.mixed(config.replay_share, rng, count, draw)

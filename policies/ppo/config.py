@@ -188,7 +188,8 @@ class PPOConfig(TrainingConfig):
 
     def tolerance_at(self, done: float) -> float:
         """Distance that counts as a success after this share of the training [m]."""
-        final = self.training_problem.task.tolerance
+        own = self.training_tolerance
+        final = self.problem.task.tolerance if own is None else own
         initial = final if self.initial_tolerance is None else self.initial_tolerance
         # Rounded, for powers differ between C libraries in the last bits.
         return round(initial * math.pow(final / initial, min(1.0, done / SETTLED)), 9)

@@ -12,6 +12,7 @@ from kinarm.episodes import Episodes
 from kinarm.failed_scenarios import FailedScenarios, Replay, StartsAndGoals
 from kinarm.kernels.reward import COLLISION
 from kinarm.networks import Mirror
+from kinarm.policies.mirror import sample_seen
 from kinarm.policies.normalizer import Normalizer, input_scale
 from kinarm.policies.ppo.state import EpisodeStates
 from kinarm.policies.sb3.vec_env import SB3VecEnv, StepReturn
@@ -114,8 +115,8 @@ class TrainingVecEnv(SB3VecEnv):
 
     def sample(self, count: int) -> StartsAndGoals:
         """Draw starts and goals as a learner meets them, without replay."""
-        drawn = self.simulator.sample(self._rng, count, start_spread=self._start_spread)
-        return drawn if self.mirror is None else self.mirror.scenarios_from_the_right(*drawn)
+        spread = self._start_spread
+        return sample_seen(self.mirror, self.simulator, self._rng, count, start_spread=spread)
 
     def step_wait(self) -> StepReturn:
         """Move every arm for one time step, and keep a record of it."""
