@@ -120,7 +120,8 @@ class Reception:
         self._visits[visit] = None
         self._make_room(visit)
         try:
-            with suppress(OSError, EOFError, asyncio.LimitOverrunError):
+            # It is cancelled by the end of the server alone, which asyncio reports as an error.
+            with suppress(OSError, EOFError, asyncio.LimitOverrunError, asyncio.CancelledError):
                 async with asyncio.timeout(PATIENCE):
                     request = await reader.readuntil(b"\r\n\r\n")
                 await self._answer(visit, request.decode("latin-1"), reader)

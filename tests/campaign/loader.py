@@ -25,6 +25,8 @@ class Loader:
         Where the file lies in its folder.
     prepare : callable
         Fills the folder with what lies beside the file.
+    needs : str
+        Module that comes with an extra, without which it reads nothing.
     """
 
     reads: tuple[str, ...]
@@ -33,3 +35,4 @@ class Loader:
     load: Callable[[Path], object]
     file: str = "file.npz"
     prepare: Callable[[Path], object] = lambda folder: None
+    needs: str = ""

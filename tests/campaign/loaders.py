@@ -269,6 +269,7 @@ LOADERS: dict[str, Loader] = {
         damaged_bytes,
         sb3_model,
         "file.zip",
+        needs="stable_baselines3",
     ),
     "VecNormalize": Loader(
         ("policies.conversion.vec_normalize.load_vec_normalize",),
@@ -276,6 +277,7 @@ LOADERS: dict[str, Loader] = {
         cut_bytes,
         load_vec_normalize,
         "file.pkl",
+        needs="stable_baselines3",
     ),
 }
 LEARNERS = "evaluation/comparison/learners.toml"

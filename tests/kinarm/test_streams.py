@@ -6,7 +6,6 @@ import pytest
 
 from kinarm.evaluation.trials import trial_generator
 from kinarm.policies.ars.algorithm import ARSTraining
-from kinarm.policies.ppo.learner import seed_iteration
 from kinarm.policies.recipes import recipe
 from kinarm.streams import Stream, stream_generator
 
@@ -30,6 +29,9 @@ def test_no_two_purposes_share_numbers(draw):
 
 
 def test_an_iteration_of_ppo_shares_nothing_with_the_trial_of_its_number():
+    pytest.importorskip("torch")
+    from kinarm.policies.ppo.learner import seed_iteration
+
     for iteration in range(5):
         ours = {generator.random() for generator in seed_iteration(0, iteration)}
         assert not ours & {trial_generator(0, iteration, stream).random() for stream in (0, 1)}
