@@ -155,6 +155,7 @@ class TestGoingOn:
         assert [task.start for task in executor.tasks] == [None] * 4
 
     def test_a_longer_training_of_ppo(self, small):
+        pytest.importorskip("torch")
         fixed = {"n_envs": 2, "n_steps": 32, "batch_size": 32, "n_epochs": 2}
         changes = {"learners": "ppo", "seeds": 1, "grid": {}}
         small(fixed={**fixed, "iterations": 2}, **changes).run(jobs=1)

@@ -29,6 +29,7 @@ class TestTable:
         assert (table["processor_seconds"] > 0).all()
 
     def test_texts_and_missing_values(self, tmp_path):
+        pytest.importorskip("torch")
         study = Study(
             {
                 **SMALL,
