@@ -89,6 +89,9 @@ class PPOConfig(TrainingConfig):
         `kinarm.failed_scenarios`.
     replay_size : int
         Failed scenarios that are kept.
+    replay_log_std : float, optional
+        Logarithm of the standard deviation of the actions in these episodes at least: with less
+        noise, what always fails is never seen to succeed. That of other episodes if not given.
     initial_policy : str, optional
         Name or file of a policy that the training begins with, of the same layers; it may be for
         another problem or arm.
@@ -119,12 +122,15 @@ class PPOConfig(TrainingConfig):
     widening: float = field(default=0.0, metadata=SHARE)
     replay_share: float = field(default=0.0, metadata={**SHARE, **OPTIONAL})
     replay_size: int = field(default=8192, metadata={"at_most": LARGEST_REPLAY, **OPTIONAL})
+    replay_log_std: float | None = field(default=None, metadata=OPTIONAL)
     initial_policy: str | None = field(default=None, metadata=OPTIONAL)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.net_arch:
             raise InvalidInputError("net_arch must name at least one layer")
+        if self.replay_log_std is not None and not self.replay_share:
+            raise InvalidInputError("replay_log_std needs a replay_share above 0")
         if self.batch_size == 1 or self.steps_per_iteration % self.batch_size:
             raise InvalidInputError(
                 f"batch_size must be above 1 and divide the {self.steps_per_iteration} steps of a "

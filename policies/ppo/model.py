@@ -18,7 +18,7 @@ from kinarm._validation import whole_number
 from kinarm.policies.ppo.config import PPOConfig
 from kinarm.policies.ppo.kernels.loss import HALF_LOG_2_PI, Experience, Objective
 from kinarm.policies.ppo.kernels.tiles import Numbers
-from kinarm.policies.ppo.kernels.update import Descent, choose
+from kinarm.policies.ppo.kernels.update import Descent, choose, fill_in_scales
 from kinarm.policies.ppo.networks import ActorCritic
 from kinarm.policies.ppo.update import UpdateRecords, update
 from kinarm.streams import Stream, stream_generator
@@ -79,6 +79,8 @@ class CompiledPPO(PPO):
             },
             device="cpu",
         )
+        self._replay_log_std = config.replay_log_std
+        self._noise_scales = np.ones((config.n_steps, env.num_envs), dtype=np.float32)
         self._weights = list(self.policy.parameters())
         self._networks = ActorCritic(
             get_flattened_obs_dim(env.observation_space),
@@ -89,7 +91,8 @@ class CompiledPPO(PPO):
 
     def _excluded_save_params(self) -> list[str]:
         """What a plain PPO has no use for."""
-        return [*super()._excluded_save_params(), "rng", "threads", "_networks", "_weights"]
+        own = ["rng", "threads", "_networks", "_weights", "_noise_scales", "_replay_log_std"]
+        return [*super()._excluded_save_params(), *own]
 
     def parameters(self) -> Numbers:
         """Parameters of actor and critic, shape (n_parameters,)."""
@@ -152,7 +155,12 @@ class CompiledPPO(PPO):
         for step in range(n_rollout_steps):
             obs = np.asarray(self._last_obs)
             noise = self.rng.standard_normal(actions.shape).astype(np.float32)
-            choose(networks.means(obs), networks.log_std, noise, actions, buffer.log_probs[step])
+            scales = self._noise_scales[step]
+            if self._replay_log_std is not None:
+                replayed = env.get_attr("replayed", 0)[0]
+                fill_in_scales(replayed, networks.log_std, self._replay_log_std, scales)
+            outcome = actions, buffer.log_probs[step]
+            choose(networks.means(obs), networks.log_std, noise, scales, *outcome)
             buffer.observations[step], buffer.actions[step] = obs, actions
             buffer.episode_starts[step] = self._last_episode_starts
             new_obs, rewards, dones, infos = env.step(np.clip(actions, box.low, box.high))
@@ -231,7 +239,7 @@ class CompiledPPO(PPO):
     def _experience(self) -> Experience:
         """What is in the buffer, arm after arm."""
         buffer = self.rollout_buffer
-        arrays = (buffer.observations, buffer.actions, buffer.log_probs)
+        arrays = (buffer.observations, buffer.actions, self._noise_scales, buffer.log_probs)
         targets = (buffer.advantages, buffer.returns)
         flat = [buffer.swap_and_flatten(array) for array in (*arrays, *targets)]
         return Experience(*flat[:2], *(array.ravel() for array in flat[2:]))

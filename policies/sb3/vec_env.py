@@ -86,6 +86,11 @@ class SB3VecEnv(Lifecycle, VecEnv):
         self._returns = np.zeros(num_envs)
         self._made = time.time()
 
+    @property
+    def replayed(self) -> NDArray[np.bool_]:
+        """Which episodes began where an earlier one had failed, shape (num_envs,)."""
+        return self._replayed
+
     def reset(self) -> Observations:
         """Begin all episodes anew, with the seeds and options that were set for it.
 

@@ -28,14 +28,17 @@ class Experience(NamedTuple):
         Observations.
     actions : ndarray of float32, shape (n, n_actions)
         Actions, not clipped.
+    scales : ndarray of float32, shape (n,)
+        By how much wider than usual the noise was with which they were chosen.
     densities : ndarray of float32, shape (n,)
-        Logarithms of the probability densities with which they were chosen.
+        Logarithms of the probability densities of that noise, over the scale.
     advantages, returns : ndarray of float32, shape (n,)
         What `RolloutBuffer` makes of the rewards.
     """
 
     observations: Numbers
     actions: Numbers
+    scales: Numbers
     densities: Numbers
     advantages: Numbers
     returns: Numbers
@@ -78,9 +81,9 @@ def derive_by_means(
     lowest, highest = 1.0 - objective.clip_range, 1.0 + objective.clip_range
     for s in range(rows.shape[0]):
         i, row = rows[s], sink + s * wide
-        density = 0.0
+        density, scale = 0.0, float(experience.scales[i])
         for j in range(n_actions):
-            deviation = float(experience.actions[i, j]) - work[row + j]
+            deviation = (float(experience.actions[i, j]) - work[row + j]) / scale
             density += log_density(deviation, precision[j], log_std[j])
         difference = min(max(density - experience.densities[i], -MOST), MOST)
         ratio = exponential(difference)
@@ -92,9 +95,9 @@ def derive_by_means(
         loss[3] += (ratio - 1.0) - difference
         slope = -surrogate * objective.share if surrogate <= limited else 0.0
         for j in range(n_actions):
-            deviation = float(experience.actions[i, j]) - work[row + j]
+            deviation = (float(experience.actions[i, j]) - work[row + j]) / scale
             pull = deviation * precision[j]
-            work[row + j] = slope * pull
+            work[row + j] = slope * pull / scale
             gradient[by_log_std + j] += slope * (deviation * pull - 1.0)
 
 

@@ -30,7 +30,7 @@ from kinarm.policies.ppo.kernels.loss import (
 )
 from kinarm.policies.ppo.kernels.tiles import LANES, ROWS, Numbers
 
-LAYOUT = "8eb845fd07cd"
+LAYOUT = "60cde4e9d5d4"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 
@@ -73,9 +73,14 @@ def evaluate(
 
 @kernel
 def choose(
-    means: Numbers, log_std: Numbers, noise: Numbers, actions: Numbers, densities: Numbers
+    means: Numbers,
+    log_std: Numbers,
+    noise: Numbers,
+    scales: Numbers,
+    actions: Numbers,
+    densities: Numbers,
 ) -> None:
-    """Turn noise, shape (n, n_actions), into actions about their means, and find their densities.
+    """Turn noise, shape (n, n_actions), into actions about their means, and find its densities.
 
     Parameters
     ----------
@@ -85,19 +90,42 @@ def choose(
         Logarithms of the standard deviations.
     noise : ndarray of float32, shape (n, n_actions)
         Standard normal numbers.
+    scales : ndarray of float32, shape (n,)
+        Factors on the standard deviations.
     densities : ndarray of float32, shape (n,)
-        Logarithms of the probability densities of the actions.
+        Logarithms of the probability densities of the deviations from the means over the scales.
     """
     precision = np.zeros(means.shape[1])
     find_precision(log_std, precision)
     for i in range(means.shape[0]):
+        scale = float(scales[i])
         for j in range(means.shape[1]):
-            actions[i, j] = means[i, j] + exponential(float(log_std[j])) * noise[i, j]
+            actions[i, j] = means[i, j] + scale * exponential(float(log_std[j])) * noise[i, j]
         density = 0.0
         for j in range(means.shape[1]):
-            deviation = float(actions[i, j]) - means[i, j]
+            deviation = (float(actions[i, j]) - means[i, j]) / scale
             density += log_density(deviation, precision[j], log_std[j])
         densities[i] = density
+
+
+@kernel
+def fill_in_scales(
+    replayed: NDArray[np.bool_], log_std: Numbers, least: float, scales: Numbers
+) -> None:
+    """Fill in by how much wider than usual the noise of episodes is, shape (n,) each.
+
+    Parameters
+    ----------
+    replayed : ndarray of bool, shape (n,)
+        Which episodes replay a failed scenario.
+    log_std : ndarray of float32, shape (n_actions,)
+        Logarithms of the usual standard deviations.
+    least : float
+        What their mean is at least in a replay.
+    """
+    wider = exponential(max(0.0, least - log_std.mean()))
+    for i in range(len(scales)):
+        scales[i] = wider if replayed[i] else 1.0
 
 
 @kernel

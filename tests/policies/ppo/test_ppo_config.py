@@ -46,6 +46,7 @@ def test_numbers_follow_from_others():
         ({"ent_coef": -1}, "ent_coef must not be negative, got -1"),
         ({"vf_coef": float("nan")}, "vf_coef"),
         ({"log_std_init": float("inf")}, "log_std_init must be finite"),
+        ({"replay_log_std": -1.0}, "replay_log_std needs a replay_share above 0"),
         ({"learning_rate_schedule": "cosine"}, "constant, linear, got 'cosine'"),
     ],
 )

@@ -15,6 +15,7 @@ from kinarm.policies.ppo.kernels.update import (
     choose,
     descend,
     evaluate,
+    fill_in_scales,
     standardisation,
 )
 from kinarm.policies.ppo.networks import ActorCritic
@@ -99,14 +100,15 @@ class Reference:
 
     def densities(self, vector, experience):
         means, _, std = self.outputs(vector, experience.observations)
-        off = (experience.actions - means) / std
+        off = (experience.actions - means) / std / experience.scales[:, None]
         return (-(off**2) / 2 - np.log(std) - np.log(2 * np.pi) / 2).sum(axis=1)
 
     def experience(self, n):
         """Of a policy that differs a little from the present one."""
         rng = self.rng
         arrays = (numbers(rng, n, N_OBSERVATIONS), numbers(rng, n, N_ACTIONS))
-        found = Experience(*arrays, *(numbers(rng, n) for _ in range(3)))
+        scales = rng.choice([1.0, 2.5], n).astype(np.float32)
+        found = Experience(*arrays, scales, *(numbers(rng, n) for _ in range(3)))
         old = self.densities(self.vector.astype(float), found) + 0.2 * rng.normal(size=n)
         return found._replace(densities=old.astype(np.float32))
 
@@ -210,13 +212,24 @@ def test_steps_of_adam():
 def test_chosen_actions():
     rng = np.random.default_rng(0)
     means, noise = numbers(rng, 20, 3), numbers(rng, 20, 3)
+    scales = rng.choice([1.0, 3.0], 20).astype(np.float32)
     log_std = np.array([-0.7, 0.0, 1.5], dtype=np.float32)
     actions, densities = np.empty_like(means), np.empty(20, dtype=np.float32)
-    choose(means, log_std, noise, actions, densities)
+    choose(means, log_std, noise, scales, actions, densities)
     std = np.exp(log_std.astype(float))
-    np.testing.assert_allclose(actions, means + std * noise, rtol=0, atol=1e-6)
-    expected = -((actions - means) ** 2) / (2 * std**2) - np.log(std * np.sqrt(2 * np.pi))
+    deviations = scales[:, None] * std * noise
+    np.testing.assert_allclose(actions, means + deviations, rtol=0, atol=2e-6)
+    expected = -(noise**2) / 2 - np.log(std * np.sqrt(2 * np.pi))
     np.testing.assert_allclose(densities, expected.sum(axis=1), rtol=0, atol=1e-5)
+
+
+def test_noise_is_wider_in_replays_alone_and_never_narrower():
+    replayed, scales = np.array([True, False, True]), np.empty(3, dtype=np.float32)
+    log_std = np.array([-2.0, -3.0], dtype=np.float32)
+    fill_in_scales(replayed, log_std, -1.0, scales)
+    np.testing.assert_allclose(scales, [np.exp(1.5), 1, np.exp(1.5)], rtol=1e-6)
+    fill_in_scales(replayed, log_std, -2.6, scales)
+    assert scales.tolist() == [1, 1, 1]
 
 
 def test_standardisation():

@@ -248,3 +248,21 @@ class TestParameters:
         matrix = torch.empty(shape, dtype=torch.float64)
         torch.nn.init.orthogonal_(matrix)
         np.testing.assert_allclose(orthogonal(normal), matrix.numpy(), rtol=0, atol=1e-9)
+
+
+def test_replays_are_explored_with_more_noise():
+    noise = {"log_std_init": -4.0, "final_log_std": -4.0, "replay_log_std": -1.0}
+    config = replace(AWKWARD, replay_share=0.5, learning_rate=1e-12, **noise)
+    training = PPOTraining(config)
+    state = training.initial_state()
+    for _ in range(6):
+        state = training.iterate(state)
+    model, buffer = training.model, training.model.rollout_buffer
+    seen = torch.from_numpy(buffer.observations.reshape(-1, buffer.observations.shape[-1]))
+    with torch.no_grad():
+        means = model.policy.get_distribution(seen).distribution.mean.numpy()
+    deviations = buffer.actions.reshape(means.shape) - means
+    wide = np.abs(deviations).max(axis=1) > 0.12  # 6.5 narrow deviations
+    assert 0.2 < wide.mean() < 0.8
+    assert deviations[wide].std() == pytest.approx(np.exp(-1), rel=0.2)
+    assert deviations[~wide].std() == pytest.approx(np.exp(-4), rel=0.2)
