@@ -69,7 +69,8 @@ class PPOConfig(TrainingConfig):
         Distance at which an episode of the training counts as a success; the task's if it is not
         given [m].
     initial_tolerance : float, optional
-        That distance at the beginning of the training, from which it changes geometrically [m].
+        That distance until spread and discount are what they are to be; from then on it changes
+        geometrically [m].
     symmetric : bool
         Whether the policy is to treat mirror images alike, where arm and obstacles are their own
         mirror image; it then learns from goals on the right and from mirror images of
@@ -194,11 +195,15 @@ class PPOConfig(TrainingConfig):
 
     def tolerance_at(self, done: float) -> float:
         """Distance that counts as a success after this share of the training [m]."""
-        own = self.training_tolerance
+        own, initial = self.training_tolerance, self.initial_tolerance
         final = self.problem.task.tolerance if own is None else own
-        initial = final if self.initial_tolerance is None else self.initial_tolerance
+        if initial is None or done >= SETTLED:
+            return final
+        if done <= self.widening:
+            return initial
+        fallen = (done - self.widening) / (SETTLED - self.widening)
         # Rounded, for powers differ between C libraries in the last bits.
-        return round(initial * math.pow(final / initial, min(1.0, done / SETTLED)), 9)
+        return round(initial * math.pow(final / initial, fallen), 9)
 
     def penalty_at(self, done: float) -> float:
         """Share of the penalty for contact that counts after this share of the training."""

@@ -92,6 +92,11 @@ def test_tolerance_falls_geometrically():
     config = PPOConfig(training_tolerance=0.005, initial_tolerance=0.08)
     expected = [0.08, 0.02, 0.005, 0.005]
     assert [config.tolerance_at(done) for done in (0, 0.45, 0.9, 1)] == pytest.approx(expected)
+    late = replace(config, widening=0.5)
+    assert [late.tolerance_at(done) for done in (0, 0.5, 0.7, 0.9)] == pytest.approx(
+        expected[:1] + expected[:3]
+    )
+    assert replace(config, widening=1.0).tolerance_at(0.8) == 0.08
     plain = [
         PPOConfig(**settings).tolerance_at(0.3) for settings in ({}, {"training_tolerance": 0.03})
     ]
