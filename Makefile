@@ -8,7 +8,7 @@ PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check 
 MODULES := $(shell find kinarm policies evaluation data -name __pycache__ -prune -o -type f -print | sort | cksum | cut -d' ' -f1)
 INSTALLED = $(VENV)/.installed-$(1)-$(MODULES)
 
-.PHONY: eval test test-slow test-all campaign lint docs clean
+.PHONY: eval test test-slow test-all campaign lint docs package clean
 
 eval: $(call INSTALLED,core) ## evaluate all shipped policies on 200 trials a task
 	$(BIN)/kinarm-eval --trials 200
@@ -42,6 +42,11 @@ lint: $(call INSTALLED,dev) ## check style, format and types
 
 docs: $(call INSTALLED,docs) ## build the site into docs/_build/html
 	$(BIN)/sphinx-build -n -W --keep-going -b html docs docs/_build/html
+
+PYTHONS ?= python3.11 python3.12 python3.13
+
+package: $(call INSTALLED,package) ## build, check and install what is published, with all PYTHONS
+	$(BIN)/python tests/packaging/everywhere.py $(PYTHONS)
 
 clean: ## remove what the other targets made
 	rm -rf $(VENV) build dist *.egg-info .coverage .mypy_cache .pytest_cache .ruff_cache .hypothesis
