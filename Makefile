@@ -8,7 +8,7 @@ PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check 
 MODULES := $(shell find kinarm policies evaluation data -name __pycache__ -prune -o -type f -print | sort | cksum | cut -d' ' -f1)
 INSTALLED = $(VENV)/.installed-$(1)-$(MODULES)
 
-.PHONY: eval test test-slow campaign lint docs clean
+.PHONY: eval test test-slow test-all campaign lint docs package clean
 
 eval: $(call INSTALLED,core) ## evaluate all shipped policies on 200 trials a task
 	$(BIN)/kinarm-eval --trials 200
@@ -16,14 +16,20 @@ eval: $(call INSTALLED,core) ## evaluate all shipped policies on 200 trials a ta
 # Without the libraries of the extra zoo, what needs them cannot be covered.
 COVERAGE := from importlib.util import find_spec; print(95 if find_spec("sb3_contrib") else 85)
 
+PYTEST := $(BIN)/python -m pytest --dist loadfile --no-loadscope-reorder --durations=25
+COVERED = --cov --cov-report=term --cov-fail-under=$$($(BIN)/python -c '$(COVERAGE)')
+
 test: $(call INSTALLED,test) ## run the tests, but for the slow ones
-	$(BIN)/python -m pytest -n auto --dist loadfile --durations=25 -m "not slow" --cov --cov-report=term \
-		--cov-fail-under=$$($(BIN)/python -c '$(COVERAGE)')
+	$(PYTEST) -n auto -m "not slow" $(COVERED)
 
 CAMPAIGN := loaders command_lines writes signals kills live_page
 
 test-slow: $(call INSTALLED,test) ## run the slow tests, those in a browser included
-	$(BIN)/python -m pytest -n auto --dist loadfile --durations=25 -m slow
+	$(PYTEST) -n auto -m slow
+
+# Some tests wait for what they started: a worker more than there are processors makes up for it.
+test-all: $(call INSTALLED,test) ## run all tests at once
+	$(PYTEST) -n $$(($$(nproc) + 1)) $(COVERED)
 
 campaign: $(call INSTALLED,all) ## damaged files, odd arguments, failing writes, signals: hours
 	set -e; for module in $(CAMPAIGN); do \
@@ -36,6 +42,11 @@ lint: $(call INSTALLED,dev) ## check style, format and types
 
 docs: $(call INSTALLED,docs) ## build the site into docs/_build/html
 	$(BIN)/sphinx-build -n -W --keep-going -b html docs docs/_build/html
+
+PYTHONS ?= python3.11 python3.12 python3.13
+
+package: $(call INSTALLED,package) ## build, check and install what is published, with all PYTHONS
+	$(BIN)/python tests/packaging/everywhere.py $(PYTHONS)
 
 clean: ## remove what the other targets made
 	rm -rf $(VENV) build dist *.egg-info .coverage .mypy_cache .pytest_cache .ruff_cache .hypothesis

@@ -1,5 +1,6 @@
 """Shared fixtures: the shipped arms, robots written on the spot, and simulators of both."""
 
+import os
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
@@ -88,10 +89,32 @@ def write_obj(path: Path, corners: np.ndarray) -> None:
     path.write_text(vertices + faces)
 
 
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Begin with the files that take long, so that no worker ends alone with one of them.
+
+    Slow tests and campaigns repeat at length what others cover: they are not traced, which
+    would take half as long again.
+    """
+    slow = [item for item in items if item.get_closest_marker("slow")]
+    files = {item.path for item in slow}
+    items.sort(key=lambda item: item.path not in files)
+    if config.pluginmanager.hasplugin("_cov"):
+        for item in items:
+            if item.get_closest_marker("slow") or "campaign" in item.path.parts:
+                item.add_marker("no_cover")
+
+
 @pytest.fixture(scope="session", autouse=True)
 def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Keep what is cached out of the user's folder, in other processes, too."""
-    folder = tmp_path_factory.mktemp("cache")
+    """Keep what is cached out of the user's folder, in other processes, too.
+
+    The workers of a run share it: what one has computed, the others read.
+    """
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        folder = folder.parent
+    folder /= "cache"
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("KINARM_CACHE", str(folder))
         yield folder

@@ -24,7 +24,7 @@
 
   let weakest = [99, ""];
   for (const node of document.querySelectorAll("h1, h2, h3, p, th, td, small, span, dt, dd, li, text, a")) {
-    if (node.textContent.trim() && !node.closest("nav")) {
+    if (node.textContent.trim() && node.checkVisibility() && !node.closest("nav")) {
       const style = getComputedStyle(node);
       const text = luminance(channels(node.tagName === "text" ? style.fill : style.color));
       const ground = luminance(behind(node));

@@ -1,6 +1,7 @@
 """The replay in a real browser, offline."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -8,6 +9,8 @@ import pytest
 
 from kinarm.arm import Arm
 from kinarm.viewer import replay_page
+
+CONTRAST = Path(__file__).with_name("contrast.js")
 
 
 def placement(arm, configuration, name):
@@ -290,3 +293,10 @@ def test_without_groups_there_is_no_list(watched):
     watched.page.keyboard.press("l")
     assert not watched.page.locator("#trial-list").is_visible()
     assert watched.complaints == []
+
+
+@pytest.mark.parametrize("size", [(1280, 900), (390, 844)])
+def test_text_can_be_read(open_page, page_file, size):
+    """A contrast of 4.5 to 1 at least (WCAG 2, AA)."""
+    contrast, where = open_page(page_file, size).tell(CONTRAST.read_text())
+    assert contrast >= 4.5, where

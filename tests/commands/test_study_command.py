@@ -114,13 +114,13 @@ class TestBadInput:
 
 
 @pytest.mark.slow
-def test_fifty_kills_at_random_moments(command, file, tmp_path):
+def test_kills_at_random_moments(command, file, tmp_path):
     """Whatever is killed, and whenever: the same command ends where one that lived does."""
     file.write_text(STUDY.replace("seeds = 3", "seeds = 20"))
     straight = Study(file, tmp_path / "straight").run(jobs=2)
     rng, kills = np.random.default_rng(0), 0
     spelled = command("kinarm-study", file, "--out", tmp_path / "it", "--jobs", 2)
-    while kills < 50:
+    while kills < 6:
         process = subprocess.Popen(
             spelled, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
         )

@@ -27,7 +27,7 @@ TARGET = {
 def counted() -> dict[str, int]:
     """Instructions of each section of the workload."""
     with tempfile.TemporaryDirectory() as folder:
-        environment = {**os.environ, **TARGET, "NUMBA_CACHE_DIR": f"{folder}/cache"}
+        environment = {**os.environ, **TARGET}
         run = [sys.executable, "-P", str(WORKLOAD)]
         subprocess.run([*run, "--warm"], env=environment, check=True)
         valgrind = ["valgrind", "--tool=callgrind", "--instr-atstart=no", "--quiet"]

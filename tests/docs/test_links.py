@@ -1,0 +1,43 @@
+"""Links of README and pages lead to files and headings that are there."""
+
+from pathlib import Path
+
+import pytest
+from pages import ROOT, anchors, links, pages
+
+PAGES = pages()
+OUTSIDE = ("https://", "http://", "mailto:")
+
+
+def broken(path: Path) -> list[str]:
+    """Links of a page that lead nowhere."""
+    found = []
+    for link in links(path):
+        file, _, anchor = link.partition("#")
+        target = (path.parent / file).resolve() if file else path
+        made_by_the_build = target.is_relative_to(ROOT / "docs" / "gallery")
+        if link.startswith(OUTSIDE) or made_by_the_build:
+            continue
+        if not target.exists() or (anchor and anchor not in anchors(target)):
+            found.append(link)
+    return found
+
+
+def test_pages_are_found():
+    assert {"README.md", "CHANGELOG.md", "docs/index.md"} <= PAGES.keys()
+    assert len([link for path in PAGES.values() for link in links(path)]) > 100
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_links_lead_somewhere(name):
+    assert broken(PAGES[name]) == []
+
+
+def test_what_leads_nowhere_is_noticed(tmp_path):
+    (tmp_path / "other.md").write_text("# Units: [rad], `q`\n(label)=\n")
+    page = tmp_path / "page.md"
+    page.write_text(
+        "# Top\n[a](other.md#units-rad-q) [b](#top) [c](other.md#label) ![d](missing.png)\n"
+        "[e](other.md#none) [f](#label) [g](https://example.org)\n```\n[h](code.md)\n```\n"
+    )
+    assert broken(page) == ["missing.png", "other.md#none", "#label"]
