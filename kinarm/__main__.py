@@ -4,7 +4,8 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from kinarm._command_line import Parser, run_command
+from kinarm._command_line import run_command
+from kinarm._parser import Parser
 
 PROG = "python -m kinarm"
 

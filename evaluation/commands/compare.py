@@ -155,7 +155,7 @@ class ComparisonRequest(RunningOptions):
         """Carry out what is missing, and tell of every training that is finished."""
         from kinarm.evaluation.comparison.runs import save_run
         from kinarm.evaluation.comparison.training import carry_out
-        from kinarm.evaluation.running.local import LocalExecutor
+        from kinarm.workers import LocalExecutor
 
         local = LocalExecutor(min(self.at_once, len(missing)))
         console = open_console(stderr=True)

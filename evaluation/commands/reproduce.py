@@ -165,8 +165,8 @@ def _train(
     """Carry out what is missing, the longest first, and read all runs anew."""
     from kinarm.evaluation.reproduction.results import Results
     from kinarm.evaluation.reproduction.training import carry_out
-    from kinarm.evaluation.running.local import LocalExecutor
     from kinarm.evaluation.running.progress import TaskProgress
+    from kinarm.workers import LocalExecutor
 
     study = results.study
     missing = sorted(results.missing, key=lambda training: -training.cost)

@@ -8,9 +8,9 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kinarm._command_line import option_name
 from kinarm._console import working
 from kinarm._files import check_output
+from kinarm._options import option_name
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
 from kinarm.problem_options import ProblemOptions, say_choices
