@@ -61,13 +61,15 @@ def _grouped(
 ) -> Iterator[tuple[str, argparse._ActionsContainer]]:
     """Fields of a dataclass, and the group of options that each goes to."""
     groups: Mapping[str, Sequence[str]] = getattr(kind, "GROUPS", {})
+    is_parser = isinstance(parser, argparse.ArgumentParser)
+    rest = group_of_options(parser, "options") if is_parser else parser
     for title, names in groups.items():
         for name in names:
             yield name, group_of_options(parser, title)
     grouped = {name for names in groups.values() for name in names}
     for name in init_fields(kind):
         if name not in grouped:
-            yield name, parser
+            yield name, rest
 
 
 def _add_option(

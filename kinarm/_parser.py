@@ -69,7 +69,8 @@ def group_of_options(parser: argparse._ActionsContainer, title: str) -> argparse
 class HelpFormatter(argparse.HelpFormatter):
     """Wraps paragraphs, and leaves lines that are indented as they are, if they are short enough.
 
-    An example that is not has its meaning on a line of its own. Usage names what has to be given.
+    Where an example is not, all have their meaning on a line of its own. Usage names what has to be
+    given.
     """
 
     def _format_usage(
@@ -113,13 +114,9 @@ class HelpFormatter(argparse.HelpFormatter):
                 subsequent_indent=indent,
                 break_on_hyphens=False,
             )
-        lines: list[str] = []
-        for line in block.splitlines():
-            example = EXAMPLE.match(line)
-            if example and len(line) > width:
-                lines += [f"  {example[1]}", f"      {example[2]}"]
-            else:
-                lines.append(line)
+        lines = block.splitlines()
+        if max(map(len, lines)) > width:
+            lines = [EXAMPLE.sub(r"  \1\n      \2", line) for line in lines]
         return "\n".join(indent + line for line in lines)
 
 

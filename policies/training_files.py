@@ -9,6 +9,7 @@ from kinarm._interrupts import telling
 from kinarm.errors import InvalidInputError, KinarmError
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import TrainingResult, TrainingState, begin_training, run_training
+from kinarm.policies.library import CHECKPOINT
 from kinarm.policies.training_progress import Watcher, watched_compilation
 
 CHECKPOINT_SECONDS = 5.0
@@ -21,7 +22,7 @@ class TrainingStopped(Exception):  # noqa: N818 - it is no error
 
 def checkpoint_path(out: str | Path) -> Path:
     """Where the checkpoint of a training lies until it is finished."""
-    return Path(out).with_suffix(".checkpoint.npz")
+    return Path(out).with_suffix(CHECKPOINT)
 
 
 def curve_path(out: str | Path) -> Path:

@@ -90,10 +90,15 @@ def faced_problem(entrants: Sequence[Entrant], options: ProblemOptions) -> Reach
     return options.resolve(trained[0] if trained else "right")
 
 
-def stated_problem(options: ProblemOptions) -> ReachProblem | None:
-    """The problem that options name, if they name one."""
+def stated_problem(
+    options: ProblemOptions, names: Sequence[str | None] = ()
+) -> ReachProblem | None:
+    """The problem that options name, if they name one.
+
+    The best policy is for some problem: for the usual one if none is named.
+    """
     named = options.problem is not None or options.task is not None
-    return options.resolve() if named else None
+    return options.resolve() if named or BEST in names else None
 
 
 def find_candidates(request: ReplayRequest) -> Candidates:
@@ -109,7 +114,7 @@ def find_candidates(request: ReplayRequest) -> Candidates:
 
 def _fresh_candidates(request: ReplayRequest, names: Sequence[str | None]) -> Candidates:
     """Let policies face trials that are drawn now."""
-    entrants = [first_entrant(name, stated_problem(request)) for name in names]
+    entrants = [first_entrant(name, stated_problem(request, names)) for name in names]
     searched = request.trial or request.worst or request.collisions
     count = request.trials or (FAILING if request.failures else SEARCHED if searched else PLAYED)
     trials = TrialSet.draw(faced_problem(entrants, request), count, request.seed or 0)
@@ -261,9 +266,11 @@ def _positions_of_collisions(run: Run) -> list[int]:
 
 
 def _positions_of_worst(count: int, run: Run) -> list[int]:
-    if count > len(run.numbers):
+    ends, positions = run.ends, dict[int, int]()
+    for position in sorted(range(len(ends)), key=lambda k: -ends[k][2]):
+        positions.setdefault(run.numbers[position], position)
+    if count > len(positions):
         raise InvalidInputError(
-            f"--worst {count} asks for more trials than there are: {len(run.numbers)}"
+            f"--worst {count} asks for more trials than there are: {len(positions)}"
         )
-    ends = run.ends
-    return sorted(range(len(ends)), key=lambda k: -ends[k][2])[:count]
+    return list(positions.values())[:count]
