@@ -21,11 +21,12 @@ from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.problem import ReachProblem
 from kinarm.simulator import Simulator
 
-KIND, FORMAT_VERSION = "evaluation", 3
+KIND, FORMAT_VERSION = "evaluation", 4
 """Kind and version of the files."""
 
-READABLE = (2, FORMAT_VERSION)
-"""Versions that can be read: 2 lacks failures, trials that go on, and bounds of a part."""
+READABLE = (2, 3, FORMAT_VERSION)
+"""Versions that can be read: 2 lacks failures, trials that go on, and bounds of a part; 2 and 3
+call complete proofs tight."""
 
 ENDS = ("outcome", "steps", "final_distance")
 """What has to be the same again."""

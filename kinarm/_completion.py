@@ -1,13 +1,21 @@
 """Completion of shells: what is typed after Tab is printed as a script by shtab."""
 
 import argparse
+import re
 import shlex
 import sys
+import textwrap
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 SHELLS = ("bash", "zsh", "fish")
+
+DETAILS = re.compile(r" \(default: |\. Names: |[;:] ")
+"""Where the help of an option goes into details."""
+
+LONGEST = 60
+"""Letters of a help that a shell shows."""
 
 FUNCTIONS: dict[str, Callable[[Iterable[str], str], str]] = {
     "bash": lambda names, call: (
@@ -43,6 +51,10 @@ def completion_script(parser: argparse.ArgumentParser, shell: str) -> str:
     import shtab
 
     for action in _actions(parser):
+        if action.help:
+            action.help = textwrap.shorten(
+                DETAILS.split(action.help)[0], LONGEST, placeholder=" ..."
+            )
         completes = getattr(action, "completes", None)
         if completes in ("file", "folder"):
             action.complete = shtab.FILE if completes == "file" else shtab.DIRECTORY  # type: ignore[attr-defined]
@@ -63,7 +75,7 @@ def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
 
 def _names_or_files(shell: str, names: tuple[str, ...]) -> dict[str, Any]:
     """How a shell completes one of some names, or a file."""
-    call = f"_kinarm_names_{zlib.crc32(' '.join(names).encode()):08x}"
+    call = f"_kinarm_files_or_names_{zlib.crc32(' '.join(names).encode()):08x}"
     return {
         "bash": call,
         "zsh": f"{{{call}}}",

@@ -72,7 +72,9 @@ def _footnote(document: dict[str, Any]) -> str:
     ]
     bounds = {problem: entry["oracle"] for problem, entry in problems if entry["oracle"]}
     if bounds:
-        shares = (f"{name} {100 * each['tight_share']:.1f} %" for name, each in bounds.items())
+        shares = (
+            f"{name} {100 * each['proof_complete_share']:.1f} %" for name, each in bounds.items()
+        )
         lines.append(
             "step ratio: steps over the number proven necessary, of trials that succeeded; "
             f"proofs complete: {', '.join(shares)}"

@@ -134,7 +134,7 @@ def _evaluated_candidates(
         if name is not None and (Path(name).suffix in (".npz", ".zip") or is_import_path(name)):
             faced = problem or next(iter(document.protocol["problems"]))
             entrant = first_entrant(name, document.problem(faced))
-        row = document.result(entrant.name if entrant else name, problem)
+        row = document.result(_name_in(document, entrant) if entrant else name, problem)
         problem = row["problem"]
         chosen.append((row, entrant or first_entrant(row["policy"])))
     faced = min(len(row["outcomes"]["steps"]) for row, _ in chosen)
@@ -149,6 +149,13 @@ def _evaluated_candidates(
         return Candidates(runs, _solved_bounds(trials), PLAYED, trials)
     floors = dict(enumerate(known))
     return Candidates(runs, lambda numbers: list(map(floors.get, numbers)), PLAYED, trials)
+
+
+def _name_in(document: EvaluationDocument, entrant: Entrant) -> str:
+    """What an evaluation calls an entrant: by its file alone, or by its folder, too."""
+    names = {row["policy"] for row in document.results}
+    whole = f"{entrant.source.parent.name}/{entrant.name}" if entrant.source else ""
+    return whole if whole in names and entrant.name not in names else entrant.name
 
 
 def _solved_bounds(trials: TrialSet) -> LowerBounds:
