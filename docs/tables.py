@@ -23,7 +23,7 @@ from kinarm.evaluation.reproduction.tables import markdown
 from kinarm.evaluation.request import EvaluationRequest
 from kinarm.observation import OBSERVATION, part_slices
 from kinarm.policies import find_learner
-from kinarm.policies.train import TrainRequest
+from kinarm.policies.training_request import TrainRequest
 from kinarm.problem_options import ProblemOptions
 
 
