@@ -58,8 +58,7 @@ class Metric:
     needs_held : bool
         Whether it is about trials that go on after success.
     heading : str
-        Heading of its column in tables, its name in words and its unit; without one it is in
-        documents alone.
+        Heading of its column, its name and unit; without one it is in documents alone.
     digits : int
         Decimals that are shown.
     shows_interval : bool
@@ -291,7 +290,7 @@ METRICS: dict[str, Metric] = {
     ),
     "time_to_success": Metric(
         meaning="median duration of the trials that succeeded",
-        definition="median of kᵢ × duration of a step, over i ∈ S",
+        definition="median of kᵢ times the duration of a step, over i ∈ S",
         formula=lambda trials: median_or_none(trials.steps_to_success * trials.time_step),
         unit="s",
         digits=2,
