@@ -10,8 +10,9 @@ import io
 import os
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, TemporaryFile
 from typing import Any
 from unittest import mock
 
@@ -23,8 +24,8 @@ from sphinx.util.docutils import SphinxDirective
 
 from kinarm.viewer.html_page import HtmlPage
 
-COLUMNS = 88
-"""Width of the terminal in which commands run."""
+TERMINAL = {"COLUMNS": "110", "LINES": "40", "TERM": "dumb"}
+"""The terminal in which commands run, for programs that ask."""
 
 KINDS = {".mp4": "video/mp4", ".png": "image/png", ".gif": "image/gif"}
 """Files that can be shown, by their ending."""
@@ -61,18 +62,24 @@ class Page:
         Where the last one ``fails``, its message is part of that, and a status of 0 is an error.
         """
         path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-        ended = subprocess.run(
-            ["sh", "-e", "-c", commands],
-            cwd=self._folder.name,
-            env={**os.environ, "PATH": path, "COLUMNS": str(COLUMNS)},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        if bool(ended.returncode) != fails:
+        terminal, theirs = os.openpty()
+        with TemporaryFile("w+") as said:
+            process = subprocess.Popen(
+                ["sh", "-e", "-c", commands],
+                cwd=self._folder.name,
+                env={**os.environ, "PATH": path, **TERMINAL},
+                stdout=theirs,
+                stderr=said,
+            )
+            os.close(theirs)
+            printed = read_terminal(terminal)
+            failed = process.wait() != 0
+            said.seek(0)
+            message = said.read()
+        if failed != fails:
             how = "were to fail" if fails else "failed"
-            raise ExtensionError(f"{self._source}:{line}: commands {how}: {ended.stderr}")
-        return ended.stdout + ended.stderr if fails else ended.stdout
+            raise ExtensionError(f"{self._source}:{line}: commands {how}: {message}")
+        return printed + message if fails else printed
 
     def write(self, name: str, text: str) -> None:
         """Write a file that later blocks use."""
@@ -85,6 +92,16 @@ class Page:
     def close(self) -> None:
         """Delete the folder."""
         self._folder.cleanup()
+
+
+def read_terminal(terminal: int) -> str:
+    """Read what is printed in a terminal until nobody is left to print."""
+    printed = bytearray()
+    with suppress(OSError):  # Linux's way to say that it has ended
+        while piece := os.read(terminal, 4096):
+            printed += piece
+    os.close(terminal)
+    return printed.decode().replace("\r\n", "\n")
 
 
 def shown(name: str, content: bytes) -> str:
