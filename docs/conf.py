@@ -30,6 +30,7 @@ extensions = [
     "sphinx_autodoc_typehints",
     "sphinx_gallery.gen_gallery",
     "cards",
+    "commands",
     "players",
     "runs",
     "tables",
@@ -87,6 +88,7 @@ sphinx_gallery_conf = {
 html_theme = "furo"
 html_title = f"kinarm {release}"
 html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sphinx = False
 

@@ -10,8 +10,9 @@ import io
 import os
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, TemporaryFile
 from typing import Any
 from unittest import mock
 
@@ -20,6 +21,11 @@ from docutils.parsers.rst import directives
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
+
+from kinarm.viewer.html_page import HtmlPage
+
+TERMINAL = {"COLUMNS": "110", "LINES": "40", "TERM": "dumb"}
+"""The terminal in which commands run, for programs that ask."""
 
 KINDS = {".mp4": "video/mp4", ".png": "image/png", ".gif": "image/gif"}
 """Files that can be shown, by their ending."""
@@ -50,20 +56,30 @@ class Page:
             exec(compile("\n" * (line - 1) + code, self._source, "exec"), self._names)
         return printed.getvalue()
 
-    def run_commands(self, commands: str, line: int = 1) -> str:
-        """Run command lines, with the commands of this Python first; what they printed."""
+    def run_commands(self, commands: str, line: int = 1, *, fails: bool = False) -> str:
+        """Run command lines, with the commands of this Python first; what they printed.
+
+        Where the last one ``fails``, its message is part of that, and a status of 0 is an error.
+        """
         path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-        ended = subprocess.run(
-            ["sh", "-e", "-c", commands],
-            cwd=self._folder.name,
-            env={**os.environ, "PATH": path},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        if ended.returncode:
-            raise ExtensionError(f"{self._source}:{line}: commands failed: {ended.stderr}")
-        return ended.stdout
+        terminal, theirs = os.openpty()
+        with TemporaryFile("w+") as said:
+            process = subprocess.Popen(
+                ["sh", "-e", "-c", commands],
+                cwd=self._folder.name,
+                env={**os.environ, "PATH": path, **TERMINAL},
+                stdout=theirs,
+                stderr=said,
+            )
+            os.close(theirs)
+            printed = read_terminal(terminal)
+            failed = process.wait() != 0
+            said.seek(0)
+            message = said.read()
+        if failed != fails:
+            how = "were to fail" if fails else "failed"
+            raise ExtensionError(f"{self._source}:{line}: commands {how}: {message}")
+        return printed + message if fails else printed
 
     def write(self, name: str, text: str) -> None:
         """Write a file that later blocks use."""
@@ -78,8 +94,20 @@ class Page:
         self._folder.cleanup()
 
 
+def read_terminal(terminal: int) -> str:
+    """Read what is printed in a terminal until nobody is left to print."""
+    printed = bytearray()
+    with suppress(OSError):  # Linux's way to say that it has ended
+        while piece := os.read(terminal, 4096):
+            printed += piece
+    os.close(terminal)
+    return printed.decode().replace("\r\n", "\n")
+
+
 def shown(name: str, content: bytes) -> str:
-    """A film or picture as HTML that refers to nothing outside."""
+    """A film, picture or page as HTML that refers to nothing outside."""
+    if name.endswith(".html"):
+        return HtmlPage(content.decode())._repr_html_()
     kind = KINDS[Path(name).suffix]
     source = f"data:{kind};base64,{base64.b64encode(content).decode()}"
     if kind.startswith("video"):
@@ -90,12 +118,17 @@ def shown(name: str, content: bytes) -> str:
 class KinarmRun(SphinxDirective):
     """Show Python or command lines (``sh``), run them, and show what they printed and made.
 
-    What has an option ``file`` is written to that file instead, for the blocks after it.
+    What has an option ``file`` is written to that file instead, for the blocks after it. Command
+    lines with an option ``fails`` end with a message, which is shown.
     """
 
     has_content = True
     required_arguments = 1
-    option_spec = {"shows": directives.unchanged, "file": directives.unchanged}  # noqa: RUF012
+    option_spec = {  # noqa: RUF012
+        "shows": directives.unchanged,
+        "file": directives.unchanged,
+        "fails": directives.flag,
+    }
 
     def run(self) -> list[nodes.Node]:
         language, code = self.arguments[0], "\n".join(self.content)
@@ -104,8 +137,11 @@ class KinarmRun(SphinxDirective):
             page.write(name, code)
             title = nodes.paragraph("", "", nodes.literal(name, name), classes=["file-name"])
             return [title, nodes.literal_block(code, code, language=language)]
-        run = {"python": page.run_python, "sh": page.run_commands}[language]
-        printed = run(code, self.lineno + self.content_offset + 1)
+        line = self.lineno + self.content_offset + 1
+        if language == "python":
+            printed = page.run_python(code, line)
+        else:
+            printed = page.run_commands(code, line, fails="fails" in self.options)
         found: list[nodes.Node] = [nodes.literal_block(code, code, language=language)]
         if printed.strip():
             found.append(

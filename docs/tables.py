@@ -1,6 +1,5 @@
 """Sphinx directive ``kinarm-table``: tables that are read from the code, so that they stay true."""
 
-import re
 from collections.abc import Mapping
 from dataclasses import fields
 
@@ -10,21 +9,15 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 from kinarm import PROBLEMS, REWARD_TERMS, Arm, RewardWeights, Scene, Simulator
-from kinarm._fields import init_fields, summary_of
+from kinarm._fields import summary_of
 from kinarm.capsules import enclosing_capsule
 from kinarm.envs.registration import ENVIRONMENTS
 from kinarm.evaluation import METRICS
 from kinarm.evaluation.commands import arms, problem
-from kinarm.evaluation.commands.bench import BenchmarkRequest
-from kinarm.evaluation.commands.compare import ComparisonRequest
-from kinarm.evaluation.commands.replay import ReplayRequest
-from kinarm.evaluation.commands.reproduce import ReproductionRequest
+from kinarm.evaluation.metrics import SYMBOLS
 from kinarm.evaluation.reproduction.tables import markdown
-from kinarm.evaluation.request import EvaluationRequest
 from kinarm.observation import OBSERVATION, part_slices
 from kinarm.policies import find_learner
-from kinarm.policies.training_request import TrainRequest
-from kinarm.problem_options import ProblemOptions
 
 
 def numbers(values: np.ndarray) -> str:
@@ -158,29 +151,29 @@ def setting(value: object) -> str:
 
 
 def metrics_table() -> str:
-    """The figures of merit."""
+    """The figures of merit: what they are called, mean and how they are computed."""
     rows = [
-        [f"`{name}`", metric.meaning, metric.unit, metric.interval or "", metric.heading]
+        [
+            f"`{name}`",
+            metric.heading or beside_heading(name),
+            metric.meaning,
+            metric.definition.replace("|", "\\|"),
+            " ".join(filter(None, (metric.unit, metric.interval))),
+        ]
         for name, metric in METRICS.items()
     ]
-    return markdown(["name", "meaning", "unit", "interval (95 %)", "column"], rows)
+    return markdown(["name", "column", "what it is", "formula", "unit, interval"], rows)
 
 
-def options_table(request: type, skip: tuple[str, ...] = ()) -> str:
-    """Options of a command: the fields of its request, but for the shared ones."""
-    shared = () if request is ProblemOptions else init_fields(ProblemOptions)
-    rows = []
-    for name, item in init_fields(request).items():
-        if name in shared or name in skip:
-            continue
-        flag = item.metadata.get("flag", f"--{name.replace('_', '-')}")
-        if not flag.startswith("--"):
-            flag = item.metadata["metavar"]
-        elif item.default is True:
-            flag = f"{flag}`, `{flag.replace('--', '--no-', 1)}"
-        meaning = re.sub(r"(--[a-z-]+)", r"`\1`", summary_of(request, name))
-        rows.append([f"`{flag}`", meaning.replace("``", "`")])
-    return markdown(["option", "meaning"], rows)
+def beside_heading(name: str) -> str:
+    """Column in which a metric stands in brackets, if it does."""
+    outer = (each for each in METRICS.values() if each.beside and each.beside[0] == name)
+    return next((f"in brackets: {each.heading}" for each in outer), "")
+
+
+def symbols_table() -> str:
+    """The letters of the formulas."""
+    return markdown(["letter", "what it stands for"], [list(item) for item in SYMBOLS.items()])
 
 
 TABLES = {
@@ -193,15 +186,9 @@ TABLES = {
     "reward": reward_table,
     "observation": lambda: observation_table(6),
     "metrics": metrics_table,
+    "symbols": symbols_table,
     "ars-recipes": lambda: recipe_table(find_learner("ars").recipes),
     "ppo-recipes": lambda: recipe_table(find_learner("ppo").recipes),
-    "problem-options": lambda: options_table(ProblemOptions),
-    "train-options": lambda: options_table(TrainRequest, skip=("learner", "settings")),
-    "evaluation-options": lambda: options_table(EvaluationRequest),
-    "replay-options": lambda: options_table(ReplayRequest),
-    "reproduction-options": lambda: options_table(ReproductionRequest),
-    "comparison-options": lambda: options_table(ComparisonRequest),
-    "benchmark-options": lambda: options_table(BenchmarkRequest),
 }
 
 

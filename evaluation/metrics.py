@@ -19,6 +19,18 @@ CLOSE = (0.02, 0.01, 0.005)
 HELD_WITHIN = 0.01
 """A goal counts as held if the tool stays within this distance to the end [m]."""
 
+SYMBOLS = {
+    "n": "number of trials; of several training seeds, all their trials together",
+    "S, C, T": "sets of the trials that ended as success, in contact (collision) or truncated",
+    "dᵢ": "final distance of trial i [m]",
+    "kᵢ": "steps that trial i took",
+    "bᵢ": "bound of trial i: steps that the oracle proves to be necessary",
+    "aᵢ": "closest approach of trial i, if success does not end it [m]",
+    "eᵢ": f"largest distance after the last {HELD_STEPS} steps of that longer trial [m]",
+    "H": "set of these longer trials that touch something",
+}
+"""What the letters in definitions of metrics stand for."""
+
 ALWAYS = float("inf")
 """Priority of columns that are never left out."""
 
@@ -31,6 +43,8 @@ class Metric:
     ----------
     meaning : str
         What it is, for documentation and reports.
+    definition : str
+        The formula in words of mathematics; `SYMBOLS` says what its letters stand for.
     formula : callable
         From `Outcomes` to the figure; None or NaN where there is nothing to tell. For an interval
         it is asked about many resamples at once and works along the last axis.
@@ -44,7 +58,7 @@ class Metric:
     needs_held : bool
         Whether it is about trials that go on after success.
     heading : str
-        Heading of its column in tables; without one it is in documents alone.
+        Heading of its column, its name and unit; without one it is in documents alone.
     digits : int
         Decimals that are shown.
     shows_interval : bool
@@ -59,6 +73,7 @@ class Metric:
     """
 
     meaning: str
+    definition: str
     formula: Callable[[Outcomes], Any]
     unit: str = ""
     interval: Literal["Wilson", "bootstrap"] | None = None
@@ -81,15 +96,15 @@ class Metric:
 
 
 def share_of(
-    meaning: str, hits: Callable[[Outcomes], NDArray[np.bool_]], heading: str = "", **shown: Any
+    meaning: str, definition: str, hits: Callable[[Outcomes], NDArray[np.bool_]], **shown: Any
 ) -> Metric:
     """Share of trials that hit."""
     return Metric(
-        meaning=f"share of trials {meaning}",
+        meaning=f"share of all trials {meaning}",
+        definition=definition,
         formula=lambda trials: hits(trials).mean(axis=-1),
         unit="%",
         interval="Wilson",
-        heading=heading,
         digits=1,
         **shown,
     )
@@ -98,9 +113,10 @@ def share_of(
 def share_within(limit: float) -> Metric:
     """Share of trials that end within a distance [m]."""
     return share_of(
-        f"with a final distance of at most {limit:g} m; contact allowed",
+        f"with a final distance of at most {limit:g} m, however they ended",
+        f"|{{i : dᵢ ≤ {limit:g} m}}| / n",
         lambda trials: trials.distance <= limit,
-        f"<= {limit:g} m",
+        heading=f"within {limit:g} m %",
         priority=1,
     )
 
@@ -110,32 +126,36 @@ def share_closer(limit: float) -> Metric:
     return share_of(
         f"that come within {1000 * limit:g} mm of the goal, if success does not end them; "
         "without contact at any time",
+        f"|{{i ∉ H : aᵢ ≤ {limit:g} m}}| / n",
         lambda trials: (trials.closest <= limit) & ~trials.held_collision,
-        f"<= {1000 * limit:g} mm",
+        heading=f"closer than {1000 * limit:g} mm %",
         needs_held=True,
         priority=14,
     )
 
 
 def distance_metric(
-    meaning: str, formula: Callable[[Outcomes], Any], heading: str = "", **shown: Any
+    meaning: str, definition: str, formula: Callable[[Outcomes], Any], **shown: Any
 ) -> Metric:
     """A statistic of the final distance."""
     return Metric(
-        meaning=f"{meaning} of the final distance",
+        meaning=f"{meaning} of the final distance over all trials, however they ended",
+        definition=definition,
         formula=formula,
         unit="m",
         interval="bootstrap",
-        heading=heading,
         **shown,
     )
 
 
-def approach_metric(meaning: str, formula: Callable[[Outcomes], Any], **shown: Any) -> Metric:
+def approach_metric(
+    meaning: str, definition: str, formula: Callable[[Outcomes], Any], **shown: Any
+) -> Metric:
     """A statistic of the closest approach."""
     return Metric(
-        meaning=f"{meaning} of the closest approach after any step, if success does not end a "
-        "trial; contact ends it",
+        meaning=f"{meaning} of the closest approach over all trials, if success does not end them; "
+        "contact does",
+        definition=definition,
         formula=formula,
         unit="m",
         interval="bootstrap",
@@ -174,88 +194,110 @@ def median_or_none(values: NDArray[Any]) -> Any:
 METRICS: dict[str, Metric] = {
     "success": share_of(
         "that ended within the tolerance, without contact",
+        "|S| / n",
         lambda trials: trials.success,
-        "success %",
+        heading="success %",
         shows_interval=True,
         spread_heading="worst..best seed %",
         priority=ALWAYS,
     ),
     "relative_success": Metric(
-        meaning="success over that of the oracle",
+        meaning="success divided by the success of the oracle in the same trials",
+        definition="success / success of the oracle, both over the bounded trials",
         formula=lambda trials: trials.relative_success,
         unit="%",
         needs_bounds=True,
-        heading="of oracle %",
+        heading="relative success %",
         digits=1,
         priority=7,
     ),
     **{f"within_{limit:g}": share_within(limit) for limit in LIMITS},
     "median_distance": distance_metric(
         "median",
+        "median of dᵢ",
         lambda trials: median(trials.ordered_distance),
-        "median m",
+        heading="median distance m",
         shows_interval=True,
         priority=12,
     ),
     "mean_distance": distance_metric(
-        "mean", lambda trials: trials.distance.mean(axis=-1), "mean m", priority=2
+        "mean",
+        "Σ dᵢ / n",
+        lambda trials: trials.distance.mean(axis=-1),
+        heading="mean distance m",
+        priority=2,
     ),
     "iqm_distance": distance_metric(
-        "interquartile mean (of the middle half)",
+        "interquartile mean",
+        "mean of dᵢ without the smallest and the largest quarter",
         lambda trials: middle_half(trials.ordered_distance).mean(axis=-1),
     ),
     "p95_distance": distance_metric(
         "95th percentile",
+        "0.95 quantile of dᵢ, interpolated linearly",
         lambda trials: quantile(trials.ordered_distance, 0.95),
-        "p95 m",
+        heading="p95 distance m",
         priority=2,
     ),
     "max_distance": Metric(
-        meaning="largest final distance",
+        meaning="largest final distance of all trials",
+        definition="max dᵢ",
         formula=lambda trials: trials.distance.max(),
         unit="m",
     ),
     "collision": share_of(
-        "that ended in contact: obstacles, the ground or the arm itself",
+        "that ended in contact with an obstacle, the ground or the arm itself",
+        "|C| / n",
         lambda trials: trials.collision,
-        "contact %",
+        heading="collision %",
         priority=6,
     ),
     "early_collision": share_of(
         f"that ended in contact within the first {EARLY_STEPS} steps",
+        f"|{{i ∈ C : kᵢ ≤ {EARLY_STEPS}}}| / n",
         lambda trials: trials.early_collision,
-        "early contact %",
+        heading="early collision %",
         priority=0.5,
     ),
     "truncated": share_of(
-        "that ran out of steps", lambda trials: trials.truncated, "out of time %", priority=0.5
+        "that took all steps without success or contact",
+        "|T| / n",
+        lambda trials: trials.truncated,
+        heading="truncated %",
+        priority=0.5,
     ),
     "mean_steps": Metric(
-        meaning="mean length of the episodes", formula=lambda trials: trials.steps.mean()
+        meaning="mean number of steps over all trials, failures included",
+        definition="Σ kᵢ / n",
+        formula=lambda trials: trials.steps.mean(),
     ),
     "median_steps": Metric(
-        meaning="median length of the episodes",
+        meaning="median number of steps over all trials, failures included",
+        definition="median of kᵢ",
         formula=lambda trials: np.median(trials.steps),
-        heading="steps",
+        heading="median steps",
         digits=0,
         priority=0.2,
     ),
     "steps_to_success": Metric(
-        meaning="steps of the trials that succeeded: median",
+        meaning="median number of steps over the trials that succeeded, and the same as time",
+        definition="median of kᵢ over i ∈ S",
         formula=lambda trials: median_or_none(trials.steps_to_success),
-        heading="steps to reach",
+        heading="steps to success",
         digits=0,
         beside=("time_to_success", "{} s"),
         priority=3,
     ),
     "time_to_success": Metric(
-        meaning="the same as time: steps by their duration",
+        meaning="median duration of the trials that succeeded",
+        definition="median of kᵢ times the duration of a step, over i ∈ S",
         formula=lambda trials: median_or_none(trials.steps_to_success * trials.time_step),
         unit="s",
         digits=2,
     ),
     "step_ratio": Metric(
-        meaning="steps over the number proven necessary, of the trials that succeeded: median",
+        meaning="median of steps divided by the bound, over the bounded trials that succeeded",
+        definition="median of kᵢ / bᵢ over the bounded i ∈ S",
         formula=lambda trials: median_or_none(trials.step_ratio),
         needs_bounds=True,
         heading="step ratio",
@@ -264,7 +306,8 @@ METRICS: dict[str, Metric] = {
         priority=8,
     ),
     "step_ratio_p95": Metric(
-        meaning="the same: 95th percentile",
+        meaning="95th percentile of steps divided by the bound, over the same trials",
+        definition="0.95 quantile of kᵢ / bᵢ over the bounded i ∈ S",
         formula=lambda trials: (
             np.percentile(trials.step_ratio, 95) if trials.step_ratio.size else None
         ),
@@ -275,26 +318,31 @@ METRICS: dict[str, Metric] = {
     "held": share_of(
         f"whose last {HELD_STEPS} steps stay within {1000 * HELD_WITHIN:g} mm of the goal, if "
         "success does not end them; without contact",
+        f"|{{i ∉ H : eᵢ ≤ {HELD_WITHIN:g} m}}| / n",
         lambda trials: (trials.farthest_at_end <= HELD_WITHIN) & ~trials.held_collision,
-        "held %",
+        heading="held %",
         needs_held=True,
         shows_interval=True,
         priority=15,
     ),
     "median_approach": approach_metric(
         "median",
+        "median of aᵢ",
         lambda trials: median(trials.ordered_closest),
-        heading="closest m",
+        heading="median approach m",
         beside=("p95_approach", "p95 {}"),
         priority=13,
     ),
     "p95_approach": approach_metric(
-        "95th percentile", lambda trials: quantile(trials.ordered_closest, 0.95)
+        "95th percentile",
+        "0.95 quantile of aᵢ, interpolated linearly",
+        lambda trials: quantile(trials.ordered_closest, 0.95),
     ),
     "held_collision": share_of(
         "that touch something if success does not end them",
+        "|H| / n",
         lambda trials: trials.held_collision,
-        "held contact %",
+        heading="held collision %",
         needs_held=True,
         priority=8.5,
     ),

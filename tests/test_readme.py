@@ -4,17 +4,19 @@ import json
 import re
 import subprocess
 import sys
-from operator import itemgetter
 from pathlib import Path
 
 import pytest
 
-from kinarm.policies import Policy
-
 ROOT = Path(__file__).parent.parent
-README, RESULTS, REPRODUCTION = (
+README, RESULTS, REPRODUCTION, PAPER = (
     (ROOT / page).read_text(encoding="utf-8")
-    for page in ("README.md", "docs/results.md", "docs/reproduction.md")
+    for page in (
+        "README.md",
+        "docs/reference/results.md",
+        "docs/reference/reproduction.md",
+        "docs/tutorials/paper.md",
+    )
 )
 
 
@@ -29,18 +31,11 @@ def run(code, folder):
     ).stdout
 
 
-def test_python_examples_run(tmp_path):
-    one, many, _ = blocks_after("Ten lines of Python", "python")
-    answer = run(one, tmp_path)
+def test_python_example_runs(tmp_path):
+    (code,) = blocks_after("Ten lines of Python", "python")
+    answer = run(code, tmp_path)
     assert float(re.match(r"(\d\.\d+) m", answer).group(1)) <= 0.05
     assert "reached: True" in answer
-    assert float(re.match(r"share reached: (.*)", run(many, tmp_path)).group(1)) > 0.85
-
-
-def test_example_with_stable_baselines3_runs(tmp_path):
-    pytest.importorskip("stable_baselines3")
-    run(blocks_after("Ten lines of Python", "python")[2], tmp_path)
-    assert Policy.load(tmp_path / "mine.npz").provenance.environment_steps >= 20_000
 
 
 @pytest.mark.slow
@@ -68,11 +63,9 @@ def test_verdicts_are_the_recorded_ones():
     shared = {claim["name"]: claim for claim in readings["spread1-progress-iteration"]}
     for claim in readings["spread1-progress-none"]:
         both = [claim, shared.get(claim["name"])]
-        for page, cell in ((README, itemgetter("verdict")), (REPRODUCTION, verdict_cell)):
-            cells = (cell(each) if each else "" for each in both)
-            assert f"| {claim['statement']} | {' | '.join(cells)} |" in page
-    assert f"{document['trainings']} trainings" in README
-    assert f"{document['environment_steps'] / 1e6:.0f} million" in README
+        cells = (verdict_cell(each) if each else "" for each in both)
+        assert f"| {claim['statement']} | {' | '.join(cells)} |" in REPRODUCTION
+    assert f"{document['trainings']} trainings" in PAPER
 
 
 def verdict_cell(claim):
@@ -82,6 +75,12 @@ def verdict_cell(claim):
         for part in claim["parts"]
     )
     return f"**{claim['verdict']}**: {'; '.join(measured)}"
+
+
+def test_the_readme_is_short():
+    assert len(README.splitlines()) <= 115
+    assert len(README.split()) <= 1000
+    assert len(re.findall(r"^\| `", README, re.MULTILINE)) <= 8
 
 
 def test_make_targets_exist():

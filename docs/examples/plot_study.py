@@ -51,7 +51,7 @@ bars = beside_bound(study)
 
 # %%
 # ``study.table()`` has one row a training; ``kinarm-study`` does the same from a file, and writes a
-# page. See :doc:`/studies`.
+# page. See :doc:`/how-to/studies`.
 
 table = study.table()
 print(table.dtype.names)

@@ -81,8 +81,8 @@ axes.legend(frameon=False)
 axes.spines[["top", "right"]].set_visible(False)
 
 # %%
-# A policy keeps its settings and versions with it, and can be written to a file and loaded again:
-# see :doc:`/policies`. The recipe itself, without replacements, trains longer and on more
+# A policy keeps its settings and versions. It can be written to a file and loaded again: see
+# :doc:`/explanation/policies`. The recipe itself, without replacements, trains longer and on more
 # scenarios.
 
 # sphinx_gallery_thumbnail_number = 2

@@ -82,7 +82,7 @@ def _footnote(document: dict[str, Any]) -> str:
         bounded = min(each["bounded"] for each in bounds.values())
         if bounded < protocol["trials"]:
             lines.append(
-                f"oracle, of oracle % and step ratio are of the first {bounded} trials of "
+                f"oracle, relative success and step ratio are of the first {bounded} trials of "
                 f"{protocol['trials']}; --policy oracle bounds all"
             )
     if protocol["hold"]:

@@ -96,8 +96,8 @@ def result_rows(comparison: Comparison) -> list[list[str]]:
 
 
 HEADER = (
-    *("problem", "learner", "success % (95 %)", "% of the oracle's", "seeds %"),
-    *("contact %", "median steps"),
+    *("problem", "learner", "success % (95 %)", "relative success %", "seeds %"),
+    *("collision %", "steps to success"),
     *("million steps", "minutes", "steps/s"),
     *(f"thousand steps, minutes to {level:.0%}" for level in LEVELS),
 )

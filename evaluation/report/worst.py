@@ -58,7 +58,7 @@ def worst_row(results: ProblemResults, worst: WorstTrial) -> dict[str, Any]:
         "steps": f"{rollouts.steps[trial]}",
     }
     if results.entry["oracle"]:
-        figures["oracle"] = oracle_steps(results, trial)
+        figures["oracle steps"] = oracle_steps(results, trial)
     return {
         "policy": worst.evaluation.entrant.name,
         "style": worst.group.style,

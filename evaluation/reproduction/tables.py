@@ -53,8 +53,8 @@ def learners_table(results: Results) -> str:
         distances = (f"{np.median(final):.3f}", f"{final.mean():.3f}")
         rows.append([name, "oracle", *oracle, *distances, "0.0", ""])
     header = (
-        *("task", "learner", "success %", "of oracle %", f"<= {NEAR} m % (seeds)"),
-        *("median m", "mean m", "contact %", "million steps"),
+        *("task", "learner", "success %", "relative success %", f"within {NEAR} m % (seeds)"),
+        *("median distance m", "mean distance m", "collision %", "million steps"),
     )
     return markdown(header, rows)
 

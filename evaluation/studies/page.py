@@ -100,8 +100,8 @@ def study_page(study: "Study", figures: dict[str, "Figure"], command: str = "") 
 
 
 HEADINGS = (
-    *("trainings", "seeds", "success %", "95 %", "worst seed %", "of oracle %"),
-    *("contact %", "median m", "steps", "step ratio", "million steps"),
+    *("trainings", "seeds", "success %", "95 %", "worst seed %", "relative success %"),
+    *("collision %", "median distance m", "median steps", "step ratio", "million steps"),
 )
 
 

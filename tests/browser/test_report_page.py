@@ -9,6 +9,7 @@ from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.document import evaluation_document
 from kinarm.evaluation.entrants import ORACLE, find_entrants
 from kinarm.evaluation.evaluation import run_trials
+from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.report.groups import group_results
 from kinarm.evaluation.report.page import write_report
 from kinarm.evaluation.report.worst import worst_trials
@@ -188,3 +189,31 @@ def test_pointing_at_a_policy_dims_the_others(visit):
     shown = page.locator("#right .chart .series:not(.dimmed)").all()
     assert dimmed > 0
     assert {each.get_attribute("data-series") for each in shown} == {"ars-tuned-right"}
+
+
+def test_a_tap_tells_what_a_figure_means(visit):
+    page = visit(**PHONE)
+    tip = page.locator("#tip")
+    assert tip.is_hidden()
+    page.locator("#right [data-term='steps to success']").last.tap()
+    assert tip.inner_text() == METRICS["steps_to_success"].meaning
+    box = tip.bounding_box()
+    assert box["x"] >= 0
+    assert box["x"] + box["width"] <= PHONE["viewport"]["width"]
+    page.locator("#right .map path:has(title), #right .map :has(> title)").first.tap(force=True)
+    assert tip.is_visible()
+    page.locator("#right h2").tap()
+    assert tip.is_hidden()
+
+
+def test_a_mouse_and_the_keyboard_tell_what_a_figure_means(visit):
+    page = visit(**DESKTOP)
+    tip, term = page.locator("#tip"), page.locator("#right th .term", has_text="step ratio")
+    term.hover()
+    assert tip.inner_text() == METRICS["step_ratio"].meaning
+    page.locator("#right h2").hover()
+    assert tip.is_hidden()
+    term.focus()
+    assert tip.is_visible()
+    page.keyboard.press("Escape")
+    assert tip.is_hidden()

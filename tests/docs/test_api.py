@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-REFERENCE = (Path(__file__).resolve().parents[2] / "docs" / "api.rst").read_text(encoding="utf-8")
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+REFERENCE = (DOCS / "reference" / "api.rst").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

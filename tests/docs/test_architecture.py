@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = ("architecture.md", "extending.md")
+PAGES = ("explanation/architecture.md", "how-to/extending.md")
 ROOMS = ("kinarm", "policies", "evaluation")
 
 
@@ -18,7 +18,7 @@ def test_modules_that_a_page_names_exist(page: str) -> None:
 
 
 def test_functions_that_the_page_names_exist() -> None:
-    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / PAGES[0]).read_text(encoding="utf-8")
     sources = "\n".join(
         path.read_text(encoding="utf-8")
         for folder in ROOMS
@@ -30,7 +30,11 @@ def test_functions_that_the_page_names_exist() -> None:
 
 
 def test_no_page_holds_what_a_merge_left() -> None:
-    pages = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.*")]
-    texts = {page.name: page.read_text(encoding="utf-8") for page in pages if page.suffix != ".png"}
+    pages = [
+        page
+        for kind in ("*.md", "*.rst", "*.py", "*.css")
+        for page in (*ROOT.glob(kind), *(ROOT / "docs").rglob(kind))
+    ]
+    texts = {str(page): page.read_text(encoding="utf-8") for page in pages}
     marked = re.compile(r"^(<{7}|>{7}) ", re.MULTILINE)
     assert [name for name, text in texts.items() if marked.search(text)] == []

@@ -18,7 +18,7 @@ from kinarm.policies import learners, load_policy, train, training_files
 from kinarm.problem import ReachProblem
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "how-to" / "extending.md").read_text(encoding="utf-8")
 BLOCKS = dict(
     re.findall(r"```\{code-block\} \w+\n:name: (\S+)\n\n(.*?)```", PAGE, re.MULTILINE | re.DOTALL)
 )
@@ -43,7 +43,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture
 def toy(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The learner of the page, in one file and registered by one line."""
-    monkeypatch.syspath_prepend(str(ROOT / "docs" / "extending"))
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "how-to"))
     monkeypatch.setattr(learners, "_MODULES", dict(learners._MODULES))
     exec(BLOCKS["register"])
     yield

@@ -242,7 +242,10 @@ def test_statistics_of_ordered_values_are_those_of_numpy_and_scipy(n):
 
 def test_a_new_metric_is_one_entry(monkeypatch):
     mean_return = Metric(
-        meaning="mean return", formula=lambda t: t.returns.mean(axis=-1), interval="bootstrap"
+        meaning="mean return",
+        definition="Σ rᵢ / n",
+        formula=lambda t: t.returns.mean(axis=-1),
+        interval="bootstrap",
     )
     monkeypatch.setitem(METRICS, "mean_return", mean_return)
     figures = figures_of(skewed(40))
@@ -254,4 +257,12 @@ def test_a_new_metric_is_one_entry(monkeypatch):
 def test_every_metric_says_what_it_means():
     for name, metric in METRICS.items():
         assert metric.meaning, name
+        assert metric.definition, name
         assert metric.beside is None or metric.beside[0] in METRICS
+
+
+def test_columns_are_called_as_in_documents():
+    for name, metric in METRICS.items():
+        words = f"{name} {metric.unit}".replace("_", " ").split()
+        if metric.heading:
+            assert [word for word in metric.heading.split() if word in words] == words, name

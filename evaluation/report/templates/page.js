@@ -26,6 +26,45 @@ for (const item of document.querySelectorAll("section .legend li[data-series], s
   item.addEventListener("pointerleave", () => highlight(section, null));
 }
 
+// What a figure means, and what a drawn mark stands for: shown by a mouse, a tap or the keyboard.
+const tip = document.getElementById("tip");
+const meanings = new Map(
+  [...document.querySelectorAll("#terms > div")].map((entry) => [entry.children[0].textContent, entry.children[1].textContent])
+);
+
+function explanation(target) {
+  const term = target.closest("[data-term]");
+  if (term) {
+    return [term, meanings.get(term.dataset.term)];
+  }
+  const mark = target.closest("svg :has(> title)");
+  return mark ? [mark, mark.querySelector("title").textContent] : [null, ""];
+}
+
+function explain(target) {
+  const [element, text] = explanation(target);
+  tip.hidden = !text;
+  if (!text) {
+    return;
+  }
+  tip.textContent = text;
+  const place = element.getBoundingClientRect();
+  const left = place.left + (place.width - tip.offsetWidth) / 2;
+  const above = place.top - tip.offsetHeight - 8;
+  tip.style.left = `${Math.max(16, Math.min(left, root.clientWidth - tip.offsetWidth - 16))}px`;
+  tip.style.top = `${above > 60 ? above : place.bottom + 8}px`;
+}
+
+document.addEventListener("click", (event) => explain(event.target));
+document.addEventListener("scroll", () => { tip.hidden = true; }, { passive: true });
+document.addEventListener("keydown", (event) => { tip.hidden ||= event.key === "Escape"; });
+for (const term of document.querySelectorAll(".term")) {
+  term.addEventListener("focus", () => explain(term));
+  term.addEventListener("blur", () => { tip.hidden = true; });
+  term.addEventListener("pointerenter", (event) => event.pointerType === "mouse" && explain(term));
+  term.addEventListener("pointerleave", (event) => { tip.hidden ||= event.pointerType === "mouse"; });
+}
+
 // The replay of the worst trials: a row chooses the trial, and follows when the player goes on.
 const frame = document.querySelector("#worst iframe");
 const rows = [...document.querySelectorAll("tr[data-replay]")];

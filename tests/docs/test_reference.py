@@ -1,0 +1,41 @@
+"""Pages that are made from the code hold all of it."""
+
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from kinarm.evaluation.metrics import METRICS, SYMBOLS
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+
+
+def module(monkeypatch: pytest.MonkeyPatch, name: str) -> ModuleType:
+    """A Sphinx extension of the docs."""
+    pytest.importorskip("sphinx")
+    monkeypatch.syspath_prepend(str(DOCS))
+    found = __import__(name)
+    monkeypatch.delitem(sys.modules, name)
+    return found
+
+
+def test_every_program_and_option_is_described(monkeypatch: pytest.MonkeyPatch) -> None:
+    commands = module(monkeypatch, "commands")
+    parsers = {parser.prog: parser for parser in commands.all_parsers()}
+    assert {"kinarm-eval", "kinarm-train ars", "kinarm-train ppo", "kinarm-problem check"} <= {
+        *parsers
+    }
+    assert {*commands.programs()} <= {*parsers}
+    for parser in parsers.values():
+        text = commands.describe(parser)
+        told = [action for action in parser._actions if action.dest not in commands.EVERYWHERE]
+        options = [each for action in told for each in action.option_strings]
+        assert [each for each in options if each not in text] == []
+
+
+def test_every_figure_is_defined(monkeypatch: pytest.MonkeyPatch) -> None:
+    tables = module(monkeypatch, "tables")
+    table = tables.metrics_table()
+    assert [name for name in METRICS if f"| `{name}` |" not in table] == []
+    assert [letter for letter in SYMBOLS if f"| {letter} |" not in tables.symbols_table()] == []
