@@ -11,6 +11,7 @@ from sphinx.util.docutils import SphinxDirective
 
 from kinarm import PROBLEMS, REWARD_TERMS, Arm, RewardWeights, Scene, Simulator
 from kinarm._fields import init_fields, summary_of
+from kinarm._options import option_default
 from kinarm.capsules import enclosing_capsule
 from kinarm.envs.registration import ENVIRONMENTS
 from kinarm.evaluation import METRICS
@@ -23,6 +24,7 @@ from kinarm.evaluation.reproduction.tables import markdown
 from kinarm.evaluation.request import EvaluationRequest
 from kinarm.observation import OBSERVATION, part_slices
 from kinarm.policies import find_learner
+from kinarm.policies.seeds import SeedsRequest
 from kinarm.policies.training_request import TrainRequest
 from kinarm.problem_options import ProblemOptions
 
@@ -179,8 +181,9 @@ def options_table(request: type, skip: tuple[str, ...] = ()) -> str:
         elif item.default is True:
             flag = f"{flag}`, `{flag.replace('--', '--no-', 1)}"
         meaning = re.sub(r"(--[a-z-]+)", r"`\1`", summary_of(request, name))
-        rows.append([f"`{flag}`", meaning.replace("``", "`")])
-    return markdown(["option", "meaning"], rows)
+        default = option_default(request, item, negatable=False)
+        rows.append([f"`{flag}`", meaning.replace("``", "`"), default])
+    return markdown(["option", "meaning", "default"], rows)
 
 
 TABLES = {
@@ -197,6 +200,7 @@ TABLES = {
     "ppo-recipes": lambda: recipe_table(find_learner("ppo").recipes),
     "problem-options": lambda: options_table(ProblemOptions),
     "train-options": lambda: options_table(TrainRequest, skip=("learner", "settings")),
+    "seeds-options": lambda: options_table(SeedsRequest, skip=("training",)),
     "evaluation-options": lambda: options_table(EvaluationRequest),
     "replay-options": lambda: options_table(ReplayRequest),
     "reproduction-options": lambda: options_table(ReproductionRequest),
