@@ -90,7 +90,7 @@ def _add_option(
         return
     flag = option_name(item, prefix)
     known = names.get(item.name) or item.metadata.get("names", tuple)()
-    default = _default(kind, item, negatable=negatable)
+    default = option_default(kind, item, negatable=negatable)
     options: dict[str, Any] = {
         "default": argparse.SUPPRESS,
         "help": _help(summary_of(kind, item.name), known, default),
@@ -150,7 +150,7 @@ def option_name(item: Field[Any], prefix: str = "") -> str:
 METAVARS = {int: "N", float: "X", Path: "FILE"}
 
 
-def _default(kind: type, item: Field[Any], *, negatable: bool) -> str:
+def option_default(kind: type, item: Field[Any], *, negatable: bool) -> str:
     """What happens without an option; empty if that goes without saying."""
     defaults: Mapping[str, str] = getattr(kind, "DEFAULTS", {})
     default = item.default

@@ -9,7 +9,7 @@ EPILOG = """
 examples:
   kinarm-replay --policy best --problem right             the first five trials of the best policy
   kinarm-replay --policy mine.npz --worst 5               the worst of 200
-  kinarm-replay results/evaluation.json --collisions      what an evaluation collided in
+  kinarm-replay results/evaluation.json --policy mine.npz --worst 5   of an evaluation
   kinarm-replay --policy best --problem right --failures  all failures of 10000 trials, by cause
   kinarm-replay --compare ppo-tuned-both oracle           two on the same trials, one as a ghost
   kinarm-replay --policy mine.npz --record trials.npz     keep the recordings as well

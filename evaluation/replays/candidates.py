@@ -8,12 +8,12 @@ from pathlib import Path
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.document import EvaluationDocument
-from kinarm.evaluation.entrants import ORACLE, Entrant, find_entrants
+from kinarm.evaluation.entrants import ORACLE, UNTRAINED_ENTRANTS, Entrant, find_entrants
 from kinarm.evaluation.imported import is_import_path
 from kinarm.evaluation.replays.request import ReplayRequest
 from kinarm.evaluation.replays.runs import FacedRun, RecordedRun, Run
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.library import BEST, group_of
+from kinarm.policies.library import BEST, group_of, policy_names
 from kinarm.problem import ReachProblem
 from kinarm.problem_options import ProblemOptions
 from kinarm.recording import Recording, load_recordings
@@ -136,7 +136,7 @@ def _evaluated_candidates(
             entrant = first_entrant(name, document.problem(faced))
         row = document.result(_name_in(document, entrant) if entrant else name, problem)
         problem = row["problem"]
-        chosen.append((row, entrant or first_entrant(row["policy"])))
+        chosen.append((row, entrant or _known_entrant(row["policy"], path)))
     faced = min(len(row["outcomes"]["steps"]) for row, _ in chosen)
     trials = document.trials(str(problem)).chosen(range(faced))
     runs = []
@@ -149,6 +149,13 @@ def _evaluated_candidates(
         return Candidates(runs, _solved_bounds(trials), PLAYED, trials)
     floors = dict(enumerate(known))
     return Candidates(runs, lambda numbers: list(map(floors.get, numbers)), PLAYED, trials)
+
+
+def _known_entrant(name: str, path: Path) -> Entrant:
+    """The entrant of a name, as long as that does not stand for a file of the user's."""
+    if name in (*UNTRAINED_ENTRANTS, *policy_names()) or is_import_path(name):
+        return first_entrant(name)
+    raise InvalidInputError(f"policy {name!r} of {str(path)!r} is a file: name it with --policy")
 
 
 def _name_in(document: EvaluationDocument, entrant: Entrant) -> str:

@@ -13,7 +13,7 @@ from kinarm.policies import Policy, recipe, train_policy
 from kinarm.problem import PROBLEMS
 
 SMALLER = {
-    "kinarm-eval": ("--trials", 3, "--no-oracle"),
+    "kinarm-eval": ("--trials", 12, "--no-oracle"),
     "kinarm-train": ("--iterations", 2),
     "kinarm-replay": ("--no-oracle", "--overwrite"),
     "kinarm-problem": (),
@@ -49,7 +49,8 @@ def place(tmp_path, monkeypatch, policy):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
-    PROBLEMS["right"].save(tmp_path / "my.toml")
+    for name in ("my.toml", "mine.toml"):
+        PROBLEMS["right"].save(tmp_path / name)
     policy.save(tmp_path / "mine.npz")
     (tmp_path / "right").mkdir()
     for seed in (0, 1):
