@@ -16,7 +16,6 @@ from kinarm._parallel import available_threads
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.policies.learners import learner_of
-from kinarm.policies.provenance import plain_settings
 from kinarm.policies.training_files import (
     TrainingStopped,
     checkpoint_path,
@@ -199,6 +198,7 @@ class SeedsRequest:
         """
         from kinarm.policies.checkpoint import load_checkpoint
         from kinarm.policies.policy import Policy
+        from kinarm.policies.provenance import plain_settings
 
         path = checkpoint_path(task.out)
         if path.exists():
@@ -243,6 +243,8 @@ def _change(
     settings: dict[str, Any], problem: "ReachProblem", config: "TrainingConfig"
 ) -> str | None:
     """How a training that was begun differs from one that is asked for."""
+    from kinarm.policies.provenance import plain_settings
+
     wanted = plain_settings(config)
     changed = [name for name in wanted | settings if wanted.get(name) != settings.get(name)]
     return ", ".join(changed) or problem.first_difference(config.problem)
