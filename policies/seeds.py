@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-from kinarm._files import check_folder, check_output, only_writer
+from kinarm._files import absolute, check_folder, check_output, only_writer
 from kinarm._interrupts import asking, telling
 from kinarm._parallel import available_threads
 from kinarm._validation import whole_number
@@ -231,9 +231,12 @@ class SeedsRequest:
         with tempfile.TemporaryDirectory(prefix="kinarm-") as folder:
             board = ProgressBoard(Path(folder), len(tasks))
             board.clear()
-            work = partial(_train, board=board, threads=threads, logs=self.training.tensorboard)
+            logs = self.training.tensorboard and absolute(self.training.tensorboard)
+            work = partial(_train, board=board, threads=threads, logs=logs)
+            # Workers that are there already may be in another folder.
+            placed = [(k, task._replace(out=absolute(task.out))) for k, task in enumerate(tasks)]
             with asking(board.ask_to_stop), _shown(board, tasks):
-                done = LocalExecutor(jobs, threads).carry_out(work, list(enumerate(tasks)))
+                done = LocalExecutor(jobs, threads).carry_out(work, placed)
                 for number, point in done:
                     last[tasks[number].out] = point
         return last
