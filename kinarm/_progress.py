@@ -49,7 +49,7 @@ class ProgressLine:
             disable=not self._console.is_terminal,
             speed_estimate_period=math.inf,
         )
-        self._task = self._progress.add_task(title, total=total, words=())
+        self._task = self._progress.add_task(title, total=total, words=(), count="")
 
     def __enter__(self) -> "ProgressLine":
         self._progress.start()
@@ -63,14 +63,24 @@ class ProgressLine:
     ) -> None:
         self._progress.stop()
 
-    def update(self, done: float | None = None, words: Sequence[str] = ()) -> None:
-        """Show how much is done, and some words; the first ones are left out for want of width."""
-        self._progress.update(self._task, completed=done, words=tuple(words))
+    def update(self, done: float | None = None, words: Sequence[str] = (), count: str = "") -> None:
+        """Show how far it is.
+
+        Parameters
+        ----------
+        done : float, optional
+            How much is done; as before if it is left out.
+        words : sequence of str
+            What is said of it; the first ones are left out for want of width.
+        count : str
+            How much that is; in numbers of what is done and of all if it is left out.
+        """
+        self._progress.update(self._task, completed=done, words=tuple(words), count=count)
         if self._progress.disable and time.monotonic() - self._printed > LINE_SECONDS:
             self._printed = time.monotonic()
             task = self._progress.tasks[0]
-            count = f"{task.completed:.0f} of {task.total:.0f} {self._unit}"
-            self._console.print(", ".join([f"{self._title}: {count}", *words, time_left(task)]))
+            said = f"{self._title}: {count_of(task)} {self._unit}"
+            self._console.print(", ".join([said, *words, time_left(task)]))
 
 
 class _Line(ProgressColumn):
@@ -102,7 +112,7 @@ def progress_line(task: "Task", width: int, marks: str) -> Text:
     marks : str
         What the bar is made of: where something is done, and where it is not.
     """
-    count, left = f"{task.completed:.0f}/{task.total:.0f}", time_left(task)
+    count, left = count_of(task), time_left(task)
     words: list[str] = list(task.fields["words"])
     title, bar = task.description, BAR
     while True:
@@ -120,6 +130,11 @@ def progress_line(task: "Task", width: int, marks: str) -> Text:
     pieces: list[Any] = [title, drawn, count, *words, Text(left, "progress.remaining")]
     shown = [Text(piece) if isinstance(piece, str) else piece for piece in pieces]
     return Text(" ", no_wrap=True, overflow="crop").join(piece for piece in shown if piece)
+
+
+def count_of(task: "Task") -> str:
+    """How much is done, of how much."""
+    return task.fields["count"] or f"{task.completed:.0f}/{task.total:.0f}"
 
 
 def time_left(task: "Task") -> str:

@@ -9,6 +9,7 @@ from pathlib import Path
 from kinarm._files import absolute, is_file, is_folder
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.policies.policy import Policy
+from kinarm.policies.training_files import CHECKPOINT
 from kinarm.problem import ProblemLike, ReachProblem
 
 BEST = "best"
@@ -16,9 +17,6 @@ BEST = "best"
 
 RANKING = "ranking.json"
 """What the shipped policies reach, beside them: see `kinarm.evaluation.ranking`."""
-
-CHECKPOINT = ".checkpoint.npz"
-"""Ending of the checkpoint of a training."""
 
 _SEED_SUFFIX = re.compile(r"-seed\d+$")
 

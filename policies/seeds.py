@@ -10,13 +10,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-from kinarm._files import check_folder, check_output, only_writer
+from kinarm._files import absolute, check_folder, check_output, only_writer
 from kinarm._interrupts import asking, telling
 from kinarm._parallel import available_threads
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.policies.learners import learner_of
-from kinarm.policies.provenance import plain_settings
 from kinarm.policies.training_files import (
     TrainingStopped,
     checkpoint_path,
@@ -199,6 +198,7 @@ class SeedsRequest:
         """
         from kinarm.policies.checkpoint import load_checkpoint
         from kinarm.policies.policy import Policy
+        from kinarm.policies.provenance import plain_settings
 
         path = checkpoint_path(task.out)
         if path.exists():
@@ -231,9 +231,12 @@ class SeedsRequest:
         with tempfile.TemporaryDirectory(prefix="kinarm-") as folder:
             board = ProgressBoard(Path(folder), len(tasks))
             board.clear()
-            work = partial(_train, board=board, threads=threads, logs=self.training.tensorboard)
+            logs = self.training.tensorboard and absolute(self.training.tensorboard)
+            work = partial(_train, board=board, threads=threads, logs=logs)
+            # Workers that are there already may be in another folder.
+            placed = [(k, task._replace(out=absolute(task.out))) for k, task in enumerate(tasks)]
             with asking(board.ask_to_stop), _shown(board, tasks):
-                done = LocalExecutor(jobs, threads).carry_out(work, list(enumerate(tasks)))
+                done = LocalExecutor(jobs, threads).carry_out(work, placed)
                 for number, point in done:
                     last[tasks[number].out] = point
         return last
@@ -243,6 +246,8 @@ def _change(
     settings: dict[str, Any], problem: "ReachProblem", config: "TrainingConfig"
 ) -> str | None:
     """How a training that was begun differs from one that is asked for."""
+    from kinarm.policies.provenance import plain_settings
+
     wanted = plain_settings(config)
     changed = [name for name in wanted | settings if wanted.get(name) != settings.get(name)]
     return ", ".join(changed) or problem.first_difference(config.problem)

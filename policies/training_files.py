@@ -9,8 +9,10 @@ from kinarm._interrupts import telling
 from kinarm.errors import InvalidInputError, KinarmError
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import TrainingResult, TrainingState, begin_training, run_training
-from kinarm.policies.library import CHECKPOINT
 from kinarm.policies.training_progress import Watcher, watched_compilation
+
+CHECKPOINT = ".checkpoint.npz"
+"""Ending of the file of a checkpoint."""
 
 CHECKPOINT_SECONDS = 5.0
 """How often a checkpoint is saved [s]."""

@@ -2,12 +2,14 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from kinarm._progress import ProgressLine
 from kinarm.kernels.notices import told_of_compilation
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import TrainingState, learner_of
+
+if TYPE_CHECKING:
+    from kinarm._progress import ProgressLine
 
 STARTS, COMPILES = "starting", "compiling, once"
 
@@ -25,7 +27,7 @@ class Watcher(Protocol):
 class TrainingProgress:
     """A line on standard error: iterations, return, success, time left."""
 
-    def __init__(self, line: ProgressLine) -> None:
+    def __init__(self, line: "ProgressLine") -> None:
         self._line = line
 
     def begin(self, compiling: bool) -> None:
@@ -42,6 +44,8 @@ class TrainingProgress:
 @contextmanager
 def shown_progress(config: TrainingConfig) -> Iterator[TrainingProgress]:
     """Show how far a training with these settings is."""
+    from kinarm._progress import ProgressLine
+
     title = f"{learner_of(config).name} {config.recipe} {config.problem.name} seed {config.seed}"
     with ProgressLine(title, config.iterations, "iterations") as line:
         yield TrainingProgress(line)

@@ -84,6 +84,8 @@ class ComparisonRequest(RunningOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if not self.train:
+            self.refuse_without_training()
         for name in ("seeds", "trials"):
             whole_number(name, getattr(self, name), 1)
         if self.steps is not None:

@@ -81,6 +81,8 @@ class StudyRequest(RunningOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if not self.train:
+            self.refuse_without_training()
         whole_number("threads", self.threads, 1)
 
     @property

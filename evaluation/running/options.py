@@ -63,6 +63,18 @@ class RunningOptions:
             if getattr(self, name) is not None and not self.slurm:
                 raise InvalidInputError(f"--{name} goes with --slurm")
 
+    def refuse_without_training(self) -> None:
+        """Refuse to be told where trainings run if there are none.
+
+        Raises
+        ------
+        InvalidInputError
+            If an option says so.
+        """
+        for name in RunningOptions.GROUPS["where trainings run"]:
+            if getattr(self, name):
+                raise InvalidInputError(f"--{name} does not go with --no-train")
+
     @property
     def at_once(self) -> int:
         """Trainings at a time on this machine."""

@@ -50,3 +50,11 @@ def test_every_command_tells_the_version(run, program):
     answer = run(program, "--version")
     assert (answer.status, answer.err) == (0, "")
     assert answer.out == f"kinarm {metadata.version('kinarm')}\n"
+
+
+def test_it_prints_the_completion_of_all_commands():
+    pytest.importorskip("shtab")
+    done = type_in("--print-completion", "bash")
+    assert (done.returncode, done.stderr) == (0, "")
+    ends = [line.split()[-1] for line in done.stdout.splitlines() if line.startswith("complete ")]
+    assert sorted(ends) == sorted(SCRIPTS)

@@ -111,7 +111,7 @@ def test_groups_of_a_panel_can_be_told_apart(trials, train_novice):
     entrants = [
         Entrant.from_policy("ars-tuned-right-seed0", train_novice("right")),
         Entrant.from_policy("ars-tuned-left-seed0", train_novice("left")),
-        Entrant.from_policy("mine", train_novice("right", 2)),
+        Entrant.from_policy("mine", train_novice("right", 2, named="paper")),
     ]
     (axes,) = distance_histograms([run_trials(e, trials) for e in entrants]).axes
     assert len(set(legend(axes))) == 3

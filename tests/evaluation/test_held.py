@@ -5,6 +5,7 @@ from dataclasses import replace
 import gymnasium
 import numpy as np
 import pytest
+from reseeded import reseeded
 
 import kinarm  # noqa: F401 registers the environments
 from kinarm.evaluation.entrants import ORACLE, Entrant, find_entrants
@@ -106,7 +107,9 @@ def test_functions_and_random_actions_are_held_too(trials):
 
 def test_seeds_are_pooled(skilled, trials):
     members = [
-        run_trials(Entrant.from_policy(f"made-seed{seed}", skilled), trials, hold=True)
+        run_trials(
+            Entrant.from_policy(f"made-seed{seed}", reseeded(skilled, seed)), trials, hold=True
+        )
         for seed in range(2)
     ]
     members[1] = replace(

@@ -28,7 +28,7 @@ def task_of(done=1234, total=8000, words=WORDS, seconds_each=0.01, title="ars tu
     """A task of which so much was done."""
     clock = Clock()
     progress = Progress(get_time=clock, disable=True, speed_estimate_period=1e9)
-    number = progress.add_task(title, total=total, words=words)
+    number = progress.add_task(title, total=total, words=words, count="")
     for part in (0, 1, done):
         clock.now = part * seconds_each
         progress.update(number, completed=part)
@@ -93,8 +93,17 @@ def shown(monkeypatch, **settings):
 
 def test_without_a_terminal_there_are_lines_now_and_then(monkeypatch):
     first, last = shown(monkeypatch).splitlines()
-    assert first == "baking: 0 of 4 loaves, starting, -:-- left"
-    assert last.startswith("baking: 4 of 4 loaves, crisp, ")
+    assert first == "baking: 0/4 loaves, starting, -:-- left"
+    assert last.startswith("baking: 4/4 loaves, crisp, ")
+
+
+def test_what_is_counted_can_be_other_than_what_is_done():
+    task = task_of(2, 8, ("right-seed0", "right-seed1"), title="trainings")
+    task.fields["count"] = "1 of 30"
+    assert progress_line(task, 80, "#-").plain.startswith(
+        "trainings ##-------- 1 of 30 right-seed0"
+    )
+    assert progress_line(task, 40, "#-").plain == "trainings 1 of 30 right-seed1 0:01 left"
 
 
 @pytest.mark.parametrize("colourful", [True, False])
