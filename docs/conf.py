@@ -52,6 +52,7 @@ autodoc_class_signature = "mixed"
 typehints_use_signature_return = True
 typehints_document_rtype = False
 always_use_bars_union = True
+maximum_signature_line_length = 90
 
 # Types of other projects: their inventories would have to be fetched.
 nitpick_ignore_regex = [
@@ -113,9 +114,11 @@ ARRAY = re.compile(
 
 
 def _shorten_signature(*event: str | None) -> tuple[str, str | None] | None:
-    """Write array types as their names where signatures keep them, those of named tuples."""
+    """Write array types as their names where signatures keep them, and made defaults as dots."""
     *_, signature, returned = event
-    return None if signature is None else (ARRAY.sub("ndarray", signature), returned)
+    if signature is None:
+        return None
+    return ARRAY.sub("ndarray", signature).replace("<factory>", "..."), returned
 
 
 def _shorten_annotations(_app: object, doctree: nodes.document) -> None:
