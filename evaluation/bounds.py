@@ -30,7 +30,7 @@ ARCHIVE = ("bounds", 1)
 """Kind and version of the files."""
 
 TRIAL_BOUNDS = (
-    *("reachable", "steps", "steps_lower_bound", "tight"),
+    *("reachable", "steps", "steps_lower_bound", "proof_complete"),
     *("final_distance", "distance_lower_bound"),
 )
 """What documents hold of every trial."""
@@ -145,8 +145,8 @@ def bounds_document(solutions: OracleSolutions) -> dict[str, Any]:
 
     ``bounded`` is their number.
     ``unsolved`` are the trials that no motion was found for, and why; ``gap`` is that between
-    ``steps`` and ``steps_lower_bound`` of the others, and ``tight_share`` the share of trials whose
-    number of steps is proven.
+    ``steps`` and ``steps_lower_bound`` of the others, and ``proof_complete_share`` the share of
+    trials whose proof is complete.
     """
     missed = np.flatnonzero(~solutions.reachable)
     gap = (solutions.steps - solutions.steps_lower_bound)[solutions.reachable]
@@ -159,7 +159,7 @@ def bounds_document(solutions: OracleSolutions) -> dict[str, Any]:
         "steps": _summary(solutions.steps),
         "steps_lower_bound": _summary(solutions.steps_lower_bound),
         "gap": _summary(gap) if gap.size else None,
-        "tight_share": float(solutions.tight.mean()),
+        "proof_complete_share": float(solutions.proof_complete.mean()),
         "trials": {name: getattr(solutions, name).tolist() for name in TRIAL_BOUNDS},
     }
 

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -17,16 +17,16 @@ from kinarm.evaluation.entrants import check_names
 from kinarm.evaluation.evaluation import Evaluation, pool
 from kinarm.evaluation.statistics import BOOTSTRAP_SEED, LEVEL, RESAMPLES
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.library import group_of
 from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.problem import ReachProblem
 from kinarm.simulator import Simulator
 
-KIND, FORMAT_VERSION = "evaluation", 3
+KIND, FORMAT_VERSION = "evaluation", 4
 """Kind and version of the files."""
 
-READABLE = (2, FORMAT_VERSION)
-"""Versions that can be read: 2 lacks failures, trials that go on, and bounds of a part."""
+READABLE = (2, 3, FORMAT_VERSION)
+"""Versions that can be read: 2 lacks failures, trials that go on, and bounds of a part; 2 and 3
+call complete proofs tight."""
 
 ENDS = ("outcome", "steps", "final_distance")
 """What has to be the same again."""
@@ -119,11 +119,14 @@ class EvaluationDocument:
         Problems and trials.
     results : list of dict
         One for each policy and problem.
+    members : dict
+        Names of the policies of each group of training seeds, by its name and problem.
     """
 
     name: str
     protocol: dict[str, Any]
     results: list[dict[str, Any]]
+    members: dict[tuple[str, str], list[str]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"EvaluationDocument({self.name!r}, {len(self.results)} results)"
@@ -153,7 +156,8 @@ class EvaluationDocument:
             raise InvalidInputError(
                 f"{name!r} has format version {version}; this kinarm reads {readable}"
             )
-        return cls(name, content["protocol"], content["results"])
+        members = {(row["policy"], row["problem"]): row["members"] for row in content["pooled"]}
+        return cls(name, content["protocol"], content["results"], members)
 
     def result(self, policy: str | None, problem: str | None) -> dict[str, Any]:
         """Find the result of a policy, or of a group's first seed, on a problem.
@@ -173,10 +177,10 @@ class EvaluationDocument:
                     f"{choices or 'none on this problem'}"
                 )
             return named[0]
-        for known_as in (str, group_of):
-            for row in fitting:
-                if known_as(row["policy"]) == policy:
-                    return row
+        for row in fitting:
+            first, *_ = self.members.get((policy, row["problem"]), [policy])
+            if row["policy"] == first:
+                return row
         raise UnknownNameError("policy", policy, dict.fromkeys(row["policy"] for row in fitting))
 
     def problem(self, name: str) -> ReachProblem:
@@ -263,6 +267,7 @@ SHAPE = {
             "outcomes": dict.fromkeys(ENDS, list),
         }
     },
+    "pooled": {ENTRY: {"policy": str, "problem": str, "members": list}},
 }
 """What is needed of a document to face its trials again: types, by nested keys."""
 

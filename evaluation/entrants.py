@@ -15,7 +15,7 @@ from kinarm.evaluation.trials import TrialSet, trial_generator
 from kinarm.networks import Networks
 from kinarm.observation import observation_size
 from kinarm.policies.conversion.vec_normalize import find_vec_normalize
-from kinarm.policies.library import group_of, policy_files, policy_names
+from kinarm.policies.library import policy_files, policy_names
 from kinarm.policies.policy import Policy
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.rollouts import Rollouts
@@ -41,8 +41,6 @@ class Entrant:
         Runs all trials of a set.
     algorithm, recipe : str
         How it was made.
-    group : str
-        What it shares with other training seeds of the same recipe and problem.
     seed : int or None
         Training seed.
     policy : Policy or None
@@ -55,7 +53,6 @@ class Entrant:
     run: Run
     algorithm: str
     recipe: str
-    group: str
     seed: int | None = None
     policy: Policy | None = None
     source: Path | None = None
@@ -113,7 +110,6 @@ class Entrant:
             run=_running(policy),
             algorithm=made.algorithm,
             recipe=made.recipe,
-            group=group_of(name),
             seed=made.seed,
             policy=policy,
             source=source,
@@ -122,7 +118,7 @@ class Entrant:
     @classmethod
     def from_function(cls, name: str, function: PolicyFunction) -> "Entrant":
         """Enter a function from observations (n, n_observations) to actions (n, n_actions)."""
-        return cls(name, _running(function), algorithm="function", recipe="", group=name)
+        return cls(name, _running(function), algorithm="function", recipe="")
 
 
 def _running(policy: Policy | PolicyFunction) -> Run:
@@ -157,12 +153,12 @@ def _run_oracle(trials: TrialSet, *, record: bool = False) -> Rollouts:
 
 
 BASELINES = {
-    "random": Entrant("random", _run_random, "baseline", "random", "random"),
-    "zero": Entrant("zero", _run_zero, "baseline", "zero", "zero"),
+    "random": Entrant("random", _run_random, "baseline", "random"),
+    "zero": Entrant("zero", _run_zero, "baseline", "zero"),
 }
 """Uniformly random actions, and no motion at all."""
 
-ORACLE = Entrant("oracle", _run_oracle, "oracle", "oracle", "oracle")
+ORACLE = Entrant("oracle", _run_oracle, "oracle", "oracle")
 """The motions that the oracle found, replayed."""
 
 UNTRAINED_ENTRANTS = {**BASELINES, ORACLE.name: ORACLE}
@@ -177,8 +173,8 @@ def find_entrants(
     ----------
     name_or_file : str or Path
         A baseline, ``"oracle"``, a shipped policy, a group of them (all training seeds),
-        ``"best"``, a policy file, a model of Stable-Baselines3 (.zip) or ``"module:function"``. A
-        model and a module run code: open only those that you trust.
+        ``"best"``, a policy file, a folder of them, a model of Stable-Baselines3 (.zip) or
+        ``"module:function"``. A model and a module run code: open only those that you trust.
     problem : ReachProblem, str or Path, optional
         What a model is for, as its file does not say, or the best shipped policy; others say it
         themselves.

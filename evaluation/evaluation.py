@@ -19,6 +19,7 @@ from kinarm.evaluation.imported import Predictor, policy_function
 from kinarm.evaluation.intervals import share_over_seeds
 from kinarm.evaluation.outcomes import Outcomes
 from kinarm.evaluation.statistics import Estimate
+from kinarm.evaluation.training_seeds import group_names
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle.solution import OracleSolutions
 from kinarm.policies.policy import Policy
@@ -307,15 +308,18 @@ def run_trials(
 
 
 def pool(evaluations: Sequence[Evaluation]) -> tuple[PooledEvaluation, ...]:
-    """Pool the training seeds of each group and problem, where there are several."""
-    groups: dict[tuple[object, ...], list[Evaluation]] = {}
+    """Pool the training seeds of each recipe and problem, where there are several.
+
+    What belongs together is what policies record of their training; see
+    `kinarm.evaluation.training_seeds.group_names`.
+    """
+    names = group_names(evaluation.entrant for evaluation in evaluations)
+    groups: dict[tuple[str, str], list[Evaluation]] = {}
     for evaluation in evaluations:
-        made = evaluation.entrant
-        trained_for = made.problem.digest if made.problem else None
-        key = (made.group, made.algorithm, made.recipe, trained_for, evaluation.problem.digest)
+        key = (names[evaluation.entrant.name], evaluation.problem.digest)
         groups.setdefault(key, []).append(evaluation)
     return tuple(
-        PooledEvaluation(members[0].entrant.group, tuple(members))
-        for members in groups.values()
+        PooledEvaluation(name, tuple(members))
+        for (name, _), members in groups.items()
         if len(members) > 1
     )

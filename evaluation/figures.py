@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from kinarm._files import write_atomically
 from kinarm.evaluation.evaluation import Evaluation
+from kinarm.evaluation.training_seeds import group_names
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,15 +37,19 @@ def distance_histograms(evaluations: Sequence[Evaluation]) -> "Figure":
     from matplotlib.figure import Figure
 
     problems = {evaluation.problem.digest: evaluation.problem for evaluation in evaluations}
-    labels = list(dict.fromkeys(series_label(evaluation) for evaluation in evaluations))
+    labels = series_labels(evaluations)
     furthest = max(float(evaluation.rollouts.distance.max()) for evaluation in evaluations)
     edges = np.arange(0.0, furthest + BIN_WIDTH, BIN_WIDTH)
     figure = Figure(figsize=(4.2 * len(problems), 3.6), layout="constrained")
     panels = figure.subplots(1, len(problems), squeeze=False)[0]
     for axes, (digest, problem) in zip(panels, problems.items(), strict=True):
-        facing = [evaluation for evaluation in evaluations if evaluation.problem.digest == digest]
-        for number, label in enumerate(labels):
-            distances = [e.rollouts.distance for e in facing if series_label(e) == label]
+        facing = [
+            (label, evaluation.rollouts.distance)
+            for label, evaluation in zip(labels, evaluations, strict=True)
+            if evaluation.problem.digest == digest
+        ]
+        for number, label in enumerate(dict.fromkeys(labels)):
+            distances = [each for shown, each in facing if shown == label]
             if distances:
                 _stairs(axes, distances, edges, label, number)
         axes.axvline(problem.task.tolerance, color="#444444", linestyle=":", linewidth=1)
@@ -71,14 +76,19 @@ def _stairs(
     axes.stairs(shares.mean(axis=0), edges, color=colour, linestyle=dash, linewidth=2, label=label)
 
 
-def series_label(evaluation: Evaluation) -> str:
+def series_labels(evaluations: Sequence[Evaluation]) -> list[str]:
     """Name of what the training seeds of a recipe share, and its problem if it is another one."""
-    entrant, trained_for = evaluation.entrant, evaluation.entrant.problem
+    groups = group_names(evaluation.entrant for evaluation in evaluations)
+    return [_label(evaluation, groups[evaluation.entrant.name]) for evaluation in evaluations]
+
+
+def _label(evaluation: Evaluation, group: str) -> str:
+    trained_for = evaluation.entrant.problem
     if trained_for is None:
-        return entrant.name
+        return evaluation.entrant.name
     same = trained_for.name == evaluation.problem.name
     origin = "" if same else f" (trained on {trained_for.name})"
-    return entrant.group.removesuffix(f"-{trained_for.name}") + origin
+    return group.removesuffix(f"-{trained_for.name}") + origin
 
 
 def save_figure(figure: "Figure", folder: Path, name: str) -> tuple[Path, ...]:

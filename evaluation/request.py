@@ -5,11 +5,12 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from kinarm._files import absolute, check_output, only_writer, write_text
 from kinarm._validation import MOST_TRIALS, whole_number
 from kinarm.errors import InvalidInputError
+from kinarm.evaluation.choices import policy_choices
 from kinarm.problem_files import problem_names
 from kinarm.problem_options import ProblemOptions, say_choices
 
@@ -43,11 +44,12 @@ class EvaluationRequest(ProblemOptions):
     Parameters
     ----------
     policies : tuple of str
-        Shipped policy, recipe (all its seeds), best, random, zero, oracle, .npz file,
-        Stable-Baselines3's model.zip (runs its code: only if you trust it), or module:function;
-        repeatable; by default all shipped ones, random and zero.
+        Shipped policy, recipe (all its seeds), best, random, zero, oracle, .npz file, folder of
+        them, Stable-Baselines3's model.zip (runs its code: only if you trust it), or
+        module:function; several, and repeatable.
     problems : tuple of str
-        A problem by name, or a problem file; repeatable. ``problem`` is for a single one.
+        A problem by name, or a problem file; several, and repeatable. ``problem`` is for a single
+        one.
     trials : int
         Trials a problem.
     seed : int
@@ -60,7 +62,8 @@ class EvaluationRequest(ProblemOptions):
         Bound what any policy could reach; of more than 2000 trials the first ones, unless the
         oracle is a named policy.
     hold : bool
-        Let success not end a trial, once more: how close policies come, and if they stay.
+        Run the trials once more, without ending them at success: how close policies come to the
+        goal, and whether they stay there.
     out : Path
         Folder for evaluation.json and histograms.
     report : Path
@@ -81,14 +84,20 @@ class EvaluationRequest(ProblemOptions):
     """
 
     policies: tuple[str, ...] = field(
-        default=(), metadata={"flag": "--policy", "metavar": "NAME_OR_FILE", "repeat": True}
+        default=(),
+        metadata={
+            "flag": "--policy",
+            "metavar": "NAME_OR_FILE",
+            "several": True,
+            "completes": policy_choices,
+        },
     )
     problems: tuple[str, ...] = field(
         default=(),
         metadata={
             "flag": "--problem",
             "metavar": "NAME_OR_FILE",
-            "repeat": True,
+            "several": True,
             "names": problem_names,
         },
     )
@@ -105,9 +114,23 @@ class EvaluationRequest(ProblemOptions):
     json: bool = False
     markdown: bool = False
 
+    GROUPS: ClassVar = {
+        "what is evaluated": ("policies", "problems", "matrix", "allow_other_arm"),
+        "trials": ("trials", "seed", "oracle", "hold"),
+        "output": ("out", "report", "card", "overwrite", "json", "markdown"),
+        "changes to the problems": ProblemOptions.GROUPS["problem"][1:],
+    }
+    DEFAULTS: ClassVar = {
+        **ProblemOptions.DEFAULTS,
+        "policies": "all shipped policies, random and zero",
+        "problems": "what each policy was trained for",
+    }
+
     def __post_init__(self) -> None:
         whole_number("trials", self.trials, 1, MOST_TRIALS)
         whole_number("seed", self.seed, 0)
+        if self.json and self.markdown:
+            raise InvalidInputError("--json and --markdown exclude each other")
 
     def run(self, command: str | None = None, tell: Tell = lambda _: None) -> dict[str, Any]:
         """Evaluate, and write what is asked for.
@@ -244,6 +267,7 @@ class EvaluationRequest(ProblemOptions):
     def _chosen(self) -> list[Chosen]:
         """Entrants that are named, without repetition; or all whose arm stays the same."""
         from kinarm.evaluation.entrants import find_entrants, shipped_entrants
+        from kinarm.evaluation.training_seeds import named_apart
         from kinarm.policies.library import BEST
         from kinarm.problem import PROBLEMS
 
@@ -264,7 +288,8 @@ class EvaluationRequest(ProblemOptions):
                     found.setdefault((entrant.name, entrant.source), (entrant, best_for))
             for entrant in find_entrants(name, only) if name != BEST else ():
                 found[entrant.name, entrant.source] = (entrant, None)
-        return list(found.values())
+        entrants = named_apart([entrant for entrant, _ in found.values()])
+        return list(zip(entrants, (best_for for _, best_for in found.values()), strict=True))
 
     def _named_problems(self) -> "list[ReachProblem]":
         names = (self.problem, *self.problems) if self.problem else self.problems

@@ -1,10 +1,13 @@
 """``python -m kinarm`` lists the commands; ``python -m kinarm eval`` runs one of them."""
 
+import subprocess
 import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from kinarm._command_line import Parser, run_command
+from kinarm._command_line import run_command
+from kinarm._completion import SHELLS
+from kinarm._parser import CommandParser
 
 PROG = "python -m kinarm"
 
@@ -32,15 +35,26 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _explain(typed: Sequence[str]) -> None:
-    """Print the help or the version, or refuse a command that does not exist."""
+    """Print the help, the version or completion scripts, or refuse an unknown command."""
     lines = (f"  {name:<10} {purpose}  (kinarm-{name})" for name, (_, purpose) in COMMANDS.items())
-    parser = Parser(
+    parser = CommandParser(
         prog=PROG,
         description="Learn to reach with a simulated robot arm.",
         epilog="commands:\n" + "\n".join(lines) + "\n\nkinarm-eval --help, and so on, tells more.",
     )
-    parser.add_argument("command", choices=COMMANDS, metavar="COMMAND", help="one of those below")
-    parser.parse_args(typed)
+    parser.add_argument(
+        "command", nargs="?", choices=COMMANDS, metavar="COMMAND", help="One of those below"
+    )
+    parser.add_argument(
+        "--print-completion",
+        choices=SHELLS,
+        help="Print the completion script of a shell for all commands and exit",
+    )
+    shell = parser.parse_args(typed).print_completion
+    if shell is not None:
+        for module, _ in COMMANDS.values():
+            words = [sys.executable, "-m", module, "--print-completion", shell]
+            subprocess.run(words, check=True)
 
 
 if __name__ == "__main__":

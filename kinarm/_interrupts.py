@@ -39,8 +39,12 @@ class Interruption(KeyboardInterrupt):
     """
 
 
+PATIENCE = 3.0
+"""So long may work that is asked to stop take to do so [s]."""
+
 _phase: Literal["foreign", "starting", "running", "ending"] = "foreign"
 _requested = False
+_ask: Callable[[], object] | None = None
 
 
 def is_command() -> bool:
@@ -78,6 +82,11 @@ def _answer(_: int, __: FrameType | None) -> None:
     if _phase == "starting":
         os._exit(EXIT_STATUS)
     if _phase == "running" and not _on_its_way():
+        if _ask is not None and not _requested:
+            _requested = True
+            signal.setitimer(signal.ITIMER_REAL, PATIENCE, AGAIN)
+            _ask()
+            return
         _requested = True
         signal.setitimer(signal.ITIMER_REAL, AGAIN, AGAIN)
         raise Interruption
@@ -136,6 +145,23 @@ def telling(what_is_left: Callable[[], str]) -> Iterator[None]:
         if not was_interrupted(error):
             raise
         raise KeyboardInterrupt(what_is_left()) from None
+
+
+@contextmanager
+def asking(stop: Callable[[], object]) -> Iterator[None]:
+    """Do what stops in order once ``stop`` is called: a request to end calls it.
+
+    The request is raised afterwards, or when the work has not stopped after `PATIENCE`, or at the
+    second request.
+    """
+    global _ask
+    _ask = stop
+    try:
+        yield
+    finally:
+        _ask = None
+    if _requested:
+        raise Interruption
 
 
 @contextmanager

@@ -1,9 +1,9 @@
 """Which problem: the options that all commands and their requests share."""
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from kinarm._fields import init_fields
 from kinarm.arm_specification import arm_names
@@ -51,6 +51,22 @@ class ProblemOptions:
     tolerance: float | None = None
     horizon: int | None = None
     start_spread: float | None = None
+
+    GROUPS: ClassVar[Mapping[str, Sequence[str]]] = {
+        "problem": (
+            *("problem", "arm", "tool_frame", "package_dirs", "task", "scene"),
+            *("tolerance", "horizon", "start_spread"),
+        )
+    }
+    """Fields by the title of the group of options that they are in."""
+
+    DEFAULTS: ClassVar[Mapping[str, str]] = {
+        **dict.fromkeys(
+            ("arm", "task", "scene", "tolerance", "horizon", "start_spread"), "the problem's"
+        ),
+        "tool_frame": "the arm's",
+    }
+    """What happens without an option."""
 
     def resolve(self, default: "ProblemLike" = "right") -> "ReachProblem":
         """The problem that the options make of a default one.

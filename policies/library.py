@@ -6,9 +6,10 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 
-from kinarm._files import is_file
+from kinarm._files import absolute, is_file, is_folder
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.policies.policy import Policy
+from kinarm.policies.training_files import CHECKPOINT
 from kinarm.problem import ProblemLike, ReachProblem
 
 BEST = "best"
@@ -27,6 +28,12 @@ def policy_names() -> tuple[str, ...]:
     return tuple(
         sorted(Path(file.name).stem for file in folder.iterdir() if file.name.endswith(".npz"))
     )
+
+
+def is_shipped(path: Path) -> bool:
+    """Whether a file is that of a shipped policy."""
+    with resources.as_file(resources.files("kinarm.data") / "policies") as folder:
+        return absolute(path).parent == absolute(folder)
 
 
 def group_of(name: str) -> str:
@@ -83,7 +90,7 @@ def load_policy(name_or_file: str | Path, problem: ProblemLike | None = None) ->
     ----------
     name_or_file : str or Path
         Name of a shipped policy; name of a group, for its first seed; ``"best"``; or path of a
-        file.
+        file, or of a folder, for the first policy in it.
     problem : ReachProblem, str or Path, optional
         What the best one is for.
 
@@ -102,12 +109,14 @@ def load_policy(name_or_file: str | Path, problem: ProblemLike | None = None) ->
 def policy_files(name_or_file: str | Path, problem: ProblemLike | None = None) -> tuple[Path, ...]:
     """Files behind a policy's name, a group's name, ``"best"`` or a path; see `load_policy`.
 
+    Those of a folder are in the order of the numbers in their names.
+
     Raises
     ------
     UnknownNameError
         If it is none of these.
     InvalidInputError
-        If it is ``"best"`` and no policy ships for the problem.
+        If it is ``"best"`` and no policy ships for the problem, or a folder without policies.
     """
     text, path = str(name_or_file), Path(name_or_file)
     if text == BEST:
@@ -116,7 +125,21 @@ def policy_files(name_or_file: str | Path, problem: ProblemLike | None = None) -
     if names:
         with resources.as_file(resources.files("kinarm.data") / "policies") as folder:
             return tuple(folder / f"{name}.npz" for name in names)
+    if is_folder(path):
+        return _files_in(path)
     if is_file(path) or path.suffix == ".npz" or path.parent != Path():
         return (path,)
     groups = dict.fromkeys(group_of(name) for name in policy_names())
-    raise UnknownNameError("policy", text, (BEST, *groups, "path/to/policy.npz"))
+    raise UnknownNameError("policy", text, (BEST, *groups, "path/to/policy.npz", "folder/"))
+
+
+def _files_in(folder: Path) -> tuple[Path, ...]:
+    """Policies in a folder, but not the checkpoints of trainings."""
+    found = [path for path in folder.glob("*.npz") if not path.name.endswith(CHECKPOINT)]
+    if not found:
+        raise InvalidInputError(f"there is no policy (.npz) in the folder {str(folder)!r}")
+    return tuple(sorted(found, key=lambda path: re.sub(r"\d+", _padded, path.name)))
+
+
+def _padded(number: re.Match[str]) -> str:
+    return number[0].rjust(20, "0")

@@ -56,14 +56,13 @@ class Provenance:
     @classmethod
     def of(cls, algorithm: str, config: TrainingConfig, environment_steps: int) -> "Provenance":
         """Record a training that took place here and now, with these settings."""
-        settings = to_plain(config)
         return cls(
             algorithm=algorithm,
             recipe=config.recipe,
             problem=config.problem.pinned,
             seed=config.seed,
             environment_steps=environment_steps,
-            config={name: value for name, value in settings.items() if name != "problem"},
+            config=plain_settings(config),
             versions=package_versions(),
             commit=source_commit(),
         )
@@ -86,6 +85,11 @@ class Provenance:
             problem = _problem(json.dumps(entries["problem"], sort_keys=True))
             entries = {**entries, "problem": problem}
         return from_plain(cls, entries, "provenance")
+
+
+def plain_settings(config: TrainingConfig) -> dict[str, Any]:
+    """All settings of a learner, but for the problem, as JSON can hold them."""
+    return {name: value for name, value in to_plain(config).items() if name != "problem"}
 
 
 @lru_cache

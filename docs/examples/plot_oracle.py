@@ -24,7 +24,7 @@ bounds = oracle_bounds(trials)
 gap = (bounds.steps - bounds.steps_lower_bound)[bounds.reachable]
 print(f"a motion was found in {100 * bounds.reachable.mean():.1f} % of the trials")
 print(f"it takes as many steps as are necessary in {100 * (gap == 0).mean():.1f} % of these")
-print(f"the proof is complete in {100 * bounds.tight.mean():.1f} %")
+print(f"the proof is complete in {100 * bounds.proof_complete.mean():.1f} %")
 
 # %%
 # Found against proven

@@ -125,7 +125,13 @@ COMMANDS = {"list": Command(ListRequest, _list), "show": Command(ShowRequest, _s
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line."""
     typed = sys.argv[1:] if arguments is None else arguments
-    run_commands("kinarm-arms", "Arms.", COMMANDS, typed or ["list"], epilog=EPILOG)
+    run_commands(
+        "kinarm-arms",
+        "List arms, and show what is known of one.",
+        COMMANDS,
+        typed or ["list"],
+        epilog=EPILOG,
+    )
 
 
 if __name__ == "__main__":

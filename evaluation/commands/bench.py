@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from kinarm._command_line import run_request
 from kinarm._console import open_console
@@ -62,6 +62,12 @@ class BenchmarkRequest:
     studies: bool = False
     out: Path | None = field(default=None, metadata={"metavar": "DIR"})
     json: bool = False
+
+    GROUPS: ClassVar = {
+        "what is measured": ("repetitions", "policy", "ppo", "limits", "peers", "studies"),
+        "output": ("out", "json"),
+    }
+    DEFAULTS: ClassVar = {"out": "a table on standard output alone"}
 
     def __post_init__(self) -> None:
         whole_number("repetitions", self.repetitions, 1)

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from kinarm._command_line import run_request
 from kinarm._console import open_console
@@ -39,7 +39,7 @@ class ComparisonRequest(RunningOptions):
     Parameters
     ----------
     learners : tuple of str
-        Names of learners; all of the table.
+        Names of learners in the table.
     problems : tuple of str
         Names or files of problems.
     seeds : int
@@ -49,7 +49,7 @@ class ComparisonRequest(RunningOptions):
     trials : int
         Trials that policies face.
     settings : Path
-        Table of learners with their settings instead of the shipped one.
+        Table of learners with their settings.
     out : Path
         Output folder.
     train : bool
@@ -70,8 +70,22 @@ class ComparisonRequest(RunningOptions):
     out: Path = field(default=Path("comparison"), metadata={"metavar": "DIR"})
     train: bool = True
 
+    GROUPS: ClassVar = {
+        "what is compared": ("learners", "problems", "seeds", "steps", "trials", "settings"),
+        "output": ("out", "train"),
+        **RunningOptions.GROUPS,
+    }
+    DEFAULTS: ClassVar = {
+        **RunningOptions.DEFAULTS,
+        "learners": "all of the table",
+        "steps": "those of the table",
+        "settings": "the shipped one",
+    }
+
     def __post_init__(self) -> None:
         super().__post_init__()
+        if not self.train:
+            self.refuse_without_training()
         for name in ("seeds", "trials"):
             whole_number(name, getattr(self, name), 1)
         if self.steps is not None:
@@ -155,7 +169,7 @@ class ComparisonRequest(RunningOptions):
         """Carry out what is missing, and tell of every training that is finished."""
         from kinarm.evaluation.comparison.runs import save_run
         from kinarm.evaluation.comparison.training import carry_out
-        from kinarm.evaluation.running.local import LocalExecutor
+        from kinarm.workers import LocalExecutor
 
         local = LocalExecutor(min(self.at_once, len(missing)))
         console = open_console(stderr=True)

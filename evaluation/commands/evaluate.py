@@ -9,15 +9,20 @@ from kinarm._console import open_console, working
 from kinarm.evaluation.request import DOCUMENT, REPORT, EvaluationRequest
 
 EPILOG = """
+Without --problem, a trained policy faces the problem that it was trained for. Policies that differ
+in their training seed alone share a row.
+
 examples:
-  kinarm-eval --trials 200                               all shipped policies and baselines
-  kinarm-eval --policy ars-tuned-right --problem right   one recipe, all its training seeds
-  kinarm-eval --policy best --problem right --hold       how close, and whether it stays there
-  kinarm-eval --policy my_policy.npz --out results       your own, with figures and every trial
+  kinarm-eval                                            all shipped policies and baselines
+  kinarm-eval --policy best --problem right              the best policy for a problem
+  kinarm-eval --policy ars-tuned-right                   one recipe, all its training seeds
+  kinarm-eval --policy right/                            the policies of a folder
+  kinarm-eval --policy mine.npz zero oracle --problem right   side by side
+  kinarm-eval --policy mine.npz --out results            files, with the outcome of every trial
+  kinarm-eval --policy mine.npz --report page            a page to look at: page/index.html
+  kinarm-eval --policy mine.npz --card share/mine.md     what to publish beside a policy
   kinarm-eval --policy model.zip --problem right         a model of Stable-Baselines3
   kinarm-eval --policy my_module:my_policy --problem left   a function of your own
-  kinarm-eval --policy my_policy.npz --card share/mine.md   what to publish beside a policy
-  kinarm-eval --trials 200 --report results              a page to look at: results/index.html
 """
 
 HELD_NOTE = (
@@ -67,7 +72,9 @@ def _footnote(document: dict[str, Any]) -> str:
     ]
     bounds = {problem: entry["oracle"] for problem, entry in problems if entry["oracle"]}
     if bounds:
-        shares = (f"{name} {100 * each['tight_share']:.1f} %" for name, each in bounds.items())
+        shares = (
+            f"{name} {100 * each['proof_complete_share']:.1f} %" for name, each in bounds.items()
+        )
         lines.append(
             "step ratio: steps over the number proven necessary, of trials that succeeded; "
             f"proofs complete: {', '.join(shares)}"

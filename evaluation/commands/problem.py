@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from kinarm._command_line import Command, print_table, run_commands
 from kinarm._files import check_output, write_atomically, write_text
@@ -50,6 +50,8 @@ class ShowRequest(ProblemOptions):
         metadata={"flag": "problem", "metavar": "NAME_OR_FILE", "names": problem_names},
     )
 
+    DEFAULTS: ClassVar = {**ProblemOptions.DEFAULTS, "problem": "right"}
+
 
 @dataclass(frozen=True, kw_only=True)
 class CheckRequest(ShowRequest):
@@ -79,6 +81,12 @@ class CheckRequest(ShowRequest):
     picture: Path | None = field(default=None, metadata={"metavar": "FILE.png"})
     json: Path | None = field(default=None, metadata={"metavar": "FILE.json"})
     overwrite: bool = False
+
+    GROUPS: ClassVar = {
+        "what is checked": ("trials", "seed"),
+        "output": ("picture", "json", "overwrite"),
+        **ProblemOptions.GROUPS,
+    }
 
     def __post_init__(self) -> None:
         whole_number("trials", self.trials, 1, MOST_TRIALS)
@@ -179,7 +187,9 @@ COMMANDS = {
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line."""
-    run_commands("kinarm-problem", "Problems.", COMMANDS, arguments, epilog=EPILOG)
+    run_commands(
+        "kinarm-problem", "List, show and check problems.", COMMANDS, arguments, epilog=EPILOG
+    )
 
 
 if __name__ == "__main__":

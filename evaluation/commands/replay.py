@@ -7,13 +7,13 @@ from kinarm.evaluation.replays.request import ReplayRequest
 
 EPILOG = """
 examples:
-  kinarm-replay --policy ars-tuned-right --trials 5       the first five trials
-  kinarm-replay --policy ars-tuned-right --worst 5        the worst of 200
-  kinarm-replay results/evaluation.json --collisions      what an evaluation collided in
-  kinarm-replay --policy best --problem right --failures  why it fails, of 10000 trials
+  kinarm-replay --policy best --problem right             the first five trials of the best policy
+  kinarm-replay --policy mine.npz --worst 5               the worst of 200
+  kinarm-replay results/evaluation.json --policy mine.npz --worst 5   of an evaluation
+  kinarm-replay --policy best --problem right --failures  all failures of 10000 trials, by cause
   kinarm-replay --compare ppo-tuned-both oracle           two on the same trials, one as a ghost
-  kinarm-replay --policy my_policy.npz --record mine.npz  keep the recordings as well
-  kinarm-replay mine.npz                                  and play them later
+  kinarm-replay --policy mine.npz --record trials.npz     keep the recordings as well
+  kinarm-replay trials.npz                                and play them later
   kinarm-replay --policy oracle --problem left --live     endless fresh trials in the browser
 """
 

@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from kinarm._command_line import run_request
 from kinarm._console import open_console
@@ -30,7 +30,7 @@ An interrupted reproduction goes on where it stopped, by the same command.
 
 examples:
   kinarm-reproduce                  the whole paper, into the folder reproduction
-  kinarm-reproduce --quick          see in a minute that everything works; results mean nothing
+  kinarm-reproduce --quick          a smoke run of a minute, which judges no claim
   kinarm-reproduce --no-ppo         Augmented Random Search alone, a few minutes
 """
 
@@ -42,11 +42,11 @@ class ReproductionRequest(RunningOptions):
     Parameters
     ----------
     out : Path
-        Output folder: reproduction, or reproduction-quick with --quick.
+        Output folder.
     quick : bool
-        A smoke version of everything, whose results mean nothing.
+        Make a smoke run: every step with trainings of a few iterations, and no verdicts.
     ppo : bool
-        Compare with PPO.
+        Train with PPO, too, and judge the claims that compare it with ARS.
 
     Raises
     ------
@@ -57,6 +57,12 @@ class ReproductionRequest(RunningOptions):
     out: Path | None = field(default=None, metadata={"metavar": "DIR"})
     quick: bool = False
     ppo: bool = True
+
+    GROUPS: ClassVar = {"what is trained": ("quick", "ppo", "out"), **RunningOptions.GROUPS}
+    DEFAULTS: ClassVar = {
+        **RunningOptions.DEFAULTS,
+        "out": "reproduction; with --quick, reproduction-quick",
+    }
 
     @property
     def folder(self) -> Path:
@@ -126,20 +132,29 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _report(request: ReproductionRequest, command: str) -> None:
-    """Run a request, and print its verdicts."""
+    """Run a request, and print its verdicts, if it has any."""
+    claims, study = request.run(command=command), request.study
+    if study.is_judged:
+        _print_verdicts(claims)
+    else:
+        print(study.warning)
+    print(f"written: {request.folder / 'REPRODUCTION.md'}, with tables and figures beside it")
+    if not study.is_judged:
+        print("next: kinarm-reproduce trains everything to the end and judges the claims")
+
+
+def _print_verdicts(claims: "Sequence[Claim]") -> None:
+    """Print each claim, what was measured, and whether it holds."""
     from rich.table import Table
 
     from kinarm.evaluation.intervals import estimate_text
 
     table = Table("claim", "measured (95 %)", "claimed", "verdict", header_style="bold")
-    for claim in request.run(command=command):
+    for claim in claims:
         measured = "\n".join(estimate_text(part.estimate) for part in claim.parts)
         claimed = "\n".join(f"{part.claimed} {part.threshold:g}" for part in claim.parts)
         table.add_row(claim.statement, measured, claimed, claim.verdict)
     open_console(piped_width=120).print(table)
-    if request.study.warning:
-        print(request.study.warning)
-    print(f"written: {request.folder / 'REPRODUCTION.md'}, with tables and figures beside it")
 
 
 def _claim_folder(folder: Path, study: "Study") -> None:
@@ -165,8 +180,8 @@ def _train(
     """Carry out what is missing, the longest first, and read all runs anew."""
     from kinarm.evaluation.reproduction.results import Results
     from kinarm.evaluation.reproduction.training import carry_out
-    from kinarm.evaluation.running.local import LocalExecutor
     from kinarm.evaluation.running.progress import TaskProgress
+    from kinarm.workers import LocalExecutor
 
     study = results.study
     missing = sorted(results.missing, key=lambda training: -training.cost)

@@ -4,7 +4,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from kinarm._command_line import print_table, run_request
 from kinarm._interrupts import GOES_ON, telling
@@ -56,7 +56,7 @@ class StudyRequest(RunningOptions):
     study : Path
         The study file.
     out : Path
-        Output folder: the file's name without its ending.
+        Output folder.
     threads : int
         Threads of a training.
     train : bool
@@ -73,8 +73,16 @@ class StudyRequest(RunningOptions):
     threads: int = 1
     train: bool = True
 
+    GROUPS: ClassVar = {"study": ("study", "out", "train", "threads"), **RunningOptions.GROUPS}
+    DEFAULTS: ClassVar = {
+        **RunningOptions.DEFAULTS,
+        "out": "the name of the file without its ending",
+    }
+
     def __post_init__(self) -> None:
         super().__post_init__()
+        if not self.train:
+            self.refuse_without_training()
         whole_number("threads", self.threads, 1)
 
     @property

@@ -8,12 +8,12 @@ from pathlib import Path
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.document import EvaluationDocument
-from kinarm.evaluation.entrants import ORACLE, Entrant, find_entrants
+from kinarm.evaluation.entrants import ORACLE, UNTRAINED_ENTRANTS, Entrant, find_entrants
 from kinarm.evaluation.imported import is_import_path
 from kinarm.evaluation.replays.request import ReplayRequest
 from kinarm.evaluation.replays.runs import FacedRun, RecordedRun, Run
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.library import BEST, group_of
+from kinarm.policies.library import BEST, group_of, policy_names
 from kinarm.problem import ReachProblem
 from kinarm.problem_options import ProblemOptions
 from kinarm.recording import Recording, load_recordings
@@ -90,10 +90,15 @@ def faced_problem(entrants: Sequence[Entrant], options: ProblemOptions) -> Reach
     return options.resolve(trained[0] if trained else "right")
 
 
-def stated_problem(options: ProblemOptions) -> ReachProblem | None:
-    """The problem that options name, if they name one."""
+def stated_problem(
+    options: ProblemOptions, names: Sequence[str | None] = ()
+) -> ReachProblem | None:
+    """The problem that options name, if they name one.
+
+    The best policy is for some problem: for the usual one if none is named.
+    """
     named = options.problem is not None or options.task is not None
-    return options.resolve() if named else None
+    return options.resolve() if named or BEST in names else None
 
 
 def find_candidates(request: ReplayRequest) -> Candidates:
@@ -109,7 +114,7 @@ def find_candidates(request: ReplayRequest) -> Candidates:
 
 def _fresh_candidates(request: ReplayRequest, names: Sequence[str | None]) -> Candidates:
     """Let policies face trials that are drawn now."""
-    entrants = [first_entrant(name, stated_problem(request)) for name in names]
+    entrants = [first_entrant(name, stated_problem(request, names)) for name in names]
     searched = request.trial or request.worst or request.collisions
     count = request.trials or (FAILING if request.failures else SEARCHED if searched else PLAYED)
     trials = TrialSet.draw(faced_problem(entrants, request), count, request.seed or 0)
@@ -129,9 +134,9 @@ def _evaluated_candidates(
         if name is not None and (Path(name).suffix in (".npz", ".zip") or is_import_path(name)):
             faced = problem or next(iter(document.protocol["problems"]))
             entrant = first_entrant(name, document.problem(faced))
-        row = document.result(entrant.name if entrant else name, problem)
+        row = document.result(_name_in(document, entrant) if entrant else name, problem)
         problem = row["problem"]
-        chosen.append((row, entrant or first_entrant(row["policy"])))
+        chosen.append((row, entrant or _known_entrant(row["policy"], path)))
     faced = min(len(row["outcomes"]["steps"]) for row, _ in chosen)
     trials = document.trials(str(problem)).chosen(range(faced))
     runs = []
@@ -144,6 +149,20 @@ def _evaluated_candidates(
         return Candidates(runs, _solved_bounds(trials), PLAYED, trials)
     floors = dict(enumerate(known))
     return Candidates(runs, lambda numbers: list(map(floors.get, numbers)), PLAYED, trials)
+
+
+def _known_entrant(name: str, path: Path) -> Entrant:
+    """The entrant of a name, as long as that does not stand for a file of the user's."""
+    if name in (*UNTRAINED_ENTRANTS, *policy_names()) or is_import_path(name):
+        return first_entrant(name)
+    raise InvalidInputError(f"policy {name!r} of {str(path)!r} is a file: name it with --policy")
+
+
+def _name_in(document: EvaluationDocument, entrant: Entrant) -> str:
+    """What an evaluation calls an entrant: by its file alone, or by its folder, too."""
+    names = {row["policy"] for row in document.results}
+    whole = f"{entrant.source.parent.name}/{entrant.name}" if entrant.source else ""
+    return whole if whole in names and entrant.name not in names else entrant.name
 
 
 def _solved_bounds(trials: TrialSet) -> LowerBounds:
@@ -261,9 +280,11 @@ def _positions_of_collisions(run: Run) -> list[int]:
 
 
 def _positions_of_worst(count: int, run: Run) -> list[int]:
-    if count > len(run.numbers):
+    ends, positions = run.ends, dict[int, int]()
+    for position in sorted(range(len(ends)), key=lambda k: -ends[k][2]):
+        positions.setdefault(run.numbers[position], position)
+    if count > len(positions):
         raise InvalidInputError(
-            f"--worst {count} asks for more trials than there are: {len(run.numbers)}"
+            f"--worst {count} asks for more trials than there are: {len(positions)}"
         )
-    ends = run.ends
-    return sorted(range(len(ends)), key=lambda k: -ends[k][2])[:count]
+    return list(positions.values())[:count]

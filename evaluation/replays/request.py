@@ -6,13 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
-from kinarm._command_line import option_name
 from kinarm._console import working
 from kinarm._files import check_output
+from kinarm._options import option_name
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
+from kinarm.evaluation.choices import policy_choices
 from kinarm.problem_options import ProblemOptions, say_choices
 
 if TYPE_CHECKING:
@@ -45,37 +46,37 @@ class ReplayRequest(ProblemOptions):
     source : Path
         File to take trials from: evaluation.json of kinarm-eval, or recordings (.npz).
     policy : str
-        Shipped policy or recipe (its first seed), best, random, zero, oracle, .npz file,
-        Stable-Baselines3's model.zip (runs its code: only if you trust it), or module:function.
+        Shipped policy or recipe (its first seed), best, random, zero, oracle, .npz file, folder of
+        them (the first), Stable-Baselines3's model.zip (runs its code: only if you trust it), or
+        module:function.
     compare : tuple of str
         Two policies on the same trials, the second as a ghost.
     trial : tuple of int
         Play this trial; repeatable.
     worst : int
-        Play so many that ended farthest away.
+        Play the trials that ended farthest from their goals, this many; each trial once.
     collisions : bool
         Play the trials that ended in contact.
     failures : bool
-        Play all trials that failed, in groups by cause, beside the oracle (of 10000 trials, by
-        the best policy).
+        Play all trials that failed, in groups by cause, beside the oracle.
     trials : int
-        Trials in all (5; or 200 to choose from).
+        Trials that are run.
     seed : int
-        Seed of the trials (0).
+        Seed of the trials.
     allow_other_arm : bool
         Let policies face an arm that they were not trained for.
     oracle : bool
         Show the number of steps proven necessary.
     out : Path
-        The page to write (replay.html).
+        The page to write.
     record : Path
         Write the recordings as well (.npz).
     overwrite : bool
         Replace files that exist.
     live : bool
-        Serve endless fresh trials to the browser of this machine instead.
+        Serve endless fresh trials to the browser of this machine instead of writing a page.
     port : int
-        Port of --live (7000, or the next free one).
+        Port of --live.
     browser : bool
         Open the live page in a browser.
 
@@ -86,7 +87,9 @@ class ReplayRequest(ProblemOptions):
     """
 
     source: Path | None = field(default=None, metadata={"flag": "source", "metavar": "FILE"})
-    policy: str | None = field(default=None, metadata={"metavar": "NAME_OR_FILE"})
+    policy: str | None = field(
+        default=None, metadata={"metavar": "NAME_OR_FILE", "completes": policy_choices}
+    )
     compare: tuple[str, str] | None = field(default=None, metadata={"metavar": ("A", "B")})
     trial: tuple[int, ...] = field(default=(), metadata={"repeat": True})
     worst: int | None = None
@@ -102,6 +105,24 @@ class ReplayRequest(ProblemOptions):
     live: bool = False
     port: int | None = None
     browser: bool = True
+
+    GROUPS: ClassVar = {
+        "what is replayed": ("source", "policy", "compare", "allow_other_arm"),
+        "which trials": (
+            *("trials", "seed", "trial", "worst", "collisions", "failures", "oracle"),
+        ),
+        "output": ("out", "record", "overwrite", "live", "port", "browser"),
+        **ProblemOptions.GROUPS,
+    }
+    DEFAULTS: ClassVar = {
+        **ProblemOptions.DEFAULTS,
+        "problem": "what the policy was trained for",
+        "policy": "with --failures, best",
+        "trials": "5; 200 to choose from, 10000 for --failures",
+        "seed": "0",
+        "out": "replay.html",
+        "port": "7000, or the next free one",
+    }
 
     def __post_init__(self) -> None:
         for name, smallest in SMALLEST.items():
@@ -211,7 +232,7 @@ class ReplayRequest(ProblemOptions):
         from kinarm.simulator import Simulator
         from kinarm.viewer.live_server import PORT, LiveServer
 
-        entrant = first_entrant(self.policy, stated_problem(self))
+        entrant = first_entrant(self.policy, stated_problem(self, [self.policy]))
         simulator = Simulator(faced_problem([entrant], self))
         say_choices([simulator.problem])
         entrant.check(simulator.arm, allow_other_arm=self.allow_other_arm)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.evaluation import Evaluation
-from kinarm.evaluation.figures import series_label
+from kinarm.evaluation.figures import series_labels
 from kinarm.evaluation.table import table_rows
 from kinarm.evaluation.trials import TrialSet
 from kinarm.scene import GoalRegion
@@ -113,20 +113,22 @@ def group_results(
     known = {(each.entrant.name, each.problem.name): each for each in evaluations}
     if list(known) != [(row["policy"], row["problem"]) for row in document["results"]]:
         raise InvalidInputError("a report needs the document of the very evaluations that it shows")
-    styles, found = _styles(evaluations), []
+    labels = series_labels(evaluations)
+    styles, found = _styles(labels, evaluations), []
+    style_of = {pair: styles[label] for pair, label in zip(known, labels, strict=True)}
     for problem, entry in document["protocol"]["problems"].items():
         groups = []
         for row in table_rows(document, problem):
             names = row.get("members", [row["policy"]])
             members = tuple(known[name, problem] for name in names)
-            groups.append(Group(row, members, styles[series_label(members[0])]))
+            groups.append(Group(row, members, style_of[names[0], problem]))
         found.append(ProblemResults(problem, entry, tuple(groups)))
     return tuple(found)
 
 
-def _styles(evaluations: Sequence[Evaluation]) -> dict[str, str]:
+def _styles(labels: Sequence[str], evaluations: Sequence[Evaluation]) -> dict[str, str]:
     """Classes by what the seeds and problems of a recipe share, in the order of appearance."""
-    entrants = {series_label(evaluation): evaluation.entrant for evaluation in evaluations}
+    entrants = {label: each.entrant for label, each in zip(labels, evaluations, strict=True)}
     styles, policies = {}, 0
     for label, entrant in entrants.items():
         if entrant.algorithm in UNTRAINED_ALGORITHMS:

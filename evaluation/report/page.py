@@ -120,17 +120,20 @@ def shown_columns(results: ProblemResults) -> list[Column]:
 
 
 def _title(problems: Sequence[ProblemResults]) -> str:
-    """The policy that was evaluated, or how many there were."""
+    """The policy that was evaluated, or how many rows of the tables are policies."""
     groups = [group for results in problems for group in results.contenders]
     names = {group.name for group in groups}
     if len(names) == 1:
         return names.pop()
-    members = {member.entrant.name for group in groups for member in group.members}
-    return f"{len(members)} policies" if groups[0].is_policy else " and ".join(sorted(names))
+    return f"{len(names)} policies" if groups[0].is_policy else " and ".join(sorted(names))
 
 
 def _subtitle(protocol: dict[str, Any], problems: Sequence[ProblemResults]) -> str:
     """What was faced, in a line."""
     faced = f"problem {problems[0].name}" if len(problems) == 1 else f"{len(problems)} problems"
     arms = " and ".join(dict.fromkeys(results.entry["arm"] for results in problems))
-    return f"{faced} · {protocol['trials']} trials each · arm {arms} · seed {protocol['seed']}"
+    groups = [group for results in problems for group in results.contenders]
+    members = {member.entrant.name for group in groups for member in group.members}
+    seeds = f" · {len(members)} trainings" if any(group.is_pooled for group in groups) else ""
+    trials = f"{protocol['trials']} trials each, seed {protocol['seed']}"
+    return f"{faced} · arm {arms}{seeds} · {trials}"

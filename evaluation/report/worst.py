@@ -34,6 +34,7 @@ def worst_trials(results: ProblemResults) -> tuple[WorstTrial, ...]:
 
 
 def _worst_of(group: Group, count: int) -> list[WorstTrial]:
+    """The worst trials of a group, each by the training seed that does worst in it."""
     ranked = sorted(
         (bool(success), -float(distance), seed, trial)
         for seed, member in enumerate(group.members)
@@ -41,7 +42,10 @@ def _worst_of(group: Group, count: int) -> list[WorstTrial]:
             zip(member.rollouts.success, member.rollouts.distance, strict=True)
         )
     )
-    return [WorstTrial(group, group.members[seed], trial) for *_, seed, trial in ranked[:count]]
+    found: dict[int, WorstTrial] = {}
+    for *_, seed, trial in ranked:
+        found.setdefault(trial, WorstTrial(group, group.members[seed], trial))
+    return list(found.values())[:count]
 
 
 def worst_row(results: ProblemResults, worst: WorstTrial) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """The paper's claims, and whether they hold here."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import attrgetter
 from typing import Any, Literal
 
@@ -21,7 +21,7 @@ from kinarm.evaluation.reproduction.study import (
 )
 from kinarm.evaluation.statistics import Estimate
 
-Verdict = Literal["holds", "does not hold", "undecided"]
+Verdict = Literal["holds", "does not hold", "undecided", "not judged"]
 
 LEARNING_LEVELS = (
     (0.2, 0.25),
@@ -81,15 +81,20 @@ class Claim:
         The finding.
     parts : tuple of ClaimPart
         What it means in numbers; all have to be so.
+    judged : bool
+        Whether the trainings are such that it can be judged.
     """
 
     name: str
     statement: str
     parts: tuple[ClaimPart, ...]
+    judged: bool = True
 
     @property
     def verdict(self) -> Verdict:
         """It holds if all parts do, and does not if one does not."""
+        if not self.judged:
+            return "not judged"
         verdicts = {part.verdict for part in self.parts}
         if "does not hold" in verdicts:
             return "does not hold"
@@ -108,7 +113,7 @@ class Claim:
                     "ci95": part.estimate.ci95 and list(part.estimate.ci95),
                     "claimed": part.claimed,
                     "threshold": part.threshold,
-                    "verdict": part.verdict,
+                    "verdict": part.verdict if self.judged else self.verdict,
                 }
                 for part in self.parts
             ],
@@ -141,7 +146,7 @@ def assess(results: Results, reading: Reading = LITERAL) -> tuple[Claim, ...]:
         ]
     if reading == LITERAL:
         claims += [low_rate_is_worse(results), *many_perturbations_are_worse(results)]
-    return tuple(claims)
+    return tuple(replace(claim, judged=results.study.is_judged) for claim in claims)
 
 
 def mostly_near(results: Results, reading: Reading, task: str) -> Claim:

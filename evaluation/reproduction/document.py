@@ -117,7 +117,7 @@ def reproduction_page(
         command=document["command"],
         commits=", ".join(document["commits"]) or "unknown",
         trainings=document["trainings"],
-        million_steps=f"{document['environment_steps'] / 1e6:.0f}",
+        steps=f"{document['environment_steps']:,}",
         **asdict(protocol),
         claims=claims_table(claims[LITERAL]),
         learners=learners_table(results),

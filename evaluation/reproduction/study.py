@@ -133,11 +133,19 @@ class Study:
     protocol: Protocol
 
     @property
+    def is_judged(self) -> bool:
+        """Whether the trainings are long enough to judge the paper's claims by."""
+        return self.name == "full"
+
+    @property
     def warning(self) -> str:
-        """What to say beside its verdicts; empty if they can be trusted."""
-        if self.name == "full":
+        """What to say of trainings by which nothing is judged; else empty."""
+        if self.is_judged:
             return ""
-        return "A smoke version: nothing was trained to the end, and no verdict means anything."
+        return (
+            f"A smoke run: each of {len(self.trainings)} trainings took a few iterations, to see "
+            "that everything works. Its figures mean nothing, and no claim is judged."
+        )
 
     def readings(self, purpose: Purpose = "ars") -> tuple[Reading, ...]:
         """Readings under which there are trainings for a purpose."""

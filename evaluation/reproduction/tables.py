@@ -13,7 +13,7 @@ from kinarm.evaluation.reproduction.runs import TrainedRun
 from kinarm.evaluation.reproduction.study import LEARNERS, LITERAL, NEAR, Reading
 from kinarm.problem import PROBLEMS
 
-MARKS = {"holds": "holds", "does not hold": "no", "undecided": "?"}
+MARKS = {"holds": "holds", "does not hold": "no", "undecided": "?", "not judged": ""}
 
 
 def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -138,6 +138,8 @@ def best_readings(claims: Mapping[Reading, Sequence[Claim]]) -> str:
         reading: [c.name for c in judged if c.verdict == "holds" and not c.name.startswith("sweep")]
         for reading, judged in claims.items()
     }
+    if any(claim.verdict == "not judged" for judged in claims.values() for claim in judged):
+        return "No claim is judged."
     most = max(len(names) for names in held.values())
     if not most:
         return "Under no reading does any of these claims hold."

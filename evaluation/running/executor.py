@@ -1,25 +1,12 @@
-"""What an executor is, and what it hands back."""
+"""What an executor is."""
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Generic, NamedTuple, Protocol, TypeVar
+from typing import Protocol, TypeVar
+
+from kinarm.workers import Finished as Finished
 
 TaskT = TypeVar("TaskT")
 ResultT = TypeVar("ResultT")
-
-
-class Finished(NamedTuple, Generic[ResultT]):
-    """A task that is done.
-
-    Attributes
-    ----------
-    number : int
-        Which of the tasks, from 0.
-    result : object
-        What the work returned for it.
-    """
-
-    number: int
-    result: ResultT
 
 
 class Executor(Protocol):

@@ -1,8 +1,9 @@
 """Where trainings run: the options that commands share."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from kinarm._parallel import available_threads
 from kinarm._validation import whole_number
@@ -19,7 +20,7 @@ class RunningOptions:
     Parameters
     ----------
     jobs : int
-        Trainings at a time on this machine; one a processor.
+        Trainings at a time on this machine.
     ray : str
         Run on Ray: auto, the address of a cluster, or local.
     slurm : bool
@@ -27,7 +28,7 @@ class RunningOptions:
     bundle : int
         Trainings of one element of a Slurm array.
     minutes : int
-        Time limit of an element of a Slurm array.
+        Time limit of an element of a Slurm array [min].
     partition : str
         Partition of Slurm.
     """
@@ -35,17 +36,44 @@ class RunningOptions:
     jobs: int | None = None
     ray: str | None = field(default=None, metadata={"metavar": "ADDRESS"})
     slurm: bool = False
-    bundle: int = 1
-    minutes: int = 240
+    bundle: int | None = None
+    minutes: int | None = None
     partition: str | None = None
 
+    GROUPS: ClassVar[Mapping[str, Sequence[str]]] = {
+        "where trainings run": ("jobs", "ray", "slurm", "bundle", "minutes", "partition")
+    }
+    DEFAULTS: ClassVar[Mapping[str, str]] = {
+        "jobs": "one a processor",
+        "ray": "this machine without Ray",
+        "bundle": "1",
+        "minutes": "240",
+        "partition": "the cluster's",
+    }
+
     def __post_init__(self) -> None:
-        for name in ("bundle", "minutes"):
-            whole_number(name, getattr(self, name), 1)
-        if self.jobs is not None:
-            whole_number("jobs", self.jobs, 1)
+        for name in ("jobs", "bundle", "minutes"):
+            if getattr(self, name) is not None:
+                whole_number(name, getattr(self, name), 1)
         if self.slurm and self.ray is not None:
             raise InvalidInputError("--ray and --slurm exclude each other")
+        if self.slurm and self.jobs is not None:
+            raise InvalidInputError("--jobs is for this machine: it does not go with --slurm")
+        for name in ("bundle", "minutes", "partition"):
+            if getattr(self, name) is not None and not self.slurm:
+                raise InvalidInputError(f"--{name} goes with --slurm")
+
+    def refuse_without_training(self) -> None:
+        """Refuse to be told where trainings run if there are none.
+
+        Raises
+        ------
+        InvalidInputError
+            If an option says so.
+        """
+        for name in RunningOptions.GROUPS["where trainings run"]:
+            if getattr(self, name):
+                raise InvalidInputError(f"--{name} does not go with --no-train")
 
     @property
     def at_once(self) -> int:
@@ -70,6 +98,6 @@ class RunningOptions:
             from kinarm.evaluation.running.slurm import SlurmExecutor
 
             return SlurmExecutor(
-                folder / "slurm", self.bundle, self.minutes, threads, self.partition
+                folder / "slurm", self.bundle or 1, self.minutes or 240, threads, self.partition
             )
         return None

@@ -1,15 +1,12 @@
 """How far many tasks are."""
 
-import math
-import time
 from collections.abc import Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from kinarm._progress import ProgressLine
 
-LINE_SECONDS = 30.0
-"""How often a line is printed, at most, where there is no terminal."""
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
 class Costly(Protocol):
@@ -39,43 +36,30 @@ class TaskProgress:
         Where to show it: a bar on a terminal, else a line now and then.
     """
 
-    def __init__(self, total: int, waiting: Sequence[Costly], jobs: int, console: Console) -> None:
+    def __init__(
+        self, total: int, waiting: Sequence[Costly], jobs: int, console: "Console"
+    ) -> None:
         self._total, self._waiting, self._jobs = total, list(waiting), jobs
-        self._printed = time.monotonic()
-        self._progress = Progress(
-            TextColumn("{task.fields[finished]}"),
-            BarColumn(bar_width=20),
-            TimeRemainingColumn(),
-            TextColumn("{task.fields[running]}"),
-            console=console,
-            disable=not console.is_terminal,
-            speed_estimate_period=math.inf,
-        )
+        self._done = 0.0
         cost = sum(task.cost for task in waiting)
-        self._bar = self._progress.add_task("", total=cost, finished="", running="")
+        self._line = ProgressLine("trainings", cost, "finished", console)
 
     def __enter__(self) -> "TaskProgress":
-        self._show(0.0)
-        self._progress.start()
+        self._show()
+        self._line.__enter__()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._progress.stop()
+        self._line.__exit__(None, None, None)
 
     def finished(self, task: Costly) -> None:
         """Take note of a finished task."""
         self._waiting.remove(task)
-        self._show(task.cost)
-        if self._progress.disable and time.monotonic() - self._printed > LINE_SECONDS:
-            self._printed = time.monotonic()
-            seconds = self._progress.tasks[0].time_remaining
-            left = "" if seconds is None else f", about {seconds / 60:.0f} min left"
-            self._progress.console.print(f"{self._finished()} finished{left}")
+        self._done += task.cost
+        self._show()
 
-    def _show(self, cost: float) -> None:
-        """Bring the bar up to date, by the cost of what was finished just now."""
-        running = ", ".join(task.name for task in self._waiting[: self._jobs])
-        self._progress.update(self._bar, advance=cost, finished=self._finished(), running=running)
-
-    def _finished(self) -> str:
-        return f"{self._total - len(self._waiting)} of {self._total} trainings"
+    def _show(self) -> None:
+        """Bring the line up to date."""
+        count = f"{self._total - len(self._waiting)} of {self._total}"
+        running = [task.name for task in self._waiting[: self._jobs]]
+        self._line.update(self._done, running, count)

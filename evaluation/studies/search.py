@@ -12,7 +12,6 @@ import tomli_w
 from kinarm._fields import to_plain
 from kinarm._files import first_line, write_text
 from kinarm.errors import MissingExtraError
-from kinarm.evaluation.running.local import LocalExecutor
 from kinarm.evaluation.studies.planning import PlannedRun, planned_runs
 from kinarm.evaluation.studies.runs import RunPoint, run_content
 from kinarm.evaluation.studies.specification import StudySpecification
@@ -20,6 +19,7 @@ from kinarm.evaluation.studies.store import StudyStore
 from kinarm.evaluation.studies.training import RunTask, TaskResult, train
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.recipes import PER_TRAINING
+from kinarm.workers import LocalExecutor
 
 if TYPE_CHECKING:
     import optuna

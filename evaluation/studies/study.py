@@ -11,7 +11,6 @@ from kinarm._parallel import available_threads
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.running.executor import Executor
-from kinarm.evaluation.running.local import LocalExecutor
 from kinarm.evaluation.running.progress import TaskProgress
 from kinarm.evaluation.studies.planning import PlannedRun, planned_runs
 from kinarm.evaluation.studies.runs import RunClock, TrainedRun, TrialBounds, load_whole_run
@@ -21,6 +20,7 @@ from kinarm.evaluation.studies.store import SPECIFICATION, StudyStore
 from kinarm.evaluation.studies.training import BoundTask, RunTask, Start, carry_out
 from kinarm.policies.learners import find_learner
 from kinarm.policies.policy import Policy
+from kinarm.workers import LocalExecutor
 
 if TYPE_CHECKING:
     import numpy as np

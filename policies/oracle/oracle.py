@@ -12,7 +12,7 @@ Contact is ignored in that, which makes both hold all the more for motions that 
 motion found is slower than the bound, the bound is raised: a motion does not end where the arm
 touches something, as far as its shapes are capsules. Boxes of configurations and distances are
 enlarged by 1e-9 to cover rounding. When the budget of a proof runs out, what is proven so far
-stands and is marked as not tight.
+stands and is marked as incomplete.
 
 Found, by search, and replayed in the simulator, whose outcome is what counts: a motion that
 reaches the goal without contact. It need not be the fastest one, and that none was found proves
@@ -152,17 +152,17 @@ class Oracle:
         horizon, n = self.simulator.task.horizon, len(starts)
         search = MotionSearch(self.simulator, starts, goals)
         ones, last = np.ones(n, dtype=np.int64), np.full(n, horizon)
-        steps_bounds, tight = self._bound_steps(search, np.arange(n), ones, last)
+        steps_bounds, complete = self._bound_steps(search, np.arange(n), ones, last)
         within = np.flatnonzero(steps_bounds <= horizon)
         for extra in range(EXTRA_STEPS + 1):
             search.try_steps(within, steps_bounds[within] + extra)
         search.try_detours(within)
-        self._count_contact(search, steps_bounds, tight)
+        self._count_contact(search, steps_bounds, complete)
         distance_bounds = self._approach(search, steps_bounds)
         replay = self.simulator.rollout_actions(search.actions, starts, goals, record=True)
         return OracleSolutions(
             reachable=replay.success,
-            tight=tight,
+            proof_complete=complete,
             steps=replay.steps,
             steps_lower_bound=steps_bounds,
             final_distance=replay.distance,
@@ -173,23 +173,23 @@ class Oracle:
         )
 
     def _count_contact(
-        self, search: MotionSearch, steps_bounds: NDArray[np.int64], tight: NDArray[np.bool_]
+        self, search: MotionSearch, steps_bounds: NDArray[np.int64], complete: NDArray[np.bool_]
     ) -> None:
         """Raise the bounds of motions that are slower, and of goals that none reaches."""
         horizon = self.simulator.task.horizon
         # A contact-free configuration ends the proof, whether or not the motion goes there.
         fewest = np.fmin(search.steps, search.solved)
         slow = np.flatnonzero(search.reached & (fewest > steps_bounds))
-        steps_bounds[slow], tight[slow] = self._bound_steps(
+        steps_bounds[slow], complete[slow] = self._bound_steps(
             search, slow, steps_bounds[slow], fewest[slow] - 1, contact=True
         )
         blocked = np.flatnonzero((fewest > horizon) & (steps_bounds <= horizon))
         last = np.full(blocked.size, horizon)
         beyond, _ = self._bound_steps(search, blocked, last, last, contact=True)
         unsettled = ~search.reached & (steps_bounds <= horizon)
-        tight[unsettled] = False
+        complete[unsettled] = False
         shut = blocked[beyond > horizon]
-        steps_bounds[shut], tight[shut] = horizon + 1, True
+        steps_bounds[shut], complete[shut] = horizon + 1, True
 
     def _approach(
         self, search: MotionSearch, steps_bounds: NDArray[np.int64]
@@ -214,14 +214,14 @@ class Oracle:
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Prove how many steps some trials take at least, and note what attains it."""
         simulator, n = self.simulator, len(rows)
-        lower_bounds, tight = np.empty(n, dtype=np.int64), np.empty(n, dtype=bool)
+        lower_bounds, complete = np.empty(n, dtype=np.int64), np.empty(n, dtype=bool)
         witnesses = search.witnesses[rows]
         inputs = (self._arm, search.starts[rows], search.goals[rows], simulator.step_limit)
         limits = (simulator.task.tolerance, contact, BUDGET, fewest, most)
-        arrays = (*inputs, *limits, lower_bounds, tight, witnesses)
+        arrays = (*inputs, *limits, lower_bounds, complete, witnesses)
         run_rows(bound_steps, n, BUDGET * n, simulator.threads, *arrays)
         search.witnesses[rows] = witnesses
-        return lower_bounds, tight
+        return lower_bounds, complete
 
     def _bound_distance(self, search: MotionSearch, rows: NDArray[np.int64]) -> NDArray[np.float64]:
         """Prove how close the tool can come within the horizon, and note where it does."""

@@ -21,10 +21,11 @@ class OracleSolution:
     steps_lower_bound : int
         Proven: no motion reaches the goal in fewer steps. The horizon + 1 if none does within the
         horizon.
-    tight : bool
+    proof_complete : bool
         Whether the proof is complete: some configuration at the goal, not proven to touch
         anything, is that many steps away, or the motion takes as many, or the goal is proven to
-        be out of reach. Else the budget of the proof ran out.
+        be out of reach. Else the budget of the proof ran out. A complete proof may leave the bound
+        below ``steps``: contact on the way is no part of it.
     final_distance : float
         Distance from the tool to the goal at the end of the motion [m].
     distance_lower_bound : float
@@ -40,7 +41,7 @@ class OracleSolution:
     reachable: bool
     steps: int
     steps_lower_bound: int
-    tight: bool
+    proof_complete: bool
     final_distance: float
     distance_lower_bound: float
     path: NDArray[np.float64]
@@ -54,7 +55,7 @@ class OracleSolutions:
 
     Attributes
     ----------
-    reachable, tight : ndarray of bool, shape (n,)
+    reachable, proof_complete : ndarray of bool, shape (n,)
         See `OracleSolution`.
     steps, steps_lower_bound : ndarray of int, shape (n,)
         See `OracleSolution`.
@@ -69,7 +70,7 @@ class OracleSolutions:
     """
 
     reachable: NDArray[np.bool_]
-    tight: NDArray[np.bool_]
+    proof_complete: NDArray[np.bool_]
     steps: NDArray[np.int64]
     steps_lower_bound: NDArray[np.int64]
     final_distance: NDArray[np.float64]
@@ -97,7 +98,7 @@ class OracleSolutions:
             reachable=bool(self.reachable[index]),
             steps=steps,
             steps_lower_bound=int(self.steps_lower_bound[index]),
-            tight=bool(self.tight[index]),
+            proof_complete=bool(self.proof_complete[index]),
             final_distance=float(self.final_distance[index]),
             distance_lower_bound=float(self.distance_lower_bound[index]),
             path=self.paths[index, : steps + 1],

@@ -19,7 +19,8 @@ from unittest import mock
 
 from hypothesis import strategies as st
 
-from kinarm._command_line import Parser, add_options
+from kinarm._options import add_options
+from kinarm._parser import Parser
 from kinarm.evaluation.commands import (
     arms,
     bench,
@@ -157,7 +158,10 @@ PROGRAMS: dict[str, Program] = {
         train.main,
         _train_flags,
         (["ars", "--out", "out.npz"], ["ppo", "--out", "out.npz"], ["ars", "--resume"]),
-        ("kinarm.policies.train.run_training",),
+        (
+            "kinarm.policies.training_files.run_training",
+            "kinarm.policies.seeds.SeedsRequest._carry_out",
+        ),
     ),
 }
 

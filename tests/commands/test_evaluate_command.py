@@ -107,23 +107,10 @@ def test_a_problem_named_twice_is_played_once(evaluated):
     assert faced(document) == [("zero", "left"), ("oracle", "left")]
 
 
-def test_training_seeds_of_files_are_pooled(evaluated, policy_folder):
-    document = evaluated(
-        *("--policy", policy_folder / "mine-seed0.npz"),
-        *("--policy", policy_folder / "mine-seed1.npz", "--trials", 3),
-    )
-    (pooled,) = document["pooled"]
-    assert (pooled["policy"], pooled["training_seeds"]) == ("mine", [0, 1])
-
-
-def test_two_files_of_one_name_are_not_mixed_up(run, policy_folder, policy, tmp_path):
-    policy.save(tmp_path / "lefty.npz")
-    answer = run(
-        *("kinarm-eval", "--policy", policy_folder / "lefty.npz"),
-        *("--policy", tmp_path / "lefty.npz", "--trials", 2),
-    )
-    assert (answer.status, answer.out) == (2, "")
-    assert "two policies are called 'lefty'" in answer.err
+def test_json_and_markdown_exclude_each_other(run):
+    answer = run("kinarm-eval", "--json", "--markdown")
+    assert (answer.status, answer.out, answer.err.count("\n")) == (2, "", 1)
+    assert "exclude each other" in answer.err
 
 
 def test_a_file_called_like_a_baseline_does_not_replace_it(run, policy, tmp_path):

@@ -92,6 +92,29 @@ def test_the_worst_of_an_evaluation(replay, evaluation):
     assert played(answer) == np.argsort(-distances, kind="stable")[:3].tolist()
 
 
+def test_the_worst_trials_of_several_policies_are_distinct(replay, policy_folder, tmp_path):
+    both = tmp_path / "both.npz"
+    names = (policy_folder / "mine-seed0.npz", policy_folder / "mine-seed1.npz")
+    made = [
+        recording
+        for name in names
+        for recording in ReplayRequest(policy=str(name), trials=6, oracle=False).recordings()[0]
+    ]
+    save_recordings(both, made)
+    numbers = played(replay(both, "--worst", 4))
+    farthest = {each.trial: 0.0 for each in made}
+    for each in made:
+        farthest[each.trial] = max(farthest[each.trial], each.final_distance)
+    assert numbers == sorted(farthest, key=lambda number: -farthest[number])[:4]
+
+
+@pytest.mark.parametrize(("options", "problem"), [((), "right"), (("--problem", "both"), "both")])
+def test_the_best_policy_for_a_problem(replay, options, problem):
+    answer = replay("--policy", "best", *options, "--trials", 1, *QUICK)
+    assert answer.status == 0, answer.err
+    assert answer.out.startswith(f"{problem} 0, {best_policy(problem)}: ")
+
+
 def test_the_collisions_of_an_evaluation(replay, evaluation):
     ends = outcomes(evaluation, "random")["outcome"]
     expected = [number for number, end in enumerate(ends) if end == "collision"]
@@ -151,12 +174,10 @@ def test_another_arm(replay):
         (("--policy", "zero", "--problem", "left", "--collisions"), ["none of the 200 trials"]),
         (("--policy", "zero", "--problem", "left", "--port", "7001"), ["--live"]),
         (("--policy", "zero", "--problem", "left", "--live"), ["--out", "--live"]),
-        (("--failures",), ["'best'", "name a --problem"]),
         (("--policy", "oracle", "--problem", "left", "--failures", "--trials", "9"), ["none of"]),
         (("--policy", "zero", "--problem", "left", "--failures"), ["10000 of 10000", "--trials"]),
         (("--policy", "zero", "--worst", "3", "--failures"), ["--worst", "--failures"]),
         (("--policy", "zero", "--problem", "left", "--failures", "--live"), ["--failures"]),
-        (("--policy", "best"), ["'best'", "name a --problem"]),
         (("--policy", "zero", "--worst", "0"), ["worst", "at least 1"]),
         (("missing.npz",), ["missing.npz", "No such file"]),
         (("missing.json",), ["missing.json", "No such file"]),
@@ -243,7 +264,7 @@ def test_an_evaluation_that_no_longer_holds(replay, evaluation, tmp_path):
         path.write_text(json.dumps(copy))
         return replay(path, "--policy", "random", *QUICK)
 
-    assert document["protocol"]["format_version"] == 3
+    assert document["protocol"]["format_version"] == 4
     check_refused(changed(lambda d: d["protocol"].update(format_version=9)), "format version 9")
 
     def right(document):

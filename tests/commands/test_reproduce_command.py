@@ -18,8 +18,8 @@ from kinarm.evaluation.commands.reproduce import ReproductionRequest
 from kinarm.evaluation.reproduction.runs import RunStore
 from kinarm.evaluation.reproduction.study import quick_study
 from kinarm.evaluation.running.executor import Finished
-from kinarm.evaluation.running.local import LocalExecutor
 from kinarm.policies import load_policy
+from kinarm.workers import LocalExecutor
 
 QUICK = ("--quick", "--no-ppo", "--jobs", 2)
 needs_ppo = pytest.mark.skipif(find_spec("stable_baselines3") is None, reason="needs the extra ppo")

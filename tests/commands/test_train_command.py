@@ -2,7 +2,6 @@
 
 import csv
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -16,7 +15,7 @@ import pytest
 from kinarm.evaluation.evaluation import evaluate
 from kinarm.policies import Policy, recipe, train_policy
 from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
-from kinarm.policies.train import TrainRequest
+from kinarm.policies.training_request import TrainRequest
 from kinarm.problem import PROBLEMS
 from kinarm.task import RewardWeights
 
@@ -25,9 +24,9 @@ LONG = {"iterations": 2000, "directions": 2, "top_directions": 2}
 LONG_OPTIONS = ["--iterations", "2000", "--directions", "2", "--top-directions", "2"]
 TRAIN_WITH_FREQUENT_CHECKPOINTS = """
 import signal, sys
-from kinarm.policies import train
+from kinarm.policies import train, training_files
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job may inherit "ignore"
-train.CHECKPOINT_SECONDS = 0.1
+training_files.CHECKPOINT_SECONDS = 0.1
 train.main(sys.argv[1:])
 """
 
@@ -86,9 +85,10 @@ def test_policy_and_curve_are_those_of_the_library(run, tmp_path):
 
 def test_summary_says_where_the_policy_is(run, tmp_path):
     answer = run("kinarm-train", "ars", "--iterations", 2, "--out", tmp_path / "p.npz")
-    assert len(answer.out.splitlines()) == 1
-    assert str(tmp_path / "p.npz") in answer.out
-    assert "2 iterations" in answer.out
+    what, where, then = answer.out.splitlines()
+    assert "2 iterations" in what
+    assert where == f"written: {tmp_path / 'p.npz'}, {tmp_path / 'p.curve.csv'}"
+    assert f"kinarm-eval --policy {tmp_path / 'p.npz'}" in then
 
 
 def test_every_setting_reaches_the_training(run, tmp_path):
@@ -190,23 +190,6 @@ def test_missing_folders_are_made(run, tmp_path):
     assert out.exists()
 
 
-def test_progress_fits_80_columns(run_outside, tmp_path, monkeypatch):
-    arguments = ("--recipe", "tuned", "--task", "both", "--seed", 10, "--iterations", 3000)
-    settings = ("--directions", 2, "--top-directions", 2, "--episodes", 1)
-    answer = run_outside(
-        *("kinarm-train", "ars", *arguments, *settings, "--out", tmp_path / "p.npz"),
-        environment={"COLUMNS": "80", "FORCE_COLOR": "1", "TERM": "xterm"},
-    )
-    lines = [
-        re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", line) for line in re.split(r"[\r\n]", answer.err)
-    ]
-    shown = [line for line in lines if line.strip()]
-    assert all(line.startswith("ars tuned* both seed 10") for line in shown)
-    assert all(len(line.rstrip()) <= 80 for line in shown)
-    assert "3000/3000 return " in shown[-1]
-    assert " success " in shown[-1]
-
-
 @pytest.mark.parametrize("name", ["paper", "tuned", "v1"])
 @pytest.mark.parametrize("stopped_after", [1, 7])
 def test_resumed_is_uninterrupted(run, tmp_path, name, stopped_after):
@@ -282,13 +265,13 @@ def test_an_unusable_checkpoint_is_refused(run, tmp_path, policy, damage):
 
 def test_checkpoints_are_kept_while_training(run, tmp_path, monkeypatch):
     """Even a process that is killed leaves one behind."""
-    from kinarm.policies import train
+    from kinarm.policies import training_files, training_progress
 
     seen = []
-    monkeypatch.setattr(train, "CHECKPOINT_SECONDS", 0.0)
-    whole = train.TrainingProgress.update
+    monkeypatch.setattr(training_files, "CHECKPOINT_SECONDS", 0.0)
+    whole = training_progress.TrainingProgress.update
     monkeypatch.setattr(
-        train.TrainingProgress,
+        training_progress.TrainingProgress,
         "update",
         lambda self, state: (
             whole(self, state) or seen.append((tmp_path / "p.checkpoint.npz").exists())

@@ -54,6 +54,9 @@ def evaluations(
     left = TrialSet.draw("left", 40, seed=5)
     made = {"made-right-seed0": train_novice("right", 0), "made-right-seed1": skilled}
     made["made-right-seed2"] = train_novice("right", 2)
+    settings = {**made["made-right-seed0"].provenance.config, "seed": 1}
+    provenance = replace(skilled.provenance, config=settings)
+    made["made-right-seed1"] = replace(skilled, provenance=provenance)
     return [
         *(run_trials(Entrant.from_policy(name, policy), trials) for name, policy in made.items()),
         run_trials(BASELINES["zero"], trials),

@@ -208,7 +208,7 @@ def test_document_tells_the_bounds_of_every_trial(hard):
     for name, column in document["trials"].items():
         assert column == [getattr(solution, name) for solution in solutions]
     assert set(document["trials"]) == {
-        *("reachable", "steps", "steps_lower_bound", "tight"),
+        *("reachable", "steps", "steps_lower_bound", "proof_complete"),
         *("final_distance", "distance_lower_bound"),
     }
 
@@ -217,7 +217,7 @@ def test_document_sums_up_the_bounds(hard):
     solutions = list(oracle_bounds(hard))
     document = bounds_document(oracle_bounds(hard))
     assert document["success"]["value"] == sum(s.reachable for s in solutions) / 12
-    assert document["tight_share"] == sum(s.tight for s in solutions) / 12
+    assert document["proof_complete_share"] == sum(s.proof_complete for s in solutions) / 12
     columns = {
         "steps": [s.steps for s in solutions],
         "steps_lower_bound": [s.steps_lower_bound for s in solutions],

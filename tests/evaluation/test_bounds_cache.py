@@ -40,7 +40,9 @@ DAMAGES = {
     "single array": single_array,
     "no array": lambda *_: archive({}),
     "foreign": lambda *_: archive({"weights": np.zeros(3)}),
-    "one missing": lambda _, arrays: archive({k: v for k, v in arrays.items() if k != "tight"}),
+    "one missing": lambda _, arrays: archive(
+        {k: v for k, v in arrays.items() if k != "proof_complete"}
+    ),
     "one too many": lambda _, arrays: archive({**arrays, "more": arrays["steps"]}),
     "one short": lambda _, arrays: archive({**arrays, "steps": arrays["steps"][:-1]}),
     "all short": lambda _, arrays: archive({name: array[:-1] for name, array in arrays.items()}),

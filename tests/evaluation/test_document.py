@@ -368,7 +368,8 @@ class TestChoosing:
         names = [("zero", "left", None), ("a-seed0", "left", "left"), ("a-seed1", "left", "left")]
         names += [("a-seed0", "right", "left")]
         rows = [dict(zip(("policy", "problem", "trained_on"), row, strict=True)) for row in names]
-        return EvaluationDocument("made.json", {}, rows)
+        members = {("a", "left"): ["a-seed0", "a-seed1"], ("a", "right"): ["a-seed0"]}
+        return EvaluationDocument("made.json", {}, rows, members)
 
     def test_by_name_and_by_group(self, document):
         assert document.result("a-seed1", "left")["policy"] == "a-seed1"

@@ -31,7 +31,7 @@ def test_baselines_by_name(name):
 def test_a_file_is_named_after_itself(skilled, tmp_path):
     skilled.save(tmp_path / "mine-seed4.npz")
     (entrant,) = find_entrants(tmp_path / "mine-seed4.npz")
-    assert (entrant.name, entrant.group) == ("mine-seed4", "mine")
+    assert entrant.name == "mine-seed4"
     assert (entrant.algorithm, entrant.recipe) == ("ars", "tuned*")
     assert (entrant.problem.name, entrant.seed) == ("right", 1)
     np.testing.assert_array_equal(entrant.policy.layers[0].weights, skilled.layers[0].weights)
@@ -66,7 +66,7 @@ def test_functions_enter_under_their_own_name():
         return np.zeros((len(observations), 5))
 
     entrant = Entrant.from_function("careful", careful)
-    assert (entrant.name, entrant.group, entrant.problem) == ("careful", "careful", None)
+    assert (entrant.name, entrant.problem) == ("careful", None)
 
 
 def test_baselines_close_the_list_of_all_entrants():

@@ -239,7 +239,12 @@ def test_pooling_gathers_training_seeds_of_a_problem(evaluations):
 
 
 def test_pooling_keeps_problems_apart(skilled):
-    entrants = [Entrant.from_policy(f"mine-seed{seed}", skilled) for seed in (0, 1)]
+    entrants = [
+        Entrant.from_policy(
+            f"mine-seed{seed}", replace(skilled, provenance=replace(skilled.provenance, seed=seed))
+        )
+        for seed in (0, 1)
+    ]
     made = [evaluate(e, task, trials=2) for e in entrants for task in ("left", "right")]
     assert [(p.name, p.problem.name, len(p.members)) for p in pool(made)] == [
         ("mine", "left", 2),

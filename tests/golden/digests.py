@@ -145,7 +145,7 @@ def oracle_digests() -> dict[str, str]:
         solutions = Oracle(problem).solve_batch(trials.starts, trials.goals)
         found[f"oracle {arm} {task}"] = digest(
             [
-                *(solutions.reachable, solutions.tight, solutions.steps),
+                *(solutions.reachable, solutions.proof_complete, solutions.steps),
                 *(solutions.steps_lower_bound, solutions.final_distance),
                 *(solutions.distance_lower_bound, solutions.actions),
                 np.nan_to_num(solutions.paths, nan=-9.0),

@@ -82,6 +82,39 @@ def test_what_was_made_of_an_interruption_is_on_its_way(monkeypatch, set_signals
         _interrupts._answer(signal.SIGINT, None)
 
 
+def test_work_is_asked_to_stop_before_it_is_interrupted(monkeypatch, set_signals):
+    monkeypatch.setattr(_interrupts, "_phase", "running")
+    seen = []
+
+    def work():
+        with _interrupts.asking(lambda: seen.append("asked")):
+            _interrupts._answer(signal.SIGINT, None)
+            seen.append(set_signals["timer"])
+
+    with pytest.raises(Interruption):
+        work()
+    assert seen == ["asked", _interrupts.PATIENCE]
+
+
+def test_work_that_does_not_stop_is_interrupted(monkeypatch, set_signals):
+    monkeypatch.setattr(_interrupts, "_phase", "running")
+
+    def work():
+        with _interrupts.asking(lambda: None):
+            _interrupts._answer(signal.SIGINT, None)
+            _interrupts._answer(signal.SIGALRM, None)
+            pytest.fail("it goes on")
+
+    with pytest.raises(Interruption):
+        work()
+    assert _interrupts._ask is None
+
+
+def test_work_that_nobody_stops_is_left_alone(set_signals):
+    with _interrupts.asking(lambda: pytest.fail("asked")):
+        pass
+
+
 def test_other_processes_keep_their_own_ways(set_signals):
     _interrupts.begin()
     _interrupts._answer(signal.SIGINT, None)

@@ -15,7 +15,7 @@ def check_floors(problem: ReachProblem, trials: int, seed: int) -> Tally:
     scenarios = simulator.sample(np.random.default_rng(seed), -(-trials // len(names)))
     bounds = oracle.solve_batch(*scenarios)
     tally.count("scenarios", len(bounds))
-    tally.count("scenarios whose floor is exact", bounds.tight.sum())
+    tally.count("scenarios whose floor is exact", bounds.proof_complete.sum())
     tally.count("policies", len(names))
     for name in names:
         done = simulator.rollout(load_policy(name), *scenarios)

@@ -16,11 +16,21 @@ from kinarm.evaluation.running.options import RunningOptions
         ({"bundle": 0}, "bundle must be"),
         ({"minutes": 0}, "minutes must be"),
         ({"ray": "auto", "slurm": True}, "--ray and --slurm exclude each other"),
+        ({"jobs": 2, "slurm": True}, "--jobs is for this machine"),
+        ({"bundle": 2}, "--bundle goes with --slurm"),
+        ({"partition": "a", "ray": "auto"}, "--partition goes with --slurm"),
     ],
 )
 def test_refused(given, words):
     with pytest.raises(InvalidInputError, match=words):
         RunningOptions(**given)
+
+
+@pytest.mark.parametrize("given", [{"jobs": 2}, {"ray": "auto"}, {"slurm": True}])
+def test_without_training_nothing_runs_anywhere(given):
+    RunningOptions().refuse_without_training()
+    with pytest.raises(InvalidInputError, match="does not go with --no-train"):
+        RunningOptions(**given).refuse_without_training()
 
 
 class Executor:

@@ -8,7 +8,7 @@ from small_studies import contents
 
 from kinarm import _files
 from kinarm.errors import OutputError
-from kinarm.evaluation.running.local import LocalExecutor
+from kinarm.workers import LocalExecutor
 
 ERRORS = {
     "no space": lambda: OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)),

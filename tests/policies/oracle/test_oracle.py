@@ -79,8 +79,8 @@ class TestBounds:
         assert np.median(gap) <= 2
         assert np.percentile(gap, 95) <= 6
         # 0.9 is the aim; a share of 200 trials is known to about 0.02.
-        assert known.tight.mean() > 0.85
-        assert (known.tight | (known.steps > known.steps_lower_bound)).all()
+        assert known.proof_complete.mean() > 0.85
+        assert (known.proof_complete | (known.steps > known.steps_lower_bound)).all()
 
     def test_trials_that_are_not_reached_say_why(self, solved):
         _, _, _, known = solved
@@ -92,7 +92,7 @@ class TestBounds:
             assert solution.final_distance >= solution.distance_lower_bound
             assert solution.final_distance > TOLERANCE
             if solution.steps_lower_bound > HORIZON:
-                assert solution.tight
+                assert solution.proof_complete
                 assert solution.distance_lower_bound >= TOLERANCE
                 assert f"{solution.distance_lower_bound:.3f} m away" in solution.reason
                 assert solution.final_distance < solution.distance_lower_bound + 0.03
@@ -118,7 +118,7 @@ class TestBounds:
         assert (gap >= 0).all()
         assert np.median(gap) <= 2
         assert np.percentile(gap, 95) <= 6
-        assert known.tight.mean() > 0.9
+        assert known.proof_complete.mean() > 0.9
 
 
 class TestMotions:
@@ -188,7 +188,7 @@ class TestDeterminism:
         oracle, starts, goals, known = solved
         rows = slice(24)
         image = oracle.solve_batch(starts[rows] * [-1, 1, 1, -1, 1, -1], goals[rows] * [1, -1, 1])
-        both = known.tight[rows] & image.tight
+        both = known.proof_complete[rows] & image.proof_complete
         assert both.mean() > 0.8
         np.testing.assert_array_equal(
             known.steps_lower_bound[rows][both], image.steps_lower_bound[both]
@@ -219,7 +219,7 @@ class TestSingleTrials:
         assert not solution.reachable
         assert solution.reason.startswith("out of reach")
         assert solution.steps_lower_bound == HORIZON + 1
-        assert solution.tight
+        assert solution.proof_complete
         assert solution.steps == HORIZON
         assert exact - 0.1 < solution.distance_lower_bound < exact + 2e-3
         assert solution.distance_lower_bound <= solution.final_distance < exact + 0.1
@@ -249,7 +249,11 @@ class TestSingleTrials:
             goal = oracle.simulator.arm.tool_position(start[0]) + np.array([0, 0, offset])
             solution = oracle.solve(start[0], goal)
             assert solution.reachable
-            assert (solution.steps, solution.steps_lower_bound, solution.tight) == (1, 1, True)
+            assert (solution.steps, solution.steps_lower_bound, solution.proof_complete) == (
+                1,
+                1,
+                True,
+            )
             assert solution.path.shape == (2, 6)
 
     def test_horizon_below_the_floor(self, oracle):
@@ -261,7 +265,7 @@ class TestSingleTrials:
         assert not solution.reachable
         assert solution.steps == horizon
         assert solution.steps_lower_bound == horizon + 1
-        assert solution.tight
+        assert solution.proof_complete
         assert solution.reason.endswith(f"within {horizon} steps")
         assert TOLERANCE <= solution.distance_lower_bound <= solution.final_distance
         assert solution.final_distance < 2 * TOLERANCE

@@ -8,11 +8,10 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 from kinarm._interrupts import kept_from_children
 from kinarm.errors import WorkerError
-from kinarm.evaluation.running.executor import Finished
 
 TaskT = TypeVar("TaskT")
 ResultT = TypeVar("ResultT")
@@ -22,6 +21,21 @@ WATCH_SECONDS = 0.2
 
 ATTEMPTS = 3
 """How often workers may end unexpectedly before another task is finished."""
+
+
+class Finished(NamedTuple, Generic[ResultT]):
+    """A task that is done.
+
+    Attributes
+    ----------
+    number : int
+        Which of the tasks, from 0.
+    result : object
+        What the work returned for it.
+    """
+
+    number: int
+    result: ResultT
 
 
 @dataclass(frozen=True)

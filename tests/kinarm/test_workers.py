@@ -6,7 +6,7 @@ import pytest
 from small_tasks import kill_own_process_at_seven, kill_own_process_once, square, touch
 
 from kinarm.errors import WorkerError
-from kinarm.evaluation.running.local import ATTEMPTS, LocalExecutor
+from kinarm.workers import ATTEMPTS, LocalExecutor
 
 
 @pytest.mark.parametrize("jobs", [1, 2])

@@ -1,0 +1,222 @@
+"""Options of command lines from the fields of dataclasses, and dataclasses from what is typed."""
+
+import argparse
+import math
+import re
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import MISSING, Field, is_dataclass
+from pathlib import Path
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+
+from kinarm._fields import alternatives, expected, init_fields, summary_of
+from kinarm._parser import group_of_options
+from kinarm.errors import KinarmError
+
+Request = TypeVar("Request")
+
+
+def add_options(
+    parser: argparse._ActionsContainer,
+    kind: type,
+    *,
+    skip: Collection[str] = (),
+    negatable: bool = False,
+    names: Mapping[str, Sequence[str]] | None = None,
+) -> None:
+    """Add an option for every field of a dataclass; only those that are given are parsed.
+
+    Names, types and help come from the dataclass and its docstring. Its attribute ``GROUPS``, if it
+    has one, puts fields into groups of options by their titles, in this order; the others come
+    last. The fields of a nested dataclass get its name as a prefix, such as ``--reward-success``.
+
+    A field's metadata may hold ``flag`` (another name of the option, or one without dashes for a
+    positional argument), ``metavar``, ``repeat`` (a tuple is collected from repetitions of the
+    option), ``several`` (and each takes one or more), ``parse`` (makes the value of the text),
+    ``names`` (a function that lists the names that an option takes, for help and completion) and
+    ``completes`` (the same, for completion alone). The attribute ``DEFAULTS`` of the dataclass
+    says what happens without an option whose field has no telling default; such a field need not
+    be given.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Where to add them.
+    kind : type
+        The dataclass.
+    skip : collection of str
+        Fields that get no option.
+    negatable : bool
+        Whether there is an option ``--no-x`` also for what is false by default.
+    names : mapping, optional
+        Names that options take, by field, where the metadata do not list them.
+    """
+    items = init_fields(kind)
+    for name, group in _grouped(parser, kind):
+        if name not in skip:
+            _add_option(group, kind, items[name], negatable=negatable, names=names or {})
+
+
+def _grouped(
+    parser: argparse._ActionsContainer, kind: type
+) -> Iterator[tuple[str, argparse._ActionsContainer]]:
+    """Fields of a dataclass, and the group of options that each goes to."""
+    groups: Mapping[str, Sequence[str]] = getattr(kind, "GROUPS", {})
+    is_parser = isinstance(parser, argparse.ArgumentParser)
+    rest = group_of_options(parser, "options") if is_parser else parser
+    for title, names in groups.items():
+        for name in names:
+            yield name, group_of_options(parser, title)
+    grouped = {name for names in groups.values() for name in names}
+    for name in init_fields(kind):
+        if name not in grouped:
+            yield name, rest
+
+
+def _add_option(
+    parser: argparse._ActionsContainer,
+    kind: type,
+    item: Field[Any],
+    prefix: str = "",
+    *,
+    negatable: bool,
+    names: Mapping[str, Sequence[str]],
+) -> None:
+    """Add the option of one field, or those of a nested dataclass."""
+    hint = alternatives(get_type_hints(kind)[item.name])[0]
+    if isinstance(hint, type) and is_dataclass(hint):
+        prefix = f"{prefix}{item.name}."
+        for inner in init_fields(hint).values():
+            _add_option(parser, hint, inner, prefix, negatable=True, names=names)
+        return
+    flag = option_name(item, prefix)
+    known = names.get(item.name) or item.metadata.get("names", tuple)()
+    default = option_default(kind, item, negatable=negatable)
+    options: dict[str, Any] = {
+        "default": argparse.SUPPRESS,
+        "help": _help(summary_of(kind, item.name), known, default),
+    }
+    if flag.startswith("--"):
+        options["dest"] = f"{prefix}{item.name}"
+        without = item.default is MISSING and item.default_factory is MISSING
+        options["required"] = without and not default
+    elif item.default is not MISSING:
+        options["nargs"] = "?"
+    if hint is bool:
+        negative = item.default is True and "flag" not in item.metadata
+        action = argparse.BooleanOptionalAction if negatable or negative else "store_true"
+        parser.add_argument(flag, action=action, **options)
+        return
+    added = parser.add_argument(flag, **options, **_value_options(item, hint, flag))
+    added.completes = _completes(item, hint, known)  # type: ignore[attr-defined]
+
+
+def _value_options(item: Field[Any], hint: Any, flag: str) -> dict[str, Any]:
+    """How argparse takes the value of an option."""
+    options: dict[str, Any] = {}
+    if "parse" in item.metadata:
+        return {"type": _checked(item.metadata["parse"]), "metavar": item.metadata["metavar"]}
+    if get_origin(hint) is tuple:
+        hint, *others = get_args(hint)
+        count = "+" if Ellipsis in others else 1 + len(others)
+        if item.metadata.get("several"):
+            options = {"action": "extend", "nargs": "+"}
+        else:
+            options = {"action": "append"} if item.metadata.get("repeat") else {"nargs": count}
+    if get_origin(hint) is Literal:
+        options["choices"] = get_args(hint)
+    else:
+        usual = METAVARS.get(hint, "NAME") if flag.startswith("--") else flag
+        options["metavar"] = item.metadata.get("metavar", usual)
+    return {**options, "type": _parser_of(hint)}
+
+
+def _completes(item: Field[Any], hint: Any, known: Sequence[str]) -> Any:
+    """What completes the value of an option: ``"file"``, ``"folder"``, or what lists names."""
+    if "completes" in item.metadata:
+        return item.metadata["completes"]
+    if known:
+        return lambda: known
+    if item.metadata.get("metavar") in ("DIR", "FOLDER"):
+        return "folder"
+    return "file" if Path in alternatives(hint) or "FILE" in str(item.metadata) else None
+
+
+def option_name(item: Field[Any], prefix: str = "") -> str:
+    """What the option of a field is called."""
+    usual = "--" + re.sub(r"[._]", "-", f"{prefix}{item.name}")
+    return str(item.metadata.get("flag", usual))
+
+
+METAVARS = {int: "N", float: "X", Path: "FILE"}
+
+
+def option_default(kind: type, item: Field[Any], *, negatable: bool) -> str:
+    """What happens without an option; empty if that goes without saying."""
+    defaults: Mapping[str, str] = getattr(kind, "DEFAULTS", {})
+    default = item.default
+    if item.name in defaults:
+        return defaults[item.name]
+    if isinstance(default, bool):
+        return "yes" if default else "no" if negatable else ""
+    if default in (None, (), MISSING):
+        return ""
+    return " ".join(map(str, default)) if isinstance(default, tuple) else str(default)
+
+
+def _help(said: str, names: Sequence[str], default: str) -> str:
+    """Description of a field, the names that it takes, and its default, as argparse formats it."""
+    said = said.replace("`", "")
+    if default:
+        said = f"{said} (default: {default})"
+    if names:
+        said = f"{said}. Names: {', '.join(names)}"
+    return said.replace("%", "%%")
+
+
+def _checked(parse: Callable[[str], Any]) -> Callable[[str], Any]:
+    """Argument type: what a function makes of a text, which it may refuse."""
+
+    def parsed(text: str) -> Any:
+        try:
+            return parse(text)
+        except KinarmError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+
+    return parsed
+
+
+def _parser_of(hint: Any) -> Callable[[str], Any]:
+    """Argument type: refuses texts that are not of a type."""
+
+    def parse(text: str) -> Any:
+        if text is argparse.SUPPRESS:  # a positional argument that is not given
+            return text
+        try:
+            value = hint(text) if hint in (int, float) else text
+        except ValueError:
+            value = math.nan
+        if isinstance(value, float) and not math.isfinite(value):
+            wanted = "a finite number" if hint is float else expected(hint)
+            raise argparse.ArgumentTypeError(f"must be {wanted}, got {text!r}")
+        return Path(text) if hint is Path else value
+
+    return parse
+
+
+def given_options(options: argparse.Namespace, kind: type) -> dict[str, Any]:
+    """What the command line gives of a dataclass's fields; nested ones as mappings."""
+    given: dict[str, Any] = {}
+    for name, value in vars(options).items():
+        outer, _, inner = name.partition(".")
+        if outer not in init_fields(kind):
+            continue
+        if inner:
+            given.setdefault(outer, {})[inner] = value
+        else:
+            given[name] = tuple(value) if isinstance(value, list) else value
+    return given
+
+
+def request_of(options: argparse.Namespace, kind: type[Request]) -> Request:
+    """Build the dataclass of what the command line gives; the rest has its defaults."""
+    return kind(**given_options(options, kind))

@@ -1,0 +1,59 @@
+"""How far a training is, in one line on standard error."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Protocol
+
+from kinarm.kernels.notices import told_of_compilation
+from kinarm.policies.config import TrainingConfig
+from kinarm.policies.learners import TrainingState, learner_of
+
+if TYPE_CHECKING:
+    from kinarm._progress import ProgressLine
+
+STARTS, COMPILES = "starting", "compiling, once"
+
+
+class Watcher(Protocol):
+    """Is told how far a training is."""
+
+    def begin(self, compiling: bool) -> None:
+        """It begins; kernels may be compiled first."""
+
+    def update(self, state: TrainingState) -> None:
+        """Take note of the latest iteration."""
+
+
+class TrainingProgress:
+    """A line on standard error: iterations, return, success, time left."""
+
+    def __init__(self, line: "ProgressLine") -> None:
+        self._line = line
+
+    def begin(self, compiling: bool) -> None:
+        """Show that the training begins."""
+        self._line.update(words=[COMPILES if compiling else STARTS])
+
+    def update(self, state: TrainingState) -> None:
+        """Show the latest iteration."""
+        point = state.curve[-1]
+        words = [f"return {point.mean_return:+.3f}", f"success {100 * point.success:.0f} %"]
+        self._line.update(state.iteration, words)
+
+
+@contextmanager
+def shown_progress(config: TrainingConfig) -> Iterator[TrainingProgress]:
+    """Show how far a training with these settings is."""
+    from kinarm._progress import ProgressLine
+
+    title = f"{learner_of(config).name} {config.recipe} {config.problem.name} seed {config.seed}"
+    with ProgressLine(title, config.iterations, "iterations") as line:
+        yield TrainingProgress(line)
+
+
+@contextmanager
+def watched_compilation(watcher: Watcher) -> Iterator[None]:
+    """Tell a watcher that a training begins, and whether kernels are compiled for it."""
+    watcher.begin(compiling=False)
+    with told_of_compilation(watcher.begin):
+        yield

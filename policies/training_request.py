@@ -1,0 +1,162 @@
+"""What a training is asked for."""
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from kinarm._files import check_output, only_writer
+from kinarm.errors import InvalidInputError, PolicyFileError
+from kinarm.policies.learners import TrainingResult, learner_of
+from kinarm.policies.recipes import recipe
+from kinarm.policies.training_files import checkpoint_path, refuse_unfinished, train_to_file
+from kinarm.problem_options import ProblemOptions, say_choices
+
+if TYPE_CHECKING:
+    from kinarm.policies.checkpoint import Checkpoint
+    from kinarm.policies.config import TrainingConfig
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainRequest(ProblemOptions):
+    """A training, from its settings to the files that it leaves.
+
+    Parameters
+    ----------
+    learner : str
+        Name of the learner.
+    recipe : str, optional
+        Named settings, or a TOML file with some.
+    seed : int, optional
+        Seed of all randomness.
+    settings : mapping
+        Settings of the learner that replace those of the recipe.
+    out : Path
+        File of the policy, beside which learning curve and checkpoint lie; with --seeds, folder of
+        the policies.
+    resume : bool
+        Go on from the checkpoint beside --out; with --seeds, with each seed that is not finished.
+    overwrite : bool
+        Replace an earlier policy.
+    tensorboard : Path, optional
+        Folder for TensorBoard logs.
+    """
+
+    learner: str
+    recipe: str | None = field(default=None, metadata={"metavar": "NAME_OR_FILE"})
+    seed: int | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    out: Path | str = field(metadata={"metavar": "FILE.npz"})
+    resume: bool = False
+    overwrite: bool = False
+    tensorboard: Path | str | None = field(default=None, metadata={"metavar": "FOLDER"})
+
+    GROUPS: ClassVar = {
+        "training": ("recipe", "seed", "resume"),
+        "output": ("out", "overwrite", "tensorboard"),
+        **ProblemOptions.GROUPS,
+    }
+    DEFAULTS: ClassVar = {
+        **ProblemOptions.DEFAULTS,
+        "recipe": "paper",
+        "seed": "0",
+        "problem": "the recipe's: right",
+    }
+
+    def run(self) -> TrainingResult:
+        """Train, and write the policy and its learning curve.
+
+        While the training lasts, a checkpoint beside the policy is renewed every few seconds.
+
+        Raises
+        ------
+        KinarmError
+            If settings cannot be used, or a file cannot be written.
+        KeyboardInterrupt
+            If it is interrupted; the checkpoint is then complete, and the message says so.
+        """
+        from kinarm.policies.training_progress import shown_progress
+
+        config, state = self._resumed() if self.resume else (self._config(), None)
+        check_output(self.out, overwrite=self.overwrite, suffix=".npz")
+        with only_writer(self.out):
+            if state is None:
+                say_reach(config)
+                say_symmetry(config)
+            options: dict[str, Any] = (
+                {} if self.tensorboard is None else {"tensorboard": self.tensorboard}
+            )
+            with shown_progress(config) as progress:
+                return train_to_file(config, state, self.out, progress, **options)
+
+    def config(self) -> "TrainingConfig":
+        """Settings of the training: those of the recipe, with what the fields replace.
+
+        Raises
+        ------
+        KinarmError
+            If they cannot be used.
+        """
+        named = self.recipe or "paper"
+        problem = self.resolve(default=recipe(self.learner, named).problem)
+        config: TrainingConfig = recipe(
+            self.learner, named, problem=problem, seed=self.seed, **self.settings
+        )
+        return config
+
+    def _config(self) -> "TrainingConfig":
+        """Settings of a new training, unless there is the checkpoint of an unfinished one."""
+        refuse_unfinished(self.out)
+        return self.config()
+
+    def _resumed(self) -> "Checkpoint":
+        """The training to go on with, which must be the one that is asked for."""
+        from kinarm.policies.checkpoint import load_checkpoint
+
+        path = checkpoint_path(self.out)
+        if not path.exists():
+            raise PolicyFileError(f"nothing to resume: there is no {str(path)!r}")
+        checkpoint = load_checkpoint(path)
+        config = checkpoint.config
+        if (other := learner_of(config).name) != self.learner:
+            raise InvalidInputError(f"{str(path)!r} is of the learner {other}")
+        given = {**self.settings, **({} if self.seed is None else {"seed": self.seed})}
+        wanted = config.changed(given)
+        changed = [name for name in given if getattr(wanted, name) != getattr(config, name)]
+        if self.recipe and Path(self.recipe).stem != config.recipe.removesuffix("*"):
+            changed.append("recipe")
+        if changed:
+            raise InvalidInputError(
+                f"the checkpoint was made with another {', '.join(changed)}: "
+                "leave it out, or train anew without --resume"
+            )
+        self.resolve(default=config.problem).check_same(config.problem, f"{str(path)!r}")
+        return checkpoint
+
+
+def say_reach(config: "TrainingConfig") -> None:
+    """Say on standard error what was chosen for the arm, and whether many goals are out of reach.
+
+    The paper's problems are known.
+    """
+    from kinarm.policies.reachability import reach_warning
+    from kinarm.problem import PROBLEMS
+    from kinarm.world import World
+
+    say_choices([config.problem])
+    if config.problem.digest not in [known.digest for known in PROBLEMS.values()]:
+        line = reach_warning(World(config.problem))
+        if line is not None:
+            sys.stderr.write(f"{line}\n")
+
+
+def say_symmetry(config: "TrainingConfig") -> None:
+    """Say on standard error that ``symmetric`` does nothing, if it is set and there is no mirror.
+
+    Recipes do not set it there; a user did.
+    """
+    from kinarm.policies.mirror import missing_mirror
+
+    if getattr(config, "symmetric", False) and (reason := missing_mirror(config.problem)):
+        sys.stderr.write(f"symmetric has no effect: {reason}\n")

@@ -1,0 +1,109 @@
+"""The examples of every help succeed, as they are written but for their size."""
+
+import shlex
+from importlib.util import find_spec
+
+import pytest
+
+from kinarm.evaluation.commands.bench import BenchmarkRequest
+from kinarm.evaluation.commands.compare import ComparisonRequest
+from kinarm.evaluation.commands.reproduce import ReproductionRequest
+from kinarm.evaluation.commands.study import StudyRequest
+from kinarm.policies import Policy, recipe, train_policy
+from kinarm.problem import PROBLEMS
+
+SMALLER = {
+    "kinarm-eval": ("--trials", 12, "--no-oracle"),
+    "kinarm-train": ("--iterations", 2),
+    "kinarm-replay": ("--no-oracle", "--overwrite"),
+    "kinarm-problem": (),
+}
+"""What examples are run with besides."""
+
+LONG = {
+    "kinarm-bench": BenchmarkRequest,
+    "kinarm-compare": ComparisonRequest,
+    "kinarm-reproduce": ReproductionRequest,
+    "kinarm-study": StudyRequest,
+}
+"""Commands of which it is enough that they accept their examples."""
+
+ELSEWHERE = (" status ", "model.zip", "--live", "my.urdf", "ur5", ">")
+"""Parts of examples that need what is not there, or a shell, or never end."""
+
+
+class AcceptedError(Exception):
+    """An example is accepted, and the work could begin."""
+
+
+def examples_of(run, *words):
+    """Examples at the end of a help."""
+    _, _, text = run(*words, "--help").out.partition("examples:\n")
+    lines = [line.strip() for line in text.splitlines() if line.startswith("  kinarm-")]
+    return [line.partition("  ")[0] for line in lines]
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch, policy):
+    """A folder with the files that examples speak of."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+    for name in ("my.toml", "mine.toml"):
+        PROBLEMS["right"].save(tmp_path / name)
+    policy.save(tmp_path / "mine.npz")
+    (tmp_path / "right").mkdir()
+    for seed in (0, 1):
+        made = train_policy(recipe("ars", "paper", problem="right", seed=seed, iterations=1))
+        made.policy.save(tmp_path / "right" / f"{seed}.npz")
+    text = "def my_policy(observations):\n    return 0 * observations[:, :5]\n"
+    (tmp_path / "my_module.py").write_text(text)
+    return tmp_path
+
+
+def check(run, examples, *, least):
+    """Run what can be run, and see that it succeeds."""
+    done = 0
+    for example in examples:
+        program, *words = shlex.split(example)
+        if any(part in example for part in ELSEWHERE):
+            continue
+        answer = run(program, *words, *SMALLER[program])
+        assert answer.status == 0, f"{example}: {answer.err}"
+        done += 1
+    assert done >= least
+
+
+def test_examples_of_training(run, place):
+    (place / "right" / "0.npz").unlink()
+    check(run, examples_of(run, "kinarm-train", "ars"), least=5)
+    assert Policy.load(place / "my.npz").problem == PROBLEMS["right"].pinned
+    assert len(list((place / "right").glob("ars-tuned-right-seed?.npz"))) == 5
+
+
+@pytest.mark.skipif(find_spec("stable_baselines3") is None, reason="needs the extra ppo")
+def test_examples_of_all_learners(run, place):
+    check(run, examples_of(run, "kinarm-train"), least=3)
+
+
+def test_examples_of_evaluating_and_replaying(run, place):
+    check(run, examples_of(run, "kinarm-eval"), least=9)
+    check(run, examples_of(run, "kinarm-replay"), least=7)
+
+
+def test_examples_of_problems(run, place):
+    check(run, examples_of(run, "kinarm-problem"), least=1)
+
+
+@pytest.mark.parametrize("program", LONG)
+def test_examples_of_what_takes_long_are_accepted(run, place, monkeypatch, program):
+    def accept(*_, **__):
+        raise AcceptedError
+
+    monkeypatch.setattr(LONG[program], "run", accept)
+    examples = [each for each in examples_of(run, program) if " status " not in each]
+    assert examples
+    for example in examples:
+        _, *words = shlex.split(example)
+        with pytest.raises(AcceptedError):
+            run(program, *words)

@@ -1,0 +1,207 @@
+"""``kinarm-train --seeds``: several seeds at once, which equal single trainings bit for bit."""
+
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from kinarm.errors import InvalidInputError
+from kinarm.policies import Policy, policy_names, recipe, train_policy
+from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
+from kinarm.policies.progress_board import ProgressBoard
+from kinarm.policies.seeds import SeedsRequest, seeds_of
+from kinarm.policies.training_request import TrainRequest
+
+ROOT = Path(__file__).resolve().parents[2]
+SMALL = ("--directions", 2, "--top-directions", 2)
+NAME = "ars-paper-right-seed{}"
+
+
+def check_equal(one: Policy, other: Policy) -> None:
+    """Bit for bit."""
+    for first, second in zip(one.layers, other.layers, strict=True):
+        assert first.weights.tobytes() == second.weights.tobytes()
+        assert first.bias.tobytes() == second.bias.tobytes()
+    assert (one.mean.tobytes(), one.std.tobytes()) == (other.mean.tobytes(), other.std.tobytes())
+    assert one.provenance.to_json() == other.provenance.to_json()
+
+
+def config(seed=0, **changes):
+    settings = {"iterations": 9, "directions": 2, "top_directions": 2, **changes}
+    return recipe("ars", "paper", problem="right", seed=seed, **settings)
+
+
+def leave_checkpoint(folder: Path, seed: int, after: int = 4) -> None:
+    """Leave the checkpoint of a seed that was stopped after some iterations."""
+    states = []
+    train_policy(config(seed), on_iteration=states.append)
+    folder.mkdir(exist_ok=True)
+    save_checkpoint(folder / f"{NAME.format(seed)}.checkpoint.npz", config(seed), states[after - 1])
+
+
+@pytest.mark.parametrize(
+    ("text", "seeds"), [("1", (0,)), ("5", (0, 1, 2, 3, 4)), ("5-7", (5, 6, 7)), ("3-3", (3,))]
+)
+def test_seeds_of_a_text(text, seeds):
+    assert seeds_of(text) == seeds
+
+
+@pytest.mark.parametrize("text", ["0", "", "-3", "7-5", "a", "1.5", "0-1000", "\u0663", "9" * 5000])
+def test_texts_that_are_no_seeds(text):
+    with pytest.raises(InvalidInputError, match=r"^must be"):
+        seeds_of(text)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_each_policy_is_that_of_a_single_training(run, tmp_path, jobs):
+    folder = tmp_path / "right"
+    arguments = ("ars", "--problem", "right", "--iterations", 9, *SMALL)
+    answer = run("kinarm-train", *arguments, "--seeds", "3-5", "--jobs", jobs, "--out", folder)
+    assert answer.status == 0, answer.err
+    names = [NAME.format(seed) for seed in (3, 4, 5)]
+    expected = [f"{name}{ending}" for name in names for ending in (".curve.csv", ".npz")]
+    assert sorted(path.name for path in folder.iterdir()) == expected
+    for seed, name in zip((3, 4, 5), names, strict=True):
+        single = tmp_path / f"{seed}.npz"
+        assert run("kinarm-train", *arguments, "--seed", seed, "--out", single).status == 0
+        check_equal(Policy.load(folder / f"{name}.npz"), Policy.load(single))
+    *lines, then = answer.out.splitlines()
+    for seed, line in zip((3, 4, 5), lines, strict=True):
+        assert line.startswith(f"seed {seed}: return ")
+        assert line.endswith(f"written: {folder / NAME.format(seed)}.npz")
+    assert f"kinarm-eval --policy {folder}/" in then
+
+
+def test_names_are_those_of_shipped_policies(tmp_path):
+    request = SeedsRequest(
+        training=TrainRequest(learner="ars", recipe="tuned", problem="left", out=tmp_path),
+        seeds=(0, 1),
+    )
+    assert {task.out.stem for task in request._tasks()} < set(policy_names())
+
+
+def test_resuming_finishes_each_seed_and_repeats_none(run, tmp_path):
+    leave_checkpoint(tmp_path, 1)
+    train_policy(config(0)).policy.save(tmp_path / f"{NAME.format(0)}.npz")
+    before = (tmp_path / f"{NAME.format(0)}.npz").read_bytes()
+    arguments = ("ars", "--problem", "right", "--iterations", 9, *SMALL, "--seeds", 3)
+    answer = run("kinarm-train", *arguments, "--out", tmp_path, "--resume")
+    assert answer.status == 0, answer.err
+    assert (tmp_path / f"{NAME.format(0)}.npz").read_bytes() == before
+    assert "seed 0: finished earlier" in answer.out
+    for seed in range(3):
+        made = Policy.load(tmp_path / f"{NAME.format(seed)}.npz")
+        check_equal(made, train_policy(config(seed)).policy)
+    assert not list(tmp_path.glob("*.checkpoint.npz"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--seeds", 2, "--seed", 1), "--seed and --seeds exclude each other"),
+        (("--jobs", 2), "--jobs goes with --seeds"),
+        (("--seeds", 2, "--jobs", 0), "jobs must be"),
+        (("--seeds", "0"), "must be 1 to 1000 seeds"),
+        (("--seeds", 2, "--resume"), "nothing to resume"),
+    ],
+)
+def test_bad_options_are_one_line_and_nothing_is_written(run, tmp_path, arguments, said):
+    answer = run("kinarm-train", "ars", *arguments, "--out", tmp_path / "out")
+    assert (answer.status, answer.out, answer.err.count("\n")) == (2, "", 1)
+    assert said in answer.err
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
+
+
+def test_out_is_a_folder(run, tmp_path):
+    answer = run("kinarm-train", "ars", "--seeds", 2, "--out", tmp_path / "right.npz")
+    assert (answer.status, answer.err.count("\n")) == (2, 1)
+    assert f"--out {tmp_path / 'right'}" in answer.err
+
+
+@pytest.mark.parametrize("left", ["policy", "checkpoint"])
+def test_files_in_the_way(run, tmp_path, left):
+    if left == "policy":
+        train_policy(config(1)).policy.save(tmp_path / f"{NAME.format(1)}.npz")
+    else:
+        leave_checkpoint(tmp_path, 1)
+    before = sorted(path.name for path in tmp_path.iterdir())
+    arguments = ("ars", "--problem", "right", "--iterations", 9, *SMALL, "--seeds", 2)
+    answer = run("kinarm-train", *arguments, "--out", tmp_path)
+    assert (answer.status, answer.err.count("\n")) == (2, 1)
+    assert ("--overwrite" if left == "policy" else "--resume") in answer.err
+    assert sorted(path.name for path in tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize("left", ["policy", "checkpoint"])
+def test_resuming_refuses_the_files_of_other_settings(run, tmp_path, left):
+    if left == "policy":
+        train_policy(config(1)).policy.save(tmp_path / f"{NAME.format(1)}.npz")
+    else:
+        leave_checkpoint(tmp_path, 1)
+    arguments = ("ars", "--problem", "right", "--iterations", 9, *SMALL, "--seeds", 2)
+    for change in (("--noise", 0.5), ("--tolerance", 0.1)):
+        answer = run("kinarm-train", *arguments, *change, "--out", tmp_path, "--resume")
+        assert (answer.status, answer.err.count("\n")) == (2, 1)
+        assert change[0][2:] in answer.err
+
+
+def test_a_seed_that_fails_says_why_in_one_line(run, tmp_path):
+    """The file of one seed is being written by another process."""
+    from kinarm._files import only_writer
+
+    with only_writer(tmp_path / f"{NAME.format(1)}.npz"):
+        arguments = ("ars", "--problem", "right", "--iterations", 9, *SMALL, "--seeds", 2)
+        answer = run("kinarm-train", *arguments, "--jobs", 1, "--out", tmp_path)
+    assert (answer.status, answer.out) == (2, "")
+    assert "another process is writing" in answer.err.splitlines()[-1]
+
+
+def start(command, folder: Path, shared: Path, *extra: object) -> subprocess.Popen:
+    """Begin a long training of three seeds, two at a time."""
+    arguments = ("ars", "--problem", "right", "--iterations", 2000, *SMALL, "--seeds", 3)
+    shared.mkdir(exist_ok=True)
+    return subprocess.Popen(
+        command("kinarm-train", *arguments, "--jobs", 2, "--out", folder, *extra),
+        cwd=ROOT,
+        env={**os.environ, "COLUMNS": "100", "TMPDIR": str(shared)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+
+
+def wait_for_iterations(process: subprocess.Popen, shared: Path, count: int) -> None:
+    """Wait until the trainings have come so far."""
+    while True:
+        assert process.poll() is None, process.stderr.read()
+        for rows in shared.glob("kinarm-*/rows"):
+            if ProgressBoard(rows.parent, 3).iterations >= count:
+                return
+        time.sleep(0.02)
+
+
+def test_ctrl_c_keeps_every_seed_and_says_how_to_go_on(command, tmp_path):
+    folder, shared = tmp_path / "right", tmp_path / "shared"
+    process = start(command, folder, shared)
+    wait_for_iterations(process, shared, 200)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=120)
+    assert process.returncode == 130
+    assert "Traceback" not in errors
+    last = errors.splitlines()[-1]
+    assert last.startswith("kinarm-train: interrupted: ")
+    assert last.endswith("the same command with --resume goes on")
+    states = [load_checkpoint(path).state for path in folder.glob("*.checkpoint.npz")]
+    assert sum(state.iteration for state in states) >= 200 or list(folder.glob("*.curve.csv"))
+    assert not list(shared.iterdir())
+
+    process = start(command, folder, shared, "--resume")
+    _, errors = process.communicate(timeout=300)
+    assert process.returncode == 0, errors
+    for seed in range(3):
+        expected = train_policy(config(seed, iterations=2000)).policy
+        check_equal(Policy.load(folder / f"{NAME.format(seed)}.npz"), expected)
