@@ -52,6 +52,7 @@ autodoc_class_signature = "mixed"
 typehints_use_signature_return = True
 typehints_document_rtype = False
 always_use_bars_union = True
+maximum_signature_line_length = 76
 
 # Types of other projects: their inventories would have to be fetched.
 nitpick_ignore_regex = [
@@ -119,7 +120,7 @@ def _shorten_signature(*event: str | None) -> tuple[str, str | None] | None:
 
 
 def _shorten_annotations(_app: object, doctree: nodes.document) -> None:
-    """Write array types as their names, and leave out that something returns None."""
+    """Write array types as their names and made defaults as dots; leave out a None returned."""
     kinds = (addnodes.desc_annotation, addnodes.desc_returns)
     for node in list(doctree.findall(lambda node: isinstance(node, kinds))):
         text = "".join(child.astext() for child in node.children)
@@ -128,6 +129,9 @@ def _shorten_annotations(_app: object, doctree: nodes.document) -> None:
             node.parent.remove(node)
         elif short != text:
             node.children = [nodes.Text(short)]
+    for node in doctree.findall(nodes.inline):
+        if "default_value" in node["classes"] and node.astext() == "<factory>":
+            node.children = [nodes.Text("...")]
 
 
 def setup(app: Sphinx) -> None:

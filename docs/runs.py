@@ -24,8 +24,11 @@ from sphinx.util.docutils import SphinxDirective
 
 from kinarm.viewer.html_page import HtmlPage
 
-TERMINAL = {"COLUMNS": "110", "LINES": "40", "TERM": "dumb"}
+TERMINAL = {"COLUMNS": "92", "LINES": "40", "TERM": "dumb"}
 """The terminal in which commands run, for programs that ask."""
+
+DRAWN = frozenset("│|")
+"""What tables are drawn with, whose lines must not wrap."""
 
 KINDS = {".mp4": "video/mp4", ".png": "image/png", ".gif": "image/gif"}
 """Files that can be shown, by their ending."""
@@ -144,9 +147,8 @@ class KinarmRun(SphinxDirective):
             printed = page.run_commands(code, line, fails="fails" in self.options)
         found: list[nodes.Node] = [nodes.literal_block(code, code, language=language)]
         if printed.strip():
-            found.append(
-                nodes.literal_block(printed, printed, language="text", classes=["printed"])
-            )
+            kinds = ["printed"] if DRAWN.intersection(printed) else ["printed", "wraps"]
+            found.append(nodes.literal_block(printed, printed, language="text", classes=kinds))
         if made := self.options.get("shows"):
             found.append(nodes.raw("", shown(made, page.read(made)), format="html"))
         return found

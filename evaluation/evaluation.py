@@ -311,7 +311,7 @@ def pool(evaluations: Sequence[Evaluation]) -> tuple[PooledEvaluation, ...]:
     """Pool the training seeds of each recipe and problem, where there are several.
 
     What belongs together is what policies record of their training; see
-    `kinarm.evaluation.training_seeds.group_names`.
+    ``kinarm.evaluation.training_seeds.group_names``.
     """
     names = group_names(evaluation.entrant for evaluation in evaluations)
     groups: dict[tuple[str, str], list[Evaluation]] = {}

@@ -44,7 +44,7 @@ class Metric:
     meaning : str
         What it is, for documentation and reports.
     definition : str
-        The formula in words of mathematics; `SYMBOLS` says what its letters stand for.
+        The formula in words of mathematics; ``SYMBOLS`` says what its letters stand for.
     formula : callable
         From `Outcomes` to the figure; None or NaN where there is nothing to tell. For an interval
         it is asked about many resamples at once and works along the last axis.

@@ -22,7 +22,7 @@ from kinarm.policies import (
     train_policy,
 )
 
-TOY = Path(__file__).resolve().parents[2] / "docs" / "extending" / "toy_learner.py"
+TOY = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "toy_learner.py"
 
 
 @pytest.fixture
