@@ -19,6 +19,8 @@ from .report.card import write_card as write_card
 from .report.page import report_page as report_page
 from .report.page import write_report as write_report
 from .request import EvaluationRequest as EvaluationRequest
+from .schemas import document_schema as document_schema
+from .schemas import schema_names as schema_names
 from .statistics import Estimate as Estimate
 from .studies.specification import StudySpecification as StudySpecification
 from .studies.study import Study as Study

@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from typing import IO, TYPE_CHECKING
 
 from kinarm.kernels.notices import COMPILING, told_of_compilation
@@ -15,6 +16,9 @@ def open_console(
     *, stderr: bool = False, piped_width: int | None = None, file: IO[str] | None = None
 ) -> "Console":
     """A console that prints texts as they are: names and paths hold no markup.
+
+    In a notebook without ipywidgets, where rich cannot redraw and warns of it, a bar is a line
+    that is printed at the end.
 
     Parameters
     ----------
@@ -29,7 +33,13 @@ def open_console(
 
     width = piped_width if file is not None or not sys.stdout.isatty() else None
     return Console(
-        stderr=stderr, file=file, width=width, markup=False, emoji=False, highlight=False
+        stderr=stderr,
+        file=file,
+        width=width,
+        markup=False,
+        emoji=False,
+        highlight=False,
+        force_jupyter=None if find_spec("ipywidgets") else False,
     )
 
 

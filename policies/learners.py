@@ -138,6 +138,11 @@ class TrainingResult(NamedTuple):
     curve: tuple[CurvePoint, ...]
     state: Any
 
+    def __repr__(self) -> str:
+        steps = self.curve[-1].environment_steps if self.curve else 0
+        made = f"{len(self.curve)} iterations, {steps / 1e6:.3g} million steps"
+        return f"{type(self).__name__}({self.policy!r}, {made})"
+
 
 _MODULES = {"ars": "kinarm.policies.ars", "ppo": "kinarm.policies.ppo"}
 

@@ -94,7 +94,7 @@ def run_outside(command: Callable[..., list[str]]) -> Callable[..., Answer]:
             command(program, *arguments),
             **{"cwd": ROOT, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **settings},
             text=True,
-            timeout=120,
+            timeout=600,
             check=False,
             env={**os.environ, "COLUMNS": "100", **(environment or {})},
         )

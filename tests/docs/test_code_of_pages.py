@@ -47,6 +47,12 @@ SHORTER = {
 }
 """What is added to commands that take long, by how they begin: the last option counts."""
 
+NEEDS = {
+    r"kinarm-train ppo|.*stable_baselines3": "stable_baselines3",
+    r".*\b(ur5|panda|xarm7|so101)\b": "trimesh",
+}
+"""What commands and Python need of the extras, by what is in them."""
+
 REPLACES = re.compile(r"kinarm-(train|eval|replay)")
 """Commands that show what can be done, one after the other, to the same files."""
 
@@ -129,6 +135,12 @@ def is_exception(code: str) -> bool:
     return any(re.match(start, code, re.DOTALL) for start in EXCEPTIONS)
 
 
+def skip_without_what_is_needed(code: str) -> None:
+    for pattern, module in NEEDS.items():
+        if re.match(pattern, code, re.DOTALL):
+            pytest.importorskip(module)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PAGES)
 def test_a_page_does_what_it_says(name: str, folder: Path) -> None:
@@ -138,13 +150,13 @@ def test_a_page_does_what_it_says(name: str, folder: Path) -> None:
             if title := re.match(r"# (\S+\.toml)$", block.code, re.M):
                 (folder / title[1]).write_text(FEWER.sub(r"\1 = 1", block.code))
         elif block.language == "python":
-            if "stable_baselines3" in block.code:
-                pytest.importorskip("stable_baselines3")
             if not is_exception(block.code):
+                skip_without_what_is_needed(block.code)
                 exec(compile(LEARN.sub(r"\g<1>512", block.code), name, "exec"), names)
         else:
             for command in filter(None, commands(block.code)):
                 if not is_exception(command):
+                    skip_without_what_is_needed(command)
                     run_command(command)
 
 

@@ -1,25 +1,34 @@
-"""Consoles print what they are given."""
+"""Bars and messages in a notebook."""
 
-import io
+import builtins
 
 import pytest
-from rich.table import Table
+from rich.progress import track
 
 from kinarm._console import open_console
 
-HOSTILE = ["x/[/o]", "p[v2].npz", "[bold]b", ":smile:", "[link=http://a]"]
+
+class ZMQInteractiveShell:
+    """What tells rich that it is in a notebook."""
 
 
-@pytest.mark.parametrize("text", HOSTILE)
-def test_names_hold_no_markup(text):
-    file = io.StringIO()
-    console = open_console(file=file, piped_width=100)
-    table = Table("name")
-    table.add_row(text)
-    console.print(f"written: {text}")
-    console.print(table)
-    assert file.getvalue().count(text) == 2
+@pytest.fixture
+def notebook(monkeypatch):
+    monkeypatch.setattr(builtins, "get_ipython", ZMQInteractiveShell, raising=False)
 
 
-def test_width_of_what_is_no_terminal():
-    assert open_console(file=io.StringIO(), piped_width=123).width == 123
+def test_a_bar_without_ipywidgets_is_a_line_at_the_end(notebook, monkeypatch, capsys):
+    """And rich does not warn, which would be an error here."""
+    monkeypatch.setattr("kinarm._console.find_spec", lambda _: None)
+    console = open_console(stderr=True)
+    assert list(track(range(3), "training", console=console)) == [0, 1, 2]
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.startswith("training")
+    assert len(said.err.splitlines()) == 1
+    assert "\x1b" not in said.err
+
+
+def test_with_ipywidgets_rich_draws_it(notebook, monkeypatch):
+    monkeypatch.setattr("kinarm._console.find_spec", lambda _: True)
+    assert open_console().is_jupyter

@@ -1,4 +1,4 @@
-"""Build what is published and use it away from the clone, with several Pythons.
+"""Build what is committed and use it away from the clone, with several Pythons.
 
 ``python tests/packaging/everywhere.py python3.11 python3.12 python3.13`` checks the sdist and the
 wheel, installs both with the pinned libraries, and with the first Python also with the oldest
@@ -10,6 +10,7 @@ import json
 import os
 import subprocess
 import sys
+import tarfile
 import tempfile
 import tomllib
 from collections.abc import Iterator
@@ -58,8 +59,11 @@ def results(commands: Path) -> object:
 def main(pythons: list[str]) -> None:
     """Check, install and use what is published."""
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        call(sys.executable, "-m", "build", "--outdir", folder, ROOT)
+        folder, source = Path(name), Path(name) / "source"
+        call("git", "-C", ROOT, "archive", "--output", folder / "source.tar", "HEAD")
+        with tarfile.open(folder / "source.tar") as archive:
+            archive.extractall(source, filter="data")
+        call(sys.executable, "-m", "build", "--outdir", folder, source)
         (sdist,), (wheel,) = folder.glob("*.tar.gz"), folder.glob("*.whl")
         call(sys.executable, "-m", "twine", "check", "--strict", sdist, wheel)
         pinned, oldest = ROOT / "constraints.txt", folder / "lowest.txt"

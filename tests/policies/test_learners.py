@@ -121,3 +121,10 @@ def test_its_states_are_policies(toy):
 def test_its_options_are_its_own(toy):
     with pytest.raises(InvalidInputError, match="toy has no option 'threads'"):
         train_policy(recipe("toy"), threads=2)
+
+
+def test_a_result_describes_itself_in_a_line():
+    result = train_policy(recipe("ars", "paper", problem="left", iterations=3))
+    assert repr(result).startswith("TrainingResult(Policy(ars paper*, problem 'left', seed 0")
+    assert "3 iterations, 0.0" in repr(result)
+    assert len(repr(result)) < 130
