@@ -8,7 +8,7 @@ PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check 
 MODULES := $(shell find kinarm policies evaluation data -name __pycache__ -prune -o -type f -print | sort | cksum | cut -d' ' -f1)
 INSTALLED = $(VENV)/.installed-$(1)-$(MODULES)
 
-.PHONY: eval test test-slow test-all campaign lint docs package clean
+.PHONY: eval test test-slow campaign lint docs package clean
 
 eval: $(call INSTALLED,core) ## evaluate all shipped policies on 200 trials a task
 	$(BIN)/kinarm-eval --trials 200
@@ -19,17 +19,16 @@ COVERAGE := from importlib.util import find_spec; print(95 if find_spec("sb3_con
 PYTEST := $(BIN)/python -m pytest --dist loadfile --no-loadscope-reorder --durations=25
 COVERED = --cov --cov-report=term --cov-fail-under=$$($(BIN)/python -c '$(COVERAGE)')
 
-test: $(call INSTALLED,test) ## run the tests, but for the slow ones
-	$(PYTEST) -n auto -m "not slow" $(COVERED)
+WORKERS ?= auto
+TESTS ?= not slow
+
+test: $(call INSTALLED,test) ## run the tests, but for the slow ones; all of them with TESTS=
+	$(PYTEST) -n $(WORKERS) -m "$(TESTS)" $(COVERED)
 
 CAMPAIGN := loaders command_lines writes signals kills live_page
 
 test-slow: $(call INSTALLED,test) ## run the slow tests, those in a browser included
-	$(PYTEST) -n auto -m slow
-
-# Some tests wait for what they started: a worker more than there are processors makes up for it.
-test-all: $(call INSTALLED,test) ## run all tests at once
-	$(PYTEST) -n $$(($$(nproc) + 1)) $(COVERED)
+	$(PYTEST) -n $(WORKERS) -m slow
 
 campaign: $(call INSTALLED,all) ## damaged files, odd arguments, failing writes, signals: hours
 	set -e; for module in $(CAMPAIGN); do \
