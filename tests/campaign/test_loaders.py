@@ -55,6 +55,7 @@ OTHERS = {
 OWN_DATA = (
     *("kinarm.viewer.html_page", "kinarm.viewer.live", "evaluation.report", "evaluation.replays"),
     *("evaluation.measurements", "evaluation.reproduction.document", "policies.learners"),
+    "evaluation.schemas",
     *(
         "policies.library",
         "policies.sb3",
