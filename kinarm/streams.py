@@ -17,6 +17,7 @@ class Stream(StrEnum):
     ARS = "ars"
     PPO_LEARNER = "ppo learner"
     PPO_SCENARIOS = "ppo scenarios"
+    PPO_DEMONSTRATIONS = "ppo demonstrations"
     REPLAY = "replay"
     STUDY = "study"
 

@@ -96,6 +96,8 @@ class PPOConfig(TrainingConfig):
     initial_policy : str, optional
         Name or file of a policy that the training begins with, of the same layers; it may be for
         another problem or arm.
+    demonstrations : int, optional
+        Trials whose motions by the oracle the actor imitates before the training.
     """
 
     iterations: int = 600
@@ -125,6 +127,7 @@ class PPOConfig(TrainingConfig):
     replay_size: int = field(default=8192, metadata={"at_most": LARGEST_REPLAY, **OPTIONAL})
     replay_log_std: float | None = field(default=None, metadata=OPTIONAL)
     initial_policy: str | None = field(default=None, metadata=OPTIONAL)
+    demonstrations: int | None = field(default=None, metadata={**MANY, **OPTIONAL})
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -170,7 +173,8 @@ class PPOConfig(TrainingConfig):
     @property
     def cost(self) -> float:
         """Rough duration of the training [s of a core]."""
-        return 3e-6 * self.n_epochs * self.environment_steps
+        taught = 8e-3 * (self.demonstrations or 0)
+        return 3e-6 * self.n_epochs * self.environment_steps + taught
 
     def learning_rate_at(self, done: float) -> float:
         """Learning rate after this share of the training."""

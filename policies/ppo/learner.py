@@ -7,15 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from stable_baselines3.common.logger import KVWriter, Logger, TensorBoardOutputFormat
 
 from kinarm.errors import InvalidInputError
 from kinarm.policies.curve import CurvePoint
 from kinarm.policies.learners import learner_of
-from kinarm.policies.mirror import task_mirror
+from kinarm.policies.mirror import sample_seen, task_mirror
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.ppo.config import PPOConfig
+from kinarm.policies.ppo.imitation import demonstrate, imitate
 from kinarm.policies.ppo.model import CompiledPPO
+from kinarm.policies.ppo.networks import ActorCritic
 from kinarm.policies.ppo.parameters import initial_parameters, split_parameters
 from kinarm.policies.ppo.state import PPOState
 from kinarm.policies.ppo.training_env import TrainingVecEnv
@@ -98,6 +101,8 @@ class PPOTraining:
             actor = split_parameters(parameters, *widths).actor
             for layer, (weights, bias) in zip(policy.layers, actor, strict=True):
                 weights[:], bias[:] = layer
+        if config.demonstrations is not None:
+            parameters = self._taught(parameters, normalizer, config.demonstrations)
         return PPOState(
             parameters=parameters,
             first_moment=np.zeros_like(parameters),
@@ -106,6 +111,20 @@ class PPOTraining:
             episodes=env.states(),
             failed=env.failed,
         )
+
+    def _taught(
+        self, parameters: NDArray[np.float32], normalizer: Normalizer, count: int
+    ) -> NDArray[np.float32]:
+        """Parameters of an actor that has imitated so many motions of the oracle."""
+        config, simulator = self.config, self.env.simulator
+        rng = stream_generator(Stream.PPO_DEMONSTRATIONS, config.seed)
+        scenarios = sample_seen(self.env.mirror, simulator, rng, count)
+        shown = demonstrate(simulator, scenarios, self.model.threads)
+        widths = (simulator.n_observations, config.net_arch, simulator.n_actions)
+        networks = ActorCritic(*widths, len(parameters))
+        networks.load(parameters)
+        imitate(networks, shown, normalizer, rng, self.model.threads)
+        return networks.gathered(networks.weights)
 
     def iterate(self, state: PPOState) -> PPOState:
         """One rollout and one update."""

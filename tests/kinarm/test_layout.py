@@ -50,6 +50,7 @@ def test_what_is_compiled_in_has_no_cache_of_its_own():
         "closest",
         "enclosing",
         "frames",
+        "imitation",
         "inverse",
         "kernels",
         "projection",

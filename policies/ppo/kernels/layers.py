@@ -10,7 +10,7 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import helper, inlined
-from kinarm.policies.ppo.kernels.tiles import LANES, Matrix, Numbers, multiply
+from kinarm.policies.ppo.kernels.tiles import LANES, ROWS, Matrix, Numbers, multiply
 
 BLOCK = 64
 """Samples that pass through a network together; their activations stay in the cache."""
@@ -136,3 +136,36 @@ def backward(
             outputs = work[source : source + rows * wide_in]
             for k in range(len(outputs)):
                 outputs[k] = behind[k] * (ONE - outputs[k] * outputs[k])
+
+
+@inlined
+def take_in(
+    observations: Numbers, i: int, layers: NDArray[np.int64], work: Numbers, s: int
+) -> None:
+    """Copy an observation into a work space."""
+    wide = padded(layers[0, N_IN])
+    seen, taken = observations[i], work[s * wide : (s + 1) * wide]
+    for j in range(len(seen)):
+        taken[j] = seen[j]
+
+
+@inlined
+def whole_tiles(samples: int) -> int:
+    """Rows of a block that holds so many samples."""
+    return (samples + ROWS - 1) // ROWS * ROWS
+
+
+@inlined
+def work_length(layers: NDArray[np.int64]) -> int:
+    """Length of the work space of a network."""
+    end = layers.shape[0] - 1
+    return int(layers[end, OUTPUTS]) + BLOCK * padded(layers[end, N_OUT])
+
+
+@inlined
+def widest(layers: NDArray[np.int64]) -> int:
+    """Width of the widest layer, padded."""
+    found = 0
+    for layer in range(layers.shape[0]):
+        found = max(found, padded(layers[layer, N_IN]))
+    return found

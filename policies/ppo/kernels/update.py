@@ -19,6 +19,10 @@ from kinarm.policies.ppo.kernels.layers import (
     backward,
     forward,
     padded,
+    take_in,
+    whole_tiles,
+    widest,
+    work_length,
 )
 from kinarm.policies.ppo.kernels.loss import (
     Experience,
@@ -28,9 +32,9 @@ from kinarm.policies.ppo.kernels.loss import (
     find_precision,
     log_density,
 )
-from kinarm.policies.ppo.kernels.tiles import LANES, ROWS, Numbers
+from kinarm.policies.ppo.kernels.tiles import LANES, Numbers
 
-LAYOUT = "60cde4e9d5d4"
+LAYOUT = "dc509efe4a7c"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 
@@ -295,36 +299,3 @@ def whole_power(base: float, exponent: int) -> float:
         base *= base
         exponent //= 2
     return power
-
-
-@inlined
-def take_in(
-    observations: Numbers, i: int, layers: NDArray[np.int64], work: Numbers, s: int
-) -> None:
-    """Copy an observation into a work space."""
-    wide = padded(layers[0, N_IN])
-    seen, taken = observations[i], work[s * wide : (s + 1) * wide]
-    for j in range(len(seen)):
-        taken[j] = seen[j]
-
-
-@inlined
-def whole_tiles(samples: int) -> int:
-    """Rows of a block that holds so many samples."""
-    return (samples + ROWS - 1) // ROWS * ROWS
-
-
-@inlined
-def work_length(layers: NDArray[np.int64]) -> int:
-    """Length of the work space of a network."""
-    end = layers.shape[0] - 1
-    return int(layers[end, OUTPUTS]) + BLOCK * padded(layers[end, N_OUT])
-
-
-@inlined
-def widest(layers: NDArray[np.int64]) -> int:
-    """Width of the widest layer, padded."""
-    found = 0
-    for layer in range(layers.shape[0]):
-        found = max(found, padded(layers[layer, N_IN]))
-    return found

@@ -1,0 +1,144 @@
+"""Imitation of the oracle, held against NumPy, the simulator and an actor that learnt nothing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3")
+
+from kinarm.errors import InvalidInputError
+from kinarm.policies import PPOConfig
+from kinarm.policies.normalizer import Normalizer
+from kinarm.policies.ppo.actor import actor_policy
+from kinarm.policies.ppo.imitation import BATCH_SIZE, Demonstrations, demonstrate, imitate
+from kinarm.policies.ppo.kernels.imitation import add_imitation_gradients
+from kinarm.policies.ppo.learner import PPOTraining
+from kinarm.policies.ppo.networks import ActorCritic
+from kinarm.policies.ppo.parameters import initial_parameters
+from kinarm.problem import PROBLEMS
+from kinarm.simulator import Simulator
+
+WIDTHS = (7, (9, 5), 3)
+RIGHT = PROBLEMS["right"]
+
+
+def made_networks(seed=0):
+    parameters = initial_parameters(np.random.default_rng(seed), *WIDTHS, -1.0)
+    networks = ActorCritic(*WIDTHS, len(parameters))
+    networks.load(parameters)
+    return networks, parameters
+
+
+def made_demonstrations(count=300):
+    """Actions that are a smooth function of what is seen."""
+    rng = np.random.default_rng(3)
+    observations = 2.0 + rng.normal(size=(count, WIDTHS[0]))
+    return Demonstrations(observations, np.tanh(observations[:, :3] - observations[:, 3:6]))
+
+
+@pytest.fixture(scope="module")
+def simulator():
+    return Simulator(RIGHT, threads=1)
+
+
+def test_gradient_is_that_of_the_mean_squared_error():
+    networks, parameters = made_networks()
+    shown = made_demonstrations(150)
+    arrays = [array.astype(np.float32) for array in shown]
+    chosen = np.random.default_rng(0).permutation(150)[:101]
+    found = []
+    for parts in (1, 3):
+        gradients = np.full((parts, len(networks.weights)), np.nan, dtype=np.float32)
+        losses = np.full(parts, np.nan)
+        add_imitation_gradients(
+            *(0, parts, networks.actor, *arrays, chosen, gradients, losses),
+        )
+        found.append(networks.gathered(gradients.sum(axis=0)))
+    np.testing.assert_allclose(found[0], found[1], rtol=0, atol=1e-6)
+    wanted = shown.actions[chosen]
+
+    def loss(vector):
+        networks.load(vector.astype(np.float32))
+        return float(np.mean((networks.means(arrays[0][chosen]).astype(float) - wanted) ** 2))
+
+    assert losses.sum() / wanted.size == pytest.approx(loss(parameters), rel=1e-5)
+    rng = np.random.default_rng(1)
+    for _ in range(10):
+        step = 1e-3 * rng.normal(size=len(parameters))
+        change = loss(parameters + step) - loss(parameters - step)
+        assert found[0] @ step == pytest.approx(change / 2, rel=0.02, abs=2e-6)
+
+
+def test_demonstrations_are_motions_that_reach_the_goals(simulator):
+    starts, goals = simulator.sample(np.random.default_rng(0), 40)
+    shown = demonstrate(simulator, (starts, goals), 1)
+    first = np.concatenate([[0], np.flatnonzero(np.diff(shown.observations[:, 0])) + 1])
+    lengths = np.diff([*first, len(shown.actions)])
+    assert len(lengths) == 40
+    actions = np.zeros((40, simulator.task.horizon, simulator.n_actions))
+    for row, (begin, length) in enumerate(zip(first, lengths, strict=True)):
+        actions[row, :length] = shown.actions[begin : begin + length]
+    rollouts = simulator.rollout_actions(actions, starts, goals, record=True)
+    assert rollouts.success.all()
+    np.testing.assert_array_equal(rollouts.steps, lengths)
+    seen = simulator.world.observe(
+        rollouts.paths[5, : lengths[5]], np.tile(goals[5], (lengths[5], 1))
+    )
+    np.testing.assert_allclose(
+        shown.observations[first[5] : first[5] + lengths[5]], seen, atol=1e-12
+    )
+
+
+def test_motions_end_as_close_as_the_simulator_asks_for(simulator):
+    strict = simulator.with_tolerance(0.004)
+    scenarios = simulator.sample(np.random.default_rng(0), 20)
+    longer = demonstrate(strict, scenarios, 1)
+    assert len(longer.actions) > len(demonstrate(simulator, scenarios, 1).actions)
+
+
+def test_without_a_motion_there_is_nothing_to_imitate():
+    short = Simulator(RIGHT.replace(horizon=1), threads=1)
+    starts, goals = short.sample(np.random.default_rng(0), 3)
+    with pytest.raises(InvalidInputError, match="no motion that could be imitated"):
+        demonstrate(short, (starts, goals), 1)
+
+
+def test_an_actor_learns_what_it_is_shown_and_the_critic_nothing():
+    shown, learnt = made_demonstrations(20 * BATCH_SIZE + 7), []
+    normalizer = Normalizer.of(shown.observations)
+    for threads in (1, 3):
+        networks, _ = made_networks()
+        errors = imitate(networks, shown, normalizer, np.random.default_rng(0), threads)
+        learnt.append(networks.gathered(networks.weights))
+    np.testing.assert_array_equal(learnt[0], learnt[1])
+    assert errors[-1] < 0.25 * errors[0]
+    seen = ((shown.observations - normalizer.mean) / normalizer.std).astype(np.float32)
+    error = np.mean((networks.means(seen) - shown.actions) ** 2)
+    assert error == pytest.approx(errors[-1], rel=0.1)
+    before, _ = made_networks()
+    np.testing.assert_array_equal(networks.values(seen, 1), before.values(seen, 1))
+
+
+def test_a_training_begins_with_what_was_imitated(simulator):
+    config = PPOConfig(
+        problem=RIGHT,
+        symmetric=True,
+        iterations=1,
+        n_envs=4,
+        n_steps=8,
+        batch_size=16,
+        net_arch=(32, 32),
+        demonstrations=300,
+    )
+    fresh = demonstrate(simulator, simulator.sample(np.random.default_rng(1), 100), 1)
+
+    def error(config, threads=1):
+        state = PPOTraining(config, threads=threads).initial_state()
+        actions = actor_policy(config, state)(fresh.observations)
+        return np.mean((actions - fresh.actions) ** 2), state.parameters
+
+    taught, parameters = error(config)
+    assert taught < 0.65 * error(replace(config, demonstrations=None))[0]
+    np.testing.assert_array_equal(error(config, threads=2)[1], parameters)
+    assert not np.array_equal(error(replace(config, seed=1))[1], parameters)
