@@ -54,6 +54,7 @@ NO_DOCUMENT = {
     "evaluation/report/svg.py": "names parts of a drawing",
     "evaluation/reproduction/runs.py": "a list of seconds, and an archive's header",
     "evaluation/studies/planning.py": "is hashed",
+    "evaluation/training_seeds.py": "is compared",
     "kinarm/_archive.py": "an archive's header",
     "kinarm/envs/portable.py": "asks whether something can be written",
     "kinarm/problem.py": "is hashed",

@@ -108,7 +108,7 @@ def test_the_command_trains_it_and_goes_on(toy, tmp_path, capsys):
 def test_its_settings_are_options_with_help(toy, capsys):
     assert command("--help") == 0
     text = " ".join(capsys.readouterr().out.split())
-    assert "--episodes N Episodes whose mean return judges a policy (20)" in text
+    assert "--episodes N Episodes whose mean return judges a policy (default: 20)" in text
     assert "--noise X Standard deviation by which" in text
 
 
