@@ -47,6 +47,8 @@ OTHERS = {
     "kinarm.arm_model.build_shapes": "a text of kinarm's own",
     "policies.provenance._problem": "a text of kinarm's own",
     "kinarm.viewer.visual_shapes.visual_parts": "a text of kinarm's own",
+    "kinarm._options._checked": "takes what is typed",
+    "kinarm._options.parsed": "takes what is typed",
     "kinarm._command_line._prepare_streams": "opens the null device",
     "kinarm._command_line._discard_output": "opens the null device",
 }

@@ -66,6 +66,7 @@ FURNITURE = {
     **dict.fromkeys(("my_arm.urdf", "my_robot.urdf"), "data/arms/paper.urdf"),
     **dict.fromkeys(("right.npz", "mine.npz"), "data/policies/ars-tuned-right-seed0.npz"),
     "my_policy.npz": "data/policies/ars-tuned-left-seed0.npz",
+    "right/ars-tuned-right-seed1.npz": "data/policies/ars-tuned-right-seed1.npz",
 }
 WRITTEN = {
     "my_problem.toml": 'base = "left"',
@@ -123,6 +124,7 @@ def run_command(command: str) -> None:
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Where a reader works, who opens no browser."""
     for name, source in FURNITURE.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
         shutil.copy(ROOT / source, tmp_path / name)
     for name, text in WRITTEN.items():
         (tmp_path / name).write_text(text)

@@ -4,6 +4,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+import small_tasks
 from small_tasks import kill_own_process_once, square
 
 from kinarm.errors import InvalidInputError, WorkerError
@@ -21,7 +22,7 @@ pytestmark = [
 def _surroundings(monkeypatch):
     """Workers find the tasks of these tests."""
     monkeypatch.setenv("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
+    monkeypatch.setenv("PYTHONPATH", str(Path(small_tasks.__file__).parent))
     yield
     ray.shutdown()
 

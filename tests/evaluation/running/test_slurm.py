@@ -2,8 +2,10 @@
 
 import importlib.util
 from functools import partial
+from pathlib import Path
 
 import pytest
+import small_tasks
 from small_tasks import square, touch
 
 from kinarm.errors import InvalidInputError, WorkerError
@@ -17,7 +19,7 @@ pytestmark = pytest.mark.skipif(
 
 @pytest.fixture
 def executor(tmp_path, monkeypatch):
-    monkeypatch.setenv("PYTHONPATH", __file__.rpartition("/")[0])
+    monkeypatch.setenv("PYTHONPATH", str(Path(small_tasks.__file__).parent))
     monkeypatch.setattr("kinarm.evaluation.running.slurm.LOOK_SECONDS", 0.05)
     return partial(SlurmExecutor, tmp_path / "slurm", cluster="local")
 
