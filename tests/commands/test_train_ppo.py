@@ -178,12 +178,12 @@ def test_tensorboard(run, tmp_path):
     assert list((tmp_path / "a" / "logs").glob("*tfevents*"))
 
 
-def test_progress_is_shown(run, tmp_path):
+def test_progress_is_shown(run, tmp_path, monkeypatch):
+    monkeypatch.setattr("kinarm._progress.LINE_SECONDS", -1.0)
     answer = run(
         "kinarm-train", "ppo", "--iterations", 3, *TINY_OPTIONS, "--out", tmp_path / "p.npz"
     )
-    assert "ppo paper* right seed 0" in answer.err
-    assert "3/3" in answer.err
+    assert "ppo paper* right seed 0: 3/3 iterations" in answer.err
 
 
 def test_without_its_packages_one_line_says_what_to_install(tmp_path):
