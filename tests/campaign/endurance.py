@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from subprocess import SubprocessError
 from typing import Any
+from unittest import mock
 
 import numpy as np
 
@@ -49,13 +50,9 @@ def run_long(minutes: float, out: Path) -> dict[str, Any]:
         temporary, outputs = Path(name) / "temporary", Path(name) / "outputs"
         temporary.mkdir()
         outputs.mkdir()
-        os.environ["TMPDIR"] = tempfile.tempdir = str(temporary)
-        os.environ["KINARM_CACHE"] = str(Path(name) / "cache")
-        try:
+        own = {"TMPDIR": str(temporary), "KINARM_CACHE": str(Path(name) / "cache")}
+        with mock.patch.dict(os.environ, own), mock.patch("tempfile.tempdir", str(temporary)):
             return _rounds(minutes, out, [temporary, outputs])
-        finally:
-            tempfile.tempdir = None
-            del os.environ["TMPDIR"], os.environ["KINARM_CACHE"]
 
 
 def _rounds(minutes: float, out: Path, folders: list[Path]) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
+from unittest import mock
 
 import numpy as np
 
@@ -220,8 +221,7 @@ READERS: Mapping[str, Callable[[Path], bytes]] = {
 @contextmanager
 def own_cache() -> Iterator[Path]:
     """A cache of the campaign's own."""
-    with TemporaryDirectory() as folder:
-        os.environ["KINARM_CACHE"] = folder
+    with TemporaryDirectory() as folder, mock.patch.dict(os.environ, KINARM_CACHE=folder):
         yield Path(folder)
 
 

@@ -16,7 +16,8 @@ from kinarm.policies import zoo_hyperparameters
 
 pytestmark = pytest.mark.slow
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "rl_zoo.md").read_text(encoding="utf-8")
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+PAGE = (DOCS / "how-to" / "rl_zoo.md").read_text(encoding="utf-8")
 BLOCKS = dict(re.findall(r"```\{code-block\} sh\n:name: (\S+)\n\n(.*?)```", PAGE, re.DOTALL))
 FLAT, GOALS = "kinarm/ReachRight-v0", "kinarm/ReachGoalRight-v0"
 SMALL = {

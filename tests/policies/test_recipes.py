@@ -138,12 +138,14 @@ class TestPPO:
         assert (config.log_std_init, config.learning_rate_schedule) == (0, "constant")
 
     def test_names(self):
-        assert set(PPO_RECIPES) == {"paper", "tuned"}
+        assert set(PPO_RECIPES) == {"paper", "tuned", "best"}
         assert all(config.recipe == name for name, config in PPO_RECIPES.items())
         assert PPO_RECIPES["paper"] == PPOConfig(recipe="paper")
 
     def test_unknown_recipe_lists_the_recipes(self):
-        with pytest.raises(UnknownNameError, match="unknown recipe 'v1'; available: paper, tuned"):
+        with pytest.raises(
+            UnknownNameError, match="unknown recipe 'v1'; available: paper, tuned, best"
+        ):
             recipe("ppo", "v1")
 
     def test_a_changed_recipe_says_so(self):
