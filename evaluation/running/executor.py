@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from typing import Protocol, TypeVar
 
-from kinarm.workers import Finished as Finished
+from kinarm.workers import Finished
 
 TaskT = TypeVar("TaskT")
 ResultT = TypeVar("ResultT")

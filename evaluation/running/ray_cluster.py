@@ -9,8 +9,8 @@ from typing import Any, TypeVar
 
 from kinarm._interrupts import kept_from_children
 from kinarm.errors import InvalidInputError, MissingExtraError, WorkerError
-from kinarm.evaluation.running.executor import Finished
 from kinarm.evaluation.running.identity import Guarded, identity
+from kinarm.workers import Finished
 
 TaskT = TypeVar("TaskT")
 ResultT = TypeVar("ResultT")

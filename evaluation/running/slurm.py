@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from kinarm.errors import InvalidInputError, MissingExtraError, WorkerError
-from kinarm.evaluation.running.executor import Finished
 from kinarm.evaluation.running.identity import Guarded, identity
+from kinarm.workers import Finished
 
 TaskT = TypeVar("TaskT")
 ResultT = TypeVar("ResultT")

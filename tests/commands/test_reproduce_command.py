@@ -17,9 +17,8 @@ from kinarm.errors import InvalidInputError, WorkerError
 from kinarm.evaluation.commands.reproduce import ReproductionRequest
 from kinarm.evaluation.reproduction.runs import RunStore
 from kinarm.evaluation.reproduction.study import Study, quick_study
-from kinarm.evaluation.running.executor import Finished
 from kinarm.policies import load_policy
-from kinarm.workers import LocalExecutor
+from kinarm.workers import Finished, LocalExecutor
 
 QUICK = ("--quick", "--no-ppo", "--jobs", 2)
 needs_ppo = pytest.mark.skipif(find_spec("stable_baselines3") is None, reason="needs the extra ppo")

@@ -121,12 +121,17 @@ def test_out_is_a_folder(run, tmp_path):
     assert f"--out {tmp_path / 'right'}" in answer.err
 
 
+def leave(folder, what):
+    """Put what a training of seed 1 leaves at its end, or on the way, into a folder."""
+    if what == "policy":
+        train_policy(config(1)).policy.save(folder / f"{NAME.format(1)}.npz")
+    else:
+        leave_checkpoint(folder, 1)
+
+
 @pytest.mark.parametrize("left", ["policy", "checkpoint"])
 def test_files_in_the_way(run, tmp_path, left):
-    if left == "policy":
-        train_policy(config(1)).policy.save(tmp_path / f"{NAME.format(1)}.npz")
-    else:
-        leave_checkpoint(tmp_path, 1)
+    leave(tmp_path, left)
     before = sorted(path.name for path in tmp_path.iterdir())
     arguments = ("ars", "--problem", "right", "--iterations", 9, *SMALL, "--seeds", 2)
     answer = run("kinarm-train", *arguments, "--out", tmp_path)
@@ -137,10 +142,7 @@ def test_files_in_the_way(run, tmp_path, left):
 
 @pytest.mark.parametrize("left", ["policy", "checkpoint"])
 def test_resuming_refuses_the_files_of_other_settings(run, tmp_path, left):
-    if left == "policy":
-        train_policy(config(1)).policy.save(tmp_path / f"{NAME.format(1)}.npz")
-    else:
-        leave_checkpoint(tmp_path, 1)
+    leave(tmp_path, left)
     arguments = ("ars", "--problem", "right", "--iterations", 9, *SMALL, "--seeds", 2)
     for change in (("--noise", 0.5), ("--tolerance", 0.1)):
         answer = run("kinarm-train", *arguments, *change, "--out", tmp_path, "--resume")

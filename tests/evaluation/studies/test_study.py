@@ -9,11 +9,11 @@ from small_studies import SMALL, contents
 
 from kinarm.errors import InvalidInputError, OutputError
 from kinarm.evaluation import evaluate, oracle_bounds
-from kinarm.evaluation.running.executor import Finished
 from kinarm.evaluation.studies import training
 from kinarm.evaluation.studies.study import Study
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies import Policy, recipe, train_policy
+from kinarm.workers import Finished
 
 
 class Counting:

@@ -5,9 +5,9 @@ from importlib.util import find_spec
 import pytest
 from small_studies import contents
 
-from kinarm.evaluation.running.executor import Finished
 from kinarm.evaluation.running.ray_cluster import RayExecutor
 from kinarm.evaluation.running.slurm import SlurmExecutor
+from kinarm.workers import Finished
 
 pytestmark = [
     pytest.mark.slow,
