@@ -1,6 +1,7 @@
 """A Ray cluster as executor."""
 
 import math
+import os
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -33,8 +34,9 @@ class RayExecutor:
     Parameters
     ----------
     address : str
-        ``"local"`` for Ray on this machine alone, ``"auto"`` for the cluster that this machine is
-        part of, or the address of one, such as ``"10.0.0.1:6379"`` or ``"ray://head:10001"``.
+        ``"local"`` for Ray on this machine alone, ``"auto"`` for the cluster in ``RAY_ADDRESS`` or
+        else the one that this machine is part of, or the address of one, such as
+        ``"10.0.0.1:6379"`` or ``"ray://head:10001"``.
     jobs : int, optional
         Processors of this machine for ``"local"``; all by default. A cluster has its own.
     threads : int
@@ -75,18 +77,21 @@ class RayExecutor:
 
     def _connect(self, ray: Any) -> None:
         """Find the cluster, or begin one on this machine."""
-        quiet = {"log_to_driver": False, "logging_level": "error", "include_dashboard": None}
-        if self.address == "local":
-            ray.init(num_cpus=self.jobs, **{**quiet, "include_dashboard": False})
+        quiet = {"log_to_driver": False, "logging_level": "error"}
+        if self.address == "local":  # without the address, Ray would join one that runs here
+            ray.init(address="local", num_cpus=self.jobs, include_dashboard=False, **quiet)
             return
+        address = self.address
+        if address == "auto":  # as Ray reads it
+            address = os.environ.get("RAY_ADDRESS") or address
         try:
-            if self.address != "auto":
-                _knock(self.address.removeprefix("ray://"))
+            if address != "auto":
+                _knock(address.removeprefix("ray://"))
             with warnings.catch_warnings(action="ignore"):  # one line says it
-                ray.init(address=self.address, **quiet)
+                ray.init(address=address, **quiet)
         except (ConnectionError, OSError, RuntimeError, TimeoutError, ValueError) as error:
             raise InvalidInputError(
-                f"no Ray cluster answers at {self.address!r}: give the address of one, auto "
+                f"no Ray cluster answers at {address!r}: give the address of one, auto "
                 "where one runs, or local"
             ) from error
 

@@ -17,6 +17,9 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore"),  # Ray's own
 ]
 
+NOBODY = "127.0.0.1:9"
+"""An address that nothing listens at."""
+
 
 @pytest.fixture(autouse=True)
 def _surroundings(monkeypatch):
@@ -51,7 +54,13 @@ def test_a_worker_that_differs_is_refused(monkeypatch):
         list(RayExecutor("local", jobs=1).carry_out(square, [1]))
 
 
-@pytest.mark.parametrize("address", ["127.0.0.1:9", "ray://127.0.0.1:9", "nowhere", "auto"])
-def test_no_cluster(address):
+def test_local_is_a_ray_of_its_own_beside_a_cluster(monkeypatch):
+    monkeypatch.setenv("RAY_ADDRESS", NOBODY)  # what init() without an address would join
+    assert dict(RayExecutor("local", jobs=1).carry_out(square, [3])) == {0: 9}
+
+
+@pytest.mark.parametrize("address", [NOBODY, f"ray://{NOBODY}", "nowhere", "auto"])
+def test_no_cluster(address, monkeypatch):
+    monkeypatch.setenv("RAY_ADDRESS", NOBODY)  # auto would find one that other tests began
     with pytest.raises(InvalidInputError, match="no Ray cluster answers at"):
         list(RayExecutor(address).carry_out(square, [1]))
