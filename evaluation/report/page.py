@@ -159,5 +159,5 @@ def _references(problems: Sequence[ProblemResults]) -> list[str]:
     names = dict.fromkeys(group.name for group in groups if not group.is_policy)
     words = [name for name in names if name != ORACLE.name]
     words += [f"the {ORACLE.name}"] if ORACLE.name in names else []
-    *first, last = words or [""]
-    return [f"beside {', '.join(first)} and {last}" if first else f"beside {last}"] if last else []
+    beside = " and ".join(part for part in (", ".join(words[:-1]), *words[-1:]) if part)
+    return [f"beside {beside}"] if beside else []
