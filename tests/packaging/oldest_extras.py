@@ -31,11 +31,11 @@ TESTS = {
 
 
 def oldest(*extras: str) -> Iterator[str]:
-    """The lowest versions that the package itself and some of its extras allow."""
+    """The lowest versions that the package itself allows, or some of its extras if they say so."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     lists = (project["dependencies"], *(project["optional-dependencies"][each] for each in extras))
-    for line in (line for lines in lists for line in lines):
-        yield line.partition(",")[0].replace(">=", "==")
+    lowest = dict(line.partition(",")[0].split(">=") for lines in lists for line in lines)
+    return (f"{name}=={version}" for name, version in lowest.items())
 
 
 def try_extra(extra: str, folder: Path) -> bool:
