@@ -143,10 +143,9 @@ def _delete_least_recently_used(folder: Path) -> None:
 def bounds_document(solutions: OracleSolutions) -> dict[str, Any]:
     """What the oracle knows about a set of trials, as a dictionary that JSON can hold.
 
-    ``bounded`` is their number.
-    ``unsolved`` are the trials that no motion was found for, and why; ``gap`` is that between
-    ``steps`` and ``steps_lower_bound`` of the others, and ``proof_complete_share`` the share of
-    trials whose proof is complete.
+    ``bounded`` is the number of trials. ``unsolved`` lists the trials without a motion, and why.
+    ``gap`` is the difference of ``steps`` and ``steps_lower_bound`` in the other trials.
+    ``proof_complete_share`` is the share of trials whose proof is complete.
     """
     missed = np.flatnonzero(~solutions.reachable)
     gap = (solutions.steps - solutions.steps_lower_bound)[solutions.reachable]
