@@ -34,7 +34,7 @@ Tell = Callable[[str], object]
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluationRequest(ProblemOptions):
-    """Put policies to random reaching trials and report how they did.
+    """Evaluate policies on random reaching trials, beside an oracle.
 
     By default a trained policy faces the problem that it was trained for, changed as the options
     say, and a baseline all problems in play. Problems that are named restrict the default
@@ -55,11 +55,11 @@ class EvaluationRequest(ProblemOptions):
     seed : int
         Seed of the trials.
     allow_other_arm : bool
-        Let policies face an arm that they were not trained for.
+        Allow an arm that a policy was not trained for.
     matrix : bool
         Every policy on every problem, not only on its own.
     oracle : bool
-        Bound what any policy could reach; of more than 2000 trials the first ones, unless the
+        Ask the oracle what any policy could reach: in the first 2000 trials at most, unless the
         oracle is a named policy.
     hold : bool
         Run the trials once more, without ending them at success: how close policies come to the

@@ -45,7 +45,7 @@ class ComparisonRequest(RunningOptions):
     seeds : int
         Trainings of each learner on each problem.
     steps : int
-        Environment steps after which a training is broken off.
+        Environment steps after which a training ends.
     trials : int
         Trials that policies face.
     settings : Path
@@ -53,7 +53,7 @@ class ComparisonRequest(RunningOptions):
     out : Path
         Output folder.
     train : bool
-        Train what is missing; else write what the finished trainings came to.
+        Train what is missing; else write the results of the finished trainings.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""``kinarm-eval``: put policies to the trials and report how they did."""
+"""``kinarm-eval``: evaluate policies on random reaching trials, beside an oracle."""
 
 import json
 from collections.abc import Sequence

@@ -46,7 +46,7 @@ class ReproductionRequest(RunningOptions):
     quick : bool
         Make a smoke run: every step with trainings of a few iterations, and no verdicts.
     ppo : bool
-        Train with PPO, too, and judge the claims that compare it with ARS.
+        Train with PPO as well, and judge the claims that compare it with ARS.
 
     Raises
     ------

@@ -64,7 +64,7 @@ class ReplayRequest(ProblemOptions):
     seed : int
         Seed of the trials.
     allow_other_arm : bool
-        Let policies face an arm that they were not trained for.
+        Allow an arm that a policy was not trained for.
     oracle : bool
         Show the number of steps proven necessary.
     out : Path

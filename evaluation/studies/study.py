@@ -1,4 +1,4 @@
-"""A study: its trainings, what they came to, and how to carry out the rest."""
+"""A study: its trainings, their results, and how to run the missing ones."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
