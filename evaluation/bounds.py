@@ -70,7 +70,7 @@ def oracle_bounds(trials: TrialSet, on_progress: Progress | None = None) -> Orac
 
 
 def bounded_trials(trials: TrialSet) -> TrialSet:
-    """The first `MOST_BOUNDED` trials, or all where there are no more or all bounds are known.
+    """The first `MOST_BOUNDED` trials, or all if there are no more or all bounds are known.
 
     A proof takes a thousand times as long as a policy's trial, and the figures made of proofs need
     no more of them.
@@ -123,7 +123,7 @@ def _save(path: Path, solutions: OracleSolutions) -> None:
 
 
 def _delete_least_recently_used(folder: Path) -> None:
-    """Delete the files that are too many, whatever other processes do to them meanwhile.
+    """Delete surplus files, and tolerate other processes that change them meanwhile.
 
     What a process that was killed left half written counts, too.
     """

@@ -133,7 +133,7 @@ class EvaluationRequest(ProblemOptions):
             raise InvalidInputError("--json and --markdown exclude each other")
 
     def run(self, command: str | None = None, tell: Tell = lambda _: None) -> dict[str, Any]:
-        """Evaluate, and write what is asked for.
+        """Evaluate, and write the outputs.
 
         Parameters
         ----------
@@ -164,7 +164,7 @@ class EvaluationRequest(ProblemOptions):
         return document
 
     def _write(self, document: dict[str, Any], evaluations: "list[Evaluation]", tell: Tell) -> None:
-        """Write what is asked for."""
+        """Write the outputs."""
         if self.report is not None:
             from kinarm.evaluation.report.page import write_report
 
@@ -197,7 +197,7 @@ class EvaluationRequest(ProblemOptions):
         return pairs
 
     def _face(self, pairs: list[Pair], tell: Tell) -> "list[Evaluation]":
-        """Let policies face their trials, problem by problem."""
+        """Run all policies on their trials, problem by problem."""
         from kinarm.evaluation.bounds import bounded_trials, oracle_bounds
         from kinarm.evaluation.entrants import ORACLE
         from kinarm.evaluation.evaluation import run_trials
@@ -299,7 +299,7 @@ class EvaluationRequest(ProblemOptions):
         return list({problem.digest: problem for problem in problems}.values())
 
     def _problems_of(self, entrants: "Sequence[Entrant]") -> "list[ReachProblem]":
-        """What some entrants were trained for, or all that there is; the paper's come first."""
+        """Problems that entrants were trained for, or all shipped ones; the paper's come first."""
         from kinarm.problem import PROBLEMS
 
         trained = [entrant.problem for entrant in entrants if entrant.problem is not None]
@@ -310,7 +310,7 @@ class EvaluationRequest(ProblemOptions):
         return [own.pop(digest) for digest in shipped if digest in own] + list(own.values())
 
     def _is_own(self, entrant: "Entrant", problem: "ReachProblem") -> bool:
-        """Whether an entrant was trained for a problem, but for what the options change."""
+        """Whether an entrant was trained for a problem, apart from the options' changes."""
         trained_for = entrant.problem
         return trained_for is None or self._changed(trained_for).digest == problem.digest
 
@@ -319,7 +319,7 @@ class EvaluationRequest(ProblemOptions):
         return replace(self, problem=None, task=None).resolve(problem)
 
     def _check_outputs(self, pairs: Sequence[Pair]) -> None:
-        """See that the files can be written, and that there is one policy for a card."""
+        """Check that the files can be written, and that there is one policy for a card."""
         if self.card is not None:
             from kinarm.evaluation.report.card import check_card
 

@@ -18,7 +18,7 @@ SPREAD_PRIORITY = 5
 
 
 class Cell(NamedTuple):
-    """A figure as text, empty if there is none, and its interval or what else is beside it."""
+    """A figure as text, empty if there is none, and its interval or other addition."""
 
     value: str = ""
     beside: str = ""

@@ -1,4 +1,4 @@
-"""One line on standard error that tells how far something is and how long the rest takes."""
+"""One line on standard error that shows progress and the remaining time."""
 
 import math
 import time
@@ -24,7 +24,7 @@ LINE_SECONDS = 30.0
 
 
 class ProgressLine:
-    """Shows how far something is: a bar on a terminal, else a line now and then.
+    """Shows progress: a bar on a terminal, and a line now and then elsewhere.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Reaching tasks: which goals, how close, how long, from where, and what is rewarded."""
+"""Reaching tasks: goals, tolerance, horizon, starts and reward."""
 
 import math
 from dataclasses import dataclass, field, fields

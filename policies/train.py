@@ -101,7 +101,7 @@ def _train(options: argparse.Namespace) -> None:
 
 
 def _train_one(request: TrainRequest) -> None:
-    """Train a policy, and say what it came to and what to type next."""
+    """Train a policy, and say how good it is and what to type next."""
     curve = request.run().curve
     last = curve[-1]
     sys.stdout.write(

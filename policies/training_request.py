@@ -91,7 +91,7 @@ class TrainRequest(ProblemOptions):
                 return train_to_file(config, state, self.out, progress, **options)
 
     def config(self) -> "TrainingConfig":
-        """Settings of the training: those of the recipe, with what the fields replace.
+        """Settings of the training: those of the recipe, with the replacements of the fields.
 
         Raises
         ------

@@ -38,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _report(request: EvaluationRequest, command: str) -> None:
-    """Run a request, and print the table and what it stands on, or JSON."""
+    """Run a request, and print the table with its notes, or JSON."""
     from kinarm.evaluation.table import print_table
 
     with working("evaluating") as say:

@@ -93,7 +93,7 @@ class CheckRequest(ShowRequest):
         whole_number("seed", self.seed, 0)
 
     def run(self) -> "ProblemCheck":
-        """Check the problem, and write what is asked for.
+        """Check the problem, and write the outputs.
 
         Raises
         ------

@@ -91,7 +91,7 @@ class StudyRequest(RunningOptions):
         return self.out or Path(self.study.stem)
 
     def run(self, executor: "Executor | None" = None, command: str | None = None) -> "Study":
-        """Train what is missing, and write what it came to.
+        """Run the missing trainings, and write the results.
 
         Parameters
         ----------

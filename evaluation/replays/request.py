@@ -178,7 +178,7 @@ class ReplayRequest(ProblemOptions):
         return self._write(report)
 
     def recordings(self) -> "list[list[Recording]]":
-        """Make or read what is to be played: a list for the policy, or one for each of two.
+        """Make or read the recordings to play: one list for each policy.
 
         Raises
         ------
