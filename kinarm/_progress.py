@@ -71,7 +71,7 @@ class ProgressLine:
         done : float, optional
             How much is done; as before if it is left out.
         words : sequence of str
-            What is said of it; the first ones are left out for want of width.
+            Texts beside the bar; the first ones are left out if the line is too narrow.
         count : str
             How much that is; in numbers of what is done and of all if it is left out.
         """

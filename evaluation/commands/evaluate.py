@@ -26,8 +26,8 @@ examples:
 """
 
 HELD_NOTE = (
-    "mm columns, held and closest: of trials that success does not end; contact at any time is a "
-    "miss; the oracle aims at 5 mm there"
+    "mm columns, held and closest are from trials that success does not end; contact "
+    "counts as a miss; the oracle aims at 5 mm there"
 )
 
 
@@ -76,7 +76,7 @@ def _footnote(document: dict[str, Any]) -> str:
             f"{name} {100 * each['proof_complete_share']:.1f} %" for name, each in bounds.items()
         )
         lines.append(
-            "step ratio: steps over the number proven necessary, of trials that succeeded; "
+            "step ratio: steps divided by the number proven necessary, in trials that succeeded; "
             f"proofs complete: {', '.join(shares)}"
         )
         bounded = min(each["bounded"] for each in bounds.values())
