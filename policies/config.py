@@ -99,7 +99,7 @@ class TrainingConfig:
 
     @property
     def training_problem(self) -> ReachProblem:
-        """The problem of the training: the task's reward is replaced by that of these settings."""
+        """The problem with the reward of these settings, on which the training runs."""
         return self.problem.replace(reward=self.reward)
 
     @property
