@@ -70,7 +70,7 @@ def oracle_bounds(trials: TrialSet, on_progress: Progress | None = None) -> Orac
 
 
 def bounded_trials(trials: TrialSet) -> TrialSet:
-    """The first `MOST_BOUNDED` trials, or all where there are no more or all bounds are known.
+    """The first `MOST_BOUNDED` trials, or all if there are no more or all bounds are known.
 
     A proof takes a thousand times as long as a policy's trial, and the figures made of proofs need
     no more of them.
@@ -123,7 +123,7 @@ def _save(path: Path, solutions: OracleSolutions) -> None:
 
 
 def _delete_least_recently_used(folder: Path) -> None:
-    """Delete the files that are too many, whatever other processes do to them meanwhile.
+    """Delete surplus files, and tolerate other processes that change them meanwhile.
 
     What a process that was killed left half written counts, too.
     """
@@ -143,10 +143,9 @@ def _delete_least_recently_used(folder: Path) -> None:
 def bounds_document(solutions: OracleSolutions) -> dict[str, Any]:
     """What the oracle knows about a set of trials, as a dictionary that JSON can hold.
 
-    ``bounded`` is their number.
-    ``unsolved`` are the trials that no motion was found for, and why; ``gap`` is that between
-    ``steps`` and ``steps_lower_bound`` of the others, and ``proof_complete_share`` the share of
-    trials whose proof is complete.
+    ``bounded`` is the number of trials. ``unsolved`` lists the trials without a motion, and why.
+    ``gap`` is the difference of ``steps`` and ``steps_lower_bound`` in the other trials.
+    ``proof_complete_share`` is the share of trials whose proof is complete.
     """
     missed = np.flatnonzero(~solutions.reachable)
     gap = (solutions.steps - solutions.steps_lower_bound)[solutions.reachable]

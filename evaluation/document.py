@@ -273,7 +273,7 @@ SHAPE = {
 
 
 def check_document(content: dict[str, Any]) -> None:
-    """See that a document of this version holds what is needed to face its trials again.
+    """Check that a document holds what is needed to run its trials again.
 
     Raises
     ------

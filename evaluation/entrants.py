@@ -59,7 +59,7 @@ class Entrant:
 
     @property
     def note(self) -> str:
-        """What is to be known about it besides, in a line; empty if there is nothing."""
+        """A remark in one line, such as the statistics in use; empty if there is none."""
         statistics = self.policy and self.policy.provenance.config.get("vec_normalize")
         return f"{self.name}: observations normalised by {statistics}" if statistics else ""
 
@@ -230,7 +230,7 @@ def shipped_entrants() -> tuple[Entrant, ...]:
 
 
 def check_names(pairs: Iterable[tuple[Entrant, ReachProblem]]) -> None:
-    """See that entrants and the problems that they face can be told apart by their names.
+    """Check that entrants, and the problems that they face, have distinct names.
 
     Raises
     ------

@@ -17,7 +17,7 @@ from kinarm.evaluation.statistics import (
 
 
 def estimate_metrics(outcomes: Outcomes) -> dict[str, Estimate]:
-    """Work out all `METRICS`, with their intervals; those of what is not known stay empty.
+    """Compute all `METRICS`, with their intervals; unknown figures stay empty.
 
     The interval of one policy is about other trials, that of several training seeds about other
     trainings and other trials.

@@ -227,7 +227,7 @@ def evaluate(
     hold: bool = False,
     **overrides: Any,
 ) -> Evaluation:
-    """Put one policy to the trials (paper, section 3.3: 200 random goals, 64 steps each).
+    """Evaluate one policy on the trials (paper, section 3.3: 200 random goals, 64 steps each).
 
     Parameters
     ----------
@@ -236,7 +236,7 @@ def evaluate(
         from observations (n, n_observations) to actions (n, n_actions); or something with a
         method ``predict`` as models of Stable-Baselines3 have it.
     problem : ReachProblem, str or Path, optional
-        What it faces; by default the problem that the policy was trained for.
+        The problem that it faces; by default the one that the policy was trained for.
     trials : int
         Number of trials.
     seed : int
@@ -244,17 +244,16 @@ def evaluate(
     allow_other_arm : bool
         Whether a policy may face an arm that it was not trained for.
     oracle : bool
-        Whether to bound what any policy could do in the trials, the first 2000 at most.
+        Whether to bound what any policy could do, in the first 2000 trials at most.
     hold : bool
-        Whether to let it face them once more, where success does not end a trial; see
-        `Evaluation.held`.
+        Whether to run the trials once more without an end at success; see `Evaluation.held`.
     **overrides
         Changes of the problem, such as ``tolerance``; see `kinarm.ReachProblem.replace`.
 
     Raises
     ------
     InvalidInputError
-        If a number is out of range, or no problem is given for something untrained.
+        If a number is out of range, or no problem is given for an untrained policy.
     PolicyFileError
         If the policy cannot be read, was trained for another arm, or does not fit this one.
     """
@@ -308,7 +307,7 @@ def run_trials(
 
 
 def pool(evaluations: Sequence[Evaluation]) -> tuple[PooledEvaluation, ...]:
-    """Pool the training seeds of each recipe and problem, where there are several.
+    """Pool the training seeds of each recipe and problem that has several.
 
     What belongs together is what policies record of their training; see
     ``kinarm.evaluation.training_seeds.group_names``.

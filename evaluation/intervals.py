@@ -39,12 +39,11 @@ class Term(NamedTuple):
 def contrast(terms: Sequence[Term]) -> Estimate:
     """Weighted sum of means over seeds and trials.
 
-    Seeds and trials are crossed random effects: all seeds of a recipe face the same trials, and so
-    may several recipes, also on tasks whose trials differ in nothing but the bench. The variance is
-    the sum of that of the seeds' means, in each term, and that of the trials' weighted means, in
-    each set of crossed trials; what is particular to a seed on a trial is in both, which errs on
-    the wide side. The interval is Student's, with the degrees of freedom of
-    Welch and Satterthwaite.
+    Seeds and trials are crossed random effects: all seeds of a recipe face the same trials. Several
+    recipes may face them as well, also on tasks whose trials differ in the bench only. The variance
+    is the variance of the seeds' means, in each term, plus that of the trials' weighted means, in
+    each set of crossed trials. Both contain the interaction of seed and trial, so the interval is
+    rather too wide. It is Student's, with the degrees of freedom of Welch and Satterthwaite.
     """
     value = sum(term.weight * float(term.values.mean()) for term in terms)
     parts = [(term.weight**2 * _mean_variance(term.values.mean(axis=1))) for term in terms]

@@ -37,7 +37,7 @@ ALWAYS = float("inf")
 
 @dataclass(frozen=True, kw_only=True)
 class Metric:
-    """A figure of merit: what it means, how it is computed and how it is shown.
+    """A figure of merit: its meaning, its formula and how tables show it.
 
     Attributes
     ----------
@@ -187,7 +187,7 @@ def middle_half(ordered: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def median_or_none(values: NDArray[Any]) -> Any:
-    """Median of values; None where there are none."""
+    """Median of values; None if there are none."""
     return np.median(values) if values.size else None
 
 

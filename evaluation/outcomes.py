@@ -18,7 +18,7 @@ HELD_STEPS = 10
 
 
 class Judged(Protocol):
-    """What figures of merit need of finished episodes; `kinarm.Rollouts` say what it means."""
+    """The part of finished episodes that figures of merit need; see `kinarm.Rollouts`."""
 
     @property
     def distance(self) -> NDArray[np.float64]:
@@ -199,7 +199,7 @@ class Outcomes:
 
     @property
     def relative_success(self) -> float | None:
-        """Success over that of the oracle in the trials that it was asked about."""
+        """Success divided by the oracle's, in the trials that the oracle was asked about."""
         reachable = self._known_bounds.reachable
         succeeded = [rollouts.success[: len(reachable)] for rollouts in self.rollouts]
         return float(np.mean(succeeded) / reachable.mean()) if reachable.any() else None

@@ -1,4 +1,4 @@
-"""What can be known of a problem before anything is trained for it."""
+"""Checks of a problem before a training: reachable goals, free starts, contact, symmetry."""
 
 from dataclasses import dataclass
 from functools import cached_property

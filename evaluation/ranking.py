@@ -1,8 +1,8 @@
-"""What the shipped policies reach: ``python -m kinarm.evaluation.ranking`` measures it.
+"""The success of all shipped policies, measured by ``python -m kinarm.evaluation.ranking``.
 
-It is run after policies have been shipped, in the clone that holds them, and writes the file from
-which `kinarm.policies.library.best_policy` names the best one. The trials are of a seed of their
-own, so that nobody chooses a policy by the trials that it is then judged by.
+Run it after policies have been shipped, in the clone that holds them. It writes the file from
+which `kinarm.policies.library.best_policy` names the best one. The trials have their own seed, so
+that no policy is chosen by the trials that later judge it.
 """
 
 import json

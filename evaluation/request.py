@@ -34,7 +34,7 @@ Tell = Callable[[str], object]
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluationRequest(ProblemOptions):
-    """Put policies to random reaching trials and report how they did.
+    """Evaluate policies on random reaching trials, beside an oracle.
 
     By default a trained policy faces the problem that it was trained for, changed as the options
     say, and a baseline all problems in play. Problems that are named restrict the default
@@ -55,11 +55,11 @@ class EvaluationRequest(ProblemOptions):
     seed : int
         Seed of the trials.
     allow_other_arm : bool
-        Let policies face an arm that they were not trained for.
+        Allow an arm that a policy was not trained for.
     matrix : bool
         Every policy on every problem, not only on its own.
     oracle : bool
-        Bound what any policy could reach; of more than 2000 trials the first ones, unless the
+        Ask the oracle what any policy could reach: in the first 2000 trials at most, unless the
         oracle is a named policy.
     hold : bool
         Run the trials once more, without ending them at success: how close policies come to the
@@ -133,7 +133,7 @@ class EvaluationRequest(ProblemOptions):
             raise InvalidInputError("--json and --markdown exclude each other")
 
     def run(self, command: str | None = None, tell: Tell = lambda _: None) -> dict[str, Any]:
-        """Evaluate, and write what is asked for.
+        """Evaluate, and write the outputs.
 
         Parameters
         ----------
@@ -164,7 +164,7 @@ class EvaluationRequest(ProblemOptions):
         return document
 
     def _write(self, document: dict[str, Any], evaluations: "list[Evaluation]", tell: Tell) -> None:
-        """Write what is asked for."""
+        """Write the outputs."""
         if self.report is not None:
             from kinarm.evaluation.report.page import write_report
 
@@ -197,7 +197,7 @@ class EvaluationRequest(ProblemOptions):
         return pairs
 
     def _face(self, pairs: list[Pair], tell: Tell) -> "list[Evaluation]":
-        """Let policies face their trials, problem by problem."""
+        """Run all policies on their trials, problem by problem."""
         from kinarm.evaluation.bounds import bounded_trials, oracle_bounds
         from kinarm.evaluation.entrants import ORACLE
         from kinarm.evaluation.evaluation import run_trials
@@ -299,7 +299,7 @@ class EvaluationRequest(ProblemOptions):
         return list({problem.digest: problem for problem in problems}.values())
 
     def _problems_of(self, entrants: "Sequence[Entrant]") -> "list[ReachProblem]":
-        """What some entrants were trained for, or all that there is; the paper's come first."""
+        """Problems that entrants were trained for, or all shipped ones; the paper's come first."""
         from kinarm.problem import PROBLEMS
 
         trained = [entrant.problem for entrant in entrants if entrant.problem is not None]
@@ -310,7 +310,7 @@ class EvaluationRequest(ProblemOptions):
         return [own.pop(digest) for digest in shipped if digest in own] + list(own.values())
 
     def _is_own(self, entrant: "Entrant", problem: "ReachProblem") -> bool:
-        """Whether an entrant was trained for a problem, but for what the options change."""
+        """Whether an entrant was trained for a problem, apart from the options' changes."""
         trained_for = entrant.problem
         return trained_for is None or self._changed(trained_for).digest == problem.digest
 
@@ -319,7 +319,7 @@ class EvaluationRequest(ProblemOptions):
         return replace(self, problem=None, task=None).resolve(problem)
 
     def _check_outputs(self, pairs: Sequence[Pair]) -> None:
-        """See that the files can be written, and that there is one policy for a card."""
+        """Check that the files can be written, and that there is one policy for a card."""
         if self.card is not None:
             from kinarm.evaluation.report.card import check_card
 

@@ -18,7 +18,7 @@ SPREAD_PRIORITY = 5
 
 
 class Cell(NamedTuple):
-    """A figure as text, empty if there is none, and its interval or what else is beside it."""
+    """A figure as text, empty if there is none, and its interval or other addition."""
 
     value: str = ""
     beside: str = ""
@@ -29,7 +29,7 @@ class Cell(NamedTuple):
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the table, with what it says of a row of the document.
+    """A column of the table, with the cell of each row of the document.
 
     Columns of low priority are left out first.
     """
@@ -55,7 +55,7 @@ def metric_columns() -> list[Column]:
 
 
 def metric_cell(name: str, row: dict[str, Any]) -> Cell:
-    """What a row of the document says of a metric."""
+    """A metric in a row of the document."""
     metric, estimate = METRICS[name], row["metrics"][name]
     if estimate["value"] is None:
         return Cell()
@@ -69,7 +69,7 @@ def metric_cell(name: str, row: dict[str, Any]) -> Cell:
 
 
 def spread_cell(name: str, row: dict[str, Any]) -> Cell:
-    """What a row of the document says of a metric's range over training seeds, if there are."""
+    """A metric's range over training seeds in a row of the document; empty without seeds."""
     spread = row.get("spread", {}).get(name)
     if spread is None:
         return Cell()
@@ -78,7 +78,7 @@ def spread_cell(name: str, row: dict[str, Any]) -> Cell:
 
 
 def text_column(key: str) -> Column:
-    """Column of something that a row of the document says in words."""
+    """Column of a text in a row of the document."""
     return Column(key, "", ALWAYS, lambda row: Cell(row[key]))
 
 
@@ -109,7 +109,8 @@ def print_table(document: dict[str, Any], console: "Console", *, markdown: bool 
     console.print(table)
     if left_out:
         headings = ", ".join(column.heading for column in left_out)
-        console.print(f"left out for want of width: {headings}; --markdown prints all", style="dim")
+        note = f"columns that do not fit here: {headings}; --markdown prints all"
+        console.print(note, style="dim")
 
 
 def evaluation_table(

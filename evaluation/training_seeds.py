@@ -1,4 +1,4 @@
-"""Which policies are training seeds of one recipe: what they record of their making tells."""
+"""Which policies are training seeds of one recipe, by the provenance that they record."""
 
 import json
 from collections import Counter
@@ -38,7 +38,7 @@ def group_names(entrants: Iterable[Entrant]) -> dict[str, str]:
 
 
 def _training(entrant: Entrant) -> Hashable:
-    """What the seeds of a recipe have in common; the name of what is no seed of any."""
+    """A key that all seeds of a recipe share; the name if the entrant is no such seed."""
     if entrant.policy is None or entrant.seed is None:
         return entrant.name
     made = entrant.policy.provenance

@@ -12,14 +12,14 @@ from kinarm._parser import CommandParser
 PROG = "python -m kinarm"
 
 COMMANDS = {
-    "eval": ("kinarm.evaluation.commands.evaluate", "put policies to the trials"),
+    "eval": ("kinarm.evaluation.commands.evaluate", "evaluate policies beside the oracle"),
     "replay": ("kinarm.evaluation.commands.replay", "watch trials in a browser"),
     "train": ("kinarm.policies.train", "train a policy"),
     "study": ("kinarm.evaluation.commands.study", "train many policies from one file"),
     "compare": ("kinarm.evaluation.commands.compare", "compare learners on the same problems"),
     "reproduce": ("kinarm.evaluation.commands.reproduce", "train what the paper trained"),
     "problem": ("kinarm.evaluation.commands.problem", "list, show and check problems"),
-    "arms": ("kinarm.evaluation.commands.arms", "list arms, and show what is known of one"),
+    "arms": ("kinarm.evaluation.commands.arms", "list arms, and describe one"),
     "bench": ("kinarm.evaluation.commands.bench", "measure how fast everything is here"),
 }
 """Modules of the commands, and what they are for, by name without ``kinarm-``."""
@@ -40,7 +40,7 @@ def _explain(typed: Sequence[str]) -> None:
     parser = CommandParser(
         prog=PROG,
         description="Learn to reach with a simulated robot arm.",
-        epilog="commands:\n" + "\n".join(lines) + "\n\nkinarm-eval --help, and so on, tells more.",
+        epilog="commands:\n" + "\n".join(lines) + "\n\nCOMMAND --help says more.",
     )
     parser.add_argument(
         "command", nargs="?", choices=COMMANDS, metavar="COMMAND", help="One of those below"

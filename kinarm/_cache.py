@@ -1,4 +1,4 @@
-"""Where what can be computed anew is kept: in the user's cache folder, for other processes."""
+"""A cache of computed results in the user's cache folder, for later processes."""
 
 import hashlib
 import os
@@ -19,7 +19,7 @@ CACHE_VARIABLE = "KINARM_CACHE"
 
 
 def cache_folder() -> Path:
-    """Folder for what can be computed anew: ``$KINARM_CACHE``, or kinarm in the user's cache."""
+    """Folder of the cache: ``$KINARM_CACHE``, or ``kinarm`` in the user's cache folder."""
     chosen, users = os.environ.get(CACHE_VARIABLE), os.environ.get("XDG_CACHE_HOME")
     if chosen:
         return Path(chosen)

@@ -34,7 +34,7 @@ def run_command(prog: str, command: Callable[[], None]) -> NoReturn:
 
 
 def _prepare_streams() -> None:
-    """Let whatever is printed be printable: on closed streams, and in encodings without it."""
+    """Make printing safe: on closed streams, and for letters that an encoding lacks."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:  # closed before this process began
@@ -55,7 +55,7 @@ def _run(command: Callable[[], None]) -> int:
 
 
 def _status_of(prog: str, error: BaseException) -> int:
-    """Tell of an error in one line; what is nobody's fault but kinarm's is raised again."""
+    """Report an error in one line and return the status; raise faults of kinarm itself again."""
     if was_interrupted(error):
         _discard_output()
         said = str(error) if isinstance(error, KeyboardInterrupt) else ""
@@ -74,7 +74,7 @@ def _status_of(prog: str, error: BaseException) -> int:
 
 
 def _discard_output() -> None:
-    """Let what is still buffered for standard output go nowhere, so that exiting is quiet."""
+    """Discard the buffer of standard output, so that exiting is quiet."""
     with suppress(io.UnsupportedOperation):  # a stream of this process alone
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 

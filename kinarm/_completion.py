@@ -1,4 +1,4 @@
-"""Completion of shells: what is typed after Tab is printed as a script by shtab."""
+"""Completion of shells: shtab prints the script of a shell."""
 
 import argparse
 import re

@@ -99,7 +99,7 @@ def take_base(entries: dict[str, Any], where: str, bases: Collection[str], defau
 
 
 def from_plain(kind: type[T], entries: object, where: str, path: str = "") -> T:
-    """Build a dataclass of plain values by the names of its fields, or say what is wrong.
+    """Build a dataclass from plain values by the names of its fields, or say what is wrong.
 
     Raises
     ------
@@ -242,7 +242,7 @@ def field_docs(kind: type) -> dict[str, str]:
 
 
 def summary_of(kind: type, name: str) -> str:
-    """First sentence of what is said about a field, without its full stop."""
+    """First sentence of a field's description, without its full stop."""
     return re.split(r"\.(?:\s|$)", field_docs(kind).get(name, name))[0]
 
 

@@ -132,7 +132,7 @@ def end() -> None:
 
 
 def was_interrupted(error: BaseException) -> bool:
-    """Whether an error comes of a request to end."""
+    """Whether a request to end caused an error."""
     return _requested or isinstance(error, KeyboardInterrupt)
 
 

@@ -1,4 +1,4 @@
-"""Options of command lines from the fields of dataclasses, and dataclasses from what is typed."""
+"""Options of command lines from the fields of dataclasses, and dataclasses from typed options."""
 
 import argparse
 import math

@@ -1,4 +1,4 @@
-"""One line on standard error that tells how far something is and how long the rest takes."""
+"""One line on standard error that shows progress and the remaining time."""
 
 import math
 import time
@@ -24,7 +24,7 @@ LINE_SECONDS = 30.0
 
 
 class ProgressLine:
-    """Shows how far something is: a bar on a terminal, else a line now and then.
+    """Shows progress: a bar on a terminal, and a line now and then elsewhere.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class ProgressLine:
         done : float, optional
             How much is done; as before if it is left out.
         words : sequence of str
-            What is said of it; the first ones are left out for want of width.
+            Texts beside the bar; the first ones are left out if the line is too narrow.
         count : str
             How much that is; in numbers of what is done and of all if it is left out.
         """

@@ -34,7 +34,7 @@ def build_model(description: Description) -> pin.Model:
 
 
 def _kinematics(description: Description, shapes: Collection[str]) -> str:
-    """What Pinocchio is told: links with some of their shapes, and joints."""
+    """Pinocchio's input: links with some of their shapes, and joints."""
     robot = ElementTree.fromstring(description.text)
     robot.attrib = {"name": "robot", "version": "1.2"}
     for part in robot.findall("material"):
@@ -48,7 +48,7 @@ def _kinematics(description: Description, shapes: Collection[str]) -> str:
 def limit_velocities(
     model: pin.Model, given: tuple[float, ...] | None, description: Description
 ) -> None:
-    """Set the velocity limits that are given, or check those of the URDF.
+    """Set the given velocity limits, or check those of the URDF.
 
     Raises
     ------

@@ -129,7 +129,7 @@ class ArmSpecification:
 
 @dataclass(frozen=True, kw_only=True)
 class ArmFile:
-    """An arm file: which arm, and where what is known of it comes from.
+    """An arm file: an arm, and the origin of its data.
 
     A TOML file with a table ``arm``, the fields of `ArmSpecification`, beside what people want to
     know.

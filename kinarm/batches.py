@@ -78,7 +78,7 @@ class IdleBatch:
     def taken(
         self, world: World, control: Control, starts: Array, goals: Array, shift: Array | None
     ) -> Batch:
-        """The batch, refilled, or else one of its own; nobody else gets it until `keep`."""
+        """Take the batch and refill it, or make a new one; nobody else gets it until `keep`."""
         try:
             batch = self._kept.pop()
         except IndexError:

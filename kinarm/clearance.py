@@ -39,9 +39,9 @@ class Clearance(NamedTuple):
 class Closeness:
     """Measures distances between the bodies of a contact model.
 
-    Capsules, spheres, boxes, convex hulls and the ground are compiled, to within 1e-10 m. Coal is
-    asked about cylinders that may be closest, and where shapes overlap: capsules and spheres deeper
-    than their radii, others at all.
+    Compiled code measures capsules, spheres, boxes, convex hulls and the ground, to within 1e-10 m.
+    Coal measures cylinders that may be closest, and shapes that overlap: capsules and spheres if
+    they overlap deeper than their radii, others in any case.
 
     Parameters
     ----------

@@ -1,9 +1,8 @@
 """Replay of failed scenarios: episodes of a training that begin where earlier ones failed.
 
 A policy that reaches most goals meets few scenarios that it can still learn from. A training may
-therefore draw a share of its scenarios from those of the last episodes that failed. What it learns
-on is then no longer what it is judged by: failed scenarios are met more often than they occur. An
-evaluation never replays any.
+therefore draw a share of its scenarios from those of the last failed episodes. Its scenarios then
+have another distribution than those of an evaluation, which never replays any.
 """
 
 from collections.abc import Callable
@@ -33,8 +32,8 @@ class Replay:
     share : float
         Probability that an episode replays a failed scenario, once there is one; 0 replays none.
     size : int
-        Failures that are kept: the last ones. A scenario that is failed again is kept once more,
-        so what is failed often is replayed often, and what is mastered is forgotten.
+        Number of the last failures that are kept. A scenario that fails again is kept once more.
+        So scenarios that fail often are replayed often, and mastered ones are displaced.
 
     Raises
     ------

@@ -194,7 +194,7 @@ def _approach(arm: Arm) -> NDArray[np.float64]:
 
 
 def _moved(arm: Arm, axes: NDArray[np.float64]) -> int:
-    """How many joints are moved: those of the actions, or those that matter for a pose."""
+    """Number of joints that move: those of the actions, or those that matter for a pose."""
     if len(axes) == 0:
         return arm.n_actuated
     chain = arm.chain

@@ -50,7 +50,7 @@ def mesh_content(path: Path) -> bytes:
 
 
 def _check_collada(content: bytes) -> None:
-    """Refuse a Collada file with words where numbers are to be: Assimp looks for them for ever."""
+    """Refuse a Collada file with words in the place of numbers: Assimp would search for ever."""
     for element in parse_xml(content).iter():
         tag = element.tag.rpartition("}")[2]
         pattern = INDICES if tag in INDEX_TAGS else NUMBERS if tag in NUMBER_TAGS else None

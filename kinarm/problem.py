@@ -1,4 +1,4 @@
-"""The problem: an arm, a scene, a task and how it is stepped, as one value.
+"""The problem: an arm, a scene, a task and a stepping, as one value.
 
 Everything that simulates, trains, bounds, evaluates, records or stores takes a problem and names
 it.
@@ -63,7 +63,7 @@ class Stepping:
 
 @dataclass(frozen=True, kw_only=True)
 class ReachProblem:
-    """What is to be reached, with which arm, among what, and under which rules.
+    """A reaching problem: an arm, a scene, a task and the rules of a step.
 
     Parameters
     ----------
@@ -314,12 +314,12 @@ PARTS: dict[str, Callable[[Any], Any]] = {"arm": _specification, "scene": _scene
 
 
 def _taken(given: dict[str, Any], kind: type) -> dict[str, Any]:
-    """Fields of a dataclass among what is given, which loses them."""
+    """Take the fields of a dataclass out of the given values."""
     return {name: given.pop(name) for name in init_fields(kind) if name in given}
 
 
 def _check_names(what: str, given: Mapping[str, Any], *kinds: type) -> None:
-    """Refuse names that none of some dataclasses has."""
+    """Refuse names that are fields of none of the dataclasses."""
     available = [item.name for kind in kinds for item in fields(kind)]
     for name in given:
         if name not in available:

@@ -51,7 +51,7 @@ def find_problem(name: str | Path) -> ReachProblem:
 
 
 def find_scene(name: str | Path) -> Scene:
-    """Find a scene: by its name, that of a problem that has it, or in a file of either.
+    """Find a scene by its name, by the name of a problem, or in a file of either.
 
     Raises
     ------
@@ -140,7 +140,7 @@ def _beside(path: Path, name: str) -> str | Path:
 
 
 def _merged(below: Any, above: Any) -> Any:
-    """Tables merged key by key; everything else from above."""
+    """Merge tables key by key; other values come from ``above``."""
     if not (isinstance(below, Mapping) and isinstance(above, Mapping)):
         return above
     return {**below, **{key: _merged(below.get(key), entry) for key, entry in above.items()}}

@@ -88,7 +88,7 @@ class ProblemOptions:
         return problem.replace(arm=self._arm(problem), **changed)
 
     def _arm(self, problem: "ReachProblem") -> "Arm | None":
-        """The arm that the options make of that of a problem, if they say anything of it."""
+        """The arm that the options name or change; None if they do neither."""
         from kinarm.arm import Arm  # loads Pinocchio: --help does without
 
         given = {"tool_frame": self.tool_frame, "package_dirs": self.package_dirs or None}

@@ -230,7 +230,7 @@ class Scene:
         raise UnknownNameError("goal region", name, (region.name for region in self.goal_regions))
 
     def obstacle_around(self, region: GoalRegion) -> Obstacle | None:
-        """The first obstacle that a goal region lies inside of, all of it; None if there is none.
+        """The first obstacle that wholly contains a goal region; None if there is none.
 
         What lies on an obstacle's face is not inside.
         """

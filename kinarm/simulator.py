@@ -278,7 +278,7 @@ class Simulator:
         record: bool,
         shift: NDArray[np.float64] | None = None,
     ) -> Episodes:
-        """Allocate and start episodes that are to be stepped."""
+        """Allocate and start episodes for stepping."""
         at_rest = table_control(np.zeros((len(starts), 1, self.n_actions)))
         batch = Batch.bound(self.world, at_rest, starts, goals, record=record, shift=shift)
         self._last = SteppedBatch(batch.episodes, at_rest.actions[:, 0], batch.session)
@@ -307,7 +307,7 @@ class Simulator:
         episodes.status[paused] = RUNNING
 
     def _stepped(self, episodes: Episodes) -> SteppedBatch:
-        """What it takes to step episodes, bound anew only for others than before."""
+        """The session and table that step episodes, kept until other episodes come."""
         if self._last is None or self._last.episodes is not episodes:
             table = np.zeros((len(episodes.status), 1, self.n_actions))
             session = self.world.session(table_control(table), episodes)

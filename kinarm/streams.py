@@ -1,4 +1,4 @@
-"""Random generators by purpose: no two purposes share numbers, whatever their seeds.
+"""Random generators by purpose: no two purposes share numbers, for any seeds.
 
 A generator's key is the hash of the purpose's name, followed by numbers of its own. The trials of
 an evaluation (``kinarm.evaluation.trials.trial_generator``) are older than the names: their keys

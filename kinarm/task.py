@@ -1,4 +1,4 @@
-"""Reaching tasks: which goals, how close, how long, from where, and what is rewarded."""
+"""Reaching tasks: goals, tolerance, horizon, starts and reward."""
 
 import math
 from dataclasses import dataclass, field, fields
@@ -23,7 +23,7 @@ class RewardWeights:
     Parameters
     ----------
     progress : float
-        Per metre by which the tool came closer to the goal in a step [1/m].
+        Reward per metre by which the tool comes closer to the goal in a step [1/m].
     closer : float
         Added in a step that brings the tool closer, subtracted in one that takes it farther.
     step : float

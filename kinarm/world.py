@@ -87,7 +87,7 @@ class World:
         return f"World({self.problem!r})"
 
     def with_tolerance(self, tolerance: float) -> World:
-        """The same world with another tolerance [m], in which nothing is built anew."""
+        """The same world with another tolerance [m]; it shares all that was built."""
         other = copy(self)
         other.problem = self.problem.replace(tolerance=tolerance)
         other.rules = self.rules._replace(tolerance=float(tolerance))
@@ -323,33 +323,33 @@ class World:
     ) -> InverseSolutions:
         """Find all configurations within the limits that bring the tool to positions or poses.
 
-        Seeds all over the joints' ranges are moved by damped Newton steps, to an error of 1e-10
-        of the arm's reach and 1e-10 rad. Solutions are *isolated* if no more joints are moved than
-        what is wanted has coordinates: 3 of a position, 5 with a direction, 6 of a pose. Then each
-        is given once. Else, and at singular configurations, there is a continuum of solutions, over
-        which those given are spread. The result for a target depends on nothing else.
+        Damped Newton steps move seeds all over the joints' ranges, to an error of 1e-10
+        of the arm's reach and 1e-10 rad. Solutions are *isolated* if no more joints move than the
+        target has coordinates: 3 of a position, 5 with a direction, 6 of a pose. Each isolated
+        solution is returned once. Else, and at singular configurations, there is a continuum, and
+        the returned solutions are spread over it. The result for a target depends on nothing else.
 
         Parameters
         ----------
         targets : array_like, shape (3,), (n, 3), (4, 4) or (n, 4, 4)
             Positions of the tool point [m], or poses of the tool as `poses` gives them.
         directions : array_like, shape (3,) or (n, 3), optional
-            Where the tool's axis is to point at these positions.
+            Directions of the tool's axis at these positions.
         near : array_like, shape (n_joints,), optional
-            Solutions nearest to it come first, and of those that differ by whole turns the nearest
-            is meant. Joints that are not moved rest there. Home by default [rad or m].
+            Solutions nearest to it come first. Of solutions that differ by whole turns, the nearest
+            one is returned. Joints that do not move rest there. Home by default [rad or m].
         free : bool
-            Keep only what touches nothing.
+            Keep only solutions without contact.
         tool_axis : array_like, shape (3,), optional
             The tool's axis, in the tool frame; along the last joint's axis and away from the joint
             before, by default.
         joints : int, optional
-            How many joints are moved, counted from the base. By default those that actions move,
-            if positions are wanted, else all that matter.
+            How many joints move, counted from the base. By default those that actions move
+            for positions, and all that matter for poses.
         turns : bool
             Give solutions that differ by whole turns one by one.
         most : int
-            Solutions of a target that are looked for, contact and whole turns apart.
+            Largest number of solutions of a target, before contact and whole turns count.
         separation : float, optional
             Least difference of two solutions in some joint; 0.001 if they are isolated, else 0.2
             by default [rad or m].

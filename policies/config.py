@@ -28,7 +28,7 @@ RECIPE_REACH = 1.264
 
 
 def relative_reach(problem: ReachProblem) -> float:
-    """Reach of a problem's arm over that of the arm ``paper``, to two digits."""
+    """Reach of a problem's arm divided by the reach of the arm ``paper``, to two digits."""
     return round(problem.load_arm().reach / RECIPE_REACH, 2)
 
 
@@ -99,7 +99,7 @@ class TrainingConfig:
 
     @property
     def training_problem(self) -> ReachProblem:
-        """The problem with the reward of these settings, which is what is trained on."""
+        """The problem with the reward of these settings, on which the training runs."""
         return self.problem.replace(reward=self.reward)
 
     @property

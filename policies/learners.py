@@ -54,7 +54,7 @@ StateT = TypeVar("StateT", bound=TrainingState)
 
 
 class Training(Protocol[StateT]):
-    """A training under way: what is built once and serves every iteration."""
+    """A running training: built once, it serves every iteration."""
 
     def initial_state(self) -> StateT:
         """State before the first iteration."""

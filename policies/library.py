@@ -31,7 +31,7 @@ def policy_names() -> tuple[str, ...]:
 
 
 def is_shipped(path: Path) -> bool:
-    """Whether a file is that of a shipped policy."""
+    """Whether a file holds a shipped policy."""
     with resources.as_file(resources.files("kinarm.data") / "policies") as folder:
         return absolute(path).parent == absolute(folder)
 

@@ -1,9 +1,10 @@
-"""Reflection about the x-z plane: what it does to observations and actions.
+"""Reflection about the x-z plane, and its effect on observations and actions.
 
 The reflection y -> -y maps the right bench to the left one and an arm that is symmetric about its
 x-z plane to itself, with joints that turn about x or z reversed. In kinarm's observations and
-actions it only changes signs. A policy that sees goals on the left in the mirror, and whose actions
-are then reflected, does on one bench exactly what it does on the other; see `kinarm.Networks`.
+actions it only changes signs. A policy with a mirror sees goals on the left reflected, and its
+actions are reflected in turn. It does on one bench exactly what it does on the other; see
+`kinarm.Networks`.
 """
 
 import math

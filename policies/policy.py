@@ -219,17 +219,17 @@ class Policy:
             that its ``save`` wrote. Loading a file runs code in it: open only files that you
             trust.
         problem : ReachProblem, str or Path, optional
-            The problem that it is for; by default that of the model's environment.
+            The problem that the policy is for; by default that of the model's environment.
         vec_normalize : VecNormalize, str or Path, optional
-            What normalises its observations, or the file of it; by default what the model's
-            environment is wrapped in.
+            The statistics that normalise its observations, or their file; by default those of the
+            model's environment.
 
         Raises
         ------
         InvalidInputError
             If it cannot be converted, with the reason: it is recurrent, computes features, has
             other activation functions, or other observations or actions than the arm; or if
-            nothing tells the problem.
+            the problem is unknown.
         PolicyFileError
             If a file cannot be read, or is something else.
         MissingExtraError

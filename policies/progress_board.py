@@ -1,4 +1,4 @@
-"""Where trainings in several processes write how far they are, and learn that they are to stop."""
+"""A board on which trainings in several processes write progress, and find the request to stop."""
 
 from dataclasses import dataclass
 from functools import cached_property

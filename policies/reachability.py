@@ -1,4 +1,4 @@
-"""Which goals an arm can reach at all, found in a second: what is looked at before a training.
+"""Check before a training, within a second, which goals an arm can reach at all.
 
 The oracle proves what no policy can reach, and finds motions. Here configurations at a goal are
 looked for, without contact; that none is found proves nothing.

@@ -1,4 +1,4 @@
-"""Several training seeds at once, each in a process of its own."""
+"""Several training seeds at once, each in its own process."""
 
 import re
 import tempfile
@@ -182,7 +182,7 @@ class SeedsRequest:
         return tasks
 
     def _waiting(self, tasks: list[SeedTask]) -> list[SeedTask]:
-        """The trainings that are not finished, if none of their files is in the way."""
+        """The unfinished trainings; refuses files that are in the way."""
         if self.training.resume:
             return self._resumed(tasks)
         for task in tasks:
@@ -191,7 +191,7 @@ class SeedsRequest:
         return tasks
 
     def _resumed(self, tasks: list[SeedTask]) -> list[SeedTask]:
-        """The trainings that are not finished, if the files are those of these settings."""
+        """The unfinished trainings; refuses files of other settings."""
         if not any(checkpoint_path(task.out).exists() or task.out.exists() for task in tasks):
             raise PolicyFileError(
                 f"nothing to resume: there is no {str(checkpoint_path(tasks[0].out))!r}"

@@ -37,11 +37,11 @@ examples:
   kinarm-train {name} --recipe tuned --seeds 5 --out right
       five policies, with the seeds 0 to 4, in the folder right
   kinarm-train {name} --recipe tuned --seeds 5 --out right --resume
-      go on after an interruption, or leave what is finished
+      go on after an interruption; finished seeds stay as they are
   kinarm-train {name} --recipe tuned --problem my.toml --out my.npz
       a problem of your own
   kinarm-train {name} --problem left --iterations 400 --out left.npz
-      the settings of the paper, but for their number of iterations
+      the settings of the paper, with fewer iterations
 """
 
 SETTINGS = "settings of the learner (defaults of the recipe paper)"
@@ -87,7 +87,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _train(options: argparse.Namespace) -> None:
-    """From options to policy files, and lines that say what they came to."""
+    """Train as the options say, write the policy files, and print how good they are."""
     given = given_options(options, find_learner(options.learner).config)
     settings = {name: value for name, value in given.items() if name not in CIRCUMSTANCES}
     request = TrainRequest(**given_options(options, TrainRequest), settings=settings)
@@ -101,7 +101,7 @@ def _train(options: argparse.Namespace) -> None:
 
 
 def _train_one(request: TrainRequest) -> None:
-    """Train a policy, and say what it came to and what to type next."""
+    """Train a policy, and say how good it is and what to type next."""
     curve = request.run().curve
     last = curve[-1]
     sys.stdout.write(
@@ -114,7 +114,7 @@ def _train_one(request: TrainRequest) -> None:
 
 
 def _train_seeds(request: SeedsRequest) -> None:
-    """Train several seeds, and say what they came to and what to type next."""
+    """Train several seeds, and say how good they are and what to type next."""
     for seed, out, last in request.run():
         said = "finished earlier"
         if last is not None:

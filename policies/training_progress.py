@@ -15,7 +15,7 @@ STARTS, COMPILES = "starting", "compiling, once"
 
 
 class Watcher(Protocol):
-    """Is told how far a training is."""
+    """Watches the progress of a training."""
 
     def begin(self, compiling: bool) -> None:
         """It begins; kernels may be compiled first."""

@@ -33,7 +33,7 @@ class TrainRequest(ProblemOptions):
     settings : mapping
         Settings of the learner that replace those of the recipe.
     out : Path
-        File of the policy, beside which learning curve and checkpoint lie; with --seeds, folder of
+        File of the policy; learning curve and checkpoint lie beside it; with --seeds, folder of
         the policies.
     resume : bool
         Go on from the checkpoint beside --out; with --seeds, with each seed that is not finished.
@@ -91,7 +91,7 @@ class TrainRequest(ProblemOptions):
                 return train_to_file(config, state, self.out, progress, **options)
 
     def config(self) -> "TrainingConfig":
-        """Settings of the training: those of the recipe, with what the fields replace.
+        """Settings of the training: those of the recipe, with the replacements of the fields.
 
         Raises
         ------

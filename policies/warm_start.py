@@ -14,7 +14,7 @@ SEEN = 10_000
 
 
 def starting_policy(name_or_file: str, widths: Sequence[int]) -> Policy:
-    """Load a policy with which a training can begin, whatever arm and problem it was made for.
+    """Load a policy with which a training can begin, of any arm and problem.
 
     Parameters
     ----------

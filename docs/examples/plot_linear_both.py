@@ -52,8 +52,8 @@ axes.spines[["top", "right"]].set_visible(False)
 # %%
 # What the oracle does
 # --------------------
-# The oracle solves 1,000 trials. Every step of its motions is an example: an observation, and the
-# action that it answers with.
+# The oracle solves 1,000 trials. Every step of its motions is an example: an observation and an
+# action.
 
 solutions = list(Oracle("both").solve_batch(starts[:1_000], goals[:1_000]))
 actions = np.concatenate([each.actions for each in solutions])
@@ -64,9 +64,9 @@ left = goal_of_step[:, 1] > 0
 print(f"{len(actions)} steps, {np.mean(left):.0%} of them to the left bench")
 
 # %%
-# The linear map nearest to these examples, by least squares, is found once for each bench and once
-# for both; half of the trials are kept to judge it. It is judged by the direction that it gives to
-# an axis where the oracle turns this axis at half of its speed or more.
+# Least squares find the linear map nearest to these examples, once for each bench and once
+# for both. The other half of the trials judges it: if the oracle turns an axis at half of its speed
+# or more, does the map turn this axis in the same direction?
 
 
 def with_bias(observed):
@@ -99,9 +99,8 @@ rows = {
 }
 
 # %%
-# A symmetric policy answers a goal to the left as the mirror image of one to the right: the signs
-# of an observation and of an action under the reflection y → -y are known. One map then serves
-# both benches.
+# A symmetric policy treats a goal on the left as the mirror image of one on the right. The
+# reflection y → -y changes known signs of observation and action. One map then serves both benches.
 
 mirror = find_mirror(simulator.world)
 seen = mirror.from_the_right(observations)
@@ -124,11 +123,11 @@ axes.legend(frameon=False, ncols=2, fontsize=8, loc="upper center")
 axes.spines[["top", "right"]].set_visible(False)
 
 # %%
-# The line is what a coin would reach. The base axis suffers least: it turns towards the goal, and a
-# linear map follows a bearing on either side. Axes 2 to 4 turn the wrong way more often than not
-# with the map of the other bench. In mirror images they turn alike; their weights of all that the
-# reflection turns round, such as lateral positions, would have to change sign with the bench. One
-# linear map cannot do that. It keeps what the maps of both benches share, and loses the rest. A
-# reflection of what a policy sees gives it back, without a single weight more.
+# The line is chance. The base axis suffers least: it turns towards the goal, and a
+# linear map follows a bearing on either side. With the map of the other bench, axes 2 to 4 turn the
+# wrong way more often than not. These axes turn alike in mirror images. So their weights for all
+# entries that the reflection changes, such as lateral positions, would have to change sign with the
+# bench. One linear map cannot do that. It keeps what the maps of both benches share, and loses the
+# rest. A reflection of the observation restores it, without a single additional weight.
 
 # sphinx_gallery_thumbnail_number = 2

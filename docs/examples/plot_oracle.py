@@ -29,8 +29,8 @@ print(f"the proof is complete in {100 * bounds.proof_complete.mean():.1f} %")
 # %%
 # Found against proven
 # --------------------
-# A point on the diagonal is a motion than which none is faster. Below it nothing can lie.
-# The policy is a trained linear one; only trials that it solves are shown.
+# A point on the diagonal is a fastest motion. No point can lie below it.
+# The policy is a trained linear one. The figure shows only trials that it solves.
 
 policy = evaluate("ars-tuned-both", trials=400, seed=3, oracle=True)
 oracle = evaluate("oracle", "both", trials=400, seed=3, oracle=True)
@@ -54,8 +54,8 @@ axes.spines[["top", "right"]].set_visible(False)
 # %%
 # The step ratio
 # --------------
-# Steps taken over steps proven necessary, of the trials that were solved: the share of all trials
-# that were solved with a ratio of at most so much.
+# The ratio divides the steps of a solved trial by the steps proven necessary. The curve shows the
+# share of all trials that were solved with at most that ratio.
 
 figure, axes = plt.subplots(figsize=(6.4, 3.6), layout="constrained")
 for ratio, colour, name in (

@@ -1,4 +1,4 @@
-"""``kinarm-arms``: what arms there are, and what is known of one."""
+"""``kinarm-arms``: the arms that kinarm knows, and a description of one."""
 
 import sys
 from collections.abc import Sequence
@@ -58,7 +58,7 @@ def _row(name: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class ShowRequest:
-    """Say what is known of an arm, and write a page on which its joints can be moved.
+    """Describe an arm, and write a page on which you move its joints.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     typed = sys.argv[1:] if arguments is None else arguments
     run_commands(
         "kinarm-arms",
-        "List arms, and show what is known of one.",
+        "List arms, and describe one.",
         COMMANDS,
         typed or ["list"],
         epilog=EPILOG,

@@ -101,7 +101,7 @@ class BenchmarkRequest:
         return document
 
     def _measure(self) -> dict[str, Any]:
-        """Measure what is asked for."""
+        """Measure what the options name."""
         from kinarm.evaluation.measurements import benchmark
 
         return benchmark.measure(

@@ -45,7 +45,7 @@ class ComparisonRequest(RunningOptions):
     seeds : int
         Trainings of each learner on each problem.
     steps : int
-        Environment steps after which a training is broken off.
+        Environment steps after which a training ends.
     trials : int
         Trials that policies face.
     settings : Path
@@ -53,7 +53,7 @@ class ComparisonRequest(RunningOptions):
     out : Path
         Output folder.
     train : bool
-        Train what is missing; else write what the finished trainings came to.
+        Train what is missing; else write the results of the finished trainings.
 
     Raises
     ------
@@ -119,7 +119,7 @@ class ComparisonRequest(RunningOptions):
         return planned_runs(chosen, problems, self.seeds, self.steps, Protocol(trials=self.trials))
 
     def run(self, executor: "Executor | None" = None, command: str | None = None) -> "Comparison":
-        """Train what is missing, and write what it came to.
+        """Run the missing trainings, and write the results.
 
         Parameters
         ----------
@@ -166,7 +166,7 @@ class ComparisonRequest(RunningOptions):
     def _train(
         self, missing: "list[PlannedRun]", folder: Path, executor: "Executor | None"
     ) -> None:
-        """Carry out what is missing, and tell of every training that is finished."""
+        """Run the missing trainings, and report each that is finished."""
         from kinarm.evaluation.comparison.runs import save_run
         from kinarm.evaluation.comparison.training import carry_out
         from kinarm.workers import LocalExecutor

@@ -1,4 +1,4 @@
-"""``kinarm-eval``: put policies to the trials and report how they did."""
+"""``kinarm-eval``: evaluate policies on random reaching trials, beside an oracle."""
 
 import json
 from collections.abc import Sequence
@@ -26,8 +26,8 @@ examples:
 """
 
 HELD_NOTE = (
-    "mm columns, held and closest: of trials that success does not end; contact at any time is a "
-    "miss; the oracle aims at 5 mm there"
+    "mm columns, held and closest are from trials that success does not end; contact "
+    "counts as a miss; the oracle aims at 5 mm there"
 )
 
 
@@ -38,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _report(request: EvaluationRequest, command: str) -> None:
-    """Run a request, and print the table and what it stands on, or JSON."""
+    """Run a request, and print the table with its notes, or JSON."""
     from kinarm.evaluation.table import print_table
 
     with working("evaluating") as say:
@@ -76,7 +76,7 @@ def _footnote(document: dict[str, Any]) -> str:
             f"{name} {100 * each['proof_complete_share']:.1f} %" for name, each in bounds.items()
         )
         lines.append(
-            "step ratio: steps over the number proven necessary, of trials that succeeded; "
+            "step ratio: steps divided by the number proven necessary, in trials that succeeded; "
             f"proofs complete: {', '.join(shares)}"
         )
         bounded = min(each["bounded"] for each in bounds.values())

@@ -55,7 +55,7 @@ class ShowRequest(ProblemOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class CheckRequest(ShowRequest):
-    """Find out what can be reached, how many starts are free, what touches, and what is symmetric.
+    """Check which goals can be reached, how many starts are free, what touches, and the symmetry.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class CheckRequest(ShowRequest):
     picture : Path
         Picture of arm and scene (.png).
     json : Path
-        All that was found, as JSON.
+        All findings, as JSON.
     overwrite : bool
         Replace earlier files.
 
@@ -93,7 +93,7 @@ class CheckRequest(ShowRequest):
         whole_number("seed", self.seed, 0)
 
     def run(self) -> "ProblemCheck":
-        """Check the problem, and write what is asked for.
+        """Check the problem, and write the outputs.
 
         Raises
         ------

@@ -46,7 +46,7 @@ class ReproductionRequest(RunningOptions):
     quick : bool
         Make a smoke run: every step with trainings of a few iterations, and no verdicts.
     ppo : bool
-        Train with PPO, too, and judge the claims that compare it with ARS.
+        Train with PPO as well, and judge the claims that compare it with ARS.
 
     Raises
     ------
@@ -79,7 +79,7 @@ class ReproductionRequest(RunningOptions):
     def run(
         self, executor: "Executor | None" = None, command: str | None = None
     ) -> "tuple[Claim, ...]":
-        """Train what is missing, and write what it came to.
+        """Run the missing trainings, and write the results.
 
         Parameters
         ----------
@@ -158,7 +158,7 @@ def _print_verdicts(claims: "Sequence[Claim]") -> None:
 
 
 def _claim_folder(folder: Path, study: "Study") -> None:
-    """Mark the folder as that of a study; refuse one that holds another."""
+    """Mark the folder with its study; refuse a folder of another study."""
     from kinarm._archive import load_json, reading
 
     marker = folder / "study.json"
@@ -177,7 +177,7 @@ def _claim_folder(folder: Path, study: "Study") -> None:
 def _train(
     results: "Results", store: "RunStore", jobs: int, executor: "Executor | None"
 ) -> "Results":
-    """Carry out what is missing, the longest first, and read all runs anew."""
+    """Run the missing trainings, the longest first, and read all runs anew."""
     from kinarm.evaluation.reproduction.results import Results
     from kinarm.evaluation.reproduction.training import carry_out
     from kinarm.evaluation.running.progress import TaskProgress

@@ -49,7 +49,7 @@ examples:
 
 @dataclass(frozen=True, kw_only=True)
 class StudyRequest(RunningOptions):
-    """Carry out the trainings of a study, and write what they came to.
+    """Run the trainings of a study, and write their results.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class StudyRequest(RunningOptions):
     threads : int
         Threads of a training.
     train : bool
-        Train what is missing; else write what the finished trainings came to.
+        Train what is missing; else write the results of the finished trainings.
 
     Raises
     ------
@@ -91,7 +91,7 @@ class StudyRequest(RunningOptions):
         return self.out or Path(self.study.stem)
 
     def run(self, executor: "Executor | None" = None, command: str | None = None) -> "Study":
-        """Train what is missing, and write what it came to.
+        """Run the missing trainings, and write the results.
 
         Parameters
         ----------
@@ -127,7 +127,7 @@ class StudyRequest(RunningOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class StatusRequest:
-    """Tell how far a study is.
+    """Say how far a study is.
 
     Parameters
     ----------

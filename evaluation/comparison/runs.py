@@ -89,7 +89,7 @@ class PlannedRun:
     seed : int
         Of the training.
     steps : int or None
-        Environment steps after which it is broken off.
+        Environment steps after which it ends.
     protocol : Protocol
         How it is judged.
     """

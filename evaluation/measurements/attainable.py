@@ -1,4 +1,4 @@
-"""What the machine could do: products and sums in lanes, and nothing else."""
+"""The rate that a core attains: products and sums in lanes, and nothing else."""
 
 from kinarm.kernels.compiling import Array, kernel
 from kinarm.kernels.lanes import LANES, as_lanes

@@ -44,7 +44,7 @@ class OperationCounter:
 
     @contextmanager
     def active(self) -> Iterator[None]:
-        """Let what is compiled meanwhile count along."""
+        """Make kernels that are compiled meanwhile count their operations."""
         with ExitStack() as stack:
             for name, method in self._builder_methods().items():
                 stack.enter_context(mock.patch.object(ir.IRBuilder, name, method))

@@ -35,7 +35,7 @@ def _told_by(command: list[str], env: Mapping[str, str]) -> bytes:
 
 
 def measure_evaluation() -> dict[str, float]:
-    """Time [s] and peak memory [MB] of ``kinarm-eval --trials 200`` as a process of its own.
+    """Time [s] and peak memory [MB] of ``kinarm-eval --trials 200`` as its own process.
 
     The first time, the bounds of the trials are not known; then they are.
     """

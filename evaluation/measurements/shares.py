@@ -9,7 +9,7 @@ LIBRARIES = ("torch", "stable_baselines3", "numpy", "scipy")
 
 
 def time_shares(run: Callable[[], object], least: float = 0.03) -> dict[str, float]:
-    """Shares of time by where it is spent, largest first; what is below ``least`` is put together.
+    """Shares of time by place, largest first; those below ``least`` are summed up.
 
     The profiler does not see into Pinocchio and Coal: they count for the module that calls them.
     """

@@ -19,7 +19,7 @@ def timed(run: Callable[[], int], repetitions: int) -> Timing:
 
 
 def alternated(runs: Mapping[str, Callable[[], int]], repetitions: int) -> dict[str, Timing]:
-    """Time several things by turns, so that whatever else the machine does slows all of them.
+    """Time several things by turns, so that other work of the machine slows all of them.
 
     Each returns how many steps it took, and its first run is not counted.
     """

@@ -1,4 +1,4 @@
-"""What can be replayed: trials faced now, those of an evaluation again, or recordings of a file."""
+"""Trials to replay: new ones, those of an evaluation, or the recordings of a file."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -113,7 +113,7 @@ def find_candidates(request: ReplayRequest) -> Candidates:
 
 
 def _fresh_candidates(request: ReplayRequest, names: Sequence[str | None]) -> Candidates:
-    """Let policies face trials that are drawn now."""
+    """Run policies on trials that are drawn now."""
     entrants = [first_entrant(name, stated_problem(request, names)) for name in names]
     searched = request.trial or request.worst or request.collisions
     count = request.trials or (FAILING if request.failures else SEARCHED if searched else PLAYED)
@@ -126,7 +126,7 @@ def _fresh_candidates(request: ReplayRequest, names: Sequence[str | None]) -> Ca
 def _evaluated_candidates(
     path: Path, names: Sequence[str | None], problem: str | None
 ) -> Candidates:
-    """Let policies face the trials of an evaluation again."""
+    """Run policies on the trials of an evaluation again."""
     document = EvaluationDocument.load(path)
     chosen = []
     for name in names:
@@ -195,7 +195,7 @@ def _recorded_candidates(
 
 
 def chosen_recordings(request: ReplayRequest) -> Chosen:
-    """What a request asks for, with what is proven of it; the first run decides.
+    """The recordings that a request asks for, with their bounds; the first run decides.
 
     Raises
     ------

@@ -19,18 +19,18 @@ def record(
     bounds: OracleSolutions | None = None,
     allow_other_arm: bool = False,
 ) -> list[Recording]:
-    """Let an entrant face trials and keep what it does, state by state.
+    """Run an entrant on trials and record its motions, state by state.
 
     Parameters
     ----------
     entrant : Entrant
         The policy, baseline or oracle.
     trials : TrialSet
-        What it faces.
+        The trials that it faces.
     numbers : sequence of int, optional
         Trials to keep, in this order; all by default.
     bounds : OracleSolutions, optional
-        What the oracle knows about the trials, or the first ones, to show beside what was done.
+        The oracle's bounds of the trials, or of the first ones, which the replay shows.
     allow_other_arm : bool
         Whether a policy may face an arm that it was not trained for.
 

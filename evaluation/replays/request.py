@@ -64,7 +64,7 @@ class ReplayRequest(ProblemOptions):
     seed : int
         Seed of the trials.
     allow_other_arm : bool
-        Let policies face an arm that they were not trained for.
+        Allow an arm that a policy was not trained for.
     oracle : bool
         Show the number of steps proven necessary.
     out : Path
@@ -178,7 +178,7 @@ class ReplayRequest(ProblemOptions):
         return self._write(report)
 
     def recordings(self) -> "list[list[Recording]]":
-        """Make or read what is to be played: a list for the policy, or one for each of two.
+        """Make or read the recordings to play: one list for each policy.
 
         Raises
         ------

@@ -38,7 +38,7 @@ class Run(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class FacedRun:
-    """Trials that are faced now; what is chosen of them becomes recordings."""
+    """Trials that run now; the chosen ones become recordings."""
 
     entrant: Entrant
     trials: TrialSet

@@ -31,7 +31,7 @@ class Row(NamedTuple):
 def check_card(
     path: Path, pairs: Sequence[tuple[Entrant, ReachProblem]], *, overwrite: bool = False
 ) -> None:
-    """See that there is one policy to write a card of, and that its files can be written.
+    """Check that there is one policy for a card, and that its files can be written.
 
     Raises
     ------

@@ -113,7 +113,7 @@ def level(distance: float, tolerance: float) -> int:
 
 
 class Marker(NamedTuple):
-    """A goal on a map: its place and shape, its colour, and what is said where the pointer is."""
+    """A goal on a map: its place, shape and colour, and the text at the pointer."""
 
     path: str
     level: int

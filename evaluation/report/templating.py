@@ -1,4 +1,4 @@
-"""Templates of what is written about an evaluation."""
+"""Templates of the report, the card and other pages."""
 
 from typing import TYPE_CHECKING, Any
 

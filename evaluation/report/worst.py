@@ -98,7 +98,7 @@ def oracle_steps(results: ProblemResults, trial: int) -> str:
 
 
 def record_worst(chosen: Sequence[WorstTrial]) -> list[Recording]:
-    """Let policies face the trials again and keep what they do: one recording for each."""
+    """Run policies on the trials again: one recording for each."""
     numbers: dict[Evaluation, list[int]] = {}
     for worst in chosen:
         numbers.setdefault(worst.evaluation, []).append(worst.trial)

@@ -1,1 +1,1 @@
-"""The paper's experiments: what is trained, how runs are kept, and what they say of its claims."""
+"""The paper's experiments: trainings, stored runs, and verdicts on the claims."""

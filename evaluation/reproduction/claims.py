@@ -279,7 +279,7 @@ def _sweep_difference(
     chosen: Callable[[float, int], bool],
     distance: Callable[[TrainedRun], NDArray[Any]] = attrgetter("distance"),
 ) -> ClaimPart:
-    """Mean of the settings that are chosen, less that of all others."""
+    """Mean of the chosen settings, less the mean of all others."""
     n = sum(chosen(*setting) for setting in settings)
     terms = [
         Term(

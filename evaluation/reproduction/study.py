@@ -139,7 +139,7 @@ class Study:
 
     @property
     def warning(self) -> str:
-        """What to say of trainings by which nothing is judged; else empty."""
+        """A warning about trainings that judge no claim; else empty."""
         if self.is_judged:
             return ""
         return (

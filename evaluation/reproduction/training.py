@@ -1,4 +1,4 @@
-"""Carry out one training of a study and judge what it came to."""
+"""Run one training of a reproduction and evaluate its policy."""
 
 from functools import cache
 from typing import Any
@@ -68,7 +68,7 @@ def _face(policy: Policy, trials: TrialSet) -> Rollouts:
 
 @cache
 def _load_kernels() -> None:
-    """Load what is compiled once in a process, before any clock runs."""
+    """Load the compiled kernels, before any clock runs."""
     trials = trial_set(LITERAL.problem("left"), 1, 0)
     simulator = trials.simulator
     actions = np.zeros((1, simulator.task.horizon, simulator.n_actions))

@@ -68,7 +68,7 @@ class Guarded:
 
 
 def check_identity(expected: tuple[tuple[str, str], ...]) -> None:
-    """Refuse to go on if something here differs from what is expected.
+    """Refuse to go on if this worker differs from the command, and name the difference.
 
     Raises
     ------

@@ -64,7 +64,7 @@ class RunningOptions:
                 raise InvalidInputError(f"--{name} goes with --slurm")
 
     def refuse_without_training(self) -> None:
-        """Refuse to be told where trainings run if there are none.
+        """Refuse options of where trainings run if nothing is trained.
 
         Raises
         ------

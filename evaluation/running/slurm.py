@@ -147,7 +147,7 @@ class Bundle:
     results: list[tuple[int, Any]] = field(default_factory=list)
 
     def __call__(self) -> list[tuple[int, Any]]:
-        """Carry out what is not finished."""
+        """Run the unfinished tasks."""
         for number, task in self.tasks[len(self.results) :]:
             self.results.append((number, self.work(task)))
         return self.results

@@ -126,7 +126,7 @@ def _cell(name: str, value: float) -> str:
 
 
 def _subtitle(study: "Study") -> str:
-    """How much of the study is finished, and how it is judged, in a line."""
+    """A line about the finished share of the study, and about its trials."""
     trials = study.specification.trials
     return (
         f"{len(study)} of {len(study.runs)} trainings · {trials.count} trials each · "

@@ -183,7 +183,7 @@ class StudySpecification:
                 yield {**of_grid, **drawn}
 
     def _drawn(self) -> Iterator[dict[str, Any]]:
-        """Random combinations; the first ones stay as they are if there are to be more."""
+        """Random combinations; a larger number keeps the first ones."""
         if not self.random:
             yield {}
             return

@@ -32,7 +32,7 @@ SPECIFICATION = "study.toml"
 
 @dataclass(frozen=True)
 class StudyStore:
-    """The folder in which a study and what it came to lie.
+    """The folder of a study and its results.
 
     Every finished training is one file under the hash of its settings, ``runs/KEY.npz``, and there
     is no other state: what has no such file is still to be done. How long it took, which no two
@@ -60,7 +60,7 @@ class StudyStore:
 
     @contextmanager
     def writing(self, study: StudySpecification) -> Iterator[None]:
-        """Make the folder that of a study, and keep other processes from writing to it.
+        """Claim the folder for a study, and keep other processes from writing to it.
 
         Raises
         ------
@@ -139,7 +139,7 @@ class StudyStore:
         return found
 
     def made(self, run: PlannedRun) -> dict[str, Any]:
-        """How a training was made: times [s], versions and commit; empty if nothing tells."""
+        """How a training was made: times [s], versions and commit; empty if unknown."""
         path = self.made_path(run)
         with suppress(KinarmError), reading(repr(str(path)), "record", KinarmError):
             entries = load_json(path, "record", KinarmError)

@@ -1,4 +1,4 @@
-"""A study: its trainings, what they came to, and how to carry out the rest."""
+"""A study: its trainings, their results, and how to run the missing ones."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -71,7 +71,7 @@ class Study:
             raise InvalidInputError(f"{where}: {error}") from error
 
     def _planned(self) -> tuple[PlannedRun, ...]:
-        """The trainings: those of the specification, or those that a search came to."""
+        """The trainings of the specification, or those that a search chose."""
         if self.specification.search:
             return searched_runs(self.specification, self.store.folder)
         return planned_runs(self.specification)
@@ -138,7 +138,7 @@ class Study:
         threads: int = 1,
         executor: Executor | None = None,
     ) -> "Study":
-        """Carry out what is missing; whatever stops it, the same call goes on.
+        """Run the missing trainings; after any interruption, the same call goes on.
 
         A training that fails does not stop the others: see `failures`. The next call tries again.
 
@@ -184,14 +184,14 @@ class Study:
         return self
 
     def refresh(self) -> None:
-        """Look into the folder anew."""
+        """Read the folder again."""
         if self.specification.search:
             self.runs = self._planned()
         for name in ("finished", "bounds", "_groups"):
             self.__dict__.pop(name, None)
 
     def _tasks(self) -> Sequence[RunTask | BoundTask]:
-        """What is to be done: first the bounds, then the trainings seed by seed."""
+        """The missing tasks: first the bounds, then the trainings seed by seed."""
         known, missing = self.bounds, self.missing
         bounds = [task for task in self.bound_tasks if task.problem.digest not in known]
         starts = self._starts(missing)

@@ -76,12 +76,12 @@ class Group:
 
     @cached_property
     def figures(self) -> dict[str, float]:
-        """The figures of merit over all seeds; NaN where there is nothing to tell."""
+        """The figures of merit over all seeds; NaN for unknown ones."""
         return figures_of(Outcomes(tuple(run.outcomes for run in self.runs), self.bounds))
 
 
 def figures_of(outcomes: Outcomes) -> dict[str, float]:
-    """Figures of merit of some trainings; NaN where there is nothing to tell."""
+    """Figures of merit of some trainings; NaN for unknown ones."""
     found = {}
     for name in FIGURES:
         known = outcomes.bounds is not None or not METRICS[name].needs_bounds
@@ -154,7 +154,7 @@ def shown(value: Any) -> str:
 
 
 def run_rows(study: "Study") -> list[dict[str, Any]]:
-    """One row per finished training: who, what varies, what it came to, how long it took."""
+    """One row per finished training: learner, varied fields, figures of merit, times."""
     fields = dict.fromkeys(field for run in study.finished for field in run.choices)
     rows = []
     for run, trained in study.finished.items():

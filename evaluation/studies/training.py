@@ -1,4 +1,4 @@
-"""Carry out one training of a study, and judge what it came to."""
+"""Run one training of a study, and evaluate its policy."""
 
 import hashlib
 import time
@@ -37,7 +37,7 @@ from kinarm.semantics import SEMANTICS
 
 
 class Start(NamedTuple):
-    """Where a training goes on that a shorter one began.
+    """The end of a shorter training, from which a longer one goes on.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class RunTask:
 
 @dataclass(frozen=True)
 class BoundTask:
-    """Trials whose bounds are to be found.
+    """Trials whose bounds the task finds.
 
     Attributes
     ----------
@@ -134,9 +134,9 @@ class TaskResult(NamedTuple):
 
 
 def carry_out(task: RunTask | BoundTask, threads: int = 1) -> TaskResult:
-    """Train and judge, or find bounds; what goes wrong is told, not raised.
+    """Train and judge, or find bounds; errors are returned, not raised.
 
-    What it comes to does not depend on the number of threads, or on where a training goes on.
+    The result does not depend on the number of threads, or on where a training goes on.
     """
     try:
         if isinstance(task, BoundTask):
@@ -158,7 +158,7 @@ def find_bounds(task: BoundTask, threads: int) -> TrialBounds:
 def train(
     task: RunTask, threads: int = 1, on_point: Callable[[RunPoint], object] | None = None
 ) -> tuple[WholeRun, RunClock]:
-    """Train and judge; ``on_point`` is told of every point of the learning curve."""
+    """Train and judge; calls ``on_point`` with every point of the learning curve."""
     began = time.process_time()
     planned = task.run
     config, trials = planned.config, planned.trials

@@ -23,23 +23,24 @@ class ReachGoalEnv(ReachEnv):
         -1 for every step that does not reach the goal and 0 for the one that does, or minus the
         distance [m].
     **settings
-        As for `ReachEnv`; of the problem's own reward, ``collision`` alone has an effect.
+        As for `ReachEnv`; only ``collision`` of the problem's own reward has an effect.
 
     Notes
     -----
-    **Observation**, ``Dict``: ``observation``, what of the observation of `ReachEnv` does not
-    depend on the goal (orientations and positions of the joint frames, 42 numbers for the shipped
-    arms); ``achieved_goal``, the tool point x, y, z [m]; ``desired_goal``, the goal x, y, z [m].
+    **Observation**, ``Dict``: ``observation``, the part of the observation of `ReachEnv` that does
+    not depend on the goal (orientations and positions of the joint frames, 42 numbers for the
+    arms of six joints); ``achieved_goal``, the tool point x, y, z [m]; ``desired_goal``, the goal
+    x, y, z [m].
 
-    **Reward**: that of the reward type, and the problem's ``collision`` (-1 by default) where a
-    move was refused. ``compute_reward(achieved_goal, desired_goal, info)`` gives it for one pair of
-    goals or for many, as hindsight replay asks for; it follows from the goals, and from
-    ``info["collision"]``. ``compute_terminated`` and ``compute_truncated`` follow from the goals.
+    **Reward**: that of the reward type, and the problem's ``collision`` (-1 by default) if a
+    move was refused. ``compute_reward(achieved_goal, desired_goal, info)`` returns it for one pair
+    of goals or for many, as hindsight replay needs it. It depends on the goals and on
+    ``info["collision"]`` only; ``compute_terminated`` and ``compute_truncated`` on the goals.
 
     **End**: terminated when the tool is within the tolerance of the goal; truncated at the
-    horizon. A move that would touch something is refused and the arm stays where it is, but the
-    episode goes on: it would not follow from the goals that it is over, and giving up would be
-    worth while. ``kinarm-eval`` judges by the rules of `ReachEnv`, where contact ends.
+    horizon. A move that would touch something is refused, the arm stays where it is, and the
+    episode goes on. An end by contact would not follow from the goals, and would reward giving up.
+    ``kinarm-eval`` judges by the rules of `ReachEnv`, where contact ends an episode.
 
     **Info**: that of `ReachEnv`, without reward terms; ``collision`` and ``contact`` are about
     the last step.

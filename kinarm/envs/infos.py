@@ -1,4 +1,4 @@
-"""What an environment tells about the steps of many arms."""
+"""The infos of an environment about the steps of many arms."""
 
 from itertools import chain, repeat
 from typing import Any
@@ -30,7 +30,7 @@ class StepInfos:
         self._keys = (*entries, *(f"_{key}" for key in entries))
 
     def tables(self, result: StepResult) -> tuple[NDArray[Any], ...]:
-        """Arrays of shape (n_entries, n) for the infos of a step, which are those of its result."""
+        """Arrays of shape (n_entries, n) for the infos of a step, taken from its result."""
         return result.numbers[self._numbers], result.flags[1:], result.contact[None]
 
     def named(
@@ -44,7 +44,7 @@ class StepInfos:
 
 
 def taken_out(table: NDArray[Any], arms: NDArray[np.bool_]) -> NDArray[Any]:
-    """Move what a table holds of some arms to a table of their own; all else of it is zero."""
+    """Move the entries of some arms to a new table, which is zero elsewhere."""
     taken = np.where(arms, table, False)  # which is a zero of every type
     np.copyto(table, False, where=arms)
     return taken

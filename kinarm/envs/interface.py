@@ -88,17 +88,17 @@ class FlatInterface:
 
 
 class GoalInterface:
-    """Goals as a dictionary, and rewards that can be computed for other goals than the one pursued.
+    """Goals as a dictionary, and rewards that can be computed for any goals.
 
-    A move that would touch something is refused, at the price of the problem's reward for a
-    collision, and the episode goes on: so giving up is never worth while.
+    A move that would touch something is refused and costs the problem's reward for a collision.
+    The episode goes on, so giving up never pays.
 
     Parameters
     ----------
     simulator : Simulator
-        What is shown.
+        The simulator that the environment shows.
     dtype : dtype_like
-        Of observations and goals: float64 or float32.
+        Type of observations and goals: float64 or float32.
     reward_type : {"sparse", "dense"}
         -1 for every step that does not reach the goal and 0 for the one that does, or minus the
         distance [m].

@@ -1,4 +1,4 @@
-"""Specifications of environments that JSON can hold, whatever problem they are of."""
+"""Specifications of environments, of any problem, that JSON can hold."""
 
 import json
 from collections.abc import Mapping

@@ -226,7 +226,7 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
 
     @property
     def contact_names(self) -> tuple[tuple[str, str] | None, ...]:
-        """Names of the two bodies of a contact, by the number that the info tells."""
+        """Names of the two bodies of a contact, by its number in the info."""
         return self._contacts.names
 
 

@@ -34,7 +34,7 @@ class Pictures(tuple[Picture, ...]):
 
     @property
     def tiled(self) -> Picture:
-        """All in one picture, row by row from the upper left; what is left over is white."""
+        """All in one picture, row by row from the upper left; empty tiles are white."""
         height, width = self[0].shape[:2]
         columns = _columns(len(self))
         rows = math.ceil(len(self) / columns)

@@ -32,19 +32,19 @@ def arm_page(
     *,
     scene: Scene = BARE_GROUND,
 ) -> ArmPage:
-    """Make a page on which an arm's joints are moved with sliders, and contact shows as it happens.
+    """Make a page with a slider for each joint of an arm, which shows contact as it happens.
 
-    The page tests the same pairs of shapes for contact as the simulator, in the browser: its
-    verdicts are those of Coal, but for shapes that are less than 1e-6 m from touching.
+    The page tests the same pairs of shapes for contact as the simulator, in the browser. Its
+    verdicts are those of Coal, except for shapes that are less than 1e-6 m from touching.
 
     Parameters
     ----------
     arm : Arm, ArmSpecification, str or Path
         The arm, where it stands; or what `kinarm.Arm.load` takes, mounted as the scene says.
     path : str or Path, optional
-        Where to write the page, if at all.
+        File of the page; without it, no file is written.
     scene : Scene
-        What stands around it; the bare ground by default.
+        The scene around the arm; the bare ground by default.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def _contact_data(model: ContactModel) -> dict[str, Any]:
 
 
 def _shape_data(shape: pin.GeometryObject) -> dict[str, Any]:
-    """Points whose hull a shape is, widened by a radius; or discs about them; none of the ground.
+    """A shape as the hull of points, widened by a radius or by discs; the ground has no points.
 
     In the frame of its joint [m].
     """

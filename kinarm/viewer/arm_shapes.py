@@ -1,4 +1,4 @@
-"""How an arm looks: as an industrial one where that fits, else by its own shapes."""
+"""The look of an arm: an industrial one if its dimensions fit, else its own shapes."""
 
 import logging
 from functools import lru_cache

@@ -159,7 +159,7 @@ def draw_surroundings(window: Visualizer, scene: Scene) -> None:
 
 
 def _draw_obstacle(window: Visualizer, obstacle: Obstacle, scene: Scene) -> None:
-    """A box; where goals lie on it, with a slab like that of a bench."""
+    """A box; with a slab like a bench if goals lie on it."""
     meshes = obstacle_meshes(obstacle, scene)
     if meshes.top is not None:
         put(window["top"], GOAL_SLAB, meshes.top)
@@ -207,6 +207,6 @@ def draw_arm(window: Visualizer, arm: Arm) -> list[Visualizer]:
 def draw_trace(
     window: Visualizer, points: NDArray[np.float64], outcome: str | None, scale: float
 ) -> None:
-    """The way of the tool, shape (n, 3) [m], in the colour of the outcome; none of a point."""
+    """The path of the tool, shape (n, 3) [m], in the colour of the outcome; none for a point."""
     if len(points) > 1:
         put(window, TRACES[outcome], tube(points, scale * TRACE_RADIUS, TRACE_SIDES))

@@ -1,4 +1,4 @@
-"""What is to be seen on a live page, for pages that are opened now and later."""
+"""The scene of a live page, for pages that are opened now and later."""
 
 import struct
 import threading
@@ -50,5 +50,5 @@ class LiveScene:
 
 
 def _within(path: str, node: str) -> bool:
-    """Whether a path is that of a node or of one below it."""
+    """Whether a path leads to a node or to one below it."""
     return path == node or path.startswith(f"{node.rstrip('/')}/")

@@ -1,4 +1,4 @@
-"""A problem on a live page: an arm that moves as it is told."""
+"""A problem on a live page: an arm that moves on command."""
 
 from __future__ import annotations
 

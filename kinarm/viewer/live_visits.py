@@ -1,9 +1,9 @@
-"""Visits to a live page: three files, to be got from this machine alone, and no more than fit.
+"""Visits to a live page, which serves three files to this machine alone.
 
-A visitor may be slow, silent, rude or many: it can neither keep others waiting nor make anything
-grow. Each is served by a task of its own, takes what it gets piece by piece, and has only so long
-for that. It is read until its request ends, and never again. Of each kind of visit there are only
-so many: a new one ends the least promising.
+Visitors may be slow, silent, rude or many. They can neither delay others nor fill the memory. Each
+has its own task, which sends piece by piece, within a time limit. The task reads a visitor until
+its request ends, and never again. The number of visits of each kind is limited: a new one ends the
+least promising.
 """
 
 import asyncio
@@ -82,7 +82,7 @@ class Visit:
 
 
 class Reception:
-    """Receives visitors; all of it happens in the thread of its event loop.
+    """Receives visitors, in the thread of its event loop.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class Reception:
         return server
 
     def tell(self) -> None:
-        """Let those who watch know that there is something new."""
+        """Notify the watching visitors of a change."""
         for visit in self._visits:
             visit.news.set()
 

@@ -46,7 +46,7 @@ class Mesh:
 
     @classmethod
     def joined(cls, meshes: Sequence[Mesh]) -> Mesh:
-        """Put meshes into one; each of them has normals of its own."""
+        """Join meshes into one; each keeps its own normals."""
         vertices, normals, faces = zip(*(mesh.with_normals() for mesh in meshes), strict=True)
         offsets = np.cumsum([0, *(len(each) for each in vertices[:-1])])
         joined = [each + offset for each, offset in zip(faces, offsets, strict=True)]

@@ -28,23 +28,23 @@ def replay_page(
     Parameters
     ----------
     recordings : Recording or sequence of Recording
-        What to play, one trial after the other.
+        The recordings to play, one trial after the other.
     path : str or Path, optional
-        Where to write the page, if at all.
+        File of the page; without it, no file is written.
     ghosts : sequence of Recording
-        What another policy did in the same trials, to be shown in the same scene.
+        Recordings of another policy in the same trials, shown in the same scene.
     groups : sequence of str
-        What each recording is listed under, if there is to be a list; those of a group follow
-        each other.
+        Group of each recording, for a list of the trials; recordings of a group follow each other.
+        Without groups there is no list.
     heading : str
-        What stands above the list.
+        Heading of the list.
 
     Raises
     ------
     InvalidInputError
         If there is no recording, or they cannot share a page.
     ArmError
-        If the arm that was recorded is not there any more, or has changed.
+        If the recorded arm is missing, or has changed.
     OutputError
         If the file cannot be written.
     """

@@ -20,7 +20,7 @@ def replay_path(
     goal: ArrayLike | None = None,
     name: str = "path",
 ) -> ReplayPage:
-    """Make a page that plays an own path; it ends where a move touches something, and shows that.
+    """Make a page that plays your own path; it ends at contact, and shows it.
 
     Parameters
     ----------

@@ -162,7 +162,7 @@ class Renderer:
         return picture
 
     def _draw_view(self, surfaces: Surfaces) -> None:
-        """Find what is seen."""
+        """Find the visible surfaces."""
         project(surfaces.places, self._projection, surfaces.corners)
         np.copyto(self._nearness, self._floor_nearness)
         self._index.fill(-1)

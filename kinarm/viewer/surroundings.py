@@ -33,7 +33,7 @@ CUBE_CHAMFER = 0.08
 
 
 class ObstacleMeshes(NamedTuple):
-    """An obstacle in the world; where goals lie on it, with a slab like that of a bench."""
+    """An obstacle in the world; with a slab like a bench if goals lie on it."""
 
     body: Mesh
     top: Mesh | None

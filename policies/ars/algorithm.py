@@ -126,7 +126,7 @@ def ars_iteration(
 
 
 def policy_normalizer(config: ARSConfig, seen: Normalizer) -> Normalizer:
-    """Statistics by which the policy normalises its inputs; empty if it does not."""
+    """Statistics that normalise the inputs of the policy; empty if it does not normalise."""
     return seen if config.normalize else Normalizer.empty(len(seen.mean))
 
 

@@ -38,9 +38,8 @@ class ARSConfig(TrainingConfig):
     top_directions : int
         Perturbations b that enter the update, those with the best returns; b = N is V1 or V2.
     symmetric : bool
-        Whether the policy is to treat mirror images alike, where arm and obstacles are their own
-        mirror image; it then learns from goals on the right and from mirror images of those on
-        the left.
+        Whether the policy treats mirror images alike, if arm and obstacles are their own mirror
+        image; it then learns from goals on the right and from mirror images of those on the left.
     net_arch : tuple of int
         Widths of hidden layers with tanh; the policy is linear if there are none.
     normalize : bool
@@ -48,18 +47,18 @@ class ARSConfig(TrainingConfig):
     scale_by_deviation : bool
         Whether the step is divided by the standard deviation of the returns (ARS) or not (BRS).
     sharing : {"none", "pair", "iteration"}
-        Who faces the same starts and goals: nobody (every episode draws its own), the two signs
-        of a perturbation, or all perturbations of an iteration.
+        Which policies face the same starts and goals: none (every episode draws its own), the two
+        signs of a perturbation, or all perturbations of an iteration.
     episodes : int
         Episodes whose mean return judges a perturbed policy.
     replay_share : float
-        Probability that a scenario is one that at least half of the policies that faced it
-        failed; see `kinarm.failed_scenarios`.
+        Probability that a scenario is replayed, after at least half of the policies failed in it;
+        see `kinarm.failed_scenarios`.
     replay_size : int
         Failed scenarios that are kept.
     initial_policy : str, optional
-        Name or file of a policy that the training begins with, of the same layers; it may be for
-        another problem or arm.
+        Name or file of a policy that the training begins with; it must have the same layers, and
+        may be for another problem or arm.
     """
 
     iterations: int = 800

@@ -1,4 +1,4 @@
-"""Normal numbers by which policies are perturbed."""
+"""Normal random numbers that perturb policies."""
 
 import math
 

@@ -84,7 +84,7 @@ def _check_actions(space: Any, simulator: Simulator) -> None:
 
 
 def _check_observations(space: Any, interface: Interface, simulator: Simulator) -> None:
-    """Refuse observations that are not those of an arm, wherever its goals are."""
+    """Refuse observations that are not those of an arm."""
     own: Any = interface.observation_space
     if isinstance(space, Box) and isinstance(own, Box):
         frames, rest = divmod(int(np.prod(space.shape)), own.shape[0])

@@ -26,7 +26,7 @@ WHOLE = ""
 
 
 def find_vec_normalize(model: Path) -> Path | None:
-    """Statistics that lie where Stable-Baselines3 and rl-zoo3 write those of a model.
+    """Find a model's statistics where Stable-Baselines3 and rl-zoo3 write them.
 
     Beside ``folder/name.zip`` it is ``folder/vecnormalize.pkl``, ``folder/vec_normalize.pkl``,
     for a checkpoint ``folder/prefix_vecnormalize_1000_steps.pkl``, and in rl-zoo3's folder

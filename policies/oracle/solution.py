@@ -112,6 +112,6 @@ class OracleSolutions:
 
     @classmethod
     def concatenated(cls, parts: "list[OracleSolutions]") -> "OracleSolutions":
-        """Join what is known about several lots of trials."""
+        """Join the solutions of several sets of trials."""
         lots = [part.arrays() for part in parts]
         return cls(**{name: np.concatenate([lot[name] for lot in lots]) for name in lots[0]})

@@ -1,4 +1,4 @@
-"""The actor of a PPO training as a policy, which needs none of the packages of the training."""
+"""The actor of a PPO training as a policy that needs neither torch nor Stable-Baselines3."""
 
 import numpy as np
 

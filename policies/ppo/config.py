@@ -19,15 +19,16 @@ from kinarm.policies.config import (
 from kinarm.problem import ReachProblem
 
 SETTLED = 0.9
-"""Share of a training after which noise and tolerance are what they are to be at the end."""
+"""Share of a training after which noise and tolerance have their final values."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PPOConfig(TrainingConfig):
     """Settings of a training of 1.2 million environment steps, as in the paper.
 
-    The paper gives no other settings; names and defaults are those of Stable-Baselines3, save that
-    16 environments fill its rollouts of 2000 steps and that minibatches are larger, for speed.
+    The paper gives no other settings. Names and defaults are those of Stable-Baselines3, with two
+    exceptions for speed: 16 environments fill the rollouts of 2000 steps, and minibatches are
+    larger.
 
     Parameters
     ----------
@@ -48,7 +49,7 @@ class PPOConfig(TrainingConfig):
     learning_rate : float
         Step size of Adam.
     learning_rate_schedule : {"constant", "linear"}
-        Whether it stays or falls linearly to zero.
+        Whether the learning rate stays or falls linearly to zero.
     gamma : float
         Discount per step.
     gae_lambda : float
@@ -60,21 +61,21 @@ class PPOConfig(TrainingConfig):
     vf_coef : float
         Weight of the critic's loss.
     max_grad_norm : float
-        Gradients are shortened to this norm.
+        Largest norm of a gradient; longer ones are clipped to it.
     log_std_init : float
         Logarithm of the standard deviation of the actions at the beginning.
     final_log_std : float, optional
-        What it is at the end: it then changes linearly. It is learnt if this is not given.
+        Logarithm of the standard deviation of the actions at the end, to which it changes
+        linearly. Without it, PPO learns the standard deviation.
     training_tolerance : float, optional
-        Distance at which an episode of the training counts as a success; the task's if it is not
-        given [m].
+        Distance at which an episode of the training counts as a success [m]. It is the task's
+        tolerance if it is not given.
     initial_tolerance : float, optional
-        That distance until spread and discount are what they are to be; from then on it changes
-        geometrically [m].
+        Training tolerance until start spread and discount have reached their final values; then
+        it changes geometrically to the final tolerance [m].
     symmetric : bool
-        Whether the policy is to treat mirror images alike, where arm and obstacles are their own
-        mirror image; it then learns from goals on the right and from mirror images of
-        those on the left.
+        Whether the policy treats mirror images alike, if arm and obstacles are their own mirror
+        image; it then learns from goals on the right and from mirror images of those on the left.
     initial_start_spread : float
         Spread of the start configurations at the beginning of the training, as a share of the
         task's.
@@ -82,22 +83,23 @@ class PPOConfig(TrainingConfig):
         Discount per step at the beginning of the training; ``gamma`` if it is not given.
     initial_penalty : float
         Share of the penalty for contact that counts at the beginning of the training; it grows
-        linearly to the whole at the end.
+        linearly to the whole penalty at the end.
     widening : float
-        Share of the training in which spread and discount change linearly to what they are to be.
+        Share of the training in which spread and discount change linearly to their final values.
     replay_share : float
         Probability that an episode begins where an earlier one failed; see
         `kinarm.failed_scenarios`.
     replay_size : int
         Failed scenarios that are kept.
     replay_log_std : float, optional
-        Logarithm of the standard deviation of the actions in these episodes at least: with less
-        noise, what always fails is never seen to succeed. That of other episodes if not given.
+        Smallest logarithm of the standard deviation of the actions in replayed episodes; with
+        less noise, a policy never succeeds where it always fails. Without it, replayed episodes
+        have the noise of the others.
     initial_policy : str, optional
-        Name or file of a policy that the training begins with, of the same layers; it may be for
-        another problem or arm.
+        Name or file of a policy that the training begins with; it must have the same layers, and
+        may be for another problem or arm.
     demonstrations : int, optional
-        Trials whose motions by the oracle the actor imitates before the training.
+        Trials that the oracle solves before the training; the actor imitates its motions.
     """
 
     iterations: int = 600

@@ -43,7 +43,7 @@ def alone_in_torch() -> Iterator[None]:
 
 
 def seed_iteration(seed: int, iteration: int) -> tuple[np.random.Generator, np.random.Generator]:
-    """Give an iteration random numbers of its own, wherever the training began.
+    """Give an iteration its own random numbers, which do not depend on where the training began.
 
     The first generator is for the learner, the second one for scenarios.
     """

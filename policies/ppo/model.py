@@ -185,7 +185,7 @@ class CompiledPPO(PPO):
         return True
 
     def _fill_in_values(self, buffer: RolloutBuffer, cut_short: list[CutShort]) -> torch.Tensor:
-        """Find all values of a rollout; returns those of the observations after it.
+        """Compute all values of a rollout; returns those of the observations after it.
 
         An episode that the time limit ended would have gone on: its last reward gets the value of
         its last observation.
@@ -201,7 +201,7 @@ class CompiledPPO(PPO):
         return torch.from_numpy(after)
 
     def train(self) -> None:
-        """Update actor and critic by what is in the buffer, as PPO does."""
+        """Update actor and critic from the buffer, as PPO does."""
         self._update_learning_rate(self.policy.optimizer)
         networks, experience = self._networks, self._experience()
         networks.load(self.parameters())

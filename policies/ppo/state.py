@@ -13,7 +13,7 @@ from kinarm.policies.normalizer import Normalizer
 
 
 class EpisodeStates(NamedTuple):
-    """What running episodes depend on; everything else follows from it.
+    """The state of running episodes; everything else follows from it.
 
     Attributes
     ----------

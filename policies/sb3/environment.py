@@ -103,7 +103,7 @@ def sb3_vec_env(
 
 
 def _single_environment(problem: ProblemLike, settings: dict[str, Any]) -> "ReachEnv":
-    """The environment of which there are to be many."""
+    """The single environment that the batch multiplies."""
     from kinarm.envs import ReachEnv, ReachGoalEnv
 
     name = str(problem).rpartition(":")[2]

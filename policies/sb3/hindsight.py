@@ -15,17 +15,17 @@ Goals = NDArray[np.floating[Any]]
 
 
 class HindsightReplayBuffer(HerReplayBuffer):
-    """A ``HerReplayBuffer`` that asks anew whether an episode is over when it substitutes a goal.
+    """A ``HerReplayBuffer`` that ends an episode where it reaches a substituted goal.
 
-    The one of Stable-Baselines3 computes the reward for the substituted goal, but keeps from the
-    original one whether the episode ended. Where reaching ends it, as in `kinarm.ReachGoalEnv`, a
-    learner would look for what comes after the goal, of which it never learns anything. What of a
-    reward does not depend on the goal, such as that for a collision, is kept without
-    ``copy_info_dict``.
+    The buffer of Stable-Baselines3 computes the reward for the substituted goal, but keeps the end
+    of the episode from the original one. In `kinarm.ReachGoalEnv` reaching the goal ends an
+    episode. A learner with that buffer would bootstrap a value after the goal, where nothing
+    comes. This buffer also keeps the part of a reward that does not depend on the goal, such as
+    the penalty for a collision, without ``copy_info_dict``.
     """
 
     def _sample_goals(self, batch_indices: Indices, env_indices: Indices) -> Goals:
-        """Goals to substitute, shape (n, 3) [m]; takes note of what else has to change."""
+        """Goals to substitute, shape (n, 3) [m]; notes which other entries have to change."""
         goals: Goals = super()._sample_goals(batch_indices, env_indices)
         where = batch_indices, env_indices
         achieved = self.next_observations["achieved_goal"][where]

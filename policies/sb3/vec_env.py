@@ -92,7 +92,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
         return self._replayed
 
     def reset(self) -> Observations:
-        """Begin all episodes anew, with the seeds and options that were set for it.
+        """Begin all episodes anew, with the seeds and options that were set before.
 
         Returns
         -------
@@ -307,5 +307,5 @@ class SB3VecEnv(Lifecycle, VecEnv):
         return [result for _ in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class: type, indices: Indices = None) -> list[bool]:
-        """Whether the infos are those of ``Monitor``, as if it were wrapped by one; else no."""
+        """True for ``Monitor``, whose infos this environment writes; False for other wrappers."""
         return [issubclass(Monitor, wrapper_class) for _ in self._get_indices(indices)]

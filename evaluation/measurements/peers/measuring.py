@@ -77,7 +77,7 @@ def compare_with(peer: Peer, policy: Policy, repetitions: int) -> list[dict[str,
 
 @contextmanager
 def stdout_to_stderr() -> Iterator[None]:
-    """Keep standard output clean of what is printed meanwhile, by code in C as well."""
+    """Send output that is printed meanwhile, by code in C as well, to standard error."""
     flush = ctypes.CDLL(None).fflush
     sys.stdout.flush()
     kept = os.dup(1)

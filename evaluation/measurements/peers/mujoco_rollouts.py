@@ -82,7 +82,7 @@ def joint_targets(
     starts: NDArray[np.float64],
     goals: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Where the actuated joints are to be after each step: on the ways of a policy's episodes.
+    """Targets of the actuated joints after each step: the paths of a policy's episodes.
 
     An episode that is over goes back on its way, and forth again, so that no arm rests.
 

@@ -46,7 +46,7 @@ class Descent(NamedTuple):
     learning_rate, first_decay, second_decay, epsilon : float
         Adam's settings.
     max_norm : float
-        Gradients are shortened to this norm.
+        Largest norm of a gradient; longer ones are clipped to it.
     """
 
     learning_rate: float
