@@ -9,6 +9,7 @@ import matplotlib as mpl
 from docutils import nodes
 from sphinx import addnodes
 from sphinx.application import Sphinx
+from sphinx_autodoc_typehints import process_signature
 
 mpl.use("Agg")  # examples run without a display
 sys.path.insert(0, str(Path(__file__).parent))  # extensions
@@ -29,6 +30,7 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx_autodoc_typehints",
     "sphinx_gallery.gen_gallery",
+    "api_index",
     "cards",
     "commands",
     "players",
@@ -113,10 +115,13 @@ ARRAY = re.compile(
 )
 
 
-def _shorten_signature(*event: str | None) -> tuple[str, str | None] | None:
-    """Write array types as their names where signatures keep them, those of named tuples."""
-    *_, signature, returned = event
-    return None if signature is None else (ARRAY.sub("ndarray", signature), returned)
+def _shorten_signature(
+    app: Sphinx, what: str, name: str, obj: object, options: object, *written: str
+) -> tuple[str | None, str | None]:
+    """Write array types as their names: before the length of a signature tells how it is set."""
+    made = process_signature(app, what, name, obj, options, *written) or written
+    signature, returned = (part and ARRAY.sub("ndarray", part) for part in made)
+    return signature, returned
 
 
 def _shorten_annotations(_app: object, doctree: nodes.document) -> None:
@@ -137,5 +142,5 @@ def _shorten_annotations(_app: object, doctree: nodes.document) -> None:
 def setup(app: Sphinx) -> None:
     """Mend what napoleon and autodoc write."""
     app.connect("autodoc-process-docstring", _attribute_types_as_text, priority=900)
-    app.connect("autodoc-process-signature", _shorten_signature, priority=900)
+    app.connect("autodoc-process-signature", _shorten_signature, priority=400)
     app.connect("doctree-read", _shorten_annotations)

@@ -1,4 +1,4 @@
-"""Batches of whole episodes, whose arrays serve one rollout after the other."""
+"""Batches of episodes, whose arrays serve one rollout or step after the other."""
 
 from typing import Any, NamedTuple
 
@@ -56,6 +56,14 @@ class Batch(NamedTuple):
         if shift is not None:
             episodes.shift[:], episodes.moments[:] = shift, 0.0
         return True
+
+
+class SteppedBatch(NamedTuple):
+    """Episodes that are stepped, their actions, shape (n, n_actions), and the session of both."""
+
+    episodes: Episodes
+    actions: Array
+    session: Session
 
 
 class IdleBatch:

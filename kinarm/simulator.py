@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import copy
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm._parallel import run_rows, run_together
 from kinarm._validation import finite_array
 from kinarm.arm import Arm
-from kinarm.batches import Batch, IdleBatch, begin_some
+from kinarm.batches import Batch, IdleBatch, SteppedBatch, begin_some
 from kinarm.episodes import PAUSED, RUNNING, Episodes
 from kinarm.errors import InvalidInputError, StartInContactError
 from kinarm.judging import judge_steps
@@ -28,14 +28,6 @@ from kinarm.world import World
 
 PolicyFunction = Callable[[NDArray[np.float64]], ArrayLike]
 """Maps observations, shape (n, n_observations), to actions, shape (n, n_actuated)."""
-
-
-class _Stepped(NamedTuple):
-    """Episodes that are stepped, their actions, shape (n, n_actions), and the session of both."""
-
-    episodes: Episodes
-    actions: NDArray[np.float64]
-    session: Session
 
 
 class Simulator:
@@ -71,7 +63,7 @@ class Simulator:
         self.world = World(problem, threads=threads)
         self.threads = self.world.threads
         self.judged = 0
-        self._last: _Stepped | None = None
+        self._last: SteppedBatch | None = None
         self._idle = IdleBatch()
 
     def __getstate__(self) -> dict[str, Any]:
@@ -289,7 +281,7 @@ class Simulator:
         """Allocate and start episodes for stepping."""
         at_rest = table_control(np.zeros((len(starts), 1, self.n_actions)))
         batch = Batch.bound(self.world, at_rest, starts, goals, record=record, shift=shift)
-        self._last = _Stepped(batch.episodes, at_rest.actions[:, 0], batch.session)
+        self._last = SteppedBatch(batch.episodes, at_rest.actions[:, 0], batch.session)
         self._start(batch.episodes, np.arange(len(starts)), batch.session)
         return batch.episodes
 
@@ -314,12 +306,12 @@ class Simulator:
             raise StartInContactError(index, pair or ("arm", "scene"))
         episodes.status[paused] = RUNNING
 
-    def _stepped(self, episodes: Episodes) -> _Stepped:
+    def _stepped(self, episodes: Episodes) -> SteppedBatch:
         """The session and table that step episodes, kept until other episodes come."""
         if self._last is None or self._last.episodes is not episodes:
             table = np.zeros((len(episodes.status), 1, self.n_actions))
             session = self.world.session(table_control(table), episodes)
-            self._last = _Stepped(episodes, table[:, 0], session)
+            self._last = SteppedBatch(episodes, table[:, 0], session)
         return self._last
 
     def _step(self, episodes: Episodes, actions: ArrayLike) -> Session:

@@ -20,6 +20,7 @@ from kinarm.arm_specification import ArmSpecification
 from kinarm.errors import ArmError, InvalidInputError, UnknownNameError
 from kinarm.urdf_files import resolve_meshes
 from kinarm.urdf_schema import FARTHEST, apply_schema
+from kinarm.urdf_tree import MOVING, TreeJoint, chain_to, read_joints
 from kinarm.xml_files import parse_xml
 
 USUAL_TOOL = "tool0"
@@ -27,8 +28,6 @@ USUAL_TOOL = "tool0"
 
 LARGEST = 5 * 10**6
 """Size of a URDF at most [bytes]."""
-
-MOVING = ("revolute", "prismatic", "continuous")
 
 
 class Description(NamedTuple):
@@ -56,22 +55,6 @@ class Description(NamedTuple):
     tool_frame: str
     held: dict[str, float]
     notes: tuple[str, ...]
-
-
-class _Joint(NamedTuple):
-    """A joint of the file."""
-
-    element: ElementTree.Element
-    name: str
-    kind: str
-    parent: str
-    child: str
-
-    @property
-    def mimics(self) -> str | None:
-        """The joint that it mimics."""
-        mimic = self.element.find("mimic")
-        return None if mimic is None else mimic.get("joint")
 
 
 def read_urdf(path: Path, specification: ArmSpecification) -> Description:
@@ -104,10 +87,10 @@ def _reduced(
     robot: ElementTree.Element, path: Path, specification: ArmSpecification
 ) -> Description:
     """Keep the chain that carries the tool."""
-    joints = _joints(robot, path)
+    joints = read_joints(robot, path)
     links = [link.get("name", "") for link in robot.findall("link")]
     tool, notes = _tool_frame(specification.tool_frame, joints, links, path)
-    chain = _chain_to(tool, joints)
+    chain = chain_to(tool, joints)
     for what in ("held", "limits"):
         _check_joints(what, getattr(specification, what) or {}, joints, path)
     asked = specification.held or {}
@@ -155,69 +138,8 @@ def _parsed(path: Path) -> ElementTree.Element:
     return robot
 
 
-def _joints(robot: ElementTree.Element, path: Path) -> dict[str, _Joint]:
-    """Joints by the link that they carry; refuses what is no tree on a fixed base."""
-    found: dict[str, _Joint] = {}
-    links = {link.get("name") for link in robot.findall("link")}
-    carried: dict[str, str] = {}
-    for element in robot.findall("joint"):
-        name, kind = element.get("name", ""), element.get("type", "")
-        ends = [element.find(end) for end in ("parent", "child")]
-        parent, child = ("" if end is None else end.get("link", "") for end in ends)
-        for link in (parent, child):
-            if link not in links:
-                raise ArmError(
-                    f"{path.name} is not a readable URDF: joint {name!r} joins {link!r}, which is "
-                    "no link"
-                )
-        if name in found:
-            raise ArmError(f"{path.name} is not a readable URDF: two joints are called {name!r}")
-        if child in carried:
-            raise ArmError(
-                f"link {child!r} of {path.name} hangs on two joints, {carried[child]!r} and "
-                f"{name!r}: closed loops are not supported"
-            )
-        if kind in ("floating", "planar"):
-            raise ArmError(f"joint {name!r} of {path.name} is {kind}: the base must be fixed")
-        if kind not in (*MOVING, "fixed"):
-            raise ArmError(f"joint {name!r} of {path.name} is {kind!r}: not supported")
-        carried[child] = name
-        found[name] = _Joint(element, name, kind, parent, child)
-    _check_tree(found, links, path)
-    return found
-
-
-def _check_tree(joints: Mapping[str, _Joint], links: set[str | None], path: Path) -> None:
-    """Refuse links that do not hang on one link, the base."""
-    carried = {joint.child: joint.parent for joint in joints.values()}
-    roots = [link for link in links if link not in carried]
-    if links and not roots:
-        raise ArmError(f"the links of {path.name} form a loop: closed loops are not supported")
-    if len(roots) > 1:
-        names = ", ".join(sorted(map(repr, roots)))
-        raise ArmError(f"{path.name} has links that no joint joins: {names}")
-    for link in carried:
-        passed: set[str] = set()
-        while link in carried and link not in passed:
-            passed.add(link)
-            link = carried[link]
-        if link in passed:
-            raise ArmError(f"the links of {path.name} form a loop: closed loops are not supported")
-
-
-def _chain_to(link: str, joints: Mapping[str, _Joint]) -> list[_Joint]:
-    """Moving joints between the base and a link, in that order."""
-    carrier = {joint.child: joint for joint in joints.values()}
-    chain: list[_Joint] = []
-    while link in carrier and len(chain) <= len(joints):
-        joint = carrier[link]
-        chain.append(joint)
-        link = joint.parent
-    return [joint for joint in reversed(chain) if joint.kind in MOVING]
-
-
 def _tool_frame(
-    asked: str | None, joints: Mapping[str, _Joint], links: list[str], path: Path
+    asked: str | None, joints: Mapping[str, TreeJoint], links: list[str], path: Path
 ) -> tuple[str, tuple[str, ...]]:
     """The tool frame, and a note if it had to be chosen."""
     if asked is not None or USUAL_TOOL in links:
@@ -228,7 +150,7 @@ def _tool_frame(
                 + ", ".join(links)
             )
         return chosen, ()
-    lengths = [sum(joint.mimics is None for joint in _chain_to(link, joints)) for link in links]
+    lengths = [sum(joint.mimics is None for joint in chain_to(link, joints)) for link in links]
     if not links or max(lengths) == 0:
         raise ArmError(f"{path.name} has no moving joint")
     longest = [link for link, n in zip(links, lengths, strict=True) if n == max(lengths)]
@@ -238,7 +160,7 @@ def _tool_frame(
 
 
 def _check_joints(
-    what: str, named: Collection[str], joints: Mapping[str, _Joint], path: Path
+    what: str, named: Collection[str], joints: Mapping[str, TreeJoint], path: Path
 ) -> None:
     """Refuse names that no moving joint has."""
     moving = [joint.name for joint in joints.values() if joint.kind in MOVING]
@@ -248,7 +170,7 @@ def _check_joints(
 
 
 def _bounded(
-    joint: _Joint, limits: Mapping[str, tuple[float, float]], path: Path
+    joint: TreeJoint, limits: Mapping[str, tuple[float, float]], path: Path
 ) -> tuple[str, ...]:
     """See that a joint that is kept has limits; return what was chosen."""
     element, name = joint.element, joint.name
@@ -279,7 +201,7 @@ def _bounded(
 
 
 def _held_positions(
-    joints: Mapping[str, _Joint], kept: Collection[str], asked: Mapping[str, float], path: Path
+    joints: Mapping[str, TreeJoint], kept: Collection[str], asked: Mapping[str, float], path: Path
 ) -> dict[str, float]:
     """Where the joints stay that are not kept."""
     positions = {}
@@ -312,7 +234,7 @@ FOLLOWING = (("multiplier", "1"), ("offset", "0"))
 """Attributes of a mimicking joint, and what they are where they are left out."""
 
 
-def _near_zero(joint: _Joint) -> float:
+def _near_zero(joint: TreeJoint) -> float:
     """Position closest to zero within the limits of a joint, if it has any."""
     limit = joint.element.find("limit")
     if limit is None or joint.kind == "continuous":

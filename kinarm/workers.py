@@ -23,6 +23,9 @@ ATTEMPTS = 3
 """How often workers may end unexpectedly before another task is finished."""
 
 
+LOST_WORKERS = "workers ended unexpectedly, perhaps for want of memory"
+
+
 class Finished(NamedTuple, Generic[ResultT]):
     """A task that is done.
 
@@ -77,8 +80,7 @@ class LocalExecutor:
                 failures += 1
                 if failures == ATTEMPTS:
                     raise WorkerError(
-                        "workers ended unexpectedly, perhaps for want of memory; "
-                        "the same command goes on with what is missing"
+                        f"{LOST_WORKERS}; the same command goes on with what is missing"
                     ) from error
 
     def _attempt(

@@ -11,18 +11,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm._archive import Archive, load_archive, reading, save_archive
 from kinarm._validation import finite_array
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.networks import ACTIVATIONS, Activation, Mirror, Networks, checked_activations
-from kinarm.observation import observation_layout
 from kinarm.policies.goal_observation import flat_observation
 from kinarm.policies.normalizer import fold_normalizer, input_scale
 from kinarm.policies.provenance import Provenance
 from kinarm.problem import ProblemLike, ReachProblem
 
-FORMAT_VERSION = 3
 LARGEST = 1e30
 """Magnitude of statistics and weights at most: with larger ones, actions overflow."""
 
@@ -304,22 +301,9 @@ class Policy:
         OutputError
             If the file cannot be written; an existing file is then left as it was.
         """
-        content = self.content()
-        save_archive(path, "policy", FORMAT_VERSION, content.arrays, content.header)
+        from kinarm.policies.policy_files import save_policy
 
-    def content(self) -> Archive:
-        """What files hold of the policy: `from_content` makes it again."""
-        header = {
-            "provenance": self.provenance.to_json(),
-            "observation": observation_layout(),
-            "activations": list(self.activations),
-        }
-        arrays = {"mean": self.mean, "std": self.std}
-        for number, layer in enumerate(self.layers):
-            arrays |= {f"weights_{number}": layer.weights, f"bias_{number}": layer.bias}
-        if self.mirror is not None:
-            arrays |= {f"mirror_{name}": part for name, part in self.mirror._asdict().items()}
-        return Archive(header, arrays)
+        save_policy(path, self)
 
     @classmethod
     def load(cls, path: str | Path) -> Policy:
@@ -331,40 +315,6 @@ class Policy:
             If the file is missing, truncated, not a policy, written by another version, or made
             for observations of another layout.
         """
-        content = load_archive(path, "policy", FORMAT_VERSION, PolicyFileError)
-        with reading(repr(str(path)), "policy", PolicyFileError):
-            return cls.from_content(content, repr(str(path)))
+        from kinarm.policies.policy_files import read_policy
 
-    @classmethod
-    def from_content(cls, content: Archive, where: str) -> Policy:
-        """Rebuild what `content` returned and the file ``where`` holds.
-
-        Raises
-        ------
-        PolicyFileError
-            If it was made for observations of another layout.
-        KinarmError
-            If something cannot be used.
-        KeyError
-            If something is missing.
-        """
-        header, arrays = content
-        if header["observation"] != observation_layout():
-            raise PolicyFileError(
-                f"{where} understands observations of layout "
-                f"{header['observation']!r}, not {observation_layout()!r}"
-            )
-        n_layers = sum(name.startswith("weights_") for name in arrays)
-        signs = [f"mirror_{name}" for name in Mirror._fields]
-        mirrored = any(name in arrays for name in signs)
-        return cls(
-            mean=arrays["mean"],
-            std=arrays["std"],
-            layers=tuple(
-                Layer(arrays[f"weights_{number}"], arrays[f"bias_{number}"])
-                for number in range(n_layers)
-            ),
-            provenance=Provenance.from_json(header["provenance"]),
-            activations=tuple(header["activations"]),
-            mirror=Mirror(*(arrays[name] for name in signs)) if mirrored else None,
-        )
+        return read_policy(path)

@@ -14,7 +14,7 @@ from kinarm._files import absolute, check_folder, check_output, only_writer
 from kinarm._interrupts import asking, telling
 from kinarm._parallel import available_threads
 from kinarm._validation import whole_number
-from kinarm.errors import InvalidInputError, PolicyFileError
+from kinarm.errors import InvalidInputError, PolicyFileError, WorkerError
 from kinarm.policies.learners import learner_of
 from kinarm.policies.training_files import (
     TrainingStopped,
@@ -148,6 +148,8 @@ class SeedsRequest:
         ------
         KinarmError
             If settings cannot be used, or a file cannot be written.
+        WorkerError
+            If workers end unexpectedly again and again; the message says how to go on.
         KeyboardInterrupt
             If it is interrupted; checkpoints are then complete, and the message says so.
         """
@@ -158,8 +160,13 @@ class SeedsRequest:
             if waiting:
                 say_reach(waiting[0].config)
                 say_symmetry(waiting[0].config)
-            with telling(partial(_what_is_left, tasks)):
-                last = self._carry_out(waiting)
+            with telling(partial(_what_is_left, tasks, "interrupted")):
+                try:
+                    last = self._carry_out(waiting)
+                except WorkerError as error:
+                    from kinarm.workers import LOST_WORKERS
+
+                    raise WorkerError(_what_is_left(tasks, LOST_WORKERS)) from error
         return tuple(TrainedSeed(task.config.seed, task.out, last.get(task.out)) for task in tasks)
 
     def _tasks(self) -> list[SeedTask]:
@@ -300,13 +307,13 @@ def _shown(board: "ProgressBoard", tasks: list[SeedTask]) -> Iterator[None]:
             line.update(board.iterations, board.words())
 
 
-def _what_is_left(tasks: list[SeedTask]) -> str:
-    """What an interruption leaves, and how to go on."""
+def _what_is_left(tasks: list[SeedTask], why: str) -> str:
+    """Why trainings end early, what that leaves, and how to go on."""
     begun = [task for task in tasks if checkpoint_path(task.out).exists()]
     finished = [task for task in tasks if task not in begun and curve_path(task.out).exists()]
     if not begun and not finished:
-        return "interrupted before the first iteration; the same command begins again"
+        return f"{why} before the first iteration; the same command begins again"
     return (
-        f"interrupted: {len(finished)} of {len(tasks)} seeds are finished; "
+        f"{why}: {len(finished)} of {len(tasks)} seeds are finished; "
         "the same command with --resume goes on"
     )

@@ -114,7 +114,7 @@ def _result_cells(series: Series, possible: float) -> list[str]:
         f"{100 * (series.success.value or 0) / max(possible, 1e-9):.1f}",
         each,
         f"{100 * (series.collision.value or 0):.1f}",
-        "" if series.median_steps is None else f"{series.median_steps:.1f}",
+        "" if series.steps_to_success is None else f"{series.steps_to_success:.1f}",
         f"{steps / 1e6:.2f}",
         f"{seconds / 60:.2f}",
         f"{steps / max(seconds, 1e-9):,.0f}",

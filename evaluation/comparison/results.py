@@ -54,9 +54,9 @@ class Series:
         return self._share([curve[-1].collisions for curve in self.curves])
 
     @property
-    def median_steps(self) -> float | None:
+    def steps_to_success(self) -> float | None:
         """Median steps of the trials that succeeded, mean over the seeds; None if not known."""
-        known = [curve[-1].median_steps for curve in self.curves]
+        known = [curve[-1].steps_to_success for curve in self.curves]
         each = [steps for steps in known if steps is not None]
         return float(np.mean(each)) if len(each) == len(known) else None
 
@@ -149,7 +149,7 @@ class Comparison:
                 "success_each": [curve[-1].successes / series.trials for curve in series.curves],
                 "collision": series.collision.to_json(),
                 "median_distance": series.last("median_distance"),
-                "median_steps": series.median_steps,
+                "steps_to_success": series.steps_to_success,
                 "environment_steps": series.last("environment_steps"),
                 "seconds": series.last("seconds"),
                 "processor_seconds": series.last("processor_seconds"),

@@ -63,8 +63,8 @@ class CurvePoint(NamedTuple):
         Trials that ended so.
     median_distance : float
         Of the final distances [m].
-    median_steps : float or None
-        Of the trials that succeeded; None if there is none, or it was not recorded.
+    steps_to_success : float or None
+        Median over the trials that succeeded; None if there is none, or it was not recorded.
     """
 
     environment_steps: int
@@ -73,7 +73,7 @@ class CurvePoint(NamedTuple):
     successes: int
     collisions: int
     median_distance: float
-    median_steps: float | None = None
+    steps_to_success: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

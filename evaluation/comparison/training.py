@@ -87,7 +87,7 @@ class Judge:
                 successes=int(rollouts.success.sum()),
                 collisions=int(rollouts.collision.sum()),
                 median_distance=round(float(np.median(rollouts.distance)), 5),
-                median_steps=float(np.median(steps)) if steps.size else None,
+                steps_to_success=float(np.median(steps)) if steps.size else None,
             )
         )
         while environment_steps >= self._protocol.checkpoint(self._number):

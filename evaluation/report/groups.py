@@ -1,6 +1,6 @@
 """What the page shows as one: a policy, or all training seeds of a recipe."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -93,11 +93,21 @@ class ProblemResults:
         return tuple(scene.goal_region(name) for name in self.task.goal_regions)
 
     @property
+    def policies(self) -> tuple[Group, ...]:
+        """Those that were trained or written, best first."""
+        return tuple(group for group in self.groups if group.is_policy)
+
+    @property
     def contenders(self) -> tuple[Group, ...]:
         """The policies; where there are none, the baselines; else the oracle."""
-        policies = tuple(group for group in self.groups if group.is_policy)
         others = tuple(group for group in self.groups if group.row["algorithm"] != "oracle")
-        return policies or others or self.groups
+        return self.policies or others or self.groups
+
+
+def count_policies(groups: Iterable[Group]) -> str:
+    """How many policies there are, as rows of the tables: training seeds of a recipe are one."""
+    count = len({group.name for group in groups})
+    return f"{count} polic{'y' if count == 1 else 'ies'}"
 
 
 def group_results(

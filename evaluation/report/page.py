@@ -6,12 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kinarm._files import check_folder, write_text
+from kinarm.evaluation.entrants import ORACLE
 from kinarm.evaluation.evaluation import Evaluation
 from kinarm.evaluation.failures import cause_words
 from kinarm.evaluation.outcomes import EARLY_STEPS
 from kinarm.evaluation.report import maps
 from kinarm.evaluation.report.charts import histogram_chart, profile_chart
-from kinarm.evaluation.report.groups import ProblemResults, group_results
+from kinarm.evaluation.report.groups import ProblemResults, count_policies, group_results
 from kinarm.evaluation.report.templating import template_environment
 from kinarm.evaluation.report.worst import record_worst, worst_row, worst_trials
 from kinarm.evaluation.table import SPREAD_PRIORITY, Column, metric_cell, metric_columns
@@ -103,6 +104,7 @@ def page_template() -> "Template":
         histogram_chart=histogram_chart,
         shown_columns=shown_columns,
         cause_words=cause_words,
+        count_policies=count_policies,
         early_steps=EARLY_STEPS,
         most_causes=MOST_CAUSES,
     )
@@ -125,15 +127,37 @@ def _title(problems: Sequence[ProblemResults]) -> str:
     names = {group.name for group in groups}
     if len(names) == 1:
         return names.pop()
-    return f"{len(names)} policies" if groups[0].is_policy else " and ".join(sorted(names))
+    return count_policies(groups) if groups[0].is_policy else " and ".join(sorted(names))
 
 
 def _subtitle(protocol: dict[str, Any], problems: Sequence[ProblemResults]) -> str:
-    """What was faced, in a line."""
-    faced = f"problem {problems[0].name}" if len(problems) == 1 else f"{len(problems)} problems"
+    """How policies were trained and what is beside them; what was faced."""
     arms = " and ".join(dict.fromkeys(results.entry["arm"] for results in problems))
+    said = [
+        *_training_seeds(problems),
+        *_references(problems),
+        f"problem {problems[0].name}" if len(problems) == 1 else f"{len(problems)} problems",
+        f"arm {arms}",
+        f"{protocol['trials']} trials each, seed {protocol['seed']}",
+    ]
+    return " \N{MIDDLE DOT} ".join(said)
+
+
+def _training_seeds(problems: Sequence[ProblemResults]) -> list[str]:
+    """How many training seeds share a row, if any do."""
     groups = [group for results in problems for group in results.contenders]
-    members = {member.entrant.name for group in groups for member in group.members}
-    seeds = f" · {len(members)} trainings" if any(group.is_pooled for group in groups) else ""
-    trials = f"{protocol['trials']} trials each, seed {protocol['seed']}"
-    return f"{faced} · arm {arms}{seeds} · {trials}"
+    fewest, most = (end(len(group.members) for group in groups) for end in (min, max))
+    if most == 1:
+        return []
+    each = " each" if len({group.name for group in groups}) > 1 else ""
+    return [f"{most if fewest == most else f'{fewest} to {most}'} training seeds{each}"]
+
+
+def _references(problems: Sequence[ProblemResults]) -> list[str]:
+    """Rows of the tables that are no policies, if there are policies; the oracle last."""
+    groups = [group for results in problems for group in results.groups if results.policies]
+    names = dict.fromkeys(group.name for group in groups if not group.is_policy)
+    words = [name for name in names if name != ORACLE.name]
+    words += [f"the {ORACLE.name}"] if ORACLE.name in names else []
+    beside = " and ".join(part for part in (", ".join(words[:-1]), *words[-1:]) if part)
+    return [f"beside {beside}"] if beside else []

@@ -1,6 +1,7 @@
 """The worst trials of each policy, which the page lists and replays."""
 
 from collections.abc import Sequence
+from itertools import islice
 from typing import Any, NamedTuple
 
 from kinarm.evaluation.evaluation import Evaluation
@@ -27,14 +28,21 @@ class WorstTrial(NamedTuple):
 
 
 def worst_trials(results: ProblemResults) -> tuple[WorstTrial, ...]:
-    """The worst trials of the best groups of a problem: failures first, the farthest first."""
+    """The worst trials of the best groups of a problem: failures first, the farthest first.
+
+    No trial is there twice: that of a better group, which has fewer failures, goes first.
+    """
     groups = results.contenders[:BEST_GROUPS]
     share = max(AT_LEAST, TRIALS // len(groups))
-    return tuple(found for group in groups for found in _worst_of(group, share))
+    found: dict[int, WorstTrial] = {}
+    for group in groups:
+        others = (worst for worst in _ranked(group) if worst.trial not in found)
+        found |= {worst.trial: worst for worst in islice(others, share)}
+    return tuple(found.values())
 
 
-def _worst_of(group: Group, count: int) -> list[WorstTrial]:
-    """The worst trials of a group, each by the training seed that does worst in it."""
+def _ranked(group: Group) -> list[WorstTrial]:
+    """Each trial of a group by the training seed that does worst in it, the worst first."""
     ranked = sorted(
         (bool(success), -float(distance), seed, trial)
         for seed, member in enumerate(group.members)
@@ -45,7 +53,7 @@ def _worst_of(group: Group, count: int) -> list[WorstTrial]:
     found: dict[int, WorstTrial] = {}
     for *_, seed, trial in ranked:
         found.setdefault(trial, WorstTrial(group, group.members[seed], trial))
-    return list(found.values())[:count]
+    return list(found.values())
 
 
 def worst_row(results: ProblemResults, worst: WorstTrial) -> dict[str, Any]:

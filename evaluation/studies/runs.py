@@ -17,6 +17,7 @@ from kinarm.evaluation.studies.specification import StudyTrials
 from kinarm.policies.checkpoint import arrays_of, rebuilt
 from kinarm.policies.learners import TrainingState, find_learner
 from kinarm.policies.policy import Policy
+from kinarm.policies.policy_files import policy_content, policy_of_content
 
 ARCHIVE, BOUNDS_ARCHIVE = ("study run", 1), ("study bounds", 1)
 """Kinds and versions of the files."""
@@ -143,7 +144,7 @@ class WholeRun(TrainedRun):
 
 def run_content(run: WholeRun) -> bytes:
     """A run as its file holds it; equal runs give equal bytes."""
-    policy = run.policy.content()
+    policy = policy_content(run.policy)
     arrays = {
         "curve": np.array(run.curve, dtype=np.float64).reshape(-1, len(RunPoint._fields)),
         **{OUTCOMES + name: array for name, array in run.outcomes._asdict().items()},
@@ -231,7 +232,7 @@ def load_whole_run(path: Path, planned: PlannedRun) -> WholeRun:
             state = rebuilt(find_learner(planned.learner).state, STATE, arrays)
         return WholeRun(
             **_results(path, planned, content),
-            policy=Policy.from_content(policy, repr(str(path))),
+            policy=policy_of_content(policy, repr(str(path))),
             state=state,
         )
 

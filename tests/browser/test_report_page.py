@@ -13,6 +13,7 @@ from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.report.groups import group_results
 from kinarm.evaluation.report.page import write_report
 from kinarm.evaluation.report.worst import worst_trials
+from kinarm.evaluation.table import metric_columns
 from kinarm.evaluation.trials import TrialSet
 
 pytestmark = pytest.mark.slow
@@ -191,18 +192,54 @@ def test_pointing_at_a_policy_dims_the_others(visit):
     assert {each.get_attribute("data-series") for each in shown} == {"ars-tuned-right"}
 
 
+def is_within(page, tip) -> bool:
+    """Whether a tip lies on the screen as a whole."""
+    box, (width, height) = tip.bounding_box(), page.evaluate("[innerWidth, innerHeight]")
+    across = box["x"] >= 0 and box["x"] + box["width"] <= width
+    return across and box["y"] >= 0 and box["y"] + box["height"] <= height
+
+
+def meaning_of(heading: str) -> str:
+    return next(column.meaning for column in metric_columns() if column.heading == heading)
+
+
 def test_a_tap_tells_what_a_figure_means(visit):
     page = visit(**PHONE)
     tip = page.locator("#tip")
     assert tip.is_hidden()
-    page.locator("#right td[data-term='median distance m']").first.tap()
-    assert tip.inner_text() == METRICS["median_distance"].meaning
-    box = tip.bounding_box()
-    assert box["x"] >= 0
-    assert box["x"] + box["width"] <= PHONE["viewport"]["width"]
-    page.locator("#right .map path:has(> title)").first.tap(force=True)
-    assert tip.is_visible()
+    for cell in page.locator("#right td[data-term]:has(.value)").all():
+        cell.tap()
+        assert tip.inner_text() == meaning_of(cell.get_attribute("data-term"))
+        assert is_within(page, tip)
     page.locator("#right h2").tap()
+    assert tip.is_hidden()
+
+
+def test_a_tap_tells_what_a_mark_stands_for(visit):
+    page = visit(**PHONE)
+    tip = page.locator("#tip")
+    for mark in page.locator("#right .map :has(> title)").all()[:12]:
+        mark.tap(force=True)
+        assert tip.is_visible(), mark.text_content()
+        assert is_within(page, tip)
+
+
+@pytest.mark.parametrize("width", [320, 390, 1280])
+def test_the_keyboard_tells_what_every_figure_means(visit, width):
+    """Each figure of a table is on the way of the tabulator key, once, wherever it stands."""
+    page = visit(viewport={"width": width, "height": 844})
+    tip, told = page.locator("#tip"), []
+    page.locator("#right h2").evaluate("h2 => { h2.tabIndex = -1; h2.focus(); }")
+    focus = "document.activeElement"
+    while page.evaluate(f"{focus}.closest('section')?.id") == "right":
+        if page.evaluate(f"{focus}.classList.contains('term')"):
+            told.append(page.evaluate(f"{focus}.textContent"))
+            page.wait_for_timeout(400)  # the page scrolls there, smoothly
+            assert tip.inner_text() == meaning_of(told[-1])
+            assert is_within(page, tip)
+        page.keyboard.press("Tab")
+    cells = page.locator("#right td[data-term]:has(.value)").all()
+    assert sorted(told) == sorted({cell.get_attribute("data-term") for cell in cells})
     assert tip.is_hidden()
 
 

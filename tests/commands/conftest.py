@@ -147,3 +147,33 @@ def solved(monkeypatch) -> list[int]:
 def empty_cache(tmp_path, monkeypatch):
     monkeypatch.setenv("KINARM_CACHE", str(tmp_path / "cache"))
     return tmp_path / "cache"
+
+
+@pytest.fixture(name="replay")
+def replaying(run, tmp_path) -> Callable[..., Answer]:
+    """Run ``kinarm-replay``; its page goes to ``made.html``."""
+
+    def call(*arguments):
+        return run("kinarm-replay", *arguments, "--out", tmp_path / "made.html")
+
+    return call
+
+
+@pytest.fixture(scope="session")
+def evaluation(run_outside, policy_folder, tmp_path_factory) -> Path:
+    """An evaluation of a policy and of a baseline."""
+    folder = tmp_path_factory.mktemp("evaluation")
+    options = ("--policy", policy_folder / "mine-seed0.npz", "--policy", "random")
+    settings = ("--task", "right", "--trials", 12, "--seed", 4, "--no-oracle")
+    assert run_outside("kinarm-eval", *options, *settings, "--out", folder).status == 0
+    return folder / "evaluation.json"
+
+
+@pytest.fixture(scope="session")
+def recordings(run_outside, policy_folder, tmp_path_factory) -> Path:
+    """Recordings of four trials."""
+    folder = tmp_path_factory.mktemp("recordings")
+    options = ("--policy", policy_folder / "mine-seed0.npz", "--trials", 4, "--no-oracle")
+    files = ("--out", folder / "page.html", "--record", folder / "made.npz")
+    assert run_outside("kinarm-replay", *options, *files).status == 0
+    return folder / "made.npz"

@@ -1,12 +1,11 @@
 """``kinarm-replay``: pages from policies, evaluations and recordings, and a live one."""
 
 import json
-from collections import Counter
 from dataclasses import replace as changed_to
-from pathlib import Path
 
 import numpy as np
 import pytest
+from documents import outcomes_of
 from refusals import check_refused
 
 from kinarm.arm import Arm
@@ -15,41 +14,6 @@ from kinarm.policies.library import best_policy
 from kinarm.recording import load_recordings, save_recordings
 
 QUICK = ("--no-oracle",)
-
-
-@pytest.fixture
-def replay(run, tmp_path):
-    """Run the command; its page goes to ``made.html``."""
-
-    def call(*arguments):
-        return run("kinarm-replay", *arguments, "--out", tmp_path / "made.html")
-
-    return call
-
-
-@pytest.fixture(scope="session")
-def evaluation(run_outside, policy_folder, tmp_path_factory) -> Path:
-    """An evaluation of a policy and of a baseline."""
-    folder = tmp_path_factory.mktemp("evaluation")
-    options = ("--policy", policy_folder / "mine-seed0.npz", "--policy", "random")
-    settings = ("--task", "right", "--trials", 12, "--seed", 4, "--no-oracle")
-    assert run_outside("kinarm-eval", *options, *settings, "--out", folder).status == 0
-    return folder / "evaluation.json"
-
-
-@pytest.fixture(scope="session")
-def recordings(run_outside, policy_folder, tmp_path_factory) -> Path:
-    """Recordings of four trials."""
-    folder = tmp_path_factory.mktemp("recordings")
-    options = ("--policy", policy_folder / "mine-seed0.npz", "--trials", 4, *QUICK)
-    files = ("--out", folder / "page.html", "--record", folder / "made.npz")
-    assert run_outside("kinarm-replay", *options, *files).status == 0
-    return folder / "made.npz"
-
-
-def outcomes(evaluation, policy):
-    rows = json.loads(evaluation.read_text())["results"]
-    return next(row["outcomes"] for row in rows if row["policy"] == policy)
 
 
 def played(answer):
@@ -71,7 +35,7 @@ def test_recordings_end_as_the_evaluation_says(run, tmp_path, evaluation, policy
     settings = ("--trials", 12, "--seed", 4, *QUICK)
     files = ("--out", tmp_path / "made.html", "--record", tmp_path / "made.npz")
     assert run("kinarm-replay", *options, *settings, *files).status == 0
-    said = outcomes(evaluation, "mine-seed0")
+    said = outcomes_of(evaluation, "mine-seed0")
     recorded = load_recordings(tmp_path / "made.npz")
     assert [each.final_distance for each in recorded] == said["final_distance"]
     assert [each.steps for each in recorded] == said["steps"]
@@ -87,7 +51,7 @@ def test_what_was_recorded_plays_the_same(run, tmp_path, recordings):
 
 
 def test_the_worst_of_an_evaluation(replay, evaluation):
-    distances = np.array(outcomes(evaluation, "random")["final_distance"])
+    distances = np.array(outcomes_of(evaluation, "random")["final_distance"])
     answer = replay(evaluation, "--policy", "random", "--worst", 3, *QUICK)
     assert played(answer) == np.argsort(-distances, kind="stable")[:3].tolist()
 
@@ -116,7 +80,7 @@ def test_the_best_policy_for_a_problem(replay, options, problem):
 
 
 def test_the_collisions_of_an_evaluation(replay, evaluation):
-    ends = outcomes(evaluation, "random")["outcome"]
+    ends = outcomes_of(evaluation, "random")["outcome"]
     expected = [number for number, end in enumerate(ends) if end == "collision"]
     assert expected
     answer = replay(evaluation, "--policy", "random", "--collisions", *QUICK)
@@ -310,61 +274,6 @@ def test_an_evaluation_with_something_missing(replay, evaluation, tmp_path, path
 def test_an_evaluation_of_several_policies(replay, evaluation):
     check_refused(replay(evaluation, "--policy", "nobody"), "'nobody'", "random")
     check_refused(replay(evaluation, "--policy", "random", "--problem", "left"), "'random'")
-
-
-# The live page
-
-
-def test_all_failures_in_groups_beside_the_oracle(replay, evaluation, policy_folder, tmp_path):
-    said = outcomes(evaluation, "random")
-    kinds = zip(said["outcome"], said["contact"], said["steps"], strict=True)
-    expected = {
-        number: "out of time"
-        if contact is None
-        else f"{' touches '.join(contact)} {'within' if steps <= 3 else 'after'} 3 steps"
-        for number, (outcome, contact, steps) in enumerate(kinds)
-        if outcome != "success"
-    }
-    kept = tmp_path / "kept.npz"
-    options = ("--problem", "right", "--trials", 12, "--seed", 4, "--record", kept)
-    answer = replay("--policy", "random", "--failures", *options)
-    first, *lines, last = answer.out.splitlines()
-    assert first == f"random: {len(expected)} of 12 trials of right failed"
-    counts = {line[7:]: int(line[:5]) for line in lines}
-    assert counts == dict(Counter(expected.values()))
-    assert list(counts.values()) == sorted(counts.values(), reverse=True)
-    assert "written" in last
-    recorded = load_recordings(kept)
-    played, ghosts = (
-        [each for each in recorded if (each.policy == "oracle") == ghost] for ghost in (False, True)
-    )
-    assert [each.trial for each in played] == [each.trial for each in ghosts]
-    assert sorted(each.trial for each in played) == sorted(expected)
-    ranks = [list(counts).index(expected[each.trial]) for each in played]
-    assert ranks == sorted(ranks)
-    for one, ghost in zip(played, ghosts, strict=True):
-        assert one.same_trial(ghost)
-        assert one.steps_lower_bound <= ghost.steps
-    assert {each.outcome for each in ghosts} == {"success"}
-
-
-def test_failures_of_an_evaluation_and_of_recordings(replay, evaluation, recordings, tmp_path):
-    ends = outcomes(evaluation, "random")["outcome"]
-    failed = len(ends) - ends.count("success")
-    answer = replay(evaluation, "--policy", "random", "--failures", *QUICK)
-    assert answer.out.startswith(f"random: {failed} of 12 trials of right failed")
-    kept = load_recordings(recordings)
-    missed = sum(each.outcome != "success" for each in kept)
-    answer = replay(recordings, "--failures", "--overwrite")
-    if missed:
-        assert f"{missed} of {len(kept)} trials of right failed" in answer.out
-    else:
-        check_refused(answer, "none of the 4 trials failed")
-
-
-def test_failures_are_those_of_the_best_policy_by_default(replay):
-    answer = replay("--failures", "--problem", "right", "--trials", 60, *QUICK)
-    assert answer.out.startswith(f"{best_policy('right')}: ")
 
 
 def test_documents_of_version_2_are_read(replay, evaluation, tmp_path):

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -207,3 +208,40 @@ def test_ctrl_c_keeps_every_seed_and_says_how_to_go_on(command, tmp_path):
     for seed in range(3):
         expected = train_policy(config(seed, iterations=2000)).policy
         check_equal(Policy.load(folder / f"{NAME.format(seed)}.npz"), expected)
+
+
+def workers(process: subprocess.Popen) -> list[int]:
+    """Worker processes of a command, of those that it has started."""
+    found = []
+    for listed in Path(f"/proc/{process.pid}/task").glob("*/children"):
+        for number in map(int, listed.read_text().split()):
+            with suppress(OSError):  # it has ended meanwhile
+                line = Path(f"/proc/{number}/cmdline").read_bytes()
+                found += [number] if b"popen_loky" in line else []
+    return found
+
+
+def test_lost_workers_keep_every_seed_and_say_how_to_go_on(command, tmp_path):
+    folder, shared = tmp_path / "right", tmp_path / "shared"
+    process = start(command, folder, shared)
+    wait_for_iterations(process, shared, 200)
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=120)
+    process = start(command, folder, shared, "--resume")
+    while process.poll() is None:
+        for number in workers(process):
+            with suppress(ProcessLookupError):
+                os.kill(number, signal.SIGKILL)
+        time.sleep(0.02)
+    errors = process.communicate()[1]
+    assert process.returncode == 1
+    assert "Traceback" not in errors
+    last = errors.splitlines()[-1]
+    assert last.startswith("kinarm-train: workers ended unexpectedly, perhaps for want of memory: ")
+    assert last.endswith("of 3 seeds are finished; the same command with --resume goes on")
+
+    process = start(command, folder, shared, "--resume")
+    _, errors = process.communicate(timeout=300)
+    assert process.returncode == 0, errors
+    expected = train_policy(config(0, iterations=2000)).policy
+    check_equal(Policy.load(folder / f"{NAME.format(0)}.npz"), expected)

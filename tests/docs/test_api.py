@@ -7,15 +7,21 @@ from pathlib import Path
 import pytest
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-REFERENCE = (DOCS / "reference" / "api.rst").read_text(encoding="utf-8")
+PAGES = {path.stem: path.read_text("utf-8") for path in (DOCS / "reference/api").glob("*.rst")}
+ENTRY = re.compile(r"^\.\. (?:auto|py:)\w+:: (?:[\w.]+\.)?(\w+)$", re.MULTILINE)
 
 
 @pytest.mark.parametrize(
     "package", ["kinarm", "kinarm.envs", "kinarm.viewer", "kinarm.policies", "kinarm.evaluation"]
 )
 def test_exported_names_are_documented(package: str) -> None:
-    documented = set(
-        re.findall(r"^\.\. (?:auto|py:)\w+:: (?:[\w.]+\.)?(\w+)$", REFERENCE, re.MULTILINE)
+    documented = {name for page in PAGES.values() for name in ENTRY.findall(page)}
+    assert set(import_module(package).__all__) - documented == set()
+
+
+def test_the_index_has_every_page() -> None:
+    index = (DOCS / "reference" / "api.rst").read_text(encoding="utf-8")
+    assert sorted(re.findall(r"^\.\. kinarm-api:: reference/api/(\w+)$", index, re.MULTILINE)) == (
+        sorted(re.findall(r"^   api/(\w+)$", index, re.MULTILINE))
     )
-    exported = set(import_module(package).__all__)
-    assert exported - documented == set()
+    assert set(re.findall(r"^   api/(\w+)$", index, re.MULTILINE)) == set(PAGES)

@@ -27,7 +27,7 @@ ROOT = Path(__file__).resolve().parents[2]
 RECORDED = {
     "benchmark": "data/results/speed/speed.json",
     "claims": "data/results/claims.json",
-    "comparison": "data/results/learners/learners.json",
+    "comparison": "data/results/*/learners.json",
     "compared-run": "data/results/*/runs/*.json",
     "ranking": "data/policies/ranking.json",
     "training-times": "data/results/timing.json",

@@ -20,6 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 COMMANDS = """
 kinarm-train ars --problem right --iterations 3 --out mine.npz
+kinarm-train ars --problem right --iterations 3 --seeds 2 --jobs 2 --out seeds
 kinarm-replay --policy mine.npz --trials 1 --out replay.html
 kinarm-eval --policy mine.npz --policy ars-tuned-right-seed0 --trials 20 --json
 """

@@ -28,6 +28,7 @@ for (const item of document.querySelectorAll("section .legend li[data-series], s
 
 // What a figure means, and what a drawn mark stands for: shown by a mouse, a tap or the keyboard.
 const tip = document.getElementById("tip");
+let explained = null;
 const meanings = new Map(
   [...document.querySelectorAll("#terms > div")].map((entry) => [entry.children[0].textContent, entry.children[1].textContent])
 );
@@ -43,26 +44,39 @@ function explanation(target) {
 
 function explain(target) {
   const [element, text] = explanation(target);
-  tip.hidden = !text;
-  if (!text) {
+  explained = text ? element : null;
+  tip.textContent = text;
+  placeTip();
+}
+
+// Beside what it explains and within the window; gone as soon as that is out of sight.
+function placeTip() {
+  const place = explained?.getBoundingClientRect();
+  tip.hidden = !place || place.bottom < 0 || place.top > root.clientHeight;
+  if (tip.hidden) {
     return;
   }
-  tip.textContent = text;
-  const place = element.getBoundingClientRect();
-  const left = place.left + (place.width - tip.offsetWidth) / 2;
+  tip.style.left = tip.style.top = "0";
+  const within = (wanted, size, room) => `${Math.max(16, Math.min(wanted, room - size - 16))}px`;
   const above = place.top - tip.offsetHeight - 8;
-  tip.style.left = `${Math.max(16, Math.min(left, root.clientWidth - tip.offsetWidth - 16))}px`;
-  tip.style.top = `${above > 60 ? above : place.bottom + 8}px`;
+  tip.style.left = within(place.left + (place.width - tip.offsetWidth) / 2, tip.offsetWidth, root.clientWidth);
+  tip.style.top = within(above > 60 ? above : place.bottom + 8, tip.offsetHeight, root.clientHeight);
+}
+
+function closeTip() {
+  explained = null;
+  placeTip();
 }
 
 document.addEventListener("click", (event) => explain(event.target));
-document.addEventListener("scroll", () => { tip.hidden = true; }, { passive: true });
-document.addEventListener("keydown", (event) => { tip.hidden ||= event.key === "Escape"; });
+document.addEventListener("scroll", placeTip, { capture: true, passive: true });
+window.addEventListener("resize", placeTip);
+document.addEventListener("keydown", (event) => event.key === "Escape" && closeTip());
 for (const term of document.querySelectorAll(".term")) {
   term.addEventListener("focus", () => explain(term));
-  term.addEventListener("blur", () => { tip.hidden = true; });
+  term.addEventListener("blur", closeTip);
   term.addEventListener("pointerenter", (event) => event.pointerType === "mouse" && explain(term));
-  term.addEventListener("pointerleave", (event) => { tip.hidden ||= event.pointerType === "mouse"; });
+  term.addEventListener("pointerleave", (event) => event.pointerType === "mouse" && closeTip());
 }
 
 // The replay of the worst trials: a row chooses the trial, and follows when the player goes on.

@@ -8,11 +8,17 @@ import math
 import numpy as np
 import pytest
 
-from kinarm.evaluation.comparison.document import comparison_page, curves_csv, write_all
+from kinarm.evaluation.comparison.document import (
+    comparison_document,
+    comparison_page,
+    curves_csv,
+    write_all,
+)
 from kinarm.evaluation.comparison.figures import learning_curves
 from kinarm.evaluation.comparison.learners import read_learners
 from kinarm.evaluation.comparison.results import Comparison
 from kinarm.evaluation.comparison.runs import CurvePoint, Protocol, planned_runs
+from kinarm.evaluation.schemas import document_schema
 from kinarm.evaluation.statistics import Estimate
 from kinarm.problem import PROBLEMS
 
@@ -91,9 +97,15 @@ def test_files(comparison, tmp_path):
     share = 80 / document["reachable"]["right"]
     cells = f"80.0 (49.0..94.3) | {share:.1f} | 90 70 80 | 10.0 | 10.0"
     assert f"| right | ARS, paper | {cells} |" in page
-    assert document["results"][0]["median_steps"] == 10.0
+    assert document["results"][0]["steps_to_success"] == 10.0
     assert "| both | oracle |" in page
     assert "gradient_steps" in page
+
+
+def test_document_is_as_its_schema_says(comparison):
+    jsonschema = pytest.importorskip("jsonschema")
+    document = json.loads(json.dumps(comparison_document(comparison, "a test")))
+    jsonschema.Draft202012Validator(document_schema("comparison")).validate(document)
 
 
 def test_page_says_what_never_happened(comparison):

@@ -58,6 +58,8 @@ class TestRecipes:
         policy = train_policy(recipe("ars", "tuned", problem=EASY, seed=0, iterations=5)).policy
         outcome = evaluate(policy, trials=40)
         assert last.successes == outcome.rollouts.success.sum()
+        for name in ("median_distance", "steps_to_success"):  # as documents call them
+            assert getattr(last, name) == pytest.approx(outcome.metrics[name].value, abs=1e-5)
         assert last.collisions == outcome.rollouts.collision.sum()
         assert last.median_distance == pytest.approx(np.median(outcome.rollouts.distance), abs=1e-5)
         assert last.environment_steps == policy.provenance.environment_steps

@@ -42,7 +42,10 @@ class TestTable:
     def test_figures_are_those_of_the_document(self, page, document):
         pooled, spread = document["pooled"][0]["metrics"], document["pooled"][0]["spread"]
         row = next(row for row in rows_of(page, "right") if text_of(row.find("th")) == "made-right")
-        cells = {cell.get("data-label"): list(cell.itertext()) for cell in row.findall("td")}
+        cells = {}
+        for cell in row.findall("td[@data-label]"):
+            label, *cells[cell.get("data-label")] = cell.itertext()
+            assert label == cell.get("data-label")
         low, high = (100 * end for end in pooled["success"]["ci95"])
         rate = 100 * pooled["success"]["value"]
         assert cells["success %"] == [f"{rate:.1f}", f"{low:.1f}\N{EN DASH}{high:.1f}"]
@@ -101,24 +104,51 @@ class TestCauses:
 
 class TestWorst:
     def test_failures_come_first_and_the_farthest_of_them(self, right):
-        chosen = worst_trials(right)
+        """Each group shows the worst of what no better one shows; seeds count together."""
+        chosen, taken = worst_trials(right), set()
+        assert [group for group, *_ in chosen] == sorted(
+            (group for group, *_ in chosen), key=right.contenders.index
+        )
         for group in right.contenders:
-            everything = sorted(
-                min(
+            badness = {
+                trial: min(
                     (bool(member.rollouts.success[trial]), -member.rollouts.distance[trial])
                     for member in group.members
                 )
                 for trial in range(len(right.trials))
-            )
-            found = [
-                (bool(e.rollouts.success[trial]), -e.rollouts.distance[trial])
-                for owner, e, trial in chosen
-                if owner is group
+                if trial not in taken
+            }
+            found = [(evaluation, trial) for owner, evaluation, trial in chosen if owner is group]
+            shown = [
+                (bool(each.rollouts.success[trial]), -each.rollouts.distance[trial])
+                for each, trial in found
             ]
-            assert found == everything[: len(found)]
-            numbers = [trial for owner, _, trial in chosen if owner is group]
+            assert shown == sorted(badness.values())[: len(shown)]
+            assert len(shown) >= 3
+            taken |= {trial for _, trial in found}
+
+    def test_no_trial_is_there_twice(self, tasks):
+        for task in tasks.values():
+            numbers = [trial for *_, trial in worst_trials(task)]
             assert len(set(numbers)) == len(numbers)
-            assert len(found) >= 3
+
+    def test_policies_that_fail_alike_show_other_trials(self, skilled_evaluation):
+        """The same policy under four names: twelve trials are shown and no three four times."""
+        many = [
+            replace(skilled_evaluation, entrant=Entrant.from_policy(name, made))
+            for name, made in ((f"policy{n}", skilled_evaluation.entrant.policy) for n in range(4))
+        ]
+        (task,) = group_results(evaluation_document(many, ""), many)
+        chosen = worst_trials(task)
+        rollouts = skilled_evaluation.rollouts
+        worst = sorted(
+            range(len(rollouts.success)),
+            key=lambda trial: (bool(rollouts.success[trial]), -rollouts.distance[trial]),
+        )
+        assert [trial for *_, trial in chosen] == worst[:12]
+        assert [group.name for group, *_ in chosen] == [
+            f"policy{n}" for n in range(4) for _ in range(3)
+        ]
 
     def test_rows_tell_what_happened(self, page, right):
         rows = content(page).findall(".//section[@id='worst']//tbody/tr")
@@ -246,9 +276,27 @@ class TestPage:
         page = report_page(evaluation_document([skilled_evaluation], ""), [skilled_evaluation])
         assert "<h1>skilled</h1>" in page
 
-    def test_several_are_counted(self, page):
-        assert "<h1>2 policies</h1>" in page
-        assert "· 4 trainings ·" in page
+    def test_policies_are_counted_as_the_reader_counts_them(self, page, document):
+        """Rows of the tables with a name of their own; the rest is named beside the number."""
+        names, others = set(), set()
+        for task in document["protocol"]["problems"]:
+            rows = rows_of(page, task)
+            policies = {text_of(row.find("th")) for row in rows if row.get("class") == "policy"}
+            heading = text_of(content(page).find(f".//section[@id='{task}']/h2"))
+            plural = "policy" if len(policies) == 1 else "policies"
+            assert heading == f"Problem {task} {len(policies)} {plural}"
+            names |= policies
+            others |= {text_of(row.find("th")) for row in rows} - policies
+        assert f"<h1>{len(names)} policies</h1>" in page
+        subtitle = re.search(r'class="subtitle">(.*?)<', page)[1].split(" · ")
+        assert subtitle[:2] == ["1 to 3 training seeds each", "beside zero and the oracle"]
+        assert others == {"zero", "oracle"}
+
+    def test_a_number_of_seeds_that_all_share_is_told_once(self, evaluations):
+        pooled = [each for each in evaluations if each.entrant.name.startswith("made-right")]
+        page = report_page(evaluation_document(pooled, ""), pooled)
+        assert "<h1>made-right</h1>" in page
+        assert f'"subtitle">{len(pooled)} training seeds · problem right' in page
 
 
 class TestWriting:

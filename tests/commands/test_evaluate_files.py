@@ -1,0 +1,96 @@
+"""``kinarm-eval``: files and reports that it writes."""
+
+import json
+
+from kinarm.evaluation import bounds
+from kinarm.evaluation.document import EvaluationDocument
+from kinarm.evaluation.evaluation import evaluate
+from kinarm.evaluation.request import EvaluationRequest
+
+FILES = {"evaluation.json", "final_distance.png", "final_distance.svg"}
+
+
+def test_folder_is_created_and_filled(run, policy_folder, tmp_path):
+    out = tmp_path / "deep" / "results"
+    arguments = ("--policy", policy_folder / "mine-seed0.npz", "--trials", 4, "--out", out)
+    answer = run("kinarm-eval", *arguments, "--json")
+    assert {path.name for path in out.iterdir()} == FILES
+    assert json.loads((out / "evaluation.json").read_text()) == json.loads(answer.out)
+
+
+def test_earlier_results_are_replaced_when_asked_for(run, tmp_path):
+    (tmp_path / "evaluation.json").write_text("old")
+    (tmp_path / "notes.txt").write_text("mine")
+    arguments = ("--policy", "zero", "--problem", "left", "--trials", 2, "--out", tmp_path)
+    refused = run("kinarm-eval", *arguments)
+    assert refused.status == 2
+    assert "evaluation.json' exists: --overwrite replaces it" in refused.err
+    assert (tmp_path / "evaluation.json").read_text() == "old"
+    run("kinarm-eval", *arguments, "--overwrite")
+    assert json.loads((tmp_path / "evaluation.json").read_text())["protocol"]["trials"] == 2
+    assert (tmp_path / "notes.txt").read_text() == "mine"
+
+
+def test_report_is_one_page(run, policy_folder, tmp_path):
+    arguments = ("--policy", policy_folder / "mine-seed0.npz", "--trials", 4)
+    answer = run("kinarm-eval", *arguments, "--report", tmp_path / "new" / "report")
+    assert (answer.status, answer.err) == (0, "")
+    (page,) = (tmp_path / "new" / "report").iterdir()
+    assert page.name == "index.html"
+    assert str(page) in "".join(answer.out.split("\n"))
+    text = page.read_text(encoding="utf-8")
+    assert "mine-seed0" in text
+    assert evaluate("zero", "right", trials=4).trials.digest in text
+    assert "kinarm-eval --policy" in text
+
+
+def test_report_and_results_share_a_folder(run, tmp_path):
+    arguments = ("--policy", "zero", "--task", "left", "--trials", 2, "--json")
+    answer = run("kinarm-eval", *arguments, "--out", tmp_path, "--report", tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {*FILES, "index.html"}
+    assert json.loads(answer.out) == json.loads((tmp_path / "evaluation.json").read_text())
+
+
+def test_report_is_the_same_from_every_process(run, run_outside, policy_folder, tmp_path):
+    arguments = ("--policy", policy_folder / "mine-seed0.npz", "--trials", 9)
+    arguments = (*arguments, "--report", tmp_path / "report", "--overwrite")
+    pages = []
+    for call in (run, run_outside):
+        assert call("kinarm-eval", *arguments).status == 0
+        pages.append((tmp_path / "report" / "index.html").read_bytes())
+    assert pages[0] == pages[1]
+
+
+def test_files_are_the_same_from_every_process(run, run_outside, policy_folder, tmp_path):
+    one, other = tmp_path / "one", tmp_path / "other"
+    arguments = ("--policy", policy_folder / "mine-seed0.npz", "--policy", "zero", "--trials", 9)
+    assert run("kinarm-eval", *arguments, "--out", one).status == 0
+    assert run_outside("kinarm-eval", *arguments, "--out", other)[0] == 0
+    for name in FILES - {"evaluation.json"}:
+        assert (one / name).read_bytes() == (other / name).read_bytes(), name
+    first, second = (json.loads((path / "evaluation.json").read_text()) for path in (one, other))
+    assert first["results"] == second["results"]
+    assert first["protocol"]["problems"] == second["protocol"]["problems"]
+    assert first["protocol"]["versions"] == second["protocol"]["versions"]
+
+
+def test_the_report_of_more_trials_than_are_bounded(run, policy_folder, tmp_path, monkeypatch):
+    monkeypatch.setattr(bounds, "MOST_BOUNDED", 4)
+    arguments = ("--policy", policy_folder / "mine-seed0.npz", "--trials", 9, "--hold")
+    files = ("--report", tmp_path, "--out", tmp_path, "--card", tmp_path / "card.md")
+    answer = run("kinarm-eval", *arguments, *files)
+    assert (answer.status, answer.err) == (0, "")
+    assert "not asked" in (tmp_path / "index.html").read_text(encoding="utf-8")
+    document = EvaluationDocument.load(tmp_path / "evaluation.json")
+    assert len(document.floors("right")) == 4
+    page = (*arguments[:2], "--worst", 9, "--out", tmp_path / "worst.html")
+    replayed = run("kinarm-replay", tmp_path / "evaluation.json", *page)
+    assert replayed.out.count("proven necessary") == 4
+
+
+def test_kept_documents_are_compact(tmp_path):
+    request = EvaluationRequest(policies=("zero",), problem="left", trials=60, out=tmp_path)
+    document = json.loads(json.dumps(request.run()))
+    text = (tmp_path / "evaluation.json").read_text()
+    assert json.loads(text) == document
+    assert len(text.splitlines()) < 1000
