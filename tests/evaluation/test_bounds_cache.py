@@ -69,6 +69,14 @@ def test_a_file_with_a_number_for_an_array_is_replaced(folder, solutions):
     assert same(oracle_bounds(draw()), solutions)
 
 
+def test_bounds_of_other_trials_under_the_name_of_these_are_replaced(folder, solutions):
+    oracle_bounds(draw())
+    (path,) = folder.iterdir()
+    fewer = {name: array[:-1] for name, array in solutions.arrays().items()}
+    path.write_bytes(archive(fewer))
+    assert same(oracle_bounds(draw()), solutions)
+
+
 def test_whichever_byte_of_a_file_is_wrong_the_bounds_are_right(folder, solutions, monkeypatch):
     oracle_bounds(draw())
     (path,) = folder.iterdir()
