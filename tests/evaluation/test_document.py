@@ -9,7 +9,7 @@ from rich.console import Console
 
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.bounds import bounds_document
-from kinarm.evaluation.document import EvaluationDocument, evaluation_document
+from kinarm.evaluation.document import ENTRY, EvaluationDocument, check_shape, evaluation_document
 from kinarm.evaluation.entrants import ORACLE, Entrant
 from kinarm.evaluation.evaluation import evaluate, run_trials
 from kinarm.evaluation.metrics import METRICS, Metric
@@ -395,3 +395,25 @@ class TestChoosing:
 
     def test_says_what_it_holds(self, document):
         assert repr(document) == "EvaluationDocument('made.json', 4 results)"
+
+
+def test_where_nothing_fits_only_the_least_is_shown(document):
+    """Rich cuts it, and every other column is named."""
+    told = " ".join(printed(document, width=24).split())
+    named = told.partition("left out for want of width: ")[2].partition("; --markdown")[0]
+    assert {*named.split(", ")} < {*shown(document)[0]}
+    assert "left out" not in printed(document)
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ({}, "results is no list"),
+        ([{"steps": 3}, 4], "results.1 is no object"),
+        ([{}], "results.0 lacks 'steps'"),
+        ([{"steps": "3"}], "results.0.steps is of the wrong kind"),
+    ],
+)
+def test_the_first_place_that_is_wrong_is_named(value, said):
+    with pytest.raises(InvalidInputError, match=f"^{said}$"):
+        check_shape(value, {ENTRY: {"steps": int}}, "results")
