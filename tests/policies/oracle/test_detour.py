@@ -7,7 +7,7 @@ import pytest
 from configurations import depths
 
 from kinarm.arm import Arm
-from kinarm.policies.oracle.detour import Tree, find_detour
+from kinarm.policies.oracle.detour import Tree, _extend, _shorten, find_detour
 from kinarm.policies.oracle.motion import along_path, steps_between, straight
 from kinarm.problem import PROBLEMS
 from kinarm.scene import PAPER_BENCHES, Obstacle, Scene
@@ -154,3 +154,14 @@ def test_nodes_lead_back_to_their_root():
     assert (first, second) == (2, 3)
     np.testing.assert_array_equal(tree.path_to_root(second), [[0, 2], [0, 1], [0, 0]])
     np.testing.assert_array_equal(tree.path_to_root(1), [[1, 0]])
+
+
+def test_a_tree_does_not_grow_towards_where_it_is(walled):
+    tree = Tree(START[None])
+    assert _extend(walled, tree, START, np.inf) == 0
+    assert len(tree.nodes) == 1
+
+
+def test_nothing_is_shorter_than_the_straight_way(walled):
+    path = np.array([START, START + 0.01])
+    assert _shorten(walled, path, np.random.default_rng(0)) is path

@@ -130,6 +130,11 @@ def test_bad_entry(saved, entries):
     refused(saved)
 
 
+def test_numbers_of_double_precision(state):
+    with pytest.raises(InvalidInputError, match="must be finite, of single precision"):
+        replace(state, parameters=state.parameters.astype(np.float64))
+
+
 def test_later_version(saved):
     spoil(saved, version=np.array(99))
     refused(saved, "version 99")
