@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinarm.errors import PolicyFileError
+from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.failed_scenarios import FailedScenarios
 from kinarm.policies import (
     CurvePoint,
