@@ -15,6 +15,7 @@ from made_up_runs import made_up
 
 from kinarm.errors import InvalidInputError, WorkerError
 from kinarm.evaluation.commands.reproduce import ReproductionRequest
+from kinarm.evaluation.reproduction import document as documents
 from kinarm.evaluation.reproduction.runs import RunStore
 from kinarm.evaluation.reproduction.study import Study, quick_study
 from kinarm.policies import load_policy
@@ -187,13 +188,14 @@ def test_quick_with_ppo(run_outside, tmp_path):
     assert "| 3: both | oracle | 100.0 |" in page
 
 
-def test_the_same_command_trains_what_is_missing(tmp_path, capsys):
+def test_the_same_command_trains_what_is_missing(tmp_path, capsys, monkeypatch):
     """By an executor of the caller's, which hands back what it is asked for, and no more."""
     study = quick_study(ppo=False)
     store = RunStore(tmp_path, study.protocol)
     policy, run = load_policy("ars-tuned-right"), made_up(np.full(study.protocol.trials, 0.04))
     for training in study.trainings[2:]:
         store.save(training, policy, run)
+    monkeypatch.setattr(documents, "write_all", lambda *_: ())
     executor = InThisProcess()
     executor.work = lambda _: (policy, run)
     request = ReproductionRequest(quick=True, ppo=False, out=tmp_path)

@@ -302,6 +302,12 @@ class TestRefused:
             (name,) = own
             self.check(model, f"the model's observations, .*{name} \\({own[name].shape[0]},\\)")
 
+    def test_other_parts(self):
+        spaces = gymnasium.spaces.Dict({"camera": box(3)})
+        env = vec_env.DummyVecEnv([partial(Wrapped, spaces)])
+        model = sb3.PPO("MultiInputPolicy", env, device="cpu")
+        self.check(model, r"the model's observations, camera \(3,\), are not those of arm")
+
     def test_an_environment_that_is_none_of_ours(self):
         env = vec_env.DummyVecEnv([lambda: gymnasium.make("Pendulum-v1")])
         assert sb3_model(sb3.PPO("MlpPolicy", env, device="cpu")).problem is None
