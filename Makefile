@@ -14,7 +14,7 @@ eval: $(call INSTALLED,core) ## evaluate all shipped policies on 200 trials a ta
 	$(BIN)/kinarm-eval --trials 200
 
 # Without the libraries of the extra zoo, what needs them cannot be covered.
-COVERAGE := from importlib.util import find_spec; print(95 if find_spec("sb3_contrib") else 85)
+COVERAGE := from importlib.util import find_spec; print(98 if find_spec("sb3_contrib") else 85)
 
 PYTEST := $(BIN)/python -m pytest --dist loadfile --no-loadscope-reorder --durations=25
 COVERED = --cov --cov-report=term --cov-fail-under=$$($(BIN)/python -c '$(COVERAGE)')

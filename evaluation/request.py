@@ -244,8 +244,6 @@ class EvaluationRequest(ProblemOptions):
             for entrant, best_for in chosen
             if self.matrix or self._faces(entrant, best_for, problem, named)
         ]
-        if not pairs:
-            raise InvalidInputError("no chosen policy was trained for a problem: name a --problem")
         if self.oracle and ORACLE not in entrants:
             faced = {problem.digest: problem for _, problem in pairs}
             pairs += [(ORACLE, problem) for problem in faced.values()]

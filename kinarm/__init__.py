@@ -12,10 +12,11 @@ __version__ = "0.1.0"
 # What there is stands in __init__.pyi, and is imported when it is first used.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
-if not _interrupts.is_command():  # a command starts in two thirds of the time without Gymnasium
+# A command starts in two thirds of the time without Gymnasium.
+if not _interrupts.is_command():  # pragma: no branch - tests are no command, and start some
     from kinarm import envs as envs  # which registers the environments
 
 _root = Path(__file__).resolve().parent.parent
-if (_root / "pyproject.toml").is_file():
+if (_root / "pyproject.toml").is_file():  # pragma: no branch - tests/packaging runs a wheel
     # In a clone the sub-packages lie beside this folder, whatever is installed.
     __path__.append(str(_root))

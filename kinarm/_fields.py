@@ -128,8 +128,6 @@ def from_plain(kind: type[T], entries: object, where: str, path: str = "") -> T:
     try:
         return kind(**values)
     except KinarmError as error:
-        if isinstance(error, InvalidInputError) and str(error).startswith(f"{where}: "):
-            raise
         raise InvalidInputError(f"{where}: {path and path[:-1] + ': '}{error}") from error
 
 

@@ -175,4 +175,4 @@ def kept_from_children() -> Iterator[None]:
 
 
 if is_command():
-    _take_over()
+    _take_over()  # pragma: no cover - tests are no command; test_interrupts starts some

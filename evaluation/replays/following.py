@@ -27,7 +27,7 @@ def fresh_recordings(entrant: Entrant, simulator: Simulator, seed: int) -> Itera
     The seed is that of the first trial; the next ones count up.
     """
     oracle = Oracle(simulator.problem)
-    for number in itertools.count():
+    for number in itertools.count():  # pragma: no branch - it counts without end
         trials = TrialSet.draw_in(simulator, 1, seed + number)
         if entrant is ORACLE:  # solved here, so that no bounds are kept of every trial
             actions = oracle.solve_batch(trials.starts, trials.goals).actions

@@ -11,7 +11,7 @@ import ipaddress
 import socket
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 from urllib.parse import urlsplit
 
 from kinarm.viewer.live_scene import LiveScene
@@ -141,7 +141,6 @@ class Reception:
                 await self._show(visit)
             finally:
                 leaving.cancel()
-            return
         if status == "200 OK" and file is None:
             status = "404 Not Found"
         self._promote(visit, "served")
@@ -149,8 +148,8 @@ class Reception:
             file = File("text/plain", f"{status}\n".encode())
         await visit.answer(status, file.kind, file.content)
 
-    async def _show(self, visit: Visit) -> None:
-        """Send the scene, and what changes of it, as fast as it is taken."""
+    async def _show(self, visit: Visit) -> NoReturn:
+        """Send the scene, and what changes of it, as fast as it is taken, until that fails."""
         while True:
             visit.news.clear()
             for command in self._scene.since(visit.seen):

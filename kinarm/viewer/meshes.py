@@ -212,7 +212,7 @@ def tube(points: ArrayLike, radius: float, sides: int = 6) -> Mesh:
 
 
 def from_coal(shape: coal.CollisionGeometry) -> Mesh:
-    """Skin of a primitive, a convex hull or a mesh, in its own frame.
+    """Skin of a primitive or a convex hull, in its own frame.
 
     Raises
     ------
@@ -229,8 +229,4 @@ def from_coal(shape: coal.CollisionGeometry) -> Mesh:
         return cylinder(2 * shape.halfLength, shape.radius, 0.0)
     if isinstance(shape, coal.ConvexBase):
         return _convex_hull(np.array(shape.points()))
-    if isinstance(shape, coal.BVHModelBase):
-        corners = [shape.tri_indices(k) for k in range(shape.num_tris)]
-        faces = [[int(corner[k]) for k in range(3)] for corner in corners]
-        return Mesh(np.array(shape.vertices()), np.array(faces, dtype=np.int64).reshape(-1, 3))
     raise TypeError(f"cannot draw a {type(shape).__name__}")

@@ -1,6 +1,7 @@
 """``kinarm-bench``: JSON alone, or a table, from the same figures."""
 
 import json
+import re
 from functools import partial
 
 import pytest
@@ -177,6 +178,23 @@ def test_table_shows_every_figure(run, monkeypatch):
     assert "tiny" not in answer.out
 
 
+def test_table_of_what_is_always_measured(run, monkeypatch):
+    """Without the extras, and without what is only measured if it is asked for."""
+    reason = "robots are not installed"
+    asked_for = ("limits", "peers", "ppo_training", "studies")
+    plain = {name: figures for name, figures in DOCUMENT.items() if name not in asked_for}
+    skipped = {"robots": [{"skipped": reason}], "stable_baselines3": {"skipped": reason}}
+    monkeypatch.setattr(benchmark, "measure", lambda *_, **__: {**plain, **skipped})
+    answer = run("kinarm-bench")
+    assert (answer.status, answer.err) == (0, "")
+    shown = " ".join(re.sub("[^\\w\\s.()-]", "", answer.out).split())
+    assert f"arms with meshes skipped {reason}" in shown
+    assert f"for Stable-Baselines3 skipped {reason}" in shown
+    assert "training of Table 1 (2.3 million steps) 1.52 s 1.41 s oracle" in shown
+    for missing in ("PPO", "study", "peers", "spent in", "DummyVecEnv"):
+        assert missing not in shown
+
+
 def test_training_that_was_skipped_says_why(run, monkeypatch):
     reason = "torch is not installed: pip install 'kinarm[ppo]'"
     assert table._ppo_rows({"skipped": reason}) == [("training with PPO", "skipped"), (reason,)]
@@ -209,6 +227,11 @@ class TestFiles:
         assert "## Everything" in page
         assert "Peers" not in page
         assert "Operations" not in page
+
+    def test_page_without_a_peer_that_is_installed(self):
+        page = speed_page({**DOCUMENT, "peers": DOCUMENT["peers"][1:]}, "kinarm-bench")
+        assert "| panda-gym | panda-gym is not installed" in page
+        assert "- **" not in page
 
     def test_folder_that_cannot_be_written_is_refused_before_anything_is_measured(
         self, run, monkeypatch, tmp_path

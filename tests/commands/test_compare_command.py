@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from kinarm.errors import InvalidInputError
 from kinarm.evaluation.commands.compare import ComparisonRequest
 
 SMALL = ("--problems", "right", "--steps", 3000, "--trials", 20, "--seeds", 1, "--jobs", 1)
@@ -13,6 +14,11 @@ RECIPES = ("--learners", "ars-paper", "ars-tuned")
 @pytest.fixture
 def folder(tmp_path):
     return tmp_path / "out"
+
+
+def test_there_must_be_a_problem():
+    with pytest.raises(InvalidInputError, match="there is no problem to compare learners on"):
+        ComparisonRequest(problems=())
 
 
 def run_files(folder):

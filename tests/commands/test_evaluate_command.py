@@ -51,6 +51,12 @@ def test_defaults(evaluated, run, policy_folder):
     assert all(relative_success(row) is not None for row in document["results"])
 
 
+def test_a_problem_without_policies_is_told(run):
+    answer = run("kinarm-eval", "--problem", "shelf-panda", "--trials", 1, "--no-oracle")
+    assert (answer.status, answer.err) == (0, "")
+    assert answer.out.splitlines()[-1] == "no shipped policy was trained for this"
+
+
 def test_command_is_recorded(evaluated):
     document = evaluated("--policy", "zero", "--trials", 2, "--task", "left")
     assert (

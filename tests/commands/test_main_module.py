@@ -6,7 +6,7 @@ from importlib import metadata
 
 import pytest
 
-from kinarm.__main__ import COMMANDS
+from kinarm.__main__ import COMMANDS, main
 
 SCRIPTS = {
     script.name: script.value.removesuffix(":main")
@@ -24,25 +24,45 @@ def test_it_knows_all_commands_and_no_other():
     assert {f"kinarm-{name}": module for name, (module, _) in COMMANDS.items()} == SCRIPTS
 
 
-def test_without_a_command_it_lists_them():
-    done = type_in()
-    assert (done.returncode, done.stderr) == (0, "")
-    assert all(name in done.stdout for name in SCRIPTS)
-    assert all(len(line) <= 80 for line in done.stdout.splitlines())
+@pytest.fixture
+def run_main(capsys):
+    """Run it in this process."""
+
+    def call(*words):
+        with pytest.raises(SystemExit) as stopped:
+            main(words)
+        return stopped.value.code or 0, *capsys.readouterr()
+
+    return call
 
 
-def test_it_runs_the_command_that_is_named():
+def test_without_a_command_it_lists_them(run_main):
+    status, out, err = run_main()
+    assert (status, err) == (0, "")
+    assert all(name in out for name in SCRIPTS)
+    assert all(len(line) <= 80 for line in out.splitlines())
+
+
+def test_it_runs_the_command_that_is_named(run_main):
     done = type_in("problem", "list")
     assert (done.returncode, done.stderr) == (0, "")
     assert "shelf-panda" in done.stdout
-    assert "usage: kinarm-eval" in type_in("eval", "--help").stdout
+    assert run_main("problem", "list") == (0, done.stdout, "")
+    assert "usage: kinarm-eval" in run_main("eval", "--help")[1]
 
 
-def test_an_unknown_command_is_refused_in_one_line():
-    done = type_in("fly")
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.count("\n") == 1
-    assert "invalid choice: 'fly' (choose from " in done.stderr
+def test_words_are_those_of_the_process_if_none_are_given(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["kinarm", "arms", "--version"])
+    with pytest.raises(SystemExit):
+        main()
+    assert capsys.readouterr().out == f"kinarm {metadata.version('kinarm')}\n"
+
+
+def test_an_unknown_command_is_refused_in_one_line(run_main):
+    status, out, err = run_main("fly")
+    assert (status, out) == (2, "")
+    assert err.count("\n") == 1
+    assert "invalid choice: 'fly' (choose from " in err
 
 
 @pytest.mark.parametrize("program", SCRIPTS)
@@ -58,3 +78,11 @@ def test_it_prints_the_completion_of_all_commands():
     assert (done.returncode, done.stderr) == (0, "")
     ends = [line.split()[-1] for line in done.stdout.splitlines() if line.startswith("complete ")]
     assert sorted(ends) == sorted(SCRIPTS)
+
+
+def test_each_command_prints_its_own_completion(run_main, monkeypatch):
+    started = []
+    monkeypatch.setattr(subprocess, "run", lambda words, check: started.append(words))
+    assert run_main("--print-completion", "zsh")[0] == 0
+    assert [words[2] for words in started] == [module for module, _ in COMMANDS.values()]
+    assert {tuple(words[3:]) for words in started} == {("--print-completion", "zsh")}

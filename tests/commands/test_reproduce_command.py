@@ -15,6 +15,7 @@ from made_up_runs import made_up
 
 from kinarm.errors import InvalidInputError, WorkerError
 from kinarm.evaluation.commands.reproduce import ReproductionRequest
+from kinarm.evaluation.reproduction import document as documents
 from kinarm.evaluation.reproduction.runs import RunStore
 from kinarm.evaluation.reproduction.study import Study, quick_study
 from kinarm.policies import load_policy
@@ -97,12 +98,12 @@ class InThisProcess:
     """An executor as simple as can be."""
 
     def __init__(self):
-        self.names = []
+        self.names, self.work = [], None
 
     def carry_out(self, work, tasks):
         for number, task in enumerate(tasks):
             self.names.append(task.name)
-            yield Finished(number, work(task))
+            yield Finished(number, (self.work or work)(task))
 
 
 @pytest.mark.slow
@@ -185,6 +186,25 @@ def test_quick_with_ppo(run_outside, tmp_path):
     assert "ARS needs fewer environment steps than PPO" in page
     assert "| 3: both | PPO, 2 seeds |" in page
     assert "| 3: both | oracle | 100.0 |" in page
+
+
+def test_the_same_command_trains_what_is_missing(tmp_path, capsys, monkeypatch):
+    """By an executor of the caller's, which hands back what it is asked for, and no more."""
+    study = quick_study(ppo=False)
+    store = RunStore(tmp_path, study.protocol)
+    policy, run = load_policy("ars-tuned-right"), made_up(np.full(study.protocol.trials, 0.04))
+    for training in study.trainings[2:]:
+        store.save(training, policy, run)
+    monkeypatch.setattr(documents, "write_all", lambda *_: ())
+    executor = InThisProcess()
+    executor.work = lambda _: (policy, run)
+    request = ReproductionRequest(quick=True, ppo=False, out=tmp_path)
+    for left in (2, 0):
+        request.run(executor)
+        told = f"{len(study.trainings) - 2} of {len(study.trainings)} trainings are finished"
+        assert (told in capsys.readouterr().err) is bool(left)
+    assert sorted(executor.names) == sorted(each.name for each in study.trainings[:2])
+    assert json.loads((tmp_path / "study.json").read_text()) == {"study": "quick"}
 
 
 @pytest.mark.parametrize("judged", [True, False])

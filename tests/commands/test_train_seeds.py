@@ -10,10 +10,11 @@ from pathlib import Path
 import pytest
 
 from kinarm.errors import InvalidInputError
-from kinarm.policies import Policy, policy_names, recipe, train_policy
+from kinarm.policies import Policy, policy_names, recipe, seeds, train_policy
 from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
 from kinarm.policies.progress_board import ProgressBoard
-from kinarm.policies.seeds import SeedsRequest, seeds_of
+from kinarm.policies.seeds import SeedsRequest, SeedTask, seeds_of
+from kinarm.policies.training_files import CheckpointKeeper, checkpoint_path
 from kinarm.policies.training_request import TrainRequest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -160,6 +161,66 @@ def test_a_seed_that_fails_says_why_in_one_line(run, tmp_path):
         answer = run("kinarm-train", *arguments, "--jobs", 1, "--out", tmp_path)
     assert (answer.status, answer.out) == (2, "")
     assert "another process is writing" in answer.err.splitlines()[-1]
+
+
+def test_what_was_to_be_replaced_is_trained_anew(run, tmp_path):
+    """A policy with the settings that are asked for is finished, one with others is not."""
+    leave(tmp_path, "policy")
+    train_policy(config(0, noise=0.5)).policy.save(tmp_path / f"{NAME.format(0)}.npz")
+    before = (tmp_path / f"{NAME.format(0)}.npz").read_bytes()
+    arguments = ("ars", "--problem", "right", "--iterations", 9, *SMALL, "--noise", 0.5)
+    options = ("--seeds", 2, "--jobs", 1, "--resume", "--overwrite", "--out", tmp_path)
+    answer = run("kinarm-train", *arguments, *options)
+    assert answer.status == 0, answer.err
+    assert (tmp_path / f"{NAME.format(0)}.npz").read_bytes() == before
+    made = Policy.load(tmp_path / f"{NAME.format(1)}.npz")
+    check_equal(made, train_policy(config(1, noise=0.5)).policy)
+
+
+def test_there_must_be_a_seed():
+    with pytest.raises(InvalidInputError, match="there is no seed to train"):
+        SeedsRequest(training=TrainRequest(learner="ars", out=Path("right")), seeds=())
+
+
+class TestAskedToStop:
+    """What a worker does, within this process."""
+
+    @pytest.fixture
+    def task(self, tmp_path):
+        return SeedTask(config(3), tmp_path / f"{NAME.format(3)}.npz")
+
+    @pytest.fixture
+    def board(self, tmp_path):
+        (tmp_path / "board").mkdir()
+        board = ProgressBoard(tmp_path / "board", 1)
+        board.clear()
+        return board
+
+    def test_before_it_begins_nothing_is_written(self, task, board, tmp_path):
+        board.ask_to_stop()
+        assert seeds._train((0, task), board, 1, None) is None
+        assert [path.name for path in tmp_path.iterdir()] == ["board"]
+        assert seeds._what_is_left([task]).endswith("the same command begins again")
+
+    def test_in_between_it_keeps_a_checkpoint(self, task, board, monkeypatch):
+        asked = iter([False, False, False, True])
+        monkeypatch.setattr(ProgressBoard, "asked_to_stop", lambda _: next(asked))
+        assert seeds._train((0, task), board, 1, None) is None
+        state = load_checkpoint(checkpoint_path(task.out)).state
+        assert state.iteration == board.iterations == 3
+        assert "0 of 1 seeds are finished" in seeds._what_is_left([task])
+        monkeypatch.undo()
+        last = seeds._train((0, task), board, 1, None)
+        assert last.environment_steps == train_policy(task.config).curve[-1].environment_steps
+        check_equal(Policy.load(task.out), train_policy(task.config).policy)
+        assert "1 of 1 seeds are finished" in seeds._what_is_left([task])
+
+    def test_without_an_iteration_there_is_nothing_to_keep(self, task):
+        path = checkpoint_path(task.out)
+        keeper = CheckpointKeeper(task.config, path, None)
+        assert keeper.save_on_interrupt() == "interrupted before the first iteration"
+        keeper.save()
+        assert not path.exists()
 
 
 def start(command, folder: Path, shared: Path, *extra: object) -> subprocess.Popen:

@@ -11,6 +11,7 @@ import pytest
 from oracle_calls import count_calls
 from trial_bounds import draw, same
 
+from kinarm._archive import save_archive
 from kinarm._cache import cache_folder
 from kinarm.evaluation import bounds
 from kinarm.evaluation.bounds import oracle_bounds
@@ -65,7 +66,15 @@ def test_a_file_that_cannot_be_used_is_replaced(folder, solutions, monkeypatch, 
 def test_a_file_with_a_number_for_an_array_is_replaced(folder, solutions):
     oracle_bounds(draw())
     (path,) = folder.iterdir()
-    path.write_bytes(archive({**solutions.arrays(), "steps": np.array(3)}))
+    save_archive(path, *bounds.ARCHIVE, {**solutions.arrays(), "steps": np.array(3)}, {})
+    assert same(oracle_bounds(draw()), solutions)
+
+
+def test_bounds_of_other_trials_under_the_name_of_these_are_replaced(folder, solutions):
+    oracle_bounds(draw())
+    (path,) = folder.iterdir()
+    fewer = {name: array[:-1] for name, array in solutions.arrays().items()}
+    save_archive(path, *bounds.ARCHIVE, fewer, {})
     assert same(oracle_bounds(draw()), solutions)
 
 

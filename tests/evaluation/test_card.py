@@ -12,7 +12,13 @@ from kinarm.evaluation.document import evaluation_document
 from kinarm.evaluation.entrants import BASELINES, ORACLE, Entrant
 from kinarm.evaluation.evaluation import run_trials
 from kinarm.evaluation.metrics import METRICS
-from kinarm.evaluation.report.card import check_card, policy_card, shown_trials, write_card
+from kinarm.evaluation.report.card import (
+    _origin,
+    check_card,
+    policy_card,
+    shown_trials,
+    write_card,
+)
 from kinarm.policies import load_policy
 from kinarm.problem import PROBLEMS
 
@@ -44,6 +50,18 @@ def test_states_figures_with_intervals_beside_the_oracle(card, document):
     ratio = rows["mine"]["metrics"]["step_ratio"]["value"]
     (line,) = (line for line in card.splitlines() if METRICS["step_ratio"].meaning in line)
     assert line.endswith(f"| {ratio:.2f} | 1.00 |")
+
+
+def test_what_was_not_trained_has_no_card(document, trials):
+    with pytest.raises(InvalidInputError, match="a card is of a trained policy, got 'zero'"):
+        policy_card("zero", document, run_trials(BASELINES["zero"], trials))
+
+
+def test_a_seed_is_told_where_it_is_known(skilled):
+    made = skilled.provenance
+    unknown = _origin(replace(made, seed=None))
+    assert unknown == [line for line in _origin(made) if line != ("seed", str(made.seed))]
+    assert len(unknown) < len(_origin(made))
 
 
 def test_states_where_the_policy_comes_from(card, skilled, document):

@@ -294,3 +294,11 @@ def test_two_problems_of_one_name_are_refused(skilled):
         evaluation_document(both, "")
     named = evaluate(skilled, PROBLEMS["right"].replace(name="lax", tolerance=0.1), trials=2)
     assert len(evaluation_document([both[0], named], "")["protocol"]["problems"]) == 2
+
+
+def test_where_nothing_fits_only_the_least_is_shown(document):
+    """Rich cuts it, and every other column is named."""
+    told = " ".join(printed(document, width=24).split())
+    named = told.partition("columns that do not fit here: ")[2].partition("; --markdown")[0]
+    assert {*named.split(", ")} < {*shown(document)[0]}
+    assert "do not fit here" not in printed(document)

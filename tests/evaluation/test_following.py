@@ -6,6 +6,7 @@ import socket
 import numpy as np
 import pytest
 
+from kinarm.errors import InvalidInputError
 from kinarm.evaluation import ReplayRequest
 from kinarm.evaluation.entrants import ORACLE, find_entrants
 from kinarm.evaluation.replays import following
@@ -96,6 +97,22 @@ def test_live_request_serves_until_it_is_stopped(no_waiting, monkeypatch, port):
     assert lines[0] == f"zero at {opened[0]} (stop with Ctrl-C)"
     assert [line.split(",")[0] for line in lines[1:]] == ["left 0", "left 1"]
     assert not listens(port)
+
+
+def test_live_request_ends_where_there_is_nothing_more_to_show(left, no_waiting, monkeypatch, port):
+    (entrant,) = find_entrants("zero")
+    few = list(itertools.islice(fresh_recordings(entrant, left, 0), 2))
+    monkeypatch.setattr(following, "fresh_recordings", lambda *_: iter(few))
+    lines = []
+    request = ReplayRequest(policy="zero", problem="left", live=True, port=port, browser=False)
+    assert request.run(lines.append) is None
+    assert [line.split(",")[0] for line in lines[1:]] == ["left 0", "left 1"]
+    assert not listens(port)
+
+
+def test_what_is_no_port_is_refused():
+    with pytest.raises(InvalidInputError, match="port must be at most 65535, got 65536"):
+        ReplayRequest(policy="zero", live=True, port=65536)
 
 
 def test_live_request_says_where_it_goes_instead(no_waiting, port):

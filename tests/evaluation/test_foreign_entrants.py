@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from kinarm.envs import ReachEnv
 from kinarm.errors import InvalidInputError, PolicyFileError, UnknownNameError
 from kinarm.evaluation import evaluate, find_entrants
+from kinarm.evaluation.imported import policy_function
 from kinarm.policies import Policy
 from kinarm.policies.conversion.vec_normalize import find_vec_normalize
 from kinarm.problem import PROBLEMS
@@ -44,6 +46,12 @@ def module(tmp_path, monkeypatch):
     (tmp_path / "mine_for_tests.py").write_text(MODULE)
     yield "mine_for_tests"
     sys.modules.pop("mine_for_tests", None)
+
+
+def test_a_predictor_whose_options_nobody_can_see():
+    """Functions in C need not tell them: ``max`` takes the largest row."""
+    policy = policy_function(SimpleNamespace(predict=max), "mine")
+    assert policy([[0.1, 0.2], [0.3, 0.1]]) == [0.3, 0.1]
 
 
 class TestModule:

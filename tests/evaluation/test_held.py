@@ -123,3 +123,11 @@ def test_seeds_are_pooled(skilled, trials):
 def test_without_it_there_is_nothing_to_tell(skilled_evaluation):
     figures = estimate_metrics(Outcomes((skilled_evaluation.rollouts,)))
     assert figures["held"].value is figures["median_approach"].value is None
+
+
+def test_what_is_shown_of_it():
+    touched = np.array([True, False, True])
+    held = Held(
+        closest=np.zeros(3), farthest_at_end=np.ones(3), collision=touched, steps=np.full(3, 64)
+    )
+    assert repr(held) == "Held(3 trials, 2 collisions)"

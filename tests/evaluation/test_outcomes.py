@@ -26,6 +26,13 @@ def test_resampled_distances_in_order_are_those_that_are_sorted(skilled_evaluati
     np.testing.assert_array_equal(resampled.ordered_distance, np.sort(resampled.distance, axis=-1))
 
 
+def test_distances_are_put_in_order_once(skilled_evaluation):
+    outcomes = Outcomes((skilled_evaluation.rollouts,))
+    order, ordered = outcomes.order_of("distance")
+    np.testing.assert_array_equal(outcomes.distance[..., order].ravel(), ordered.ravel())
+    assert outcomes.order_of("distance")[0] is order
+
+
 @pytest.fixture
 def few_bounded(monkeypatch):
     monkeypatch.setattr(bounds, "MOST_BOUNDED", 12)

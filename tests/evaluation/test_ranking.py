@@ -2,9 +2,11 @@
 
 import json
 from importlib import resources
+from types import SimpleNamespace
 
 import pytest
 
+from kinarm.evaluation import ranking as rankings
 from kinarm.evaluation.ranking import SEED, TRIALS, ranking
 from kinarm.policies import policy_names
 from kinarm.policies.library import RANKING, best_policy
@@ -29,3 +31,16 @@ def test_the_best_are_measured_again(recorded):
         again = ranking([best])["success"][problem]
         assert again == {best: successes[best]}
         assert successes[best] == max(successes.values())
+
+
+def test_what_is_measured_is_written_beside_the_policies(monkeypatch, tmp_path):
+    name = "ars-tuned-right-seed0"
+    (tmp_path / "policies").mkdir()
+    there = SimpleNamespace(files=lambda _: tmp_path, as_file=resources.as_file)
+    monkeypatch.setattr(rankings, "resources", there)
+    monkeypatch.setattr(rankings, "policy_names", lambda: (name,))
+    monkeypatch.setattr(rankings, "ranking", lambda names: ranking(names, trials=20))
+    rankings.main()
+    written = json.loads((tmp_path / "policies" / RANKING).read_text())
+    assert (written["trials"], written["seed"]) == (20, SEED)
+    assert list(written["success"]["right"]) == [name]

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from kinarm.errors import InvalidInputError, UnknownNameError
-from kinarm.evaluation.document import EvaluationDocument, evaluation_document
+from kinarm.evaluation.document import ENTRY, EvaluationDocument, check_shape, evaluation_document
 
 
 @pytest.fixture
@@ -107,3 +107,17 @@ class TestChoosing:
 
     def test_says_what_it_holds(self, document):
         assert repr(document) == "EvaluationDocument('made.json', 4 results)"
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ({}, "results is no list"),
+        ([{"steps": 3}, 4], "results.1 is no object"),
+        ([{}], "results.0 lacks 'steps'"),
+        ([{"steps": "3"}], "results.0.steps is of the wrong kind"),
+    ],
+)
+def test_the_first_place_that_is_wrong_is_named(value, said):
+    with pytest.raises(InvalidInputError, match=f"^{said}$"):
+        check_shape(value, {ENTRY: {"steps": int}}, "results")

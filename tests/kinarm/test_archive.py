@@ -9,7 +9,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from kinarm._archive import load_archive, reading, save_archive
+from kinarm._archive import load_archive, parse_json, reading, save_archive
 from kinarm.errors import InvalidInputError, OutputError, PolicyFileError, RecordingFileError
 
 ARRAYS = {
@@ -285,3 +285,10 @@ class TestHostileFiles:
         array = np.asfortranarray(np.arange(6.0).reshape(2, 3))
         rewritten(saved, numbers=array)
         np.testing.assert_array_equal(load(saved).arrays["numbers"], array)
+
+
+def test_documents_that_would_fill_the_memory_are_not_parsed():
+    """Empty lists take thirty times the memory of their text."""
+    assert parse_json("[" + "[]," * 1000 + "[]]") == [[]] * 1001
+    with pytest.raises(ValueError, match="it would take [0-9]+ MB of memory"):
+        parse_json("[" + "[]," * 3_000_000 + "[]]")

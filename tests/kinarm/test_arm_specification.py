@@ -120,6 +120,11 @@ class TestArmFiles:
         assert arm.n_joints == 5
         assert arm.name == "mine"
 
+    def test_folders_of_packages_are_kept(self, tmp_path):
+        given = ArmSpecification(source="paper", package_dirs=(str(tmp_path),))
+        assert given.completed().package_dirs == (str(tmp_path),)
+        assert ArmSpecification(source="paper").completed().package_dirs == ()
+
     def test_source_and_folders_start_at_the_file(self, tmp_path, shipped_arms, monkeypatch):
         urdf = shipped_arms["paper"].urdf_path.read_text()
         (tmp_path / "own.urdf").write_text(urdf)

@@ -1,6 +1,7 @@
 """Arrays that can be computed anew are kept in the user's cache folder."""
 
 import os
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -74,3 +75,13 @@ def test_the_folder_is_the_users_unless_another_is_named(tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path))
     assert cache_folder() == Path(tmp_path) / ".cache" / "kinarm"
     assert "KINARM_CACHE" not in os.environ
+
+
+def test_without_a_home_it_is_that_of_temporary_files(monkeypatch):
+    def homeless():
+        raise RuntimeError("Could not determine home directory.")
+
+    for name in ("KINARM_CACHE", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(Path, "home", homeless)
+    assert cache_folder() == Path(tempfile.gettempdir()) / "kinarm"

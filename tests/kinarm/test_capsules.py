@@ -5,7 +5,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from kinarm.capsules import enclosing_capsule
+from kinarm.capsules import _capsule_around, enclosing_capsule
 from kinarm.errors import ArmError
 
 
@@ -89,6 +89,14 @@ class TestEnclosingCapsule:
                 points = np.array([shape.placement.act(p) for p in shape.geometry.points()])
                 capsule = enclosing_capsule(shape)
                 assert (distance_from_segment(points, capsule) <= capsule.radius + 1e-12).all()
+
+    def test_what_is_round_gets_a_sphere(self):
+        """The corners of an octahedron are as far from its centre in all directions."""
+        corners = np.concatenate([np.eye(3), -np.eye(3)])
+        capsule = _capsule_around(corners)
+        np.testing.assert_array_equal(capsule.start, capsule.end)
+        np.testing.assert_allclose(capsule.start, 0, atol=1e-8)
+        assert capsule.radius == pytest.approx(1)
 
     def test_unsupported_shape_is_refused(self):
         shape = pin.GeometryObject("cone_0", 1, pin.SE3.Identity(), coal.Cone(0.1, 0.2))

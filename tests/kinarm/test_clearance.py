@@ -106,6 +106,24 @@ def test_infinite_where_nothing_is_tested(make_joint, write_robot):
     assert np.isnan(points).all()
 
 
+def test_where_everything_overlaps_the_deepest_pair_counts(make_joint, make_collision, write_robot):
+    """Coal is asked about every pair: no bound is large enough to leave one out."""
+    shapes = {
+        0: make_collision('<box size="0.4 0.4 0.4"/>'),
+        2: make_collision('<box size="0.3 0.2 0.4"/>', xyz="0 0 0.3"),
+    }
+    limit = '<limit lower="-3.1" upper="3.1" velocity="3" effort="0"/>'
+    path = write_robot([make_joint(), make_joint(axis="0 1 0", limit=limit)], shapes)
+    problem = ReachProblem.load("right")
+    empty = Scene(obstacles=(), goal_regions=problem.scene.goal_regions, ground=False)
+    world = World(problem.replace(arm=path, scene=empty))
+    for q in np.random.default_rng(2).uniform((-2, 2.9), (2, 3.1), (20, 2)):
+        distances = coal_distances(world, q)
+        assert len(distances) == 1
+        assert distances[0] < -0.1
+        assert world.clearance(q).distance == pytest.approx(distances.min(), abs=COAL)
+
+
 def test_survives_a_copy(simulator):
     closeness = Closeness(simulator.world.contact_model)
     again, q = pickle.loads(pickle.dumps(closeness)), random_configurations(simulator, 8, 20)

@@ -37,6 +37,10 @@ class TestCommands:
             (WorkerError("a worker ended"), 1, "bake: a worker ended\n"),
             (KeyboardInterrupt(), 130, "bake: interrupted\n"),
             (KeyboardInterrupt("stopped at 3"), 130, "bake: stopped at 3\n"),
+            (BrokenPipeError(), 0, ""),
+            (OSError(28, "No space left", "bread"), 1, "bake: bread: No space left\n"),
+            (OSError(5, "Input/output error"), 1, "bake: standard output: Input/output error\n"),
+            (MemoryError(), 1, "bake: out of memory: no more to be had\n"),
             (SystemExit(5), 5, ""),
             (SystemExit(None), 0, ""),
         ],
@@ -135,6 +139,15 @@ class TestStreams:
     def test_closed_streams(self, closed):
         done = self.run(closed)
         assert (done.returncode, done.stderr) == (0, b"")
+
+    @pytest.mark.parametrize("name", ["stdout", "stderr"])
+    def test_a_stream_that_was_closed_before_takes_everything(self, monkeypatch, name):
+        monkeypatch.setattr(sys, name, None)
+        with pytest.raises(SystemExit) as stopped:
+            run_command("bake", lambda: getattr(sys, name).write("crumbs"))
+        with getattr(sys, name) as stream:
+            assert stream.name == os.devnull
+        assert not stopped.value.code
 
     def test_encodings_without_the_letter(self):
         done = self.run("", PYTHONIOENCODING="ascii")

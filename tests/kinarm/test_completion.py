@@ -12,7 +12,7 @@ pytest.importorskip("shtab")
 
 from kinarm._completion import SHELLS, completion_script
 from kinarm._options import add_options
-from kinarm._parser import Parser
+from kinarm._parser import CommandParser, Parser
 from kinarm.evaluation.replays.request import ReplayRequest
 
 
@@ -46,6 +46,19 @@ def test_options_and_names_are_in_every_script(shell):
     text = script(shell)
     for word in ("bread", "shape", "loaf", "rye", "print-completion"):
         assert word in text
+
+
+@pytest.mark.parametrize("shell", SHELLS)
+def test_options_of_commands_are_completed(shell):
+    """What an option is for is told to its first detail, by shells that show it."""
+    parser = Parser(prog="bake")
+    parser.add_argument("--quiet", action="store_true")
+    inner = parser.add_subparsers(parser_class=CommandParser).add_parser("bread", help="Bread.")
+    add_options(inner, Baking)
+    text = completion_script(parser, shell)
+    for word in ("quiet", "bread", "shape", "loaf", "rye"):
+        assert word in text
+    assert ("Where it goes" in text) is (shell != "bash")
 
 
 @pytest.mark.parametrize("shell", SHELLS)

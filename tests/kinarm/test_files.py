@@ -1,5 +1,6 @@
 """Atomic writing, and seeing beforehand that a file can be written."""
 
+import fcntl
 import multiprocessing
 import os
 import signal
@@ -10,10 +11,15 @@ from pathlib import Path
 import pytest
 
 from kinarm._files import (
+    absolute,
     check_folder,
     check_output,
     first_line,
+    is_being_written,
+    is_file,
+    is_folder,
     only_writer,
+    read_file,
     write_atomically,
     write_text,
 )
@@ -176,6 +182,34 @@ class TestOnlyWriter:
             write_text(path, "free again")
         assert list(tmp_path.iterdir()) == [path]
 
+    def test_what_it_writes_is_being_written(self, tmp_path):
+        path = tmp_path / "one"
+        assert not is_being_written(path)
+        with only_writer(path):
+            assert is_being_written(path)
+        (tmp_path / ".one.lock").touch()  # which a process that was killed left behind
+        assert not is_being_written(path)
+
+    @pytest.mark.parametrize("left", [False, True])
+    def test_a_lock_that_its_last_owner_removes_meanwhile(self, tmp_path, monkeypatch, left):
+        """It is locked, but another file or none lies in its place: another one is opened."""
+        lock, flock, calls = tmp_path / ".one.lock", fcntl.flock, []
+
+        def race(file, operation):
+            calls.append(file)
+            if len(calls) == 1:
+                lock.unlink()
+                if left:
+                    lock.touch()
+            flock(file, operation)
+
+        monkeypatch.setattr(fcntl, "flock", race)
+        with only_writer(tmp_path / "one"):
+            assert len(calls) == 2
+            assert calls[0].closed is left or calls[0] is not calls[1]
+            assert os.path.samestat(os.fstat(calls[1].fileno()), lock.stat())
+        assert list(tmp_path.iterdir()) == []
+
     def test_other_outputs_are_free(self, tmp_path):
         with only_writer(tmp_path / "one"), only_writer(tmp_path / "two"):
             pass
@@ -241,6 +275,30 @@ class TestCheckOutput:
         (tmp_path / "file").write_text("")
         with pytest.raises(OutputError, match="cannot write to .*file"):
             check_output(tmp_path / "file" / "policy.npz")
+
+
+class TestNamesThatNoFileCanHave:
+    LONG = "x" * 5000
+
+    @pytest.mark.parametrize("name", [LONG, "a\0b"])
+    def test_there_is_none(self, name):
+        assert not is_file(name)
+        assert not is_folder(name)
+
+    def test_they_stay_as_they_are(self):
+        assert absolute("a\0b") == Path("a\0b")
+
+    def test_they_cannot_be_written(self):
+        with pytest.raises(OutputError, match="cannot write 'xxx.*File name too long"):
+            check_output(self.LONG)
+
+
+def test_files_are_read_up_to_a_size(tmp_path):
+    path = tmp_path / "file"
+    path.write_bytes(bytes(2_000_001))
+    assert len(read_file(path)) == len(read_file(path, 2_000_001)) == 2_000_001
+    with pytest.raises(ValueError, match="it is larger than 2 MB"):
+        read_file(path, 2_000_000)
 
 
 def test_texts_are_written_in_utf_8(tmp_path):

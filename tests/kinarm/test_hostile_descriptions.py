@@ -6,6 +6,7 @@ import pytest
 from kinarm.arm import Arm
 from kinarm.errors import ArmError
 from kinarm.hulls import hull_of_mesh
+from kinarm.mesh_content import mesh_content
 from kinarm.urdf_schema import MOST_LINKS
 from kinarm.xml_files import DEEPEST, parse_xml
 
@@ -20,6 +21,7 @@ BOMB = b'<!DOCTYPE a [<!ENTITY b "bbbbbbbbbb"><!ENTITY c "&b;&b;&b;&b;">]><robot
         (b'<a><b count="99999999999"/></a>', "more than it holds"),
         (b"<a><b></a>", "mismatched tag"),
         (b"", "no element found"),
+        (b"<a:b/>", "unbound prefix"),
         (b'<?xml version="1.0" encoding="xyz"?><a/>', "unknown encoding"),
         (b'<?xml version="1.0" encoding="hex"?><a/>', "not a text encoding"),
         (b'<?xml version="1.0" encoding="utf-7"?><a/>', "not supported"),
@@ -106,3 +108,38 @@ def test_meshes_that_are_refused(tmp_path, number, reason):
     path.write_text("".join("v {} {} {}\n".format(*corner) for corner in corners) + faces)
     with pytest.raises(ArmError, match=f"'part.obj'.*{reason}"):
         hull_of_mesh(path, np.ones(3))
+
+
+@pytest.mark.parametrize("xyz", ["0 up 0", "0 0 0x"])
+def test_words_in_place_of_numbers(make_joint, write_robot, xyz):
+    path = write_robot([make_joint(xyz=xyz), make_joint(axis="0 1 0")])
+    with pytest.raises(ArmError, match=f"numbers of xyz of <origin> must be 3 .*, got '{xyz}'"):
+        Arm.load(path)
+
+
+def test_links_that_nothing_holds(make_joint, write_robot):
+    path = write_robot([make_joint()], extra='<link name="lost"/>')
+    with pytest.raises(ArmError, match="has links that no joint joins: 'link_0', 'lost'"):
+        Arm.load(path)
+
+
+def test_a_robot_that_cannot_move(make_joint, write_robot):
+    with pytest.raises(ArmError, match=r"made.urdf has no moving joint"):
+        Arm.load(write_robot([make_joint("fixed")], tool=None))
+
+
+def test_a_wheel_that_carries_nothing_is_held_where_it_is(make_joint, write_robot):
+    """A continuous joint has no range to be in the middle of."""
+    wheel = (
+        '<link name="wheel"/><joint name="roll" type="continuous"><parent link="link_1"/>'
+        '<child link="wheel"/><axis xyz="1 0 0"/></joint>'
+    )
+    arm = Arm.load(write_robot([make_joint()], extra=wheel))
+    assert arm.description.held == {"roll": 0.0}
+
+
+def test_meshes_with_words_in_place_of_numbers(tmp_path):
+    path = tmp_path / "mesh.dae"
+    path.write_text("<COLLADA><float_array>1.0 two 3.0</float_array></COLLADA>")
+    with pytest.raises(ArmError, match=r"'mesh.dae' cannot .*<float_array> holds what is no"):
+        mesh_content(path)

@@ -37,6 +37,7 @@ def set_signals(monkeypatch):
         ("-m", ["python", "-m", "pytest"], False),
         ("-m", ["python", "-m", "pytest", "kinarm"], False),
         ("-m", ["python", "-m", "kinarmor"], False),
+        ("-m", ["python"], False),
         (None, ["python"], False),
     ],
 )

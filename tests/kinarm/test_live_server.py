@@ -1,5 +1,6 @@
 """The live page's server: what it tells, whom it answers, and what it keeps."""
 
+import errno
 import io
 import socket
 import struct
@@ -7,6 +8,7 @@ import threading
 import urllib.error
 import urllib.request
 from itertools import islice
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +18,7 @@ from meshcat.geometry import Box
 
 from kinarm.errors import InvalidInputError, OutputError
 from kinarm.viewer.live_scene import LiveScene
-from kinarm.viewer.live_server import LiveServer
+from kinarm.viewer.live_server import LiveServer, _say_nothing_of_the_network
 from kinarm.viewer.live_visits import MOST, judged
 
 
@@ -248,3 +250,30 @@ class TestPorts:
             taken.listen()
             with pytest.raises(OutputError, match="cannot serve on port 65535: Address already"):
                 LiveServer(65535)
+
+
+def test_closing_again_does_nothing():
+    with LiveServer(0) as server:
+        server.close()
+    assert not server._thread.is_alive()
+
+
+def test_a_port_that_is_not_ours_to_take(monkeypatch):
+    """The next ones are not tried: they are as little."""
+    tried = []
+
+    def refuse(address):
+        tried.append(address[1])
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr(socket, "create_server", refuse)
+    with pytest.raises(OutputError, match="cannot serve on port 80: Permission denied"):
+        LiveServer(80)
+    assert tried == [80]
+
+
+@pytest.mark.parametrize(("error", "told"), [(OSError(), False), (ValueError(), True)])
+def test_breaking_connections_are_no_news(error, told):
+    context, seen = {"message": "it broke", "exception": error}, []
+    _say_nothing_of_the_network(SimpleNamespace(default_exception_handler=seen.append), context)
+    assert seen == ([context] if told else [])

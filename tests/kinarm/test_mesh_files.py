@@ -326,3 +326,16 @@ class TestRobots:
             touched = [part.mesh for part in collision_parts(arm) if part.joint == joint]
             if touched:
                 np.testing.assert_allclose(bounds(*seen), bounds(*touched), atol=0.12)
+
+
+def test_files_that_their_reader_fails_on(tmp_path, monkeypatch):
+    import trimesh
+
+    def fail(*_, **__):
+        raise KeyError("vertices\nof all things")
+
+    path = tmp_path / "cube.stl"
+    path.write_bytes(bytes(84))
+    monkeypatch.setattr(trimesh, "load_scene", fail)
+    with pytest.raises(ArmError, match="^mesh 'cube.stl' cannot be read: 'vertices"):
+        mesh_files._pieces(path, (1, 1, 1))

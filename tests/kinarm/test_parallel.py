@@ -1,5 +1,6 @@
 """Kernels over ranges of rows."""
 
+import os
 import threading
 
 import numpy as np
@@ -19,6 +20,14 @@ def test_every_row_is_worked_on_once(n, threads, work):
 
     run_rows(kernel, n, work, threads, counts)
     np.testing.assert_array_equal(counts, 1)
+
+
+def test_threads_are_those_that_the_system_grants(monkeypatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 2, 5})
+    assert available_threads() == 3
+    monkeypatch.delattr(os, "sched_getaffinity")
+    monkeypatch.setattr(os, "cpu_count", lambda: 7)
+    assert available_threads() == 7
 
 
 def test_no_rows():

@@ -132,3 +132,8 @@ def test_equal_scenes_compare_and_hash_equal():
     assert Scene(obstacles=[obstacle()]) == Scene(obstacles=(obstacle(),))
     assert hash(Scene()) == hash(Scene())
     assert Scene(ground=False) != Scene()
+
+
+def test_what_is_too_far_away_is_refused():
+    with pytest.raises(ProblemError, match=r"'far' must be at most 1e\+06, got"):
+        Obstacle(name="far", lower=(0.0, 0.0, 0.0), upper=(1.0, 1.0, 2e6))

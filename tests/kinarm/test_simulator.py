@@ -511,3 +511,18 @@ def test_with_another_tolerance_it_is_as_if_built_so():
     np.testing.assert_array_equal(found.steps, expected.steps)
     np.testing.assert_array_equal(found.success, expected.success)
     assert found.success.sum() > plain.success.sum()
+
+
+def test_functions_drive_all_episodes(simulator, scenarios):
+    with pytest.raises(InvalidInputError, match="policy_index does not apply to a function"):
+        simulator.rollout(lambda seen: seen[:, :5], *scenarios, policy_index=[0])
+
+
+def test_a_step_tells_the_distance_from_the_tool_to_the_goal(simulator, scenarios):
+    """Against Pinocchio."""
+    starts, goals = (part[:20] for part in scenarios)
+    episodes = simulator.reset(starts, goals)
+    result = simulator.step(episodes, np.full((20, 5), 0.3))
+    tools = np.array([simulator.arm.tool_position(q) for q in episodes.q])
+    expected = np.linalg.norm(tools - goals, axis=1)
+    np.testing.assert_allclose(result.distance, expected, atol=1e-12)

@@ -8,7 +8,9 @@ import struct
 import time
 from dataclasses import replace
 
+import coal
 import numpy as np
+import pinocchio as pin
 import pytest
 import umsgpack
 
@@ -20,9 +22,19 @@ from kinarm.problem import ReachProblem
 from kinarm.recording import record_rollouts
 from kinarm.scene import GoalRegion, Obstacle, Scene, rotation_matrix
 from kinarm.viewer import Camera, arm_page, replay_page
+from kinarm.viewer.arm_page import _shape_data
 from kinarm.viewer.arm_shapes import arm_parts
 from kinarm.viewer.camera import stage_scale
-from kinarm.viewer.meshes import Mesh, box, capsule, cylinder, housing, lathe, tube
+from kinarm.viewer.meshes import (
+    Mesh,
+    box,
+    capsule,
+    cylinder,
+    from_coal,
+    housing,
+    lathe,
+    tube,
+)
 from kinarm.viewer.surroundings import obstacle_meshes
 
 
@@ -308,3 +320,17 @@ def test_small_stages_are_seen_from_nearer_by():
     assert stage_scale(arm, Scene(goal_regions=(far,))) == pytest.approx(2, rel=1e-3)
     near = ReachProblem.load("left").replace(scene=small)
     assert Camera.of_replays(near, short).position[0] > camera.position[0]
+
+
+def test_lists_have_a_group_for_each_recording(recordings):
+    with pytest.raises(InvalidInputError, match="a group for each recording: 2 for 3"):
+        replay_page(recordings, groups=["fell", "fell"])
+
+
+def test_shapes_that_no_arm_has_are_not_drawn():
+    cone = coal.Cone(0.1, 0.2)
+    with pytest.raises(TypeError, match="cannot draw a Cone"):
+        from_coal(cone)
+    shape = pin.GeometryObject("hat", 1, pin.SE3.Identity(), cone)
+    with pytest.raises(ArmError, match="collision shape 'hat' is a Cone: not supported"):
+        _shape_data(shape)

@@ -1,10 +1,15 @@
 """Worker processes: every task once, whatever happens to them."""
 
+import os
+import queue
+import sys
 from functools import partial
+from types import SimpleNamespace
 
 import pytest
 from small_tasks import kill_own_process_at_seven, kill_own_process_once, square, touch
 
+from kinarm import workers
 from kinarm.errors import WorkerError
 from kinarm.workers import ATTEMPTS, LocalExecutor
 
@@ -47,3 +52,22 @@ def test_errors_of_a_task_are_told_as_they_are(tmp_path):
     work = partial(touch, tmp_path / "missing")
     with pytest.raises(FileNotFoundError):
         list(LocalExecutor(2).carry_out(work, range(3)))
+
+
+def test_a_worker_ends_when_its_parent_has_ended(monkeypatch):
+    """Linux then gives it another one."""
+    parents, waited = iter([17, 17, 1]), []
+    monkeypatch.setattr(os, "getppid", lambda: next(parents))
+    monkeypatch.setattr(workers, "time", SimpleNamespace(sleep=waited.append))
+    monkeypatch.setattr(os, "_exit", sys.exit)
+    with pytest.raises(SystemExit) as ended:
+        workers._end_with_parent(17)
+    assert ended.value.code == 1
+    assert waited == [workers.WATCH_SECONDS] * 2
+
+
+def test_a_worker_looks_after_its_parent_in_a_thread_of_its_own(monkeypatch):
+    watched = queue.SimpleQueue()
+    monkeypatch.setattr(workers, "_end_with_parent", watched.put)
+    workers._prepare_worker(17)
+    assert watched.get(timeout=30) == 17

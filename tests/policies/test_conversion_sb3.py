@@ -12,6 +12,7 @@ import pytest
 from kinarm.envs import ReachEnv, ReachGoalEnv
 from kinarm.errors import InvalidInputError, KinarmError, MissingExtraError, PolicyFileError
 from kinarm.policies import Policy
+from kinarm.policies.conversion.sb3_models import sb3_model
 from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
 
@@ -223,8 +224,8 @@ class TestProblem:
 class Wrapped(gymnasium.Wrapper):
     """An arm with other spaces."""
 
-    def __init__(self, observation=None, action=None):
-        super().__init__(ReachEnv("right"))
+    def __init__(self, observation=None, action=None, env=None):
+        super().__init__(env or ReachEnv("right"))
         self.observation_space = observation or self.env.observation_space
         self.action_space = action or self.env.action_space
 
@@ -289,6 +290,27 @@ class TestRefused:
         self.check(self.of_spaces(action=box(4)), "arm 'paper' takes 5 numbers from -1 to 1")
         wide = gymnasium.spaces.Box(-2.0, 2.0, (5,))
         self.check(self.of_spaces(action=wide), "arm 'paper' takes 5 numbers from -1 to 1")
+
+    def test_goals_in_other_boxes(self):
+        """Its observations are a dictionary as ours, whose parts are not; or no dictionary."""
+        for own in ({"desired_goal": box(2)}, {"observation": box(9)}):
+            spaces = {**ReachGoalEnv("right").observation_space.spaces, **own}
+            env = vec_env.DummyVecEnv(
+                [partial(Wrapped, gymnasium.spaces.Dict(spaces), None, ReachGoalEnv("right"))]
+            )
+            model = sb3.PPO("MultiInputPolicy", env, device="cpu")
+            (name,) = own
+            self.check(model, f"the model's observations, .*{name} \\({own[name].shape[0]},\\)")
+
+    def test_other_parts(self):
+        spaces = gymnasium.spaces.Dict({"camera": box(3)})
+        env = vec_env.DummyVecEnv([partial(Wrapped, spaces)])
+        model = sb3.PPO("MultiInputPolicy", env, device="cpu")
+        self.check(model, r"the model's observations, camera \(3,\), are not those of arm")
+
+    def test_an_environment_that_is_none_of_ours(self):
+        env = vec_env.DummyVecEnv([lambda: gymnasium.make("Pendulum-v1")])
+        assert sb3_model(sb3.PPO("MlpPolicy", env, device="cpu")).problem is None
 
     def test_a_frame_stack(self):
         env = vec_env.VecFrameStack(vec_env.DummyVecEnv([MAKE["MlpPolicy"]]), 4)

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from kinarm.errors import InvalidInputError
 from kinarm.policies.normalizer import Normalizer, input_scale
 
 
@@ -81,3 +82,9 @@ def test_statistics_of_given_observations():
     assert seen.count == 200
     np.testing.assert_allclose(seen.mean, data.mean(axis=0), rtol=1e-12)
     np.testing.assert_allclose(seen.std, data.std(axis=0), rtol=1e-12)
+
+
+@pytest.mark.parametrize(("count", "squares"), [(-1, [0.0, 0.0]), (3, [0.0, -1e-9])])
+def test_what_no_observations_have_is_refused(count, squares):
+    with pytest.raises(InvalidInputError, match="must not be negative"):
+        Normalizer(count, np.zeros(2), np.array(squares))

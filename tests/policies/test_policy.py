@@ -412,3 +412,9 @@ class TestBadFile:
             Policy.load(saved)
         make_policy().save(saved)
         assert isinstance(Policy.load(saved).provenance, Provenance)
+
+
+def test_what_would_overflow_is_refused(provenance):
+    layer = Layer(np.full((2, 3), 1e31), np.zeros(2))
+    with pytest.raises(InvalidInputError, match=r"weights must be at most 1e\+30"):
+        Policy(np.zeros(3), np.ones(3), (layer,), provenance)

@@ -8,7 +8,12 @@ from importlib import metadata
 import pytest
 
 from kinarm.errors import InvalidInputError
-from kinarm.policies.provenance import Provenance, package_versions, source_commit
+from kinarm.policies.provenance import (
+    Provenance,
+    _package_versions,
+    package_versions,
+    source_commit,
+)
 from kinarm.problem import ReachProblem
 
 
@@ -90,3 +95,16 @@ def test_outside_of_a_clone_the_commit_is_unknown(anew, monkeypatch, tmp_path):
     installed = tmp_path / "kinarm" / "policies" / "provenance.py"
     monkeypatch.setattr("kinarm.policies.provenance.__file__", str(installed))
     assert source_commit() == ""
+
+
+def test_packages_that_are_not_installed_are_left_out(monkeypatch):
+    version = metadata.version
+
+    def without_torch(package):
+        if package == "torch":
+            raise metadata.PackageNotFoundError(package)
+        return version(package)
+
+    monkeypatch.setattr(metadata, "version", without_torch)
+    found, known = dict(_package_versions.__wrapped__()), package_versions()
+    assert found == {name: version for name, version in known.items() if name != "torch"}

@@ -78,3 +78,13 @@ def test_others_are_refused(tmp_path, network_file):
     biased.save(tmp_path / "biased.npz")
     with pytest.raises(InvalidInputError, match="has a bias"):
         first_policy(ARSConfig(initial_policy=str(tmp_path / "biased.npz")))
+
+
+def test_statistics_are_taken_where_they_are_used():
+    policy = "ars-tuned-right-seed1"
+    states = [
+        begin_training(ARSConfig(initial_policy=policy, normalize=normalize)).initial_state()
+        for normalize in (True, False)
+    ]
+    assert [state.normalizer.count > 0 for state in states] == [True, False]
+    np.testing.assert_array_equal(states[0].theta, states[1].theta)

@@ -1,7 +1,10 @@
 """The benchmark measures what it says, on sizes small enough for a test."""
 
 import json
+import os
+import signal
 import subprocess
+import sys
 import time
 from functools import partial
 from pathlib import Path
@@ -11,6 +14,7 @@ import numpy as np
 import pytest
 
 from kinarm._parallel import available_threads
+from kinarm.errors import WorkerError
 from kinarm.evaluation.measurements import (
     benchmark,
     environments,
@@ -39,11 +43,11 @@ def document(train_novice, tmp_path_factory):
 
 def shrink(patch: pytest.MonkeyPatch) -> None:
     """Fewer batch sizes and trials, and a short training."""
-    run = subprocess.run
+    told_by = measurements_of_evaluation._told_by
 
-    def run_less(command, **settings):
+    def told_by_less(command, env):
         fewer = ["1" if word == "200" else word for word in command]
-        return run([*fewer, "--policy", "zero"], **settings)
+        return told_by([*fewer, "--policy", "zero"], env)
 
     patch.setattr(benchmark, "BATCHES", (6, 512))
     patch.setattr(benchmark, "measure_robots", lambda _: [{"skipped": "not here"}])
@@ -52,7 +56,7 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(oracle, "ORACLE_TRIALS", 4)
     patch.setattr(pictures, "PICTURES", 2)
     patch.setattr(training, "recipe", partial(recipe, iterations=3))
-    patch.setattr(subprocess, "run", run_less)
+    patch.setattr(measurements_of_evaluation, "_told_by", told_by_less)
 
 
 def rates(document) -> list[dict[str, float]]:
@@ -135,6 +139,24 @@ def test_the_evaluation_is_measured_before_and_after_its_bounds_are_known(monkey
     assert (folder == again, before, after) == (True, 0, 1)
     assert folder != own_cache
     assert not folder.exists()
+
+
+def test_an_evaluation_that_fails_is_told():
+    with pytest.raises(WorkerError, match="was to be measured ended unexpectedly"):
+        measurements_of_evaluation._told_by([sys.executable, "-c", "raise SystemExit(3)"], {})
+
+
+def test_an_evaluation_ends_with_an_interrupted_benchmark(monkeypatch):
+    seen = []
+
+    def communicate(process):
+        seen.append(process)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(subprocess.Popen, "communicate", communicate)
+    with pytest.raises(KeyboardInterrupt):
+        measurements_of_evaluation._told_by(["sleep", "600"], os.environ)
+    assert seen[0].returncode == -signal.SIGKILL
 
 
 def test_speed_up_is_the_ratio_of_two_figures(document):

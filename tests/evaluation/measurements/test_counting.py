@@ -1,6 +1,9 @@
 """Operations are counted as often as they are carried out, and for each lane."""
 
 import math
+import subprocess
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -57,6 +60,11 @@ def test_lanes_count_one_for_each():
     assert counted(scale, np.zeros((2, LANES))) == {"sums": LANES, "products": LANES}
 
 
+def test_single_precision_does_not_count():
+    assert counted(lambda x: x * x, np.float32(3)) == {}
+    assert counted(lambda x: x * x, 3.0) == {"products": 1}
+
+
 def test_layer_takes_a_product_and_a_sum_for_each_weight():
     weights, inputs, outputs = np.zeros(49 * 5), np.zeros((1, 48)), np.zeros((1, 5))
     found = counted(affine_layer.py_func, weights, 0, 48, 5, inputs, 0, outputs, 0)
@@ -75,6 +83,21 @@ def test_names_are_those_of_the_source():
         source_name("_ZN6kinarm7kernels7network3actB3v64B52c8tJT") == "kinarm.kernels.network.act"
     )
     assert source_name("main") == "main"
+
+
+def test_operations_are_those_that_a_process_of_its_own_prints(monkeypatch):
+    """It compiles anew: an earlier kernel, from Numba's cache, would not count."""
+    seen = []
+
+    def run(command, *, env, **_):
+        seen.append((command, list(Path(env["NUMBA_CACHE_DIR"]).iterdir())))
+        return SimpleNamespace(stdout='{"total": 3.5}')
+
+    monkeypatch.setattr(subprocess, "run", run)
+    assert operations.measure_operations("mine.npz") == {"total": 3.5}
+    ((command, cached),) = seen
+    assert command[-3:] == ["-m", operations.__name__, "mine.npz"]
+    assert cached == []
 
 
 @pytest.mark.slow

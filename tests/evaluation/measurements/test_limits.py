@@ -86,6 +86,18 @@ class TestRobots:
         (row,) = robots.measure_robots(1)
         assert "pip install 'kinarm[robots]'" in row["skipped"]
 
+    def test_left_out_where_the_package_is_incomplete(self, monkeypatch):
+        monkeypatch.setattr(robots.metadata, "files", lambda _: ["robots/README.md"])
+        with pytest.raises(MissingExtraError, match="example-robot-data"):
+            robots.robots_folder()
+
+    def test_novices_are_trained_for_their_robot(self, monkeypatch):
+        monkeypatch.setattr(robots, "robot_problem", PROBLEMS.get)
+        monkeypatch.setattr(robots, "TRAINING_ITERATIONS", 2)
+        made = robots.novice.__wrapped__("left").provenance
+        assert made.problem.name == "left"
+        assert made.config["iterations"] == 2
+
     def test_rows_name_their_arm(self, monkeypatch, train_novice):
         monkeypatch.setattr(robots, "ROBOT_BATCH", 6)
         monkeypatch.setattr(robots, "novice", lambda name: train_novice("right"))

@@ -1,8 +1,11 @@
 """Peers are compared on the same arm, scene and ways, and a missing one is named."""
 
+import itertools
 import os
 import sys
-from types import ModuleType
+from importlib import import_module
+from types import ModuleType, SimpleNamespace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -120,6 +123,27 @@ def test_environments_are_stepped_beside_ours(monkeypatch, train_novice):
     assert min(single.theirs.median, single.ours.median, batch.ours.median) > 0
 
 
+@pytest.mark.parametrize(
+    ("module", "measured_by", "environment"),
+    [
+        ("panda_gym", "panda_reach", "PandaReach"),
+        ("gymnasium_robotics", "fetch_reach", "FetchReach"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_environments_of_peers_are_stepped(
+    monkeypatch, train_novice, module, measured_by, environment
+):
+    pytest.importorskip(module)
+    monkeypatch.setattr(reach_environments, "STEPS", 3)
+    monkeypatch.setattr(reach_environments, "VECTOR_STEPS", 2)
+    peer = import_module(f"{measuring.__package__}.{measured_by}")
+    found = list(peer.compare(train_novice("left"), 1))
+    assert [row.what.split("-")[0] for row in found] == [environment] * 2
+    assert {row.terms for row in found} == {peer.TERMS}
+    assert min(row.theirs.median for row in found) > 0
+
+
 class TestMuJoCo:
     @pytest.fixture(params=["paper", "lrmate200ic_5l", "ur5"])
     def worlds(self, request):
@@ -205,6 +229,45 @@ class TestMuJoCo:
         ends = found[:, -1, 1 : 1 + model.nq]
         assert np.median(np.abs(ends - targets[:, -1])) < 1e-2
 
+    def test_rollouts_of_two_arms_are_compared(self, monkeypatch, train_novice):
+        """Each by as many tests a step as kinarm's, and by one."""
+        pytest.importorskip("mujoco")
+        from kinarm.evaluation.measurements.peers import mujoco_rollouts
+
+        counted = []
+        monkeypatch.setattr(mujoco_rollouts, "EPISODES", 4)
+        monkeypatch.setattr(mujoco_rollouts, "novice", lambda _: train_novice("left"))
+        monkeypatch.setattr(
+            mujoco_rollouts,
+            "compared",
+            lambda theirs, ours, *_, **__: counted.append([theirs(), ours()]),
+        )
+        policy = train_novice("right")
+        assert len(list(mujoco_rollouts.compare(policy, 1))) == 4
+        starts, goals = Simulator("right").sample(np.random.default_rng(4), 4)
+        steps = int(Simulator("right").rollout(policy, starts, goals).steps.sum())
+        assert counted[:2] == [[4 * 64, steps]] * 2
+
+    def test_every_solid_has_its_size(self, make_joint, make_collision, write_robot):
+        """The mass that MuJoCo gives a solid of density 1000 is that of its volume."""
+        mujoco = pytest.importorskip("mujoco")
+        from kinarm.evaluation.measurements.peers.mjcf import mjcf
+
+        shapes = {
+            1: make_collision('<cylinder radius="0.1" length="0.3"/>', rpy="0.3 0.2 0.1"),
+            2: make_collision('<sphere radius="0.1"/>'),
+            3: make_collision('<box size="0.1 0.2 0.3"/>'),
+        }
+        path = write_robot([make_joint(), make_joint(xyz="0 0 0.5"), make_joint()], shapes)
+        document = ElementTree.fromstring(mjcf(World(PROBLEMS["right"].replace(arm=path)), 0.02))
+        for body in document.iter("body"):
+            for inertial in body.findall("inertial"):
+                body.remove(inertial)  # so that MuJoCo works it out
+        model = mujoco.MjModel.from_xml_string(ElementTree.tostring(document, encoding="unicode"))
+        volumes = [np.pi * 0.1**2 * 0.3, 4 / 3 * np.pi * 0.1**3, 0.1 * 0.2 * 0.3]
+        masses = [model.body(f"link{k}").mass[0] for k in (1, 2, 3)]
+        assert masses == pytest.approx(1000 * np.array(volumes))
+
 
 class TestAugmentedRandomSearch:
     @pytest.fixture
@@ -220,6 +283,24 @@ class TestAugmentedRandomSearch:
         (found,) = contrib_ars.compare(train_novice("right"), 1)
         assert "theirs" in found.what
         assert min(found.theirs.median, found.ours.median) > 0
+
+    def test_trials_are_looked_at_now_and_then_until_the_budget_is_spent(
+        self, contrib_ars, monkeypatch
+    ):
+        """Ten iterations of a second each, and a look at every second one."""
+        clock = itertools.count(0.0)
+        monkeypatch.setattr(contrib_ars, "time", SimpleNamespace(perf_counter=lambda: next(clock)))
+        for name, value in {"BUDGET": 10.0, "BETWEEN_LOOKS": 2.0, "LEVEL": 1.1}.items():
+            monkeypatch.setattr(contrib_ars, name, value)
+        trials, looks = TrialSet.draw(PROBLEMS["right"], 4, 0), []
+        zeros = np.zeros(trials.simulator.n_actions)
+
+        def policy():
+            looks.append(len(looks))
+            return lambda seen: zeros + 0 * seen[:, :5]
+
+        found = contrib_ars.attempt(lambda: 7, policy, trials)
+        assert (found.seconds, len(looks)) == (10.0, 5)
 
     def test_training_is_over_when_enough_trials_succeed(self, contrib_ars, monkeypatch):
         monkeypatch.setattr(contrib_ars, "BETWEEN_LOOKS", 0.0)

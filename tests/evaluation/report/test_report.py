@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from importlib import resources
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import pytest
@@ -15,7 +16,7 @@ from kinarm.evaluation.evaluation import evaluate
 from kinarm.evaluation.report import maps
 from kinarm.evaluation.report.groups import PAGE_COLOURS, PAGE_DASHES, group_results
 from kinarm.evaluation.report.page import page_template, report_page, write_report
-from kinarm.evaluation.report.worst import record_worst, worst_trials
+from kinarm.evaluation.report.worst import oracle_steps, record_worst, worst_trials
 from kinarm.evaluation.table import table_rows
 from kinarm.viewer import replay_page
 
@@ -149,6 +150,14 @@ class TestWorst:
         assert [group.name for group, *_ in chosen] == [
             f"policy{n}" for n in range(4) for _ in range(3)
         ]
+
+    def test_what_the_oracle_makes_of_a_trial(self):
+        """It reached the first and the second goal, not the third, and was not asked of more."""
+        trials = {"reachable": [True, True, False], "steps": [9, 9, 64]}
+        proven = {"steps_lower_bound": [9, 7, 40]}
+        results = SimpleNamespace(entry={"oracle": {"trials": {**trials, **proven}}})
+        told = [oracle_steps(results, trial) for trial in range(4)]
+        assert told == ["9", "9, proven \N{GREATER-THAN OR EQUAL TO} 7", "not reached", "not asked"]
 
     def test_rows_tell_what_happened(self, page, right):
         rows = content(page).findall(".//section[@id='worst']//tbody/tr")

@@ -8,11 +8,12 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from drawings import PIXEL
+from matplotlib.figure import Figure
 from scipy import stats
 
 from kinarm.evaluation.document import evaluation_document
 from kinarm.evaluation.evaluation import evaluate
-from kinarm.evaluation.report import charts, maps
+from kinarm.evaluation.report import charts, maps, svg
 from kinarm.evaluation.report.groups import group_results
 from kinarm.evaluation.report.maps import fates, level
 from kinarm.evaluation.report.page import page_template, report_page
@@ -49,6 +50,18 @@ def places(limits):
     low, high = log(limits[0]), log(limits[-1])
     inside = charts.WIDTH - charts.LEFT - charts.RIGHT
     return charts.LEFT + (np.log(limits) - low) / (high - low) * inside
+
+
+def test_only_paths_and_texts_of_styled_artists_are_kept():
+    """A line has a path; its markers are uses of a definition, which a page cannot style."""
+    figure = Figure()
+    axes = figure.subplots()
+    (line,) = axes.plot([0, 1], [0, 1], marker="o")
+    svg.style(line, "curve", title="a line")
+    svg.style(axes.text(0.5, 0.5, "half"), "label")
+    drawing = svg.draw(figure, "a line and a word")
+    kept = [(shape.classes, shape.text, bool(shape.path)) for shape in drawing.shapes]
+    assert kept == [("curve", "", True), ("label", "half", False)]
 
 
 class TestProfile:

@@ -103,6 +103,21 @@ class TestStore:
         monkeypatch.setattr(runs, "SEMANTICS", "another")
         assert store.load(TRAINING) is None
 
+    def test_they_concern_ppo(self, store, monkeypatch):
+        training = replace(TRAINING, purpose="ppo")
+        policy = Policy.load(store.policy_path(TRAINING))
+        store.save(training, policy, made_up(np.zeros(PROTOCOL.trials)))
+        assert store.load(training) is not None
+        versions = runs.package_versions()
+        monkeypatch.setattr(runs, "package_versions", lambda: {**versions, "torch": "0"})
+        assert store.load(training) is None
+
+    def test_commits_are_those_of_the_policies_that_can_be_read(self, store):
+        made = Policy.load(store.policy_path(TRAINING)).provenance.commit
+        assert store.commits([TRAINING]) == ((made,) if made else ())
+        store.policy_path(TRAINING).write_bytes(b"damaged")
+        assert store.commits([TRAINING]) == ()
+
     def test_ppos_packages_do_not_concern_ars(self, store, monkeypatch):
         versions = runs.package_versions()
         monkeypatch.setattr(runs, "package_versions", lambda: {**versions, "torch": "0"})

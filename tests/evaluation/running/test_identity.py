@@ -11,6 +11,11 @@ def test_the_same_here():
     assert Guarded(len, identity())("four") == 4
 
 
+def test_it_is_found_out_once():
+    assert identity.__wrapped__() == identity()
+    assert identity() is identity()
+
+
 def test_everything_that_results_depend_on_is_told():
     names = {name for name, _ in identity()}
     assert {"python", "numpy", "numba", "coal", "pin", "semantics", "source of kinarm"} <= names

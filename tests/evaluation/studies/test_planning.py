@@ -1,5 +1,7 @@
 """From a study to its trainings."""
 
+from dataclasses import replace
+
 import pytest
 
 from kinarm.errors import InvalidInputError, KinarmError
@@ -106,6 +108,15 @@ class TestProblem:
     def test_the_rest_stays(self):
         problem = changed_problem(PROBLEMS["both"], "task.start_spread", 0.5)
         assert problem == PROBLEMS["both"].replace(start_spread=0.5)
+
+    def test_a_field_of_a_pinned_arm_makes_another_arm(self):
+        """The hash of the arm that it was is not held against it."""
+        pinned = PROBLEMS["right"].pinned
+        problem = changed_problem(pinned, "arm.tool_offset", [0.0, 0.0, 0.2])
+        expected = PROBLEMS["right"].replace(
+            arm=replace(PROBLEMS["right"].arm, tool_offset=(0.0, 0.0, 0.2))
+        )
+        assert problem.arm_digest == expected.arm_digest != pinned.arm_digest
 
     def test_a_scene_by_name(self):
         problem = changed_problem(PROBLEMS["right"], "scene", "table")

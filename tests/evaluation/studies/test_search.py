@@ -76,6 +76,19 @@ class TestSearch:
         assert len(study) == 8
         assert [run.key for run in study.runs[:6]] == [run.key for run in searched.runs]
 
+    def test_what_is_complete_is_not_tried_again(self, searched, tmp_path):
+        best = (tmp_path / "best.toml").read_bytes()
+        (tmp_path / "best.toml").unlink()
+        again = Study(SEARCH, tmp_path).run(jobs=1)
+        assert states(again) == ["COMPLETE"] * 6
+        assert (tmp_path / "best.toml").read_bytes() == best
+
+    def test_there_is_no_best_of_nothing(self, tmp_path):
+        study = Study(SEARCH, tmp_path)
+        with study.store.writing(study.specification):
+            searches.write_recipe(study.specification, tmp_path)
+        assert not (tmp_path / "best.toml").exists()
+
     def test_a_search_under_way_is_read(self, tmp_path):
         study = Study(SEARCH, tmp_path)
         assert study.runs == ()

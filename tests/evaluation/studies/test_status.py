@@ -35,6 +35,11 @@ def test_under_way(small):
     assert second.startswith("2.0 a minute; 2 remain, until about ")
 
 
+def test_a_rate_is_told_once_there_is_one():
+    status = StudyStatus(name="x", done=1, remaining=2, failed=(), running=True, rate=None)
+    assert status.lines() == ["x: 1 of 3 trainings finished, running"]
+
+
 def test_failures_are_told(tmp_path, monkeypatch):
     def fail(*_):
         raise ValueError("of all things")

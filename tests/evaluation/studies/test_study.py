@@ -73,7 +73,13 @@ class TestResults:
         policy.save(tmp_path / "it.npz")
         assert Policy.load(tmp_path / "it.npz").provenance.seed == run.config.seed
 
+    def test_a_specification_is_taken_as_it_is(self, finished):
+        again = Study(finished.specification, finished.store.folder)
+        assert [run.key for run in again.runs] == [run.key for run in finished.runs]
+
     def test_reprs_and_lengths(self, finished):
+        trained = next(iter(finished))
+        assert len(trained.outcomes) == len(trained.outcomes.distance) == 12
         assert len(finished) == len(list(finished)) == 4
         assert repr(finished) == "Study('small', 4 of 4 trainings finished)"
         assert finished.missing == ()
@@ -165,6 +171,49 @@ class TestGoingOn:
         assert [task.start.state.iteration for task in executor.tasks] == [2]
         straight = small("straight", **long).run(jobs=1)
         assert contents(straight.store.folder).items() <= contents(study.store.folder).items()
+
+    def test_nor_if_the_state_was_not_kept(self, small, monkeypatch):
+        """Without it, a longer training begins anew, and comes to the same."""
+        study = small().run(jobs=1)
+        found = study.store.shorter_runs(
+            {run.lineage for run in small(fixed={**SMALL["fixed"], "iterations": 8}).runs}
+        )
+        for each in (each for kept in found.values() for each in kept):
+            path = study.store.run_path(each[0])
+            with np.load(path) as archive:
+                arrays = {
+                    name: archive[name] for name in archive.files if not name.startswith("state.")
+                }
+            assert len(arrays) < len(archive.files)
+            np.savez(path, **arrays)
+        executor = Counting()
+        longer = small(fixed={**SMALL["fixed"], "iterations": 8}).run(executor=executor)
+        assert [task.start for task in executor.tasks] == [None] * 4
+        straight = small("straight", fixed=longer.specification.fixed).run(jobs=1)
+        for run in longer.runs:
+            assert longer.store.run_path(run).read_bytes() == (
+                straight.store.run_path(run).read_bytes()
+            )
+
+    def test_a_run_with_fewer_trials_is_made_anew(self, small):
+        study = small().run(jobs=1)
+        path = study.store.run_path(study.runs[0])
+        before = path.read_bytes()
+        with np.load(path) as archive:
+            arrays = {
+                name: archive[name][:-1] if name.startswith("outcomes.") else archive[name]
+                for name in archive.files
+            }
+        np.savez(path, **arrays)
+        assert study.runs[0] not in Study.load(study.store.folder).finished
+        small().run(jobs=1)
+        assert path.read_bytes() == before
+
+    def test_where_no_record_tells_how_long_it_took(self, small):
+        study = small().run(jobs=1)
+        study.store.made_path(study.runs[0]).unlink()
+        assert study.store.made(study.runs[0]) == {}
+        assert np.isnan(study.table()["seconds"]).sum() == 1
 
     def test_a_folder_of_another_study(self, small):
         small().run(jobs=1)

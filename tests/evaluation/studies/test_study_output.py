@@ -2,16 +2,20 @@
 
 import csv
 import re
+import sys
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from small_studies import SMALL
 
+from kinarm.errors import MissingExtraError
 from kinarm.evaluation.statistics import wilson_interval
-from kinarm.evaluation.studies.figures import draw_all, effects
+from kinarm.evaluation.studies import page
+from kinarm.evaluation.studies.figures import _band, beside_bound, draw_all, effects
 from kinarm.evaluation.studies.page import group_row, write_all
 from kinarm.evaluation.studies.study import Study
-from kinarm.evaluation.studies.table import share_over_seeds
+from kinarm.evaluation.studies.table import share_over_seeds, shown, write_parquet
 
 
 class TestTable:
@@ -44,6 +48,13 @@ class TestTable:
         table = study.table()
         assert table["sharing"].tolist() == ["none", "pair", ""]
         assert table["n_epochs"].tolist() == ["", "", "1"]
+        panels = {axes.get_title(): axes for axes in effects(study).axes}
+        assert [text.get_text() for text in panels["sharing"].get_xticklabels()] == ["none", "pair"]
+        assert set(panels) == {"learner", "sharing"}
+
+    def test_lists_of_numbers_are_joined(self):
+        assert shown((64, 32)) == "64-32"
+        assert shown([0.5, "tanh"]) == "0.5-tanh"
 
     def test_nothing_finished(self, small):
         assert len(small().table()) == 0
@@ -94,6 +105,19 @@ class TestFiles:
         read = parquet.read_table(folder / "runs.parquet")
         assert read.column("success").to_pylist() == finished.table()["success"].tolist()
 
+    def test_parquet_needs_an_extra(self, finished, monkeypatch, tmp_path):
+        monkeypatch.setitem(sys.modules, "pyarrow", None)
+        with pytest.raises(MissingExtraError, match=r"kinarm\[study\]"):
+            write_parquet(finished, tmp_path / "runs.parquet")
+
+    def test_without_it_everything_else_is_written(self, small, monkeypatch):
+        monkeypatch.setattr(page, "find_spec", lambda _: None)
+        study = small(seeds=1, grid={}).run(jobs=1)
+        write_all(study, "kinarm-study mine.toml")
+        written = {path.name for path in study.store.folder.iterdir()}
+        assert {"runs.csv", "index.html", "beside_bound.png"} <= written
+        assert "runs.parquet" not in written
+
     def test_the_page_fetches_nothing_and_tells_everything(self, folder, finished):
         page = (folder / "index.html").read_text()
         assert not re.search(r"(src|href)=\"(?!#|data:)", re.sub(r"xlink:href", "", page))
@@ -116,6 +140,35 @@ class TestFigures:
     def test_nothing_varies(self, small):
         study = small(grid={}, seeds=1, trials={"count": 5, "per_decade": 0}).run(jobs=1)
         assert list(draw_all(study)) == ["beside_bound"]
+
+    def test_nothing_finished(self, small):
+        assert draw_all(small()) == {}
+        assert beside_bound(small()) is None
+
+    def test_curves_that_nothing_is_known_of_are_left_out(self):
+        axes = Figure().subplots()
+        known = (np.array([1.0, 10.0]), np.array([0.0, 1.0]))
+        unknown = [(np.array([]), np.array([])), (np.array([np.nan]), np.array([0.5]))]
+        _band(axes, unknown, "unknown", 0)
+        assert len(axes.lines) == 0
+        _band(axes, [*unknown, known], "known", 0)
+        (line,) = axes.lines
+        assert (line.get_ydata()[0], line.get_ydata()[-1]) == (0.0, 1.0)
+
+    def test_places_that_no_field_fills_are_empty(self, small):
+        """Four fields in rows of three, of which one has more values than there is room for."""
+        ranges = {name: {"low": 0.01, "high": 0.1} for name in ("step_size", "noise")}
+        more = {"episodes": {"low": 1, "high": 9}, "reward.success": {"low": 0.0, "high": 1.0}}
+        study = small(grid={}, random={"count": 3, **ranges, **more}, seeds=1).run(jobs=1)
+        assert [axes.get_visible() for axes in effects(study).axes] == [True] * 4 + [False] * 2
+
+    def test_of_many_numbers_not_each_has_a_tick(self, small):
+        sizes = [0.01 * (k + 1) for k in range(7)]
+        study = small(grid={"step_size": sizes}, seeds=1).run(jobs=1)
+        (axes,) = effects(study).axes
+        drawn = sorted(line.get_xdata()[0] for line in axes.lines if line.get_marker() == "o")
+        assert drawn == pytest.approx(sizes)
+        assert axes.get_xticks().tolist() != drawn
 
     def test_effects_are_means_over_the_rest(self, finished):
         (axes,) = effects(finished).axes

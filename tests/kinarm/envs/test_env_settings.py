@@ -150,6 +150,7 @@ class TestSettings:
                 "render_mode must be .*rgb_array_list.*'film'",
             ),
             ({"observation_dtype": "int8"}, InvalidInputError, "observation_dtype must be one of"),
+            ({"observation_dtype": "real"}, InvalidInputError, "must be one of .*, got 'real'"),
         ],
     )
     def test_bad_settings_are_refused(self, settings, error, message):

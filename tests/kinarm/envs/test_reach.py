@@ -12,7 +12,7 @@ from gymnasium.utils.env_checker import check_env, data_equivalence
 
 import kinarm
 from kinarm.envs.reach import ReachEnv
-from kinarm.envs.registration import ENVIRONMENTS
+from kinarm.envs.registration import ENVIRONMENTS, register_environments
 from kinarm.errors import InvalidInputError, StartInContactError
 from kinarm.problem import ReachProblem
 from kinarm.simulator import Simulator
@@ -299,3 +299,21 @@ def test_problems_by_name_and_from_files(kind, tmp_path):
     batch = gymnasium.make_vec(f"kinarm/{kind}-v0", num_envs=2, problem=str(path))
     assert batch.reset(seed=0)[1] is not None
     batch.close()
+
+
+def test_errors_of_a_step_that_no_action_explains_are_not_hidden(monkeypatch):
+    env = ReachEnv()
+    env.reset(seed=0)
+
+    def fail(*_):
+        raise ValueError("a defect")
+
+    monkeypatch.setattr(env.simulator, "step", fail)
+    with pytest.raises(ValueError, match="^a defect$"):
+        env.step(env.action_space.sample())
+
+
+def test_registering_again_changes_nothing():
+    before = {name: gymnasium.registry[name] for name in ENVIRONMENTS}
+    register_environments()
+    assert {name: gymnasium.registry[name] for name in ENVIRONMENTS} == before

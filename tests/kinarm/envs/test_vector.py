@@ -330,3 +330,9 @@ def test_vector_environments_of_single_ones(kind):
         actions = np.full((2, 5), 0.02)
         assert_same_results(envs.step(actions), batch.step(actions))
     envs.close()
+
+
+def test_before_the_first_reset_there_is_nothing_to_mask():
+    batch = ReachVectorEnv(2)
+    with pytest.raises(InvalidInputError, match=r"call reset\(\) without it first"):
+        batch.reset(options={"reset_mask": np.array([True, False])})

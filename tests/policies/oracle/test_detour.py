@@ -7,8 +7,10 @@ import pytest
 from configurations import depths
 
 from kinarm.arm import Arm
-from kinarm.policies.oracle.detour import Tree, find_detour
+from kinarm.policies.oracle import motion_search
+from kinarm.policies.oracle.detour import Tree, _extend, _shorten, find_detour
 from kinarm.policies.oracle.motion import along_path, steps_between, straight
+from kinarm.policies.oracle.motion_search import MotionSearch
 from kinarm.problem import PROBLEMS
 from kinarm.scene import PAPER_BENCHES, Obstacle, Scene
 from kinarm.simulator import Simulator
@@ -154,3 +156,37 @@ def test_nodes_lead_back_to_their_root():
     assert (first, second) == (2, 3)
     np.testing.assert_array_equal(tree.path_to_root(second), [[0, 2], [0, 1], [0, 0]])
     np.testing.assert_array_equal(tree.path_to_root(1), [[1, 0]])
+
+
+def test_a_tree_does_not_grow_towards_where_it_is(walled):
+    tree = Tree(START[None])
+    assert _extend(walled, tree, START, np.inf) == 0
+    assert len(tree.nodes) == 1
+
+
+def test_nothing_is_shorter_than_the_straight_way(walled):
+    path = np.array([START, START + 0.01])
+    assert _shorten(walled, path, np.random.default_rng(0)) is path
+
+
+class TestWhatIsTried:
+    """Motions along detours, of which one trial has none and another none that is short enough."""
+
+    @pytest.fixture
+    def search(self, walled):
+        goal = walled.arm.tool_position(END)
+        return MotionSearch(walled, START[None], goal[None])
+
+    def test_without_a_detour_there_is_no_motion(self, search, monkeypatch):
+        asked = []
+        monkeypatch.setattr(motion_search, "find_detour", lambda *given: asked.append(given))
+        search.try_detours(np.array([0]))
+        assert len(asked) == 1
+        assert not search.reached.any()
+
+    def test_detours_that_take_too_long_are_not_played(self, search, monkeypatch):
+        monkeypatch.setattr(motion_search, "find_detour", lambda *_: np.array([START, END]))
+        monkeypatch.setattr(motion_search, "along_path", lambda *_, **__: None)
+        search.try_detours(np.array([0]))
+        assert not search.reached.any()
+        assert np.isinf(search.costs).all()

@@ -162,6 +162,12 @@ class TestRefusals:
         with pytest.raises(InvalidInputError, match=message):
             inverse_kinematics(simulator, start, goal)
 
+    @pytest.mark.parametrize("separation", [0.0, -1.0, float("nan")])
+    def test_solutions_must_lie_apart(self, simulator, separation):
+        start, goal = simulator.arm.home, np.array([0.4, -0.6, 0.325])
+        with pytest.raises(InvalidInputError, match="separation must be greater than 0, got"):
+            inverse_kinematics(simulator, start, goal, separation=separation)
+
     @pytest.mark.parametrize("samples", [0, -3, 2.5, True])
     def test_bad_number_of_samples(self, simulator, samples):
         with pytest.raises(InvalidInputError, match="samples must be a whole number"):

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinarm.errors import PolicyFileError
+from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.failed_scenarios import FailedScenarios
 from kinarm.policies import (
     CurvePoint,
@@ -128,6 +128,11 @@ def test_missing_entry(saved, key):
 def test_bad_entry(saved, entries):
     spoil(saved, **entries)
     refused(saved)
+
+
+def test_numbers_of_double_precision(state):
+    with pytest.raises(InvalidInputError, match="must be finite, of single precision"):
+        replace(state, parameters=state.parameters.astype(np.float64))
 
 
 def test_later_version(saved):

@@ -169,6 +169,20 @@ def test_threads_do_not_matter(name):
             assert getattr(state, part).tobytes() == getattr(states[0], part).tobytes()
 
 
+def test_before_the_first_update_adam_knows_nothing(config):
+    model = PPOTraining(config).model
+    for moment in model.moments():
+        np.testing.assert_array_equal(moment, np.zeros_like(model.parameters()))
+
+
+def test_a_vector_of_another_network_is_refused():
+    """By hand: 1 deviation, 24 + 8 in the layers of each, 3 for the action and 3 for the value."""
+    vector = np.arange(71, dtype=np.float32)
+    split_parameters(vector, 7, (3, 2), 1)
+    with pytest.raises(InvalidInputError, match="expected a state of 71 parameters, got 70"):
+        split_parameters(vector[:-1], 7, (3, 2), 1)
+
+
 def test_threads_are_an_option():
     config = replace(AWKWARD, iterations=1)
     first, second = (train_policy(config, threads=threads).state for threads in (1, 2))

@@ -1,0 +1,45 @@
+"""What is told of an arm: shapes with their corners, and pairs that are left out with a reason."""
+
+import pytest
+
+from kinarm.arm import Arm
+from kinarm.arm_specification import AllowedContact
+from kinarm.evaluation.arm_facts import ArmFacts
+
+
+@pytest.fixture(scope="module")
+def facts(mesh_arm):
+    """Of an arm whose first and last link are allowed to touch."""
+    allowed = AllowedContact(links=("link_0", "link_4"), reason="a cable joins them")
+    path = mesh_arm.specification.source
+    return ArmFacts.of(Arm.load(path, allowed_contacts=(allowed,)))
+
+
+def test_hulls_are_told_by_their_corners(facts):
+    shapes = facts.sections()["collision shapes"]
+    assert [line.partition(": ")[2] for line in shapes] == [
+        "box",
+        "convex hull of 8 vertices",
+        "convex hull of 8 vertices",
+        "cylinder",
+    ]
+
+
+def test_pairs_that_are_left_out_have_a_reason(facts):
+    """Neighbours on the chain, by hand, and those that are allowed to touch."""
+    left_out = {
+        frozenset((one, other)): reason
+        for one, other, reason in facts.left_out()
+        if "ground" not in (one, other)
+    }
+    bodies = ("link_0", "link_2", "link_3", "link_4")
+    assert left_out == {
+        frozenset(("link_2", "link_3")): "neighbours",
+        frozenset(("link_3", "link_4")): "neighbours",
+        frozenset(("link_0", "link_4")): "allowed: a cable joins them",
+    }
+    tested = {frozenset(pair) for pair in facts.statistics.pairs if "ground" not in pair}
+    assert tested == {
+        frozenset((bodies[0], "link_2")),
+        *map(frozenset, [bodies[:3:2], bodies[1::2]]),
+    }

@@ -1,0 +1,32 @@
+"""What a request to replay finds, and who can face trials again."""
+
+import pytest
+
+from kinarm._files import write_text
+from kinarm.errors import InvalidInputError
+from kinarm.evaluation import ReplayRequest
+from kinarm.evaluation.document import document_text, evaluation_document
+from kinarm.evaluation.entrants import Entrant
+from kinarm.evaluation.evaluation import run_trials
+from kinarm.evaluation.replays.candidates import find_candidates
+from kinarm.evaluation.replays.runs import FacedRun
+from kinarm.evaluation.trials import TrialSet
+
+
+@pytest.fixture
+def of_a_file(train_novice, tmp_path):
+    """An evaluation of a policy in a file, and that file."""
+    path, policy = tmp_path / "mine.npz", train_novice("right")
+    policy.save(path)
+    faced = [run_trials(Entrant.from_policy("mine", policy, path), TrialSet.draw("right", 5, 0))]
+    write_text(tmp_path / "evaluation.json", document_text(evaluation_document(faced, "")))
+    return tmp_path / "evaluation.json", path
+
+
+def test_a_policy_of_a_file_has_to_be_named(of_a_file):
+    evaluation, path = of_a_file
+    with pytest.raises(InvalidInputError, match="'mine' of .* is a file: name it with --policy"):
+        find_candidates(ReplayRequest(source=evaluation))
+    (run,) = find_candidates(ReplayRequest(source=evaluation, policy=str(path))).runs
+    assert isinstance(run, FacedRun)
+    assert len(run.ends) == 5

@@ -1,0 +1,35 @@
+"""Where a checked problem may start, and shares in words."""
+
+import numpy as np
+import pytest
+
+from kinarm.evaluation.problem_check import _random_starts, percent
+from kinarm.evaluation.statistics import Estimate
+from kinarm.problem import PROBLEMS
+from kinarm.world import World
+
+
+def test_where_starts_are_listed_these_are_checked():
+    listed = ((0.0,) * 6, (0.5, 0.0, 0.0, 0.0, 0.0, 0.0))
+    world = World(PROBLEMS["right"].replace(starts=listed))
+    np.testing.assert_array_equal(_random_starts(world), listed)
+
+
+def test_elsewhere_starts_lie_between_home_and_the_limits():
+    world = World(PROBLEMS["right"].replace(start_spread=0.25))
+    away, arm = _random_starts(world) - world.arm.home, world.arm
+    low, high = (away.min(axis=0), away.max(axis=0))
+    assert (low >= 0.25 * (arm.lower - arm.home) - 1e-12).all()
+    assert (high <= 0.25 * (arm.upper - arm.home) + 1e-12).all()
+    assert (high > low).sum() == arm.n_actuated
+
+
+@pytest.mark.parametrize(
+    ("estimate", "said"),
+    [
+        (Estimate(0.5, (0.25, 0.75)), "50.0 % (25.0..75.0)"),
+        (Estimate(None), "unknown"),
+    ],
+)
+def test_shares_in_words(estimate, said):
+    assert percent(estimate) == said
