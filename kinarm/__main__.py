@@ -28,6 +28,8 @@ COMMANDS = {
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command that is named, or list all of them."""
     typed = list(sys.argv[1:] if arguments is None else arguments)
+    if typed[:1] == ["--"]:
+        del typed[0]
     if typed and typed[0] in COMMANDS:
         module, _ = COMMANDS[typed[0]]
         import_module(module).main(typed[1:])

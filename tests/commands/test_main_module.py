@@ -49,6 +49,7 @@ def test_it_runs_the_command_that_is_named(run_main):
     assert "shelf-panda" in done.stdout
     assert run_main("problem", "list") == (0, done.stdout, "")
     assert "usage: kinarm-eval" in run_main("eval", "--help")[1]
+    assert run_main("--", "problem", "list") == (0, done.stdout, "")
 
 
 def test_words_are_those_of_the_process_if_none_are_given(monkeypatch, capsys):
