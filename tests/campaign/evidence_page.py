@@ -20,7 +20,7 @@ COLUMNS = {
     "contact": (
         *("configurations", "near contact", "touching", "steps refused"),
         *("configurations of the second engine", "touching for Coal alone"),
-        "touching for MuJoCo alone",
+        *("touching for MuJoCo alone", "configurations at which MuJoCo ends the process"),
     ),
     "floors": (
         *("trials", "scenarios", "scenarios whose floor is exact", "successes"),

@@ -141,7 +141,9 @@ TRAINING = samples.planned_training().name
 ONE = np.ones(3)
 
 LOADERS: dict[str, Loader] = {
-    "policy": Loader(("policies.policy.load",), samples.policies, damaged_archive, _policy),
+    "policy": Loader(
+        ("policies.policy_files.read_policy",), samples.policies, damaged_archive, _policy
+    ),
     "checkpoint": Loader(
         ("policies.checkpoint.load_checkpoint", "policies.checkpoint.rebuilt"),
         samples.checkpoints,

@@ -1,6 +1,8 @@
 """A small share of the evidence, and whether it would notice a lie."""
 
 import json
+import os
+import signal
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from tests.campaign import evidence
 from tests.campaign.census import Census, take_census
 from tests.campaign.checks import steps, verdicts
 from tests.campaign.checks.second_engine import MARGIN, SecondEngine
+from tests.campaign.checks.surviving import surviving
 from tests.campaign.checks.tally import Tally
 from tests.campaign.endurance import judged
 from tests.helpers.configurations import random_configurations
@@ -82,7 +85,7 @@ def test_the_second_engine_sees_what_coal_sees(simulators):
         engine, model = SecondEngine(simulator.world), simulator.world.contact_model
         asked = random_configurations(simulator, 3, 400)
         truth = model.in_contact(asked)
-        np.testing.assert_array_equal(engine.in_contact(asked), truth)
+        np.testing.assert_array_equal([engine.in_contact(q) for q in asked], truth)
         assert 0 < truth.sum() < len(asked)
         assert all(engine.depth(q) > 0 for q in asked[truth])
         assert not any(engine.depth(q) for q in asked[~truth])
@@ -91,6 +94,45 @@ def test_the_second_engine_sees_what_coal_sees(simulators):
             pair = model.pair_names.index(tuple(closest.bodies[row].tolist()))
             found = engine.distance(asked[row], pair)
             assert found == pytest.approx(closest.distance[row], abs=MARGIN)
+
+
+def test_calls_that_end_the_process_are_known_by_their_numbers():
+    def call(number):
+        if number in (0, 3, 4):
+            os.kill(os.getpid(), signal.SIGKILL)
+        return number / 2
+
+    found = surviving(call, 7)
+    np.testing.assert_array_equal(found, [np.nan, 0.5, 1, np.nan, np.nan, 2.5, 3])
+    assert len(surviving(call, 0)) == 0
+
+
+def test_calls_that_fail_are_no_such_end():
+    with pytest.raises(RuntimeError, match="status 1"):
+        surviving(lambda number: 1 / number, 2)
+
+
+def test_what_the_second_engine_cannot_judge_is_counted_apart(monkeypatch):
+    pytest.importorskip("mujoco")
+    problem, whole = evidence.Part("contact", "paper", 1).problem, {}
+    for ends in (False, True):
+
+        def in_contact(self, q, ends=ends, judge=SecondEngine.in_contact):
+            if ends and q[0] > 0:
+                os.kill(os.getpid(), signal.SIGKILL)
+            return judge(self, q)
+
+        with monkeypatch.context() as patched:
+            patched.setattr(SecondEngine, "in_contact", in_contact)
+            whole[ends] = verdicts.check_verdicts(problem, 60, 0)
+    judged, ended = (
+        "configurations of the second engine",
+        "configurations at which MuJoCo ends the process",
+    )
+    assert whole[False].counts[ended] == 0
+    assert whole[True].counts[ended] > 10
+    assert whole[True].counts[judged] + whole[True].counts[ended] == whole[False].counts[judged]
+    assert not any(whole[True].failed.values())
 
 
 def test_tally_describes_the_first_failures():

@@ -200,7 +200,7 @@ class TestAskedToStop:
         board.ask_to_stop()
         assert seeds._train((0, task), board, 1, None) is None
         assert [path.name for path in tmp_path.iterdir()] == ["board"]
-        assert seeds._what_is_left([task]).endswith("the same command begins again")
+        assert seeds._what_is_left([task], "interrupted").endswith("the same command begins again")
 
     def test_in_between_it_keeps_a_checkpoint(self, task, board, monkeypatch):
         asked = iter([False, False, False, True])
@@ -208,12 +208,12 @@ class TestAskedToStop:
         assert seeds._train((0, task), board, 1, None) is None
         state = load_checkpoint(checkpoint_path(task.out)).state
         assert state.iteration == board.iterations == 3
-        assert "0 of 1 seeds are finished" in seeds._what_is_left([task])
+        assert "0 of 1 seeds are finished" in seeds._what_is_left([task], "interrupted")
         monkeypatch.undo()
         last = seeds._train((0, task), board, 1, None)
         assert last.environment_steps == train_policy(task.config).curve[-1].environment_steps
         check_equal(Policy.load(task.out), train_policy(task.config).policy)
-        assert "1 of 1 seeds are finished" in seeds._what_is_left([task])
+        assert "1 of 1 seeds are finished" in seeds._what_is_left([task], "interrupted")
 
     def test_without_an_iteration_there_is_nothing_to_keep(self, task):
         path = checkpoint_path(task.out)

@@ -27,7 +27,10 @@ def is_installed() -> bool:
 
 
 class SecondEngine:
-    """MuJoCo's view of a world, with exactly the pairs that kinarm tests."""
+    """MuJoCo's view of a world, with exactly the pairs that kinarm tests.
+
+    Its methods may end the process: MuJoCo 3.10 does so for some cylinders near contact.
+    """
 
     def __init__(self, world: World) -> None:
         import mujoco
@@ -41,16 +44,12 @@ class SecondEngine:
             for pair in world.contact_model.geometry.collisionPairs
         ]
 
-    def in_contact(self, configurations: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Which configurations, shape (n, n_joints) [rad or m], touch something."""
-        touching = np.empty(len(configurations), dtype=bool)
-        model, data = self._model, self._data
-        for row, configuration in enumerate(configurations):
-            data.qpos[:] = configuration
-            self._mujoco.mj_kinematics(model, data)
-            self._mujoco.mj_collision(model, data)
-            touching[row] = data.ncon > 0
-        return touching
+    def in_contact(self, configuration: NDArray[np.float64]) -> bool:
+        """Whether a configuration, shape (n_joints,) [rad or m], touches something."""
+        self._data.qpos[:] = configuration
+        self._mujoco.mj_kinematics(self._model, self._data)
+        self._mujoco.mj_collision(self._model, self._data)
+        return bool(self._data.ncon > 0)
 
     def distance(self, configuration: NDArray[np.float64], pair: int) -> float:
         """Distance of a tested pair, negative if it overlaps; `FARTHEST` at most [m]."""
@@ -61,7 +60,7 @@ class SecondEngine:
 
     def depth(self, configuration: NDArray[np.float64]) -> float:
         """How deep the deepest of the contacts is that are found, 0 without one [m]."""
-        self.in_contact(configuration[None])
+        self.in_contact(configuration)
         return -float(self._data.contact.dist.min(initial=0.0))
 
 

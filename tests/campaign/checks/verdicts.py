@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from kinarm.problem import ReachProblem
 from kinarm.simulator import Simulator
 from tests.campaign.checks.second_engine import MARGIN, SecondEngine, is_installed
+from tests.campaign.checks.surviving import surviving
 from tests.campaign.checks.tally import Tally
 from tests.helpers.configurations import contact_boundary, jittered
 
@@ -134,26 +135,35 @@ def _ask_second_engine(
     """Compare Coal's verdicts with the second engine's."""
     if engine is None:
         return
-    truth, other = simulator.world.contact_model.in_contact(asked), engine.in_contact(asked)
-    differing = np.flatnonzero(truth != other)
-    alone, named = truth[differing], simulator.world.contact_model.first_in_contact
-    # Of the pair that Coal names, or of the contacts that MuJoCo finds.
-    distances = np.array(
-        [
-            engine.distance(q, int(named(q) or 0)) if coal else engine.depth(q)
-            for q, coal in zip(asked[differing], alone, strict=True)
-        ]
-    )
-    tally.count("configurations of the second engine", len(asked))
+    contact = simulator.world.contact_model
+    truth = contact.in_contact(asked)
+    other = surviving(lambda row: float(engine.in_contact(asked[row])), len(asked))
+    judged = ~np.isnan(other)
+    differing = np.flatnonzero(judged & (truth != other))
+
+    def distance(number: int) -> float:
+        """Of the pair that Coal names, or of the contacts that MuJoCo finds."""
+        q = asked[differing[number]]
+        if not truth[differing[number]]:
+            return engine.depth(q)
+        return engine.distance(q, int(contact.first_in_contact(q) or 0))
+
+    distances = surviving(distance, len(differing))
+    measured = ~np.isnan(distances)
+    judged[differing[~measured]] = False
+    differing, distances = differing[measured], distances[measured]
+    alone = truth[differing]
+    tally.count("configurations of the second engine", judged.sum())
+    tally.count("configurations at which MuJoCo ends the process", (~judged).sum())
     tally.count("touching", truth.sum())
     tally.count("touching for Coal alone", alone.sum())
     tally.count("touching for MuJoCo alone", (~alone).sum())
     tally.largest("gap where Coal alone sees contact [m]", distances[alone].max(initial=0.0))
     tally.largest("depth where Coal alone sees none [m]", distances[~alone].max(initial=0.0))
-    agree = np.ones(len(asked), dtype=bool)
-    agree[differing] = np.abs(distances) <= MARGIN
-    claim = f"engines agree, but for {MARGIN:g} m about contact"
-    _claim(tally, claim, agree, asked, dict(zip(differing.tolist(), distances, strict=True)))
+    gaps = np.zeros(len(asked))
+    gaps[differing] = distances
+    claim, agree = f"engines agree, but for {MARGIN:g} m about contact", np.abs(gaps) <= MARGIN
+    _claim(tally, claim, agree[judged], asked[judged], gaps[judged])
 
 
 def _claim(
@@ -161,7 +171,7 @@ def _claim(
     claim: str,
     holds: NDArray[np.bool_],
     asked: Array,
-    distances: dict[int, float] | None = None,
+    distances: Array | None = None,
 ) -> None:
     def describe(row: int) -> dict[str, object]:
         found = {} if distances is None else {"distance": float(distances[row])}
