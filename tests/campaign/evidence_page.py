@@ -21,6 +21,7 @@ COLUMNS = {
         *("configurations", "near contact", "touching", "steps refused"),
         *("configurations of the second engine", "touching for Coal alone"),
         *("touching for MuJoCo alone", "configurations at which MuJoCo ends the process"),
+        "contacts of a capsule and a box that MuJoCo overlooks",
     ),
     "floors": (
         *("trials", "scenarios", "scenarios whose floor is exact", "successes"),

@@ -5,6 +5,8 @@ from numpy.typing import NDArray
 
 from kinarm.problem import ReachProblem
 from kinarm.simulator import Simulator
+from kinarm.world import World
+from tests.campaign.checks.capsules import capsule_box_distance
 from tests.campaign.checks.second_engine import MARGIN, SecondEngine, is_installed
 from tests.campaign.checks.surviving import surviving
 from tests.campaign.checks.tally import Tally
@@ -158,12 +160,24 @@ def _ask_second_engine(
     tally.count("touching", truth.sum())
     tally.count("touching for Coal alone", alone.sum())
     tally.count("touching for MuJoCo alone", (~alone).sum())
-    tally.largest("gap where Coal alone sees contact [m]", distances[alone].max(initial=0.0))
-    tally.largest("depth where Coal alone sees none [m]", distances[~alone].max(initial=0.0))
     gaps = np.zeros(len(asked))
     gaps[differing] = distances
+    doubtful = np.flatnonzero(truth & (gaps > MARGIN))
+    overlooked = [row for row in doubtful if _box_is_entered(simulator.world, asked[row])]
+    gaps[overlooked] = 0.0
+    tally.count("contacts of a capsule and a box that MuJoCo overlooks", len(overlooked))
+    gap, depth = gaps[truth].max(initial=0.0), gaps[~truth].max(initial=0.0)
+    tally.largest("gap where Coal alone sees contact [m]", gap)
+    tally.largest("depth where Coal alone sees none [m]", depth)
     claim, agree = f"engines agree, but for {MARGIN:g} m about contact", np.abs(gaps) <= MARGIN
     _claim(tally, claim, agree[judged], asked[judged], gaps[judged])
+
+
+def _box_is_entered(world: World, configuration: Array) -> bool:
+    """Whether the pair that Coal names is a capsule in a box, by the definition of both."""
+    pair = int(world.contact_model.first_in_contact(configuration) or 0)
+    distance = capsule_box_distance(world, configuration, pair)
+    return distance is not None and distance <= 0
 
 
 def _claim(
