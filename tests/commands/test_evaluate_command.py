@@ -52,7 +52,7 @@ def test_defaults(evaluated, run, policy_folder):
 
 
 def test_a_problem_without_policies_is_told(run):
-    answer = run("kinarm-eval", "--problem", "shelf-panda", "--trials", 1, "--no-oracle")
+    answer = run("kinarm-eval", "--problem", "table-paper", "--trials", 1, "--no-oracle")
     assert (answer.status, answer.err) == (0, "")
     assert answer.out.splitlines()[-1] == "no shipped policy was trained for this"
 
