@@ -1,6 +1,6 @@
 """Who takes part in an evaluation: trained policies and baselines."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -67,6 +67,30 @@ class Entrant:
     def problem(self) -> ReachProblem | None:
         """The problem that it was trained for, if it was."""
         return self.policy.problem if self.policy else None
+
+    def serves(
+        self,
+        problem: ReachProblem,
+        change: Callable[[ReachProblem], ReachProblem] = lambda trained_for: trained_for,
+    ) -> bool:
+        """Whether it was made for a problem.
+
+        What was not trained is for every problem. A policy with a mirror learnt the goals of one
+        side, so it is for each side alone, too.
+
+        Parameters
+        ----------
+        problem : ReachProblem
+            What it is to face.
+        change : callable
+            Makes the changes to the problem that it was trained for which make no difference.
+        """
+        if self.policy is None:
+            return True
+        trained_for = change(self.policy.problem)
+        if self.policy.mirror is not None:
+            return trained_for.covers(problem)
+        return trained_for.digest == problem.digest
 
     def check(self, arm: Arm, *, allow_other_arm: bool = False) -> None:
         """See that the policy, if there is one, can drive an arm.

@@ -11,26 +11,30 @@ from importlib import resources
 from typing import Any
 
 from kinarm._files import write_text
+from kinarm.evaluation.entrants import find_entrants
 from kinarm.evaluation.trials import trial_set
-from kinarm.policies.library import RANKING, load_policy, policy_names
+from kinarm.policies.library import RANKING, policy_names
+from kinarm.problem import PROBLEMS
 
 TRIALS, SEED = 10_000, 20_161
 
 
 def ranking(names: Iterable[str], trials: int = TRIALS) -> dict[str, Any]:
-    """Share of trials in which policies succeed on the problem that they are for.
+    """Share of trials in which policies succeed on the problems that they are for.
 
     Returns
     -------
     dict
         ``trials``, ``seed``, and ``success``: of each policy by its name, by problem.
     """
+    entrants = [entrant for name in names for entrant in find_entrants(name)]
     success: dict[str, dict[str, float]] = {}
-    for name in names:
-        policy = load_policy(name)
-        problem, faced = policy.problem, trial_set(policy.problem, trials, SEED)
-        rollouts = faced.simulator.rollout(policy, faced.starts, faced.goals)
-        success.setdefault(problem.name, {})[name] = float(rollouts.success.mean())
+    for name, problem in PROBLEMS.items():
+        faced = trial_set(problem, trials, SEED)
+        for entrant in entrants:
+            if entrant.serves(problem):
+                share = float(entrant.run(faced).success.mean())
+                success.setdefault(name, {})[entrant.name] = share
     return {"trials": trials, "seed": SEED, "success": success}
 
 

@@ -37,9 +37,9 @@ class EvaluationRequest(ProblemOptions):
     """Evaluate policies on random reaching trials, beside an oracle.
 
     By default a trained policy faces the problem that it was trained for, changed as the options
-    say, and a baseline all problems in play. Problems that are named restrict the default
-    selection; together with named policies, or ``matrix``, they say what those face. The oracle
-    joins on every problem that is faced.
+    say, a symmetric one also those with a part of its goals, and a baseline all problems in play.
+    Problems that are named restrict the default selection; together with named policies, or
+    ``matrix``, they say what those face. The oracle joins on every problem that is faced.
 
     Parameters
     ----------
@@ -260,7 +260,7 @@ class EvaluationRequest(ProblemOptions):
         """Whether an entrant faces a problem, where not all face all."""
         if best_for is not None:
             return best_for.digest == problem.digest
-        return bool(self.policies and named) or self._is_own(entrant, problem)
+        return bool(self.policies and named) or entrant.serves(problem, self._changed)
 
     def _chosen(self) -> list[Chosen]:
         """Entrants that are named, without repetition; or all whose arm stays the same."""
@@ -306,11 +306,6 @@ class EvaluationRequest(ProblemOptions):
         if self.matrix or not own:
             return list((shipped | own).values())
         return [own.pop(digest) for digest in shipped if digest in own] + list(own.values())
-
-    def _is_own(self, entrant: "Entrant", problem: "ReachProblem") -> bool:
-        """Whether an entrant was trained for a problem, apart from the options' changes."""
-        trained_for = entrant.problem
-        return trained_for is None or self._changed(trained_for).digest == problem.digest
 
     def _changed(self, problem: "ReachProblem") -> "ReachProblem":
         """A problem with the changes that the options make of any."""

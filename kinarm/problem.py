@@ -226,6 +226,15 @@ class ReachProblem:
                 return f"{key} is {there}, not {here}"
         return None
 
+    def covers(self, other: "ReachProblem") -> bool:
+        """Whether this is the other problem, or that with further goal regions.
+
+        How often each region is drawn makes no difference.
+        """
+        wider = set(self.task.goal_regions) >= set(other.task.goal_regions)
+        goals = {"goal_regions": other.task.goal_regions, "goal_weights": other.task.goal_weights}
+        return wider and self.replace(**goals).first_difference(other) is None
+
     def check_same(self, other: "ReachProblem", what: str) -> None:
         """Refuse another problem.
 

@@ -7,24 +7,42 @@ from kinarm.policies.ars.config import ARSConfig
 from kinarm.policies.config import rewarded_per_reach
 from kinarm.task import RewardWeights
 
+TUNED = ARSConfig(
+    recipe="tuned",
+    step_size_schedule="linear",
+    iterations=8000,
+    symmetric=True,
+    sharing="iteration",
+    episodes=16,
+    reward=RewardWeights(collision=-4.0, success=0.5),
+    replay_share=0.4,
+)
+
+BEST = replace(
+    TUNED,
+    recipe="best",
+    net_arch=(16,),
+    iterations=24_000,
+    noise=0.02,
+    directions=48,
+    top_directions=24,
+    episodes=24,
+    reward=RewardWeights(collision=-6.0, success=0.5),
+    replay_share=0.5,
+    replay_size=1024,
+)
+
 RECIPES = {
     "paper": ARSConfig(recipe="paper"),
-    "tuned": ARSConfig(
-        recipe="tuned",
-        step_size_schedule="linear",
-        iterations=8000,
-        symmetric=True,
-        sharing="iteration",
-        episodes=8,
-        reward=RewardWeights(collision=-2.0, success=0.5),
-    ),
+    "tuned": TUNED,
+    "best": BEST,
     "v1": ARSConfig(recipe="v1", normalize=False, top_directions=24),
     "brs": ARSConfig(recipe="brs", normalize=False, scale_by_deviation=False, top_directions=24),
 }
 """ARS settings by name.
 
-``paper`` is Table 1. ``tuned`` is the best that we found for a linear policy. ``v1`` and ``brs``
-are Table 1 without the augmentations that the names lack.
+``paper`` is Table 1. ``tuned`` is the best that we found for a linear policy, ``best`` for a small
+network. ``v1`` and ``brs`` are Table 1 without the augmentations that the names lack.
 """
 
 NETWORK: dict[str, Any] = {
@@ -41,7 +59,7 @@ NETWORK: dict[str, Any] = {
 
 
 def adapted(config: ARSConfig) -> ARSConfig:
-    """Adapt ``tuned`` to its problem.
+    """Adapt ``tuned`` and ``best`` to their problem.
 
     Progress is rewarded in proportion to the arm's reach. Where several regions are to be reached
     and no reflection maps one to another, a linear policy cannot turn to either side: a small
@@ -49,10 +67,10 @@ def adapted(config: ARSConfig) -> ARSConfig:
     """
     from kinarm.policies.mirror import different_regions, missing_mirror  # loads Pinocchio
 
-    if config.recipe != "tuned":
+    if config.recipe not in ("tuned", "best"):
         return config
     symmetric = not missing_mirror(config.problem)
     config = replace(config, symmetric=symmetric)
-    if different_regions(config.problem, symmetric) > 1:
+    if not config.net_arch and different_regions(config.problem, symmetric) > 1:
         config = replace(config, **NETWORK)
     return rewarded_per_reach(config)

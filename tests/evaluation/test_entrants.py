@@ -105,6 +105,35 @@ def test_a_policy_for_another_arm_is_told(skilled):
         entrant.check(Arm.load("paper_flange"))
 
 
+def served(entrant, **changes):
+    """Names of the problems that an entrant is for, in a world with these changes."""
+    return [
+        name
+        for name, problem in PROBLEMS.items()
+        if entrant.serves(problem.replace(**changes), lambda own: own.replace(**changes))
+    ]
+
+
+def test_a_policy_is_for_the_problem_that_it_was_trained_for(skilled):
+    plain = Entrant.from_policy("plain", replace(skilled, mirror=None))
+    assert served(plain) == served(plain, tolerance=0.02) == ["right"]
+    assert not plain.serves(PROBLEMS["right"].replace(tolerance=0.02))
+
+
+def test_a_symmetric_policy_is_also_for_a_part_of_its_goals(skilled):
+    assert skilled.mirror is not None
+    made = replace(skilled.provenance, problem=PROBLEMS["both"].pinned)
+    symmetric = replace(skilled, provenance=made)
+    assert served(Entrant.from_policy("of both", symmetric)) == ["left", "right", "both"]
+    assert served(Entrant.from_policy("of one", skilled)) == ["right"]
+    assert served(Entrant.from_policy("plain", replace(symmetric, mirror=None))) == ["both"]
+
+
+@pytest.mark.parametrize("entrant", [*BASELINES.values(), ORACLE], ids=lambda e: e.name)
+def test_what_is_not_trained_is_for_every_problem(entrant):
+    assert served(entrant) == list(PROBLEMS)
+
+
 @pytest.mark.parametrize("entrant", [*BASELINES.values(), ORACLE], ids=lambda e: e.name)
 def test_what_is_not_trained_fits_every_arm(shipped_arms, entrant):
     for arm in shipped_arms.values():

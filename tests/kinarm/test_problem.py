@@ -248,6 +248,21 @@ class TestComparison:
     def test_the_own_value_comes_last(self, changes, difference):
         assert RIGHT.first_difference(RIGHT.replace(**changes)) == difference
 
+    def test_a_problem_covers_those_with_a_part_of_its_goals(self):
+        both = PROBLEMS["both"]
+        assert both.covers(both)
+        assert both.covers(RIGHT)
+        assert both.covers(PROBLEMS["left"])
+        assert both.replace(goal_weights=(1, 2)).covers(RIGHT.replace(name="other"))
+        assert not RIGHT.covers(both)
+        assert not RIGHT.covers(PROBLEMS["left"])
+
+    @pytest.mark.parametrize("changes", CHANGES.values(), ids=CHANGES)
+    def test_a_problem_covers_none_that_differs_in_something_else(self, changes):
+        other = RIGHT.replace(**changes)
+        if other.task.goal_regions == RIGHT.task.goal_regions and not other.task.goal_weights:
+            assert not RIGHT.covers(other)
+
     def test_the_same_problem_of_another_name(self):
         other = RIGHT.replace(name="other", arm=ArmSpecification(home=(0,) * 6)).pinned
         assert RIGHT.first_difference(other) is None

@@ -55,8 +55,8 @@ def test_settings_replace_those_of_the_recipe():
 
 
 def test_unknown_recipe_lists_the_recipes():
-    with pytest.raises(UnknownNameError, match="unknown recipe 'best'; available: paper, tuned"):
-        recipe("ars", "best")
+    with pytest.raises(UnknownNameError, match="unknown recipe 'precise'; available: paper, tuned"):
+        recipe("ars", "precise")
 
 
 def test_unknown_learner_lists_the_learners():
@@ -138,13 +138,13 @@ class TestPPO:
         assert (config.log_std_init, config.learning_rate_schedule) == (0, "constant")
 
     def test_names(self):
-        assert set(PPO_RECIPES) == {"paper", "tuned", "best"}
+        assert set(PPO_RECIPES) == {"paper", "tuned", "taught", "best", "precise"}
         assert all(config.recipe == name for name, config in PPO_RECIPES.items())
         assert PPO_RECIPES["paper"] == PPOConfig(recipe="paper")
 
     def test_unknown_recipe_lists_the_recipes(self):
         with pytest.raises(
-            UnknownNameError, match="unknown recipe 'v1'; available: paper, tuned, best"
+            UnknownNameError, match="unknown recipe 'v1'; available: paper, tuned, taught"
         ):
             recipe("ppo", "v1")
 
@@ -168,7 +168,7 @@ class TestFile:
         path = write('base = "tuned"\niterations = 9\nnoise = 1\n[reward]\nsuccess = 2\n')
         config = recipe("ars", path, problem="left", seed=4)
         expected = recipe("ars", "tuned", problem="left", seed=4, iterations=9, noise=1.0)
-        weights = RewardWeights(collision=-2, success=2)
+        weights = RewardWeights(collision=-4, success=2)
         assert config == replace(expected, recipe="mine", reward=weights)
 
     def test_without_base_it_is_the_papers(self, write):
@@ -202,8 +202,11 @@ class TestFile:
             ("[reward]\nbonus = 1", "mine.toml: unknown key 'reward.bonus'; available: progress"),
             ("[reward]\ncollision = 2", "mine.toml: reward: .*rewards contact"),
             ("reward = 1", "mine.toml: reward must be a table, got 1"),
-            ('base = "best"', "mine.toml: base must be one of paper, tuned, v1, brs, got 'best'"),
-            ('base = ["paper"]', "mine.toml: base must be one of paper, tuned, v1, brs"),
+            (
+                'base = "precise"',
+                "mine.toml: base must be one of paper, tuned, best, v1, brs, got 'precise'",
+            ),
+            ('base = ["paper"]', "mine.toml: base must be one of paper, tuned, best, v1, brs"),
             (f"noise = {'[' * 10_000}", "mine.toml: not a recipe file"),
             ("problem = 3", "mine.toml: problem must be the name or file of a problem, got 3"),
             ("noise =", "mine.toml: not a recipe file: "),

@@ -50,6 +50,26 @@ def test_for_the_papers_arm_nothing_is_scaled(learner, problem):
     assert getattr(made, "training_tolerance", 0.03) == 0.03
 
 
+OURS = [
+    (learner, name)
+    for learner in ("ars", "ppo")
+    for name in find_learner(learner).recipes
+    if name not in ("paper", "v1", "brs")
+]
+"""Learners and recipes that are not those of papers."""
+
+
+@pytest.mark.parametrize(("learner", "name"), OURS)
+def test_every_recipe_of_ours_is_adapted(half_right, learner, name):
+    half, whole = (recipe(learner, name, problem=problem) for problem in (half_right, "right"))
+    assert half.recipe == name
+    assert half.reward.progress == whole.reward.progress / SCALE
+    for tolerance in ("initial_tolerance", "training_tolerance"):
+        of_whole = getattr(whole, tolerance, None)
+        expected = None if of_whole is None else pytest.approx(SCALE * of_whole)
+        assert getattr(half, tolerance, None) == expected
+
+
 def test_progress_counts_in_the_arms_reach(half_right):
     assert half_right.load_arm().reach == pytest.approx(SCALE * 1.263671568590896)
     for learner in ("ars", "ppo"):
