@@ -16,7 +16,7 @@ def make_card(policy: str) -> str:
 
 
 class KinarmCard(SphinxDirective):
-    """Show the card of a shipped policy, such as ``ppo-tuned-right-seed0``, as its text."""
+    """Show the card of a shipped policy, such as ``ppo-tuned-both-seed0``, as its text."""
 
     required_arguments = 1
 

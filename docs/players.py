@@ -22,7 +22,7 @@ def make_replay(policy: str, problem: str, trials: list[int], ghost: str | None)
 
 
 class KinarmReplay(SphinxDirective):
-    """Show trials of a policy, such as ``ars-tuned-right``, on a problem."""
+    """Show trials of a policy, such as ``ars-tuned-both``, on a problem."""
 
     required_arguments = 2
     option_spec = {"trials": numbers, "ghost": directives.unchanged}  # noqa: RUF012

@@ -23,7 +23,7 @@ _SEED_SUFFIX = re.compile(r"-seed\d+$")
 
 @cache
 def policy_names() -> tuple[str, ...]:
-    """Names of the shipped policies, such as ``ars-tuned-right-seed0``."""
+    """Names of the shipped policies, such as ``ars-tuned-both-seed0``."""
     folder = resources.files("kinarm.data") / "policies"
     return tuple(
         sorted(Path(file.name).stem for file in folder.iterdir() if file.name.endswith(".npz"))

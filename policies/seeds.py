@@ -136,7 +136,7 @@ class SeedsRequest:
     def run(self) -> tuple[TrainedSeed, ...]:
         """Train, and write a policy and a learning curve for each seed.
 
-        Names are those of the shipped policies, such as ``ars-tuned-right-seed0.npz``. With
+        Names are those of the shipped policies, such as ``ars-tuned-both-seed0.npz``. With
         ``resume``, finished seeds are left as they are, and the others go on or begin.
 
         Returns

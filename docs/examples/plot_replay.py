@@ -18,7 +18,7 @@ from kinarm.viewer import replay_page
 
 trials = TrialSet.draw("right", trials=200, seed=0)
 bounds = oracle_bounds(trials)
-(policy,) = find_entrants("ars-tuned-right-seed0")
+(policy,) = find_entrants("ars-tuned-both-seed0")
 (oracle,) = find_entrants("oracle")
 recordings = record(policy, trials, bounds=bounds)
 collided = [each for each in recordings if each.outcome == "collision"]

@@ -55,7 +55,7 @@ class BenchmarkRequest:
     """
 
     repetitions: int = 7
-    policy: str = field(default="ars-tuned-right", metadata={"metavar": "NAME_OR_FILE"})
+    policy: str = field(default="ars-tuned-both", metadata={"metavar": "NAME_OR_FILE"})
     ppo: bool = False
     limits: bool = False
     peers: bool = False

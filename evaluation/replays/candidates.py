@@ -76,18 +76,22 @@ def first_entrant(name: str | None, problem: ReachProblem | None = None) -> Entr
     return find_entrants(name, problem)[0]
 
 
-def faced_problem(entrants: Sequence[Entrant], options: ProblemOptions) -> ReachProblem:
-    """The problem that options make of the one that the first trained entrant is for.
+def faced_problem(
+    entrants: Sequence[Entrant], options: ProblemOptions, stated: ReachProblem | None
+) -> ReachProblem:
+    """The problem that is stated, or what options make of that of the first trained entrant.
 
     Raises
     ------
     InvalidInputError
         If no entrant was trained and no option names a problem.
     """
+    if stated is not None:
+        return stated
     trained = [entrant.problem for entrant in entrants if entrant.problem is not None]
-    if not trained and options.problem is None and options.task is None:
+    if not trained:
         raise InvalidInputError(f"{entrants[0].name!r} was not trained: name a --problem")
-    return options.resolve(trained[0] if trained else "right")
+    return options.resolve(trained[0])
 
 
 def stated_problem(
@@ -114,10 +118,11 @@ def find_candidates(request: ReplayRequest) -> Candidates:
 
 def _fresh_candidates(request: ReplayRequest, names: Sequence[str | None]) -> Candidates:
     """Run policies on trials that are drawn now."""
-    entrants = [first_entrant(name, stated_problem(request, names)) for name in names]
+    stated = stated_problem(request, names)
+    entrants = [first_entrant(name, stated) for name in names]
     searched = request.trial or request.worst or request.collisions
     count = request.trials or (FAILING if request.failures else SEARCHED if searched else PLAYED)
-    trials = TrialSet.draw(faced_problem(entrants, request), count, request.seed or 0)
+    trials = TrialSet.draw(faced_problem(entrants, request, stated), count, request.seed or 0)
     options = {"allow_other_arm": request.allow_other_arm}
     runs = [FacedRun.of(entrant, trials, **options) for entrant in entrants]
     return Candidates(runs, _solved_bounds(trials), count, trials)

@@ -232,8 +232,9 @@ class ReplayRequest(ProblemOptions):
         from kinarm.simulator import Simulator
         from kinarm.viewer.live_server import PORT, LiveServer
 
-        entrant = first_entrant(self.policy, stated_problem(self, [self.policy]))
-        simulator = Simulator(faced_problem([entrant], self))
+        stated = stated_problem(self, [self.policy])
+        entrant = first_entrant(self.policy, stated)
+        simulator = Simulator(faced_problem([entrant], self, stated))
         say_choices([simulator.problem])
         entrant.check(simulator.arm, allow_other_arm=self.allow_other_arm)
         fresh = fresh_recordings(entrant, simulator, self.seed or 0)

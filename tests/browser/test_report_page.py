@@ -30,7 +30,7 @@ PLAYER = "document.querySelector('#worst iframe').contentWindow.kinarm"
 def evaluations():
     """Two recipes on one task, one on another, beside the oracle."""
     made = []
-    for problem, names in (("right", ("ars-tuned-right", "ppo-tuned-right")), ("both", ("zero",))):
+    for problem, names in (("right", ("ars-tuned-both", "ppo-tuned-both")), ("both", ("zero",))):
         trials = TrialSet.draw(problem, 20, seed=3)
         oracle_bounds(trials)
         entrants = [each for name in names for each in find_entrants(name)]
@@ -185,11 +185,11 @@ def test_player_rests_out_of_sight(visit):
 
 def test_pointing_at_a_policy_dims_the_others(visit):
     page = visit(**DESKTOP)
-    page.locator("#right .legend li[data-series='ars-tuned-right']").hover()
+    page.locator("#right .legend li[data-series='ars-tuned-both']").hover()
     dimmed = page.locator("#right .chart .dimmed").count()
     shown = page.locator("#right .chart .series:not(.dimmed)").all()
     assert dimmed > 0
-    assert {each.get_attribute("data-series") for each in shown} == {"ars-tuned-right"}
+    assert {each.get_attribute("data-series") for each in shown} == {"ars-tuned-both"}
 
 
 def is_within(page, tip) -> bool:

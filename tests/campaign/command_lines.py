@@ -48,7 +48,7 @@ WORDS = (
     *("inf", "100000000", "99999999999999999999", "1" * 5000, "0x10", "1_000", "2.5", "\u0663"),
     *("é\u2028\udcff", "x" * 5000, "a/" * 600 + "b", "[/o]", "x/[red]", "~", "../..", "/", "."),
     *("/dev/null", "/dev/full", "/dev/stdin", "/proc/self/mem", "/proc/self/status", "@file"),
-    *("right", "left", "both", "paper", "tuned", "zero", "random", "oracle", "ars-tuned-right"),
+    *("right", "left", "both", "paper", "tuned", "zero", "random", "oracle", "ars-tuned-both"),
     *("os:getcwd", "antigravity:x", "math:sin", "no.such:thing", "ppo", "ars", "list", "show"),
     *("out", "out.npz", "out.md", "out.html", "out.png", "out.json", "damaged.npz", "damaged.toml"),
     *("damaged.json", "damaged.urdf", "damaged.zip", "folder", "folder/deep/out", "check"),
@@ -124,7 +124,7 @@ PROGRAMS: dict[str, Program] = {
     "kinarm-eval": Program(
         evaluate.main,
         lambda: _flags(evaluate.EvaluationRequest),
-        (["--policy", "zero"], ["--trials", "2"], ["--policy", "ars-tuned-right", "--out", "out"]),
+        (["--policy", "zero"], ["--trials", "2"], ["--policy", "ars-tuned-both", "--out", "out"]),
         ("kinarm.evaluation.request.EvaluationRequest._face",),
     ),
     "kinarm-problem": Program(

@@ -119,11 +119,11 @@ def trainings(run: LongRun) -> None:
 
 def evaluations(run: LongRun) -> None:
     """Evaluate policies, and ask the oracle for bounds of fresh trials."""
-    evaluate("ars-tuned-right", trials=100, seed=run.round)
+    evaluate("ars-tuned-both", trials=100, seed=run.round)
     evaluate("ppo-tuned-both", trials=20, seed=run.round)
     trials = TrialSet.draw("right", 4, seed=run.round)
     bounds = oracle_bounds(trials)
-    rollouts = find_entrants("ars-tuned-right")[0].run(trials)
+    rollouts = find_entrants("ars-tuned-both")[0].run(trials)
     assert (rollouts.steps >= bounds.steps_lower_bound)[rollouts.success].all()
     run.count("evaluated trials", 124)
 
@@ -143,7 +143,7 @@ def replays(run: LongRun) -> None:
 def live_pages(run: LongRun) -> None:
     """Move an arm on the page that lasts and on a new one, while clients come and go."""
     starts, goals = run.simulator.sample(np.random.default_rng(run.round), 2)
-    policy = find_entrants("ars-tuned-left")[0].policy
+    policy = find_entrants("ars-tuned-both")[0].policy
     rollouts = run.simulator.rollout(policy, starts, goals, record=True)
     with LiveServer(PORT) as passing:
         assert passing.port != run.stage.server.port
@@ -197,12 +197,12 @@ def commands(run: LongRun) -> None:
     _await(lambda: checkpoint.stat().st_mtime_ns != saved, resumed)
     assert _stop(run, resumed, signal.SIGINT) == 130
     evaluated = _start(
-        *("kinarm.evaluation.commands.evaluate", "--policy", "ars-tuned-right"),
+        *("kinarm.evaluation.commands.evaluate", "--policy", "ars-tuned-both"),
         *("--trials", "20", "--out", str(run.folder / "evaluated")),
     )
     assert _stop(run, evaluated) == 0
     live = _start(
-        *("kinarm.evaluation.commands.replay", "--policy", "ars-tuned-right", "--live"),
+        *("kinarm.evaluation.commands.replay", "--policy", "ars-tuned-both", "--live"),
         *("--no-browser", "--port", str(PORT + 50)),
     )
     assert live.stdout is not None

@@ -79,7 +79,7 @@ SUBJECTS: dict[str, Subject] = {
     ),
     "eval": Subject(
         "kinarm-eval",
-        ("--policy", "ars-tuned-right", "--problem", "right", "--report", "out"),
+        ("--policy", "ars-tuned-both", "--problem", "right", "--report", "out"),
     ),
     "eval, printed": Subject("kinarm-eval", ("--trials", "50", "--problem", "left")),
     "problem": Subject(
@@ -88,7 +88,7 @@ SUBJECTS: dict[str, Subject] = {
     ),
     "replay": Subject(
         "kinarm-replay",
-        ("--policy", "ars-tuned-right", "--trials", "3", "--out", "r.html", "--record", "r.npz"),
+        ("--policy", "ars-tuned-both", "--trials", "3", "--out", "r.html", "--record", "r.npz"),
     ),
     "replay, live": Subject(
         "kinarm-replay",

@@ -43,7 +43,7 @@ def written(write: Callable[[Path], object], name: str = "file.npz") -> bytes:
 
 def policies() -> list[bytes]:
     """A linear policy, and one with hidden layers."""
-    names = ("ars-tuned-right-seed0", "ppo-tuned-both-seed0")
+    names = ("ars-tuned-both-seed0", "ppo-tuned-both-seed0")
     return [written(load_policy(name).save) for name in names]
 
 
@@ -67,7 +67,7 @@ def trials() -> TrialSet:
 def recordings() -> list[bytes]:
     """Of three trials."""
     simulator = trials().simulator
-    policy = load_policy("ars-tuned-right")
+    policy = load_policy("ars-tuned-both")
     rollouts = simulator.rollout(policy, trials().starts, trials().goals, record=True)
     recorded = record_rollouts(simulator, rollouts, "ars")
     return [written(lambda path: save_recordings(path, recorded))]
@@ -77,7 +77,7 @@ def evaluations() -> list[bytes]:
     """An ``evaluation.json`` with the oracle's bounds, one without, one with held trials."""
     found = []
     for parts in ({"oracle": True}, {}, {"hold": True}):
-        entrant = find_entrants("ars-tuned-right")[0]
+        entrant = find_entrants("ars-tuned-both")[0]
         document = evaluation_document([run_trials(entrant, trials(), **parts)], "kinarm-eval")
         found.append(document_text(document).encode())
     return found

@@ -33,7 +33,7 @@ LARGE = 1000
 @cache
 def evaluations() -> list[Evaluation]:
     """What a command came to before it writes."""
-    request = evaluate.EvaluationRequest(policies=("ars-tuned-right",), trials=2, oracle=False)
+    request = evaluate.EvaluationRequest(policies=("ars-tuned-both",), trials=2, oracle=False)
     return request.evaluate()
 
 
@@ -45,7 +45,7 @@ def _evaluate() -> None:
         evaluate.main(
             [
                 "--policy",
-                "ars-tuned-right",
+                "ars-tuned-both",
                 "--no-oracle",
                 "--trials",
                 "2",
@@ -95,7 +95,7 @@ WRITERS: dict[str, Callable[[], object]] = {
     "kinarm-replay": lambda: replay.main(
         [
             "--policy",
-            "ars-tuned-right",
+            "ars-tuned-both",
             "--trials",
             "1",
             "--no-oracle",

@@ -152,7 +152,7 @@ class TestCard:
         ("arguments", "word"),
         [
             ((), "and 51 more"),
-            (("--policy", "ars-tuned-right"), "ars-tuned-right-seed0 on right"),
+            (("--policy", "ars-tuned-both"), "ars-tuned-both-seed0 on both"),
             (("--policy", "zero", "--problem", "right"), "zero on right"),
             (("--policy", "oracle", "--problem", "right"), "got oracle"),
         ],

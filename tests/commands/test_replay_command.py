@@ -111,7 +111,7 @@ def test_two_policies_on_the_same_trials(replay, tmp_path):
 
 
 def test_the_oracle_and_a_policy(replay):
-    answer = replay("--compare", "oracle", "ars-tuned-right", "--trial", 3)
+    answer = replay("--compare", "oracle", "ars-tuned-both", "--trial", 3)
     assert played(answer) == [3, 3]
     assert "oracle: reached the goal" in answer.out
 
@@ -126,9 +126,9 @@ def test_another_arm(replay):
     [
         ((), ["name a --policy"]),
         (("--policy", "zero"), ["'zero'", "name a --problem"]),
-        (("--policy", "nobody"), ["'nobody'", "ars-tuned-right"]),
+        (("--policy", "nobody"), ["'nobody'", "ars-tuned-both"]),
         (("--policy", "zero", "--problem", "up"), ["'up'", "left, right, both"]),
-        (("--policy", "ars-tuned-right", "--arm", "paper_flange"), ["trained for arm 'paper'"]),
+        (("--policy", "ars-tuned-both", "--arm", "paper_flange"), ["trained for arm 'paper'"]),
         (("--policy", "zero", "--compare", "zero", "random"), ["--policy", "--compare"]),
         (("--policy", "zero", "--worst", "3", "--collisions"), ["--worst", "--collisions"]),
         (("--compare", "zero"), ["--compare", "2 arguments"]),

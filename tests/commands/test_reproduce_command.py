@@ -192,7 +192,7 @@ def test_the_same_command_trains_what_is_missing(tmp_path, capsys, monkeypatch):
     """By an executor of the caller's, which hands back what it is asked for, and no more."""
     study = quick_study(ppo=False)
     store = RunStore(tmp_path, study.protocol)
-    policy, run = load_policy("ars-tuned-right"), made_up(np.full(study.protocol.trials, 0.04))
+    policy, run = load_policy("ars-tuned-both"), made_up(np.full(study.protocol.trials, 0.04))
     for training in study.trainings[2:]:
         store.save(training, policy, run)
     monkeypatch.setattr(documents, "write_all", lambda *_: ())
@@ -218,7 +218,7 @@ def test_finished_trainings_are_summed_up_without_another_one(
     store = RunStore(tmp_path, study.protocol)
     distance = np.full(study.protocol.trials, 0.04 if near else 0.5)
     for training in study.trainings:
-        store.save(training, load_policy("ars-tuned-right"), made_up(distance))
+        store.save(training, load_policy("ars-tuned-both"), made_up(distance))
     answer = run("kinarm-reproduce", *QUICK, "--out", tmp_path)
     assert answer.status == 0, answer.err
     page = (tmp_path / "REPRODUCTION.md").read_text()

@@ -64,9 +64,9 @@ LEARN = re.compile(r"(\.learn\(\s*)[\d_]+")
 
 FURNITURE = {
     **dict.fromkeys(("my_arm.urdf", "my_robot.urdf"), "data/arms/paper.urdf"),
-    **dict.fromkeys(("right.npz", "mine.npz"), "data/policies/ars-tuned-right-seed0.npz"),
-    "my_policy.npz": "data/policies/ars-tuned-left-seed0.npz",
-    "right/ars-tuned-right-seed1.npz": "data/policies/ars-tuned-right-seed1.npz",
+    **dict.fromkeys(("right.npz", "mine.npz"), "data/policies/ars-tuned-both-seed0.npz"),
+    "my_policy.npz": "data/policies/ars-tuned-both-seed0.npz",
+    "right/ars-tuned-right-seed1.npz": "data/policies/ars-tuned-both-seed1.npz",
 }
 WRITTEN = {
     "my_problem.toml": 'base = "left"',

@@ -100,7 +100,7 @@ def test_a_metric_is_one_entry(
     metrics.METRICS.update(table)
     for name, metric in added.items():
         monkeypatch.setitem(metrics.METRICS, name, metric)
-    command = "kinarm-eval --policy ars-tuned-right-seed0 --trials 40 --no-oracle"
+    command = "kinarm-eval --policy ars-tuned-both-seed0 --trials 40 --no-oracle"
     run(f"{command} --json")
     (result,) = json.loads(capsys.readouterr().out)["results"]
     outcomes = result["outcomes"]
@@ -146,7 +146,7 @@ assert find_mirror(env.simulator.world).observations[-1] == 1
 assert "distance 1" in observation_layout()
 assert "48-48" in kinarm.ReachEnv.__doc__ or "distance from the tool" in kinarm.ReachEnv.__doc__
 try:
-    kinarm.policies.load_policy("ars-tuned-right")
+    kinarm.policies.load_policy("ars-tuned-both")
 except kinarm.PolicyFileError as error:
     assert "layout" in str(error)
 else:

@@ -32,7 +32,7 @@ class Plain:
         return np.tanh(observation[:, 3:8])
 
 remembering, plain = Remembering(), Plain()
-shipped = load_policy("ars-tuned-right")
+shipped = load_policy("ars-tuned-both")
 number = 3
 _hidden = towards
 """
@@ -174,7 +174,7 @@ class TestModel:
             find_entrants(tmp_path / "gone.zip", "right")
 
 
-@pytest.mark.parametrize("policy", ["ppo-tuned-right", "ars-tuned-right"])
+@pytest.mark.parametrize("policy", ["ppo-tuned-both", "ars-tuned-both"])
 @pytest.mark.parametrize("name", ["kinarm/ReachRight-v0", "kinarm/ReachGoalRight-v0"])
 def test_stable_baselines3_evaluates_every_policy(policy, name):
     evaluation = pytest.importorskip("stable_baselines3.common.evaluation")

@@ -98,7 +98,7 @@ def test_recorded_documents(name):
 @pytest.fixture(scope="module")
 def evaluation():
     request = EvaluationRequest(
-        policies=("ars-tuned-right", "random"), problem="right", trials=12, hold=True
+        policies=("ars-tuned-both", "random"), problem="right", trials=12, hold=True
     )
     return request.run(command="a test")
 
@@ -118,7 +118,7 @@ def test_an_evaluation_of_any_problem(name):
 
 
 def test_a_ranking():
-    check(ranking(["ars-tuned-left-seed0"], trials=5), "ranking")
+    check(ranking(["ars-tuned-both-seed0"], trials=5), "ranking")
 
 
 @pytest.mark.parametrize(

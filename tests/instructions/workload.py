@@ -44,7 +44,7 @@ def make_requests() -> Callable[[int, bytes], None]:
 
 def sections() -> dict[str, Callable[[], object]]:
     """Work by name."""
-    policy = load_policy("ars-tuned-right-seed0")
+    policy = load_policy("ars-tuned-both-seed0")
     simulator = Simulator("right", threads=1)
     scenarios = simulator.sample(np.random.default_rng(0), 256)
     env = ReachVectorEnv(64, "right", threads=1)

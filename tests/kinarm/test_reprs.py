@@ -7,7 +7,7 @@ from kinarm.policies import Oracle, load_policy, recipe
 
 
 def test_objects_show_themselves_in_one_line() -> None:
-    simulator, policy = kinarm.Simulator("left"), load_policy("ars-tuned-left")
+    simulator, policy = kinarm.Simulator("left"), load_policy("ars-tuned-both")
     starts, goals = simulator.sample(np.random.default_rng(0), 3)
     rollouts = simulator.rollout(policy, starts, goals)
     shown = {

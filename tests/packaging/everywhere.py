@@ -22,7 +22,7 @@ COMMANDS = """
 kinarm-train ars --problem right --iterations 3 --out mine.npz
 kinarm-train ars --problem right --iterations 3 --seeds 2 --jobs 2 --out seeds
 kinarm-replay --policy mine.npz --trials 1 --out replay.html
-kinarm-eval --policy mine.npz --policy ars-tuned-right-seed0 --trials 20 --json
+kinarm-eval --policy mine.npz --policy ars-tuned-both-seed0 --trials 20 --json
 """
 """What is tried in an empty folder; the last one's results are compared."""
 

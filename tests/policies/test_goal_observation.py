@@ -48,7 +48,7 @@ def test_others_are_refused(shown, change, message):
 
 class TestPredict:
     def test_answers_as_a_call_and_gives_the_state_back(self, shown):
-        policy, (flat, parts) = load_policy("ppo-tuned-right"), shown
+        policy, (flat, parts) = load_policy("ppo-tuned-both"), shown
         actions, state = policy.predict(flat, "mine", np.zeros(30, dtype=bool), False)
         np.testing.assert_array_equal(actions, policy(flat))
         assert state == "mine"
@@ -56,13 +56,13 @@ class TestPredict:
         np.testing.assert_allclose(of_parts, actions, rtol=0, atol=1e-12)
 
     def test_one_arm_after_the_other(self, shown):
-        policy, (flat, parts) = load_policy("ars-tuned-right"), shown
+        policy, (flat, parts) = load_policy("ars-tuned-both"), shown
         action, state = policy.predict(flat[0])
         assert (action.shape, state) == ((5,), None)
         assert policy.predict({name: part[0] for name, part in parts.items()})[0].shape == (5,)
 
     def test_drives_a_goal_conditioned_environment(self):
-        env, policy = ReachGoalEnv("right"), load_policy("ppo-tuned-right")
+        env, policy = ReachGoalEnv("right"), load_policy("ppo-tuned-both")
         reached = []
         for seed in range(8):
             observation, _ = env.reset(seed=seed)

@@ -223,7 +223,7 @@ class TestTransferByReflection:
         """Of learnt policies, and of one that turns at full speed."""
         simulator = Simulator(SYMMETRIC[name], threads=1)
         mirror = find_mirror(simulator.world)
-        learnt = load_policy("ppo-tuned-right-seed0"), load_policy("ars-tuned-right-seed0")
+        learnt = load_policy("ppo-tuned-both-seed0"), load_policy("ars-tuned-both-seed0")
         starts, goals = simulator.sample(np.random.default_rng(2), 150)
         for plain in (*learnt, lively(make_policy(8, seed=4), 30)):
             policy = replace(plain, mirror=mirror)
@@ -234,7 +234,7 @@ class TestTransferByReflection:
             np.testing.assert_allclose(first.paths * REVERSED, second.paths, rtol=0, atol=1e-12)
 
     def test_one_trained_on_the_right_does_as_well_on_the_left(self, mirror):
-        policy = replace(load_policy("ars-tuned-right-seed0"), mirror=mirror)
+        policy = replace(load_policy("ars-tuned-both-seed0"), mirror=mirror)
         simulator = Simulator("right", threads=1)
         starts, goals = simulator.sample(np.random.default_rng(3), 200)
         learnt = simulator.rollout(policy, starts, goals)

@@ -37,8 +37,8 @@ def same_deeds(first, second, problem="left"):
 
 
 def test_ars_begins_with_a_linear_policy():
-    config = ARSConfig(problem="left", initial_policy="ars-tuned-right-seed1")
-    same_deeds(first_policy(config), load_policy("ars-tuned-right-seed1"))
+    config = ARSConfig(problem="left", initial_policy="ars-tuned-both-seed1")
+    same_deeds(first_policy(config), load_policy("ars-tuned-both-seed1"))
 
 
 def test_ars_begins_with_a_network(network_file):
@@ -48,7 +48,7 @@ def test_ars_begins_with_a_network(network_file):
 
 def test_ppo_begins_with_an_actor():
     pytest.importorskip("stable_baselines3")
-    name = "ppo-tuned-right-seed2"
+    name = "ppo-tuned-both-seed2"
     config = PPOConfig(problem="left", initial_policy=name, net_arch=(64, 64, 64))
     same_deeds(first_policy(config), load_policy(name))
 
@@ -56,10 +56,10 @@ def test_ppo_begins_with_an_actor():
 def test_another_arm_will_do():
     config = ARSConfig(
         problem=PROBLEMS["right"].replace(arm="lrmate200ic_5l"),
-        initial_policy="ars-tuned-right-seed1",
+        initial_policy="ars-tuned-both-seed1",
         iterations=1,
     )
-    weights = load_policy("ars-tuned-right-seed1").layers[0].weights
+    weights = load_policy("ars-tuned-both-seed1").layers[0].weights
     np.testing.assert_array_equal(first_policy(config).layers[0].weights, weights)
 
 
@@ -73,7 +73,7 @@ def test_others_are_refused(tmp_path, network_file):
     relu.save(tmp_path / "relu.npz")
     with pytest.raises(InvalidInputError, match="has the functions relu, linear; those of the"):
         first_policy(ARSConfig(initial_policy=str(tmp_path / "relu.npz"), net_arch=(9,)))
-    linear = load_policy("ars-tuned-right-seed1")
+    linear = load_policy("ars-tuned-both-seed1")
     biased = replace(linear, layers=(Layer(linear.layers[0].weights, np.ones(5)),))
     biased.save(tmp_path / "biased.npz")
     with pytest.raises(InvalidInputError, match="has a bias"):
@@ -81,7 +81,7 @@ def test_others_are_refused(tmp_path, network_file):
 
 
 def test_statistics_are_taken_where_they_are_used():
-    policy = "ars-tuned-right-seed1"
+    policy = "ars-tuned-both-seed1"
     states = [
         begin_training(ARSConfig(initial_policy=policy, normalize=normalize)).initial_state()
         for normalize in (True, False)

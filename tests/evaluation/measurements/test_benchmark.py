@@ -80,9 +80,9 @@ def test_more_is_measured_where_it_is_asked_for(monkeypatch):
         found = SimpleNamespace(name=name, median=3.0, _asdict=dict)
         answer = fast if name == "measure_rollouts" else found
         monkeypatch.setattr(benchmark, name, lambda *_, answer=answer: answer)
-    plain = benchmark.measure("ars-tuned-right", 1)
+    plain = benchmark.measure("ars-tuned-both", 1)
     more = dict.fromkeys(("ppo", "limits", "peers", "studies"), True)
-    everything = benchmark.measure("ars-tuned-right", 1, **more)
+    everything = benchmark.measure("ars-tuned-both", 1, **more)
     assert plain["speed_up_over_reference"] == 2.0
     assert set(everything) - set(plain) == {"ppo_training", "limits", "peers", "studies"}
     assert everything["studies"].name == "measure_studies"

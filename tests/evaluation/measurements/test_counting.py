@@ -102,7 +102,7 @@ def test_operations_are_those_that_a_process_of_its_own_prints(monkeypatch):
 
 @pytest.mark.slow
 def test_step_is_counted_in_a_process_of_its_own():
-    found = operations.measure_operations("ars-tuned-right-seed0")
+    found = operations.measure_operations("ars-tuned-both-seed0")
     functions = found["functions"]
     assert found["total"] == pytest.approx(sum(functions.values()))
     assert found["total"] == pytest.approx(sum(found["kinds"].values()))
