@@ -16,7 +16,7 @@ from kinarm.policies import load_policy
 from kinarm.recording import record_rollouts
 from kinarm.viewer import Camera, Renderer
 
-POLICY = "ppo-tuned-both"
+POLICY = "ppo-best-both"
 OUT = Path(__file__).parent / "_static" / "reach.gif"
 WIDTH, HEIGHT, SCALE = 600, 420, 2
 """Size of the animation, and how much larger pictures are taken, for smoother edges."""

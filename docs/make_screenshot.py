@@ -20,7 +20,7 @@ def main() -> None:
     """Make a replay, show a step of it and take its picture."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "replay.html"
-        make_replay("ppo-tuned-both", "right", [0, 1, 3], "oracle").save(path)
+        make_replay("ppo-best-both", "right", [0, 1, 3], "oracle").save(path)
         with open_page(path, WIDTH, HEIGHT) as page:
             page.wait_for_selector("body[data-ready]")
             page.evaluate(f"kinarm.seek({STEP})")

@@ -15,7 +15,8 @@ FORMAT_VERSION = 3
 def save_policy(path: str | Path, policy: Policy) -> None:
     """Write a policy; see `Policy.save`."""
     content = policy_content(policy)
-    save_archive(path, "policy", FORMAT_VERSION, content.arrays, content.header)
+    # Weights of networks have the digits of single precision: compressed, they take half the room.
+    save_archive(path, "policy", FORMAT_VERSION, content.arrays, content.header, compress=True)
 
 
 def read_policy(path: str | Path) -> Policy:

@@ -2,7 +2,9 @@
 
 ``python tests/golden/digests.py`` prints them, ``--record`` keeps them in ``digests.json`` with the
 semantics of simulator and oracle that they belong to; under one version they stay as they are.
-Numbers are rounded to 8 decimals, far above what processors and C libraries differ by.
+A digest of what a policy or settings lead to follows a hash of that policy or those settings, and
+may change with it: other policies ship and recipes are tuned without another version. Numbers are
+rounded to 8 decimals, far above what processors and C libraries differ by.
 """
 
 import hashlib
@@ -55,6 +57,11 @@ def of_rollouts(rollouts: Rollouts) -> str:
     )
 
 
+def led_to(given: str, found: str) -> str:
+    """A digest after a hash of what it follows from."""
+    return f"{hashlib.sha256(given.encode()).hexdigest()[:8]} {found}"
+
+
 def trial_digests() -> dict[str, str]:
     """Starts and goals of the trials of every arm and task."""
     found = {}
@@ -77,12 +84,13 @@ def rollout_digests() -> dict[str, str]:
             found[f"rollouts {arm} {task} random"] = of_rollouts(
                 simulator.rollout_actions(actions, starts, goals, record=True)
             )
-            learners = ("ars-paper", "ars-tuned", "ppo-tuned")
-            for learner in (*learners, "ppo-paper") if arm == "paper" else learners:
-                policy = load_policy(f"{learner}-{task}-seed1")
+            groups = (f"ars-paper-{task}", "ars-tuned-both", "ppo-tuned-both", "ppo-best-both")
+            for group in (*groups, f"ppo-paper-{task}") if arm == "paper" else groups:
+                policy = load_policy(f"{group}-seed1")
                 shift = np.linspace(-0.5, 0.5, simulator.n_observations)
-                found[f"rollouts {arm} {task} {learner}"] = of_rollouts(
-                    simulator.rollout(policy, starts, goals, record=True, shift=shift)
+                found[f"rollouts {arm} {task} {group.rpartition('-')[0]}"] = led_to(
+                    json.dumps([layer.weights.tolist() for layer in policy.layers]),
+                    of_rollouts(simulator.rollout(policy, starts, goals, record=True, shift=shift)),
                 )
     return found
 
@@ -91,7 +99,14 @@ def ars_digests() -> dict[str, str]:
     """Ten iterations of Augmented Random Search."""
     found = {}
     again = {"replay_share": 0.5}
-    for name, changes in (("paper", {}), ("tuned", {}), ("tuned", again), ("brs", {})):
+    settings = (
+        ("paper", {}),
+        ("tuned", {}),
+        ("tuned", again),
+        ("best", {"episodes": 2}),
+        ("brs", {}),
+    )
+    for name, changes in settings:
         for task in TASKS:
             states: list[ARSState] = []
             made = recipe("ars", name, problem=task, seed=2)
@@ -99,11 +114,14 @@ def ars_digests() -> dict[str, str]:
             result = train_policy(config, on_iteration=states.append)
             state = states[-1]
             curve = [point[:4] for point in state.curve]
-            found[f"ars {name} {task}{' replay' if changes else ''}"] = digest(
-                [
-                    *(state.theta, state.normalizer.mean, state.normalizer.squares, curve),
-                    *result.policy.networks().weights,
-                ]
+            found[f"ars {name} {task}{' replay' if changes else ''}"] = led_to(
+                repr(config),
+                digest(
+                    [
+                        *(state.theta, state.normalizer.mean, state.normalizer.squares, curve),
+                        *result.policy.networks().weights,
+                    ]
+                ),
             )
     return found
 
@@ -119,19 +137,22 @@ def ppo_digests() -> dict[str, str]:
         ("tuned", "left", {}),
         ("tuned", "both", {}),
         ("tuned", "right", again),
+        ("taught", "both", {"demonstrations": 60}),
     ):
         states: list[PPOState] = []
-        train_policy(
-            replace(recipe("ppo", name, problem=task, seed=2), iterations=3, **changes),
-            on_iteration=states.append,
-        )
+        made = recipe("ppo", name, problem=task, seed=2)
+        config = replace(made, iterations=3, **changes)
+        train_policy(config, on_iteration=states.append)
         state = states[-1]
-        found[f"ppo {name} {task}{' replay' if changes else ''}"] = digest(
-            [
-                *(state.parameters, state.first_moment, state.second_moment),
-                *(state.normalizer.mean, state.normalizer.squares, *state.episodes[:4]),
-                np.nan_to_num([point[:4] for point in state.curve]),
-            ]
+        found[f"ppo {name} {task}{' replay' if changes else ''}"] = led_to(
+            repr(config),
+            digest(
+                [
+                    *(state.parameters, state.first_moment, state.second_moment),
+                    *(state.normalizer.mean, state.normalizer.squares, *state.episodes[:4]),
+                    np.nan_to_num([point[:4] for point in state.curve]),
+                ]
+            ),
         )
     return found
 
@@ -165,14 +186,20 @@ def seal(record: dict[str, Any]) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 
 
+def _given(digest: str) -> str:
+    """Hash of what a digest follows from; empty if it follows from the name alone."""
+    return digest.rpartition(" ")[0]
+
+
 def renewed(record: dict[str, Any], digests: dict[str, str]) -> dict[str, Any]:
-    """A record of the digests; refused if those of the same version change."""
+    """A record of the digests; refused if those of the same version and givens change."""
     versions = {"semantics": SEMANTICS, "oracle_semantics": ORACLE_SEMANTICS}
     kept = {name for name, version in versions.items() if record[name] == version}
     refused = [
         name
         for name, recorded in record["digests"].items()
         if digests.get(name) != recorded
+        and _given(digests.get(name, recorded)) == _given(recorded)
         and "semantics" in kept
         and ("oracle_semantics" in kept or not name.startswith("oracle "))
     ]

@@ -71,6 +71,15 @@ class TestRecordingAnew:
         with pytest.raises(SystemExit, match="trials"):
             renewed({**old, "oracle_semantics": "0"}, {**digests, "trials": "z"})
 
+    def test_what_follows_from_another_policy_needs_none(self) -> None:
+        old = {**OLD, "digests": {**OLD["digests"], "rollouts": "p a"}}
+        digests = {**OLD["digests"], "rollouts": "q b"}
+        assert renewed(old, digests)["digests"] == digests
+        with pytest.raises(SystemExit, match="rollouts"):
+            renewed(old, {**digests, "rollouts": "p b"})
+        with pytest.raises(SystemExit, match="rollouts"):
+            renewed(old, OLD["digests"])
+
     def test_further_digests_do_not(self) -> None:
         digests = {**OLD["digests"], "oracle": "c"}
         assert renewed(OLD, digests)["digests"] == digests

@@ -249,7 +249,7 @@ class TestFile:
             file.write(b"half")
             raise OSError(28, "No space left on device")
 
-        monkeypatch.setattr(np, "savez", fail)
+        monkeypatch.setattr(np, "savez_compressed", fail)
         with pytest.raises(OutputError, match="cannot write.*No space left"):
             make_policy(seed=9).save(saved)
         assert saved.read_bytes() == before
