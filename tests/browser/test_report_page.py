@@ -224,6 +224,25 @@ def test_a_tap_tells_what_a_mark_stands_for(visit):
         assert is_within(page, tip)
 
 
+def test_arrows_go_through_the_goals_of_a_map(visit):
+    page = visit(**DESKTOP)
+    tip, first = page.locator("#tip"), page.locator("#right svg.map[tabindex]").first
+    titles = first.locator(":has(> title) > title").all_text_contents()[::-1]
+    first.focus()
+    for key, index in (("ArrowRight", 0), ("ArrowDown", 1), ("ArrowLeft", 0), ("ArrowUp", -1)):
+        first.press(key)
+        tip.wait_for()  # the page scrolls there
+        assert tip.inner_text() == titles[index]
+        assert first.locator(".chosen > title").text_content() == titles[index]
+        assert is_within(page, tip)
+    first.press("Escape")
+    assert tip.is_hidden()
+    first.press("ArrowRight")
+    page.keyboard.press("Tab")
+    assert tip.is_hidden()
+    assert not first.locator(".chosen").count()
+
+
 @pytest.mark.parametrize("width", [320, 390, 1280])
 def test_the_keyboard_tells_what_every_figure_means(visit, width):
     """Each figure of a table is on the way of the tabulator key, once, wherever it stands."""

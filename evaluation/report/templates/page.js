@@ -79,6 +79,33 @@ for (const term of document.querySelectorAll(".term")) {
   term.addEventListener("pointerleave", (event) => event.pointerType === "mouse" && closeTip());
 }
 
+// Arrows go from mark to mark of the map that has the focus; what is drawn last comes first.
+const DIRECTIONS = { ArrowLeft: -1, ArrowUp: -1, ArrowRight: 1, ArrowDown: 1 };
+
+for (const map of document.querySelectorAll("svg.map[tabindex]")) {
+  const marks = [...map.querySelectorAll(":scope :has(> title)")].reverse();
+  const choose = (index) => {
+    map.querySelector(".chosen")?.classList.remove("chosen");
+    marks[index]?.classList.add("chosen");
+  };
+  map.addEventListener("keydown", (event) => {
+    const direction = DIRECTIONS[event.key];
+    if (direction === undefined) {
+      return;
+    }
+    event.preventDefault();
+    const current = marks.indexOf(map.querySelector(".chosen"));
+    const next = current < 0 ? 0 : (current + direction + marks.length) % marks.length;
+    choose(next);
+    marks[next].scrollIntoView({ block: "nearest", inline: "nearest" });
+    explain(marks[next]);
+  });
+  map.addEventListener("blur", () => {
+    choose(-1);
+    closeTip();
+  });
+}
+
 // The replay of the worst trials: a row chooses the trial, and follows when the player goes on.
 const frame = document.querySelector("#worst iframe");
 const rows = [...document.querySelectorAll("tr[data-replay]")];
