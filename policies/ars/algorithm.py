@@ -113,7 +113,7 @@ def ars_iteration(
         mean_return=mean_return,
         std_return=std_return,
         success=success,
-        environment_steps=normalizer.count,
+        environment_steps=state.environment_steps + int(rollouts.steps.sum()),
         wall_time=state.wall_time + time.perf_counter() - began,
     )
     return ARSState(

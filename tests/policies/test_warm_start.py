@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinarm.errors import InvalidInputError, UnknownNameError
-from kinarm.policies import ARSConfig, PPOConfig, load_policy, state_policy
+from kinarm.policies import ARSConfig, PPOConfig, load_policy, state_policy, train_policy
 from kinarm.policies.learners import begin_training
 from kinarm.policies.policy import Layer
 from kinarm.problem import PROBLEMS
@@ -88,3 +88,13 @@ def test_statistics_are_taken_where_they_are_used():
     ]
     assert [state.normalizer.count > 0 for state in states] == [True, False]
     np.testing.assert_array_equal(states[0].theta, states[1].theta)
+
+
+def test_steps_are_those_of_the_training():
+    """Not the observations that the initial policy's statistics stand for."""
+    settings = {"iterations": 2, "directions": 2, "top_directions": 1}
+    warm = ARSConfig(initial_policy="ars-tuned-right-seed1", **settings)
+    for config in (ARSConfig(**settings), warm):
+        curve = train_policy(config, threads=1).curve
+        taken = [point.environment_steps for point in curve]
+        assert 0 < taken[0] < taken[1] <= 2 * 4 * 64

@@ -1,0 +1,1 @@
+"""Transfer: what policies for one task are worth for other tasks and for another arm."""
