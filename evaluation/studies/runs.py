@@ -255,6 +255,9 @@ OUTCOME_KINDS = {"distance": "f", "steps": "i", "returns": "f", "success": "b", 
 BOUND_KINDS = {"reachable": "b", "steps_lower_bound": "i"}
 """Kinds of arrays with an entry for each trial: numbers, whole numbers and truth values."""
 
+LARGEST = 1e12
+"""Numbers of trials at most: sums and squares of them stay finite."""
+
 
 def _each_trials(
     arrays: Mapping[str, NDArray[Any]], kinds: Mapping[str, str], count: int
@@ -264,12 +267,15 @@ def _each_trials(
     Raises
     ------
     ValueError
-        If one is missing, or of another kind or shape.
+        If one is missing, of another kind or shape, or holds a number that is not finite or
+        beyond what a trial comes to.
     """
     for name, kind in kinds.items():
         array = arrays[name]
         if array.dtype.kind != kind or array.shape != (count,):
             raise ValueError(f"{name} is not of {count} trials")
+        if kind == "f" and not (np.abs(array) <= LARGEST).all():
+            raise ValueError(f"{name} holds a number that no trial comes to")
     return {name: arrays[name] for name in kinds}
 
 
