@@ -195,7 +195,7 @@ def _bounded(
         for end, value in zip(("lower", "upper"), limits[name], strict=True):
             limit.set(end, repr(value))
     lower, upper = (float(limit.attrib[end]) for end in ("lower", "upper"))
-    if not -1e10 < lower < upper < 1e10:  # Pinocchio would say so in words of its own
+    if not lower < upper < 1e10:  # Pinocchio would say so in words of its own
         raise ArmError(f"joint {name!r} of {path.name} has no usable limits: {lower}..{upper}")
     return notes
 

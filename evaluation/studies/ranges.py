@@ -12,9 +12,6 @@ DIGITS = 6
 
 RANGE = ("low", "high", "log")
 
-LARGEST = 1e100
-"""Ends of ranges at most: what is drawn between them stays finite."""
-
 
 def check_range(where: str, entry: Any) -> None:
     """Refuse what nothing can be drawn from."""
@@ -34,9 +31,8 @@ def check_range(where: str, entry: Any) -> None:
 
 
 def _is_number(value: Any) -> TypeGuard[float]:
-    """Whether a value is a number that is not too large; a truth value is none."""
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return is_number and abs(value) <= LARGEST
+    """Whether a value is a number; a truth value is none."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def draw(entry: Any, uniform: float) -> Any:

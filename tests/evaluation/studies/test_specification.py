@@ -123,9 +123,6 @@ class TestChoices:
         ({"random": {"count": 1, "noise": {"low": 1, "high": 1}}}, "low below high"),
         ({"random": {"count": 1, "noise": {"low": 1, "hihg": 2}}}, "low below high"),
         ({"random": {"count": 1, "noise": {"low": True, "high": 2}}}, "low below high"),
-        ({"random": {"count": 1, "noise": {"low": 1, "high": 10**400, "log": True}}}, "low below"),
-        ({"random": {"count": 1, "noise": {"low": -1e300, "high": 1.0}}}, "low below high"),
-        ({"random": {"count": 1, "noise": {"low": 1.0, "high": math.inf}}}, "low below high"),
         ({"random": {"count": 1, "noise": []}}, "random.noise must be a list of at least one"),
         ({"random": {"count": 1, "noise": 3}}, "random.noise must be a list of values"),
         (
