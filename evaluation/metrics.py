@@ -165,9 +165,9 @@ def approach_metric(
 
 
 def median(ordered: NDArray[np.float64]) -> Any:
-    """Median along the last axis of values that are ordered."""
+    """Median along the last axis of values that are ordered, whatever their size."""
     n = ordered.shape[-1]
-    return (ordered[..., (n - 1) // 2] + ordered[..., n // 2]) / 2
+    return ordered[..., (n - 1) // 2] / 2 + ordered[..., n // 2] / 2
 
 
 def quantile(ordered: NDArray[np.float64], share: float) -> Any:

@@ -19,7 +19,7 @@ from kinarm._files import first_line, read_file
 from kinarm.arm_specification import ArmSpecification
 from kinarm.errors import ArmError, InvalidInputError, UnknownNameError
 from kinarm.urdf_files import resolve_meshes
-from kinarm.urdf_schema import FARTHEST, apply_schema
+from kinarm.urdf_schema import FARTHEST, FARTHEST_POSITION, apply_schema
 from kinarm.urdf_tree import MOVING, TreeJoint, chain_to, read_joints
 from kinarm.xml_files import parse_xml
 
@@ -195,7 +195,7 @@ def _bounded(
         for end, value in zip(("lower", "upper"), limits[name], strict=True):
             limit.set(end, repr(value))
     lower, upper = (float(limit.attrib[end]) for end in ("lower", "upper"))
-    if not lower < upper < 1e10:  # Pinocchio would say so in words of its own
+    if not -FARTHEST_POSITION <= lower < upper <= FARTHEST_POSITION:
         raise ArmError(f"joint {name!r} of {path.name} has no usable limits: {lower}..{upper}")
     return notes
 
@@ -227,6 +227,12 @@ def _held_positions(
             assert mimic is not None
             factor, offset = (float(mimic.get(name, d)) for name, d in FOLLOWING)
             positions[joint.name] = factor * positions[leader] + offset
+    for name, position in positions.items():
+        if not abs(position) <= FARTHEST_POSITION:
+            raise ArmError(
+                f"joint {name!r} of {path.name} cannot be held at {position}: positions are at "
+                f"most {FARTHEST_POSITION:g}"
+            )
     return {name: positions[name] for name in joints if name in positions}
 
 

@@ -14,6 +14,9 @@ MOST_LINKS = 500
 FARTHEST = 1e4
 """Lengths at most [m]."""
 
+FARTHEST_POSITION = 1e6
+"""Positions of joints at most [rad or m]: up to there, the kernels' sines are exact."""
+
 Numbers = tuple[float, ...]
 
 

@@ -12,6 +12,9 @@ DIGITS = 6
 
 RANGE = ("low", "high", "log")
 
+LARGEST = 1e30
+"""Size of low and high at most, and of 1 / low with log: what is drawn does not overflow."""
+
 
 def check_range(where: str, entry: Any) -> None:
     """Refuse what nothing can be drawn from."""
@@ -28,6 +31,12 @@ def check_range(where: str, entry: Any) -> None:
         )
     if given.get("log") and low <= 0:
         raise InvalidInputError(f"{where}.low must be greater than 0 with log, got {low!r}")
+    least = 1 / LARGEST if given.get("log") else -LARGEST
+    for end, value in (("low", low), ("high", high)):
+        if not least <= value <= LARGEST:
+            raise InvalidInputError(
+                f"{where}.{end} must be between {least:g} and {LARGEST:g}, got {value!r}"
+            )
 
 
 def _is_number(value: Any) -> TypeGuard[float]:

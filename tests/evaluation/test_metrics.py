@@ -240,6 +240,10 @@ def test_statistics_of_ordered_values_are_those_of_numpy_and_scipy(n):
     np.testing.assert_allclose(metrics.middle_half(ordered).mean(axis=-1), trimmed, rtol=1e-14)
 
 
+def test_the_median_of_the_largest_floats_does_not_overflow():
+    assert metrics.median(2.0**1023 * np.array([0.5, 1.0, 1.5, 1.75])) == 1.25 * 2.0**1023
+
+
 def test_a_new_metric_is_one_entry(monkeypatch):
     mean_return = Metric(
         meaning="mean return",

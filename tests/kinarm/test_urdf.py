@@ -50,6 +50,22 @@ class TestHeldJoints:
         path = write_robot([make_joint()], extra=gripper(lower="0.01"))
         assert Arm.load(path).description.held["open_a"] == 0.01
 
+    @pytest.mark.parametrize(
+        ("of_file", "held", "name", "position"),
+        [
+            ({}, {"open_a": 1e308}, "open_a", r"1e\+308"),
+            ({}, {"joint_2": math.nan}, "joint_2", "nan"),
+            ({"factor": "9e3"}, {"open_a": 1e3}, "open_b", "9000000.1"),
+        ],
+    )
+    def test_not_farther_away_than_angles_are_exact(
+        self, make_joint, write_robot, of_file, held, name, position
+    ):
+        joints = [make_joint(), make_joint(axis="0 1 0")]
+        path = write_robot(joints, extra=gripper(**of_file))
+        with pytest.raises(ArmError, match=rf"'{name}' of made\.urdf cannot be held at {position}"):
+            Arm.load(path, held=held)
+
     @pytest.mark.parametrize("position", [-0.02, 0.0, 0.03])
     def test_poses_are_those_of_the_whole_tree(self, gripping, position):
         """Pinocchio reads the URDF with all its joints, one of which mimics another."""
@@ -293,6 +309,8 @@ class TestRefusals:
             '<limit velocity="1" effort="0"/>',
             '<limit lower="1" upper="-1" velocity="1" effort="0"/>',
             '<limit lower="1" upper="1" velocity="1" effort="0"/>',
+            '<limit lower="-1e308" upper="1" velocity="1" effort="0"/>',
+            '<limit lower="-1" upper="1e308" velocity="1" effort="0"/>',
         ],
     )
     def test_joint_without_usable_limits(self, make_joint, write_robot, limit):

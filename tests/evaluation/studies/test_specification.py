@@ -5,6 +5,7 @@ import math
 import pytest
 
 from kinarm.errors import InvalidInputError
+from kinarm.evaluation.studies.ranges import LARGEST
 from kinarm.evaluation.studies.specification import StudySpecification
 
 FILE = """
@@ -97,6 +98,15 @@ class TestChoices:
         assert 0.9 < logs[-1] <= 1
         assert logs[200] == pytest.approx(-1, abs=0.4)
 
+    @pytest.mark.parametrize("number", [float, int])
+    @pytest.mark.parametrize("log", [True, False])
+    def test_draws_from_the_widest_ranges_are_finite(self, log, number):
+        low = 1 / LARGEST if log else -LARGEST
+        widest = {"low": number(low) or 1, "high": number(LARGEST), "log": log}
+        drawn = [c["noise"] for c in made(random={"count": 9, "noise": widest}).choices()]
+        assert all(widest["low"] <= value <= widest["high"] for value in drawn)
+        assert len(set(drawn)) == 9
+
     def test_nothing_varies(self):
         assert list(made().choices()) == [{}]
 
@@ -128,6 +138,22 @@ class TestChoices:
         (
             {"random": {"count": 1, "noise": {"low": 0, "high": 2, "log": True}}},
             "random.noise.low must be greater than 0 with log, got 0",
+        ),
+        (
+            {"random": {"count": 1, "noise": {"low": 1, "high": 10**400, "log": True}}},
+            "random.noise.high must be between 1e-30 and 1e+30, got 10000",
+        ),
+        (
+            {"search": {"count": 1, "noise": {"low": -(10**400), "high": 1}}},
+            "search.noise.low must be between -1e+30 and 1e+30, got -10000",
+        ),
+        (
+            {"random": {"count": 1, "noise": {"low": 0.0, "high": math.inf}}},
+            "random.noise.high must be between -1e+30 and 1e+30, got inf",
+        ),
+        (
+            {"random": {"count": 1, "noise": {"low": 5e-324, "high": 1, "log": True}}},
+            "random.noise.low must be between 1e-30 and 1e+30, got 5e-324",
         ),
         ({"trials": {"count": 0}}, "trials: count must be a whole number of at least 1"),
         ({"trials": {"count": 10**8}}, "trials: count must be at most 10000000, got 100000000"),
