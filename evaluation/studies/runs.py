@@ -181,7 +181,7 @@ def load_bounds(path: Path, count: int) -> TrialBounds:
     """
     arrays = load_archive(path, *BOUNDS_ARCHIVE, InvalidInputError).arrays
     with reading(repr(str(path)), BOUNDS_ARCHIVE[0], InvalidInputError):
-        return TrialBounds(**_each_trials(arrays, BOUND_KINDS, count))
+        return TrialBounds(**_each_trials(arrays, BOUND_TYPES, count))
 
 
 def timeless(state: TrainingState) -> TrainingState:
@@ -247,30 +247,36 @@ def _results(path: Path, planned: PlannedRun, content: Archive) -> dict[str, Any
         "settings": header["settings"],
         "curve": tuple(_point(row) for row in arrays["curve"].tolist()),
         "last": RunPoint(**header["last"]),
-        "outcomes": TrialOutcomes(**_each_trials(outcomes, OUTCOME_KINDS, planned.trials.count)),
+        "outcomes": TrialOutcomes(**_each_trials(outcomes, OUTCOME_TYPES, planned.trials.count)),
     }
 
 
-OUTCOME_KINDS = {"distance": "f", "steps": "i", "returns": "f", "success": "b", "collision": "b"}
-BOUND_KINDS = {"reachable": "b", "steps_lower_bound": "i"}
-"""Kinds of arrays with an entry for each trial: numbers, whole numbers and truth values."""
+OUTCOME_TYPES = {"distance": "f8", "steps": "i8", "returns": "f8", "success": "?", "collision": "?"}
+BOUND_TYPES = {"reachable": "?", "steps_lower_bound": "i8"}
+"""Types of arrays with an entry for each trial: numbers, whole numbers and truth values."""
+
+LARGEST = 1e12
+"""Numbers of trials at most: sums and squares of them stay finite."""
 
 
 def _each_trials(
-    arrays: Mapping[str, NDArray[Any]], kinds: Mapping[str, str], count: int
+    arrays: Mapping[str, NDArray[Any]], types: Mapping[str, str], count: int
 ) -> dict[str, NDArray[Any]]:
     """Arrays that are to have an entry for each of so many trials.
 
     Raises
     ------
     ValueError
-        If one is missing, or of another kind or shape.
+        If one is missing, of another type or shape, or holds a number that is not finite or
+        beyond what a trial comes to.
     """
-    for name, kind in kinds.items():
+    for name, type_ in types.items():
         array = arrays[name]
-        if array.dtype.kind != kind or array.shape != (count,):
+        if array.dtype != type_ or array.shape != (count,):
             raise ValueError(f"{name} is not of {count} trials")
-    return {name: arrays[name] for name in kinds}
+        if type_ == "f8" and not (np.abs(array) <= LARGEST).all():
+            raise ValueError(f"{name} holds a number that no trial comes to")
+    return {name: arrays[name] for name in types}
 
 
 def _point(row: list[float]) -> RunPoint:

@@ -1,6 +1,7 @@
 """Studies: what is trained, once, and what it comes to."""
 
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -208,6 +209,17 @@ class TestGoingOn:
         assert study.runs[0] not in Study.load(study.store.folder).finished
         small().run(jobs=1)
         assert path.read_bytes() == before
+
+    @pytest.mark.parametrize("number", [1e308, -math.inf, math.nan])
+    @pytest.mark.parametrize("name", ["distance", "returns"])
+    def test_a_run_with_numbers_that_no_trial_comes_to_is_made_anew(self, small, name, number):
+        study = small().run(jobs=1)
+        path = study.store.run_path(study.runs[0])
+        with np.load(path) as archive:
+            arrays = {each: archive[each] for each in archive.files}
+        arrays[f"outcomes.{name}"][:2] = number
+        np.savez(path, **arrays)
+        assert study.runs[0] not in Study.load(study.store.folder).finished
 
     def test_where_no_record_tells_how_long_it_took(self, small):
         study = small().run(jobs=1)
