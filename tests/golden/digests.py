@@ -114,7 +114,7 @@ def ars_digests() -> dict[str, str]:
             result = train_policy(config, on_iteration=states.append)
             state = states[-1]
             curve = [point[:4] for point in state.curve]
-            found[f"ars {name} {task}{' replay' if changes else ''}"] = led_to(
+            found[f"ars {name} {task}{' replay' if changes == again else ''}"] = led_to(
                 repr(config),
                 digest(
                     [
@@ -144,7 +144,7 @@ def ppo_digests() -> dict[str, str]:
         config = replace(made, iterations=3, **changes)
         train_policy(config, on_iteration=states.append)
         state = states[-1]
-        found[f"ppo {name} {task}{' replay' if changes else ''}"] = led_to(
+        found[f"ppo {name} {task}{' replay' if changes == again else ''}"] = led_to(
             repr(config),
             digest(
                 [
