@@ -1,6 +1,7 @@
 """Figures of an evaluation."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from kinarm._files import write_atomically
 from kinarm.evaluation.evaluation import Evaluation
 from kinarm.evaluation.training_seeds import group_names
+from kinarm.problem import ReachProblem
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -77,17 +79,30 @@ def _stairs(
 
 
 def series_labels(evaluations: Sequence[Evaluation]) -> list[str]:
-    """Name of what the training seeds of a recipe share, and its problem if it is another one."""
+    """Name of what the training seeds of a recipe share, and its problem if it is another one.
+
+    A symmetric policy for several goal regions has one name on all problems that it is for.
+    """
     groups = group_names(evaluation.entrant for evaluation in evaluations)
     return [_label(evaluation, groups[evaluation.entrant.name]) for evaluation in evaluations]
 
 
 def _label(evaluation: Evaluation, group: str) -> str:
-    trained_for = evaluation.entrant.problem
-    if trained_for is None:
-        return evaluation.entrant.name
-    same = trained_for.name == evaluation.problem.name
-    origin = "" if same else f" (trained on {trained_for.name})"
+    entrant, faced = evaluation.entrant, evaluation.problem
+    if entrant.policy is None:
+        return entrant.name
+
+    def as_faced(own: ReachProblem) -> ReachProblem:
+        """The problem that it was trained for, all but its goals as they are faced."""
+        regions, weights = own.task.goal_regions, own.task.goal_weights
+        task = replace(faced.task, goal_regions=regions, goal_weights=weights)
+        return own.replace(task=task, stepping=faced.stepping)
+
+    trained_for = entrant.policy.problem
+    symmetric = entrant.policy.mirror is not None and len(trained_for.task.goal_regions) > 1
+    if symmetric and entrant.serves(faced, as_faced):
+        return group
+    origin = "" if trained_for.name == faced.name else f" (trained on {trained_for.name})"
     return group.removesuffix(f"-{trained_for.name}") + origin
 
 

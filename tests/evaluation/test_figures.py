@@ -6,7 +6,7 @@ from matplotlib.patches import StepPatch
 
 from kinarm.evaluation.entrants import BASELINES, Entrant
 from kinarm.evaluation.evaluation import run_trials
-from kinarm.evaluation.figures import distance_histograms, save_figure
+from kinarm.evaluation.figures import distance_histograms, save_figure, series_labels
 from kinarm.evaluation.trials import TrialSet
 from kinarm.problem import PROBLEMS
 
@@ -116,6 +116,23 @@ def test_groups_of_a_panel_can_be_told_apart(trials, train_novice):
     (axes,) = distance_histograms([run_trials(e, trials) for e in entrants]).axes
     assert len(set(legend(axes))) == 3
     assert len({patch.get_edgecolor() for patch in stairs(axes)}) == 3
+
+
+def test_a_symmetric_policy_has_one_name_on_all_its_problems(train_novice):
+    symmetric = Entrant.from_policy("ars-tuned-both-seed0", train_novice("both"))
+    plain = Entrant.from_policy("ars-paper-both-seed0", train_novice("both", named="paper"))
+    trial_sets = [TrialSet.draw(name, 4, seed=0) for name in PROBLEMS]
+    trial_sets.append(TrialSet.draw(PROBLEMS["right"].replace(tolerance=0.2), 4, seed=0))
+    for trials in trial_sets:
+        for entrant in (symmetric, plain):
+            (label,) = series_labels([run_trials(entrant, trials)])
+            if entrant is symmetric:
+                assert label == "ars-tuned-both"
+            else:
+                own = trials.problem.name == "both"
+                assert label == ("ars-paper" if own else "ars-paper (trained on both)")
+    other = TrialSet.draw(PROBLEMS["right"].replace(name="elsewhere", scene="post"), 4, seed=0)
+    assert series_labels([run_trials(symmetric, other)]) == ["ars-tuned (trained on both)"]
 
 
 def test_every_line_of_a_matrix_has_a_look_of_its_own(train_novice):
