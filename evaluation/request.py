@@ -25,8 +25,8 @@ DOCUMENT, HISTOGRAMS, REPORT = "evaluation.json", "final_distance", "index.html"
 Pair = tuple["Entrant", "ReachProblem"]
 """Who faces what."""
 
-Chosen = tuple["Entrant", "ReachProblem | None"]
-"""Who takes part, and the problem that it is the best for if it was chosen as that."""
+Chosen = tuple["Entrant", tuple["ReachProblem", ...]]
+"""Who takes part, and the problems that it is the best for if it was chosen as that."""
 
 Tell = Callable[[str], object]
 """Is told what is being done."""
@@ -240,7 +240,7 @@ class EvaluationRequest(ProblemOptions):
         entrants = [entrant for entrant, _ in chosen]
         pairs = [
             (entrant, problem)
-            for problem in named or self._problems_of(entrants)
+            for problem in named or self._problems_of(chosen)
             for entrant, best_for in chosen
             if self.matrix or self._faces(entrant, best_for, problem, named)
         ]
@@ -253,13 +253,13 @@ class EvaluationRequest(ProblemOptions):
     def _faces(
         self,
         entrant: "Entrant",
-        best_for: "ReachProblem | None",
+        best_for: "Sequence[ReachProblem]",
         problem: "ReachProblem",
         named: "Sequence[ReachProblem]",
     ) -> bool:
         """Whether an entrant faces a problem, where not all face all."""
-        if best_for is not None:
-            return best_for.digest == problem.digest
+        if best_for:
+            return problem.digest in {each.digest for each in best_for}
         return bool(self.policies and named) or entrant.serves(problem, self._changed)
 
     def _chosen(self) -> list[Chosen]:
@@ -271,7 +271,7 @@ class EvaluationRequest(ProblemOptions):
 
         if not self.policies:
             return [
-                (entrant, None)
+                (entrant, ())
                 for entrant in shipped_entrants()
                 if entrant.problem is None
                 or self._changed(entrant.problem).arm_digest == entrant.problem.arm_digest
@@ -283,9 +283,11 @@ class EvaluationRequest(ProblemOptions):
             for best_for in problems or map(self._changed, PROBLEMS.values()):
                 if name == BEST:
                     (entrant,) = find_entrants(BEST, best_for)
-                    found.setdefault((entrant.name, entrant.source), (entrant, best_for))
+                    key = (entrant.name, entrant.source)
+                    _, others = found.get(key, (entrant, ()))
+                    found[key] = (entrant, (*others, best_for))
             for entrant in find_entrants(name, only) if name != BEST else ():
-                found[entrant.name, entrant.source] = (entrant, None)
+                found[entrant.name, entrant.source] = (entrant, ())
         entrants = named_apart([entrant for entrant, _ in found.values()])
         return list(zip(entrants, (best_for for _, best_for in found.values()), strict=True))
 
@@ -296,12 +298,17 @@ class EvaluationRequest(ProblemOptions):
         problems = (replace(self, problem=name).resolve() for name in names)
         return list({problem.digest: problem for problem in problems}.values())
 
-    def _problems_of(self, entrants: "Sequence[Entrant]") -> "list[ReachProblem]":
-        """Problems that entrants were trained for, or all shipped ones; the paper's come first."""
+    def _problems_of(self, chosen: Sequence[Chosen]) -> "list[ReachProblem]":
+        """Problems that entrants were trained or chosen for, or all; the paper's come first."""
         from kinarm.problem import PROBLEMS
 
-        trained = [entrant.problem for entrant in entrants if entrant.problem is not None]
-        own = {problem.digest: problem for problem in map(self._changed, trained)}
+        trained = [
+            self._changed(entrant.problem)
+            for entrant, best_for in chosen
+            if entrant.problem is not None and not best_for
+        ]
+        best = [problem for _, best_for in chosen for problem in best_for]
+        own = {problem.digest: problem for problem in (*trained, *best)}
         shipped = {problem.digest: problem for problem in map(self._changed, PROBLEMS.values())}
         if self.matrix or not own:
             return list((shipped | own).values())

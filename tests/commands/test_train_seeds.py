@@ -79,7 +79,7 @@ def test_each_policy_is_that_of_a_single_training(run, tmp_path, jobs):
 
 def test_names_are_those_of_shipped_policies(tmp_path):
     request = SeedsRequest(
-        training=TrainRequest(learner="ars", recipe="tuned", problem="left", out=tmp_path),
+        training=TrainRequest(learner="ars", recipe="tuned", problem="both", out=tmp_path),
         seeds=(0, 1),
     )
     assert {task.out.stem for task in request._tasks()} < set(policy_names())

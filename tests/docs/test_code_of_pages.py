@@ -42,7 +42,7 @@ SHORTER = {
     r"kinarm-train ppo": "--iterations 1 --n-envs 8 --batch-size 64",
     r"kinarm-train ": "--iterations 2",
     r"kinarm-eval (?!.*--trials \d{1,2}\b)": "--trials 8",
-    r"kinarm-replay .*--failures": "--trials 40",
+    r"kinarm-replay .*--failures": "--trials 2000",
     r"kinarm-study \S+\.toml": "--jobs 1",
 }
 """What is added to commands that take long, by how they begin: the last option counts."""

@@ -148,10 +148,11 @@ def test_pooled_step_ratio_is_over_all_seeds(trials):
         for member in members
         for trial in np.flatnonzero(member.rollouts.success)
     ]
-    assert 60 < len(ratios) < 240
+    faced = len(members) * len(trials)
+    assert 0.25 < len(ratios) / faced < 1
     assert median == pytest.approx(np.median(ratios))
     assert p95 == pytest.approx(np.percentile(ratios, 95))
-    assert relative == pytest.approx(len(ratios) / 240)
+    assert relative == pytest.approx(len(ratios) / faced)
 
 
 def test_pooled_figures_without_bounds_have_none(evaluations):

@@ -68,7 +68,7 @@ class TestModule:
     def test_a_policy_keeps_what_it_says_of_itself(self, module):
         (entrant,) = find_entrants(f"{module}:shipped")
         assert isinstance(entrant.policy, Policy)
-        assert entrant.problem.name == "right"
+        assert entrant.problem.name == "both"
 
     def test_it_may_make_an_environment_by_its_id(self, tmp_path):
         """Commands do not register environments before they are needed."""

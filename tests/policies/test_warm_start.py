@@ -93,7 +93,7 @@ def test_statistics_are_taken_where_they_are_used():
 def test_steps_are_those_of_the_training():
     """Not the observations that the initial policy's statistics stand for."""
     settings = {"iterations": 2, "directions": 2, "top_directions": 1}
-    warm = ARSConfig(initial_policy="ars-tuned-right-seed1", **settings)
+    warm = ARSConfig(initial_policy="ars-tuned-both-seed1", **settings)
     for config in (ARSConfig(**settings), warm):
         curve = train_policy(config, threads=1).curve
         taken = [point.environment_steps for point in curve]

@@ -178,7 +178,7 @@ class TestTraining:
         if learner == "ppo":
             pytest.importorskip("stable_baselines3")
         study = small(learners=(learner,), protocol=replace(PROTOCOL, look_trials=200))
-        name = f"{learner}-tuned-left-seed0"
+        name = f"{learner}-tuned-both-seed0"
         known = replace(load_policy(name), mirror=None)
         (training, *_) = (
             each for each in study.trainings if each.source and each.problem.name == "both"
@@ -224,7 +224,7 @@ class TestRunning:
 def policies():
     """Learnt ones without a mirror, and one that turns at full speed."""
     linear, network = (
-        replace(load_policy(f"{learner}-tuned-left-seed0"), mirror=None)
+        replace(load_policy(f"{learner}-tuned-both-seed0"), mirror=None)
         for learner in ("ars", "ppo")
     )
     layers = tuple(Layer(9 * layer.weights, layer.bias + 0.1) for layer in network.layers)
