@@ -9,6 +9,10 @@ from kinarm.evaluation.studies.runs import load_bounds, load_whole_run, planned_
 from kinarm.evaluation.studies.specification import StudySpecification
 from kinarm.evaluation.studies.store import StudyStore
 from kinarm.evaluation.studies.study import Study
+from kinarm.evaluation.studies.transfer.planning import Protocol
+from kinarm.evaluation.studies.transfer.runs import load_run, policy_path, save_run
+from kinarm.evaluation.studies.transfer.study import TransferStudy
+from kinarm.evaluation.studies.transfer.training import carry_out
 
 from .loader import Loader
 from .mutations import damaged_archive, damaged_json, damaged_toml
@@ -84,7 +88,38 @@ def _load_file(path: Path) -> None:
     repr(Study(StudySpecification.load(path), path.parent))
 
 
+TRANSFER = TransferStudy(
+    learners=("ars",),
+    seeds=1,
+    settings={"ars": {"iterations": 1, "episodes": 1, "directions": 2, "top_directions": 1}},
+    protocol=Protocol(trials=2, looks=2, look_trials=2),
+).trainings[0]
+"""A training of a study of transfer."""
+
+
+@cache
+def _transfer_files() -> tuple[bytes, bytes]:
+    """What is kept of the training, and its policy."""
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        save_run(folder, TRANSFER, carry_out(TRANSFER, folder))
+        kept = folder / f"{TRANSFER.name}.json"
+        return kept.read_bytes(), policy_path(folder, TRANSFER).read_bytes()
+
+
+def _save_transferred(folder: Path) -> None:
+    policy_path(folder, TRANSFER).write_bytes(_transfer_files()[1])
+
+
 LOADERS = {
+    "run of a study of transfer": Loader(
+        ("evaluation.studies.transfer.runs.load_run",),
+        lambda: [_transfer_files()[0]],
+        damaged_json,
+        lambda path: load_run(path.parent, TRANSFER),
+        f"{TRANSFER.name}.json",
+        _save_transferred,
+    ),
     "study": Loader(
         ("evaluation.studies.specification.load",),
         lambda: [FILE],

@@ -44,6 +44,7 @@ WRITERS = {
     "evaluation/reproduction/document.py": "claims",
     "evaluation/request.py": "evaluation",
     "evaluation/studies/store.py": "failed-training",
+    "evaluation/studies/transfer/__main__.py": "transfer",
 }
 """Modules that write documents, and a schema of each."""
 
@@ -54,6 +55,8 @@ NO_DOCUMENT = {
     "evaluation/report/svg.py": "names parts of a drawing",
     "evaluation/reproduction/runs.py": "a list of seconds, and an archive's header",
     "evaluation/studies/planning.py": "is hashed",
+    "evaluation/studies/transfer/planning.py": "is hashed",
+    "evaluation/studies/transfer/runs.py": "counts beside a policy",
     "evaluation/training_seeds.py": "is compared",
     "kinarm/_archive.py": "an archive's header",
     "kinarm/envs/portable.py": "asks whether something can be written",

@@ -73,6 +73,6 @@ def load_run(folder: Path, training: PlannedTraining) -> TransferRun | None:
     path = folder / f"{training.name}.json"
     with suppress(KinarmError), reading(repr(str(path)), "run", KinarmError):
         looks = tuple(Look(**look) for look in load_json(path, "run", KinarmError)["looks"])
-        if looks:
+        if looks and all(type(count) is int and count >= 0 for look in looks for count in look):
             return TransferRun(Policy.load(policy_path(folder, training)), looks)
     return None

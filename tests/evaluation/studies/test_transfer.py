@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import ttest_ind
 
 from kinarm.errors import InvalidInputError, UnknownNameError
-from kinarm.evaluation import evaluate
+from kinarm.evaluation import document_schema, evaluate
 from kinarm.evaluation.studies.transfer import __main__ as command
 from kinarm.evaluation.studies.transfer import reflection
 from kinarm.evaluation.studies.transfer.document import (
@@ -78,6 +78,11 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def document(folder):
     return small().run(folder, command="made for tests")
+
+
+def test_the_document_is_that_of_its_schema(document):
+    jsonschema = pytest.importorskip("jsonschema")
+    jsonschema.validate(document, document_schema("transfer"))
 
 
 class TestPlanning:
