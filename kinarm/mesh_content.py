@@ -64,8 +64,9 @@ def _check_collada(content: bytes) -> None:
         if pattern is not None and not pattern.fullmatch(element.text or ""):
             raise ValueError(f"<{tag}> holds what is no number")
         for name in COUNTS:
-            if not COUNT.fullmatch(element.get(name, "0")):
-                raise ValueError(f"{name} of <{tag}> is no whole number of at least 0")
+            given = element.get(name, "0")
+            if not COUNT.fullmatch(given) or int(given) > len(content):
+                raise ValueError(f"{name} of <{tag}> is no number of what the file can hold")
 
 
 def check_vertices(path: Path, vertices: NDArray[np.float64]) -> None:

@@ -145,11 +145,13 @@ def test_meshes_with_words_in_place_of_numbers(tmp_path):
         mesh_content(path)
 
 
-@pytest.mark.parametrize("attribute", ['count="-1e308"', 'stride="count"', 'offset="-1"'])
+@pytest.mark.parametrize(
+    "attribute", ['count="-1e308"', 'stride="many"', 'offset="-1"', 'set="999"']
+)
 def test_collada_with_counts_that_are_none(attribute, tmp_path):
     """Assimp would read where there is nothing, and end the process."""
     path = tmp_path / "mesh.dae"
     path.write_text(f"<COLLADA><float_array {attribute}>1.0 2.0 3.0</float_array></COLLADA>")
     name = attribute.partition("=")[0]
-    with pytest.raises(ArmError, match=f"'mesh.dae' cannot .*{name} of <float_array> is no whole"):
+    with pytest.raises(ArmError, match=f"'mesh.dae' cannot .*{name} of <float_array> is no number"):
         mesh_content(path)
