@@ -143,3 +143,12 @@ def test_meshes_with_words_in_place_of_numbers(tmp_path):
     path.write_text("<COLLADA><float_array>1.0 two 3.0</float_array></COLLADA>")
     with pytest.raises(ArmError, match=r"'mesh.dae' cannot .*<float_array> holds what is no"):
         mesh_content(path)
+
+
+@pytest.mark.parametrize("count", ["-1e308", "-1", "24.5", "many", ""])
+@pytest.mark.parametrize("name", ["count", "offset", "stride", "set"])
+def test_collada_whose_counts_are_none(tmp_path, name, count):
+    path = tmp_path / "mesh.dae"
+    path.write_text(f'<COLLADA><float_array {name}="{count}">1.0 2.0</float_array></COLLADA>')
+    with pytest.raises(ArmError, match=f"'mesh.dae' cannot .*{name} of <float_array> is no whole"):
+        mesh_content(path)
