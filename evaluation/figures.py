@@ -1,7 +1,6 @@
 """Figures of an evaluation."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +11,6 @@ from numpy.typing import NDArray
 from kinarm._files import write_atomically
 from kinarm.evaluation.evaluation import Evaluation
 from kinarm.evaluation.training_seeds import group_names
-from kinarm.problem import ReachProblem
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -78,6 +76,20 @@ def _stairs(
     axes.stairs(shares.mean(axis=0), edges, color=colour, linestyle=dash, linewidth=2, label=label)
 
 
+def draw_band(
+    axes: "Axes",
+    places: NDArray[np.float64],
+    heights: NDArray[np.float64],
+    label: str,
+    colour: str,
+    dash: str,
+) -> None:
+    """Draw the mean of curves, shape (n_curves, n_places), and a band from lowest to highest."""
+    low, high = heights.min(axis=0), heights.max(axis=0)
+    axes.fill_between(places, low, high, color=colour, alpha=0.15, lw=0)
+    axes.plot(places, heights.mean(axis=0), color=colour, linestyle=dash, lw=2, label=label)
+
+
 def series_labels(evaluations: Sequence[Evaluation]) -> list[str]:
     """Name of what the training seeds of a recipe share, and its problem if it is another one.
 
@@ -88,19 +100,13 @@ def series_labels(evaluations: Sequence[Evaluation]) -> list[str]:
 
 
 def _label(evaluation: Evaluation, group: str) -> str:
-    entrant, faced = evaluation.entrant, evaluation.problem
-    if entrant.policy is None:
-        return entrant.name
-
-    def as_faced(own: ReachProblem) -> ReachProblem:
-        """The problem that it was trained for, all but its goals as they are faced."""
-        regions, weights = own.task.goal_regions, own.task.goal_weights
-        task = replace(faced.task, goal_regions=regions, goal_weights=weights)
-        return own.replace(task=task, stepping=faced.stepping)
-
-    trained_for = entrant.policy.problem
-    symmetric = entrant.policy.mirror is not None and len(trained_for.task.goal_regions) > 1
-    if symmetric and entrant.serves(faced, as_faced):
+    policy, faced = evaluation.entrant.policy, evaluation.problem
+    if policy is None:
+        return evaluation.entrant.name
+    trained_for = policy.problem
+    own, others = (set(problem.task.goal_regions) for problem in (trained_for, faced))
+    symmetric = policy.mirror is not None and len(own) > 1
+    if symmetric and own >= others and trained_for.same_place(faced):
         return group
     origin = "" if trained_for.name == faced.name else f" (trained on {trained_for.name})"
     return group.removesuffix(f"-{trained_for.name}") + origin

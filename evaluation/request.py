@@ -280,14 +280,15 @@ class EvaluationRequest(ProblemOptions):
         only = problems[0] if len(problems) == 1 else None
         found: dict[tuple[str, Path | None], Chosen] = {}
         for name in self.policies:
+            if name != BEST:
+                for entrant in find_entrants(name, only):
+                    found[entrant.name, entrant.source] = (entrant, ())
+                continue
             for best_for in problems or map(self._changed, PROBLEMS.values()):
-                if name == BEST:
-                    (entrant,) = find_entrants(BEST, best_for)
-                    key = (entrant.name, entrant.source)
-                    _, others = found.get(key, (entrant, ()))
-                    found[key] = (entrant, (*others, best_for))
-            for entrant in find_entrants(name, only) if name != BEST else ():
-                found[entrant.name, entrant.source] = (entrant, ())
+                (entrant,) = find_entrants(BEST, best_for)
+                key = (entrant.name, entrant.source)
+                _, others = found.get(key, (entrant, ()))
+                found[key] = (entrant, (*others, best_for))
         entrants = named_apart([entrant for entrant, _ in found.values()])
         return list(zip(entrants, (best_for for _, best_for in found.values()), strict=True))
 

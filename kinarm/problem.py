@@ -226,6 +226,10 @@ class ReachProblem:
                 return f"{key} is {there}, not {here}"
         return None
 
+    def same_place(self, other: "ReachProblem") -> bool:
+        """Whether another problem has the same arm and scene."""
+        return self.arm_digest == other.arm_digest and self.scene == other.scene
+
     def covers(self, other: "ReachProblem") -> bool:
         """Whether this is the other problem, or that with further goal regions.
 

@@ -226,6 +226,11 @@ def train_policy(
     return run_training(config, training, state=state, on_iteration=on_iteration)
 
 
+def thread_options(config: TrainingConfig, threads: int) -> dict[str, int]:
+    """Options of a training on so many threads; none if its learner does not ask for them."""
+    return {"threads": threads} if "threads" in learner_of(config).options else {}
+
+
 def begin_training(config: TrainingConfig, **options: Any) -> Training[Any]:
     """Prepare a training, and refuse what cannot be trained; see `train_policy`."""
     learner = learner_of(config)

@@ -71,8 +71,8 @@ def best_policy(problem: ProblemLike | None) -> str:
 
 def _differ_in_nothing_else(one: ReachProblem, other: ReachProblem) -> bool:
     """Whether two problems have the same arm, scene and goals."""
-    same_place = one.arm_digest == other.arm_digest and one.scene == other.scene
-    return same_place and set(one.task.goal_regions) == set(other.task.goal_regions)
+    same_goals = set(one.task.goal_regions) == set(other.task.goal_regions)
+    return same_goals and one.same_place(other)
 
 
 @cache

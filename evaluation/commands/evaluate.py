@@ -15,7 +15,7 @@ in their training seed alone share a row.
 examples:
   kinarm-eval                                            all shipped policies and baselines
   kinarm-eval --policy best --problem right              the best policy for a problem
-  kinarm-eval --policy ars-tuned-both                   one recipe, all its training seeds
+  kinarm-eval --policy ars-tuned-both                    one recipe, all its training seeds
   kinarm-eval --policy right/                            the policies of a folder
   kinarm-eval --policy mine.npz zero oracle --problem right   side by side
   kinarm-eval --policy mine.npz --out results            files, with the outcome of every trial

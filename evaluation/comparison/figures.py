@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from kinarm.evaluation.comparison.results import Comparison, Series
-from kinarm.evaluation.figures import COLOURS, DASHES
+from kinarm.evaluation.figures import COLOURS, DASHES, draw_band
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -66,12 +66,4 @@ def _draw(axes: "Axes", series: Series, quantity: str, number: int) -> None:
     places = np.geomspace(first, max(first, last), PLACES)
     success = np.nan_to_num(series.success_at(quantity, places))
     colour, dash = COLOURS[number % len(COLOURS)], DASHES[number // len(COLOURS) % len(DASHES)]
-    x = places / ACROSS[quantity].unit
-    axes.fill_between(x, success.min(axis=0), success.max(axis=0), color=colour, alpha=0.15, lw=0)
-    axes.plot(
-        *(x, success.mean(axis=0)),
-        color=colour,
-        linestyle=dash,
-        lw=2,
-        label=series.learner.title,
-    )
+    draw_band(axes, places / ACROSS[quantity].unit, success, series.learner.title, colour, dash)

@@ -15,7 +15,7 @@ from kinarm.errors import InvalidInputError
 from kinarm.evaluation.comparison.learners import ALGORITHMS, ComparedLearner
 from kinarm.evaluation.comparison.runs import CurvePoint, PlannedRun, Protocol
 from kinarm.evaluation.trials import trial_set
-from kinarm.policies.learners import begin_training, learner_of, state_policy
+from kinarm.policies.learners import begin_training, state_policy, thread_options
 from kinarm.policies.policy import Policy
 from kinarm.policies.sb3.environment import sb3_vec_env
 from kinarm.problem import ReachProblem
@@ -103,8 +103,7 @@ def clocks() -> NDArray[np.float64]:
 def train_recipe(run: PlannedRun, judge: Judge) -> None:
     """Train by a recipe of kinarm on one thread, to its end or the number of steps given."""
     config = run.config
-    takes_threads = "threads" in learner_of(config).options
-    training = begin_training(config, **({"threads": 1} if takes_threads else {}))
+    training = begin_training(config, **thread_options(config, 1))
     state = training.initial_state()
     over = False
     judge.start()

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from kinarm.evaluation.reproduction.runs import TrainedRun
 from kinarm.evaluation.reproduction.study import LITERAL, PlannedTraining, Protocol
 from kinarm.evaluation.trials import TrialSet, trial_set
-from kinarm.policies.learners import TrainingState, learner_of, state_policy, train_policy
+from kinarm.policies.learners import TrainingState, state_policy, thread_options, train_policy
 from kinarm.policies.policy import Policy
 from kinarm.problem import ReachProblem
 from kinarm.rollouts import Rollouts
@@ -45,8 +45,7 @@ def carry_out(
             rollouts = _face(state_policy(config, state), trials)
             distance.append(rollouts.distance.astype(np.float32))
 
-    takes_threads = "threads" in learner_of(config).options
-    options: dict[str, Any] = {"threads": threads} if takes_threads else {}
+    options: dict[str, Any] = dict(thread_options(config, threads))
     policy, curve, _ = train_policy(config, on_iteration=judge, **options)
     final = _face(policy, final_trials(config.problem, protocol))
     run = TrainedRun(

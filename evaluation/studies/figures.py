@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.evaluation.figures import COLOURS, DASHES
+from kinarm.evaluation.figures import COLOURS, DASHES, draw_band
 from kinarm.evaluation.intervals import share_over_seeds
 from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.studies.planning import PlannedRun
@@ -115,9 +115,7 @@ def _band(
     places = np.geomspace(first, max(first, min(x[-1] for x, _ in curves)), 200)
     heights = np.array([np.interp(places, x, y) for x, y in curves])
     colour, dash = COLOURS[number % len(COLOURS)], DASHES[number // len(COLOURS) % len(DASHES)]
-    low, high = heights.min(axis=0), heights.max(axis=0)
-    axes.fill_between(places, low, high, color=colour, alpha=0.15, lw=0)
-    axes.plot(places, heights.mean(axis=0), color=colour, linestyle=dash, lw=2, label=label)
+    draw_band(axes, places, heights, label, colour, dash)
 
 
 def effects(study: "Study") -> "Figure | None":

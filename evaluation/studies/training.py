@@ -6,7 +6,7 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,8 +26,8 @@ from kinarm.evaluation.trials import trial_set
 from kinarm.policies.learners import (
     TrainingState,
     begin_training,
-    learner_of,
     state_policy,
+    thread_options,
 )
 from kinarm.policies.oracle import ORACLE_SEMANTICS, Oracle
 from kinarm.policies.policy import Policy
@@ -163,9 +163,7 @@ def train(
     planned = task.run
     config, trials = planned.config, planned.trials
     judge = Judge(config.problem, trials)
-    takes_threads = "threads" in learner_of(config).options
-    options: dict[str, Any] = {"threads": threads} if takes_threads else {}
-    training = begin_training(config, **options)
+    training = begin_training(config, **thread_options(config, threads))
     state: TrainingState
     if task.start is None:
         state, earlier = training.initial_state(), RunClock()

@@ -182,6 +182,10 @@ CHANGES = {
 }
 
 
+GOALS = ("task.goal_regions", "task.goal_weights")
+"""Where problems may differ of which one covers the other."""
+
+
 class TestDigest:
     def test_ignores_the_name(self):
         assert RIGHT.replace(name="other").digest == RIGHT.digest
@@ -257,11 +261,9 @@ class TestComparison:
         assert not RIGHT.covers(both)
         assert not RIGHT.covers(PROBLEMS["left"])
 
-    @pytest.mark.parametrize("changes", CHANGES.values(), ids=CHANGES)
-    def test_a_problem_covers_none_that_differs_in_something_else(self, changes):
-        other = RIGHT.replace(**changes)
-        if other.task.goal_regions == RIGHT.task.goal_regions and not other.task.goal_weights:
-            assert not RIGHT.covers(other)
+    @pytest.mark.parametrize("field", [each for each in CHANGES if not each.startswith(GOALS)])
+    def test_a_problem_covers_none_that_differs_in_something_else(self, field):
+        assert not RIGHT.covers(RIGHT.replace(**CHANGES[field]))
 
     def test_the_same_problem_of_another_name(self):
         other = RIGHT.replace(name="other", arm=ArmSpecification(home=(0,) * 6)).pinned

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinarm.evaluation.figures import COLOURS, DASHES
+from kinarm.evaluation.figures import COLOURS, DASHES, draw_band
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -77,6 +77,4 @@ def _draw_curve(
             for each, curve in zip(steps, curves, strict=True)
         ]
     )
-    low, high = success.min(axis=0), success.max(axis=0)
-    axes.fill_between(places, low, high, color=colour, alpha=0.15, lw=0)
-    axes.plot(places, success.mean(axis=0), color=colour, linestyle=dash, lw=2, label=label)
+    draw_band(axes, places, success, label, colour, dash)

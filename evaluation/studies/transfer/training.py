@@ -1,8 +1,6 @@
 """Carry out one training of a study of transfer, and judge it in the course."""
 
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +11,9 @@ from kinarm.evaluation.trials import trial_set
 from kinarm.policies.learners import (
     TrainingState,
     begin_training,
-    learner_of,
     run_training,
     state_policy,
+    thread_options,
 )
 
 
@@ -29,7 +27,7 @@ def carry_out(training: PlannedTraining, folder: Path) -> TransferRun:
     config, protocol = training.config, training.protocol
     if training.source is not None:
         path = policy_path(folder, training.source)
-        config = replace(config, initial_policy=str(path))  # type: ignore[call-arg]
+        config = config.changed({"initial_policy": str(path)})
     trials = trial_set(config.problem, protocol.look_trials, protocol.look_seed)
     due = set(look_iterations(config.iterations, protocol.looks).tolist())
     looks: list[Look] = []
@@ -41,9 +39,7 @@ def carry_out(training: PlannedTraining, folder: Path) -> TransferRun:
             ended = int(rollouts.success.sum()), int(rollouts.collision.sum())
             looks.append(Look(state.iteration, state.environment_steps, *ended))
 
-    takes_threads = "threads" in learner_of(config).options
-    options: dict[str, Any] = {"threads": 1} if takes_threads else {}
-    begun = begin_training(config, **options)
+    begun = begin_training(config, **thread_options(config, 1))
     state = begun.initial_state()
     look(state)
     result = run_training(config, begun, state=state, on_iteration=look)
