@@ -35,7 +35,7 @@ def test_paper_is_the_default():
 
 
 def test_names():
-    assert {"paper", "tuned", "v1", "brs"} <= set(ARS_RECIPES)
+    assert set(ARS_RECIPES) == {"paper", "tuned", "linear", "best", "v1", "brs"}
     for name, config in ARS_RECIPES.items():
         assert config.recipe == name
 

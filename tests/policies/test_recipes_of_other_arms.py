@@ -96,6 +96,7 @@ def test_where_no_reflection_helps():
     scene = PROBLEMS["both"].scene
     lopsided = PROBLEMS["both"].replace(scene=replace(scene, obstacles=scene.obstacles[:1]))
     ars, ppo = (recipe(learner, "tuned", problem=lopsided) for learner in ("ars", "ppo"))
+    assert recipe("ars", "linear", problem=lopsided).net_arch == ()
     assert (ars.recipe, ars.net_arch, ars.symmetric) == ("tuned", (16,), False)
     assert (ppo.recipe, ppo.reward.progress, ppo.symmetric) == ("tuned", 12.0, False)
     assert ppo.gamma_at(0) < ppo.gamma_at(1)
