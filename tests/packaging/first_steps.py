@@ -1,0 +1,164 @@
+"""Do what a newcomer does: from a clone to an own policy and its replay, with a log.
+
+``python tests/packaging/first_steps.py data/results/first_steps`` clones what is committed, and
+types the commands of the README and then those of the tutorial *First policy*, as they are written,
+in their order. It records what was typed, how long each command took and what it printed, and opens
+the last replay in Chromium if there is one. Needs the network. It fails if a command does, or if
+the policy reaches less than `ENOUGH`.
+"""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from helpers.pages import DOCS, ROOT, blocks
+
+ENOUGH = 0.85
+"""Success of the newcomer's policy."""
+
+SHOWN = 12
+"""Last lines of a command's output in the log."""
+
+INSTALL, ACTIVATE = "make eval", ". .venv/bin/activate"
+"""What the README says first, and what it says before the other commands."""
+
+PAGES = (ROOT / "README.md", DOCS / "tutorials" / "first_policy.md")
+
+
+class Step(NamedTuple):
+    """Something that was typed.
+
+    Attributes
+    ----------
+    typed : str
+        Commands of a shell or of Python.
+    seconds : float
+        How long it took [s].
+    said : str
+        What it printed.
+    """
+
+    typed: str
+    seconds: float
+    said: str
+
+    @property
+    def in_one_line(self) -> str:
+        """What was typed, or that it was a program."""
+        lines = self.typed.splitlines()
+        return f"`{lines[0]}`" if len(lines) == 1 else "Python of the tutorial"
+
+
+def typed() -> Iterator[str]:
+    """What a newcomer types in the clone: first the two pages are asked whether they say so."""
+    readme, tutorial = PAGES
+    assert all(f"\n{line}" in readme.read_text(encoding="utf-8") for line in (INSTALL, ACTIVATE))
+    yield INSTALL
+    for block in blocks(tutorial):
+        if block.directive != "kinarm-run":
+            continue
+        if block.language == "sh":
+            yield from block.code.splitlines()
+        else:
+            yield f"python - <<'END'\n{block.code}END"
+
+
+def carry_out(command: str, clone: Path, environment: dict[str, str]) -> Step:
+    """Type something in the clone."""
+    prepared = command if command == INSTALL else f"{ACTIVATE}\n{command}"
+    began = time.monotonic()
+    done = subprocess.run(
+        ["bash", "-e", "-c", prepared],
+        cwd=clone,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+    )
+    step = Step(command, time.monotonic() - began, done.stdout)
+    if done.returncode:
+        raise SystemExit(f"{command}: status {done.returncode}\n{done.stdout}")
+    return step
+
+
+def success(clone: Path, environment: dict[str, str]) -> float:
+    """Share of 4000 fresh trials that the policy reaches."""
+    command = "kinarm-eval --policy mine.npz --trials 4000 --seed 161 --json"
+    said = carry_out(f"{command} 2>/dev/null", clone, environment).said
+    (row,) = (row for row in json.loads(said)["results"] if row["policy"] == "mine")
+    return float(row["metrics"]["success"]["value"])
+
+
+def picture(page: Path, out: Path) -> None:
+    """Open a replay in a browser, as far as there is one, and keep what it shows."""
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    if chromium is not None:
+        flags = ("--headless", "--no-sandbox", "--hide-scrollbars", "--virtual-time-budget=8000")
+        drawing = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+        view = ("--window-size=1000,640", f"--screenshot={out.resolve()}", page.as_uri())
+        subprocess.run([chromium, *flags, *drawing, *view], check=True, capture_output=True)
+
+
+def table(steps: list[Step], reached: float) -> str:
+    """What was typed and how long it took, for the documentation."""
+    rows = [f"| {step.in_one_line} | {step.seconds:.0f} |" for step in steps]
+    total = sum(step.seconds for step in steps)
+    return "\n".join(
+        (
+            "| typed | seconds |",
+            "| --- | --- |",
+            *rows,
+            f"| **all** | {total:.0f} |",
+            "",
+            f"The policy reached {100 * reached:.1f} % of 4000 fresh trials "
+            "(`kinarm-eval --policy mine.npz --trials 4000 --seed 161`).",
+            "",
+        )
+    )
+
+
+def log(steps: list[Step]) -> str:
+    """What was typed, and the last lines of what was printed."""
+    terminal = re.compile(r"\x1b\[[0-9;?]*[a-zA-Z]")
+    parts = []
+    for step in steps:
+        said = terminal.sub("", step.said).replace("\r", "\n").splitlines()
+        last = "\n".join(line.rstrip() for line in said[-SHOWN:])
+        parts.append(f"$ {step.typed}\n{last}\n({step.seconds:.1f} s)\n")
+    return "\n".join(parts)
+
+
+def main(out: Path) -> None:
+    """Walk, and record it below a path without ending."""
+    with tempfile.TemporaryDirectory() as name:
+        clone = Path(name) / "kinarm"
+        environment = {
+            **{key: value for key, value in os.environ.items() if key != "VIRTUAL_ENV"},
+            "KINARM_CACHE": f"{name}/cache",
+            "COLUMNS": "100",
+        }
+        subprocess.run(["git", "clone", "--quiet", ROOT, clone], check=True)
+        steps = []
+        for command in typed():
+            steps.append(carry_out(command, clone, environment))
+            sys.stderr.write(f"{steps[-1].seconds:6.1f} s  {steps[-1].in_one_line}\n")
+        reached = success(clone, environment)
+        picture(clone / "failures.html", out.with_suffix(".png"))
+    out.with_suffix(".md").write_text(table(steps, reached), encoding="utf-8")
+    out.with_suffix(".log").write_text(log(steps), encoding="utf-8")
+    sys.exit(reached < ENOUGH)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
