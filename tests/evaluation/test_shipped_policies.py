@@ -15,7 +15,7 @@ from kinarm.problem import PROBLEMS
 from kinarm.task import RewardWeights
 
 PAPER = [(algorithm, "paper", problem) for algorithm in ("ars", "ppo") for problem in PROBLEMS]
-OURS = [("ars", "tuned"), ("ppo", "tuned"), ("ppo", "taught"), ("ppo", "best")]
+OURS = [("ars", "tuned"), ("ars", "linear"), ("ppo", "tuned"), ("ppo", "taught"), ("ppo", "best")]
 SEEDS = {
     **{"-".join(group): 4 for group in PAPER},
     **{f"{algorithm}-{named}-both": 10 for algorithm, named in OURS},
@@ -110,7 +110,7 @@ def test_symmetric_policies_treat_mirror_images_alike(name):
 @pytest.mark.parametrize("problem", PROBLEMS)
 @pytest.mark.parametrize(
     ("group", "floor"),
-    [("ars-tuned", 0.94), ("ppo-tuned", 0.90), ("ppo-taught", 0.965), ("ppo-best", 0.985)],
+    [("ars-tuned", 0.94), ("ars-linear", 0.96), ("ppo-tuned", 0.90), ("ppo-taught", 0.965), ("ppo-best", 0.985)],
 )
 def test_policies_reach(group, problem, floor):
     """300 trials with a seed not used in training; the mean over training seeds."""
