@@ -110,7 +110,13 @@ def test_symmetric_policies_treat_mirror_images_alike(name):
 @pytest.mark.parametrize("problem", PROBLEMS)
 @pytest.mark.parametrize(
     ("group", "floor"),
-    [("ars-tuned", 0.94), ("ars-linear", 0.96), ("ppo-tuned", 0.90), ("ppo-taught", 0.965), ("ppo-best", 0.985)],
+    [
+        ("ars-tuned", 0.94),
+        ("ars-linear", 0.96),
+        ("ppo-tuned", 0.90),
+        ("ppo-taught", 0.965),
+        ("ppo-best", 0.985),
+    ],
 )
 def test_policies_reach(group, problem, floor):
     """300 trials with a seed not used in training; the mean over training seeds."""

@@ -206,7 +206,10 @@ class TestFile:
                 'base = "precise"',
                 "mine.toml: base must be one of paper, tuned, linear, best, v1, brs, got 'precise'",
             ),
-            ('base = ["paper"]', "mine.toml: base must be one of paper, tuned, linear, best, v1, brs"),
+            (
+                'base = ["paper"]',
+                "mine.toml: base must be one of paper, tuned, linear, best, v1, brs",
+            ),
             (f"noise = {'[' * 10_000}", "mine.toml: not a recipe file"),
             ("problem = 3", "mine.toml: problem must be the name or file of a problem, got 3"),
             ("noise =", "mine.toml: not a recipe file: "),
