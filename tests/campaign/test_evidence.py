@@ -7,6 +7,7 @@ import signal
 import numpy as np
 import pytest
 
+from kinarm.policies import policy_names
 from kinarm.simulator import Simulator
 from tests.campaign import evidence
 from tests.campaign.census import Census, take_census
@@ -48,7 +49,7 @@ def test_verdicts_are_those_of_coal(tmp_path):
 
 def test_no_policy_beats_what_is_proven(tmp_path):
     counts = check("floors", "both", 960, tmp_path)
-    assert counts["trials"] == 960
+    assert 960 <= counts["trials"] < 960 + len(policy_names())  # as many for each of them
     assert counts["successes"] > 100
 
 

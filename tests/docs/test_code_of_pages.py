@@ -24,6 +24,7 @@ PROGRAMS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scri
 EXCEPTIONS = {
     r"make ": "does what .ci/run does; that the targets exist is tested beside the README",
     r"pip install": "changes the installation",
+    r"\. \.venv/bin/activate": "changes the shell; tests/packaging/first_steps.py",
     r"python -m tests\.campaign": "takes hours; tests/campaign runs a share of each",
     r"python tests/instructions": "records anew; tests/instructions compares",
     r"kinarm-bench": "measures for minutes; tests/commands/test_bench_command.py",
