@@ -40,6 +40,9 @@ class LongRun(NamedTuple):
         What is added to go on, once there is a file of a name.
     when : str
         That name, or pattern; empty if the same command goes on in any case.
+    last : str
+        File that is there without one of that name as soon as the run is complete: it may be
+        killed between that and its end.
     made : str
         What names of files begin with that are compared.
     """
@@ -47,19 +50,26 @@ class LongRun(NamedTuple):
     subject: Subject
     resume: tuple[str, ...] = ()
     when: str = ""
+    last: str = ""
     made: str = ""
+
+    def complete(self, folder: Path) -> bool:
+        """Whether everything is written, so that there is nothing to go on with."""
+        return bool(self.last) and (folder / self.last).exists() and not self._begun(folder)
+
+    def _begun(self, folder: Path) -> bool:
+        return bool(self.when) and any(folder.glob(self.when))
 
     def words(self, folder: Path) -> list[str]:
         """The command line in a folder, with what makes it go on if there is something."""
         program = self.subject.spelled(as_module=False)
         if self.subject.program == "kinarm-train":  # one that saves checkpoints all the time
             program = [sys.executable, "-c", FREQUENT, *self.subject.arguments]
-        goes_on = self.when and list(folder.glob(self.when))
-        return [*program, *(self.resume if goes_on else ())]
+        return [*program, *(self.resume if self._begun(folder) else ())]
 
 
 OUT = ("--out", "out")
-RESUME = ("--resume", "--overwrite")
+GOES_ON = (("--resume", "--overwrite"), "p.checkpoint.npz", "p.npz")
 RUNS: dict[str, LongRun] = {
     "train, ars": LongRun(
         Subject(
@@ -69,12 +79,9 @@ RUNS: dict[str, LongRun] = {
                 *("--iterations", "3000"),
             ),
         ),
-        RESUME,
-        "p.checkpoint.npz",
+        *GOES_ON,
     ),
-    "train, ppo": LongRun(
-        Subject("kinarm-train", ("ppo", "--out", "p.npz", *SMALL_PPO)), RESUME, "p.checkpoint.npz"
-    ),
+    "train, ppo": LongRun(Subject("kinarm-train", ("ppo", "--out", "p.npz", *SMALL_PPO)), *GOES_ON),
     "reproduce": LongRun(
         Subject("kinarm-reproduce", ("--quick", "--no-ppo", "--jobs", "2", *OUT)), made="out"
     ),
@@ -150,7 +157,7 @@ def killed(
 
 
 def _ends_before(seconds: float, run: LongRun, folder: Path, tally: KillTally) -> bool:
-    """Kill a run after some time; whether it has ended by then, since it goes on each time."""
+    """Kill a run after some time; whether it was complete by then, since it goes on each time."""
     with started(run.words(folder), folder) as process:
         time.sleep(seconds)
         status = process.poll()
@@ -164,7 +171,7 @@ def _ends_before(seconds: float, run: LongRun, folder: Path, tally: KillTally) -
             _let_age(folder)
         elif status:
             tally.find(f"ends with status {status}", err=(folder / "err").read_text()[-2000:])
-    return status is not None
+    return status is not None or run.complete(folder)
 
 
 def _to_its_end(run: LongRun, folder: Path, tally: KillTally) -> float:
