@@ -3,14 +3,13 @@
 ``python tests/packaging/first_steps.py data/results/first_steps`` clones what is committed, and
 types the commands of the README and then those of the tutorial *First policy*, as they are written,
 in their order. It records what was typed, how long each command took and what it printed, and opens
-the last replay in Chromium if there is one. Needs the network. It fails if a command does, or if
-the policy reaches less than `ENOUGH`.
+the last replay in a browser. Needs the network, Chromium and the extra ``test``. It fails if a
+command does, or if the policy reaches less than `ENOUGH`.
 """
 
 import json
 import os
 import re
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -20,7 +19,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "docs"))
 
+from browser import open_page
 from helpers.pages import DOCS, ROOT, blocks
 
 ENOUGH = 0.85
@@ -101,13 +102,10 @@ def success(clone: Path, environment: dict[str, str]) -> float:
 
 
 def picture(page: Path, out: Path) -> None:
-    """Open a replay in a browser, as far as there is one, and keep what it shows."""
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
-    if chromium is not None:
-        flags = ("--headless", "--no-sandbox", "--hide-scrollbars", "--virtual-time-budget=8000")
-        drawing = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-        view = ("--window-size=1000,640", f"--screenshot={out.resolve()}", page.as_uri())
-        subprocess.run([chromium, *flags, *drawing, *view], check=True, capture_output=True)
+    """Open a replay in a browser, and keep what it shows."""
+    with open_page(page, 1000, 640) as opened:
+        opened.wait_for_selector("body[data-ready]")
+        opened.screenshot(path=out)
 
 
 def table(steps: list[Step], reached: float) -> str:
