@@ -1,0 +1,75 @@
+"""Policies trained for one bench, on the other one by reflection."""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+
+from kinarm.evaluation.studies.transfer import reflection
+from kinarm.evaluation.studies.transfer.planning import (
+    SOURCE,
+    targets,
+)
+from kinarm.evaluation.studies.transfer.reflection import reflection_of, with_mirror
+from kinarm.evaluation.trials import trial_set
+from kinarm.policies import load_policy, recipe, train_policy
+from kinarm.policies.mirror import find_mirror, missing_mirror
+from kinarm.policies.policy import Layer
+from kinarm.problem import PROBLEMS, ReachProblem
+from kinarm.problem_files import problem_names
+
+SHORT = {"iterations": 6, "episodes": 1, "directions": 4, "top_directions": 2}
+
+
+@pytest.fixture(scope="module")
+def policies():
+    """Learnt ones without a mirror, and one that turns at full speed."""
+    linear, network = (
+        replace(load_policy(f"{learner}-tuned-both-seed0"), mirror=None)
+        for learner in ("ars", "ppo")
+    )
+    layers = tuple(Layer(9 * layer.weights, layer.bias + 0.1) for layer in network.layers)
+    return linear, network, replace(network, layers=layers)
+
+
+def test_mirrored_trials_give_mirrored_trajectories(policies):
+    """In all shipped problems of the arm ``paper`` that have a mirror, and of another arm."""
+    shipped = [ReachProblem.load(name) for name in problem_names() if "paper" in name]
+    known = [each for each in (*PROBLEMS.values(), *shipped) if not missing_mirror(each)]
+    assert {each.name for each in known} >= {"left", "both", "post-paper", "table-paper"}
+    for problem, policy in product((*known, targets()[-1]), policies):
+        found = reflection_of(policy, trial_set(problem, 100, 3))
+        assert (found["problem"], found["trials"]) == (problem.name, 100)
+        assert found["deviation"] <= 1e-12
+        assert found["differing"] == 0
+
+
+def test_without_a_mirror_they_do_not(policies, monkeypatch):
+    monkeypatch.setattr(reflection, "with_mirror", lambda policy, _: policy)
+    for policy in policies:
+        found = reflection_of(policy, trial_set(PROBLEMS["both"], 100, 3))
+        assert found["differing"] > 10
+        assert found["deviation"] > 0.1
+
+
+def test_on_the_left_nothing_changes(policies):
+    trials = trial_set(SOURCE, 100, 4)
+    mirror = find_mirror(trials.simulator.world)
+    for policy in policies:
+        plain, other = (
+            trials.simulator.rollout(each, trials.starts, trials.goals, record=True)
+            for each in (policy, with_mirror(policy, mirror))
+        )
+        np.testing.assert_array_equal(plain.steps, other.steps)
+        np.testing.assert_allclose(plain.paths, other.paths, rtol=0, atol=1e-12)
+
+
+def test_a_symmetric_training_is_one_whose_policy_gets_a_mirror():
+    """On the right, where policies with a mirror see what there is."""
+    plain, symmetric = (
+        train_policy(recipe("ars", "tuned", problem="right", symmetric=symmetric, **SHORT)).policy
+        for symmetric in (False, True)
+    )
+    np.testing.assert_array_equal(plain.layers[0].weights, symmetric.layers[0].weights)
+    np.testing.assert_array_equal(plain.mean, symmetric.mean)
