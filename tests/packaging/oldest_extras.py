@@ -17,24 +17,37 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 
 TESTS = {
+    "peers": ("evaluation/measurements/test_peers.py",),
     "ppo": (
         *("policies/ppo", "policies/sb3", "policies/test_conversion_sb3.py"),
         *("policies/test_conversion_torch.py", "commands/test_train_ppo.py"),
     ),
+    "ray": ("evaluation/running/test_ray_cluster.py", "evaluation/studies/test_study_elsewhere.py"),
     "render": ("kinarm/envs/test_rendering.py",),
     "robots": ("kinarm/test_mesh_files.py", "kinarm/test_known_arms.py"),
     "slurm": ("evaluation/running/test_slurm.py", "evaluation/studies/test_study_elsewhere.py"),
     "study": ("evaluation/studies/test_study_output.py",),
     "tune": ("evaluation/studies/test_search.py",),
+    "zoo": ("interop/test_rl_zoo.py",),
 }
 """What is tested of an extra, below ``tests``."""
 
 
-def oldest(*extras: str) -> Iterator[str]:
-    """The lowest versions that the package itself allows, or some of its extras if they say so."""
+def oldest(extra: str) -> Iterator[str]:
+    """The lowest versions that the package itself and one of its extras allow."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    lists = (project["dependencies"], *(project["optional-dependencies"][each] for each in extras))
-    lowest = dict(line.partition(",")[0].split(">=") for lines in lists for line in lines)
+    extras = project["optional-dependencies"]
+
+    def bounds(lines: list[str]) -> Iterator[tuple[str, str]]:
+        for line in lines:
+            if line.startswith("kinarm["):
+                for other in line.removeprefix("kinarm[").removesuffix("]").split(","):
+                    yield from bounds(extras[other])
+            else:
+                name, _, version = line.partition(",")[0].partition(">=")
+                yield name, version
+
+    lowest = dict([*bounds(project["dependencies"]), *bounds(extras[extra])])
     return (f"{name}=={version}" for name, version in lowest.items())
 
 
