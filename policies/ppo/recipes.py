@@ -60,7 +60,7 @@ BEST = replace(
 
 PRECISE = replace(
     TUNED,
-    **{**WIDE, **MANY, "final_log_std": -3.7},
+    **{**WIDE, **MANY, "final_log_std": -3.7, "replay_log_std": -2.5},
     recipe="precise",
     iterations=1465,
     initial_tolerance=0.03,
