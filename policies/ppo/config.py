@@ -73,6 +73,9 @@ class PPOConfig(TrainingConfig):
     initial_tolerance : float, optional
         Training tolerance until start spread and discount have reached their final values; then
         it changes geometrically to the final tolerance [m].
+    stop_at_goal : bool
+        Whether success in the training takes two steps in a row within the training tolerance, so
+        that the hand does not only pass the goal. At the last step, one is enough.
     symmetric : bool
         Whether the policy treats mirror images alike, if arm and obstacles are their own mirror
         image; it then learns from goals on the right and from mirror images of those on the left.
@@ -95,6 +98,9 @@ class PPOConfig(TrainingConfig):
         Smallest logarithm of the standard deviation of the actions in replayed episodes; with
         less noise, a policy never succeeds where it always fails. Without it, replayed episodes
         have the noise of the others.
+    replay_noise_steps : int, optional
+        Steps at the beginning of a replayed episode in which it has that noise; all of them, if
+        it is not given.
     initial_policy : str, optional
         Name or file of a policy that the training begins with; it must have the same layers, and
         may be for another problem or arm.
@@ -120,6 +126,7 @@ class PPOConfig(TrainingConfig):
     final_log_std: float | None = field(default=None, metadata=OPTIONAL)
     training_tolerance: float | None = field(default=None, metadata=POSITIVE)
     initial_tolerance: float | None = field(default=None, metadata={**POSITIVE, **OPTIONAL})
+    stop_at_goal: bool = field(default=False, metadata=OPTIONAL)
     symmetric: bool = False
     initial_start_spread: float = field(default=1.0, metadata=SHARE)
     initial_gamma: float | None = field(default=None, metadata=SHARE)
@@ -128,6 +135,7 @@ class PPOConfig(TrainingConfig):
     replay_share: float = field(default=0.0, metadata={**SHARE, **OPTIONAL})
     replay_size: int = field(default=8192, metadata={"at_most": LARGEST_REPLAY, **OPTIONAL})
     replay_log_std: float | None = field(default=None, metadata=OPTIONAL)
+    replay_noise_steps: int | None = field(default=None, metadata={**MANY, **OPTIONAL})
     initial_policy: str | None = field(default=None, metadata=OPTIONAL)
     demonstrations: int | None = field(default=None, metadata={**MANY, **OPTIONAL})
 
@@ -137,6 +145,8 @@ class PPOConfig(TrainingConfig):
             raise InvalidInputError("net_arch must name at least one layer")
         if self.replay_log_std is not None and not self.replay_share:
             raise InvalidInputError("replay_log_std needs a replay_share above 0")
+        if self.replay_noise_steps is not None and self.replay_log_std is None:
+            raise InvalidInputError("replay_noise_steps needs a replay_log_std")
         if self.batch_size == 1 or self.steps_per_iteration % self.batch_size:
             raise InvalidInputError(
                 f"batch_size must be above 1 and divide the {self.steps_per_iteration} steps of a "

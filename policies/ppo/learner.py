@@ -74,9 +74,13 @@ class PPOTraining:
         mirror = task_mirror(config.symmetric, simulator.world)
         self.config = config
         _, scenarios = seed_iteration(config.seed, 0)
-        replay = config.replay
         self.env = TrainingVecEnv(
-            simulator, config.n_envs, rng=scenarios, mirror=mirror, replay=replay
+            simulator,
+            config.n_envs,
+            rng=scenarios,
+            mirror=mirror,
+            replay=config.replay,
+            stop_at_goal=config.stop_at_goal,
         )
         self.model = CompiledPPO(self.env, config, threads)
         self.model.set_logger(Logger(folder=None, output_formats=outputs))

@@ -80,6 +80,7 @@ class CompiledPPO(PPO):
             device="cpu",
         )
         self._replay_log_std = config.replay_log_std
+        self._replay_noise_steps = config.replay_noise_steps
         self._noise_scales = np.ones((config.n_steps, env.num_envs), dtype=np.float32)
         self._weights = list(self.policy.parameters())
         self._networks = ActorCritic(
@@ -92,6 +93,7 @@ class CompiledPPO(PPO):
     def _excluded_save_params(self) -> list[str]:
         """What a plain PPO has no use for."""
         own = ["rng", "threads", "_networks", "_weights", "_noise_scales", "_replay_log_std"]
+        own += ["_replay_noise_steps"]
         return [*super()._excluded_save_params(), *own]
 
     def parameters(self) -> Numbers:
@@ -157,8 +159,7 @@ class CompiledPPO(PPO):
             noise = self.rng.standard_normal(actions.shape).astype(np.float32)
             scales = self._noise_scales[step]
             if self._replay_log_std is not None:
-                replayed = env.get_attr("replayed", 0)[0]
-                fill_in_scales(replayed, networks.log_std, self._replay_log_std, scales)
+                fill_in_scales(self._noisy(env), networks.log_std, self._replay_log_std, scales)
             outcome = actions, buffer.log_probs[step]
             choose(networks.means(obs), networks.log_std, noise, scales, *outcome)
             buffer.observations[step], buffer.actions[step] = obs, actions
@@ -183,6 +184,14 @@ class CompiledPPO(PPO):
         callback.update_locals(locals())
         callback.on_rollout_end()
         return True
+
+    def _noisy(self, env: VecEnv) -> NDArray[np.bool_]:
+        """Which episodes are to have more noise, shape (n_envs,)."""
+        replayed: NDArray[np.bool_] = env.get_attr("replayed", 0)[0]
+        if self._replay_noise_steps is None:
+            return replayed
+        steps: NDArray[np.int64] = env.get_attr("steps", 0)[0]
+        return replayed & (steps < self._replay_noise_steps)
 
     def _fill_in_values(self, buffer: RolloutBuffer, cut_short: list[CutShort]) -> torch.Tensor:
         """Compute all values of a rollout; returns those of the observations after it.

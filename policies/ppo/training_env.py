@@ -8,9 +8,9 @@ from gymnasium.spaces import Box, Space
 from numpy.typing import NDArray
 
 from kinarm.envs.interface import Verdict
-from kinarm.episodes import Episodes
+from kinarm.episodes import RUNNING, Episodes
 from kinarm.failed_scenarios import FailedScenarios, Replay, StartsAndGoals
-from kinarm.kernels.reward import COLLISION
+from kinarm.kernels.reward import COLLISION, SUCCESS
 from kinarm.networks import Mirror
 from kinarm.policies.mirror import sample_seen
 from kinarm.policies.normalizer import Normalizer, input_scale
@@ -32,6 +32,8 @@ class NormalizedInterface:
     ----------
     penalty : float
         Share of the penalty for contact that counts.
+    passes : ndarray of bool, shape (n,)
+        Which episodes go on if they succeed in this step.
     """
 
     tells_terms = True
@@ -40,6 +42,7 @@ class NormalizedInterface:
         unbounded = Box(-np.inf, np.inf, (n_observations,), dtype=np.float32)
         self.observation_space: Space[Any] = unbounded
         self.penalty = 1.0
+        self.passes: NDArray[np.bool_] = np.zeros(1, dtype=np.bool_)
         self.normalize_by(Normalizer.empty(n_observations))
 
     def normalize_by(self, normalizer: Normalizer) -> None:
@@ -51,10 +54,13 @@ class NormalizedInterface:
         shown: NDArray[np.float32] = ((observations - self._mean) * self._scale).astype(np.float32)
         return shown
 
-    def judge(self, episodes: Episodes, result: StepResult) -> Verdict:  # noqa: ARG002
-        """Take the simulator's reward, with a share of its penalty for contact, and endings."""
+    def judge(self, episodes: Episodes, result: StepResult) -> Verdict:
+        """Take the simulator's reward and endings, except for the penalty and for what passes."""
+        passing = result.success & self.passes
+        episodes.status[passing] = RUNNING
         remitted = (1.0 - self.penalty) * result.terms[:, COLLISION]
-        return Verdict(result.reward - remitted, result.terminated, result.truncated)
+        remitted += np.where(passing, result.terms[:, SUCCESS], 0.0)
+        return Verdict(result.reward - remitted, result.terminated & ~passing, result.truncated)
 
 
 class EndedEpisodes(NamedTuple):
@@ -70,7 +76,8 @@ class TrainingVecEnv(SB3VecEnv):
 
     One generator, given to `draw_from`, draws starts and goals of all arms. With a mirror, those
     with goals to the left are reflected, so that a learner only ever meets goals to the right.
-    What is recorded of episodes that ended leaves out those that replayed a failed scenario.
+    What is recorded of episodes that ended leaves out those that replayed a failed scenario. To
+    stop at the goal, a success takes two steps in a row within the tolerance.
     """
 
     def __init__(
@@ -81,8 +88,10 @@ class TrainingVecEnv(SB3VecEnv):
         rng: np.random.Generator,
         mirror: Mirror | None = None,
         replay: Replay | None = None,
+        stop_at_goal: bool = False,
     ) -> None:
         self.mirror = mirror
+        self.stop_at_goal = stop_at_goal
         self._shown = NormalizedInterface(simulator.n_observations)
         self._record = EndedEpisodes([], [], 0.0)
         super().__init__(simulator, num_envs, self._shown, replay=replay)
@@ -121,6 +130,10 @@ class TrainingVecEnv(SB3VecEnv):
     def step_wait(self) -> StepReturn:
         """Move every arm for one time step, and keep a record of it."""
         began = time.perf_counter()
+        if self.stop_at_goal:
+            episodes, task = self._begun_episodes(), self.simulator.task
+            outside, last = episodes.distance > task.tolerance, episodes.steps + 1 == task.horizon
+            self._shown.passes = outside & ~last
         outcome = super().step_wait()
         for row in np.flatnonzero(outcome[2]).tolist():
             info = outcome[3][row]

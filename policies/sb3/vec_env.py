@@ -91,6 +91,11 @@ class SB3VecEnv(Lifecycle, VecEnv):
         """Which episodes began where an earlier one had failed, shape (num_envs,)."""
         return self._replayed
 
+    @property
+    def steps(self) -> NDArray[np.int64]:
+        """Steps of the running episodes so far, shape (num_envs,)."""
+        return self._begun_episodes().steps
+
     def reset(self) -> Observations:
         """Begin all episodes anew, with the seeds and options that were set before.
 

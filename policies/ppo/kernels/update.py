@@ -114,22 +114,22 @@ def choose(
 
 @kernel
 def fill_in_scales(
-    replayed: NDArray[np.bool_], log_std: Numbers, least: float, scales: Numbers
+    noisy: NDArray[np.bool_], log_std: Numbers, least: float, scales: Numbers
 ) -> None:
     """Fill in by how much wider than usual the noise of episodes is, shape (n,) each.
 
     Parameters
     ----------
-    replayed : ndarray of bool, shape (n,)
-        Which episodes replay a failed scenario.
+    noisy : ndarray of bool, shape (n,)
+        Which episodes have more.
     log_std : ndarray of float32, shape (n_actions,)
         Logarithms of the usual standard deviations.
     least : float
-        What their mean is at least in a replay.
+        What their mean is then at least.
     """
     wider = exponential(max(0.0, least - log_std.mean()))
     for i in range(len(scales)):
-        scales[i] = wider if replayed[i] else 1.0
+        scales[i] = wider if noisy[i] else 1.0
 
 
 @kernel

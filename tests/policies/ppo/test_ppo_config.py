@@ -47,6 +47,7 @@ def test_numbers_follow_from_others():
         ({"vf_coef": float("nan")}, "vf_coef"),
         ({"log_std_init": float("inf")}, "log_std_init must be finite"),
         ({"replay_log_std": -1.0}, "replay_log_std needs a replay_share above 0"),
+        ({"replay_noise_steps": 5}, "replay_noise_steps needs a replay_log_std"),
         ({"learning_rate_schedule": "cosine"}, "constant, linear, got 'cosine'"),
     ],
 )

@@ -264,9 +264,10 @@ class TestParameters:
         np.testing.assert_allclose(orthogonal(normal), matrix.numpy(), rtol=0, atol=1e-9)
 
 
-def test_replays_are_explored_with_more_noise():
+def deviations_in_replays(**changes):
+    """Actions of a rollout less their means, and whether they are the first of an episode."""
     noise = {"log_std_init": -4.0, "final_log_std": -4.0, "replay_log_std": -1.0}
-    config = replace(AWKWARD, replay_share=0.5, learning_rate=1e-12, **noise)
+    config = replace(AWKWARD, replay_share=0.5, learning_rate=1e-12, **noise, **changes)
     training = PPOTraining(config)
     state = training.initial_state()
     for _ in range(6):
@@ -275,8 +276,24 @@ def test_replays_are_explored_with_more_noise():
     seen = torch.from_numpy(buffer.observations.reshape(-1, buffer.observations.shape[-1]))
     with torch.no_grad():
         means = model.policy.get_distribution(seen).distribution.mean.numpy()
-    deviations = buffer.actions.reshape(means.shape) - means
-    wide = np.abs(deviations).max(axis=1) > 0.12  # 6.5 narrow deviations
+    return buffer.actions.reshape(means.shape) - means, buffer.episode_starts.reshape(-1) == 1
+
+
+def is_wide(deviations):
+    return np.abs(deviations).max(axis=1) > 0.12  # 6.5 narrow deviations
+
+
+def test_replays_are_explored_with_more_noise():
+    deviations, _ = deviations_in_replays()
+    wide = is_wide(deviations)
     assert 0.2 < wide.mean() < 0.8
     assert deviations[wide].std() == pytest.approx(np.exp(-1), rel=0.2)
     assert deviations[~wide].std() == pytest.approx(np.exp(-4), rel=0.2)
+
+
+def test_the_noise_of_replays_ends_after_some_steps():
+    deviations, first = deviations_in_replays(replay_noise_steps=1)
+    wide = is_wide(deviations)
+    assert wide.any()
+    assert not wide[~first].any()
+    assert not wide[first].all()  # some are new

@@ -32,7 +32,7 @@ def normalizer():
 
 @pytest.fixture
 def make_env(normalizer):
-    def make(seed=0, *, number=NUMBER, mirrored=False, replay=None, **settings):
+    def make(seed=0, *, number=NUMBER, mirrored=False, replay=None, stop_at_goal=False, **settings):
         overrides = {"reward": REWARD, "tolerance": 0.5, **settings}
         simulator = Simulator(PROBLEMS["both"].replace(**overrides), threads=1)
         env = TrainingVecEnv(
@@ -41,6 +41,7 @@ def make_env(normalizer):
             rng=np.random.default_rng(seed),
             mirror=find_mirror(simulator.world) if mirrored else None,
             replay=replay,
+            stop_at_goal=stop_at_goal,
         )
         env.normalize_by(normalizer)
         return env
@@ -306,3 +307,45 @@ def test_a_share_of_the_penalty(make_env):
         np.testing.assert_allclose(milder, expected, rtol=0, atol=1e-6)
         touched += touching.sum()
     assert touched > 5
+
+
+def drive(env, steps=200):
+    """Distances, rewards, ends and successes of steps with random actions, a row per step."""
+    rng = np.random.default_rng(0)
+    env.reset()
+    history = []
+    for _ in range(steps):
+        before = env.states()
+        _, rewards, dones, infos = env.step(rng.uniform(-0.4, 0.4, (NUMBER, 5)).astype(np.float32))
+        after = [info.get("distance", np.nan) for info in infos]
+        reached = [info.get("is_success", False) for info in infos]
+        history.append((distances_of(env, before), before.steps, rewards, dones, after, reached))
+    return [np.array(column) for column in zip(*history, strict=True)]
+
+
+def distances_of(env, states):
+    seen = ReachEnv(env.simulator.problem).simulator
+    return seen.reset(states.q, states.goal).distance
+
+
+class TestStopAtGoal:
+    def test_success_takes_two_steps_within_or_the_last(self, make_env):
+        env = make_env(stop_at_goal=True, tolerance=0.9, horizon=4)
+        distances, steps, _, dones, after, reached = drive(env)
+        assert (after[reached] <= 0.9).all()
+        within, last = distances <= 0.9, steps == 3
+        assert (within | last)[reached].all()
+        assert reached[within & ~last].any()
+        assert reached[~within & last].any()
+        stayed = within[1:] & ~dones[:-1]  # reached in the step before, which did not end it
+        assert stayed.any()
+        assert dones[1:][within[1:] & (after[1:] <= 0.9)].all()
+
+    def test_only_a_success_has_its_bonus(self, make_env):
+        distances, _, rewards, dones, _, reached = drive(
+            make_env(stop_at_goal=True, tolerance=0.9, horizon=4)
+        )
+        passing = (distances[:-1] > 0.9) & (distances[1:] <= 0.9) & ~dones[:-1]
+        assert passing.any()
+        assert (rewards[:-1][passing] < 1).all()
+        assert (rewards[reached] > 1).all()
