@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from kinarm._fields import to_plain
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.ars.state import ARSState
 from kinarm.policies.learners import train_policy
@@ -115,7 +116,7 @@ def ars_digests() -> dict[str, str]:
             state = states[-1]
             curve = [point[:4] for point in state.curve]
             found[f"ars {name} {task}{' replay' if changes == again else ''}"] = led_to(
-                repr(config),
+                str(to_plain(config)),
                 digest(
                     [
                         *(state.theta, state.normalizer.mean, state.normalizer.squares, curve),
@@ -145,7 +146,7 @@ def ppo_digests() -> dict[str, str]:
         train_policy(config, on_iteration=states.append)
         state = states[-1]
         found[f"ppo {name} {task}{' replay' if changes == again else ''}"] = led_to(
-            repr(config),
+            str(to_plain(config)),
             digest(
                 [
                     *(state.parameters, state.first_moment, state.second_moment),
