@@ -18,6 +18,7 @@ def pages() -> dict[Path, Page]:
     return site_pages()
 
 
+@pytest.mark.slow
 def test_every_link_and_anchor_leads_somewhere(pages):
     assert len(pages) > 20
     assert broken_links(pages) == []
