@@ -20,10 +20,9 @@ PYTEST := $(BIN)/python -m pytest --dist loadfile --no-loadscope-reorder --durat
 COVERED = --cov --cov-report=term --cov-fail-under=$$($(BIN)/python -c '$(COVERAGE)')
 
 WORKERS ?= auto
-TESTS ?= not slow
 
-test: $(call INSTALLED,test) ## run the tests, but for the slow ones; all of them with TESTS=
-	$(PYTEST) -n $(WORKERS) -m "$(TESTS)" $(COVERED)
+test: $(call INSTALLED,test) ## run the tests, but for the slow ones
+	$(PYTEST) -n $(WORKERS) -m "not slow" $(COVERED)
 
 CAMPAIGN := loaders command_lines writes signals kills live_page
 
