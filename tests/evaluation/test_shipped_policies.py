@@ -17,7 +17,7 @@ from kinarm.task import RewardWeights
 PAPER = [(algorithm, "paper", problem) for algorithm in ("ars", "ppo") for problem in PROBLEMS]
 OURS = [
     *(("ars", named) for named in ("tuned", "linear", "best")),
-    *(("ppo", named) for named in ("tuned", "taught", "best")),
+    *(("ppo", named) for named in ("tuned", "taught", "best", "precise")),
 ]
 SEEDS = {
     **{"-".join(group): 4 for group in PAPER},
@@ -120,6 +120,7 @@ def test_symmetric_policies_treat_mirror_images_alike(name):
         ("ppo-tuned", 0.90),
         ("ppo-taught", 0.965),
         ("ppo-best", 0.985),
+        ("ppo-precise", 0.98),
     ],
 )
 def test_policies_reach(group, problem, floor):
