@@ -92,9 +92,9 @@ class CompiledPPO(PPO):
 
     def _excluded_save_params(self) -> list[str]:
         """What a plain PPO has no use for."""
-        own = ["rng", "threads", "_networks", "_weights", "_noise_scales", "_replay_log_std"]
-        own += ["_replay_noise_steps"]
-        return [*super()._excluded_save_params(), *own]
+        own = ["rng", "threads", "_networks", "_weights", "_noise_scales"]
+        settings = ["_replay_log_std", "_replay_noise_steps"]
+        return [*super()._excluded_save_params(), *own, *settings]
 
     def parameters(self) -> Numbers:
         """Parameters of actor and critic, shape (n_parameters,)."""

@@ -151,7 +151,7 @@ class TestCard:
     @pytest.mark.parametrize(
         ("arguments", "word"),
         [
-            ((), "-both-seed2 on left and "),
+            ((), "ars-best-both-seed2 on left and "),
             (("--policy", "ars-tuned-both"), "ars-tuned-both-seed0 on both"),
             (("--policy", "zero", "--problem", "right"), "zero on right"),
             (("--policy", "oracle", "--problem", "right"), "got oracle"),

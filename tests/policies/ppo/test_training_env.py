@@ -316,16 +316,12 @@ def drive(env, steps=200):
     history = []
     for _ in range(steps):
         before = env.states()
+        distances = env.simulator.reset(before.q, before.goal).distance
         _, rewards, dones, infos = env.step(rng.uniform(-0.4, 0.4, (NUMBER, 5)).astype(np.float32))
         after = [info.get("distance", np.nan) for info in infos]
         reached = [info.get("is_success", False) for info in infos]
-        history.append((distances_of(env, before), before.steps, rewards, dones, after, reached))
+        history.append((distances, before.steps, rewards, dones, after, reached))
     return [np.array(column) for column in zip(*history, strict=True)]
-
-
-def distances_of(env, states):
-    seen = ReachEnv(env.simulator.problem).simulator
-    return seen.reset(states.q, states.goal).distance
 
 
 class TestStopAtGoal:
