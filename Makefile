@@ -39,7 +39,7 @@ lint: $(call INSTALLED,dev) ## check style, format and types
 	$(BIN)/mypy
 
 docs: $(call INSTALLED,docs) ## build the site into docs/_build/html
-	$(BIN)/sphinx-build -n -W --keep-going -b html docs docs/_build/html
+	$(BIN)/sphinx-build -n -W --keep-going --jobs auto -b html docs docs/_build/html
 
 PYTHONS ?= python3.11 python3.12 python3.13
 
