@@ -10,14 +10,15 @@ from kinarm.simulator import Simulator
 KNOWN_ARMS = ("ur3", "ur5", "ur10", "panda", "xarm7", "z1", "kinova", "so100", "so101")
 
 
-def _is_installed() -> bool:
+def is_installed() -> bool:
+    """Whether the extra robots, which brings the meshes, is installed."""
     try:
         return bool(metadata.version("example-robot-data"))
     except metadata.PackageNotFoundError:
         return False
 
 
-INSTALLED = pytest.mark.skipif(not _is_installed(), reason="needs the extra robots")
+INSTALLED = pytest.mark.skipif(not is_installed(), reason="needs the extra robots")
 
 
 def simulator_among_boxes(name: str) -> Simulator:
