@@ -259,7 +259,7 @@ def test_the_keyboard_tells_what_every_figure_means(visit, width):
         page.keyboard.press("Tab")
     cells = page.locator("#right td[data-term]:has(.value)").all()
     assert sorted(told) == sorted({cell.get_attribute("data-term") for cell in cells})
-    assert tip.is_hidden()
+    tip.wait_for(state="hidden")
 
 
 def test_a_mouse_and_the_keyboard_tell_what_a_figure_means(visit):
