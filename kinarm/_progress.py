@@ -52,7 +52,8 @@ class ProgressLine:
         self._task = self._progress.add_task(title, total=total, words=(), count="")
 
     def __enter__(self) -> "ProgressLine":
-        self._progress.start()
+        if not self._progress.disable:
+            self._progress.start()
         return self
 
     def __exit__(
@@ -61,7 +62,8 @@ class ProgressLine:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        self._progress.stop()
+        if not self._progress.disable:  # before Rich 15, stopping would print an empty line
+            self._progress.stop()
 
     def update(self, done: float | None = None, words: Sequence[str] = (), count: str = "") -> None:
         """Show how far it is.
