@@ -57,9 +57,13 @@ def _omitted(item: Field[Any], entry: Any) -> bool:
     """Whether plain values leave a field out."""
     if entry is None:
         return True
+    return "optional" in item.metadata and bool(entry == default_of(item))
+
+
+def default_of(item: Field[Any]) -> Any:
+    """What a field is if it is not given."""
     make = item.default_factory
-    default = item.default if make is MISSING else make()
-    return "optional" in item.metadata and bool(entry == default)
+    return item.default if make is MISSING else make()
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Any
 from kinarm._fields import to_plain
 from kinarm._files import write_text
 from kinarm.evaluation.comparison.figures import learning_curves
-from kinarm.evaluation.comparison.learners import ComparedLearner
+from kinarm.evaluation.comparison.learners import OF_OTHERS, ComparedLearner
 from kinarm.evaluation.comparison.results import LEVELS, Comparison, Series
 from kinarm.evaluation.comparison.runs import CurvePoint
 from kinarm.evaluation.figures import save_figure
@@ -137,14 +137,11 @@ def settings_table(learners: Iterable[ComparedLearner]) -> str:
     rows = []
     for learner in learners:
         entries = to_plain(learner)
-        given = {name: entries[name] for name in SHOWN if entries[name]} | learner.settings
+        shown = ("recipe", *OF_OTHERS)
+        given = {name: entries[name] for name in shown if entries[name]} | learner.settings
         settings = ", ".join(f"{name} {_shown(value)}" for name, value in given.items())
         rows.append([learner.title, learner.algorithm, settings, learner.source])
     return markdown(("learner", "algorithm", "settings", "source"), rows)
-
-
-SHOWN = ("recipe", "n_envs", "hindsight", "train_on", "normalize", "decaying", "action_noise")
-"""Fields of a learner that are shown beside its settings."""
 
 
 def _shown(value: object) -> str:

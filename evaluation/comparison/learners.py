@@ -1,21 +1,25 @@
 """Who is compared: learners with their settings, and where these come from."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from importlib.resources import as_file, files
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from kinarm._fields import check_fields, from_plain, read_toml
+from kinarm._fields import check_fields, default_of, from_plain, read_toml
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError, MissingExtraError, UnknownNameError
 from kinarm.policies.learners import find_learner, learner_names
+from kinarm.policies.recipes import PER_TRAINING, recipe
 
 ALGORITHMS = {
     **dict.fromkeys(("A2C", "DDPG", "PPO", "SAC", "TD3"), "stable_baselines3"),
     "TQC": "sb3_contrib",
 }
 """Algorithms of Stable-Baselines3's libraries, and the module that each is in."""
+
+OF_OTHERS = ("n_envs", "hindsight", "train_on", "normalize", "decaying", "action_noise")
+"""What kinarm's learners do not have, or have in their settings."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +53,7 @@ class ComparedLearner:
     action_noise : float
         Standard deviation of noise that is added to the actions in training.
     settings : dict
-        What else the algorithm's constructor is given.
+        What replaces settings of the recipe, or what else the algorithm's constructor is given.
 
     Raises
     ------
@@ -78,10 +82,23 @@ class ComparedLearner:
             raise UnknownNameError("algorithm", self.algorithm, (*learner_names(), *ALGORITHMS))
         if self.is_recipe != bool(self.recipe):
             raise InvalidInputError("kinarm's learners have a recipe, and others have none")
-        if not self.is_recipe:
+        if self.is_recipe:
+            self._check_settings()
+        else:
             whole_number("environment_steps", self.environment_steps, 1)
         if self.decaying and "learning_rate" not in self.settings:
             raise InvalidInputError("decaying needs settings.learning_rate to start from")
+
+    def _check_settings(self) -> None:
+        """Refuse settings that the recipe does not have, before anything is trained."""
+        for item in fields(self):
+            if item.name in OF_OTHERS and getattr(self, item.name) != default_of(item):
+                raise InvalidInputError(f"{item.name} is not for kinarm's learners")
+        for name in PER_TRAINING:
+            if name in self.settings:
+                raise InvalidInputError(f"settings.{name}: the comparison chooses it")
+        if self.settings:
+            recipe(self.algorithm, self.recipe, **self.settings)
 
     @property
     def is_recipe(self) -> bool:

@@ -121,7 +121,8 @@ class PlannedRun:
         learner = self.learner
         if not learner.is_recipe:
             return None
-        return recipe(learner.algorithm, learner.recipe, problem=self.problem, seed=self.seed)
+        changes = {**learner.settings, "problem": self.problem, "seed": self.seed}
+        return recipe(learner.algorithm, learner.recipe, **changes)
 
     @property
     def name(self) -> str:

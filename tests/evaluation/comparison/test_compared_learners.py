@@ -13,6 +13,8 @@ source = "here"
 environment_steps = 100
 """
 
+RECIPE = '[mine]\ntitle = "Mine"\nsource = "here"\nalgorithm = "ars"\nrecipe = "tuned"\n'
+
 
 def read(tmp_path, text):
     path = tmp_path / "mine.toml"
@@ -48,6 +50,11 @@ def test_a_table_of_ones_own(tmp_path):
         (MINE + 'recipe = "paper"', "kinarm's learners have a recipe, and others have none"),
         (MINE.replace("SAC", "ars"), "kinarm's learners have a recipe"),
         (MINE + "decaying = true", "decaying needs settings.learning_rate"),
+        (RECIPE + "[mine.settings]\nsteps = 0.9", "mine: unknown setting of ars 'steps'"),
+        (RECIPE + "[mine.settings]\nreplay_share = 1.5", "mine: .*replay_share"),
+        (RECIPE + "n_envs = 8", "mine: n_envs is not for kinarm's learners"),
+        (RECIPE + "train_on = { tolerance = 0.1 }", "train_on is not for kinarm's learners"),
+        (RECIPE + "[mine.settings]\nseed = 3", r"settings\.seed: the comparison chooses it"),
         ("[mine", "not a table of learners file"),
     ],
 )

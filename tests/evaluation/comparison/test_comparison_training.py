@@ -64,6 +64,17 @@ class TestRecipes:
         assert last.median_distance == pytest.approx(np.median(outcome.rollouts.distance), abs=1e-5)
         assert last.environment_steps == policy.provenance.environment_steps
 
+    def test_settings_replace_those_of_the_recipe(self):
+        learner = replace(
+            read_learners()["ars-tuned"],
+            settings={"iterations": 5, "net_arch": [4], "reward": {"success": 1.0}},
+        )
+        config = planned(learner, seed=3).config
+        changes = {"iterations": 5, "net_arch": (4,), "reward": {"success": 1.0}}
+        assert config == recipe("ars", "tuned", problem=EASY, seed=3, **changes)
+        assert config.net_arch == (4,)
+        assert (config.reward.success, config.reward.collision) == (1.0, -4.0)
+
 
 class TestStableBaselines:
     @pytest.fixture(autouse=True)
