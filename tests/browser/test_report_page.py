@@ -56,11 +56,14 @@ def address(document, evaluations, tmp_path_factory) -> str:
 
 @pytest.fixture
 def visit(browser, address):
-    """Open the report without a network; nothing may be fetched and nothing may go wrong."""
+    """Open the report without a network; nothing may be fetched and nothing may go wrong.
+
+    Who wants motion says so: what plays by itself is drawn without end, and pages scroll slowly.
+    """
     contexts, requests, problems = [], [], []
 
-    def call(**settings):
-        context = browser.new_context(offline=True, **settings)
+    def call(motion="reduce", **settings):
+        context = browser.new_context(offline=True, reduced_motion=motion, **settings)
         contexts.append(context)
         page = context.new_page()
         page.on("request", lambda request: requests.append(request.url))
@@ -135,7 +138,10 @@ def test_replay_waits_until_it_is_near(visit):
     assert not page.evaluate("document.querySelector('#worst iframe').srcdoc")
 
 
-@pytest.mark.parametrize("settings", [DESKTOP, PHONE], ids=["desktop", "phone"])
+MOVING_PHONE = {**PHONE, "motion": "no-preference"}
+
+
+@pytest.mark.parametrize("settings", [DESKTOP, MOVING_PHONE], ids=["desktop", "phone in motion"])
 def test_a_row_chooses_the_trial(visit, chosen, settings):
     page = visit(**settings)
     start_replay(page)
@@ -148,7 +154,7 @@ def test_a_row_chooses_the_trial(visit, chosen, settings):
             chosen[place].trial,
         )
         assert page.locator("tr[aria-current]").get_attribute("data-replay") == str(place)
-        # The page scrolls smoothly.
+        # With motion, the page scrolls there smoothly.
         top = "document.querySelector('#worst iframe').getBoundingClientRect().y"
         wait_until(page, f"0 <= {top} && {top} < {settings['viewport']['height'] / 2}")
 
@@ -253,13 +259,11 @@ def test_the_keyboard_tells_what_every_figure_means(visit, width):
     while page.evaluate(f"{focus}.closest('section')?.id") == "right":
         if page.evaluate(f"{focus}.classList.contains('term')"):
             told.append(page.evaluate(f"{focus}.textContent"))
-            page.wait_for_timeout(400)  # the page scrolls there, smoothly
             assert tip.inner_text() == meaning_of(told[-1])
             assert is_within(page, tip)
         page.keyboard.press("Tab")
     cells = page.locator("#right td[data-term]:has(.value)").all()
     assert sorted(told) == sorted({cell.get_attribute("data-term") for cell in cells})
-    tip.wait_for(state="hidden")
 
 
 def test_a_mouse_and_the_keyboard_tell_what_a_figure_means(visit):
