@@ -104,7 +104,7 @@ class PPOConfig(TrainingConfig):
     initial_policy : str, optional
         Name or file of a policy that the training begins with; it must have the same layers, and
         may be for another problem or arm.
-    demonstrations : int, optional
+    demonstrations : int
         Trials that the oracle solves before the training; the actor imitates its motions.
     """
 
@@ -137,7 +137,7 @@ class PPOConfig(TrainingConfig):
     replay_log_std: float | None = field(default=None, metadata=OPTIONAL)
     replay_noise_steps: int | None = field(default=None, metadata={**MANY, **OPTIONAL})
     initial_policy: str | None = field(default=None, metadata=OPTIONAL)
-    demonstrations: int | None = field(default=None, metadata={**MANY, **OPTIONAL})
+    demonstrations: int = field(default=0, metadata={"at_least": 0, **MANY, **OPTIONAL})
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -185,7 +185,7 @@ class PPOConfig(TrainingConfig):
     @property
     def cost(self) -> float:
         """Rough duration of the training [s of a core]."""
-        taught = 8e-3 * (self.demonstrations or 0)
+        taught = 8e-3 * self.demonstrations
         return 3e-6 * self.n_epochs * self.environment_steps + taught
 
     def learning_rate_at(self, done: float) -> float:

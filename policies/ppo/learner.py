@@ -105,7 +105,7 @@ class PPOTraining:
             actor = split_parameters(parameters, *widths).actor
             for layer, (weights, bias) in zip(policy.layers, actor, strict=True):
                 weights[:], bias[:] = layer
-        if config.demonstrations is not None:
+        if config.demonstrations:
             parameters = self._taught(parameters, normalizer, config.demonstrations)
         return PPOState(
             parameters=parameters,

@@ -104,7 +104,7 @@ def adapted(config: PPOConfig) -> PPOConfig:
     if config.recipe not in RECIPES or config.recipe == "paper":
         return config
     problem, symmetric = config.problem, not missing_mirror(config.problem)
-    if config.demonstrations is None and different_regions(problem, symmetric) > 1:
+    if not config.demonstrations and different_regions(problem, symmetric) > 1:
         config = replace(config, **UNALIKE)
     scale = problem.task.tolerance / PROBLEMS["right"].task.tolerance
     tolerances = {

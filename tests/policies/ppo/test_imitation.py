@@ -139,6 +139,6 @@ def test_a_training_begins_with_what_was_imitated(simulator):
         return np.mean((actions - fresh.actions) ** 2), state.parameters
 
     taught, parameters = error(config)
-    assert taught < 0.65 * error(replace(config, demonstrations=None))[0]
+    assert taught < 0.65 * error(replace(config, demonstrations=0))[0]
     np.testing.assert_array_equal(error(config, threads=2)[1], parameters)
     assert not np.array_equal(error(replace(config, seed=1))[1], parameters)
