@@ -28,7 +28,7 @@ class Cause(NamedTuple):
 
     def __str__(self) -> str:
         if self.pair is None:
-            return "out of time"
+            return "truncated"
         when = f"within {EARLY_STEPS} steps" if self.early else f"after {EARLY_STEPS} steps"
         return f"{self.pair[0]} touches {self.pair[1]} {when}"
 

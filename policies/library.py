@@ -16,7 +16,7 @@ BEST = "best"
 """Stands for the best shipped policy for a problem."""
 
 RANKING = "ranking.json"
-"""What the shipped policies reach, beside them: see `kinarm.evaluation.ranking`."""
+"""Which shipped policies are best, beside them: see `kinarm.evaluation.ranking`."""
 
 _SEED_SUFFIX = re.compile(r"-seed\d+$")
 
@@ -42,10 +42,10 @@ def group_of(name: str) -> str:
 
 
 def best_policy(problem: ProblemLike | None) -> str:
-    """Name of the shipped policy that reaches most goals of a problem.
+    """Name of the best shipped policy for a problem.
 
-    What they reach was measured when they were shipped, with the success that they were trained
-    for; another tolerance, horizon, reward or spread of the starts does not change the choice.
+    It was chosen when they were shipped, from what they reach of the problem as it ships; another
+    tolerance, horizon, reward or spread of the starts does not change the choice.
 
     Parameters
     ----------
@@ -59,13 +59,13 @@ def best_policy(problem: ProblemLike | None) -> str:
     """
     if problem is None:
         raise InvalidInputError(f"{BEST!r} is the best policy for a problem: name a --problem")
-    wanted, shipped = ReachProblem.load(problem), _successes()
-    for trained_for, successes in shipped.items():
+    wanted, best = ReachProblem.load(problem), _best_policies()
+    for trained_for, name in best.items():
         if _differ_in_nothing_else(ReachProblem.load(trained_for), wanted):
-            return max(sorted(successes), key=lambda name: successes[name])
+            return name
     raise InvalidInputError(
         f"no shipped policy is for the arm, scene and goals of problem {wanted.name!r}: "
-        f"they are for {', '.join(shipped)}"
+        f"they are for {', '.join(best)}"
     )
 
 
@@ -76,11 +76,11 @@ def _differ_in_nothing_else(one: ReachProblem, other: ReachProblem) -> bool:
 
 
 @cache
-def _successes() -> dict[str, dict[str, float]]:
-    """What the shipped policies reach of the problem that they are for, by problem and name."""
+def _best_policies() -> dict[str, str]:
+    """Names of the best shipped policies, by problem."""
     text = (resources.files("kinarm.data") / "policies" / RANKING).read_text(encoding="utf-8")
-    ranked: dict[str, dict[str, float]] = json.loads(text)["success"]
-    return ranked
+    best: dict[str, str] = json.loads(text)["best"]
+    return best
 
 
 def load_policy(name_or_file: str | Path, problem: ProblemLike | None = None) -> Policy:

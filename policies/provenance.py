@@ -13,6 +13,7 @@ from typing import Any
 from kinarm._fields import from_plain, to_plain
 from kinarm.policies.config import TrainingConfig
 from kinarm.problem import ReachProblem
+from kinarm.semantics import SEMANTICS
 
 RECORDED_PACKAGES = (
     *("kinarm", "numpy", "numba", "pin", "coal", "gymnasium", "scipy"),
@@ -42,6 +43,9 @@ class Provenance:
         Versions of the packages that matter.
     commit : str
         Commit of kinarm's source, with ``-dirty`` if it was changed; empty if unknown.
+    semantics : str, optional
+        Version of what kinarm computes (`kinarm.semantics`) with which it was trained; unknown in
+        older files and for policies that were trained elsewhere.
     """
 
     algorithm: str
@@ -52,6 +56,7 @@ class Provenance:
     config: dict[str, Any] = field(default_factory=dict)
     versions: dict[str, str] = field(default_factory=dict)
     commit: str = ""
+    semantics: str | None = None
 
     @classmethod
     def of(cls, algorithm: str, config: TrainingConfig, environment_steps: int) -> "Provenance":
@@ -65,6 +70,7 @@ class Provenance:
             config=plain_settings(config),
             versions=package_versions(),
             commit=source_commit(),
+            semantics=SEMANTICS,
         )
 
     def to_json(self) -> dict[str, Any]:

@@ -263,7 +263,7 @@ def described(recording: "Recording") -> str:
     ending = {
         "success": "reached the goal",
         "collision": " touches ".join(recording.contact or ("something",)),
-        "truncated": "out of time",
+        "truncated": "truncated",
     }[recording.outcome]
     floor = recording.steps_lower_bound
     necessary = f" ({floor} proven necessary)" if floor is not None else ""
