@@ -11,8 +11,8 @@ end: every cell runs as it stands.
 # %%
 # Train
 # -----
-# A result describes itself in one line. Progress bars of longer runs are quiet in a notebook, and
-# live with the package ipywidgets.
+# A result describes itself in one line. Longer runs show a progress bar in a notebook if the
+# package ipywidgets is installed.
 
 from kinarm.policies import recipe, train_policy
 
