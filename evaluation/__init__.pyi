@@ -12,6 +12,7 @@ from .figures import save_figure as save_figure
 from .metrics import METRICS as METRICS
 from .metrics import Metric as Metric
 from .outcomes import Outcomes as Outcomes
+from .replays.failures import find_failures as find_failures
 from .replays.recorder import record as record
 from .replays.request import ReplayRequest as ReplayRequest
 from .report.card import policy_card as policy_card

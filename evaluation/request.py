@@ -190,7 +190,8 @@ class EvaluationRequest(ProblemOptions):
     def _checked_pairs(self) -> list[Pair]:
         """Who faces which problem, if all of them can and the files can be written."""
         pairs = self.pairs()
-        arms = {problem.name: problem.load_arm() for _, problem in pairs}
+        problems = {problem.name: problem for _, problem in pairs}
+        arms = {name: problem.load_arm() for name, problem in problems.items()}
         for entrant, problem in pairs:
             entrant.check(arms[problem.name], allow_other_arm=self.allow_other_arm)
         self._check_outputs(pairs)

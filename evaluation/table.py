@@ -4,9 +4,10 @@ import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from kinarm._console import open_console
+from kinarm._console import open_console, print_fitting
 from kinarm.evaluation.metrics import ALWAYS, METRICS
 
 if TYPE_CHECKING:
@@ -15,6 +16,10 @@ if TYPE_CHECKING:
 
 SPREAD_PRIORITY = 5
 """Priority of the columns with ranges over training seeds; see `Metric.priority`."""
+
+
+REPLACED = "* some settings of the recipe are replaced"
+"""What the star in a label means."""
 
 
 class Cell(NamedTuple):
@@ -77,9 +82,24 @@ def spread_cell(name: str, row: dict[str, Any]) -> Cell:
     return Cell(extremes, f"{len(spread['each'])} seeds")
 
 
-def text_column(key: str) -> Column:
+def text_column(heading: str, text: Callable[[dict[str, Any]], str]) -> Column:
     """Column of a text in a row of the document."""
-    return Column(key, "", ALWAYS, lambda row: Cell(row[key]))
+    return Column(heading, "", ALWAYS, lambda row: Cell(text(row)))
+
+
+def policy_label(row: dict[str, Any]) -> str:
+    """Name of a row's policy; where it names a recipe, with the star of replaced settings.
+
+    Names of files lack the star: ``ars-tuned-right`` is ``ars-tuned*-right``.
+    """
+    made, recipe = row["algorithm"], row["recipe"]
+    name: str = row["policy"]
+    return name.replace(f"{made}-{recipe.removesuffix('*')}-", f"{made}-{recipe}-", 1)
+
+
+def has_star(row: dict[str, Any]) -> bool:
+    """Whether the label of a row says that settings of the recipe are replaced."""
+    return row["recipe"].endswith("*") and row["recipe"] in policy_label(row)
 
 
 def print_table(document: dict[str, Any], console: "Console", *, markdown: bool = False) -> None:
@@ -91,26 +111,25 @@ def print_table(document: dict[str, Any], console: "Console", *, markdown: bool 
         row for problem in document["protocol"]["problems"] for row in table_rows(document, problem)
     ]
     figures = [c for c in metric_columns() if any(c.cell(row).value for row in rows)]
-    columns = [text_column("problem"), text_column("policy"), *figures]
+    columns = [
+        text_column("problem", itemgetter("problem")),
+        text_column("policy", policy_label),
+        *figures,
+    ]
     if markdown:
         text = io.StringIO()
-        open_console(file=text, piped_width=1000).print(
-            evaluation_table(document, columns, markdown=True)
-        )
+        open_console(file=text).print(evaluation_table(document, columns, markdown=True))
         console.out(text.getvalue().strip(), highlight=False)
         return
     expendable = sorted((c for c in columns if c.priority < ALWAYS), key=lambda c: c.priority)
-    unbounded = console.options.update(width=1000)
-    for count in range(len(expendable) + 1):
-        left_out = expendable[:count]
-        table = evaluation_table(document, [c for c in columns if c not in left_out])
-        if console.measure(table, options=unbounded).maximum <= console.width:
-            break
-    console.print(table)
-    if left_out:
-        headings = ", ".join(column.heading for column in left_out)
-        note = f"columns that do not fit here: {headings}; --markdown prints all"
-        console.print(note, style="dim")
+    print_fitting(
+        console,
+        lambda left_out: evaluation_table(
+            document, [column for column in columns if column.heading not in left_out]
+        ),
+        [column.heading for column in expendable],
+        "--markdown prints all",
+    )
 
 
 def evaluation_table(
@@ -128,7 +147,8 @@ def evaluation_table(
         if not markdown:
             table.add_section()
         for row in table_rows(document, problem):
-            table.add_row(*(str(column.cell(row)) for column in columns))
+            texts = (str(column.cell(row)) for column in columns)
+            table.add_row(*(text.replace("*", "\\*") if markdown else text for text in texts))
     return table
 
 

@@ -1,5 +1,6 @@
 """``python -m kinarm`` lists the commands; ``python -m kinarm eval`` runs one of them."""
 
+import argparse
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -41,11 +42,12 @@ def _explain(typed: Sequence[str]) -> None:
     lines = (f"  {name:<10} {purpose}  (kinarm-{name})" for name, (_, purpose) in COMMANDS.items())
     parser = CommandParser(
         prog=PROG,
-        description="Learn to reach with a simulated robot arm.",
-        epilog="commands:\n" + "\n".join(lines) + "\n\nCOMMAND --help says more.",
+        usage=f"{PROG} COMMAND ... [options]",
+        description="Learn to reach with a simulated robot arm.\n\ncommands:\n" + "\n".join(lines),
+        epilog="COMMAND --help says more.",
     )
     parser.add_argument(
-        "command", nargs="?", choices=COMMANDS, metavar="COMMAND", help="One of those below"
+        "command", nargs="?", choices=COMMANDS, metavar="COMMAND", help=argparse.SUPPRESS
     )
     parser.add_argument(
         "--print-completion",

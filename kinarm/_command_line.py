@@ -4,7 +4,7 @@ import io
 import os
 import shlex
 import sys
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, NamedTuple, NoReturn, TypeVar
 
@@ -173,13 +173,21 @@ def run_commands(
     run_command(prog, run)
 
 
-def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print a table on standard output, as wide as the terminal, or as it is if that is none."""
+def print_table(
+    headings: Sequence[str], rows: Sequence[Sequence[str]], expendable: Sequence[str] = ()
+) -> None:
+    """Print a table on standard output; columns that are expendable go first if it is narrow."""
     from rich.table import Table
 
-    from kinarm._console import open_console
+    from kinarm._console import open_console, print_fitting
 
-    table = Table(*headings, box=None, header_style="bold", pad_edge=False)
-    for row in rows:
-        table.add_row(*row)
-    open_console(piped_width=1000).print(table)
+    def table_without(left_out: Collection[str]) -> Table:
+        shown = [k for k, heading in enumerate(headings) if heading not in left_out]
+        table = Table(box=None, header_style="bold", pad_edge=False)
+        for k in shown:
+            table.add_column(headings[k])
+        for row in rows:
+            table.add_row(*(row[k] for k in shown))
+        return table
+
+    print_fitting(open_console(), table_without, expendable, "a wider terminal shows them")

@@ -1,7 +1,8 @@
 """Terminals as the commands use them."""
 
+import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import IO, TYPE_CHECKING
@@ -10,12 +11,18 @@ from kinarm.kernels.notices import COMPILING, told_of_compilation
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.table import Table
 
 
-def open_console(
-    *, stderr: bool = False, piped_width: int | None = None, file: IO[str] | None = None
-) -> "Console":
+UNBOUNDED = 1000
+"""Width that has room for every table."""
+
+
+def open_console(*, stderr: bool = False, file: IO[str] | None = None) -> "Console":
     """A console that prints texts as they are: names and paths hold no markup.
+
+    It is as wide as the terminal. Standard output that is no terminal, and a file, are unbounded;
+    the environment variable ``COLUMNS`` sets another width of standard output.
 
     In a notebook without ipywidgets, where rich cannot redraw and warns of it, a bar is a line
     that is printed at the end.
@@ -24,23 +31,52 @@ def open_console(
     ----------
     stderr : bool
         Whether it is standard error.
-    piped_width : int, optional
-        Width where standard output is no terminal.
     file : text stream, optional
         Where else to print to.
     """
     from rich.console import Console
 
-    width = piped_width if file is not None or not sys.stdout.isatty() else None
+    piped = not stderr and not sys.stdout.isatty() and "COLUMNS" not in os.environ
     return Console(
         stderr=stderr,
         file=file,
-        width=width,
+        width=UNBOUNDED if file is not None or piped else None,
         markup=False,
         emoji=False,
         highlight=False,
         force_jupyter=None if find_spec("ipywidgets") else False,
     )
+
+
+def print_fitting(
+    console: "Console",
+    table_without: Callable[[Sequence[str]], "Table"],
+    expendable: Sequence[str],
+    advice: str,
+) -> None:
+    """Print a table without the columns for which there is no room, and name these.
+
+    Parameters
+    ----------
+    console : rich.console.Console
+        Where to print it.
+    table_without : callable
+        The table without some columns, given their headings.
+    expendable : sequence of str
+        Headings of columns that can be left out, in that order.
+    advice : str
+        How to see them all.
+    """
+    unbounded = console.options.update(width=UNBOUNDED)
+    for count in range(len(expendable) + 1):
+        left_out = expendable[:count]
+        table = table_without(left_out)
+        if console.measure(table, options=unbounded).maximum <= console.width:
+            break
+    console.print(table)
+    if left_out:
+        note = f"columns that do not fit here: {', '.join(left_out)}; {advice}"
+        console.print(note, style="dim")
 
 
 @contextmanager

@@ -205,7 +205,9 @@ def check_output(path: str | Path, *, overwrite: bool = False, suffix: str = "")
         ending = f" that ends in {suffix}" if suffix else ""
         raise OutputError(f"the output must be a file{ending}, got {str(path)!r}")
     if exists and not overwrite:
-        raise OutputError(f"{str(path)!r} exists: --overwrite replaces it (overwrite=True)")
+        refused = OutputError(f"{str(path)!r} exists: --overwrite replaces it")
+        refused.add_note("in Python: overwrite=True")
+        raise refused
     check_folder(file.parent)
 
 

@@ -20,7 +20,7 @@ def add_options(
     kind: type,
     *,
     skip: Collection[str] = (),
-    negatable: bool = False,
+    explicit: bool = False,
     names: Mapping[str, Sequence[str]] | None = None,
 ) -> None:
     """Add an option for every field of a dataclass; only those that are given are parsed.
@@ -45,15 +45,16 @@ def add_options(
         The dataclass.
     skip : collection of str
         Fields that get no option.
-    negatable : bool
-        Whether there is an option ``--no-x`` also for what is false by default.
+    explicit : bool
+        Whether every default is said, none and no, too, and there is an option ``--no-x`` also for
+        what is false by default.
     names : mapping, optional
         Names that options take, by field, where the metadata do not list them.
     """
     items = init_fields(kind)
     for name, group in _grouped(parser, kind):
         if name not in skip:
-            _add_option(group, kind, items[name], negatable=negatable, names=names or {})
+            _add_option(group, kind, items[name], explicit=explicit, names=names or {})
 
 
 def _grouped(
@@ -78,7 +79,7 @@ def _add_option(
     item: Field[Any],
     prefix: str = "",
     *,
-    negatable: bool,
+    explicit: bool,
     names: Mapping[str, Sequence[str]],
 ) -> None:
     """Add the option of one field, or those of a nested dataclass."""
@@ -86,11 +87,11 @@ def _add_option(
     if isinstance(hint, type) and is_dataclass(hint):
         prefix = f"{prefix}{item.name}."
         for inner in init_fields(hint).values():
-            _add_option(parser, hint, inner, prefix, negatable=True, names=names)
+            _add_option(parser, hint, inner, prefix, explicit=True, names=names)
         return
     flag = option_name(item, prefix)
     known = names.get(item.name) or item.metadata.get("names", tuple)()
-    default = option_default(kind, item, negatable=negatable)
+    default = option_default(kind, item, explicit=explicit)
     options: dict[str, Any] = {
         "default": argparse.SUPPRESS,
         "help": _help(summary_of(kind, item.name), known, default),
@@ -103,7 +104,7 @@ def _add_option(
         options["nargs"] = "?"
     if hint is bool:
         negative = item.default is True and "flag" not in item.metadata
-        action = argparse.BooleanOptionalAction if negatable or negative else "store_true"
+        action = argparse.BooleanOptionalAction if explicit or negative else "store_true"
         parser.add_argument(flag, action=action, **options)
         return
     added = parser.add_argument(flag, **options, **_value_options(item, hint, flag))
@@ -150,15 +151,17 @@ def option_name(item: Field[Any], prefix: str = "") -> str:
 METAVARS = {int: "N", float: "X", Path: "FILE"}
 
 
-def option_default(kind: type, item: Field[Any], *, negatable: bool) -> str:
+def option_default(kind: type, item: Field[Any], *, explicit: bool) -> str:
     """What happens without an option; empty if that goes without saying."""
     defaults: Mapping[str, str] = getattr(kind, "DEFAULTS", {})
     default = item.default
     if item.name in defaults:
         return defaults[item.name]
     if isinstance(default, bool):
-        return "yes" if default else "no" if negatable else ""
-    if default in (None, (), MISSING):
+        return "yes" if default else "no" if explicit else ""
+    if default in (None, ()):
+        return "none" if explicit else ""
+    if default is MISSING:
         return ""
     return " ".join(map(str, default)) if isinstance(default, tuple) else str(default)
 

@@ -4,7 +4,8 @@ import argparse
 import re
 import sys
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from typing import Any, ClassVar, NoReturn
 
 from kinarm.errors import one_line
@@ -41,6 +42,22 @@ class Parser(argparse.ArgumentParser):
                 help="Print the completion script of a shell and exit",
             )
 
+    def parse_known_args(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
+    ) -> tuple[argparse.Namespace, list[str]]:
+        """Parse, and refuse what is unknown here: the parser of a command knows its own options."""
+        parsed, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{self._suggestion(unknown)}")
+        return parsed, unknown
+
+    def _suggestion(self, unknown: Sequence[str]) -> str:
+        """Options that are spelt like the unknown ones."""
+        given = (word.partition("=")[0] for word in unknown if word.startswith("--"))
+        known = self._option_string_actions
+        meant = [name for word in given for name in get_close_matches(word, known, 1)]
+        return f"; did you mean {', '.join(meant)}?" if meant else ""
+
     def error(self, message: str) -> NoReturn:
         """Print one line on standard error and exit."""
         self.exit(2, f"{self.prog}: {one_line(message)} (see {self.prog} --help)\n")
@@ -69,8 +86,8 @@ def group_of_options(parser: argparse._ActionsContainer, title: str) -> argparse
 class HelpFormatter(argparse.HelpFormatter):
     """Wraps paragraphs, and leaves lines that are indented as they are, if they are short enough.
 
-    Where an example is not, all have their meaning on a line of its own. Usage names what has to be
-    given.
+    Where an example is not, all have their meaning on a line of its own; one that is still too long
+    goes on in the next line, as shells accept it. Usage names what has to be given.
     """
 
     def _format_usage(
@@ -116,8 +133,26 @@ class HelpFormatter(argparse.HelpFormatter):
             )
         lines = block.splitlines()
         if max(map(len, lines)) > width:
-            lines = [EXAMPLE.sub(r"  \1\n      \2", line) for line in lines]
+            apart = "\n".join(EXAMPLE.sub(r"  \1\n      \2", line) for line in lines)
+            lines = [part for line in apart.splitlines() for part in _continued(line, width)]
         return "\n".join(indent + line for line in lines)
+
+
+def _continued(line: str, width: int) -> list[str]:
+    """A line of help in lines of this width at most; those of an example end in backslashes."""
+    if len(line) <= width:
+        return [line]
+    start = line[: len(line) - len(line.lstrip())]
+    mark, further = (" \\", "  ") if len(start) == 2 else ("", "")
+    *parts, last = textwrap.wrap(
+        line.strip(),
+        width - len(mark),
+        initial_indent=start,
+        subsequent_indent=start + further,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return [*(part + mark for part in parts), last]
 
 
 class _ShowVersion(argparse.Action):

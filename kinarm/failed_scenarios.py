@@ -32,8 +32,7 @@ class Replay:
     share : float
         Probability that an episode replays a failed scenario, once there is one; 0 replays none.
     size : int
-        Number of the last failures that are kept. A scenario that fails again is kept once more.
-        So scenarios that fail often are replayed often, and mastered ones are displaced.
+        Number of the last failures that are kept; see `FailedScenarios`.
 
     Raises
     ------
@@ -53,6 +52,13 @@ class Replay:
 
 class FailedScenarios(NamedTuple):
     """Scenarios of the last episodes that failed, the oldest first.
+
+    A failure is kept for each episode, not for each scenario: one that failed k times among the
+    last ``size`` failures is held k times, and all held ones are replayed with equal chance. So
+    its chance is proportional to its recent failures, which needs no priorities that would have to
+    be estimated, tuned and stored. Newer failures displace the oldest: a mastered scenario adds
+    none, and is forgotten after ``size`` failures of others. Those that always fail are held more
+    and more often, and can displace all others.
 
     Attributes
     ----------

@@ -29,7 +29,7 @@ def find_urdf(source: str) -> Path:
         raise ArmError(f"{source!r} is a folder, not a URDF")
     if path.suffix == ".urdf" or path.parent != Path():
         raise ArmError(f"URDF {source!r} does not exist")
-    raise UnknownNameError("arm", source, (*arm_names(), "path/to/robot.urdf"))
+    raise UnknownNameError("arm", source, (*arm_names(), "path/to/robot.urdf", "path/to/arm.toml"))
 
 
 def _installed(source: str) -> Path:

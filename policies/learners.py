@@ -5,7 +5,7 @@ class. The module of ARS, for example, is ``kinarm.policies.ars``.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
@@ -77,6 +77,8 @@ class Learner(Generic[ConfigT, StateT]):
         Settings, and state of a training.
     recipes : mapping of str to config
         Settings by name; ``"paper"`` has to be among them.
+    summaries : mapping of str to str
+        What recipes are, in a few words by name, for help.
     begin : callable
         Prepares a training, given settings and options.
     policy : callable
@@ -98,6 +100,7 @@ class Learner(Generic[ConfigT, StateT]):
     recipes: Mapping[str, ConfigT]
     begin: Callable[..., Training[StateT]]
     policy: Callable[[ConfigT, StateT], "Policy"]
+    summaries: Mapping[str, str] = field(default_factory=dict)
     adapt: Callable[[ConfigT], ConfigT] = lambda config: config
     options: tuple[str, ...] = ()
     packages: tuple[str, ...] = ()

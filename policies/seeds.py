@@ -42,15 +42,16 @@ def seeds_of(text: str) -> tuple[int, ...]:
     Raises
     ------
     InvalidInputError
-        If it is neither a number nor a range.
+        If it is neither a number nor a rising range, or there are too many.
     """
     found = re.fullmatch(r"(?:([0-9]{1,9})-)?([0-9]{1,9})", text)
-    if found is None:
-        raise InvalidInputError(f"must be a number of seeds or a range such as 5-9, got {text!r}")
-    first, last = int(found[1] or 0), int(found[2]) - (found[1] is None)
-    if not first <= last < first + MOST_SEEDS:
-        raise InvalidInputError(f"must be 1 to {MOST_SEEDS} seeds, got {text!r}")
-    return tuple(range(first, last + 1))
+    if found is not None:
+        first, last = int(found[1] or 0), int(found[2]) - (found[1] is None)
+        if first <= last < first + MOST_SEEDS:
+            return tuple(range(first, last + 1))
+    raise InvalidInputError(
+        f"must be a number (5) or a rising range (5-9), 1 to {MOST_SEEDS} seeds, got {text!r}"
+    )
 
 
 class SeedTask(NamedTuple):

@@ -27,21 +27,22 @@ kinarm-train LEARNER --help lists recipes and options.
 examples:
   kinarm-train ars --recipe tuned --out right.npz           one policy
   kinarm-train ars --recipe tuned --seeds 5 --out right     five, in the folder right
-  kinarm-train ppo --recipe tuned --problem both --out both.npz
+  kinarm-train ppo --recipe tuned --problem both --out both.npz   both benches, with PPO (extra ppo)
 """
 
 EPILOG = """
+{recipes}
 examples:
-  kinarm-train {name} --recipe tuned --out right.npz
-      the best settings that we found, on the problem right
-  kinarm-train {name} --recipe tuned --seeds 5 --out right
+  kinarm-train {name} --recipe {recipe} --out right.npz
+      one policy, for the problem right
+  kinarm-train {name} --recipe {recipe} --seeds 5 --out right
       five policies, with the seeds 0 to 4, in the folder right
-  kinarm-train {name} --recipe tuned --seeds 5 --out right --resume
+  kinarm-train {name} --recipe {recipe} --seeds 5 --out right --resume
       go on after an interruption; finished seeds stay as they are
-  kinarm-train {name} --recipe tuned --problem my.toml --out my.npz
+  kinarm-train {name} --recipe {recipe} --problem my.toml --out my.npz
       a problem of your own
-  kinarm-train {name} --problem left --iterations 400 --out left.npz
-      the settings of the paper, with fewer iterations
+  kinarm-train {name} --recipe {recipe} --iterations {half} --out short.npz
+      half as long, for the problem right
 """
 
 SETTINGS = "settings of the learner (defaults of the recipe paper)"
@@ -71,14 +72,26 @@ def _add_learner(
         learner.name,
         help=learner.title,
         description=f"Train a policy with {learner.title}.",
-        epilog=(needs if learner.extra else "") + EPILOG.format(name=learner.name),
+        epilog=(needs if learner.extra else "") + _epilog(learner),
     )
     unused = () if "tensorboard" in learner.options else ("tensorboard",)
     recipes = {"recipe": tuple(learner.recipes)}
     add_options(parser, TrainRequest, skip=("learner", "settings", *unused), names=recipes)
     add_options(parser, SeedsRequest, skip=("training",))
     settings = parser.add_argument_group(SETTINGS)
-    add_options(settings, learner.config, skip=CIRCUMSTANCES, negatable=True)
+    add_options(settings, learner.config, skip=CIRCUMSTANCES, explicit=True)
+
+
+def _epilog(learner: Learner[Any, Any]) -> str:
+    """What the recipes of a learner are, and examples with the one to try first."""
+    recipe = "tuned" if "tuned" in learner.recipes else "paper"
+    lines = (f"  {name:<8} {learner.summaries[name]}\n" for name in learner.summaries)
+    return EPILOG.format(
+        name=learner.name,
+        recipes="recipes:\n" + "".join(lines) if learner.summaries else "",
+        recipe=recipe,
+        half=learner.recipes[recipe].iterations // 2,
+    )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -106,7 +119,8 @@ def _train_one(request: TrainRequest) -> None:
     last = curve[-1]
     sys.stdout.write(
         f"{len(curve)} iterations, {last.environment_steps / 1e6:.2f} million steps in "
-        f"{last.wall_time:.1f} s; last iteration: mean return {last.mean_return:+.3f}, "
+        f"{last.wall_time:.1f} s\n"
+        f"last iteration: mean return {last.mean_return:+.3f}, "
         f"success {100 * last.success:.0f} %\n"
         f"written: {request.out}, {curve_path(request.out)}\n"
     )

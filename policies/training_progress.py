@@ -4,14 +4,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Protocol
 
-from kinarm.kernels.notices import told_of_compilation
+from kinarm.kernels.notices import COMPILING, told_of_compilation
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import TrainingState, learner_of
 
 if TYPE_CHECKING:
     from kinarm._progress import ProgressLine
 
-STARTS, COMPILES = "starting", "compiling, once"
+STARTS, COMPILES = "starting", COMPILING
 
 
 class Watcher(Protocol):

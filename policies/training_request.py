@@ -1,11 +1,12 @@
 """What a training is asked for."""
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from kinarm._fields import to_plain
 from kinarm._files import check_output, only_writer
 from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.policies.learners import TrainingResult, learner_of
@@ -38,7 +39,7 @@ class TrainRequest(ProblemOptions):
     resume : bool
         Go on from the checkpoint beside --out; with --seeds, with each seed that is not finished.
     overwrite : bool
-        Replace an earlier policy.
+        Replace an earlier policy; with --resume, by that of the training that goes on.
     tensorboard : Path, optional
         Folder for TensorBoard logs.
     """
@@ -121,18 +122,50 @@ class TrainRequest(ProblemOptions):
         config = checkpoint.config
         if (other := learner_of(config).name) != self.learner:
             raise InvalidInputError(f"{str(path)!r} is of the learner {other}")
-        given = {**self.settings, **({} if self.seed is None else {"seed": self.seed})}
-        wanted = config.changed(given)
-        changed = [name for name in given if getattr(wanted, name) != getattr(config, name)]
-        if self.recipe and Path(self.recipe).stem != config.recipe.removesuffix("*"):
-            changed.append("recipe")
-        if changed:
+        if changed := self._changed(config):
             raise InvalidInputError(
-                f"the checkpoint was made with another {', '.join(changed)}: "
-                "leave it out, or train anew without --resume"
+                f"the checkpoint has {' and '.join(changed.values())}: "
+                f"leave out {', '.join(changed)}, or delete {str(path)!r} to train anew"
             )
         self.resolve(default=config.problem).check_same(config.problem, f"{str(path)!r}")
         return checkpoint
+
+    def _changed(self, config: "TrainingConfig") -> dict[str, str]:
+        """Options whose settings differ from those of a training, and both values of each."""
+        given = {**self.settings, **({} if self.seed is None else {"seed": self.seed})}
+        ours, theirs = _values(config.changed(given), given), _values(config, given)
+        found = {
+            _option(name, value): f"{name} {_said(theirs[name])}, not {_said(value)}"
+            for name, value in ours.items()
+            if value != theirs[name]
+        }
+        recipe = config.recipe.removesuffix("*")
+        if self.recipe and Path(self.recipe).stem != recipe:
+            found["--recipe"] = f"recipe {recipe}, not {Path(self.recipe).stem}"
+        return found
+
+
+def _values(config: "TrainingConfig", names: Iterable[str]) -> dict[str, Any]:
+    """Settings with these names; of the reward, every weight."""
+    values = {name: getattr(config, name) for name in names}
+    if "reward" in values:
+        del values["reward"]
+        weights = to_plain(config.training_problem.task.reward)
+        values |= {f"reward_{name}": weight for name, weight in weights.items()}
+    return values
+
+
+def _option(name: str, value: object) -> str:
+    """The option that gives a setting this value."""
+    return f"--{'no-' if value is False else ''}{name.replace('_', '-')}"
+
+
+def _said(value: object) -> str:
+    """A value as command lines have it."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    words = value if isinstance(value, tuple) else () if value is None else (value,)
+    return " ".join(map(str, words)) or "none"
 
 
 def say_reach(config: "TrainingConfig") -> None:

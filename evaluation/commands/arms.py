@@ -25,6 +25,8 @@ HEADINGS = (
     *("arm", "title", "joints", "actuated", "reach [m]", "speeds [deg/s]", "pairs"),
     *("licence", "source", "installed"),
 )
+EXPENDABLE = ("source", "licence", "speeds [deg/s]", "pairs", "actuated", "joints", "title")
+"""Columns that a narrow terminal does without, the first ones first."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,7 +99,7 @@ class ShowRequest:
 
 def _list(request: ListRequest) -> None:
     rows = request.rows()
-    print_table(HEADINGS, rows)
+    print_table(HEADINGS, rows, EXPENDABLE)
     if any(row[-1] == "no" for row in rows):
         package = PACKAGE.removesuffix(":")
         sys.stderr.write(f"not installed: part of {package}; pip install 'kinarm[robots]'\n")

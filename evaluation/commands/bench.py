@@ -127,7 +127,7 @@ def _report(request: BenchmarkRequest, command: str) -> None:
     if request.json:
         print(json.dumps(document))
         return
-    console = open_console(piped_width=110)
+    console = open_console()
     title = f"kinarm-bench, policy {document['policy']}"
     _print_table(console, title, table.HEADER, table.rows(document))
     if "limits" in document:

@@ -25,7 +25,7 @@ An interrupted comparison goes on where it stopped, by the same command; a finis
 repeated only with other settings.
 
 examples:
-  kinarm-compare                                          everything, into the folder comparison
+  kinarm-compare                                          everything, which takes hours
   kinarm-compare --learners ars-tuned sb3-tqc-her --problems right --seeds 1
   kinarm-compare --no-train                               write what is finished so far
   kinarm-compare --settings mine.toml --out mine          a table of learners of your own
@@ -193,7 +193,7 @@ def _report(request: ComparisonRequest, command: str) -> None:
     table = Table(*HEADER, header_style="bold")
     for row in result_rows(request.run(command=command)):
         table.add_row(*row)
-    open_console(piped_width=160).print(table)
+    open_console().print(table)
     print(f"written: {request.out / 'LEARNERS.md'}, with tables and figures beside it")
 
 

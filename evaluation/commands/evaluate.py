@@ -46,7 +46,7 @@ def _report(request: EvaluationRequest, command: str) -> None:
     if request.json:
         print(json.dumps(document))
         return
-    console = open_console(piped_width=200)
+    console = open_console()
     print_table(document, console, markdown=request.markdown)
     if not request.markdown:
         console.print(_footnote(document), style="dim")
@@ -63,6 +63,8 @@ def _report(request: EvaluationRequest, command: str) -> None:
 
 def _footnote(document: dict[str, Any]) -> str:
     """What the figures in the table stand on."""
+    from kinarm.evaluation.table import REPLACED, has_star, table_rows
+
     protocol = document["protocol"]
     problems = protocol["problems"].items()
     arms = " and ".join(dict.fromkeys(entry["arm"] for _, entry in problems))
@@ -85,6 +87,9 @@ def _footnote(document: dict[str, Any]) -> str:
                 f"oracle, relative success and step ratio are of the first {bounded} trials of "
                 f"{protocol['trials']}; --policy oracle bounds all"
             )
+    shown = (row for name, _ in problems for row in table_rows(document, name))
+    if any(map(has_star, shown)):
+        lines.append(REPLACED)
     if protocol["hold"]:
         lines.append(HELD_NOTE)
     hashes = (f"{problem} {entry['trial_set_hash']}" for problem, entry in problems)

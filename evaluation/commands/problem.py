@@ -1,6 +1,7 @@
 """``kinarm-problem``: list, show and check problems."""
 
 import json
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -19,13 +20,15 @@ if TYPE_CHECKING:
 
 EPILOG = """
 examples:
-  kinarm-problem list                                     the problems that ship
+  kinarm-problem                                          the problems that ship
   kinarm-problem show shelf-panda > mine.toml             a file to start from
   kinarm-problem show --arm ur5 --scene ring > mine.toml  parts put together
   kinarm-problem check mine.toml --picture mine.png       what can be reached, and what touches
 """
 
 HEADINGS = ("problem", "arm", "obstacles", "goals", "step [s]", "tolerance [m]")
+EXPENDABLE = ("obstacles", "step [s]", "tolerance [m]")
+"""Columns that a narrow terminal does without, the first ones first."""
 
 PICTURE_SIZE = 960, 640
 
@@ -158,7 +161,7 @@ def rows() -> list[tuple[str, ...]]:
 
 
 def _list(_: ListRequest) -> None:
-    print_table(HEADINGS, rows())
+    print_table(HEADINGS, rows(), EXPENDABLE)
 
 
 def _show(request: ShowRequest) -> None:
@@ -187,8 +190,13 @@ COMMANDS = {
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line."""
+    typed = sys.argv[1:] if arguments is None else arguments
     run_commands(
-        "kinarm-problem", "List, show and check problems.", COMMANDS, arguments, epilog=EPILOG
+        "kinarm-problem",
+        "List, show and check problems.",
+        COMMANDS,
+        typed or ["list"],
+        epilog=EPILOG,
     )
 
 

@@ -154,7 +154,7 @@ def _print_verdicts(claims: "Sequence[Claim]") -> None:
         measured = "\n".join(estimate_text(part.estimate) for part in claim.parts)
         claimed = "\n".join(f"{part.claimed} {part.threshold:g}" for part in claim.parts)
         table.add_row(claim.statement, measured, claimed, claim.verdict)
-    open_console(piped_width=120).print(table)
+    open_console().print(table)
 
 
 def _claim_folder(folder: Path, study: "Study") -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 from kinarm._fields import to_plain
 from kinarm._files import write_text
-from kinarm.evaluation.comparison.figures import learning_curves
+from kinarm.evaluation.comparison.figures import final_success, learning_curves
 from kinarm.evaluation.comparison.learners import OF_OTHERS, ComparedLearner
 from kinarm.evaluation.comparison.results import LEVELS, Comparison, Series
 from kinarm.evaluation.comparison.runs import CurvePoint
@@ -18,7 +18,9 @@ from kinarm.evaluation.reproduction.tables import markdown
 from kinarm.policies.provenance import package_versions, source_commit
 
 NAME = "learners"
-"""Of all files."""
+"""Of all files but the figure of what was reached."""
+
+REACHED = "final_success"
 
 
 def write_all(comparison: Comparison, folder: Path, command: str) -> None:
@@ -33,6 +35,7 @@ def write_all(comparison: Comparison, folder: Path, command: str) -> None:
     write_text(folder / f"{NAME}.json", json.dumps(document, indent=1) + "\n")
     write_text(folder / f"{NAME}.csv", curves_csv(comparison))
     save_figure(learning_curves(comparison), folder, NAME)
+    save_figure(final_success(comparison), folder, REACHED)
     write_text(folder / f"{NAME.upper()}.md", comparison_page(comparison, document))
 
 
@@ -65,7 +68,7 @@ def curves_csv(comparison: Comparison) -> str:
 
 
 def comparison_page(comparison: Comparison, document: dict[str, Any]) -> str:
-    """``LEARNERS.md``: the table of results, the figure and the table of settings."""
+    """``LEARNERS.md``: the table of results, the figures and the table of settings."""
     protocol, versions = document["protocol"], document["versions"].items()
     return "\n".join(
         [
@@ -75,6 +78,7 @@ def comparison_page(comparison: Comparison, document: dict[str, Any]) -> str:
             f"{protocol['seed']}; in brackets 95 % intervals, of the trials that the seeds share. "
             "Every training had one thread; minutes are processor time without judging.\n",
             markdown(HEADER, result_rows(comparison)),
+            f"![Success of the trained policies]({REACHED}.png)\n",
             f"![Success against environment steps and against time]({NAME}.png)\n",
             settings_table(_learners(comparison)),
             ", ".join(f"{name} {version}" for name, version in versions) + ".\n",

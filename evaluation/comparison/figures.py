@@ -1,4 +1,4 @@
-"""Learning curves of a comparison."""
+"""Learning curves of a comparison, and where they end."""
 
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -67,3 +67,36 @@ def _draw(axes: "Axes", series: Series, quantity: str, number: int) -> None:
     success = np.nan_to_num(series.success_at(quantity, places))
     colour, dash = COLOURS[number % len(COLOURS)], DASHES[number // len(COLOURS) % len(DASHES)]
     draw_band(axes, places / ACROSS[quantity].unit, success, series.learner.title, colour, dash)
+
+
+def final_success(comparison: Comparison) -> "Figure":
+    """Success of the trained policies, a row per learner and a panel per problem; the best on top.
+
+    Dots are training seeds, lines the 95 % intervals of their means over trials. The dotted line is
+    the share of trials in which any policy could succeed.
+    """
+    from matplotlib.figure import Figure
+
+    grouped = {
+        problem: sorted(
+            (series for series in comparison.series if series.problem.name == problem),
+            key=lambda series: series.success.value or 0.0,
+        )
+        for problem in comparison.reachable
+    }
+    heights = [0.5 + 0.24 * len(ranked) for ranked in grouped.values()]
+    figure = Figure(figsize=(7.2, 0.4 + sum(heights)), layout="constrained")
+    panels = figure.subplots(len(grouped), squeeze=False, sharex=True, height_ratios=heights)
+    for (problem, ranked), axes in zip(grouped.items(), panels[:, 0], strict=True):
+        for height, series in enumerate(ranked):
+            ends = series.success.ci95 or (np.nan, np.nan)
+            axes.plot([100 * end for end in ends], [height, height], color=COLOURS[0])
+            each = [100 * curve[-1].successes / series.trials for curve in series.curves]
+            axes.plot(each, [height] * len(each), "o", color=COLOURS[1], markersize=4)
+        axes.axvline(100 * comparison.reachable[problem], color="#444444", linestyle=":", lw=1)
+        axes.set_yticks(range(len(ranked)), [series.learner.title for series in ranked])
+        axes.set(title=problem, xlim=(-1, 101))
+        axes.grid(axis="x", alpha=0.3)
+        axes.spines[["top", "right"]].set_visible(False)
+    panels[-1, 0].set_xlabel("trials with success [%]")
+    return figure

@@ -101,12 +101,15 @@ def clocks() -> NDArray[np.float64]:
 
 
 def train_recipe(run: PlannedRun, judge: Judge) -> None:
-    """Train by a recipe of kinarm on one thread, to its end or the number of steps given."""
+    """Train by a recipe of kinarm on one thread, to its end or the number of steps given.
+
+    The clock runs while the oracle solves what a recipe imitates, and while it is imitated.
+    """
     config = run.config
     training = begin_training(config, **thread_options(config, 1))
+    judge.start()
     state = training.initial_state()
     over = False
-    judge.start()
     while not over:
         state = training.iterate(state)
         over = state.iteration == config.iterations or (

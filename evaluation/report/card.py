@@ -168,6 +168,8 @@ def _origin(made: Provenance) -> list[tuple[str, str]]:
         lines.append(("environment steps", f"{made.environment_steps:,}"))
     if made.commit:
         lines.append(("commit of kinarm", made.commit))
+    if made.semantics is not None:
+        lines.append(("semantics of kinarm", made.semantics))
     versions = ", ".join(f"{package} {version}" for package, version in made.versions.items())
     return [*lines, ("versions", versions)] if versions else lines
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.evaluation import Evaluation
 from kinarm.evaluation.figures import series_labels
-from kinarm.evaluation.table import table_rows
+from kinarm.evaluation.table import policy_label, table_rows
 from kinarm.evaluation.trials import TrialSet
 from kinarm.scene import GoalRegion
 from kinarm.task import ReachTask
@@ -39,7 +39,7 @@ class Group:
     @property
     def name(self) -> str:
         """Name in the table."""
-        return str(self.row["policy"])
+        return policy_label(self.row)
 
     @property
     def is_policy(self) -> bool:

@@ -15,7 +15,14 @@ from kinarm.evaluation.report.charts import histogram_chart, profile_chart
 from kinarm.evaluation.report.groups import ProblemResults, count_policies, group_results
 from kinarm.evaluation.report.templating import template_environment
 from kinarm.evaluation.report.worst import record_worst, worst_row, worst_trials
-from kinarm.evaluation.table import SPREAD_PRIORITY, Column, metric_cell, metric_columns
+from kinarm.evaluation.table import (
+    REPLACED,
+    SPREAD_PRIORITY,
+    Column,
+    has_star,
+    metric_cell,
+    metric_columns,
+)
 from kinarm.viewer import replay_page
 
 if TYPE_CHECKING:
@@ -133,12 +140,14 @@ def _title(problems: Sequence[ProblemResults]) -> str:
 def _subtitle(protocol: dict[str, Any], problems: Sequence[ProblemResults]) -> str:
     """How policies were trained and what is beside them; what was faced."""
     arms = " and ".join(dict.fromkeys(results.entry["arm"] for results in problems))
+    groups = [group for results in problems for group in results.groups]
     said = [
         *_training_seeds(problems),
         *_references(problems),
         f"problem {problems[0].name}" if len(problems) == 1 else f"{len(problems)} problems",
         f"arm {arms}",
         f"{protocol['trials']} trials each, seed {protocol['seed']}",
+        *([REPLACED] if any(has_star(group.row) for group in groups) else []),
     ]
     return " \N{MIDDLE DOT} ".join(said)
 

@@ -5,7 +5,7 @@ const HOLD = 1.4; // seconds between the end of a trial and the next one
 const BADGES = {
   success: ["Reached", "m5 12.5 4.5 4.5L19 7.5"],
   collision: ["Contact", "M6 6l12 12M18 6 6 18"],
-  truncated: ["Out of time", "M12 6v6.5l4 2.5M12 3a9 9 0 1 0 .01 0"],
+  truncated: ["Truncated", "M12 6v6.5l4 2.5M12 3a9 9 0 1 0 .01 0"],
 };
 
 /* ---------- the panels: card, plot and controls ---------- */

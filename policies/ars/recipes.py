@@ -69,7 +69,7 @@ def adapted(config: ARSConfig) -> ARSConfig:
     """Adapt ``tuned``, ``linear`` and ``best`` to their problem.
 
     Progress is rewarded in proportion to the arm's reach. Where several regions are to be reached
-    and no reflection maps one to another, a linear policy cannot turn to either side: in ``tuned``,
+    and no reflection maps one to another, one linear map does not serve all of them: in ``tuned``,
     a small network takes its place, whose many parameters need more directions.
     """
     from kinarm.policies.mirror import different_regions, missing_mirror  # loads Pinocchio

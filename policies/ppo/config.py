@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 from kinarm._fields import OPTIONAL
 from kinarm.errors import InvalidInputError
@@ -138,6 +139,16 @@ class PPOConfig(TrainingConfig):
     replay_noise_steps: int | None = field(default=None, metadata={**MANY, **OPTIONAL})
     initial_policy: str | None = field(default=None, metadata=OPTIONAL)
     demonstrations: int = field(default=0, metadata={"at_least": 0, **MANY, **OPTIONAL})
+
+    DEFAULTS: ClassVar = {
+        "final_log_std": "none, it is learnt",
+        "training_tolerance": "the task's",
+        "initial_tolerance": "the training tolerance",
+        "initial_gamma": "gamma",
+        "replay_log_std": "none, noise as in others",
+        "replay_noise_steps": "all",
+    }
+    """What happens without an option whose field has no value by default."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -161,11 +161,6 @@ class TrainingVecEnv(SB3VecEnv):
             replayed=self._replayed.copy(),
         )
 
-    @property
-    def failed(self) -> FailedScenarios:
-        """What may be replayed."""
-        return self._failed
-
     def restore(self, states: EpisodeStates, failed: FailedScenarios) -> NDArray[np.float32]:
         """Go on with episodes that `states` described; returns their observations."""
         episodes = self.simulator.reset(states.q, states.goal)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 
@@ -79,7 +79,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
         self.metadata = environment_metadata(simulator)
         self._streams: dict[int, ScenarioStream] = {}
         self._replay, self._chooser = replay, np.random.default_rng()
-        self._failed = FailedScenarios.none(simulator.arm.n_joints)
+        self._failed = self._restored = FailedScenarios.none(simulator.arm.n_joints)
         self._starts = np.empty((num_envs, simulator.arm.n_joints))
         self._replayed = np.zeros(num_envs, dtype=bool)
         self._actions = np.zeros((num_envs, simulator.n_actions))
@@ -90,6 +90,37 @@ class SB3VecEnv(Lifecycle, VecEnv):
     def replayed(self) -> NDArray[np.bool_]:
         """Which episodes began where an earlier one had failed, shape (num_envs,)."""
         return self._replayed
+
+    @property
+    def failed(self) -> FailedScenarios:
+        """Scenarios of the last episodes that failed, which may be replayed."""
+        return self._failed
+
+    def restore_failed(self, starts: ArrayLike, goals: ArrayLike) -> None:
+        """Replay the `failed` scenarios of an earlier environment, and none that failed in this.
+
+        A reset with a seed goes back to them: the same seed gives the same episodes again, also
+        where a learner seeds the environment later.
+
+        Parameters
+        ----------
+        starts : array_like, shape (n, n_joints)
+            Start configurations, the oldest first [rad or m]; the last ``replay_size`` are kept.
+        goals : array_like, shape (n, 3)
+            Goal positions [m].
+
+        Raises
+        ------
+        InvalidInputError
+            If nothing is replayed here, or as `kinarm.Simulator.reset` says.
+        StartInContactError
+            If a start touches something.
+        """
+        if self._replay is None:
+            raise InvalidInputError("failed scenarios need an environment with a replay_share")
+        checked, size = self.simulator.reset(starts, goals), self._replay.size
+        self._failed = FailedScenarios(checked.q[-size:], checked.goal[-size:])
+        self._restored = self._failed
 
     @property
     def steps(self) -> NDArray[np.int64]:
@@ -117,7 +148,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
                 self._streams[row] = self._stream(seed)
         if self._seeds[0] is not None:
             self._chooser = stream_generator(Stream.REPLAY, self._seeds[0])
-            self._failed = FailedScenarios.none(self.simulator.arm.n_joints)
+            self._failed = self._restored
         starts, goals = self._draw(np.arange(self.num_envs))
         for row, options in enumerate(self._options):
             starts[row], goals[row] = pick_scenario(options, starts[row], goals[row])
