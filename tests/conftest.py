@@ -12,6 +12,10 @@ from kinarm.arm import Arm
 from kinarm.problem import ReachProblem
 from kinarm.simulator import Simulator
 
+for _name in ("COLUMNS", "LINES"):  # readline, which pytest loads, tells them to child processes
+    os.environ.pop(_name, None)
+    os.unsetenv(_name)
+
 settings.register_profile("repeatable", derandomize=True, database=None, deadline=None)
 settings.load_profile("repeatable")
 

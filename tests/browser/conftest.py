@@ -88,12 +88,12 @@ class Watched:
 
 
 @pytest.fixture(scope="session")
-def visit(browser: object) -> Callable[[Path], AbstractContextManager[Watched]]:
+def visit(browser: object) -> Callable[..., AbstractContextManager[Watched]]:
     """Open a page for the length of a ``with`` block."""
 
     @contextmanager
-    def visited(path: Path) -> Iterator[Watched]:
-        page = Watched(browser, path, (800, 600), calm=True)
+    def visited(path: Path, size: tuple[int, int] = (800, 600)) -> Iterator[Watched]:
+        page = Watched(browser, path, size, calm=True)
         yield page
         page.context.close()
 

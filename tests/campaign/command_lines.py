@@ -108,6 +108,7 @@ PROGRAMS: dict[str, Program] = {
         arms.main,
         lambda: _flags(arms.ShowRequest),
         (["list"], ["show", "paper"], ["show", "damaged.urdf"]),
+        ("kinarm.evaluation.commands.arms.ListRequest.rows",),
     ),
     "kinarm-bench": Program(
         bench.main,

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from .command_lines import PROGRAMS, CommandJudge, command_lines, drawn_line, inside
 from .running import generator
 
-DRAWN, MADE = 30, 12
+DRAWN, MADE = 20, 8
 
 
 @pytest.mark.parametrize("name", PROGRAMS)

@@ -2,7 +2,7 @@
 
 import ast
 import json
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 import pytest
@@ -17,7 +17,7 @@ from .loaders import LOADERS, make_try
 from .running import Tally, run_inputs
 
 ROOT = Path(__file__).parents[2]
-INPUTS = 100
+INPUTS = 40
 
 READING_CALLS = {
     *("load_archive", "load_json", "read_toml", "read_file", "parse_xml", "mesh_content"),
@@ -69,6 +69,7 @@ OWN_DATA = (
 """Modules that read nothing but what ships with kinarm, or what they wrote."""
 
 
+@cache
 def reading_functions() -> set[str]:
     """Functions of the three packages that call what reads files."""
     found = set()
@@ -152,14 +153,14 @@ def loads_well(name: str, folder: Path, content: str) -> bool:
 
 
 @pytest.mark.parametrize("name", ["evaluation", "compared run", "study marker", "wall times"])
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(document=JSON)
 def test_any_json_document(name, document, tmp_path_factory):
     assert loads_well(name, tmp_path_factory.getbasetemp() / name, json.dumps(document))
 
 
 @pytest.mark.parametrize("name", ["problem", "scene", "task", "arm file", "recipe"])
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(document=TOML)
 def test_any_toml_document(name, document, tmp_path_factory):
     assert loads_well(name, tmp_path_factory.getbasetemp() / name, tomli_w.dumps(document))

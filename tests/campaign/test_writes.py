@@ -10,7 +10,7 @@ from .faults import FAULTS
 from .surroundings import PLACES, half_written, run_in, unfit_answer
 from .writes import WRITERS, WriteJudge, contents, run_writer
 
-TURNS = 40
+TURNS = 16
 """Calls that fail of every command, one after the other, about."""
 
 QUICK = ("training of a comparison", "training of a reproduction")

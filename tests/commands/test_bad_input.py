@@ -47,7 +47,7 @@ UNUSABLE_ROBOTS = {
     ("arguments", "words"),
     [
         (["--task", "upwards"], ["'upwards'", "left, right, both"]),
-        (["--arm", "nobody"], ["'nobody'", ARMS]),
+        (["--arm", "nobody"], ["'nobody'", ARMS, "path/to/robot.urdf, path/to/arm.toml"]),
         (["--arm", "missing.urdf"], ["missing.urdf"]),
         (["--arm", ""], []),
         (["--policy", "nobody"], ["'nobody'", "random, zero"]),
@@ -123,6 +123,20 @@ def test_train_ppo_refuses(run, tmp_path, arguments, words):
     answer = run("kinarm-train", "ppo", *paths, *arguments)
     check_refused(answer, *words)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("kinarm-train ars --out p.npz --recepie tuned", "--recepie tuned; did you mean --recipe?"),
+        ("kinarm-train ars --out p.npz --what=5", "--what=5 (see kinarm-train ars --help)"),
+        ("kinarm-problem check --trails=5", "did you mean --trials? (see kinarm-problem check "),
+        ("kinarm-eval --polcy zero", "did you mean --policy? (see kinarm-eval --help)"),
+    ],
+)
+def test_an_unknown_option_is_refused_with_the_help_that_lists_it(run, words, told):
+    program, *arguments = words.split()
+    check_refused(run(program, *arguments), "unrecognized arguments: --", told)
 
 
 @pytest.mark.parametrize("arguments", [[], ["nobody"], ["ars"], ["ppo"]])
@@ -237,8 +251,7 @@ def test_an_earlier_policy_survives_a_failed_training(run, tmp_path, policy_fold
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")  # noqa: PTH110
-@pytest.mark.parametrize("unbuffered", ["", "1"])
-@pytest.mark.parametrize("extra", [(), ("--json",)])
+@pytest.mark.parametrize(("extra", "unbuffered"), [((), "1"), (("--json",), "")])
 def test_a_full_disk_is_reported_in_one_line(run_outside, extra, unbuffered, monkeypatch):
     monkeypatch.setenv("PYTHONUNBUFFERED", unbuffered)
     arguments = ("--policy", "zero", "--task", "left", "--trials", 1, *extra)

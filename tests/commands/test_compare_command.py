@@ -16,6 +16,12 @@ def folder(tmp_path):
     return tmp_path / "out"
 
 
+@pytest.fixture
+def unpainted(monkeypatch):
+    """Figures are drawn, but not written, which takes longer than the trainings."""
+    monkeypatch.setattr("kinarm.evaluation.comparison.document.save_figure", lambda *_: ())
+
+
 def test_there_must_be_a_problem():
     with pytest.raises(InvalidInputError, match="there is no problem to compare learners on"):
         ComparisonRequest(problems=())
@@ -33,6 +39,7 @@ def test_a_small_comparison_and_again(run, folder):
     assert "2 of 2 trainings: ars-tuned-right-seed0" in answer.err
     finished = run_files(folder)
     assert len(finished) == 2
+    assert {path.suffix for path in folder.glob("learners.*g")} == {".png", ".svg"}
     page = (folder / "LEARNERS.md").read_text()
     again = run("kinarm-compare", *RECIPES, *SMALL, "--out", folder)
     assert again.status == 0
@@ -41,6 +48,7 @@ def test_a_small_comparison_and_again(run, folder):
     assert (folder / "LEARNERS.md").read_text() == page
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_what_is_missing_is_trained_and_nothing_else(run, folder):
     run("kinarm-compare", *RECIPES[:2], *SMALL, "--out", folder)
     finished = run_files(folder)
@@ -59,6 +67,7 @@ def test_what_is_missing_is_trained_and_nothing_else(run, folder):
     assert old == new
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_other_settings_leave_finished_trainings_alone(run, folder):
     run("kinarm-compare", *RECIPES[:2], *SMALL, "--out", folder)
     finished = run_files(folder)
@@ -68,6 +77,7 @@ def test_other_settings_leave_finished_trainings_alone(run, folder):
     assert finished.items() <= both.items()
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_without_training(run, folder):
     run("kinarm-compare", *RECIPES[:2], *SMALL, "--out", folder)
     answer = run("kinarm-compare", *RECIPES, *SMALL[:-2], "--no-train", "--out", folder)
@@ -77,6 +87,7 @@ def test_without_training(run, folder):
     assert len(run_files(folder)) == 1
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_from_python(folder):
     request = ComparisonRequest(
         learners=("ars-paper",),

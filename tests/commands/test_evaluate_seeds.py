@@ -26,6 +26,38 @@ def test_training_seeds_are_pooled_whatever_their_files_are_called(evaluated, se
     assert pooled["members"] == ["a", "b9", "b10"]
 
 
+@pytest.mark.parametrize("count", [1, 2])
+def test_the_star_of_replaced_settings_is_shown(run, evaluated, tmp_path, count):
+    """Files are called without it; documents have it in the recipe."""
+    made = ("ars", "--recipe", "tuned", "--iterations", 1, "--seeds", count, "--jobs", 1)
+    assert run("kinarm-train", *made, "--out", tmp_path / "few").status == 0
+    arguments = ("--policy", tmp_path / "few", "--trials", 3, "--no-oracle")
+    label, note = "ars-tuned*-right", "* some settings of the recipe are replaced"
+    if count == 1:
+        label += "-seed0"
+    out = run("kinarm-eval", *arguments).out
+    assert f" {label} " in out
+    assert note in out.splitlines()
+    assert f" {label} ".replace("*", "\\*") in run("kinarm-eval", "--markdown", *arguments).out
+    document = evaluated(*arguments)
+    (row,) = document["pooled"] or document["results"]
+    assert (row["policy"], row["recipe"]) == (label.replace("*", ""), "tuned*")
+    page = tmp_path / "page"
+    assert run("kinarm-eval", *arguments, "--report", page).status == 0
+    text = (page / "index.html").read_text()
+    assert f"<span>{label}</span>" in text
+    assert note in text
+
+
+@pytest.mark.parametrize("name", ["ars-tuned-both", "mine-seed0.npz"])
+def test_no_star_is_shown_where_no_name_says_so(run, policy_folder, name):
+    """Shipped policies have the settings of their recipes, and other names tell no recipe."""
+    given = policy_folder / name if name.endswith(".npz") else name
+    out = run("kinarm-eval", "--policy", given, "--trials", 3, "--no-oracle").out
+    assert name.removesuffix(".npz") in out
+    assert "*" not in out
+
+
 def test_trainings_with_other_settings_are_not_pooled(evaluated, policy_folder):
     """Their names say that they are seeds of one recipe; their settings say otherwise."""
     names = ("mine-seed0.npz", "mine-seed1.npz")

@@ -118,6 +118,16 @@ def test_training_help_names_every_option(run, learner, options):
     assert [option for option in f"{common} {options}".split() if option not in text] == []
 
 
+@pytest.mark.parametrize("learner", ["ars", "ppo"])
+def test_training_help_tells_the_default_of_every_setting(run, learner, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "500")
+    _, _, text = run("kinarm-train", learner, "--help").out.partition("settings of the learner")
+    settings, _, _ = text.partition("\n\n")
+    options = settings.split("\n  --")[1:]
+    assert len(options) > 15
+    assert [option for option in options if "(default: " not in option] == []
+
+
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_commands_are_installed(program):
     (entry,) = metadata.entry_points(group="console_scripts", name=program)
@@ -131,8 +141,7 @@ def test_help_into_a_closed_pipe_shows_no_error(command, program, unbuffered):
     assert write_into_closed_pipe(command(program, "--help"), unbuffered) == ""
 
 
-@pytest.mark.parametrize("unbuffered", ["", "1"])
-@pytest.mark.parametrize("extra", [(), ("--json",)])
+@pytest.mark.parametrize(("extra", "unbuffered"), [((), ""), (("--json",), "1")])
 def test_results_into_a_closed_pipe_show_no_error(command, extra, unbuffered):
     arguments = ("--policy", "zero", "--task", "left", "--trials", 40, *extra)
     assert write_into_closed_pipe(command("kinarm-eval", *arguments), unbuffered) == ""
@@ -163,11 +172,18 @@ def write_into_closed_pipe(arguments: list[str], unbuffered: str) -> str:
     ],
     ids=" ".join,
 )
-def test_help_fits_a_terminal_of_80_columns(run, words, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "80")
+@pytest.mark.parametrize("width", [60, 80])
+def test_help_fits_a_terminal(run, words, width, monkeypatch):
+    monkeypatch.setenv("COLUMNS", str(width))
     answer = run(*words, "--help")
     assert answer.status == 0
-    assert [line for line in answer.out.splitlines() if len(line) > 80] == []
+    assert [line for line in answer.out.splitlines() if len(line) > width] == []
+
+
+def test_a_long_example_goes_on_in_the_next_line(run, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "60")
+    text = run("kinarm-train", "ars", "--help").out
+    assert "  kinarm-train ars --recipe tuned --iterations 4000 \\\n    --out short.npz\n" in text
 
 
 AS_A_COMMAND = """

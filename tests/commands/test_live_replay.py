@@ -90,5 +90,5 @@ def test_trials_are_reported_as_they_end(live):
     process, _ = live(free_port())
     os.set_blocking(process.stdout.fileno(), True)
     began = time.monotonic()
-    assert "left 0, zero: out of time after 64 steps" in process.stdout.readline()
+    assert "left 0, zero: truncated after 64 steps" in process.stdout.readline()
     assert time.monotonic() - began < 30

@@ -40,6 +40,7 @@ def test_without_a_command_it_lists_them(run_main):
     status, out, err = run_main()
     assert (status, err) == (0, "")
     assert all(name in out for name in SCRIPTS)
+    assert out.index("commands:") < out.index("kinarm-eval") < out.index("--help")
     assert all(len(line) <= 80 for line in out.splitlines())
 
 

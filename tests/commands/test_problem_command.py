@@ -60,12 +60,23 @@ def write(tmp_path, monkeypatch):
     return write_file
 
 
-def test_list_names_every_problem(run):
-    answer = run("kinarm-problem", "list")
+@pytest.mark.parametrize("words", [(), ("list",)])
+def test_list_names_every_problem(run, words):
+    answer = run("kinarm-problem", *words)
     assert (answer.status, answer.err) == (0, "")
     head, *lines = answer.out.splitlines()
     assert head.split()[:4] == ["problem", "arm", "obstacles", "goals"]
     assert [line.split()[0] for line in lines] == list(problem_names())
+
+
+def test_a_narrow_list_has_a_line_a_problem(run, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "60")
+    head, *lines = run("kinarm-problem").out.splitlines()
+    assert "obstacles" not in head
+    assert max(map(len, lines)) <= 60
+    named = [line.split()[0] for line in lines[: len(problem_names())]]
+    assert named == list(problem_names())
+    assert "columns that do not fit here: obstacles" in lines[len(problem_names())]
 
 
 def test_show_prints_what_can_be_read_again(run, write):
@@ -156,7 +167,6 @@ def test_refusals(run, write, tmp_path, command, text, words):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ([], ["COMMAND"]),
         (["check", "nothing"], ["'nothing'", "shelf-panda"]),
         (["check", "both", "--trials", "0"], ["trials", "at least 1"]),
         (["check", "both", "--seed", "-1"], ["seed"]),

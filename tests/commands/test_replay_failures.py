@@ -13,7 +13,7 @@ def test_all_failures_in_groups_beside_the_oracle(replay, evaluation, policy_fol
     said = outcomes_of(evaluation, "random")
     kinds = zip(said["outcome"], said["contact"], said["steps"], strict=True)
     expected = {
-        number: "out of time"
+        number: "truncated"
         if contact is None
         else f"{' touches '.join(contact)} {'within' if steps <= 3 else 'after'} 3 steps"
         for number, (outcome, contact, steps) in enumerate(kinds)

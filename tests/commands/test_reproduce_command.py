@@ -84,15 +84,6 @@ class TestQuick:
         assert contents(folder) == before
         assert {path: path.stat().st_mtime_ns for path in (folder / "runs").iterdir()} == runs
 
-    def test_a_damaged_run_is_made_anew(self, reference, run_outside):
-        folder, _ = reference
-        before = contents(folder)
-        damaged = folder / "runs" / "ars-both-seed1.npz"
-        damaged.write_bytes(damaged.read_bytes()[:1000])
-        answer = run_outside("kinarm-reproduce", *QUICK, cwd=folder.parent)
-        assert "29 of 30 trainings are finished" in answer.err
-        assert contents(folder) == before
-
 
 class InThisProcess:
     """An executor as simple as can be."""
@@ -108,11 +99,12 @@ class InThisProcess:
 
 @pytest.mark.slow
 def test_python_gets_the_same_from_a_request_and_another_executor(reference, tmp_path):
-    """Nothing is left to do in a copy without two of the runs but these two."""
+    """Nothing is left to do in a copy without a run, and with a damaged one, but these two."""
     folder = tmp_path / "copy"
     shutil.copytree(reference[0], folder)
-    for name in ("ars-left-seed0", "ars-both-seed1"):
-        (folder / "runs" / f"{name}.npz").unlink()
+    (folder / "runs" / "ars-left-seed0.npz").unlink()
+    damaged = folder / "runs" / "ars-both-seed1.npz"
+    damaged.write_bytes(damaged.read_bytes()[:1000])
     executor = InThisProcess()
     request = ReproductionRequest(quick=True, ppo=False, out=folder)
     claims = request.run(executor, command="kinarm-reproduce --quick --no-ppo --jobs 2")
@@ -127,7 +119,7 @@ def test_killed_at_random_points_and_resumed(reference, command, tmp_path):
     rng = np.random.default_rng(0)
     spelled = command("kinarm-reproduce", *QUICK)
     kills = 0
-    for enough in (1, 9, 20):
+    for enough in (1, 15):
         process = subprocess.Popen(
             spelled, cwd=tmp_path, stderr=subprocess.DEVNULL, start_new_session=True
         )
@@ -138,7 +130,7 @@ def test_killed_at_random_points_and_resumed(reference, command, tmp_path):
         process.kill()
         process.wait()
         see_that_all_end(process.pid)
-    assert kills >= 2
+    assert kills >= 1
     done = subprocess.run(spelled, cwd=tmp_path, capture_output=True, text=True, check=True)
     assert "of 30 trainings are finished" in done.stderr
     assert contents(folder) == contents(reference[0])
@@ -207,13 +199,17 @@ def test_the_same_command_trains_what_is_missing(tmp_path, capsys, monkeypatch):
     assert json.loads((tmp_path / "study.json").read_text()) == {"study": "quick"}
 
 
-@pytest.mark.parametrize("judged", [True, False])
-@pytest.mark.parametrize("near", [True, False])
+@pytest.mark.parametrize(("near", "judged"), [(True, True), (False, True), (True, False)])
 def test_finished_trainings_are_summed_up_without_another_one(
     run, tmp_path, monkeypatch, near, judged
 ):
-    """All figures, tables and verdicts, of made-up trainings that ended near their goals or not."""
+    """All figures, tables and verdicts, of made-up trainings that ended near their goals or not.
+
+    The figures are drawn of all of them, and written of the first ones.
+    """
     monkeypatch.setattr(Study, "is_judged", judged)
+    if not (near and judged):
+        monkeypatch.setattr(documents, "save_figure", lambda *_: ())
     study = quick_study(ppo=False)
     store = RunStore(tmp_path, study.protocol)
     distance = np.full(study.protocol.trials, 0.04 if near else 0.5)
@@ -231,7 +227,8 @@ def test_finished_trainings_are_summed_up_without_another_one(
     assert ("Under no reading" in page) is (judged and not near)
     assert ("No claim is judged." in page) is not judged
     assert len((tmp_path / "runs.csv").read_text().splitlines()) == 1 + len(study.trainings)
-    assert list(tmp_path.glob("figure2.*"))
+    figures = {path.suffix for path in tmp_path.glob("figure2.*")}
+    assert figures == ({".png", ".svg"} if near and judged else set())
 
 
 def test_lost_workers_are_told_in_one_line(run, monkeypatch, tmp_path):

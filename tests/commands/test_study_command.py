@@ -120,7 +120,7 @@ def test_kills_at_random_moments(command, file, tmp_path):
     straight = Study(file, tmp_path / "straight").run(jobs=2)
     rng, kills = np.random.default_rng(0), 0
     spelled = command("kinarm-study", file, "--out", tmp_path / "it", "--jobs", 2)
-    while kills < 6:
+    while kills < 3:
         process = subprocess.Popen(
             spelled, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
         )

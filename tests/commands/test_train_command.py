@@ -2,6 +2,7 @@
 
 import csv
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -85,8 +86,10 @@ def test_policy_and_curve_are_those_of_the_library(run, tmp_path):
 
 def test_summary_says_where_the_policy_is(run, tmp_path):
     answer = run("kinarm-train", "ars", "--iterations", 2, "--out", tmp_path / "p.npz")
-    what, where, then = answer.out.splitlines()
-    assert "2 iterations" in what
+    what, how, where, then = answer.out.splitlines()
+    assert what.startswith("2 iterations, ")
+    assert what.endswith(" s")
+    assert re.fullmatch(r"last iteration: mean return [+-]\d\.\d{3}, success \d+ %", how)
     assert where == f"written: {tmp_path / 'p.npz'}, {tmp_path / 'p.curve.csv'}"
     assert f"kinarm-eval --policy {tmp_path / 'p.npz'}" in then
 
@@ -216,34 +219,40 @@ def test_the_clock_goes_on_when_resumed(run, tmp_path):
 def test_naming_the_same_settings_again_is_fine(run, tmp_path):
     stop_after(2, recipe("ars", "tuned", iterations=3, seed=5), tmp_path / "p.checkpoint.npz")
     arguments = ("--recipe", "tuned", "--seed", 5, "--iterations", 3, "--resume")
+    arguments += ("--reward-success", 0.5)
     assert run("kinarm-train", "ars", "--out", tmp_path / "p.npz", *arguments).status == 0
     assert Policy.load(tmp_path / "p.npz").provenance.recipe == "tuned*"
 
 
 @pytest.mark.parametrize(
-    ("option", "value"),
+    ("option", "told"),
     [
-        ("--task", "left"),
-        ("--seed", 1),
-        ("--iterations", 99),
-        ("--noise", 0.5),
-        ("--arm", "paper_flange"),
-        ("--sharing", "pair"),
-        ("--recipe", "tuned"),
-        ("--reward-success", 3),
-        ("--tolerance", 0.1),
+        ("--task left", "goal_regions"),
+        ("--arm paper_flange", "arm"),
+        ("--tolerance 0.1", "tolerance"),
+        ("--seed 1", "has seed 0, not 1: leave out --seed, or"),
+        ("--iterations 99", "has iterations 4, not 99: leave out --iterations, or"),
+        ("--noise 0.5", "has noise 0.03, not 0.5: leave out --noise, or"),
+        ("--sharing pair", "has sharing none, not pair: leave out --sharing, or"),
+        ("--recipe tuned", "has recipe paper, not tuned: leave out --recipe, or"),
+        ("--reward-success 3", "has reward_success 0.0, not 3.0: leave out --reward-success, or"),
+        ("--no-normalize", "has normalize yes, not no: leave out --no-normalize, or"),
+        ("--net-arch 8 4", "has net_arch none, not 8 4: leave out --net-arch, or"),
+        ("--seed 1 --noise 0.5", "not 0.5 and seed 0, not 1: leave out --noise, --seed, or"),
     ],
 )
-def test_other_settings_are_refused_when_resuming(run, tmp_path, option, value):
+def test_other_settings_are_refused_when_resuming(run, tmp_path, option, told):
     """A setting that would be ignored is an error, and the checkpoint stays as it is."""
     checkpoint = tmp_path / "p.checkpoint.npz"
     stop_after(2, recipe("ars", "paper", iterations=4), checkpoint)
     before = checkpoint.read_bytes()
-    answer = run("kinarm-train", "ars", "--out", tmp_path / "p.npz", "--resume", option, value)
+    words = ("--out", tmp_path / "p.npz", "--resume", *option.split())
+    answer = run("kinarm-train", "ars", *words)
     assert (answer.status, answer.out) == (2, "")
     assert len(answer.err.splitlines()) == 1
-    word = {"--task": "goal_regions", "--reward-success": "reward"}.get(option, option[2:])
-    assert word in answer.err
+    assert told in answer.err
+    if "leave out" in told:
+        assert f"delete {str(checkpoint)!r} to train anew" in answer.err
     assert checkpoint.read_bytes() == before
     assert not (tmp_path / "p.npz").exists()
 

@@ -53,7 +53,7 @@ def test_seeds_of_a_text(text, seeds):
 
 @pytest.mark.parametrize("text", ["0", "", "-3", "7-5", "a", "1.5", "0-1000", "\u0663", "9" * 5000])
 def test_texts_that_are_no_seeds(text):
-    with pytest.raises(InvalidInputError, match=r"^must be"):
+    with pytest.raises(InvalidInputError, match=r"^must be a number \(5\) or a rising range"):
         seeds_of(text)
 
 
@@ -106,7 +106,7 @@ def test_resuming_finishes_each_seed_and_repeats_none(run, tmp_path):
         (("--seeds", 2, "--seed", 1), "--seed and --seeds exclude each other"),
         (("--jobs", 2), "--jobs goes with --seeds"),
         (("--seeds", 2, "--jobs", 0), "jobs must be"),
-        (("--seeds", "0"), "must be 1 to 1000 seeds"),
+        (("--seeds", "9-5"), "must be a number (5) or a rising range (5-9), 1 to 1000 seeds"),
         (("--seeds", 2, "--resume"), "nothing to resume"),
     ],
 )
@@ -248,7 +248,18 @@ def wait_for_iterations(process: subprocess.Popen, shared: Path, count: int) -> 
         time.sleep(0.02)
 
 
-def test_ctrl_c_keeps_every_seed_and_says_how_to_go_on(command, tmp_path):
+def workers(process: subprocess.Popen) -> list[int]:
+    """Worker processes of a command, of those that it has started."""
+    found = []
+    for listed in Path(f"/proc/{process.pid}/task").glob("*/children"):
+        for number in map(int, listed.read_text().split()):
+            with suppress(OSError):  # it has ended meanwhile
+                line = Path(f"/proc/{number}/cmdline").read_bytes()
+                found += [number] if b"popen_loky" in line else []
+    return found
+
+
+def test_ctrl_c_and_lost_workers_keep_every_seed_and_say_how_to_go_on(command, tmp_path):
     folder, shared = tmp_path / "right", tmp_path / "shared"
     process = start(command, folder, shared)
     wait_for_iterations(process, shared, 200)
@@ -263,31 +274,6 @@ def test_ctrl_c_keeps_every_seed_and_says_how_to_go_on(command, tmp_path):
     assert sum(state.iteration for state in states) >= 200 or list(folder.glob("*.curve.csv"))
     assert not list(shared.iterdir())
 
-    process = start(command, folder, shared, "--resume")
-    _, errors = process.communicate(timeout=300)
-    assert process.returncode == 0, errors
-    for seed in range(3):
-        expected = train_policy(config(seed, iterations=2000)).policy
-        check_equal(Policy.load(folder / f"{NAME.format(seed)}.npz"), expected)
-
-
-def workers(process: subprocess.Popen) -> list[int]:
-    """Worker processes of a command, of those that it has started."""
-    found = []
-    for listed in Path(f"/proc/{process.pid}/task").glob("*/children"):
-        for number in map(int, listed.read_text().split()):
-            with suppress(OSError):  # it has ended meanwhile
-                line = Path(f"/proc/{number}/cmdline").read_bytes()
-                found += [number] if b"popen_loky" in line else []
-    return found
-
-
-def test_lost_workers_keep_every_seed_and_say_how_to_go_on(command, tmp_path):
-    folder, shared = tmp_path / "right", tmp_path / "shared"
-    process = start(command, folder, shared)
-    wait_for_iterations(process, shared, 200)
-    process.send_signal(signal.SIGINT)
-    process.communicate(timeout=120)
     process = start(command, folder, shared, "--resume")
     while process.poll() is None:
         for number in workers(process):
@@ -304,5 +290,6 @@ def test_lost_workers_keep_every_seed_and_say_how_to_go_on(command, tmp_path):
     process = start(command, folder, shared, "--resume")
     _, errors = process.communicate(timeout=300)
     assert process.returncode == 0, errors
-    expected = train_policy(config(0, iterations=2000)).policy
-    check_equal(Policy.load(folder / f"{NAME.format(0)}.npz"), expected)
+    for seed in range(3):
+        expected = train_policy(config(seed, iterations=2000)).policy
+        check_equal(Policy.load(folder / f"{NAME.format(seed)}.npz"), expected)

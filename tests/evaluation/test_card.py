@@ -64,6 +64,12 @@ def test_a_seed_is_told_where_it_is_known(skilled):
     assert len(unknown) < len(_origin(made))
 
 
+def test_semantics_are_told_where_they_are_known(skilled):
+    made = replace(skilled.provenance, semantics=None)
+    known = _origin(replace(made, semantics="3"))
+    assert [line for line in known if line not in _origin(made)] == [("semantics of kinarm", "3")]
+
+
 def test_states_where_the_policy_comes_from(card, skilled, document):
     made = skilled.provenance
     for line in (

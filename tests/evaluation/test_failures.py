@@ -70,7 +70,7 @@ def test_the_worst_seed_is_named(evaluations):
 def test_causes_read_as_words():
     assert str(Cause(("hand", "bench"), True)) == "hand touches bench within 3 steps"
     assert str(Cause(("hand", "bench"), False)) == "hand touches bench after 3 steps"
-    assert str(Cause(None, False)) == "out of time"
+    assert str(Cause(None, False)) == "truncated"
 
 
 @pytest.mark.parametrize(("collision", "steps", "early"), [(1, 3, 1), (1, 4, 0), (0, 3, 0)])

@@ -2,6 +2,7 @@
 
 from dataclasses import asdict
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,8 @@ from kinarm.policies import load_policy, policy_names, recipe
 from kinarm.policies.mirror import find_mirror
 from kinarm.problem import PROBLEMS
 from kinarm.task import RewardWeights
+
+ROOT = Path(__file__).parents[2]
 
 PAPER = [(algorithm, "paper", problem) for algorithm in ("ars", "ppo") for problem in PROBLEMS]
 OURS = [
@@ -50,6 +53,26 @@ def settings_of(config):
     return settings
 
 
+def assert_made_by(config, made):
+    """Settings that have come since it was trained had no other value then."""
+    released = settings_of(config)
+    reward = {**RECEIVED, **made.config["reward"]}
+    assert {**released, **made.config, "reward": reward} == released
+    assert made.commit
+    assert not made.commit.endswith("-dirty"), "trained from changed sources"
+
+
+@pytest.mark.parametrize("problem", ["right", "both"])
+def test_policies_of_the_example_are_of_the_recipe_without_its_mirror(problem):
+    paths = sorted((ROOT / "data" / "results" / "linear_both" / problem).glob("*.npz"))
+    for seed, path in enumerate(paths):
+        policy = load_policy(path)
+        config = recipe("ars", "tuned", problem=problem, symmetric=False, seed=seed)
+        assert_made_by(config, policy.provenance)
+        assert policy.mirror is None
+    assert len(paths) == 4
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_provenance_is_complete_and_that_of_the_released_recipe(name):
     policy = load_policy(name)
@@ -59,13 +82,8 @@ def test_provenance_is_complete_and_that_of_the_released_recipe(name):
     assert made.seed == int(seed.removeprefix("seed"))
     assert policy.problem.name == problem
     assert policy.problem.first_difference(PROBLEMS[problem]) is None
-    released = settings_of(recipe(algorithm, named, problem=problem, seed=made.seed))
-    # Settings that have come since it was trained had no other value then.
-    config = {**released, **made.config, "reward": {**RECEIVED, **made.config["reward"]}}
-    assert config == released
+    assert_made_by(recipe(algorithm, named, problem=problem, seed=made.seed), made)
     assert {"python", "kinarm", "numpy", "numba", "pin", "coal"} <= set(made.versions)
-    assert made.commit
-    assert not made.commit.endswith("-dirty"), "trained from changed sources"
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -29,6 +29,15 @@ SMALL = {
 }
 """What makes the trainings short."""
 
+ENDED = "a training has ended"
+SEVERAL = f"""
+import runpy, sys
+for words in {{}}:
+    sys.argv = ["train", *words]
+    runpy.run_module("rl_zoo3.train", run_name="__main__")
+    print({ENDED!r}, flush=True)
+"""
+
 
 def run(line, folder, *others):
     """Run a command line in a process of its own, with further arguments; returns its output."""
@@ -48,12 +57,12 @@ def run(line, folder, *others):
     return done.stdout
 
 
-def train(folder, algorithm, env_id, *others):
+def training(algorithm, env_id):
     """Train as the page does, with another algorithm on another environment, for a moment."""
     line = BLOCKS["zoo-train"].replace("$CONF", str(zoo_hyperparameters(algorithm)))
-    line = line.replace("--algo ppo", f"--algo {algorithm}").replace(FLAT, env_id)
-    budget = ["-n", 800, "--eval-freq", 400, "--eval-episodes", 4]
-    return run(line, folder, "-params", *SMALL[algorithm], *budget, *others)
+    line = line.replace("--algo ppo", f"--algo {algorithm}").replace(FLAT, env_id).strip()
+    budget = "-n 800 --eval-freq 400 --eval-episodes 4"
+    return f"{line} -params {' '.join(SMALL[algorithm])} {budget}"
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +77,7 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def trained(folder):
     """The logs of a training with PPO."""
-    assert "Success rate" in train(folder, "ppo", FLAT)
+    assert "Success rate" in run(training("ppo", FLAT), folder)
     return folder / "logs" / "ppo" / "kinarm-ReachRight-v0_1"
 
 
@@ -91,18 +100,20 @@ def test_train(trained):
     assert log["results"].shape == log["successes"].shape == (2, 4)
 
 
-@pytest.mark.parametrize(
-    ("algorithm", "env_id"),
-    [("a2c", FLAT), ("td3", FLAT), ("sac", GOALS), ("tqc", GOALS)],
-)
-def test_train_with_other_algorithms(folder, algorithm, env_id):
-    assert "Success rate" in train(folder, algorithm, env_id)
-    name = env_id.replace("/", "-")
-    assert list((folder / "logs" / algorithm).glob(f"{name}_*/{name}.zip"))
+def test_train_with_other_algorithms(folder):
+    """One after the other in one process, as each would be in its own."""
+    others = {"td3": FLAT, "sac": GOALS, "tqc": GOALS}
+    words = [shlex.split(training(*other))[3:] for other in others.items()]
+    (folder / "several.py").write_text(SEVERAL.format(words))
+    printed = run("python several.py", folder).split(ENDED)[:-1]
+    assert ["Success rate" in each for each in printed] == [True] * len(others)
+    for algorithm, env_id in others.items():
+        name = env_id.replace("/", "-")
+        assert list((folder / "logs" / algorithm).glob(f"{name}_*/{name}.zip"))
 
 
 def test_packages_can_be_named_instead(tmp_path):
-    assert train(tmp_path, "ppo", FLAT, "--gym-packages", "kinarm")
+    assert "Success rate" in run(training("a2c", FLAT), tmp_path, "--gym-packages", "kinarm")
 
 
 def test_enjoy_evaluates(folder, trained):

@@ -149,8 +149,8 @@ class TestOptions:
         assert f"{said}: what" in refused(capsys, "--bowl", "pan", kind=Mixing)
         assert f"{said}: --bowl" in refused(capsys, "eggs", kind=Mixing)
 
-    def test_what_is_false_by_default_can_be_negatable(self):
-        options = parsed("--no-quiet", negatable=True)
+    def test_what_is_false_by_default_can_be_negated(self):
+        options = parsed("--no-quiet", explicit=True)
         assert given_options(options, Baking) == {"quiet": False}
 
     def test_options_of_others_are_left_alone(self):
@@ -176,6 +176,14 @@ class TestOptions:
         assert shown["--output"] == "--output FILE Where it goes"
         assert shown["--oven-heat"] == "--oven-heat X How hot it is [K] (default: 450.0)"
         assert shown["recipe"] == "recipe File of the recipe"
+
+    def test_every_default_can_be_said(self, capsys, monkeypatch):
+        monkeypatch.setenv("COLUMNS", "200")
+        with pytest.raises(SystemExit):
+            parsed("--help", explicit=True)
+        said = " ".join(capsys.readouterr().out.split())
+        assert "What is strewn on it (default: none)" in said
+        assert "Say nothing (default: no)" in said
 
     @pytest.mark.parametrize(
         ("arguments", "message"),

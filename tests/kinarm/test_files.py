@@ -253,8 +253,10 @@ class TestCheckOutput:
     def test_existing_file_has_to_be_given_up(self, tmp_path):
         path = tmp_path / "old.npz"
         path.write_text("old")
-        with pytest.raises(OutputError, match=r"old.npz' exists: --overwrite replaces it"):
+        with pytest.raises(OutputError, match=r"old.npz' exists") as told:
             check_output(path)
+        assert str(told.value).endswith("exists: --overwrite replaces it")
+        assert told.value.__notes__ == ["in Python: overwrite=True"]
         check_output(path, overwrite=True)
         assert path.read_text() == "old"
 

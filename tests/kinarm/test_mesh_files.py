@@ -296,10 +296,11 @@ class TestWithoutTheExtra:
 @pytest.mark.parametrize("name", ROBOTS)
 class TestRobots:
     def test_pages_are_small(self, name):
-        page = arm_page(name)
+        arm = Arm.load(name)
+        page = arm_page(arm)
         assert len(page.html.encode()) < 5_000_000
-        parts = arm_parts(Arm.load(name))
-        assert {part.joint for part in parts} == set(range(Arm.load(name).n_joints + 1))
+        parts = arm_parts(arm)
+        assert {part.joint for part in parts} == set(range(arm.n_joints + 1))
         assert sum(len(part.mesh.faces) for part in parts) < 200_000
 
     def test_meshes_lie_where_pinocchio_puts_them(self, name):
@@ -321,9 +322,10 @@ class TestRobots:
     def test_meshes_fill_the_collision_shapes(self, name):
         """Links look about as large as what decides about contact."""
         arm = Arm.load(name)
+        visual, collision = list(visual_parts(arm)), list(collision_parts(arm))
         for joint in range(1, arm.n_joints + 1):
-            seen = [part.mesh for part in visual_parts(arm) if part.joint == joint]
-            touched = [part.mesh for part in collision_parts(arm) if part.joint == joint]
+            seen = [part.mesh for part in visual if part.joint == joint]
+            touched = [part.mesh for part in collision if part.joint == joint]
             if touched:
                 np.testing.assert_allclose(bounds(*seen), bounds(*touched), atol=0.12)
 

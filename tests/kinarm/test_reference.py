@@ -126,31 +126,31 @@ class TestCompiledRolloutsEqualTheReference:
     @pytest.mark.parametrize("name", ["paper", "paper_flange", "lrmate200ic_5l"])
     def test_random_linear_policies(self, simulators, name):
         simulator = simulators[name]
-        ends = compare_networks(simulator, random_networks(simulator, 100, 1), 2, 500)
-        assert 50 < ends[1] < 490
+        ends = compare_networks(simulator, random_networks(simulator, 100, 1), 2, 200)
+        assert 20 < ends[1] < 196
 
     @pytest.mark.parametrize("name", ["paper", "lrmate200ic_5l"])
     def test_random_deep_policies(self, simulators, name):
         simulator = simulators[name]
         networks = random_networks(simulator, 50, 3, hidden=(16, 12))
-        ends = compare_networks(simulator, networks, 4, 300)
-        assert ends[1] > 20
+        ends = compare_networks(simulator, networks, 4, 150)
+        assert ends[1] > 10
 
     def test_trained_policies(self, long_reach):
         # Closed loops amplify the rounding in which the two evaluations of a network differ.
         networks = trained_networks("ars-tuned-both-seed0", 20, 5)
-        ends = compare_networks(long_reach, networks, 6, 500, atol=1e-9)
+        ends = compare_networks(long_reach, networks, 6, 250, atol=1e-9)
         success, collision, count = ends
-        assert success > 60
-        assert collision > 20
-        assert count - success - collision > 20
+        assert success > 30
+        assert collision > 10
+        assert count - success - collision > 10
 
     @pytest.mark.parametrize("name", ["paper", "paper_flange", "lrmate200ic_5l"])
     @pytest.mark.parametrize("problem", ["left", "right"])
     def test_action_tables(self, name, problem):
         simulator = simulator_of(problem, arm=name)
-        ends = compare_actions(simulator, 7, 250)
-        assert ends[1] > 15
+        ends = compare_actions(simulator, 7, 120)
+        assert ends[1] > 7
 
     @pytest.mark.parametrize("name", ["mesh", "sliding"])
     def test_generic_arms(self, simulators, name):

@@ -40,7 +40,7 @@ def contents(path):
 def refused(path):
     with pytest.raises(PolicyFileError) as caught:
         load_checkpoint(path)
-    gc.collect()  # a file left open is reported here, not in a later test
+    gc.collect(1)  # a file left open is reported here, not in a later test
     assert path.name in str(caught.value)
     assert "\n" not in str(caught.value)
 

@@ -52,6 +52,7 @@ def test_names():
         assert {"paper", "tuned"} <= set(learner.recipes)
         for key, config in learner.recipes.items():
             assert (type(config), config.recipe) == (learner.config, key)
+        assert list(learner.summaries) == list(learner.recipes)
 
 
 def test_unknown_learner():

@@ -15,6 +15,7 @@ from kinarm.policies.provenance import (
     source_commit,
 )
 from kinarm.problem import ReachProblem
+from kinarm.semantics import SEMANTICS
 
 
 def test_round_trip_through_json(provenance):
@@ -56,6 +57,7 @@ def test_of_a_training_here_and_now():
         config={"recipe": "mine", "seed": 7, "step_size": 0.1, "widths": [8, 8]},
         versions=package_versions(),
         commit=source_commit(),
+        semantics=SEMANTICS,
     )
     assert made.problem.arm.digest == problem.arm_digest
     assert Provenance.from_json(json.loads(json.dumps(made.to_json()))) == made
@@ -76,6 +78,13 @@ def test_a_seed_may_be_unknown(provenance):
     unknown = replace(provenance, seed=None)
     assert "seed" not in unknown.to_json()
     assert Provenance.from_json(unknown.to_json()) == unknown
+
+
+def test_the_semantics_of_an_older_file_are_unknown(provenance):
+    assert provenance.semantics is None
+    assert "semantics" not in provenance.to_json()
+    known = replace(provenance, semantics="3")
+    assert Provenance.from_json(known.to_json()) == known
 
 
 @pytest.fixture

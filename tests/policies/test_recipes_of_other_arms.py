@@ -101,6 +101,14 @@ def test_where_no_reflection_helps():
     assert (ppo.recipe, ppo.reward.progress, ppo.symmetric) == ("tuned", 12.0, False)
     assert ppo.gamma_at(0) < ppo.gamma_at(1)
     assert ppo.penalty_at(0) < ppo.penalty_at(1)
+    ours = find_learner("ppo").recipes
+    for name in ("taught", "best", "precise"):  # they keep what the oracle showed
+        taught = recipe("ppo", name, problem=lopsided)
+        assert taught.learning_rate == 5e-4
+        assert taught == replace(
+            ours[name], problem=lopsided, symmetric=False, learning_rate=taught.learning_rate
+        )
+        assert recipe("ppo", name, problem="both").learning_rate == ours[name].learning_rate
 
 
 def test_regions_that_are_images_of_each_other_count_once():

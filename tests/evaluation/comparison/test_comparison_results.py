@@ -14,7 +14,7 @@ from kinarm.evaluation.comparison.document import (
     curves_csv,
     write_all,
 )
-from kinarm.evaluation.comparison.figures import learning_curves
+from kinarm.evaluation.comparison.figures import final_success, learning_curves
 from kinarm.evaluation.comparison.learners import read_learners
 from kinarm.evaluation.comparison.results import Comparison
 from kinarm.evaluation.comparison.runs import CurvePoint, Protocol, planned_runs
@@ -82,7 +82,8 @@ def test_curves_as_csv(comparison):
 def test_files(comparison, tmp_path):
     write_all(comparison, tmp_path, "kinarm-compare --seeds 3")
     names = {path.name for path in tmp_path.iterdir()}
-    assert names == {f"learners.{end}" for end in ("json", "csv", "png", "svg")} | {"LEARNERS.md"}
+    figures = {f"{name}.{end}" for name in ("learners", "final_success") for end in ("png", "svg")}
+    assert names == figures | {"learners.json", "learners.csv", "LEARNERS.md"}
     document = json.loads((tmp_path / "learners.json").read_text())
     assert document["command"] == "kinarm-compare --seeds 3"
     assert document["results"][0]["success"]["value"] == pytest.approx(0.8)
@@ -120,3 +121,14 @@ def test_figure_has_a_row_per_problem(comparison):
     lines = figure.axes[0].get_lines()
     assert [line.get_label() for line in lines[:2]] == ["ARS, paper", "SAC (SB3)"]
     assert lines[0].get_ydata()[-1] == pytest.approx(0.8)
+
+
+def test_the_best_are_on_top(comparison):
+    panel = final_success(comparison).axes[0]
+    titles = [label.get_text() for label in panel.get_yticklabels()]
+    ranked = sorted(comparison.series[:2], key=lambda series: series.success.value)
+    assert titles == [series.learner.title for series in ranked]
+    best = titles.index("ARS, paper")
+    interval, seeds = panel.get_lines()[2 * best : 2 * best + 2]
+    np.testing.assert_allclose(sorted(seeds.get_xdata()), [70, 80, 90])
+    np.testing.assert_allclose(interval.get_xdata(), [49.0, 94.3], atol=0.05)

@@ -8,6 +8,7 @@ import pytest
 
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation import evaluate
+from kinarm.evaluation.comparison import training
 from kinarm.evaluation.comparison.learners import ComparedLearner, read_learners
 from kinarm.evaluation.comparison.runs import CurvePoint, PlannedRun, Protocol, load_run, save_run
 from kinarm.evaluation.comparison.training import Judge, carry_out, sb3_model, train_sb3
@@ -25,7 +26,9 @@ def planned(learner, steps=None, seed=0, problem=EASY):
 
 
 def sb3_learner(algorithm="SAC", hindsight=True, **changes):
-    buffer = {"replay_buffer_kwargs": {"n_sampled_goal": 4}} if hindsight else {}
+    buffer = {"learning_starts": 1000, "buffer_size": 2000}
+    if hindsight:
+        buffer["replay_buffer_kwargs"] = {"n_sampled_goal": 4}
     policy = "MultiInputPolicy" if hindsight else "MlpPolicy"
     given = {
         "name": "mine",
@@ -35,7 +38,7 @@ def sb3_learner(algorithm="SAC", hindsight=True, **changes):
         "environment_steps": 1300,
         "n_envs": 4,
         "hindsight": hindsight,
-        "settings": {"policy": policy, "learning_starts": 600, "batch_size": 16, **buffer},
+        "settings": {"policy": policy, "batch_size": 16, **buffer},
     }
     return ComparedLearner(**(given | changes))
 
@@ -75,6 +78,28 @@ class TestRecipes:
         assert config.net_arch == (4,)
         assert (config.reward.success, config.reward.collision) == (1.0, -4.0)
 
+    def test_the_clock_runs_while_the_oracle_teaches(self, monkeypatch):
+        pytest.importorskip("stable_baselines3")
+        from kinarm.policies.ppo import learner as ppo
+
+        now, demonstrate = np.zeros(2), ppo.demonstrate
+
+        def slow(*given):
+            now[:] += 100.0
+            return demonstrate(*given)
+
+        monkeypatch.setattr(ppo, "demonstrate", slow)
+        monkeypatch.setattr(training, "clocks", now.copy)
+        taught = ComparedLearner(
+            name="taught",
+            title="Taught",
+            source="here",
+            algorithm="ppo",
+            recipe="taught",
+            settings={"iterations": 1, "demonstrations": 20, "net_arch": [4]},
+        )
+        assert carry_out(planned(taught))[-1].processor_seconds == 100.0
+
 
 class TestStableBaselines:
     @pytest.fixture(autouse=True)
@@ -88,7 +113,7 @@ class TestStableBaselines:
             (
                 "SAC",
                 False,
-                {"decaying": True, "settings": {"policy": "MlpPolicy", "learning_rate": 0.01}},
+                {"decaying": True, "settings": {**FALLING, "learning_starts": 1000}},
             ),
             ("TD3", False, {"action_noise": 0.1, "train_on": {"reward": {"success": 5.0}}}),
         ],

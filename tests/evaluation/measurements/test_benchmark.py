@@ -50,6 +50,7 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
         return told_by([*fewer, "--policy", "zero"], env)
 
     patch.setattr(benchmark, "BATCHES", (6, 512))
+    patch.setattr(environments, "VECTOR_ENVS", 8)
     patch.setattr(benchmark, "measure_robots", lambda _: [{"skipped": "not here"}])
     patch.setattr(limits, "BATCH", 6)
     patch.setattr(limits, "TURNS", 1000)

@@ -96,7 +96,7 @@ class TestCauses:
         failed = sum(each["trials"] for each in pooled["failures"])
         assert told["made-right"] == f"{failed} failures"
         first = pooled["failures"][0]
-        words = "out of time" if first["contact"] is None else " touches ".join(first["contact"])
+        words = "truncated" if first["contact"] is None else " touches ".join(first["contact"])
         share = f"{100 * first['trials'] / failed:.0f} %"
         assert causes["made-right"].startswith(f"{share} {words}")
         hidden = max(len(pooled["failures"]) - 6, 0)

@@ -57,7 +57,7 @@ def saved(state, tmp_path):
 def refused(path, words=None):
     with pytest.raises(PolicyFileError, match=words) as caught:
         load_checkpoint(path)
-    gc.collect()  # a file left open is reported here, not in a later test
+    gc.collect(1)  # a file left open is reported here, not in a later test
     assert path.name in str(caught.value)
     assert "\n" not in str(caught.value)
 
