@@ -36,6 +36,7 @@ def rows(document: dict[str, Any]) -> Iterator[Row]:
     yield f"oracle, {oracle['trials']} trials", *seconds
     evaluation = document["evaluation"]
     memory = f"{evaluation['peak_memory_mb']:.0f} MB"
+    yield "kinarm-eval --trials 200, nothing compiled", f"{evaluation['seconds_first']:.1f} s"
     for known, name in (("unknown", "seconds_without_bounds"), ("known", "seconds")):
         what = f"kinarm-eval --trials 200, bounds {known}"
         yield what, f"{evaluation[name]:.1f} s", memory

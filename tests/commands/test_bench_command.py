@@ -19,7 +19,12 @@ from kinarm.evaluation.measurements import (
 from kinarm.evaluation.measurements.document import speed_page
 from kinarm.policies import recipe
 
-EVALUATION = {"seconds_without_bounds": 9.87, "seconds": 4.32, "peak_memory_mb": 321.0}
+EVALUATION = {
+    "seconds_first": 23.4,
+    "seconds_without_bounds": 9.87,
+    "seconds": 4.32,
+    "peak_memory_mb": 321.0,
+}
 ROW = {"batch": 512, "actions": "trained", "threads": 2, "judged_share": 0.0125}
 RATE = {"median": 1234567.0, "best": 2345678.0}
 DOCUMENT = {
