@@ -22,6 +22,12 @@ WATCH_SECONDS = 0.2
 ATTEMPTS = 3
 """How often workers may end unexpectedly before another task is finished."""
 
+REPLACED = "A worker stopped while some jobs were given to the executor"
+"""How Loky's warning begins of a worker that it replaces because its memory has grown.
+
+Kernels and libraries that a task loads are no leak. The warning comes from the thread that manages
+the workers: as an error, it would end that thread, and nothing would go on.
+"""
 
 LOST_WORKERS = "workers ended unexpectedly, perhaps for want of memory"
 
@@ -99,6 +105,7 @@ class LocalExecutor:
             initargs=(os.getpid(),),
         ):
             parallel = Parallel(return_as="generator_unordered", batch_size=1, max_nbytes=None)
+        warnings.filterwarnings("ignore", REPLACED, UserWarning)
         resource_tracker.ensure_running()  # where it begins, it lets signals through again
         with kept_from_children():
             done = parallel(delayed(_done)(work, *item) for item in list(waiting.items()))

@@ -7,7 +7,13 @@ from functools import partial
 from types import SimpleNamespace
 
 import pytest
-from small_tasks import kill_own_process_at_seven, kill_own_process_once, square, touch
+from small_tasks import (
+    kill_own_process_at_seven,
+    kill_own_process_once,
+    seem_to_leak,
+    square,
+    touch,
+)
 
 from kinarm import workers
 from kinarm.errors import WorkerError
@@ -46,6 +52,12 @@ def test_a_task_that_kills_every_worker():
     tasks = LocalExecutor(2).carry_out(kill_own_process_at_seven, range(9))
     with pytest.raises(WorkerError, match="workers ended unexpectedly"):
         list(tasks)
+
+
+def test_workers_that_grow_are_replaced_in_silence():
+    """Loky warns of it in a thread of its own, which an error would end, and nothing go on."""
+    done = LocalExecutor(2).carry_out(seem_to_leak, range(8))
+    assert sorted(done) == [(number, number) for number in range(8)]
 
 
 def test_errors_of_a_task_are_told_as_they_are(tmp_path):
