@@ -40,6 +40,9 @@ EXCEPTIONS = {
 """Commands and blocks of Python that are not run here, by how they begin, and why."""
 
 SHORTER = {
+    r"kinarm-train ppo .*--recipe (taught|best|precise)": (
+        "--iterations 1 --n-envs 8 --batch-size 64 --demonstrations 8"
+    ),
     r"kinarm-train ppo": "--iterations 1 --n-envs 8 --batch-size 64",
     r"kinarm-train ": "--iterations 2",
     r"kinarm-eval (?!.*--trials \d{1,2}\b)": "--trials 8",

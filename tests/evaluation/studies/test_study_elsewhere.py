@@ -1,5 +1,6 @@
 """The same study, wherever it runs: the same files, byte for byte."""
 
+from contextlib import suppress
 from importlib.util import find_spec
 
 import pytest
@@ -26,7 +27,8 @@ class Disturbed:
         for count, (number, result) in enumerate(done):
             yield Finished(number, result)
             if count == 3:
-                self._cluster.remove_node(self._lost, allow_graceful=False)
+                with suppress(AssertionError):  # on a busy machine, its processes end later
+                    self._cluster.remove_node(self._lost, allow_graceful=False)
             if count == 5:
                 self._cluster.add_node(num_cpus=1)
 
