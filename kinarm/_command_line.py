@@ -111,7 +111,7 @@ def run_request(
     typed = sys.argv[1:] if arguments is None else arguments
     parser = Parser(prog=prog, description=(kind.__doc__ or "").partition("\n")[0], epilog=epilog)
     add_options(parser, kind, skip=skip)
-    command = shlex.join([prog, *typed])
+    command = " ".join([prog, *map(shlex.quote, typed)])
     run_command(prog, lambda: report(request_of(parser.parse_args(typed), kind), command))
 
 

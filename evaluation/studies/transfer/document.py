@@ -221,9 +221,13 @@ class TransferResults:
 
 
 def _difference(first: NDArray[np.bool_], second: NDArray[np.bool_]) -> Estimate:
-    """Difference of shares of the same trials, shape (n_seeds, n_trials) each."""
+    """Difference of shares of the same trials, shape (n_seeds, n_trials) each; from -1 to 1."""
     terms = ((1.0, first), (-1.0, second))
-    return contrast([Term(sign, hits.astype(np.float64)) for sign, hits in terms])
+    estimate = contrast([Term(sign, hits.astype(np.float64)) for sign, hits in terms])
+    if estimate.ci95 is None:
+        return estimate
+    low, high = estimate.ci95
+    return Estimate(estimate.value, (max(low, -1.0), min(high, 1.0)))
 
 
 def ratio_of_means(first: NDArray[np.float64], second: NDArray[np.float64]) -> Estimate:

@@ -22,7 +22,7 @@ def learning_curves(document: Mapping[str, Any]) -> "Figure":
     """Success against environment steps, a row per learner and a column per problem.
 
     Lines are means over the training seeds, bands reach from the worst of them to the best.
-    Dotted is what the policies of the first task do with nothing.
+    Dotted is what the policies of the first task do as they are.
     """
     from matplotlib.figure import Figure
     from matplotlib.ticker import NullFormatter
@@ -47,7 +47,7 @@ def learning_curves(document: Mapping[str, Any]) -> "Figure":
 
 
 def _draw_panel(axes: "Axes", document: Mapping[str, Any], learner: str, problem: str) -> None:
-    """Draw all curves of a learner on a problem, and what it does with nothing."""
+    """Draw all curves of a learner on a problem, and what a policy of the first task does."""
     for number, (role, title) in enumerate(ROLES.items()):
         for length, dash in zip(document["lengths"], DASHES, strict=False):
             wanted = {"learner": learner, "problem": problem, "role": role, "length": length}
@@ -56,7 +56,7 @@ def _draw_panel(axes: "Axes", document: Mapping[str, Any], learner: str, problem
     (nothing,) = _chosen(
         document["zero_shot"], {"learner": learner, "problem": problem, "way": "as it is"}
     )
-    axes.axhline(nothing["success"]["value"], color="#444444", linestyle=":", label="with nothing")
+    axes.axhline(nothing["success"]["value"], color="#444444", linestyle=":", label="as it is")
 
 
 def _chosen(rows: Sequence[Any], wanted: Mapping[str, Any]) -> list[Mapping[str, Any]]:

@@ -37,10 +37,10 @@ def transfer_page(document: Mapping[str, Any], figure: str) -> str:
             f"Made by `{document['command']}` at commit {document['commit'] or 'unknown'}: "
             f"{document['trainings']} trainings, {document['seeds']} seeds of each kind, "
             f"{document['environment_steps']:,} environment steps. Policies are from trainings on "
-            f"`{source}`. Trained policies faced {protocol['trials']} trials a problem, seed "
-            f"{protocol['seed']}; those in training {protocol['look_trials']}, seed "
+            f"`{source}`. Trained policies faced {protocol['trials']:,} trials a problem, seed "
+            f"{protocol['seed']}; those in training {protocol['look_trials']:,}, seed "
             f"{protocol['look_seed']}.\n",
-            "## With nothing\n",
+            "## As they are, and reflected\n",
             markdown(ZERO_SHOT, _zero_shot_rows(document["zero_shot"])),
             "## With a warm start\n",
             markdown(UNTIL, _until_rows(document["warm_start"])),
@@ -110,7 +110,7 @@ def _reflection_rows(rows: Sequence[Mapping[str, Any]]) -> Iterator[list[str]]:
         yield [
             row["learner"].upper(),
             f"`{row['problem']}`",
-            str(row["trials"]),
+            f"{row['trials']:,}",
             f"{row['deviation']:.1e}",
             str(row["differing"]),
         ]
