@@ -56,7 +56,7 @@ def settings_of(config):
 def assert_made_by(config, made):
     """Settings that have come since it was trained had no other value then."""
     released = settings_of(config)
-    reward = {**RECEIVED, **made.config["reward"]}
+    reward = {**RECEIVED, **made.config.get("reward", asdict(made.problem.task.reward))}
     assert {**released, **made.config, "reward": reward} == released
     assert made.commit
     assert not made.commit.endswith("-dirty"), "trained from changed sources"
