@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import IO, TYPE_CHECKING
 
-from kinarm.kernels.notices import COMPILING, told_of_compilation
+from kinarm._activities import told_of_activities
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -83,7 +83,7 @@ def print_fitting(
 def working(doing: str) -> Iterator[Callable[[str], object]]:
     """Say on standard error what a command is doing, while it does it, if that is a terminal.
 
-    Yields a function by which it says something else. While kernels are compiled, it says so.
+    Yields a function by which it says something else. While kernels are compiled, it says so, too.
     """
     said = doing
     with open_console(stderr=True).status(doing) as status:
@@ -93,8 +93,8 @@ def working(doing: str) -> Iterator[Callable[[str], object]]:
             said = text
             status.update(text)
 
-        def tell(begins: bool) -> None:
-            status.update(f"{said}; {COMPILING}" if begins else said)
+        def tell(activity: str) -> None:
+            status.update(f"{said}; {activity}" if activity else said)
 
-        with told_of_compilation(tell):
+        with told_of_activities(tell):
             yield say

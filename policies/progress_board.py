@@ -8,13 +8,18 @@ from typing import Any
 import numpy as np
 
 from kinarm.policies.learners import TrainingState
-from kinarm.policies.training_progress import COMPILES, STARTS
+from kinarm.policies.training_progress import STARTING
 
-WAITING, STARTING, COMPILING, TRAINING = range(4)
+WAITING, PREPARING, TRAINING = range(3)
 """Phases of a training."""
 
-ROW = np.dtype([("phase", "i8"), ("iteration", "i8"), ("mean_return", "f8"), ("success", "f8")])
-"""What is known of a training."""
+ROW = np.dtype(
+    [
+        *(("phase", "i8"), ("iteration", "i8"), ("mean_return", "f8"), ("success", "f8")),
+        ("activity", "U48"),
+    ]
+)
+"""What is known of a training; while it is prepared, what takes long, in words."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +74,8 @@ class ProgressBoard:
         if len(known):
             extremes = dict.fromkeys((f"{100 * known.min():.0f}", f"{100 * known.max():.0f}"))
             return [f"success {'-'.join(extremes)} %"]
-        return [COMPILES if (rows["phase"] == COMPILING).any() else STARTS]
+        activities = filter(None, rows["activity"][rows["phase"] == PREPARING])
+        return [str(next(activities, STARTING))]
 
 
 class BoardWatcher:
@@ -86,11 +92,12 @@ class BoardWatcher:
     def __init__(self, board: ProgressBoard, number: int) -> None:
         self._row = board.rows[number : number + 1]
 
-    def begin(self, compiling: bool) -> None:
-        """Note that the training begins."""
-        self._row["phase"] = COMPILING if compiling else STARTING
+    def prepare(self, activity: str) -> None:
+        """Note what the training does before it goes on."""
+        self._row["activity"] = activity
+        self._row["phase"] = PREPARING
 
     def update(self, state: TrainingState) -> None:
         """Note the latest iteration."""
         point = state.curve[-1]
-        self._row[0] = (TRAINING, state.iteration, point.mean_return, point.success)
+        self._row[0] = (TRAINING, state.iteration, point.mean_return, point.success, "")

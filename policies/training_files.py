@@ -9,7 +9,7 @@ from kinarm._interrupts import telling
 from kinarm.errors import InvalidInputError, KinarmError
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import TrainingResult, TrainingState, begin_training, run_training
-from kinarm.policies.training_progress import Watcher, watched_compilation
+from kinarm.policies.training_progress import Watcher, watched_preparation
 
 CHECKPOINT = ".checkpoint.npz"
 """Ending of the file of a checkpoint."""
@@ -122,7 +122,7 @@ def train_to_file(
             raise TrainingStopped
 
     with telling(keeper.save_on_interrupt):
-        with watched_compilation(watcher):
+        with watched_preparation(watcher):
             training = begin_training(config, **options)
             result = run_training(config, training, state=state, on_iteration=on_iteration)
         try:

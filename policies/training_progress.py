@@ -4,21 +4,22 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Protocol
 
-from kinarm.kernels.notices import COMPILING, told_of_compilation
+from kinarm._activities import told_of_activities
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import TrainingState, learner_of
 
 if TYPE_CHECKING:
     from kinarm._progress import ProgressLine
 
-STARTS, COMPILES = "starting", COMPILING
+STARTING = "starting"
+"""What a training does before its first iteration, unless it says something else."""
 
 
 class Watcher(Protocol):
     """Watches the progress of a training."""
 
-    def begin(self, compiling: bool) -> None:
-        """It begins; kernels may be compiled first."""
+    def prepare(self, activity: str) -> None:
+        """It does something before it goes on, in words; empty if that is over."""
 
     def update(self, state: TrainingState) -> None:
         """Take note of the latest iteration."""
@@ -30,9 +31,9 @@ class TrainingProgress:
     def __init__(self, line: "ProgressLine") -> None:
         self._line = line
 
-    def begin(self, compiling: bool) -> None:
-        """Show that the training begins."""
-        self._line.update(words=[COMPILES if compiling else STARTS])
+    def prepare(self, activity: str) -> None:
+        """Show what the training does before it goes on."""
+        self._line.update(words=[activity or STARTING])
 
     def update(self, state: TrainingState) -> None:
         """Show the latest iteration."""
@@ -52,8 +53,8 @@ def shown_progress(config: TrainingConfig) -> Iterator[TrainingProgress]:
 
 
 @contextmanager
-def watched_compilation(watcher: Watcher) -> Iterator[None]:
-    """Tell a watcher that a training begins, and whether kernels are compiled for it."""
-    watcher.begin(compiling=False)
-    with told_of_compilation(watcher.begin):
+def watched_preparation(watcher: Watcher) -> Iterator[None]:
+    """Tell a watcher that a training begins, and what takes long before it goes on."""
+    watcher.prepare("")
+    with told_of_activities(watcher.prepare):
         yield

@@ -13,7 +13,7 @@ from numba import types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 
-from kinarm.kernels.notices import compiling
+from kinarm._activities import COMPILING, doing
 
 WITHOUT = {
     "WithLifting",
@@ -45,7 +45,7 @@ class KernelCompiler(CompilerBase):
         collects = gc.isenabled()
         gc.disable()
         try:
-            with compiling():
+            with doing(COMPILING):
                 return super().compile_extra(func)
         finally:
             if collects:

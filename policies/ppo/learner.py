@@ -10,6 +10,7 @@ import torch
 from numpy.typing import NDArray
 from stable_baselines3.common.logger import KVWriter, Logger, TensorBoardOutputFormat
 
+from kinarm._activities import doing
 from kinarm.errors import InvalidInputError
 from kinarm.policies.curve import CurvePoint
 from kinarm.policies.learners import learner_of
@@ -24,6 +25,9 @@ from kinarm.policies.ppo.state import PPOState
 from kinarm.policies.ppo.training_env import TrainingVecEnv
 from kinarm.policies.warm_start import starting_policy, statistics
 from kinarm.streams import Stream, stream_generator
+
+IMITATING = "learning from the oracle's motions first"
+"""What is told before a training that begins with demonstrations."""
 
 NORMALIZED_OVER = 10_000
 """Random starts whose observations are the statistics of the normaliser."""
@@ -106,7 +110,8 @@ class PPOTraining:
             for layer, (weights, bias) in zip(policy.layers, actor, strict=True):
                 weights[:], bias[:] = layer
         if config.demonstrations:
-            parameters = self._taught(parameters, normalizer, config.demonstrations)
+            with doing(IMITATING):
+                parameters = self._taught(parameters, normalizer, config.demonstrations)
         return PPOState(
             parameters=parameters,
             first_moment=np.zeros_like(parameters),

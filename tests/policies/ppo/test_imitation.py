@@ -7,13 +7,14 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 
+from kinarm._activities import told_of_activities
 from kinarm.errors import InvalidInputError
 from kinarm.policies import PPOConfig
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.ppo.actor import actor_policy
 from kinarm.policies.ppo.imitation import BATCH_SIZE, Demonstrations, demonstrate, imitate
 from kinarm.policies.ppo.kernels.imitation import add_imitation_gradients
-from kinarm.policies.ppo.learner import PPOTraining
+from kinarm.policies.ppo.learner import IMITATING, PPOTraining
 from kinarm.policies.ppo.networks import ActorCritic
 from kinarm.policies.ppo.parameters import initial_parameters
 from kinarm.problem import PROBLEMS
@@ -138,7 +139,10 @@ def test_a_training_begins_with_what_was_imitated(simulator):
         actions = actor_policy(config, state)(fresh.observations)
         return np.mean((actions - fresh.actions) ** 2), state.parameters
 
-    taught, parameters = error(config)
+    heard: list[str] = []
+    with told_of_activities(heard.append):
+        taught, parameters = error(config)
+    assert (heard[0], heard[-1]) == (IMITATING, "")
     assert taught < 0.65 * error(replace(config, demonstrations=0))[0]
     np.testing.assert_array_equal(error(config, threads=2)[1], parameters)
     assert not np.array_equal(error(replace(config, seed=1))[1], parameters)

@@ -1,4 +1,4 @@
-"""Listeners hear of compilation, once a kernel, and commands say so on a terminal."""
+"""Listeners hear what takes long, such as compilation, and commands say so on a terminal."""
 
 import os
 import pty
@@ -8,9 +8,9 @@ import sys
 import numpy as np
 import pytest
 
+from kinarm._activities import COMPILING, doing, told_of_activities
 from kinarm._console import working
 from kinarm.kernels.compiling import inlined, kernel
-from kinarm.kernels.notices import COMPILING, compiling, told_of_compilation
 
 
 def test_a_kernel_is_told_of_once_and_its_helpers_are_not():
@@ -24,19 +24,28 @@ def test_a_kernel_is_told_of_once_and_its_helpers_are_not():
             numbers[i] = doubled(numbers[i])
 
     heard = []
-    with told_of_compilation(heard.append):
+    with told_of_activities(heard.append):
         for _ in range(2):
             fill(np.ones(3))
-    assert heard == [True, False]
+    assert heard == [COMPILING, ""]
     fill(np.ones(3, dtype=np.float32))  # compiled anew, and nobody listens
-    assert heard == [True, False]
+    assert heard == [COMPILING, ""]
 
 
 def test_a_failure_ends_it_too():
     heard = []
-    with told_of_compilation(heard.append), pytest.raises(ValueError, match="no"), compiling():
+    with told_of_activities(heard.append), pytest.raises(ValueError, match="no"), doing(COMPILING):
         raise ValueError("no")
-    assert heard == [True, False]
+    assert heard == [COMPILING, ""]
+
+
+def test_one_within_another_is_told_of_and_the_same_is_not():
+    heard = []
+    with told_of_activities(heard.append), doing("learning"):
+        for each in ("learning", COMPILING):
+            with doing(each), doing(each):
+                pass
+    assert heard == ["learning", COMPILING, "learning", ""]
 
 
 def test_what_was_said_comes_back(monkeypatch):
@@ -44,7 +53,7 @@ def test_what_was_said_comes_back(monkeypatch):
     monkeypatch.setattr("rich.status.Status.update", lambda _, text: said.append(text))
     with working("evaluating") as say:
         say("right: 2 of 3")
-        with compiling():
+        with doing(COMPILING):
             pass
     assert said == ["right: 2 of 3", f"right: 2 of 3; {COMPILING}", "right: 2 of 3"]
 
