@@ -29,7 +29,7 @@ EXCEPTIONS = {
     r"python tests/instructions": "records anew; tests/instructions compares",
     r"kinarm-bench": "measures for minutes; tests/commands/test_bench_command.py",
     r"kinarm-compare": "trains for hours; tests/commands/test_compare_command.py",
-    r"kinarm-reproduce|.*ReproductionRequest": "trains for an hour; tests/commands",
+    r"kinarm-reproduce|.*ReproductionRequest": "trains for half an hour; tests/commands",
     r"kinarm-study .*--(ray|slurm)": "needs a cluster; tests/evaluation/running",
     r"kinarm-study search": "trains for hours; tests/evaluation/studies/test_search.py",
     r"kinarm-train .*search/best": "needs what that search found",
