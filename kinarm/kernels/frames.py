@@ -8,7 +8,7 @@ from kinarm.kernels.jacobian import spatial_jacobian
 from kinarm.kernels.kinematics import POSE, forward_kinematics, to_world
 from kinarm.kernels.planes import rotated
 
-LAYOUT = "b886eb9f28ae"
+LAYOUT = "212549befa8e"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 

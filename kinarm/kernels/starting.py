@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import Array, kernel
 
-LAYOUT = "8a77551c5792"
+LAYOUT = "e1df61d23bda"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 

@@ -4,6 +4,7 @@ import ast
 import hashlib
 import re
 from importlib import import_module
+from inspect import isfunction
 from pathlib import Path
 
 import pytest
@@ -39,7 +40,8 @@ def compiled_in(source):
             text = Path(import_module(module).__file__).read_text(encoding="utf-8")
             parts |= {module: text} | compiled_in(text)
         else:
-            fields = {name: getattr(value, "_fields", value) for name, value in values.items()}
+            data = {name: value for name, value in values.items() if not isfunction(value)}
+            fields = {name: getattr(value, "_fields", value) for name, value in data.items()}
             parts |= {f"{module}.{name}": repr(value) for name, value in fields.items()}
     return parts
 

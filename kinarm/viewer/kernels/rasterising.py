@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from kinarm.kernels.compiling import Array, kernel
 from kinarm.viewer.kernels.edges import edge, within
 
-LAYOUT = "0ebfb8ed7db8"
+LAYOUT = "77378cba4c43"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 NEAR = 0.01

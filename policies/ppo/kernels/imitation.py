@@ -18,7 +18,7 @@ from kinarm.policies.ppo.kernels.layers import (
 )
 from kinarm.policies.ppo.kernels.tiles import Numbers
 
-LAYOUT = "be6178f6d53b"
+LAYOUT = "a751486dd8e5"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 

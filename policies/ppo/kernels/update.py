@@ -34,7 +34,7 @@ from kinarm.policies.ppo.kernels.loss import (
 )
 from kinarm.policies.ppo.kernels.tiles import LANES, Numbers
 
-LAYOUT = "dc509efe4a7c"
+LAYOUT = "9b589d8c361c"
 """Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
 
 
