@@ -61,9 +61,11 @@ class Step(NamedTuple):
 
 
 def typed() -> Iterator[str]:
-    """What a newcomer types in the clone: first the two pages are asked whether they say so."""
+    """What a newcomer types in the clone, if the README says the first two commands."""
     readme, tutorial = PAGES
-    assert all(f"\n{line}" in readme.read_text(encoding="utf-8") for line in (INSTALL, ACTIVATE))
+    said = readme.read_text(encoding="utf-8")
+    if missing := [command for command in (INSTALL, ACTIVATE) if command not in said]:
+        raise SystemExit(f"{readme.name} does not say: {', '.join(missing)}")
     yield INSTALL
     for block in blocks(tutorial):
         if block.directive != "kinarm-run":
