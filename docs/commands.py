@@ -11,7 +11,7 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 from kinarm._command_line import Parser
-from kinarm.evaluation.reproduction.tables import markdown
+from kinarm.evaluation.markdown import markdown_table
 
 BESIDE = {"kinarm-study": ["status"]}
 """First words that a program answers with a parser of its own, which its own one does not know."""
@@ -75,7 +75,7 @@ def options_table(group: argparse._ArgumentGroup, formatter: argparse.HelpFormat
         if action.dest not in EVERYWHERE and action.help not in (None, argparse.SUPPRESS)
     ]
     title = f"**{group.title}**" if rows and group.title else ""
-    table = markdown(["option", "meaning"], rows) if rows else ""
+    table = markdown_table(["option", "meaning"], rows) if rows else ""
     return f"{title}\n\n{table}".strip()
 
 

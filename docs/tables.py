@@ -14,8 +14,8 @@ from kinarm.capsules import enclosing_capsule
 from kinarm.envs.registration import ENVIRONMENTS
 from kinarm.evaluation import METRICS
 from kinarm.evaluation.commands import arms, problem
+from kinarm.evaluation.markdown import markdown_table
 from kinarm.evaluation.metrics import SYMBOLS
-from kinarm.evaluation.reproduction.tables import markdown
 from kinarm.observation import OBSERVATION, part_slices
 from kinarm.policies import find_learner
 
@@ -42,7 +42,7 @@ def arm_table(name: str) -> str:
     ]
     rows.append(["tool point", numbers(chain.tool), "", "", "", ""])
     header = ["joint", "origin in its parent [m]", "axis", "limits [deg]"]
-    return markdown([*header, "velocity limit [deg/s]", "per step [deg]"], rows)
+    return markdown_table([*header, "velocity limit [deg/s]", "per step [deg]"], rows)
 
 
 def capsule_table(name: str) -> str:
@@ -53,18 +53,18 @@ def capsule_table(name: str) -> str:
         frame = f"joint {shape.parentJoint}" if shape.parentJoint else "world"
         link = shape.name.rsplit("_", 1)[0].replace("_", " ")
         rows.append([link, frame, numbers(start), numbers(end), f"{radius:.3f}"])
-    return markdown(["body", "frame", "from [m]", "to [m]", "radius [m]"], rows)
+    return markdown_table(["body", "frame", "from [m]", "to [m]", "radius [m]"], rows)
 
 
 def arms_table() -> str:
     """The arms that have a name."""
     rows = [[f"`{name}`", *others] for name, *others, _ in arms.ListRequest().rows()]
-    return markdown(arms.HEADINGS[:-1], rows)
+    return markdown_table(arms.HEADINGS[:-1], rows)
 
 
 def shipped_problems_table() -> str:
     """The problems that ship, but for the paper's."""
-    return markdown(
+    return markdown_table(
         problem.HEADINGS,
         [[f"`{name}`", *others] for name, *others in problem.rows() if name not in PROBLEMS],
     )
@@ -84,7 +84,7 @@ def scene_table() -> str:
         for kind, boxes in (("obstacle", scene.obstacles), ("goal region", scene.goal_regions))
         for box in boxes
     ]
-    return markdown(["box", "x [m]", "y [m]", "z [m]"], rows)
+    return markdown_table(["box", "x [m]", "y [m]", "z [m]"], rows)
 
 
 def problems_table() -> str:
@@ -98,7 +98,7 @@ def problems_table() -> str:
         ]
         for number, (name, problem) in enumerate(PROBLEMS.items(), start=1)
     ]
-    return markdown(["problem", "in the paper", "goal regions", "environments"], rows)
+    return markdown_table(["problem", "in the paper", "goal regions", "environments"], rows)
 
 
 def reward_table() -> str:
@@ -108,7 +108,7 @@ def reward_table() -> str:
         [f"`{name}`", f"{getattr(weights, name):g}", summary_of(RewardWeights, name)]
         for name in REWARD_TERMS
     ]
-    return markdown(["term", "weight by default", "what the weight is"], rows)
+    return markdown_table(["term", "weight by default", "what the weight is"], rows)
 
 
 def observation_table(n_joints: int) -> str:
@@ -124,7 +124,7 @@ def observation_table(n_joints: int) -> str:
         ]
         for part in OBSERVATION
     ]
-    return markdown(["index", "part", "meaning", "unit", "signs in the mirror"], rows)
+    return markdown_table(["index", "part", "meaning", "unit", "signs in the mirror"], rows)
 
 
 def recipe_table(recipes: Mapping[str, object]) -> str:
@@ -135,7 +135,7 @@ def recipe_table(recipes: Mapping[str, object]) -> str:
         for item in fields(next(iter(recipes.values())))
         if item.name not in skipped
     ]
-    return markdown(["setting", *(f"`{name}`" for name in recipes)], rows)
+    return markdown_table(["setting", *(f"`{name}`" for name in recipes)], rows)
 
 
 def setting(value: object) -> str:
@@ -162,7 +162,7 @@ def metrics_table() -> str:
         ]
         for name, metric in METRICS.items()
     ]
-    return markdown(["name", "column", "what it is", "formula", "unit, interval"], rows)
+    return markdown_table(["name", "column", "what it is", "formula", "unit, interval"], rows)
 
 
 def beside_heading(name: str) -> str:
@@ -173,7 +173,9 @@ def beside_heading(name: str) -> str:
 
 def symbols_table() -> str:
     """The letters of the formulas."""
-    return markdown(["letter", "what it stands for"], [list(item) for item in SYMBOLS.items()])
+    return markdown_table(
+        ["letter", "what it stands for"], [list(item) for item in SYMBOLS.items()]
+    )
 
 
 TABLES = {

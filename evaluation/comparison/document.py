@@ -14,7 +14,7 @@ from kinarm.evaluation.comparison.learners import OF_OTHERS, ComparedLearner
 from kinarm.evaluation.comparison.results import LEVELS, Comparison, Series
 from kinarm.evaluation.comparison.runs import CurvePoint
 from kinarm.evaluation.figures import save_figure
-from kinarm.evaluation.reproduction.tables import markdown
+from kinarm.evaluation.markdown import markdown_table
 from kinarm.policies.provenance import package_versions, source_commit
 
 NAME = "learners"
@@ -77,7 +77,7 @@ def comparison_page(comparison: Comparison, document: dict[str, Any]) -> str:
             f"policies faced the same {protocol['trials']} trials a problem, seed "
             f"{protocol['seed']}; in brackets 95 % intervals, of the trials that the seeds share. "
             "Every training had one thread; minutes are processor time without judging.\n",
-            markdown(HEADER, result_rows(comparison)),
+            markdown_table(HEADER, result_rows(comparison)),
             f"![Success of the trained policies]({REACHED}.png)\n",
             f"![Success against environment steps and against time]({NAME}.png)\n",
             settings_table(_learners(comparison)),
@@ -145,7 +145,7 @@ def settings_table(learners: Iterable[ComparedLearner]) -> str:
         given = {name: entries[name] for name in shown if entries[name]} | learner.settings
         settings = ", ".join(f"{name} {_shown(value)}" for name, value in given.items())
         rows.append([learner.title, learner.algorithm, settings, learner.source])
-    return markdown(("learner", "algorithm", "settings", "source"), rows)
+    return markdown_table(("learner", "algorithm", "settings", "source"), rows)
 
 
 def _shown(value: object) -> str:

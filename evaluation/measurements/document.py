@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from kinarm._files import write_text
+from kinarm.evaluation.markdown import markdown_table
 from kinarm.evaluation.measurements.table import (
     HEADER,
     OPERATION_HEADER,
@@ -18,7 +19,6 @@ from kinarm.evaluation.measurements.table import (
     rows,
     time_rows,
 )
-from kinarm.evaluation.reproduction.tables import markdown
 
 NAME = "speed"
 """Of both files."""
@@ -51,16 +51,16 @@ def _parts(document: dict[str, Any], command: str) -> Iterator[str]:
     )
     if "peers" in document:
         yield "## Peers\n"
-        yield markdown(PEER_HEADER, peer_rows(document["peers"]))
+        yield markdown_table(PEER_HEADER, peer_rows(document["peers"]))
         yield from _terms(document["peers"])
     if "limits" in document:
         yield "## Operations of a step\n"
         yield limit_text(document) + "\n"
-        yield markdown(OPERATION_HEADER, operation_rows(document["limits"]))
+        yield markdown_table(OPERATION_HEADER, operation_rows(document["limits"]))
         yield "## Where time goes\n"
-        yield markdown(TIME_HEADER, time_rows(document["limits"]))
+        yield markdown_table(TIME_HEADER, time_rows(document["limits"]))
     yield "## Everything\n"
-    yield markdown(HEADER, filled(rows(document), len(HEADER)))
+    yield markdown_table(HEADER, filled(rows(document), len(HEADER)))
     versions = document["versions"].items()
     yield ", ".join(f"{name} {version}" for name, version in versions) + "."
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.intervals import estimate_text
+from kinarm.evaluation.markdown import markdown_table
 from kinarm.evaluation.reproduction.claims import LEARNING_LEVELS, Claim, steps_to_levels
 from kinarm.evaluation.reproduction.results import Results
 from kinarm.evaluation.reproduction.runs import TrainedRun
@@ -14,12 +15,6 @@ from kinarm.evaluation.reproduction.study import LEARNERS, LITERAL, NEAR, Readin
 from kinarm.problem import PROBLEMS
 
 MARKS = {"holds": "holds", "does not hold": "no", "undecided": "?", "not judged": ""}
-
-
-def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Format a table of some columns."""
-    lines = [header, ["---"] * len(header), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
 
 
 def claims_table(claims: Iterable[Claim]) -> str:
@@ -35,7 +30,7 @@ def claims_table(claims: Iterable[Claim]) -> str:
         for claim in claims
         for part in claim.parts
     ]
-    return markdown(("claim", "measure", "measured (95 %)", "claimed", "verdict"), rows)
+    return markdown_table(("claim", "measure", "measured (95 %)", "claimed", "verdict"), rows)
 
 
 def learners_table(results: Results) -> str:
@@ -56,7 +51,7 @@ def learners_table(results: Results) -> str:
         *("task", "learner", "success %", "relative success %", f"within {NEAR} m % (seeds)"),
         *("median distance m", "mean distance m", "collision %", "million steps"),
     )
-    return markdown(header, rows)
+    return markdown_table(header, rows)
 
 
 def _learner_cells(runs: Sequence[TrainedRun], tolerance: float, possible: float) -> list[str]:
@@ -91,7 +86,7 @@ def sweep_table(results: Results) -> str:
         near, steps = _near_cell(distance), _steps_cell(runs)
         rows.append((f"{rate:g}", str(perturbations), mean, near, steps))
     header = ("learning rate", "perturbations", "mean final distance m (seeds)")
-    return markdown((*header, f"<= {NEAR} m % (seeds)", "million steps"), rows)
+    return markdown_table((*header, f"<= {NEAR} m % (seeds)", "million steps"), rows)
 
 
 def speed_table(results: Results) -> str:
@@ -104,7 +99,7 @@ def speed_table(results: Results) -> str:
             cells = (_median_cell(learner[number]) for learner in steps)
             rows.append((task, f"{share:.0%} within {distance:g} m", *cells))
     header = ("task", "level", *(f"{LEARNERS[purpose]}, steps" for purpose in shown))
-    return markdown(header, rows)
+    return markdown_table(header, rows)
 
 
 def _median_cell(steps: NDArray[np.float64]) -> str:
@@ -129,7 +124,7 @@ def readings_table(results: Results, claims: Mapping[Reading, Sequence[Claim]]) 
         found = (*(marks.get(name, "") for name in names), held)
         rows.append((f"{reading.start_spread:g}", reading.reward, reading.sharing, shares, *found))
     header = ("starts", "reward", "shared by", f"ARS <= {NEAR} m %, left / right / both")
-    return markdown((*header, *(f"`{name}`" for name in names), "hold"), rows)
+    return markdown_table((*header, *(f"`{name}`" for name in names), "hold"), rows)
 
 
 def best_readings(claims: Mapping[Reading, Sequence[Claim]]) -> str:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from kinarm.evaluation.reproduction.tables import markdown
+from kinarm.evaluation.markdown import markdown_table
 
 ZERO_SHOT = (
     *("learner", "on", "as it is: success % (95 %)", "collision %"),
@@ -41,14 +41,14 @@ def transfer_page(document: Mapping[str, Any], figure: str) -> str:
             f"{protocol['seed']}; those in training {protocol['look_trials']:,}, seed "
             f"{protocol['look_seed']}.\n",
             "## As they are, and reflected\n",
-            markdown(ZERO_SHOT, _zero_shot_rows(document["zero_shot"])),
+            markdown_table(ZERO_SHOT, _zero_shot_rows(document["zero_shot"])),
             "## With a warm start\n",
-            markdown(UNTIL, _until_rows(document["warm_start"])),
+            markdown_table(UNTIL, _until_rows(document["warm_start"])),
             f"![Success against environment steps]({figure})\n",
             "## At the end\n",
-            markdown(AT_THE_END, _end_rows(document["warm_start"])),
+            markdown_table(AT_THE_END, _end_rows(document["warm_start"])),
             "## By reflection\n",
-            markdown(REFLECTION, _reflection_rows(document["reflection"])),
+            markdown_table(REFLECTION, _reflection_rows(document["reflection"])),
             ", ".join(f"{name} {version}" for name, version in versions) + ".\n",
         ]
     )
