@@ -162,6 +162,11 @@ class Episodes(NamedTuple):
             episodes.shift[:] = shift
         return episodes, known
 
+    def resume(self, rows: NDArray[np.int64], horizon: int) -> None:
+        """Let episodes go on that success or contact ended; at the horizon they are truncated."""
+        over = self.steps[rows] >= horizon
+        self.status[rows] = np.where(over, TRUNCATED, RUNNING)
+
 
 @lru_cache(maxsize=64)
 def episodes_layout(n: int, n_joints: int, n_pairs: int, horizon: int, collects: bool) -> Layout:

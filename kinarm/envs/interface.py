@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium.spaces import Box, Dict, Space
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from kinarm.episodes import RUNNING, TRUNCATED, Episodes
+from kinarm.episodes import TRUNCATED, Episodes
 from kinarm.errors import InvalidInputError
 from kinarm.observation import OBSERVATION, Ranges, observation_bounds, part_slices
 from kinarm.rollouts import StepResult
@@ -161,9 +161,7 @@ class GoalInterface:
         """Reward by the goals, and let episodes go on whose move was refused."""
         truncated = result.truncated
         if np.count_nonzero(result.collision):
-            rows = result.collision.nonzero()[0]
-            over = episodes.steps[rows] >= self._horizon
-            episodes.status[rows] = np.where(over, TRUNCATED, RUNNING)
+            episodes.resume(result.collision.nonzero()[0], self._horizon)
             truncated = truncated | (episodes.status == TRUNCATED) & result.collision
         info = {"collision": result.collision}
         reward = self.compute_reward(*self._goals(episodes.observation), info)

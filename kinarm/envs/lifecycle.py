@@ -10,8 +10,17 @@ class Lifecycle:
     closed: bool = False
     _episodes: Episodes | None = None
 
-    def _begun_episodes(self) -> Episodes:
-        """The episodes under way, if there are any."""
+    @property
+    def episodes(self) -> Episodes:
+        """The episodes under way, one row per arm.
+
+        Raises
+        ------
+        ClosedEnvironmentError
+            If the environment is closed.
+        ResetNeededError
+            If it was never reset.
+        """
         self._check_open()
         if self._episodes is None:
             raise ResetNeededError("the environment was never begun: call reset()")

@@ -159,7 +159,7 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
 
     def step(self, action: Array) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
         """Move for one time step."""
-        episode = self._begun_episodes()
+        episode = self.episodes
         if episode.status.item() != RUNNING:
             self._check_action(action)
             return self._rest(episode)
@@ -181,7 +181,7 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
 
     def render(self) -> Any:
         """Take a picture of the arm; see ``render_mode``."""
-        self._begun_episodes()
+        _ = self.episodes  # refuses if there are none
         pictures = self._pictures.render()
         if self.render_mode == "rgb_array_list":
             return [picture for (picture,) in pictures]

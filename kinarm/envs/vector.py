@@ -145,7 +145,7 @@ class ReachVectorEnv(Lifecycle, PortableSpec, VectorEnv[Any, Array, NDArray[Any]
         self, actions: Array
     ) -> tuple[Observations, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
         """Move every arm for one time step."""
-        episodes = self._begun_episodes()
+        episodes = self.episodes
         running = episodes.status == RUNNING
         resting = np.count_nonzero(running) < self.num_envs
         if resting and self.autoreset_mode is AutoresetMode.DISABLED:
@@ -168,7 +168,7 @@ class ReachVectorEnv(Lifecycle, PortableSpec, VectorEnv[Any, Array, NDArray[Any]
 
     def render(self) -> Any:
         """Take a picture of every arm; see ``render_mode``."""
-        self._begun_episodes()
+        _ = self.episodes  # refuses if there are none
         return self._pictures.render()
 
     @property

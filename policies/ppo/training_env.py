@@ -8,7 +8,7 @@ from gymnasium.spaces import Box, Space
 from numpy.typing import NDArray
 
 from kinarm.envs.interface import Verdict
-from kinarm.episodes import RUNNING, Episodes
+from kinarm.episodes import Episodes
 from kinarm.failed_scenarios import FailedScenarios, Replay, StartsAndGoals
 from kinarm.kernels.reward import COLLISION, SUCCESS
 from kinarm.networks import Mirror
@@ -25,8 +25,8 @@ class NormalizedInterface:
 
     Parameters
     ----------
-    n_observations : int
-        Length of an observation.
+    simulator : Simulator
+        What is shown.
 
     Attributes
     ----------
@@ -38,7 +38,8 @@ class NormalizedInterface:
 
     tells_terms = True
 
-    def __init__(self, n_observations: int) -> None:
+    def __init__(self, simulator: Simulator) -> None:
+        self._horizon, n_observations = simulator.task.horizon, simulator.n_observations
         unbounded = Box(-np.inf, np.inf, (n_observations,), dtype=np.float32)
         self.observation_space: Space[Any] = unbounded
         self.penalty = 1.0
@@ -57,7 +58,7 @@ class NormalizedInterface:
     def judge(self, episodes: Episodes, result: StepResult) -> Verdict:
         """Take the simulator's reward and endings, except for the penalty and for what passes."""
         passing = result.success & self.passes
-        episodes.status[passing] = RUNNING
+        episodes.resume(passing.nonzero()[0], self._horizon)
         remitted = (1.0 - self.penalty) * result.terms[:, COLLISION]
         remitted += np.where(passing, result.terms[:, SUCCESS], 0.0)
         return Verdict(result.reward - remitted, result.terminated & ~passing, result.truncated)
@@ -92,7 +93,7 @@ class TrainingVecEnv(SB3VecEnv):
     ) -> None:
         self.mirror = mirror
         self.stop_at_goal = stop_at_goal
-        self._shown = NormalizedInterface(simulator.n_observations)
+        self._shown = NormalizedInterface(simulator)
         self._record = EndedEpisodes([], [], 0.0)
         super().__init__(simulator, num_envs, self._shown, replay=replay)
         self.draw_from(rng)
@@ -131,7 +132,7 @@ class TrainingVecEnv(SB3VecEnv):
         """Move every arm for one time step, and keep a record of it."""
         began = time.perf_counter()
         if self.stop_at_goal:
-            episodes, task = self._begun_episodes(), self.simulator.task
+            episodes, task = self.episodes, self.simulator.task
             outside, last = episodes.distance > task.tolerance, episodes.steps + 1 == task.horizon
             self._shown.passes = outside & ~last
         outcome = super().step_wait()
@@ -151,7 +152,7 @@ class TrainingVecEnv(SB3VecEnv):
 
     def states(self) -> EpisodeStates:
         """Copy what the running episodes depend on."""
-        episodes = self._begun_episodes()
+        episodes = self.episodes
         return EpisodeStates(
             q=episodes.q.copy(),
             goal=episodes.goal.copy(),

@@ -125,7 +125,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
     @property
     def steps(self) -> NDArray[np.int64]:
         """Steps of the running episodes so far, shape (num_envs,)."""
-        return self._begun_episodes().steps
+        return self.episodes.steps
 
     def reset(self) -> Observations:
         """Begin all episodes anew, with the seeds and options that were set before.
@@ -218,7 +218,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
             If the environment is closed or was never reset, or the actions have another shape or
             an entry that is not finite.
         """
-        episodes = self._begun_episodes()
+        episodes = self.episodes
         result = self.simulator.step(episodes, self._actions)
         verdict = self.interface.judge(episodes, result)
         self._returns += verdict.reward
@@ -284,7 +284,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
         InvalidInputError
             If the environment is closed or was never reset.
         """
-        self._begun_episodes()
+        _ = self.episodes  # refuses if there are none
         if self.render_mode is None or mode not in (None, self.render_mode):
             return super().render(mode)
         shown = self._pictures.render()
@@ -296,7 +296,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
         """One picture of each arm, shape (height, width, 3), if the mode is ``rgb_array``."""
         if self.render_mode != "rgb_array":
             return [None] * self.num_envs
-        self._begun_episodes()
+        _ = self.episodes  # refuses if there are none
         return list(self._pictures.render())
 
     def close(self) -> None:

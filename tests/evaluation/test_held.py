@@ -29,7 +29,7 @@ def stepped(skilled, trials):
         distances, over = [], False
         while not over:
             observation, _, terminated, over, _ = env.step(skilled(observation))
-            tool = env.simulator.arm.tool_position(env._episodes.q[0])  # through Pinocchio
+            tool = env.simulator.arm.tool_position(env.episodes.q[0])  # through Pinocchio
             distances.append(np.linalg.norm(tool - goal))
             over |= terminated
         found.append((min(distances), max(distances[-HELD_STEPS:]), terminated, len(distances)))

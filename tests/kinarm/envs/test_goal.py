@@ -65,7 +65,7 @@ def test_observation_is_that_of_the_flat_environment_taken_apart():
     own = np.concatenate([plain[places["orientation"]], plain[places["position"]]])
     np.testing.assert_array_equal(parts["observation"], own)
     np.testing.assert_array_equal(parts["desired_goal"], plain[:3])
-    tool = flat.simulator.arm.tool_position(flat._episodes.q[0])
+    tool = flat.simulator.arm.tool_position(flat.episodes.q[0])
     np.testing.assert_allclose(parts["achieved_goal"], tool, atol=1e-15)
 
 
@@ -74,7 +74,7 @@ def test_contact_refuses_the_move_and_the_episode_goes_on():
     env = ReachGoalEnv()
     env.reset(options=DOWN)
     for _ in range(40):
-        before = env.simulator.arm.tool_position(env._episodes.q[0])
+        before = env.simulator.arm.tool_position(env.episodes.q[0])
         observation, reward, terminated, truncated, info = env.step([0, 1, 0, 0, 0])
         if info["collision"]:
             break
@@ -111,7 +111,7 @@ def test_after_a_refused_move_contact_is_still_found():
     env.reset(seed=3)
     action = np.zeros(5)
     for _ in range(4000):
-        start, goal = env._episodes.q[0].copy(), env._episodes.goal[0].copy()
+        start, goal = env.episodes.q[0].copy(), env.episodes.goal[0].copy()
         if rng.random() < 0.5:
             action = np.sign(rng.uniform(-1, 1, 5))
         _, _, terminated, truncated, info = env.step(action)

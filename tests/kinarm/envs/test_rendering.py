@@ -42,7 +42,7 @@ class TestPicture:
     @pytest.mark.parametrize("kind", [ReachEnv, ReachGoalEnv])
     def test_is_what_the_renderer_draws(self, kind):
         env = moved(kind("left", render_mode="rgb_array", **SMALL))
-        episode = env._episodes
+        episode = env.episodes
         expected = Renderer("left", **SMALL).render(
             episode.q[0], episode.goal[0], trace=env._pictures._traces[0, :6]
         )
@@ -51,10 +51,10 @@ class TestPicture:
     def test_way_is_that_of_the_tool(self):
         env = ReachEnv("right", render_mode="rgb_array", **SMALL)
         env.reset(seed=0)
-        tools = [env.simulator.arm.tool_position(env._episodes.q[0])]
+        tools = [env.simulator.arm.tool_position(env.episodes.q[0])]
         for action in np.random.default_rng(0).uniform(-0.2, 0.2, (4, 5)):
             env.step(action)
-            tools.append(env.simulator.arm.tool_position(env._episodes.q[0]))
+            tools.append(env.simulator.arm.tool_position(env.episodes.q[0]))
         np.testing.assert_allclose(env._pictures._traces[0, :5], tools, atol=1e-12)
 
     def test_contact_is_shown(self, simulator):

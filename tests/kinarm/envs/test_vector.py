@@ -117,7 +117,7 @@ def test_contacts_are_those_that_the_judge_finds():
     rng, world, refused = np.random.default_rng(0), batch.simulator.world, 0
     for _ in range(100):
         infos = batch.step(np.sign(rng.uniform(-1, 1, (64, 5))))[-1]
-        q, target = batch._episodes.q, batch._episodes.target
+        q, target = batch.episodes.q, batch.episodes.target
         pairs = [batch.contact_names[number] for number in infos["contact"]]
         for row in np.flatnonzero(infos["collision"]):
             assert pairs[row] == world.contact_pair(q[row], target[row]) is not None

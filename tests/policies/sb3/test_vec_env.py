@@ -303,7 +303,7 @@ class TestReplay:
         rng, ended = np.random.default_rng(1), []
         env.reset()
         for _ in range(steps):
-            goals = env._episodes.goal.copy()
+            goals = env.episodes.goal.copy()
             infos = env.step(rng.uniform(-1, 1, (env.num_envs, 5)))[3]
             ended += [(tuple(goals[k]), info) for k, info in enumerate(infos) if "episode" in info]
         return ended
