@@ -27,14 +27,3 @@ def test_functions_that_the_page_names_exist() -> None:
     named = set(re.findall(r"`(?:\w+\.)?([a-zA-Z_]{4,})`", text)) - {"episodes", *ROOMS}
     for name in named:
         assert re.search(rf"\b(def|class) {name}\b|^{name}\b", sources, re.MULTILINE), name
-
-
-def test_no_page_holds_what_a_merge_left() -> None:
-    pages = [
-        page
-        for kind in ("*.md", "*.rst", "*.py", "*.css")
-        for page in (*ROOT.glob(kind), *(ROOT / "docs").rglob(kind))
-    ]
-    texts = {str(page): page.read_text(encoding="utf-8") for page in pages}
-    marked = re.compile(r"^(<{7}|>{7}) ", re.MULTILINE)
-    assert [name for name, text in texts.items() if marked.search(text)] == []

@@ -1,6 +1,5 @@
-"""Pages whose code runs in the build: the directive that runs it, and that the pages use it."""
+"""The directive that runs the code of pages in the build."""
 
-import re
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -8,12 +7,6 @@ from types import ModuleType
 import pytest
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-PAGES = sorted(
-    page.relative_to(DOCS).with_suffix("").as_posix()
-    for page in DOCS.rglob("*.md")
-    if "{kinarm-run}" in page.read_text(encoding="utf-8")
-)
-FROM_FILE_TO_REPLAY = ("how-to/own_arm", "how-to/own_scene")
 
 
 @pytest.fixture
@@ -36,25 +29,6 @@ def page(runs):
 def test_files_are_there_for_later_blocks(page):
     page.write("mine.toml", 'arm = "paper"')
     assert page.run_commands("cat mine.toml") == 'arm = "paper"\n'
-
-
-@pytest.mark.parametrize("name", FROM_FILE_TO_REPLAY)
-def test_from_file_to_replay_takes_thirty_lines(name):
-    text = (DOCS / f"{name}.md").read_text(encoding="utf-8")
-    blocks = re.findall(r"^```\{kinarm-run\} (?:xml|toml|sh)\n(.*?)^```$", text, re.M | re.S)
-    lines = [line for block in blocks for line in block.splitlines() if line.strip(": ")]
-    assert len([line for line in lines if not line.startswith(":")]) <= 30
-    assert "kinarm-replay" in blocks[-1]
-
-
-def test_at_least_ten_pages_run_with_figures_and_five_with_replays():
-    shown = [
-        re.findall(r"^:shows: (\S+)$", (DOCS / f"{page}.md").read_text(), re.M) for page in PAGES
-    ]
-    examples = [*(DOCS / "examples").glob("plot_*.py")]
-    with_replays = [names for names in shown if any(name.endswith(".html") for name in names)]
-    assert len([names for names in shown if names]) + len(examples) >= 15
-    assert len(with_replays) >= 5
 
 
 def test_blocks_share_names_and_a_folder_and_their_prints_are_kept(page):
