@@ -93,6 +93,46 @@ def write_obj(path: Path, corners: np.ndarray) -> None:
     path.write_text(vertices + faces)
 
 
+SKIPPED = "kinarm/skipped"
+"""Where the names of tests that a run skipped are kept until the next one."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Let a run take up what another one left."""
+    told = "run the slow tests, and those that the last run without this option skipped"
+    parser.addoption("--rest", action="store_true", help=told)
+
+
+class Skipped:
+    """Keeps what a run skips, for want of a library above all.
+
+    Parameters
+    ----------
+    config : pytest.Config
+        Configuration of the run.
+    """
+
+    def __init__(self, config: pytest.Config) -> None:
+        self.config, self.names = config, set[str]()
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.skipped:
+            self.names.add(report.nodeid)
+
+    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
+        if report.skipped:
+            self.names.add(report.nodeid)
+
+    def pytest_sessionfinish(self) -> None:
+        self.config.cache.set(SKIPPED, sorted(self.names))
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Note what is skipped, once for all workers."""
+    if not config.getoption("rest") and not hasattr(config, "workerinput"):
+        config.pluginmanager.register(Skipped(config))
+
+
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Begin with the files that take long, so that no worker ends alone with one of them.
@@ -100,12 +140,17 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     Slow tests and campaigns repeat at length what others cover: they are not traced, which
     would take half as long again.
     """
-    slow = [item for item in items if item.get_closest_marker("slow")]
+    slow = {item for item in items if item.get_closest_marker("slow")}
+    if config.getoption("rest"):
+        skipped = tuple(config.cache.get(SKIPPED, []))
+        left = {item for item in items if item in slow or item.nodeid.startswith(skipped)}
+        config.hook.pytest_deselected(items=[item for item in items if item not in left])
+        items[:] = [item for item in items if item in left]
     files = {item.path for item in slow}
     items.sort(key=lambda item: item.path not in files)
     if config.pluginmanager.hasplugin("_cov"):
         for item in items:
-            if item.get_closest_marker("slow") or "campaign" in item.path.parts:
+            if item in slow or "campaign" in item.path.parts:
                 item.add_marker("no_cover")
 
 
