@@ -1,8 +1,8 @@
 from .bounds import oracle_bounds as oracle_bounds
+from .contestants import Contestant as Contestant
+from .contestants import find_contestants as find_contestants
 from .document import EvaluationDocument as EvaluationDocument
 from .document import evaluation_document as evaluation_document
-from .entrants import Entrant as Entrant
-from .entrants import find_entrants as find_entrants
 from .evaluation import Evaluation as Evaluation
 from .evaluation import PooledEvaluation as PooledEvaluation
 from .evaluation import evaluate as evaluate
@@ -12,9 +12,9 @@ from .figures import save_figure as save_figure
 from .metrics import METRICS as METRICS
 from .metrics import Metric as Metric
 from .outcomes import Outcomes as Outcomes
-from .replays.failures import find_failures as find_failures
-from .replays.recorder import record as record
-from .replays.request import ReplayRequest as ReplayRequest
+from .replay.failures import find_failures as find_failures
+from .replay.recorder import record as record
+from .replay.request import ReplayRequest as ReplayRequest
 from .report.card import policy_card as policy_card
 from .report.card import write_card as write_card
 from .report.page import report_page as report_page

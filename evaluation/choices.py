@@ -3,8 +3,8 @@
 
 def policy_choices() -> tuple[str, ...]:
     """Names of policies, their groups and baselines."""
-    from kinarm.evaluation.entrants import UNTRAINED_ENTRANTS
+    from kinarm.evaluation.contestants import UNTRAINED
     from kinarm.policies.library import BEST, group_of, policy_names
 
     names = policy_names()
-    return (BEST, *dict.fromkeys(map(group_of, names)), *names, *UNTRAINED_ENTRANTS)
+    return (BEST, *dict.fromkeys(map(group_of, names)), *names, *UNTRAINED)

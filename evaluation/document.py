@@ -13,7 +13,7 @@ from kinarm._files import first_line
 from kinarm._validation import finite_array
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.bounds import bounds_document
-from kinarm.evaluation.entrants import check_names
+from kinarm.evaluation.contestants import check_names
 from kinarm.evaluation.evaluation import Evaluation, pool
 from kinarm.evaluation.statistics import BOOTSTRAP_SEED, LEVEL, RESAMPLES
 from kinarm.evaluation.trials import TrialSet
@@ -54,7 +54,7 @@ def evaluation_document(evaluations: Sequence[Evaluation], command: str) -> dict
     InvalidInputError
         If two policies on a problem, or two problems, have the same name.
     """
-    check_names((each.entrant, each.problem) for each in evaluations)
+    check_names((each.contestant, each.problem) for each in evaluations)
     any_set = evaluations[0].trials
     facing = {each.problem.name: each for each in reversed(evaluations)}
     return {
@@ -63,7 +63,7 @@ def evaluation_document(evaluations: Sequence[Evaluation], command: str) -> dict
             "command": command,
             "trials": len(any_set),
             "seed": any_set.seed,
-            "hold": any(each.held is not None for each in evaluations),
+            "hold": any(each.holding is not None for each in evaluations),
             "intervals": {
                 "level": LEVEL,
                 "shares": "Wilson",

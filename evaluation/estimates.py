@@ -5,7 +5,6 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.evaluation.intervals import share_over_seeds, student
 from kinarm.evaluation.metrics import METRICS, Metric
 from kinarm.evaluation.outcomes import Outcomes
 from kinarm.evaluation.statistics import (
@@ -13,6 +12,8 @@ from kinarm.evaluation.statistics import (
     Interval,
     percentile_interval,
     resampled_figures,
+    share_over_seeds,
+    student,
 )
 
 
@@ -26,7 +27,7 @@ def estimate_metrics(outcomes: Outcomes) -> dict[str, Estimate]:
         name: metric
         for name, metric in METRICS.items()
         if (outcomes.bounds is not None or not metric.needs_bounds)
-        and (outcomes.held or not metric.needs_held)
+        and (outcomes.holding or not metric.needs_holding)
     }
     intervals = _bootstrapped(outcomes, known) | _of_shares(outcomes, known)
     estimates = dict.fromkeys(METRICS, Estimate(None))

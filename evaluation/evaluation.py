@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.bounds import first_bounds
-from kinarm.evaluation.entrants import Entrant, find_entrants
+from kinarm.evaluation.contestants import Contestant, find_contestants
 from kinarm.evaluation.estimates import estimate_metrics
 from kinarm.evaluation.failures import failure_rows
-from kinarm.evaluation.held import Held, held_trials
+from kinarm.evaluation.holding import Holding, measure_holding
 from kinarm.evaluation.imported import Predictor, policy_function
-from kinarm.evaluation.intervals import share_over_seeds
 from kinarm.evaluation.outcomes import Outcomes
-from kinarm.evaluation.statistics import Estimate
+from kinarm.evaluation.statistics import Estimate, share_over_seeds
 from kinarm.evaluation.training_seeds import group_names
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle.solution import OracleSolutions
@@ -34,7 +33,7 @@ class Evaluation:
 
     Attributes
     ----------
-    entrant : Entrant
+    contestant : Contestant
         The policy.
     trials : TrialSet
         What it faced.
@@ -42,15 +41,15 @@ class Evaluation:
         What it did.
     bounds : OracleSolutions or None
         What any policy could do in the trials, or in the first ones, if that was asked for.
-    held : Held or None
+    holding : Holding or None
         What it did where success did not end the trials, if that was asked for.
     """
 
-    entrant: Entrant
+    contestant: Contestant
     trials: TrialSet
     rollouts: Rollouts
     bounds: OracleSolutions | None = None
-    held: Held | None = None
+    holding: Holding | None = None
 
     @property
     def problem(self) -> ReachProblem:
@@ -101,19 +100,21 @@ class Evaluation:
     def to_json(self) -> dict[str, Any]:
         """Figures of merit and every trial, as a dictionary that JSON can hold."""
         return {
-            **_row_head(self.entrant.name, (self,), self.metrics, training_seed=self.entrant.seed),
-            "note": self.entrant.note,
+            **_row_head(
+                self.contestant.name, (self,), self.metrics, training_seed=self.contestant.seed
+            ),
+            "note": self.contestant.note,
             "outcomes": {
                 "final_distance": self.rollouts.distance.tolist(),
                 "steps": self.rollouts.steps.tolist(),
                 "outcome": list(self.outcomes),
                 "contact": [list(pair) if pair else None for pair in self.contacts],
             },
-            **({"held": self.held.to_json()} if self.held else {}),
+            **({"held": self.holding.to_json()} if self.holding else {}),
         }
 
     def __repr__(self) -> str:
-        return f"Evaluation({_summary(self.entrant.name, self.trials, self.success)})"
+        return f"Evaluation({_summary(self.contestant.name, self.trials, self.success)})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,13 +166,13 @@ class PooledEvaluation:
                 self.name,
                 self.members,
                 self.metrics,
-                members=[member.entrant.name for member in self.members],
-                training_seeds=[member.entrant.seed for member in self.members],
+                members=[member.contestant.name for member in self.members],
+                training_seeds=[member.contestant.seed for member in self.members],
             ),
             "spread": self.spread,
             "worst_seed": {
-                "policy": self.worst.entrant.name,
-                "training_seed": self.worst.entrant.seed,
+                "policy": self.worst.contestant.name,
+                "training_seed": self.worst.contestant.seed,
                 "success": self.worst.success.to_json(),
             },
         }
@@ -187,7 +188,7 @@ def _outcomes(members: Sequence[Evaluation]) -> Outcomes:
     return Outcomes(
         tuple(member.rollouts for member in members),
         members[0].bounds,
-        tuple(member.held for member in members if member.held),
+        tuple(member.holding for member in members if member.holding),
         members[0].problem.stepping.time_step,
     )
 
@@ -197,13 +198,13 @@ def _row_head(
 ) -> dict[str, Any]:
     """What a row of a document is about, its figures, and why its trials failed."""
     evaluation = evaluations[0]
-    entrant = evaluation.entrant
+    contestant = evaluation.contestant
     return {
         "policy": name,
-        "algorithm": entrant.algorithm,
-        "recipe": entrant.recipe,
+        "algorithm": contestant.algorithm,
+        "recipe": contestant.recipe,
         "problem": evaluation.problem.name,
-        "trained_on": entrant.problem.name if entrant.problem else None,
+        "trained_on": contestant.problem.name if contestant.problem else None,
         **seeds,
         "trials": len(evaluation.trials),
         "metrics": {key: estimate.to_json() for key, estimate in metrics.items()},
@@ -217,7 +218,7 @@ def _summary(name: str, trials: TrialSet, success: Estimate) -> str:
 
 
 def evaluate(
-    policy: str | Path | Policy | Entrant | PolicyFunction | Predictor,
+    policy: str | Path | Policy | Contestant | PolicyFunction | Predictor,
     problem: ProblemLike | None = None,
     trials: int = 200,
     seed: int = 0,
@@ -231,8 +232,8 @@ def evaluate(
 
     Parameters
     ----------
-    policy : str, Path, Policy, Entrant, function or predictor
-        What `find_entrants` finds by a name or file (a group's first seed); a policy; a function
+    policy : str, Path, Policy, Contestant, function or predictor
+        What `find_contestants` finds by a name or file (a group's first seed); a policy; a function
         from observations (n, n_observations) to actions (n, n_actions); or something with a
         method ``predict`` as models of Stable-Baselines3 have it.
     problem : ReachProblem, str or Path, optional
@@ -246,7 +247,7 @@ def evaluate(
     oracle : bool
         Whether to bound what any policy could do, in the first 2000 trials at most.
     hold : bool
-        Whether to run the trials once more without an end at success; see `Evaluation.held`.
+        Whether to run the trials once more without an end at success; see `Evaluation.holding`.
     **overrides
         Changes of the problem, such as ``tolerance``; see `kinarm.ReachProblem.replace`.
 
@@ -257,37 +258,40 @@ def evaluate(
     PolicyFileError
         If the policy cannot be read, was trained for another arm, or does not fit this one.
     """
-    entrant = _entrant_of(policy, problem)
-    faced = problem if problem is not None else entrant.problem
+    contestant = _contestant_of(policy, problem)
+    faced = problem if problem is not None else contestant.problem
     if faced is None:
-        raise InvalidInputError(f"{entrant.name!r} was not trained for a problem: name one")
+        raise InvalidInputError(f"{contestant.name!r} was not trained for a problem: name one")
     trial_set = TrialSet.draw(ReachProblem.load(faced).replace(**overrides), trials, seed)
-    return run_trials(entrant, trial_set, allow_other_arm, oracle=oracle, hold=hold)
+    return run_trials(contestant, trial_set, allow_other_arm, oracle=oracle, hold=hold)
 
 
-def _entrant_of(
-    policy: str | Path | Policy | Entrant | PolicyFunction | Predictor, problem: ProblemLike | None
-) -> Entrant:
-    if isinstance(policy, Entrant):
+def _contestant_of(
+    policy: str | Path | Policy | Contestant | PolicyFunction | Predictor,
+    problem: ProblemLike | None,
+) -> Contestant:
+    if isinstance(policy, Contestant):
         return policy
     if isinstance(policy, Policy):
         made = policy.provenance
-        return Entrant.from_policy(f"{made.algorithm}-{made.recipe}-{policy.problem.name}", policy)
+        return Contestant.from_policy(
+            f"{made.algorithm}-{made.recipe}-{policy.problem.name}", policy
+        )
     if isinstance(policy, str | Path):
-        return find_entrants(policy, problem)[0]
+        return find_contestants(policy, problem)[0]
     name = getattr(policy, "__name__", None) or type(policy).__name__
-    return Entrant.from_function(name, policy_function(policy, name))
+    return Contestant.from_function(name, policy_function(policy, name))
 
 
 def run_trials(
-    entrant: Entrant,
+    contestant: Contestant,
     trials: TrialSet,
     allow_other_arm: bool = False,
     *,
     oracle: bool = False,
     hold: bool = False,
 ) -> Evaluation:
-    """Let an entrant face a set of trials; see `evaluate`.
+    """Let an contestant face a set of trials; see `evaluate`.
 
     Raises
     ------
@@ -295,14 +299,14 @@ def run_trials(
         If it was trained for another arm and that is not allowed, or its inputs or actions are
         not those of this arm.
     """
-    entrant.check(trials.simulator.arm, allow_other_arm=allow_other_arm)
-    rollouts = entrant.run(trials)
+    contestant.check(trials.simulator.arm, allow_other_arm=allow_other_arm)
+    rollouts = contestant.run(trials)
     return Evaluation(
-        entrant,
+        contestant,
         trials,
         rollouts,
         first_bounds(trials) if oracle else None,
-        held_trials(entrant, trials) if hold else None,
+        measure_holding(contestant, trials) if hold else None,
     )
 
 
@@ -312,10 +316,10 @@ def pool(evaluations: Sequence[Evaluation]) -> tuple[PooledEvaluation, ...]:
     What belongs together is what policies record of their training; see
     ``kinarm.evaluation.training_seeds.group_names``.
     """
-    names = group_names(evaluation.entrant for evaluation in evaluations)
+    names = group_names(evaluation.contestant for evaluation in evaluations)
     groups: dict[tuple[str, str], list[Evaluation]] = {}
     for evaluation in evaluations:
-        key = (names[evaluation.entrant.name], evaluation.problem.digest)
+        key = (names[evaluation.contestant.name], evaluation.problem.digest)
         groups.setdefault(key, []).append(evaluation)
     return tuple(
         PooledEvaluation(name, tuple(members))

@@ -95,14 +95,14 @@ def series_labels(evaluations: Sequence[Evaluation]) -> list[str]:
 
     A symmetric policy for several goal regions has one name on all problems that it is for.
     """
-    groups = group_names(evaluation.entrant for evaluation in evaluations)
-    return [_label(evaluation, groups[evaluation.entrant.name]) for evaluation in evaluations]
+    groups = group_names(evaluation.contestant for evaluation in evaluations)
+    return [_label(evaluation, groups[evaluation.contestant.name]) for evaluation in evaluations]
 
 
 def _label(evaluation: Evaluation, group: str) -> str:
-    policy, faced = evaluation.entrant.policy, evaluation.problem
+    policy, faced = evaluation.contestant.policy, evaluation.problem
     if policy is None:
-        return evaluation.entrant.name
+        return evaluation.contestant.name
     trained_for = policy.problem
     own, others = (set(problem.task.goal_regions) for problem in (trained_for, faced))
     symmetric = policy.mirror is not None and len(own) > 1

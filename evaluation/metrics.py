@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.evaluation.outcomes import EARLY_STEPS, HELD_STEPS, Outcomes
+from kinarm.evaluation.outcomes import EARLY_STEPS, HOLDING_STEPS, Outcomes
 
 LIMITS = (0.1, 0.2)
 """Distances whose shares are reported beside success [m]."""
@@ -16,7 +16,7 @@ LIMITS = (0.1, 0.2)
 CLOSE = (0.02, 0.01, 0.005)
 """Distances whose shares are reported where success does not end a trial [m]."""
 
-HELD_WITHIN = 0.01
+HOLDING_WITHIN = 0.01
 """A goal counts as held if the tool stays within this distance to the end [m]."""
 
 SYMBOLS = {
@@ -26,7 +26,7 @@ SYMBOLS = {
     "kᵢ": "steps that trial i took",
     "bᵢ": "bound of trial i: steps that the oracle proves to be necessary",
     "aᵢ": "closest approach of trial i, if success does not end it [m]",
-    "eᵢ": f"largest distance after the last {HELD_STEPS} steps of that longer trial [m]",
+    "eᵢ": f"largest distance after the last {HOLDING_STEPS} steps of that longer trial [m]",
     "H": "set of these longer trials that touch something",
 }
 """What the letters in definitions of metrics stand for."""
@@ -55,7 +55,7 @@ class Metric:
         about each trial by itself as well.
     needs_bounds : bool
         Whether it compares with the oracle.
-    needs_held : bool
+    needs_holding : bool
         Whether it is about trials that go on after success.
     heading : str
         Heading of its column, its name and unit; without one it is in documents alone.
@@ -78,7 +78,7 @@ class Metric:
     unit: str = ""
     interval: Literal["Wilson", "bootstrap"] | None = None
     needs_bounds: bool = False
-    needs_held: bool = False
+    needs_holding: bool = False
     heading: str = ""
     digits: int = 3
     shows_interval: bool = False
@@ -127,9 +127,9 @@ def share_closer(limit: float) -> Metric:
         f"that come within {1000 * limit:g} mm of the goal, if success does not end them; "
         "without contact at any time",
         f"|{{i ∉ H : aᵢ ≤ {limit:g} m}}| / n",
-        lambda trials: (trials.closest <= limit) & ~trials.held_collision,
+        lambda trials: (trials.closest <= limit) & ~trials.holding_collision,
         heading=f"closer than {1000 * limit:g} mm %",
-        needs_held=True,
+        needs_holding=True,
         priority=14,
     )
 
@@ -159,7 +159,7 @@ def approach_metric(
         formula=formula,
         unit="m",
         interval="bootstrap",
-        needs_held=True,
+        needs_holding=True,
         **shown,
     )
 
@@ -316,12 +316,12 @@ METRICS: dict[str, Metric] = {
     ),
     **{f"closer_than_{1000 * limit:g}_mm": share_closer(limit) for limit in CLOSE},
     "held": share_of(
-        f"whose last {HELD_STEPS} steps stay within {1000 * HELD_WITHIN:g} mm of the goal, if "
-        "success does not end them; without contact",
-        f"|{{i ∉ H : eᵢ ≤ {HELD_WITHIN:g} m}}| / n",
-        lambda trials: (trials.farthest_at_end <= HELD_WITHIN) & ~trials.held_collision,
+        f"whose last {HOLDING_STEPS} steps stay within {1000 * HOLDING_WITHIN:g} mm of the goal, "
+        "if success does not end them; without contact",
+        f"|{{i ∉ H : eᵢ ≤ {HOLDING_WITHIN:g} m}}| / n",
+        lambda trials: (trials.farthest_at_end <= HOLDING_WITHIN) & ~trials.holding_collision,
         heading="held %",
-        needs_held=True,
+        needs_holding=True,
         shows_interval=True,
         priority=15,
     ),
@@ -341,9 +341,9 @@ METRICS: dict[str, Metric] = {
     "held_collision": share_of(
         "that touch something if success does not end them",
         "|H| / n",
-        lambda trials: trials.held_collision,
+        lambda trials: trials.holding_collision,
         heading="held collision %",
-        needs_held=True,
+        needs_holding=True,
         priority=8.5,
     ),
 }

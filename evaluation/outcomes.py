@@ -13,7 +13,7 @@ from kinarm.errors import InvalidInputError
 EARLY_STEPS = 3
 """Contact within so many steps is early: the arm started close to what it touches."""
 
-HELD_STEPS = 10
+HOLDING_STEPS = 10
 """Last steps of a trial over which the goal is to be held."""
 
 
@@ -55,8 +55,8 @@ class Bounded(Protocol):
         """Steps that are necessary."""
 
 
-class HeldJudged(Protocol):
-    """What figures of merit need of trials that went on after success; see `Held`."""
+class HoldingLike(Protocol):
+    """What figures of merit need of trials that went on after success; see `Holding`."""
 
     @property
     def closest(self) -> NDArray[np.float64]:
@@ -83,7 +83,7 @@ class Outcomes:
         One per training seed.
     bounds : OracleSolutions or None
         What any policy could do in the trials, or in the first ones, if that is known.
-    held : tuple of Held
+    holding : tuple of Holding
         What they did where success did not end the trials, if that is known.
     time_step : float
         Duration of a step [s].
@@ -95,7 +95,7 @@ class Outcomes:
 
     rollouts: tuple[Judged, ...]
     bounds: Bounded | None = None
-    held: tuple[HeldJudged, ...] = ()
+    holding: tuple[HoldingLike, ...] = ()
     time_step: float = float("nan")
     numbers: NDArray[np.int64] | None = None
     origin: "Outcomes | None" = None
@@ -107,7 +107,7 @@ class Outcomes:
     def of_seed(self, seed: int) -> "Outcomes":
         """What one of the training seeds did."""
         one = slice(seed, seed + 1)
-        return replace(self, rollouts=self.rollouts[one], held=self.held[one])
+        return replace(self, rollouts=self.rollouts[one], holding=self.holding[one])
 
     def _joined(self, columns: Iterable[NDArray[Any]]) -> NDArray[Any]:
         chosen = [column if self.numbers is None else column[self.numbers] for column in columns]
@@ -149,17 +149,17 @@ class Outcomes:
     @cached_property
     def closest(self) -> NDArray[np.float64]:
         """Closest approaches where success did not end the trials [m]."""
-        return self._joined(held.closest for held in self.held)
+        return self._joined(each.closest for each in self.holding)
 
     @cached_property
     def farthest_at_end(self) -> NDArray[np.float64]:
         """Largest distances in the last steps of those trials [m]."""
-        return self._joined(held.farthest_at_end for held in self.held)
+        return self._joined(each.farthest_at_end for each in self.holding)
 
     @cached_property
-    def held_collision(self) -> NDArray[np.bool_]:
+    def holding_collision(self) -> NDArray[np.bool_]:
         """Whether those trials ended in contact."""
-        return self._joined(held.collision for held in self.held)
+        return self._joined(each.collision for each in self.holding)
 
     @cached_property
     def steps(self) -> NDArray[np.int64]:

@@ -21,10 +21,10 @@ import numpy as np
 
 from kinarm._files import write_text
 from kinarm.evaluation.bounds import first_bounds
-from kinarm.evaluation.entrants import find_entrants
-from kinarm.evaluation.intervals import share_over_seeds
+from kinarm.evaluation.contestants import find_contestants
 from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.outcomes import Bounded, Judged, Outcomes
+from kinarm.evaluation.statistics import share_over_seeds
 from kinarm.evaluation.trials import trial_set
 from kinarm.policies.library import RANKING, group_of, policy_names
 from kinarm.problem import PROBLEMS
@@ -41,11 +41,11 @@ def ranking(names: Iterable[str], trials: int = TRIALS) -> dict[str, Any]:
         ``trials``, ``seed``; ``success`` and ``step_ratio`` of each policy by its name, by
         problem; ``best``: name of the best policy, by problem.
     """
-    entrants = [entrant for name in names for entrant in find_entrants(name)]
+    contestants = [contestant for name in names for contestant in find_contestants(name)]
     made: dict[str, Any] = {"success": {}, "step_ratio": {}, "best": {}}
     for name, problem in PROBLEMS.items():
         faced = trial_set(problem, trials, SEED)
-        found = {each.name: each.run(faced) for each in entrants if each.serves(problem)}
+        found = {each.name: each.run(faced) for each in contestants if each.serves(problem)}
         if found:
             bounds = first_bounds(faced)
             made["success"][name] = {who: float(did.success.mean()) for who, did in found.items()}

@@ -15,17 +15,17 @@ from kinarm.problem_files import problem_names
 from kinarm.problem_options import ProblemOptions, say_choices
 
 if TYPE_CHECKING:
-    from kinarm.evaluation.entrants import Entrant
+    from kinarm.evaluation.contestants import Contestant
     from kinarm.evaluation.evaluation import Evaluation
     from kinarm.problem import ReachProblem
 
 DOCUMENT, HISTOGRAMS, REPORT = "evaluation.json", "final_distance", "index.html"
 """Files that are written; the histograms as PNG and as SVG."""
 
-Pair = tuple["Entrant", "ReachProblem"]
+Pair = tuple["Contestant", "ReachProblem"]
 """Who faces what."""
 
-Chosen = tuple["Entrant", tuple["ReachProblem", ...]]
+Chosen = tuple["Contestant", tuple["ReachProblem", ...]]
 """Who takes part, and the problems that it is the best for if it was chosen as that."""
 
 Tell = Callable[[str], object]
@@ -180,7 +180,7 @@ class EvaluationRequest(ProblemOptions):
             from kinarm.evaluation.figures import distance_histograms, save_figure
 
             write_text(self.out / DOCUMENT, document_text(document))
-            shown = [e for e in evaluations if e.entrant.algorithm != "oracle"] or evaluations
+            shown = [e for e in evaluations if e.contestant.algorithm != "oracle"] or evaluations
             save_figure(distance_histograms(shown), self.out, HISTOGRAMS)
 
     def evaluate(self, tell: Tell = lambda _: None) -> "list[Evaluation]":
@@ -192,15 +192,15 @@ class EvaluationRequest(ProblemOptions):
         pairs = self.pairs()
         problems = {problem.name: problem for _, problem in pairs}
         arms = {name: problem.load_arm() for name, problem in problems.items()}
-        for entrant, problem in pairs:
-            entrant.check(arms[problem.name], allow_other_arm=self.allow_other_arm)
+        for contestant, problem in pairs:
+            contestant.check(arms[problem.name], allow_other_arm=self.allow_other_arm)
         self._check_outputs(pairs)
         return pairs
 
     def _face(self, pairs: list[Pair], tell: Tell) -> "list[Evaluation]":
         """Run all policies on their trials, problem by problem."""
         from kinarm.evaluation.bounds import bounded_trials, oracle_bounds
-        from kinarm.evaluation.entrants import ORACLE
+        from kinarm.evaluation.contestants import ORACLE
         from kinarm.evaluation.evaluation import run_trials
         from kinarm.evaluation.trials import TrialSet
 
@@ -215,13 +215,13 @@ class EvaluationRequest(ProblemOptions):
             tell(f"evaluating on {name}")
             evaluations += [
                 run_trials(
-                    entrant,
-                    bounded if entrant is ORACLE else trials,
+                    contestant,
+                    bounded if contestant is ORACLE else trials,
                     self.allow_other_arm,
                     oracle=self.oracle,
                     hold=self.hold,
                 )
-                for entrant, faced in pairs
+                for contestant, faced in pairs
                 if faced.name == name
             ]
         return evaluations
@@ -235,17 +235,17 @@ class EvaluationRequest(ProblemOptions):
             If a name or file cannot be used, there is nothing to do, or two policies or problems
             have one name.
         """
-        from kinarm.evaluation.entrants import ORACLE, check_names
+        from kinarm.evaluation.contestants import ORACLE, check_names
 
         chosen, named = self._chosen(), self._named_problems()
-        entrants = [entrant for entrant, _ in chosen]
+        contestants = [contestant for contestant, _ in chosen]
         pairs = [
-            (entrant, problem)
+            (contestant, problem)
             for problem in named or self._problems_of(chosen)
-            for entrant, best_for in chosen
-            if self.matrix or self._faces(entrant, best_for, problem, named)
+            for contestant, best_for in chosen
+            if self.matrix or self._faces(contestant, best_for, problem, named)
         ]
-        if self.oracle and ORACLE not in entrants:
+        if self.oracle and ORACLE not in contestants:
             faced = {problem.digest: problem for _, problem in pairs}
             pairs += [(ORACLE, problem) for problem in faced.values()]
         check_names(pairs)
@@ -253,45 +253,45 @@ class EvaluationRequest(ProblemOptions):
 
     def _faces(
         self,
-        entrant: "Entrant",
+        contestant: "Contestant",
         best_for: "Sequence[ReachProblem]",
         problem: "ReachProblem",
         named: "Sequence[ReachProblem]",
     ) -> bool:
-        """Whether an entrant faces a problem, where not all face all."""
+        """Whether an contestant faces a problem, where not all face all."""
         if best_for:
             return problem.digest in {each.digest for each in best_for}
-        return bool(self.policies and named) or entrant.serves(problem, self._changed)
+        return bool(self.policies and named) or contestant.serves(problem, self._changed)
 
     def _chosen(self) -> list[Chosen]:
-        """Entrants that are named, without repetition; or all whose arm stays the same."""
-        from kinarm.evaluation.entrants import find_entrants, shipped_entrants
+        """Contestants that are named, without repetition; or all whose arm stays the same."""
+        from kinarm.evaluation.contestants import find_contestants, shipped_contestants
         from kinarm.evaluation.training_seeds import named_apart
         from kinarm.policies.library import BEST
         from kinarm.problem import PROBLEMS
 
         if not self.policies:
             return [
-                (entrant, ())
-                for entrant in shipped_entrants()
-                if entrant.problem is None
-                or self._changed(entrant.problem).arm_digest == entrant.problem.arm_digest
+                (contestant, ())
+                for contestant in shipped_contestants()
+                if contestant.problem is None
+                or self._changed(contestant.problem).arm_digest == contestant.problem.arm_digest
             ]
         problems = self._named_problems()
         only = problems[0] if len(problems) == 1 else None
         found: dict[tuple[str, Path | None], Chosen] = {}
         for name in self.policies:
             if name != BEST:
-                for entrant in find_entrants(name, only):
-                    found[entrant.name, entrant.source] = (entrant, ())
+                for contestant in find_contestants(name, only):
+                    found[contestant.name, contestant.source] = (contestant, ())
                 continue
             for best_for in problems or map(self._changed, PROBLEMS.values()):
-                (entrant,) = find_entrants(BEST, best_for)
-                key = (entrant.name, entrant.source)
-                _, others = found.get(key, (entrant, ()))
-                found[key] = (entrant, (*others, best_for))
-        entrants = named_apart([entrant for entrant, _ in found.values()])
-        return list(zip(entrants, (best_for for _, best_for in found.values()), strict=True))
+                (contestant,) = find_contestants(BEST, best_for)
+                key = (contestant.name, contestant.source)
+                _, others = found.get(key, (contestant, ()))
+                found[key] = (contestant, (*others, best_for))
+        contestants = named_apart([contestant for contestant, _ in found.values()])
+        return list(zip(contestants, (best_for for _, best_for in found.values()), strict=True))
 
     def _named_problems(self) -> "list[ReachProblem]":
         names = (self.problem, *self.problems) if self.problem else self.problems
@@ -301,13 +301,13 @@ class EvaluationRequest(ProblemOptions):
         return list({problem.digest: problem for problem in problems}.values())
 
     def _problems_of(self, chosen: Sequence[Chosen]) -> "list[ReachProblem]":
-        """Problems that entrants were trained or chosen for, or all; the paper's come first."""
+        """Problems that contestants were trained or chosen for, or all; the paper's come first."""
         from kinarm.problem import PROBLEMS
 
         trained = [
-            self._changed(entrant.problem)
-            for entrant, best_for in chosen
-            if entrant.problem is not None and not best_for
+            self._changed(contestant.problem)
+            for contestant, best_for in chosen
+            if contestant.problem is not None and not best_for
         ]
         best = [problem for _, best_for in chosen for problem in best_for]
         own = {problem.digest: problem for problem in (*trained, *best)}

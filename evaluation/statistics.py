@@ -4,7 +4,7 @@ Written out here, because SciPy's statistics take longer to load than a policy t
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -122,3 +122,141 @@ def _quantile(ordered: NDArray[np.float64], share: float) -> NDArray[np.float64]
     quantile: NDArray[np.float64]
     quantile = (1 - beyond) * ordered[..., below] + beyond * ordered[..., below + 1]
     return quantile
+
+
+def estimate_text(estimate: Estimate) -> str:
+    """A statistic and its interval in words; a single seed has no interval."""
+    if estimate.value is None:
+        return "not measurable"
+    interval = "{:.3f}..{:.3f}".format(*estimate.ci95) if estimate.ci95 else "no interval"
+    return f"{estimate.value:.3f} ({interval})"
+
+
+class Term(NamedTuple):
+    """One part of a contrast of means.
+
+    Attributes
+    ----------
+    weight : float
+        By which its mean enters.
+    values : ndarray, shape (n_seeds, n_trials)
+        What every training seed got in every trial.
+    trials : hashable
+        Names the trials. Crossed ones have one name: terms were measured on the same trials, or
+        trial by trial on variants of them, such as the same places of another bench.
+    """
+
+    weight: float
+    values: NDArray[np.float64]
+    trials: Hashable = "crossed"
+
+
+def contrast(terms: Sequence[Term]) -> Estimate:
+    """Weighted sum of means over seeds and trials.
+
+    Seeds and trials are crossed random effects: all seeds of a recipe face the same trials. Several
+    recipes may face them as well, also on tasks whose trials differ in the bench only. The variance
+    is the variance of the seeds' means, in each term, plus that of the trials' weighted means, in
+    each set of crossed trials. Both contain the interaction of seed and trial, so the interval is
+    rather too wide. It is Student's, with the degrees of freedom of Welch and Satterthwaite.
+    """
+    value = sum(term.weight * float(term.values.mean()) for term in terms)
+    parts = [(term.weight**2 * _mean_variance(term.values.mean(axis=1))) for term in terms]
+    freedom = [term.values.shape[0] - 1 for term in terms]
+    for name in dict.fromkeys(term.trials for term in terms):
+        shared = [term.weight * term.values.mean(axis=0) for term in terms if term.trials == name]
+        per_trial = np.sum(shared, axis=0)
+        parts.append(_mean_variance(per_trial))
+        freedom.append(len(per_trial) - 1)
+    return student(value, zip(parts, freedom, strict=True))
+
+
+def student(value: float, components: Iterable[tuple[float, int]]) -> Estimate:
+    """Interval from independent components of the variance.
+
+    They are estimated variances that add up to that of the statistic, and their degrees of
+    freedom; without any freedom in one of them there is no interval.
+    """
+    from scipy.special import stdtrit
+
+    variances, freedom = (np.array(part, dtype=float) for part in zip(*components, strict=True))
+    if not freedom.all():
+        return Estimate(value, None)
+    total = float(variances.sum())
+    if not total:
+        return Estimate(value, (value, value))
+    effective = total**2 / float((variances**2 / freedom).sum())
+    reach = float(stdtrit(effective, (1 + LEVEL) / 2)) * total**0.5
+    return Estimate(value, (value - reach, value + reach))
+
+
+def mean_share(shares: NDArray[np.float64], n_trials: int) -> Estimate:
+    """Mean of the seeds' shares of trials.
+
+    The trials' part of the variance is that of a binomial share, with two hits and two misses
+    added (Agresti and Coull), so that it does not vanish where nothing or everything was hit.
+
+    Parameters
+    ----------
+    shares : ndarray, shape (n_seeds,)
+        Share of every seed.
+    n_trials : int
+        Trials of a seed; they count as if all seeds had met the same ones.
+    """
+    value = float(shares.mean())
+    moderate = (value * n_trials + 2) / (n_trials + 4)
+    binomial = moderate * (1 - moderate) / (n_trials + 4)
+    components = [(_mean_variance(shares), len(shares) - 1), (binomial, n_trials - 1)]
+    ci95 = student(value, components).ci95
+    return Estimate(value, ci95 and (max(ci95[0], 0.0), min(ci95[1], 1.0)))
+
+
+def share_over_seeds(hits: NDArray[Any]) -> Estimate:
+    """A share of trials and its 95 % interval.
+
+    That of one seed is Wilson's, about other trials. That of several covers those over seeds and
+    trials (`contrast`), which knows nothing where all seeds agree, and over trials alone.
+
+    Parameters
+    ----------
+    hits : ndarray, shape (n_seeds, n_trials)
+        Whether a trial hit, or the share of several trainings in which it did.
+    """
+    share = float(hits.mean())
+    low, high = wilson_interval(round(share * hits.shape[1]), hits.shape[1])
+    if len(hits) > 1:
+        crossed = contrast([Term(1.0, hits.astype(np.float64))]).ci95 or (share, share)
+        low, high = min(low, crossed[0]), max(high, crossed[1])
+    return Estimate(share, (max(low, 0.0), min(high, 1.0)))
+
+
+def superiority(pairs: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> Estimate:
+    """Probability that a member of the first group is below one of the second; ties count half.
+
+    Several comparisons of the same groups, such as with several measures, and then several pairs
+    of groups are averaged. The interval is Wilson's, for as many independent comparisons as the
+    smaller groups have members: the variance of the statistic is at most theirs (van Dantzig
+    1951), however few seeds there are.
+
+    Parameters
+    ----------
+    pairs : sequence of (ndarray, ndarray)
+        Groups of independent seeds, shape (n_measures, n_seeds) each; infinity stands for never.
+    """
+    from scipy.stats import norm
+
+    below = [
+        (first[:, :, None] < second[:, None]) + 0.5 * (first[:, :, None] == second[:, None])
+        for first, second in pairs
+    ]
+    value = float(np.mean([comparisons.mean() for comparisons in below]))
+    n = sum(min(first.shape[1], second.shape[1]) for first, second in pairs)
+    z2 = float(norm.ppf((1 + LEVEL) / 2)) ** 2
+    centre = (value + z2 / (2 * n)) / (1 + z2 / n)
+    reach = (z2 * (value * (1 - value) / n + z2 / (4 * n * n))) ** 0.5 / (1 + z2 / n)
+    return Estimate(value, (centre - reach, centre + reach))
+
+
+def _mean_variance(values: NDArray[np.float64]) -> float:
+    """Variance of the mean of independent values; 0 for a single one."""
+    return float(values.var(ddof=1)) / len(values) if len(values) > 1 else 0.0

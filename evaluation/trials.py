@@ -28,7 +28,7 @@ def trial_generator(seed: int, trial: int, stream: int = 0) -> np.random.Generat
     trial : int
         Number of the trial.
     stream : int
-        0 draws the trial itself; others are for entrants that act at random.
+        0 draws the trial itself; others are for contestants that act at random.
     """
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(trial, stream)))
 

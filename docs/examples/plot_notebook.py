@@ -56,4 +56,4 @@ from kinarm.evaluation import record
 from kinarm.viewer import replay_page
 
 worst = np.argsort(-evaluation.rollouts.distance)[:3]
-replay_page(record(evaluation.entrant, evaluation.trials, worst))
+replay_page(record(evaluation.contestant, evaluation.trials, worst))

@@ -13,13 +13,13 @@ to the oracle, which shows how they could have ended.
 # ------
 # A :py:class:`~kinarm.Recording` holds the states that the simulator went through.
 
-from kinarm.evaluation import TrialSet, find_entrants, oracle_bounds, record
+from kinarm.evaluation import TrialSet, find_contestants, oracle_bounds, record
 from kinarm.viewer import replay_page
 
 trials = TrialSet.draw("right", trials=200, seed=0)
 bounds = oracle_bounds(trials)
-(policy,) = find_entrants("ars-tuned-both-seed0")
-(oracle,) = find_entrants("oracle")
+(policy,) = find_contestants("ars-tuned-both-seed0")
+(oracle,) = find_contestants("oracle")
 recordings = record(policy, trials, bounds=bounds)
 collided = [each for each in recordings if each.outcome == "collision"]
 for each in collided:

@@ -25,7 +25,7 @@ examples:
   kinarm-eval --policy my_module:my_policy --problem left   a function of your own
 """
 
-HELD_NOTE = (
+HOLDING_NOTE = (
     "mm columns, held and closest are from trials that success does not end; contact "
     "counts as a miss; the oracle aims at 5 mm there"
 )
@@ -91,7 +91,7 @@ def _footnote(document: dict[str, Any]) -> str:
     if any(map(has_star, shown)):
         lines.append(REPLACED)
     if protocol["hold"]:
-        lines.append(HELD_NOTE)
+        lines.append(HOLDING_NOTE)
     hashes = (f"{problem} {entry['trial_set_hash']}" for problem, entry in problems)
     lines.append(f"trial sets: {', '.join(hashes)}")
     lines += dict.fromkeys(row["note"] for row in document["results"] if row["note"])

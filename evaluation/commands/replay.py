@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from kinarm._command_line import run_request
-from kinarm.evaluation.replays.request import ReplayRequest
+from kinarm.evaluation.replay.request import ReplayRequest
 
 EPILOG = """
 examples:

@@ -147,7 +147,7 @@ def _print_verdicts(claims: "Sequence[Claim]") -> None:
     """Print each claim, what was measured, and whether it holds."""
     from rich.table import Table
 
-    from kinarm.evaluation.intervals import estimate_text
+    from kinarm.evaluation.statistics import estimate_text
 
     table = Table("claim", "measured (95 %)", "claimed", "verdict", header_style="bold")
     for claim in claims:

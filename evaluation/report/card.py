@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 from kinarm._files import check_output, write_text
 from kinarm.errors import InvalidInputError
-from kinarm.evaluation.entrants import ORACLE, Entrant
+from kinarm.evaluation.contestants import ORACLE, Contestant
 from kinarm.evaluation.evaluation import Evaluation
 from kinarm.evaluation.metrics import METRICS, Metric
-from kinarm.evaluation.replays.recorder import record
+from kinarm.evaluation.replay.recorder import record
 from kinarm.evaluation.report.templating import template_environment
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import Provenance
@@ -29,7 +29,7 @@ class Row(NamedTuple):
 
 
 def check_card(
-    path: Path, pairs: Sequence[tuple[Entrant, ReachProblem]], *, overwrite: bool = False
+    path: Path, pairs: Sequence[tuple[Contestant, ReachProblem]], *, overwrite: bool = False
 ) -> None:
     """Check that there is one policy for a card, and that its files can be written.
 
@@ -40,9 +40,11 @@ def check_card(
     OutputError
         If a file exists, or cannot be written.
     """
-    faced = [(entrant, problem) for entrant, problem in pairs if entrant is not ORACLE]
+    faced = [(contestant, problem) for contestant, problem in pairs if contestant is not ORACLE]
     if len(faced) != 1 or faced[0][0].policy is None:
-        named = [f"{entrant.name} on {problem.name}" for entrant, problem in faced] or ["oracle"]
+        named = [f"{contestant.name} on {problem.name}" for contestant, problem in faced] or [
+            "oracle"
+        ]
         more = f" and {len(named) - 3} more" if len(named) > 3 else ""
         raise InvalidInputError(
             "a card is of one trained policy on one problem: choose it with --policy and "
@@ -72,13 +74,13 @@ def write_card(path: Path, document: Mapping[str, Any], evaluations: Sequence[Ev
     OutputError
         If a file cannot be written.
     """
-    (evaluation,) = (each for each in evaluations if each.entrant is not ORACLE)
+    (evaluation,) = (each for each in evaluations if each.contestant is not ORACLE)
     write_text(path, policy_card(path.stem, document, evaluation))
     own = path.with_suffix(".npz")
-    if evaluation.entrant.source != own.resolve():
+    if evaluation.contestant.source != own.resolve():
         _policy_of(evaluation).save(own)
     options: dict[str, Any] = {"bounds": evaluation.bounds, "allow_other_arm": True}
-    shown = record(evaluation.entrant, evaluation.trials, shown_trials(evaluation), **options)
+    shown = record(evaluation.contestant, evaluation.trials, shown_trials(evaluation), **options)
     replay_page(shown).save(path.with_suffix(".html"))
 
 
@@ -103,7 +105,7 @@ def policy_card(name: str, document: Mapping[str, Any], evaluation: Evaluation) 
         network=_network(policy),
         settings=_settings(policy.provenance.config),
         problem=evaluation.problem.pinned,
-        rows=figure_rows(rows[evaluation.entrant.name], oracle),
+        rows=figure_rows(rows[evaluation.contestant.name], oracle),
         has_oracle=oracle is not None,
         entry=document["protocol"]["problems"][evaluation.problem.name],
         protocol=document["protocol"],
@@ -131,10 +133,10 @@ def shown_trials(evaluation: Evaluation) -> list[int]:
 
 def _policy_of(evaluation: Evaluation) -> Policy:
     """The trained policy that was evaluated."""
-    entrant = evaluation.entrant
-    if entrant.policy is None:
-        raise InvalidInputError(f"a card is of a trained policy, got {entrant.name!r}")
-    return entrant.policy
+    contestant = evaluation.contestant
+    if contestant.policy is None:
+        raise InvalidInputError(f"a card is of a trained policy, got {contestant.name!r}")
+    return contestant.policy
 
 
 def _settings(config: Mapping[str, Any], prefix: str = "") -> list[tuple[str, str]]:

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.evaluation.figures import BIN_WIDTH
-from kinarm.evaluation.intervals import share_over_seeds
 from kinarm.evaluation.metrics import LIMITS
 from kinarm.evaluation.report.groups import Group, ProblemResults
 from kinarm.evaluation.report.svg import Drawing, draw, style
+from kinarm.evaluation.statistics import share_over_seeds
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

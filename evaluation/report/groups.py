@@ -22,7 +22,7 @@ PAGE_COLOURS = 6
 PAGE_DASHES = 4
 
 UNTRAINED_ALGORITHMS = ("baseline", "oracle")
-"""Algorithms of the entrants that policies are compared with."""
+"""Algorithms of the contestants that policies are compared with."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +120,7 @@ def group_results(
     InvalidInputError
         If the document was made of others.
     """
-    known = {(each.entrant.name, each.problem.name): each for each in evaluations}
+    known = {(each.contestant.name, each.problem.name): each for each in evaluations}
     if list(known) != [(row["policy"], row["problem"]) for row in document["results"]]:
         raise InvalidInputError("a report needs the document of the very evaluations that it shows")
     labels = series_labels(evaluations)
@@ -138,11 +138,11 @@ def group_results(
 
 def _styles(labels: Sequence[str], evaluations: Sequence[Evaluation]) -> dict[str, str]:
     """Classes by what the seeds and problems of a recipe share, in the order of appearance."""
-    entrants = {label: each.entrant for label, each in zip(labels, evaluations, strict=True)}
+    contestants = {label: each.contestant for label, each in zip(labels, evaluations, strict=True)}
     styles, policies = {}, 0
-    for label, entrant in entrants.items():
-        if entrant.algorithm in UNTRAINED_ALGORITHMS:
-            styles[label] = f"reference {entrant.name}"
+    for label, contestant in contestants.items():
+        if contestant.algorithm in UNTRAINED_ALGORITHMS:
+            styles[label] = f"reference {contestant.name}"
         else:
             styles[label] = (
                 f"colour{policies % PAGE_COLOURS} dash{policies // PAGE_COLOURS % PAGE_DASHES}"

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kinarm._files import check_folder, write_text
-from kinarm.evaluation.entrants import ORACLE
+from kinarm.evaluation.contestants import ORACLE
 from kinarm.evaluation.evaluation import Evaluation
 from kinarm.evaluation.failures import cause_words
 from kinarm.evaluation.outcomes import EARLY_STEPS

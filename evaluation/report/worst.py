@@ -5,7 +5,7 @@ from itertools import islice
 from typing import Any, NamedTuple
 
 from kinarm.evaluation.evaluation import Evaluation
-from kinarm.evaluation.replays.recorder import record
+from kinarm.evaluation.replay.recorder import record
 from kinarm.evaluation.report.groups import Group, ProblemResults
 from kinarm.evaluation.report.maps import OUTCOME_WORDS
 from kinarm.recording import Recording
@@ -68,7 +68,7 @@ def worst_row(results: ProblemResults, worst: WorstTrial) -> dict[str, Any]:
     if results.entry["oracle"]:
         figures["oracle steps"] = oracle_steps(results, trial)
     return {
-        "policy": worst.evaluation.entrant.name,
+        "policy": worst.evaluation.contestant.name,
         "style": worst.group.style,
         "trial": trial,
         "figures": figures,
@@ -106,6 +106,6 @@ def record_worst(chosen: Sequence[WorstTrial]) -> list[Recording]:
     for each, trials in numbers.items():
         # Whether a policy may face another arm was checked when the evaluation was made.
         options: dict[str, Any] = {"bounds": each.bounds, "allow_other_arm": True}
-        for recording in record(each.entrant, each.trials, trials, **options):
+        for recording in record(each.contestant, each.trials, trials, **options):
             recordings[each, recording.trial] = recording
     return [recordings[worst.evaluation, worst.trial] for worst in chosen]

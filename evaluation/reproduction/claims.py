@@ -8,7 +8,6 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.evaluation.intervals import Term, contrast, mean_share, superiority
 from kinarm.evaluation.reproduction.results import Results
 from kinarm.evaluation.reproduction.runs import TrainedRun
 from kinarm.evaluation.reproduction.study import (
@@ -19,7 +18,7 @@ from kinarm.evaluation.reproduction.study import (
     Purpose,
     Reading,
 )
-from kinarm.evaluation.statistics import Estimate
+from kinarm.evaluation.statistics import Estimate, Term, contrast, mean_share, superiority
 
 Verdict = Literal["holds", "does not hold", "undecided", "not judged"]
 

@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.evaluation.bounds import oracle_bounds
-from kinarm.evaluation.intervals import estimate_text
 from kinarm.evaluation.markdown import markdown_table
 from kinarm.evaluation.reproduction.claims import LEARNING_LEVELS, Claim, steps_to_levels
 from kinarm.evaluation.reproduction.results import Results
 from kinarm.evaluation.reproduction.runs import TrainedRun
 from kinarm.evaluation.reproduction.study import LEARNERS, LITERAL, NEAR, Reading
+from kinarm.evaluation.statistics import estimate_text
 from kinarm.problem import PROBLEMS
 
 MARKS = {"holds": "holds", "does not hold": "no", "undecided": "?", "not judged": ""}

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.evaluation.figures import COLOURS, DASHES, draw_band
-from kinarm.evaluation.intervals import share_over_seeds
-from kinarm.evaluation.statistics import Estimate
+from kinarm.evaluation.statistics import Estimate, share_over_seeds
 from kinarm.evaluation.studies.planning import PlannedRun
 from kinarm.evaluation.studies.runs import TrainedRun
 from kinarm.evaluation.studies.table import Group, identity, shorter, shown

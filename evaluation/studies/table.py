@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from kinarm._files import write_atomically, write_text
 from kinarm.errors import MissingExtraError
-from kinarm.evaluation.intervals import share_over_seeds
 from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.outcomes import Outcomes
-from kinarm.evaluation.statistics import Estimate
+from kinarm.evaluation.statistics import Estimate, share_over_seeds
 from kinarm.evaluation.studies.planning import PlannedRun
 from kinarm.evaluation.studies.runs import TrainedRun, TrialBounds
 from kinarm.policies.config import TrainingConfig

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from kinarm.evaluation.bounds import oracle_bounds
+from kinarm.evaluation.contestants import ORACLE, find_contestants
 from kinarm.evaluation.document import evaluation_document
-from kinarm.evaluation.entrants import ORACLE, find_entrants
 from kinarm.evaluation.evaluation import run_trials
 from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.report.groups import group_results
@@ -33,8 +33,8 @@ def evaluations():
     for problem, names in (("right", ("ars-tuned-both", "ppo-tuned-both")), ("both", ("zero",))):
         trials = TrialSet.draw(problem, 20, seed=3)
         oracle_bounds(trials)
-        entrants = [each for name in names for each in find_entrants(name)]
-        made += [run_trials(each, trials, oracle=True) for each in (*entrants, ORACLE)]
+        contestants = [each for name in names for each in find_contestants(name)]
+        made += [run_trials(each, trials, oracle=True) for each in (*contestants, ORACLE)]
     return made
 
 
@@ -149,7 +149,7 @@ def test_a_row_chooses_the_trial(visit, chosen, settings):
         page.locator(f"tr[data-replay='{place}'] th").click()
         state = page.evaluate(f"{PLAYER}.state")
         assert (state["policy"], state["problem"], state["trial"]) == (
-            chosen[place].evaluation.entrant.name,
+            chosen[place].evaluation.contestant.name,
             chosen[place].evaluation.problem.name,
             chosen[place].trial,
         )

@@ -31,7 +31,7 @@ from kinarm.evaluation.commands import (
     reproduce,
     study,
 )
-from kinarm.evaluation.replays.request import ReplayRequest
+from kinarm.evaluation.replay.request import ReplayRequest
 from kinarm.policies import train
 
 from .judging import Judge, Verdict, unfit

@@ -15,7 +15,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from kinarm.evaluation import TrialSet, evaluate, find_entrants, oracle_bounds, record
+from kinarm.evaluation import TrialSet, evaluate, find_contestants, oracle_bounds, record
 from kinarm.policies import load_checkpoint, recipe, save_checkpoint, sb3_vec_env, train_policy
 from kinarm.problem import PROBLEMS
 from kinarm.recording import load_recordings, save_recordings
@@ -123,7 +123,7 @@ def evaluations(run: LongRun) -> None:
     evaluate("ppo-tuned-both", trials=20, seed=run.round)
     trials = TrialSet.draw("right", 4, seed=run.round)
     bounds = oracle_bounds(trials)
-    rollouts = find_entrants("ars-tuned-both")[0].run(trials)
+    rollouts = find_contestants("ars-tuned-both")[0].run(trials)
     assert (rollouts.steps >= bounds.steps_lower_bound)[rollouts.success].all()
     run.count("evaluated trials", 124)
 
@@ -131,7 +131,7 @@ def evaluations(run: LongRun) -> None:
 def replays(run: LongRun) -> None:
     """Record trials, write them and their page, and read them again."""
     trials = TrialSet.draw("both", 3, seed=run.round)
-    recordings = record(find_entrants("ppo-tuned-both")[0], trials)
+    recordings = record(find_contestants("ppo-tuned-both")[0], trials)
     file, page = run.folder / "three.npz", run.folder / "three.html"
     save_recordings(file, recordings)
     replay_page(load_recordings(file)).save(page)
@@ -143,7 +143,7 @@ def replays(run: LongRun) -> None:
 def live_pages(run: LongRun) -> None:
     """Move an arm on the page that lasts and on a new one, while clients come and go."""
     starts, goals = run.simulator.sample(np.random.default_rng(run.round), 2)
-    policy = find_entrants("ars-tuned-both")[0].policy
+    policy = find_contestants("ars-tuned-both")[0].policy
     rollouts = run.simulator.rollout(policy, starts, goals, record=True)
     with LiveServer(PORT) as passing:
         assert passing.port != run.stage.server.port

@@ -14,8 +14,8 @@ import numpy as np
 from kinarm.evaluation.comparison.learners import read_learners
 from kinarm.evaluation.comparison.runs import CurvePoint, PlannedRun, planned_runs, save_run
 from kinarm.evaluation.comparison.runs import Protocol as ComparisonProtocol
+from kinarm.evaluation.contestants import find_contestants
 from kinarm.evaluation.document import document_text, evaluation_document
-from kinarm.evaluation.entrants import find_entrants
 from kinarm.evaluation.evaluation import run_trials
 from kinarm.evaluation.reproduction.runs import RunStore, TrainedRun
 from kinarm.evaluation.reproduction.study import PlannedTraining, Study, quick_study
@@ -77,8 +77,8 @@ def evaluations() -> list[bytes]:
     """An ``evaluation.json`` with the oracle's bounds, one without, one with held trials."""
     found = []
     for parts in ({"oracle": True}, {}, {"hold": True}):
-        entrant = find_entrants("ars-tuned-both")[0]
-        document = evaluation_document([run_trials(entrant, trials(), **parts)], "kinarm-eval")
+        contestant = find_contestants("ars-tuned-both")[0]
+        document = evaluation_document([run_trials(contestant, trials(), **parts)], "kinarm-eval")
         found.append(document_text(document).encode())
     return found
 

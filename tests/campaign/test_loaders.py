@@ -55,7 +55,7 @@ OTHERS = {
 """Functions that call one of these, but are no loaders, and why."""
 
 OWN_DATA = (
-    *("kinarm.viewer.html_page", "kinarm.viewer.live", "evaluation.report", "evaluation.replays"),
+    *("kinarm.viewer.html_page", "kinarm.viewer.live", "evaluation.report", "evaluation.replay"),
     *("evaluation.measurements", "evaluation.reproduction.document", "policies.learners"),
     "evaluation.schemas",
     *(

@@ -22,8 +22,8 @@ from kinarm.problem import PROBLEMS
 def test_json_alone_is_printed_and_equals_the_library(evaluated, policy_folder):
     document = evaluated("--policy", policy_folder / "mine-seed0.npz", "--trials", 9, "--seed", 4)
     expected, oracle = (
-        evaluate(entrant, "right", trials=9, seed=4, oracle=True)
-        for entrant in (policy_folder / "mine-seed0.npz", "oracle")
+        evaluate(contestant, "right", trials=9, seed=4, oracle=True)
+        for contestant in (policy_folder / "mine-seed0.npz", "oracle")
     )
     rows = json.loads(json.dumps([expected.to_json(), oracle.to_json()]))
     assert document["results"] == rows
@@ -191,7 +191,7 @@ def test_bad_numbers_are_refused_where_the_request_is_made(settings):
 def test_changes_apply_to_what_policies_were_trained_for(policy_folder):
     files = tuple(str(policy_folder / f"{name}.npz") for name in ("lefty", "mine-seed0"))
     request = EvaluationRequest(policies=(*files, "zero"), tolerance=0.2, oracle=False)
-    faced = [(entrant.name, problem) for entrant, problem in request.pairs()]
+    faced = [(contestant.name, problem) for contestant, problem in request.pairs()]
     assert [(name, problem.name) for name, problem in faced] == [
         ("lefty", "left"),
         ("zero", "left"),
@@ -216,7 +216,7 @@ def test_a_problem_file(evaluated, policy_folder, tmp_path):
     assert entries["lax"]["starts"] == entries["right"]["starts"]
 
 
-def test_held_trials_are_told_beside_the_others(run, evaluated, policy_folder):
+def test_holding_trials_are_told_beside_the_others(run, evaluated, policy_folder):
     arguments = ("--policy", policy_folder / "mine-seed0.npz", "--trials", 6)
     plain, held = evaluated(*arguments), evaluated(*arguments, "--hold")
     assert (plain["protocol"]["hold"], held["protocol"]["hold"]) == (False, True)
@@ -231,7 +231,7 @@ def test_held_trials_are_told_beside_the_others(run, evaluated, policy_folder):
     assert "held %" not in run("kinarm-eval", *arguments).out
 
 
-def test_held_figures_fit_a_narrow_terminal():
+def test_holding_figures_fit_a_narrow_terminal():
     document = EvaluationRequest(
         policies=("zero",), problem="left", trials=3, hold=True, oracle=False
     ).run()

@@ -101,7 +101,7 @@ def test_a_trained_policy_can_be_evaluated(run, tmp_path):
     assert run("kinarm-train", "ppo", *arguments, "--out", out).status == 0
     evaluation = evaluate(out, trials=3)
     assert (evaluation.problem.name, len(evaluation.rollouts)) == ("both", 3)
-    assert evaluation.entrant.algorithm == "ppo"
+    assert evaluation.contestant.algorithm == "ppo"
 
 
 @pytest.mark.parametrize("name", ["paper", "tuned"])

@@ -10,7 +10,7 @@ import pytest
 from trial_bounds import draw
 
 from kinarm.evaluation.bounds import oracle_bounds
-from kinarm.evaluation.entrants import BASELINES, Entrant
+from kinarm.evaluation.contestants import BASELINES, Contestant
 from kinarm.evaluation.evaluation import Evaluation, run_trials
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies import Policy, recipe, train_policy
@@ -43,7 +43,7 @@ def trials() -> TrialSet:
 
 @pytest.fixture(scope="session")
 def skilled_evaluation(skilled: Policy, trials: TrialSet) -> Evaluation:
-    return run_trials(Entrant.from_policy("skilled", skilled), trials)
+    return run_trials(Contestant.from_policy("skilled", skilled), trials)
 
 
 @pytest.fixture(scope="session")
@@ -58,9 +58,12 @@ def evaluations(
     provenance = replace(skilled.provenance, config=settings)
     made["made-right-seed1"] = replace(skilled, provenance=provenance)
     return [
-        *(run_trials(Entrant.from_policy(name, policy), trials) for name, policy in made.items()),
+        *(
+            run_trials(Contestant.from_policy(name, policy), trials)
+            for name, policy in made.items()
+        ),
         run_trials(BASELINES["zero"], trials),
-        run_trials(Entrant.from_policy("made-left-seed0", train_novice("left")), left),
+        run_trials(Contestant.from_policy("made-left-seed0", train_novice("left")), left),
     ]
 
 
@@ -83,7 +86,7 @@ def made_up(skilled_evaluation: Evaluation) -> Callable[[Sequence[float]], Evalu
     def make(distances: Sequence[float]) -> Evaluation:
         chosen = np.resize(np.asarray(distances, dtype=float), len(skilled_evaluation.trials))
         rollouts = replace(skilled_evaluation.rollouts, distance=chosen)
-        return Evaluation(skilled_evaluation.entrant, skilled_evaluation.trials, rollouts)
+        return Evaluation(skilled_evaluation.contestant, skilled_evaluation.trials, rollouts)
 
     return make
 

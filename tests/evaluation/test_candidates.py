@@ -5,11 +5,11 @@ import pytest
 from kinarm._files import write_text
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation import ReplayRequest
+from kinarm.evaluation.contestants import Contestant
 from kinarm.evaluation.document import document_text, evaluation_document
-from kinarm.evaluation.entrants import Entrant
 from kinarm.evaluation.evaluation import run_trials
-from kinarm.evaluation.replays.candidates import find_candidates
-from kinarm.evaluation.replays.runs import FacedRun
+from kinarm.evaluation.replay.candidates import find_candidates
+from kinarm.evaluation.replay.runs import FacedRun
 from kinarm.evaluation.trials import TrialSet
 
 
@@ -18,7 +18,7 @@ def of_a_file(train_novice, tmp_path):
     """An evaluation of a policy in a file, and that file."""
     path, policy = tmp_path / "mine.npz", train_novice("right")
     policy.save(path)
-    faced = [run_trials(Entrant.from_policy("mine", policy, path), TrialSet.draw("right", 5, 0))]
+    faced = [run_trials(Contestant.from_policy("mine", policy, path), TrialSet.draw("right", 5, 0))]
     write_text(tmp_path / "evaluation.json", document_text(evaluation_document(faced, "")))
     return tmp_path / "evaluation.json", path
 

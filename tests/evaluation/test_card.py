@@ -8,8 +8,8 @@ import pytest
 
 from kinarm.errors import InvalidInputError, OutputError
 from kinarm.evaluation.bounds import oracle_bounds
+from kinarm.evaluation.contestants import BASELINES, ORACLE, Contestant
 from kinarm.evaluation.document import evaluation_document
-from kinarm.evaluation.entrants import BASELINES, ORACLE, Entrant
 from kinarm.evaluation.evaluation import run_trials
 from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.report.card import (
@@ -27,7 +27,7 @@ from kinarm.problem import PROBLEMS
 def faced(skilled, trials):
     """A policy and the oracle on the same trials."""
     oracle_bounds(trials)
-    mine = run_trials(Entrant.from_policy("mine", skilled), trials, oracle=True)
+    mine = run_trials(Contestant.from_policy("mine", skilled), trials, oracle=True)
     return [mine, run_trials(ORACLE, trials, oracle=True)]
 
 
@@ -109,7 +109,9 @@ def test_how_to_use_it_runs(card, document, faced, tmp_path, monkeypatch):
     exec(re.search(r"```python\n(.*?)```", card, re.DOTALL).group(1), scope)
     assert scope["info"]["distance"] > 0
     own = load_policy("mine.npz")
-    np.testing.assert_array_equal(own.layers[0].weights, faced[0].entrant.policy.layers[0].weights)
+    np.testing.assert_array_equal(
+        own.layers[0].weights, faced[0].contestant.policy.layers[0].weights
+    )
     assert "mine.html" in card
     assert (tmp_path / "mine.html").stat().st_size > 1e5
 
@@ -133,7 +135,7 @@ def test_without_the_oracle(faced, document):
 def test_says_it_if_the_problem_is_another_one(skilled, trials):
     harder = PROBLEMS["right"].replace(tolerance=0.03, name="harder")
     other = trials.draw(harder, 4, 0)
-    evaluation = run_trials(Entrant.from_policy("mine", skilled), other)
+    evaluation = run_trials(Contestant.from_policy("mine", skilled), other)
     text = policy_card("mine", evaluation_document([evaluation], "made"), evaluation)
     assert "it was trained for another one, `right`" in text
     assert "within 0.03 m" in text
@@ -142,7 +144,7 @@ def test_says_it_if_the_problem_is_another_one(skilled, trials):
 class TestCheck:
     @pytest.fixture
     def mine(self, skilled):
-        return Entrant.from_policy("mine", skilled), PROBLEMS["right"]
+        return Contestant.from_policy("mine", skilled), PROBLEMS["right"]
 
     def test_one_policy_beside_the_oracle(self, mine, tmp_path):
         check_card(tmp_path / "mine.md", [mine, (ORACLE, PROBLEMS["right"])])
@@ -153,9 +155,9 @@ class TestCheck:
             check_card(tmp_path / "mine.md", [mine] * count)
 
     def test_baselines_and_the_oracle_are_refused(self, tmp_path):
-        for entrant, name in ((BASELINES["zero"], "zero on right"), (ORACLE, "oracle")):
+        for contestant, name in ((BASELINES["zero"], "zero on right"), (ORACLE, "oracle")):
             with pytest.raises(InvalidInputError, match=f"one trained policy.*got {name}"):
-                check_card(tmp_path / "mine.md", [(entrant, PROBLEMS["right"])])
+                check_card(tmp_path / "mine.md", [(contestant, PROBLEMS["right"])])
 
     def test_what_exists_is_kept(self, mine, tmp_path):
         for name in ("mine.md", "mine.html", "mine.npz"):
@@ -166,9 +168,9 @@ class TestCheck:
             (tmp_path / name).unlink()
 
     def test_the_policy_s_own_file_may_lie_there(self, mine, tmp_path):
-        entrant, problem = mine
-        entrant.policy.save(tmp_path / "mine.npz")
-        there = replace(entrant, source=(tmp_path / "mine.npz").resolve())
+        contestant, problem = mine
+        contestant.policy.save(tmp_path / "mine.npz")
+        there = replace(contestant, source=(tmp_path / "mine.npz").resolve())
         check_card(tmp_path / "mine.md", [(there, problem)])
 
     def test_its_name_ends_in_md(self, mine, tmp_path):

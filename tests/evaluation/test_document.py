@@ -9,8 +9,8 @@ from rich.console import Console
 
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.bounds import bounds_document
+from kinarm.evaluation.contestants import ORACLE, Contestant
 from kinarm.evaluation.document import evaluation_document
-from kinarm.evaluation.entrants import ORACLE, Entrant
 from kinarm.evaluation.evaluation import evaluate, run_trials
 from kinarm.evaluation.metrics import METRICS, Metric
 from kinarm.evaluation.table import print_table
@@ -89,7 +89,7 @@ def test_every_result_has_every_field(document):
         assert list(row["metrics"]) == list(METRICS)
         for name, metric in METRICS.items():
             value, ci95 = row["metrics"][name]["value"], row["metrics"][name]["ci95"]
-            told = metric.interval is not None and not metric.needs_held
+            told = metric.interval is not None and not metric.needs_holding
             assert (ci95 is not None) == told, name
             if ci95:
                 assert ci95[0] <= value <= ci95[1], name
@@ -231,7 +231,7 @@ def test_table_is_sorted_by_success(document):
 
 def test_table_keeps_a_policy_beside_a_group_of_its_recipe(evaluations, skilled, trials):
     """One's own policy does not vanish because shipped seeds share its recipe."""
-    mine = run_trials(Entrant.from_policy("mine", skilled), trials)
+    mine = run_trials(Contestant.from_policy("mine", skilled), trials)
     document = evaluation_document([*evaluations, mine], "")
     assert "mine" in [row["policy"] for row in shown(document)]
 
@@ -278,7 +278,7 @@ def test_a_new_metric_is_one_entry(evaluations, monkeypatch):
         spread_heading="spread of it %",
     )
     monkeypatch.setitem(METRICS, "within_0.5", metric)
-    again = [type(each)(each.entrant, each.trials, each.rollouts) for each in evaluations]
+    again = [type(each)(each.contestant, each.trials, each.rollouts) for each in evaluations]
     document = evaluation_document(again, "")
     for row, evaluation in zip(document["results"], again, strict=True):
         assert row["metrics"]["within_0.5"] == evaluation.within(0.5).to_json()

@@ -10,7 +10,7 @@ from reseeded import reseeded
 
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError, UnknownNameError
-from kinarm.evaluation.entrants import BASELINES, Entrant
+from kinarm.evaluation.contestants import BASELINES, Contestant
 from kinarm.evaluation.evaluation import evaluate, pool, run_trials
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle import Oracle
@@ -127,9 +127,9 @@ def test_the_random_baseline_moves_differently_in_every_trial_and_seed():
     assert len(np.unique(moved.round(9), axis=0)) == len(moved)
 
 
-def test_every_entrant_faces_the_same_trials(skilled):
-    entrants = ("zero", "random", skilled, lambda observations: np.ones((len(observations), 5)))
-    made = [evaluate(entrant, "right", trials=8, seed=3).trials for entrant in entrants]
+def test_every_contestant_faces_the_same_trials(skilled):
+    contestants = ("zero", "random", skilled, lambda observations: np.ones((len(observations), 5)))
+    made = [evaluate(contestant, "right", trials=8, seed=3).trials for contestant in contestants]
     assert len({trials.digest for trials in made}) == 1
 
 
@@ -148,7 +148,7 @@ def test_a_policy_faces_its_own_problem_by_default(train_novice):
 def test_a_policy_file_does_as_the_policy_does(skilled, tmp_path):
     skilled.save(tmp_path / "mine.npz")
     from_file, direct = (evaluate(p, trials=10) for p in (tmp_path / "mine.npz", skilled))
-    assert from_file.entrant.name == "mine"
+    assert from_file.contestant.name == "mine"
     np.testing.assert_array_equal(from_file.rollouts.distance, direct.rollouts.distance)
 
 
@@ -157,7 +157,7 @@ def test_a_function_does_as_the_policy_in_it_does(skilled):
         return skilled(observations)
 
     function, compiled = (evaluate(p, "right", trials=40) for p in (wrapped, skilled))
-    assert (function.entrant.name, function.entrant.policy) == ("wrapped", None)
+    assert (function.contestant.name, function.contestant.policy) == ("wrapped", None)
     np.testing.assert_array_equal(function.rollouts.steps, compiled.rollouts.steps)
     np.testing.assert_allclose(function.rollouts.distance, compiled.rollouts.distance, atol=1e-9)
 
@@ -178,9 +178,9 @@ def test_a_function_with_bad_actions_is_refused(actions):
         evaluate(lambda _: actions, "right", trials=3)
 
 
-def test_an_entrant_can_be_put_to_the_trials_directly(skilled):
-    entrant = Entrant.from_policy("mine", skilled)
-    assert evaluate(entrant, trials=2).entrant is entrant
+def test_an_contestant_can_be_put_to_the_trials_directly(skilled):
+    contestant = Contestant.from_policy("mine", skilled)
+    assert evaluate(contestant, trials=2).contestant is contestant
 
 
 def test_a_problem_of_ones_own(skilled):
@@ -199,8 +199,8 @@ def test_a_policy_for_another_arm_is_refused_unless_allowed(skilled):
 def test_run_trials_refuses_another_arm_too(skilled):
     trials = TrialSet.draw(PROBLEMS["right"].replace(arm="lrmate200ic_5l"), 2, 0)
     with pytest.raises(PolicyFileError, match="trained for arm"):
-        run_trials(Entrant.from_policy("mine", skilled), trials)
-    assert len(run_trials(Entrant.from_policy("mine", skilled), trials, True).rollouts) == 2
+        run_trials(Contestant.from_policy("mine", skilled), trials)
+    assert len(run_trials(Contestant.from_policy("mine", skilled), trials, True).rollouts) == 2
 
 
 def test_run_trials_on_a_scene_of_ones_own():
@@ -234,14 +234,16 @@ def test_bad_arguments_are_refused(arguments, error, message):
 def test_pooling_gathers_training_seeds_of_a_problem(evaluations):
     (pooled,) = pool(evaluations)
     assert (pooled.name, pooled.problem.name, len(pooled.members)) == ("made-right", "right", 3)
-    assert [member.entrant.name for member in pooled.members] == [
+    assert [member.contestant.name for member in pooled.members] == [
         f"made-right-seed{seed}" for seed in (0, 1, 2)
     ]
 
 
 def test_pooling_keeps_problems_apart(skilled):
-    entrants = [Entrant.from_policy(f"mine-seed{seed}", reseeded(skilled, seed)) for seed in (0, 1)]
-    made = [evaluate(e, task, trials=2) for e in entrants for task in ("left", "right")]
+    contestants = [
+        Contestant.from_policy(f"mine-seed{seed}", reseeded(skilled, seed)) for seed in (0, 1)
+    ]
+    made = [evaluate(e, task, trials=2) for e in contestants for task in ("left", "right")]
     assert [(p.name, p.problem.name, len(p.members)) for p in pool(made)] == [
         ("mine", "left", 2),
         ("mine", "right", 2),
@@ -299,7 +301,7 @@ def test_texts_of_evaluations_are_one_readable_line(evaluations, trials):
     assert repr(evaluations[3]).startswith("Evaluation(zero on 60 trials of right, success 0 (0..")
     (pooled,) = pool(evaluations)
     assert repr(pooled).startswith("PooledEvaluation(3 seeds of made-right on 60 trials of right,")
-    for made in (trials, pooled, *evaluations, *(each.entrant for each in evaluations)):
+    for made in (trials, pooled, *evaluations, *(each.contestant for each in evaluations)):
         assert len(repr(made)) < 130
         assert "\n" not in repr(made)
 

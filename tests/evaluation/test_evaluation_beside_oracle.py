@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinarm.errors import InvalidInputError, PolicyFileError
-from kinarm.evaluation.entrants import BASELINES, ORACLE, Entrant, find_entrants
+from kinarm.evaluation.contestants import BASELINES, ORACLE, Contestant, find_contestants
 from kinarm.evaluation.evaluation import evaluate, pool, run_trials
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle import Oracle
@@ -129,8 +129,8 @@ def test_trials_are_solved_once_for_all_who_face_them(skilled, monkeypatch):
         Oracle, "solve_batch", lambda *args, **kw: calls.append(1) or solve(*args, **kw)
     )
     trials = TrialSet.draw("right", 3, seed=77)
-    for entrant in (Entrant.from_policy("mine", skilled), ORACLE, BASELINES["zero"]):
-        run_trials(entrant, trials, oracle=True)
+    for contestant in (Contestant.from_policy("mine", skilled), ORACLE, BASELINES["zero"]):
+        run_trials(contestant, trials, oracle=True)
     assert len(calls) == 1
 
 
@@ -141,7 +141,7 @@ def test_a_policy_for_another_arm_is_refused_before_the_oracle_is_asked(skilled,
 
 
 def test_pooled_step_ratio_is_over_all_seeds(trials):
-    members = [run_trials(e, trials, oracle=True) for e in find_entrants("ars-tuned-both")]
+    members = [run_trials(e, trials, oracle=True) for e in find_contestants("ars-tuned-both")]
     relative, median, p95 = oracle_figures(pool(members)[0])
     ratios = [
         member.rollouts.steps[trial] / member.bounds.steps_lower_bound[trial]

@@ -62,7 +62,7 @@ def test_time_to_reach_is_of_the_trials_that_succeeded(skilled_evaluation):
 
 
 def test_the_worst_seed_is_named(evaluations):
-    rates = {each.entrant.name: each.success.value for each in evaluations[:3]}
+    rates = {each.contestant.name: each.success.value for each in evaluations[:3]}
     worst = pool(evaluations)[0].to_json()["worst_seed"]
     assert rates[worst["policy"]] == worst["success"]["value"] == min(rates.values())
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.patches import StepPatch
 
-from kinarm.evaluation.entrants import BASELINES, Entrant
+from kinarm.evaluation.contestants import BASELINES, Contestant
 from kinarm.evaluation.evaluation import run_trials
 from kinarm.evaluation.figures import distance_histograms, save_figure, series_labels
 from kinarm.evaluation.trials import TrialSet
@@ -94,8 +94,8 @@ def test_a_recipe_keeps_its_colour_in_every_panel(skilled, train_novice, evaluat
     right, left = evaluations[0].trials, evaluations[-1].trials
     made = [
         run_trials(BASELINES["zero"], right),
-        run_trials(Entrant.from_policy("ars-tuned-right-seed0", skilled), right),
-        run_trials(Entrant.from_policy("ars-tuned-left-seed0", train_novice("left")), left),
+        run_trials(Contestant.from_policy("ars-tuned-right-seed0", skilled), right),
+        run_trials(Contestant.from_policy("ars-tuned-left-seed0", train_novice("left")), left),
         run_trials(BASELINES["zero"], left),
     ]
     first, second = (
@@ -108,25 +108,25 @@ def test_a_recipe_keeps_its_colour_in_every_panel(skilled, train_novice, evaluat
 
 def test_groups_of_a_panel_can_be_told_apart(trials, train_novice):
     """Policies of one recipe, trained on two tasks, and one's own, all on the same task."""
-    entrants = [
-        Entrant.from_policy("ars-tuned-right-seed0", train_novice("right")),
-        Entrant.from_policy("ars-tuned-left-seed0", train_novice("left")),
-        Entrant.from_policy("mine", train_novice("right", 2, named="paper")),
+    contestants = [
+        Contestant.from_policy("ars-tuned-right-seed0", train_novice("right")),
+        Contestant.from_policy("ars-tuned-left-seed0", train_novice("left")),
+        Contestant.from_policy("mine", train_novice("right", 2, named="paper")),
     ]
-    (axes,) = distance_histograms([run_trials(e, trials) for e in entrants]).axes
+    (axes,) = distance_histograms([run_trials(e, trials) for e in contestants]).axes
     assert len(set(legend(axes))) == 3
     assert len({patch.get_edgecolor() for patch in stairs(axes)}) == 3
 
 
 def test_a_symmetric_policy_has_one_name_on_all_its_problems(train_novice):
-    symmetric = Entrant.from_policy("ars-tuned-both-seed0", train_novice("both"))
-    plain = Entrant.from_policy("ars-paper-both-seed0", train_novice("both", named="paper"))
+    symmetric = Contestant.from_policy("ars-tuned-both-seed0", train_novice("both"))
+    plain = Contestant.from_policy("ars-paper-both-seed0", train_novice("both", named="paper"))
     trial_sets = [TrialSet.draw(name, 4, seed=0) for name in PROBLEMS]
     trial_sets.append(TrialSet.draw(PROBLEMS["right"].replace(tolerance=0.2), 4, seed=0))
     for trials in trial_sets:
-        for entrant in (symmetric, plain):
-            (label,) = series_labels([run_trials(entrant, trials)])
-            if entrant is symmetric:
+        for contestant in (symmetric, plain):
+            (label,) = series_labels([run_trials(contestant, trials)])
+            if contestant is symmetric:
                 assert label == "ars-tuned-both"
             else:
                 own = trials.problem.name == "both"
@@ -141,13 +141,15 @@ def test_every_line_of_a_matrix_has_a_look_of_its_own(train_novice):
         for named in ("paper", "tuned")
         for problem in PROBLEMS
     }
-    entrants = [Entrant.from_policy(*item) for item in policies.items()] + [*BASELINES.values()]
+    contestants = [Contestant.from_policy(*item) for item in policies.items()] + [
+        *BASELINES.values()
+    ]
     trial_sets = [TrialSet.draw(name, 4, seed=0) for name in PROBLEMS]
-    matrix = [run_trials(entrant, trials) for trials in trial_sets for entrant in entrants]
+    matrix = [run_trials(contestant, trials) for trials in trial_sets for contestant in contestants]
     for axes in distance_histograms(matrix).axes:
-        assert len(set(legend(axes))) == len(entrants)
+        assert len(set(legend(axes))) == len(contestants)
         looks = {(patch.get_edgecolor(), patch.get_linestyle()) for patch in stairs(axes)}
-        assert len(looks) == len(entrants)
+        assert len(looks) == len(contestants)
 
 
 def test_files_are_written_and_reproducible(evaluations, tmp_path):

@@ -8,7 +8,7 @@ import pytest
 
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation import ReplayRequest, evaluate, find_failures
-from kinarm.evaluation.replays import failures
+from kinarm.evaluation.replay import failures
 from kinarm.viewer import replay_page
 
 POLICIES, PROBLEMS = ("ars-tuned-both-seed9", "ppo-paper-both-seed1"), ("left", "both")

@@ -8,9 +8,9 @@ import pytest
 
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation import ReplayRequest
-from kinarm.evaluation.entrants import ORACLE, find_entrants
-from kinarm.evaluation.replays import following
-from kinarm.evaluation.replays.following import follow, fresh_recordings
+from kinarm.evaluation.contestants import ORACLE, find_contestants
+from kinarm.evaluation.replay import following
+from kinarm.evaluation.replay.following import follow, fresh_recordings
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle import Oracle
 from kinarm.simulator import Simulator
@@ -42,8 +42,8 @@ def listens(port):
 
 
 def test_every_trial_is_that_of_the_next_seed(left):
-    (entrant,) = find_entrants("zero")
-    found = list(itertools.islice(fresh_recordings(entrant, left, 5), 3))
+    (contestant,) = find_contestants("zero")
+    found = list(itertools.islice(fresh_recordings(contestant, left, 5), 3))
     assert [recording.trial for recording in found] == [0, 1, 2]
     for seed, recording in enumerate(found, start=5):
         trials = TrialSet.draw("left", 1, seed)
@@ -62,8 +62,8 @@ def test_the_oracle_reaches_goals_in_the_steps_that_it_finds(left):
 
 
 def test_following_takes_its_time_and_hands_out_what_is_over(left, no_waiting, port):
-    (entrant,) = find_entrants("zero")
-    recordings = list(itertools.islice(fresh_recordings(entrant, left, 0), 2))
+    (contestant,) = find_contestants("zero")
+    recordings = list(itertools.islice(fresh_recordings(contestant, left, 0), 2))
     with LiveServer(port) as server:
         seen = []
         for recording in follow(server, left, recordings):
@@ -89,7 +89,7 @@ def stop_after(lines, count):
 
 def test_live_request_serves_until_it_is_stopped(no_waiting, monkeypatch, port):
     lines, opened = [], []
-    monkeypatch.setattr("kinarm.evaluation.replays.request.webbrowser.open", opened.append)
+    monkeypatch.setattr("kinarm.evaluation.replay.request.webbrowser.open", opened.append)
     request = ReplayRequest(policy="zero", problem="left", live=True, port=port)
     with pytest.raises(EnoughError):
         request.run(stop_after(lines, 3))
@@ -100,8 +100,8 @@ def test_live_request_serves_until_it_is_stopped(no_waiting, monkeypatch, port):
 
 
 def test_live_request_ends_where_there_is_nothing_more_to_show(left, no_waiting, monkeypatch, port):
-    (entrant,) = find_entrants("zero")
-    few = list(itertools.islice(fresh_recordings(entrant, left, 0), 2))
+    (contestant,) = find_contestants("zero")
+    few = list(itertools.islice(fresh_recordings(contestant, left, 0), 2))
     monkeypatch.setattr(following, "fresh_recordings", lambda *_: iter(few))
     lines = []
     request = ReplayRequest(policy="zero", problem="left", live=True, port=port, browser=False)

@@ -7,8 +7,8 @@ import pytest
 
 from kinarm.evaluation import bounds
 from kinarm.evaluation.bounds import bounded_trials, first_bounds, oracle_bounds
+from kinarm.evaluation.contestants import Contestant
 from kinarm.evaluation.document import evaluation_document
-from kinarm.evaluation.entrants import Entrant
 from kinarm.evaluation.evaluation import run_trials
 from kinarm.evaluation.outcomes import Outcomes
 from kinarm.evaluation.trials import TrialSet
@@ -44,8 +44,8 @@ def test_of_many_trials_the_first_are_bounded(skilled):
     few = TrialSet.draw("right", 12, seed=8)
     assert bounded_trials(trials).digest == few.digest
     assert bounded_trials(few) is few
-    many = run_trials(Entrant.from_policy("skilled", skilled), trials, oracle=True)
-    first = run_trials(Entrant.from_policy("skilled", skilled), few, oracle=True)
+    many = run_trials(Contestant.from_policy("skilled", skilled), trials, oracle=True)
+    first = run_trials(Contestant.from_policy("skilled", skilled), few, oracle=True)
     assert len(many.bounds) == 12
     for name in ("relative_success", "step_ratio", "step_ratio_p95"):
         assert many.metrics[name].value == first.metrics[name].value

@@ -1,20 +1,22 @@
-"""Recordings of entrants are what an evaluation sees."""
+"""Recordings of contestants are what an evaluation sees."""
 
 import pytest
 
 from kinarm.errors import InvalidInputError, PolicyFileError
-from kinarm.evaluation import Entrant, TrialSet, find_entrants, oracle_bounds, record
+from kinarm.evaluation import Contestant, TrialSet, find_contestants, oracle_bounds, record
 from kinarm.evaluation.evaluation import run_trials
 from kinarm.problem import ReachProblem
 
 
 @pytest.mark.parametrize("name", ["skilled", "random", "zero", "oracle"])
 def test_they_end_as_the_evaluation(trials, skilled, name):
-    entrant = (
-        Entrant.from_policy("skilled", skilled) if name == "skilled" else find_entrants(name)[0]
+    contestant = (
+        Contestant.from_policy("skilled", skilled)
+        if name == "skilled"
+        else find_contestants(name)[0]
     )
-    evaluation = run_trials(entrant, trials)
-    recordings = record(entrant, trials)
+    evaluation = run_trials(contestant, trials)
+    recordings = record(contestant, trials)
     assert [each.outcome for each in recordings] == list(evaluation.outcomes)
     assert [each.steps for each in recordings] == evaluation.rollouts.steps.tolist()
     assert [each.final_distance for each in recordings] == evaluation.rollouts.distance.tolist()
@@ -24,7 +26,7 @@ def test_they_end_as_the_evaluation(trials, skilled, name):
 
 def test_they_say_what_is_proven_and_where_they_come_from(trials, skilled):
     bounds = oracle_bounds(trials)
-    (recording,) = record(Entrant.from_policy("skilled", skilled), trials, [3], bounds=bounds)
+    (recording,) = record(Contestant.from_policy("skilled", skilled), trials, [3], bounds=bounds)
     assert recording.trial == 3
     assert recording.steps_lower_bound == bounds.steps_lower_bound[3]
     assert recording.provenance["trial_seed"] == trials.seed
@@ -33,21 +35,21 @@ def test_they_say_what_is_proven_and_where_they_come_from(trials, skilled):
 
 
 def test_functions_are_recorded(trials):
-    entrant = Entrant.from_function("still", lambda observations: observations[:, :5] * 0)
-    (recording,) = record(entrant, trials, [0])
+    contestant = Contestant.from_function("still", lambda observations: observations[:, :5] * 0)
+    (recording,) = record(contestant, trials, [0])
     assert (recording.states == trials.starts[0]).all()
     assert recording.outcome == "truncated"
 
 
 def test_another_arm(skilled):
     trials = TrialSet.draw(ReachProblem.load("right").replace(arm="paper_flange"), 1, seed=0)
-    entrant = Entrant.from_policy("skilled", skilled)
+    contestant = Contestant.from_policy("skilled", skilled)
     with pytest.raises(PolicyFileError, match="trained for arm 'paper'"):
-        record(entrant, trials)
-    (recording,) = record(entrant, trials, allow_other_arm=True)
+        record(contestant, trials)
+    (recording,) = record(contestant, trials, allow_other_arm=True)
     assert recording.problem.arm.name == "paper_flange"
 
 
 def test_no_such_trial(trials):
     with pytest.raises(InvalidInputError, match="no trial 60: there are 0 to 59"):
-        record(find_entrants("zero")[0], trials, [60])
+        record(find_contestants("zero")[0], trials, [60])

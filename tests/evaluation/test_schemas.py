@@ -14,7 +14,7 @@ from kinarm.evaluation import (
     TrialSet,
     document_schema,
     evaluation_document,
-    find_entrants,
+    find_contestants,
     schema_names,
 )
 from kinarm.evaluation.evaluation import run_trials
@@ -117,8 +117,8 @@ def test_an_evaluation_of_any_problem(name):
     if problem.arm.name not in ("paper", "paper_flange") and not is_installed():
         pytest.skip("needs the extra robots")
     trials = TrialSet.draw(problem, 3, seed=0)
-    (entrant,) = find_entrants("zero")
-    check(evaluation_document([run_trials(entrant, trials)], "a test"), "evaluation")
+    (contestant,) = find_contestants("zero")
+    check(evaluation_document([run_trials(contestant, trials)], "a test"), "evaluation")
 
 
 def test_a_ranking():

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinarm.evaluation.entrants import find_entrants
+from kinarm.evaluation.contestants import find_contestants
 from kinarm.evaluation.evaluation import run_trials
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies import load_policy, policy_names, recipe
@@ -111,7 +111,7 @@ def test_the_layers_are_those_of_the_settings(name):
 @pytest.mark.parametrize("group", SEEDS)
 def test_a_group_is_all_its_training_seeds(group):
     names = [f"{group}-seed{n}" for n in range(SEEDS[group])]
-    assert [entrant.name for entrant in find_entrants(group)] == names
+    assert [contestant.name for contestant in find_contestants(group)] == names
     weights = {load_policy(name).layers[0].weights.tobytes() for name in names}
     assert len(weights) == len(names)
 
@@ -145,7 +145,7 @@ def test_policies_reach(group, problem, floor):
     """300 trials with a seed not used in training; the mean over training seeds."""
     trials = TrialSet.draw(problem, 300, seed=12345)
     rates = [
-        run_trials(entrant, trials, oracle=False).success.value
-        for entrant in find_entrants(f"{group}-both")
+        run_trials(contestant, trials, oracle=False).success.value
+        for contestant in find_contestants(f"{group}-both")
     ]
     assert sum(rates) / len(rates) >= floor, rates

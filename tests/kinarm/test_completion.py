@@ -13,7 +13,7 @@ pytest.importorskip("shtab")
 from kinarm._completion import SHELLS, completion_script
 from kinarm._options import add_options
 from kinarm._parser import CommandParser, Parser
-from kinarm.evaluation.replays.request import ReplayRequest
+from kinarm.evaluation.replay.request import ReplayRequest
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,8 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._fields import to_plain
-from kinarm.evaluation.intervals import Term, contrast, share_over_seeds, student, superiority
-from kinarm.evaluation.statistics import Estimate
+from kinarm.evaluation.statistics import (
+    Estimate,
+    Term,
+    contrast,
+    share_over_seeds,
+    student,
+    superiority,
+)
 from kinarm.evaluation.studies.transfer.planning import SOURCE, PlannedTraining, Role, targets
 from kinarm.evaluation.studies.transfer.reflection import reflection_of, with_mirror
 from kinarm.evaluation.studies.transfer.runs import TransferRun

@@ -2,8 +2,8 @@
 
 import pytest
 
+from kinarm.evaluation.contestants import ORACLE
 from kinarm.evaluation.document import evaluation_document
-from kinarm.evaluation.entrants import ORACLE
 from kinarm.evaluation.evaluation import run_trials
 from kinarm.evaluation.report.groups import group_results
 from kinarm.evaluation.report.page import report_page

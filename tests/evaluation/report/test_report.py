@@ -10,8 +10,8 @@ import pytest
 from drawings import PIXEL
 
 from kinarm.errors import InvalidInputError, OutputError
+from kinarm.evaluation.contestants import BASELINES, Contestant
 from kinarm.evaluation.document import evaluation_document
-from kinarm.evaluation.entrants import BASELINES, Entrant
 from kinarm.evaluation.evaluation import evaluate
 from kinarm.evaluation.report import maps
 from kinarm.evaluation.report.groups import PAGE_COLOURS, PAGE_DASHES, group_results
@@ -136,8 +136,10 @@ class TestWorst:
     def test_policies_that_fail_alike_show_other_trials(self, skilled_evaluation):
         """The same policy under four names: twelve trials are shown and no three four times."""
         many = [
-            replace(skilled_evaluation, entrant=Entrant.from_policy(name, made))
-            for name, made in ((f"policy{n}", skilled_evaluation.entrant.policy) for n in range(4))
+            replace(skilled_evaluation, contestant=Contestant.from_policy(name, made))
+            for name, made in (
+                (f"policy{n}", skilled_evaluation.contestant.policy) for n in range(4)
+            )
         ]
         (task,) = group_results(evaluation_document(many, ""), many)
         chosen = worst_trials(task)
@@ -163,7 +165,7 @@ class TestWorst:
         rows = content(page).findall(".//section[@id='worst']//tbody/tr")
         for row, (_, evaluation, trial) in zip(rows, worst_trials(right), strict=False):
             cells = {cell.get("data-label"): text_of(cell) for cell in row.findall("td")}
-            assert text_of(row.find("th")) == evaluation.entrant.name
+            assert text_of(row.find("th")) == evaluation.contestant.name
             assert cells["trial"] == str(trial)
             assert cells["distance m"] == f"{evaluation.rollouts.distance[trial]:.3f}"
             assert cells["steps"] == str(evaluation.rollouts.steps[trial])
@@ -178,7 +180,7 @@ class TestWorst:
         for recording, worst in zip(record_worst(chosen), chosen, strict=True):
             _, evaluation, trial = worst
             assert (recording.policy, recording.problem.name, recording.trial) == (
-                evaluation.entrant.name,
+                evaluation.contestant.name,
                 evaluation.problem.name,
                 trial,
             )
@@ -220,7 +222,7 @@ class TestPage:
 
     def test_names_are_text_and_never_markup(self, faced):
         evil = '<img src=x onerror="alert(1)">&amp;'
-        first = replace(faced[0], entrant=replace(faced[0].entrant, name=evil))
+        first = replace(faced[0], contestant=replace(faced[0].contestant, name=evil))
         page = report_page(evaluation_document([first], f"kinarm-eval --policy {evil}"), [first])
         assert "<img" not in page
         assert evil in [text_of(row.find("th")) for row in rows_of(page, "right")]
@@ -264,9 +266,10 @@ class TestPage:
 
     def test_many_policies_stay_apart(self, skilled_evaluation):
         many = [
-            replace(skilled_evaluation, entrant=Entrant.from_policy(name, made))
+            replace(skilled_evaluation, contestant=Contestant.from_policy(name, made))
             for name, made in (
-                (f"policy{n}", skilled_evaluation.entrant.policy) for n in range(PAGE_COLOURS + 2)
+                (f"policy{n}", skilled_evaluation.contestant.policy)
+                for n in range(PAGE_COLOURS + 2)
             )
         ]
         (task,) = group_results(evaluation_document(many, ""), many)
@@ -302,7 +305,7 @@ class TestPage:
         assert others == {"zero", "oracle"}
 
     def test_a_number_of_seeds_that_all_share_is_told_once(self, evaluations):
-        pooled = [each for each in evaluations if each.entrant.name.startswith("made-right")]
+        pooled = [each for each in evaluations if each.contestant.name.startswith("made-right")]
         page = report_page(evaluation_document(pooled, ""), pooled)
         assert "<h1>made-right</h1>" in page
         assert f'"subtitle">{len(pooled)} training seeds · problem right' in page

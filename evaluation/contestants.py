@@ -30,7 +30,7 @@ class Run(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Entrant:
+class Contestant:
     """Something that can be put to the trials.
 
     Attributes
@@ -123,10 +123,10 @@ class Entrant:
     def __repr__(self) -> str:
         trained = f" for {self.problem.name}" if self.problem else ""
         source = f", {str(self.source)!r}" if self.source else ""
-        return f"Entrant({self.name!r}: {self.algorithm} {self.recipe}{trained}{source})"
+        return f"Contestant({self.name!r}: {self.algorithm} {self.recipe}{trained}{source})"
 
     @classmethod
-    def from_policy(cls, name: str, policy: Policy, source: Path | None = None) -> "Entrant":
+    def from_policy(cls, name: str, policy: Policy, source: Path | None = None) -> "Contestant":
         """Enter a trained policy."""
         made = policy.provenance
         return cls(
@@ -140,7 +140,7 @@ class Entrant:
         )
 
     @classmethod
-    def from_function(cls, name: str, function: PolicyFunction) -> "Entrant":
+    def from_function(cls, name: str, function: PolicyFunction) -> "Contestant":
         """Enter a function from observations (n, n_observations) to actions (n, n_actions)."""
         return cls(name, _running(function), algorithm="function", recipe="")
 
@@ -177,20 +177,20 @@ def _run_oracle(trials: TrialSet, *, record: bool = False) -> Rollouts:
 
 
 BASELINES = {
-    "random": Entrant("random", _run_random, "baseline", "random"),
-    "zero": Entrant("zero", _run_zero, "baseline", "zero"),
+    "random": Contestant("random", _run_random, "baseline", "random"),
+    "zero": Contestant("zero", _run_zero, "baseline", "zero"),
 }
 """Uniformly random actions, and no motion at all."""
 
-ORACLE = Entrant("oracle", _run_oracle, "oracle", "oracle")
+ORACLE = Contestant("oracle", _run_oracle, "oracle", "oracle")
 """The motions that the oracle found, replayed."""
 
-UNTRAINED_ENTRANTS = {**BASELINES, ORACLE.name: ORACLE}
+UNTRAINED = {**BASELINES, ORACLE.name: ORACLE}
 
 
-def find_entrants(
+def find_contestants(
     name_or_file: str | Path, problem: ProblemLike | None = None
-) -> tuple[Entrant, ...]:
+) -> tuple[Contestant, ...]:
     """Find what a name stands for.
 
     Parameters
@@ -214,67 +214,67 @@ def find_entrants(
         or no policy ships for the problem.
     """
     text = str(name_or_file)
-    if text in UNTRAINED_ENTRANTS:
-        return (UNTRAINED_ENTRANTS[text],)
+    if text in UNTRAINED:
+        return (UNTRAINED[text],)
     if text.endswith(".zip"):
-        return (_model_entrant(Path(text), problem),)
+        return (_model_contestant(Path(text), problem),)
     if is_import_path(text):
-        return (_imported_entrant(text),)
+        return (_imported_contestant(text),)
     try:
         paths = policy_files(name_or_file, problem)
     except UnknownNameError as error:
-        available = (*UNTRAINED_ENTRANTS, *error.available, "path/to/model.zip", "module:function")
+        available = (*UNTRAINED, *error.available, "path/to/model.zip", "module:function")
         raise UnknownNameError(error.kind, error.given, available) from None
     return tuple(
-        Entrant.from_policy(path.stem, Policy.load(path), path.resolve()) for path in paths
+        Contestant.from_policy(path.stem, Policy.load(path), path.resolve()) for path in paths
     )
 
 
-def _model_entrant(path: Path, problem: ProblemLike | None) -> Entrant:
+def _model_contestant(path: Path, problem: ProblemLike | None) -> Contestant:
     """A model of Stable-Baselines3, with the statistics that lie beside it."""
     try:
         policy = Policy.from_sb3(path, problem, find_vec_normalize(path))
     except InvalidInputError as error:
         raise InvalidInputError(f"{str(path)!r}: {error}") from error
-    return Entrant.from_policy(path.stem, policy, path.resolve())
+    return Contestant.from_policy(path.stem, policy, path.resolve())
 
 
-def _imported_entrant(name: str) -> Entrant:
+def _imported_contestant(name: str) -> Contestant:
     """A policy, or a function, of a module."""
     found = imported_policy(name)
     if isinstance(found, Policy):
-        return Entrant.from_policy(name, found)
-    return Entrant.from_function(name, found)
+        return Contestant.from_policy(name, found)
+    return Contestant.from_function(name, found)
 
 
-def shipped_entrants() -> tuple[Entrant, ...]:
+def shipped_contestants() -> tuple[Contestant, ...]:
     """All shipped policies, then the baselines."""
-    shipped = (entrant for name in policy_names() for entrant in find_entrants(name))
+    shipped = (contestant for name in policy_names() for contestant in find_contestants(name))
     return (*shipped, *BASELINES.values())
 
 
-def check_names(pairs: Iterable[tuple[Entrant, ReachProblem]]) -> None:
-    """Check that entrants, and the problems that they face, have distinct names.
+def check_names(pairs: Iterable[tuple[Contestant, ReachProblem]]) -> None:
+    """Check that contestants, and the problems that they face, have distinct names.
 
     Raises
     ------
     InvalidInputError
         If two of them cannot.
     """
-    entrants: dict[str, Entrant] = {}
+    contestants: dict[str, Contestant] = {}
     problems: dict[str, ReachProblem] = {}
     faced = set()
-    for entrant, problem in pairs:
+    for contestant, problem in pairs:
         difference = problems.setdefault(problem.name, problem).first_difference(problem)
         if difference is not None:
             raise InvalidInputError(
                 f"two problems are called {problem.name!r}: in the second, {difference}"
             )
-        first = entrants.setdefault(entrant.name, entrant)
-        if first.source != entrant.source or (entrant.name, problem.name) in faced:
-            sources = (each.source or "the one that needs no file" for each in (first, entrant))
+        first = contestants.setdefault(contestant.name, contestant)
+        if first.source != contestant.source or (contestant.name, problem.name) in faced:
+            sources = (each.source or "the one that needs no file" for each in (first, contestant))
             raise InvalidInputError(
-                f"two policies are called {entrant.name!r}: {' and '.join(map(str, sources))}; "
+                f"two policies are called {contestant.name!r}: {' and '.join(map(str, sources))}; "
                 "rename a file"
             )
-        faced.add((entrant.name, problem.name))
+        faced.add((contestant.name, problem.name))

@@ -5,8 +5,8 @@ import time
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from kinarm.evaluation.entrants import ORACLE, Entrant
-from kinarm.evaluation.replays.recorder import record
+from kinarm.evaluation.contestants import ORACLE, Contestant
+from kinarm.evaluation.replay.recorder import record
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle import Oracle
 from kinarm.recording import Recording, record_rollouts
@@ -21,7 +21,9 @@ REST = 1.2
 """Pause between trials [s]."""
 
 
-def fresh_recordings(entrant: Entrant, simulator: Simulator, seed: int) -> Iterator[Recording]:
+def fresh_recordings(
+    contestant: Contestant, simulator: Simulator, seed: int
+) -> Iterator[Recording]:
     """Record one trial after the other, without end.
 
     The seed is that of the first trial; the next ones count up.
@@ -29,12 +31,12 @@ def fresh_recordings(entrant: Entrant, simulator: Simulator, seed: int) -> Itera
     oracle = Oracle(simulator.problem)
     for number in itertools.count():  # pragma: no branch - it counts without end
         trials = TrialSet.draw_in(simulator, 1, seed + number)
-        if entrant is ORACLE:  # solved here, so that no bounds are kept of every trial
+        if contestant is ORACLE:  # solved here, so that no bounds are kept of every trial
             actions = oracle.solve_batch(trials.starts, trials.goals).actions
             rollouts = simulator.rollout_actions(actions, trials.starts, trials.goals, record=True)
-            (recording,) = record_rollouts(simulator, rollouts, entrant.name)
+            (recording,) = record_rollouts(simulator, rollouts, contestant.name)
         else:
-            (recording,) = record(entrant, trials, allow_other_arm=True)
+            (recording,) = record(contestant, trials, allow_other_arm=True)
         yield replace(recording, trial=number)
 
 

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 from itertools import product
 
 from kinarm.errors import InvalidInputError
-from kinarm.evaluation.replays.candidates import (
+from kinarm.evaluation.replay.candidates import (
     FAILING,
     MOST_FAILURES,
     Chosen,
     chosen_recordings,
 )
-from kinarm.evaluation.replays.request import ReplayRequest
+from kinarm.evaluation.replay.request import ReplayRequest
 from kinarm.policies.library import group_of
 from kinarm.recording import Recording
 

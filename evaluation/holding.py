@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.evaluation.bounds import oracle_bounds
-from kinarm.evaluation.entrants import ORACLE, Entrant
-from kinarm.evaluation.outcomes import HELD_STEPS
+from kinarm.evaluation.contestants import ORACLE, Contestant
+from kinarm.evaluation.outcomes import HOLDING_STEPS
 from kinarm.evaluation.trials import TrialSet
 from kinarm.rollouts import Rollouts
 from kinarm.world import World
@@ -25,7 +25,7 @@ LOT = 1000
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class Holding:
     """What a policy did in trials that only contact or the horizon end.
 
     Attributes
@@ -33,7 +33,7 @@ class Held:
     closest : ndarray, shape (n,)
         Smallest distance from the tool to the goal after any step [m].
     farthest_at_end : ndarray, shape (n,)
-        Largest distance after the last `HELD_STEPS` steps, or all if there are fewer [m];
+        Largest distance after the last `HOLDING_STEPS` steps, or all if there are fewer [m];
         infinite where contact ended the trial.
     collision : ndarray of bool, shape (n,)
         Whether contact ended the trial.
@@ -47,17 +47,17 @@ class Held:
     steps: NDArray[np.int64]
 
     def __repr__(self) -> str:
-        return f"Held({len(self.steps)} trials, {int(self.collision.sum())} collisions)"
+        return f"Holding({len(self.steps)} trials, {int(self.collision.sum())} collisions)"
 
     @classmethod
-    def of(cls, rollouts: Rollouts, trials: TrialSet) -> "Held":
+    def of(cls, rollouts: Rollouts, trials: TrialSet) -> "Holding":
         """Measure rollouts that kept the configurations visited."""
         lots = [slice(first, first + LOT) for first in range(0, len(rollouts), LOT)]
         distances = [
             _distances(trials.simulator.world, rollouts.paths[lot, 1:], rollouts.goals[lot])
             for lot in lots
         ]
-        at_end = np.concatenate([each[:, -HELD_STEPS:].max(axis=1) for each in distances])
+        at_end = np.concatenate([each[:, -HOLDING_STEPS:].max(axis=1) for each in distances])
         return cls(
             closest=np.concatenate([np.nanmin(each, axis=1) for each in distances]),
             farthest_at_end=np.where(rollouts.collision, np.inf, at_end),
@@ -92,16 +92,18 @@ def _distances(
     return distances
 
 
-def held_trials(entrant: Entrant, trials: TrialSet) -> Held:
-    """Let an entrant face trials that success does not end.
+def measure_holding(contestant: Contestant, trials: TrialSet) -> Holding:
+    """Let an contestant face trials that success does not end.
 
     Starts and goals are those of the trials. The oracle aims at `AIM` there, and stays where it
     gets to.
     """
     endless = trials.with_tolerance(NEVER)
-    if entrant is ORACLE:
+    if contestant is ORACLE:
         aimed = trials.with_tolerance(min(AIM, trials.problem.task.tolerance))
         actions = oracle_bounds(aimed).actions
         scenarios = (endless.starts, endless.goals)
-        return Held.of(endless.simulator.rollout_actions(actions, *scenarios, record=True), trials)
-    return Held.of(entrant.run(endless, record=True), trials)
+        return Holding.of(
+            endless.simulator.rollout_actions(actions, *scenarios, record=True), trials
+        )
+    return Holding.of(contestant.run(endless, record=True), trials)

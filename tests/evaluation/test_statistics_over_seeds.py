@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from kinarm.evaluation.intervals import (
+from kinarm.evaluation.statistics import (
+    Estimate,
     Term,
     contrast,
     estimate_text,
     mean_share,
     superiority,
 )
-from kinarm.evaluation.statistics import Estimate
 
 RNG = np.random.default_rng
 

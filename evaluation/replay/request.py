@@ -185,12 +185,12 @@ class ReplayRequest(ProblemOptions):
         KinarmError
             If a file, name or number cannot be used.
         """
-        from kinarm.evaluation.replays.candidates import chosen_recordings
+        from kinarm.evaluation.replay.candidates import chosen_recordings
 
         return chosen_recordings(self).runs
 
     def _write(self, report: Callable[[str], object]) -> "ReplayPage":
-        from kinarm.evaluation.replays.candidates import chosen_recordings
+        from kinarm.evaluation.replay.candidates import chosen_recordings
         from kinarm.recording import save_recordings
         from kinarm.viewer import replay_page
 
@@ -223,28 +223,28 @@ class ReplayRequest(ProblemOptions):
 
     def _serve(self, report: Callable[[str], object]) -> None:
         """Serve fresh trials until this is interrupted."""
-        from kinarm.evaluation.replays.candidates import (
+        from kinarm.evaluation.replay.candidates import (
             faced_problem,
-            first_entrant,
+            first_contestant,
             stated_problem,
         )
-        from kinarm.evaluation.replays.following import follow, fresh_recordings
+        from kinarm.evaluation.replay.following import follow, fresh_recordings
         from kinarm.simulator import Simulator
         from kinarm.viewer.live_server import PORT, LiveServer
 
         stated = stated_problem(self, [self.policy])
-        entrant = first_entrant(self.policy, stated)
-        simulator = Simulator(faced_problem([entrant], self, stated))
+        contestant = first_contestant(self.policy, stated)
+        simulator = Simulator(faced_problem([contestant], self, stated))
         say_choices([simulator.problem])
-        entrant.check(simulator.arm, allow_other_arm=self.allow_other_arm)
-        fresh = fresh_recordings(entrant, simulator, self.seed or 0)
+        contestant.check(simulator.arm, allow_other_arm=self.allow_other_arm)
+        fresh = fresh_recordings(contestant, simulator, self.seed or 0)
         # The first one loads and compiles what is needed before the page is announced.
         recordings = chain([next(fresh)], fresh)
         wanted = self.port or PORT
         with LiveServer(wanted) as server:
             if server.port != wanted:
                 report(f"port {wanted} is in use: taking {server.port}")
-            report(f"{entrant.name} at {server.address} (stop with Ctrl-C)")
+            report(f"{contestant.name} at {server.address} (stop with Ctrl-C)")
             if self.browser:
                 webbrowser.open(server.address)
             for recording in follow(server, simulator, recordings):

@@ -8,13 +8,13 @@ import pytest
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError, UnknownNameError
 from kinarm.evaluation.bounds import oracle_bounds
-from kinarm.evaluation.entrants import (
+from kinarm.evaluation.contestants import (
     BASELINES,
     ORACLE,
-    Entrant,
+    Contestant,
     check_names,
-    find_entrants,
-    shipped_entrants,
+    find_contestants,
+    shipped_contestants,
 )
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies import policy_names
@@ -23,62 +23,62 @@ from kinarm.problem import PROBLEMS
 
 @pytest.mark.parametrize("name", ["random", "zero"])
 def test_baselines_by_name(name):
-    (entrant,) = find_entrants(name)
-    assert entrant is BASELINES[name]
-    assert (entrant.algorithm, entrant.problem, entrant.policy) == ("baseline", None, None)
+    (contestant,) = find_contestants(name)
+    assert contestant is BASELINES[name]
+    assert (contestant.algorithm, contestant.problem, contestant.policy) == ("baseline", None, None)
 
 
 def test_a_file_is_named_after_itself(skilled, tmp_path):
     skilled.save(tmp_path / "mine-seed4.npz")
-    (entrant,) = find_entrants(tmp_path / "mine-seed4.npz")
-    assert entrant.name == "mine-seed4"
-    assert (entrant.algorithm, entrant.recipe) == ("ars", "tuned*")
-    assert (entrant.problem.name, entrant.seed) == ("right", 1)
-    np.testing.assert_array_equal(entrant.policy.layers[0].weights, skilled.layers[0].weights)
+    (contestant,) = find_contestants(tmp_path / "mine-seed4.npz")
+    assert contestant.name == "mine-seed4"
+    assert (contestant.algorithm, contestant.recipe) == ("ars", "tuned*")
+    assert (contestant.problem.name, contestant.seed) == ("right", 1)
+    np.testing.assert_array_equal(contestant.policy.layers[0].weights, skilled.layers[0].weights)
 
 
 def test_a_relative_file_needs_no_folder(skilled, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     skilled.save("mine.npz")
-    assert find_entrants("mine.npz")[0].name == "mine"
+    assert find_contestants("mine.npz")[0].name == "mine"
 
 
 @pytest.mark.parametrize("name", ["random.npz", "oracle.npz"])
 def test_a_file_called_like_a_baseline_is_that_file(skilled, tmp_path, name):
     skilled.save(tmp_path / name)
-    (entrant,) = find_entrants(tmp_path / name)
-    assert entrant.policy is not None
+    (contestant,) = find_contestants(tmp_path / name)
+    assert contestant.policy is not None
 
 
 def test_an_unknown_name_lists_what_exists():
     with pytest.raises(UnknownNameError, match="unknown policy 'nobody'") as caught:
-        find_entrants("nobody")
+        find_contestants("nobody")
     assert {"random", "zero", "oracle"} <= set(caught.value.available)
 
 
 def test_a_missing_file_is_told_apart_from_an_unknown_name(tmp_path):
     with pytest.raises(PolicyFileError, match="cannot read"):
-        find_entrants(tmp_path / "nobody.npz")
+        find_contestants(tmp_path / "nobody.npz")
 
 
 def test_functions_enter_under_their_own_name():
     def careful(observations):
         return np.zeros((len(observations), 5))
 
-    entrant = Entrant.from_function("careful", careful)
-    assert (entrant.name, entrant.problem) == ("careful", None)
+    contestant = Contestant.from_function("careful", careful)
+    assert (contestant.name, contestant.problem) == ("careful", None)
 
 
-def test_baselines_close_the_list_of_all_entrants():
-    names = [entrant.name for entrant in shipped_entrants()]
+def test_baselines_close_the_list_of_all_contestants():
+    names = [contestant.name for contestant in shipped_contestants()]
     assert names[-2:] == ["random", "zero"]
     assert names[:-2] == list(policy_names())
 
 
 def test_the_oracle_by_name():
-    (entrant,) = find_entrants("oracle")
-    assert entrant is ORACLE
-    assert (entrant.algorithm, entrant.problem, entrant.policy) == ("oracle", None, None)
+    (contestant,) = find_contestants("oracle")
+    assert contestant is ORACLE
+    assert (contestant.algorithm, contestant.problem, contestant.policy) == ("oracle", None, None)
 
 
 def test_the_oracle_replays_what_it_found():
@@ -91,31 +91,31 @@ def test_the_oracle_replays_what_it_found():
     assert not rollouts.collision.any()
 
 
-def test_the_oracle_does_not_change_other_entrants(skilled, trials):
-    entrant = Entrant.from_policy("mine", skilled)
-    before = entrant.run(trials)
+def test_the_oracle_does_not_change_other_contestants(skilled, trials):
+    contestant = Contestant.from_policy("mine", skilled)
+    before = contestant.run(trials)
     ORACLE.run(trials)
-    np.testing.assert_array_equal(entrant.run(trials).distance, before.distance)
+    np.testing.assert_array_equal(contestant.run(trials).distance, before.distance)
 
 
 def test_a_policy_for_another_arm_is_told(skilled):
-    entrant = Entrant.from_policy("mine", skilled)
-    entrant.check(Arm.load())
+    contestant = Contestant.from_policy("mine", skilled)
+    contestant.check(Arm.load())
     with pytest.raises(PolicyFileError, match=r"trained for arm 'paper', not for 'paper_flange'"):
-        entrant.check(Arm.load("paper_flange"))
+        contestant.check(Arm.load("paper_flange"))
 
 
-def served(entrant, **changes):
-    """Names of the problems that an entrant is for, in a world with these changes."""
+def served(contestant, **changes):
+    """Names of the problems that an contestant is for, in a world with these changes."""
     return [
         name
         for name, problem in PROBLEMS.items()
-        if entrant.serves(problem.replace(**changes), lambda own: own.replace(**changes))
+        if contestant.serves(problem.replace(**changes), lambda own: own.replace(**changes))
     ]
 
 
 def test_a_policy_is_for_the_problem_that_it_was_trained_for(skilled):
-    plain = Entrant.from_policy("plain", replace(skilled, mirror=None))
+    plain = Contestant.from_policy("plain", replace(skilled, mirror=None))
     assert served(plain) == served(plain, tolerance=0.02) == ["right"]
     assert not plain.serves(PROBLEMS["right"].replace(tolerance=0.02))
 
@@ -124,25 +124,25 @@ def test_a_symmetric_policy_is_also_for_a_part_of_its_goals(skilled):
     assert skilled.mirror is not None
     made = replace(skilled.provenance, problem=PROBLEMS["both"].pinned)
     symmetric = replace(skilled, provenance=made)
-    assert served(Entrant.from_policy("of both", symmetric)) == ["left", "right", "both"]
-    assert served(Entrant.from_policy("of one", skilled)) == ["right"]
-    assert served(Entrant.from_policy("plain", replace(symmetric, mirror=None))) == ["both"]
+    assert served(Contestant.from_policy("of both", symmetric)) == ["left", "right", "both"]
+    assert served(Contestant.from_policy("of one", skilled)) == ["right"]
+    assert served(Contestant.from_policy("plain", replace(symmetric, mirror=None))) == ["both"]
 
 
-@pytest.mark.parametrize("entrant", [*BASELINES.values(), ORACLE], ids=lambda e: e.name)
-def test_what_is_not_trained_is_for_every_problem(entrant):
-    assert served(entrant) == list(PROBLEMS)
+@pytest.mark.parametrize("contestant", [*BASELINES.values(), ORACLE], ids=lambda e: e.name)
+def test_what_is_not_trained_is_for_every_problem(contestant):
+    assert served(contestant) == list(PROBLEMS)
 
 
-@pytest.mark.parametrize("entrant", [*BASELINES.values(), ORACLE], ids=lambda e: e.name)
-def test_what_is_not_trained_fits_every_arm(shipped_arms, entrant):
+@pytest.mark.parametrize("contestant", [*BASELINES.values(), ORACLE], ids=lambda e: e.name)
+def test_what_is_not_trained_fits_every_arm(shipped_arms, contestant):
     for arm in shipped_arms.values():
-        entrant.check(arm)
+        contestant.check(arm)
 
 
-def test_names_have_to_tell_entrants_and_problems_apart(skilled):
+def test_names_have_to_tell_contestants_and_problems_apart(skilled):
     right, lax = PROBLEMS["right"], PROBLEMS["right"].replace(tolerance=0.2)
-    mine = Entrant.from_policy("mine", skilled)
+    mine = Contestant.from_policy("mine", skilled)
     check_names([(mine, right), (ORACLE, right), (mine, PROBLEMS["left"])])
     with pytest.raises(InvalidInputError, match=r"'right': .*task.tolerance is 0.2, not"):
         check_names([(mine, right), (ORACLE, lax)])

@@ -9,7 +9,7 @@ import pytest
 
 from kinarm.envs import ReachEnv
 from kinarm.errors import InvalidInputError, PolicyFileError, UnknownNameError
-from kinarm.evaluation import evaluate, find_entrants
+from kinarm.evaluation import evaluate, find_contestants
 from kinarm.evaluation.imported import policy_function
 from kinarm.policies import Policy
 from kinarm.policies.conversion.vec_normalize import find_vec_normalize
@@ -57,18 +57,18 @@ def test_a_predictor_whose_options_nobody_can_see():
 class TestModule:
     @pytest.mark.parametrize("name", ["towards", "remembering", "plain"])
     def test_whatever_chooses_actions(self, module, name):
-        (entrant,) = find_entrants(f"{module}:{name}")
-        assert (entrant.name, entrant.algorithm) == (f"{module}:{name}", "function")
-        found = evaluate(entrant, "right", trials=20)
+        (contestant,) = find_contestants(f"{module}:{name}")
+        assert (contestant.name, contestant.algorithm) == (f"{module}:{name}", "function")
+        found = evaluate(contestant, "right", trials=20)
         expected = evaluate(lambda seen: np.tanh(seen[:, 3:8]), "right", trials=20)
         np.testing.assert_array_equal(found.rollouts.distance, expected.rollouts.distance)
         again = evaluate(f"{module}:{name}", "right", trials=20)
         np.testing.assert_array_equal(again.rollouts.distance, expected.rollouts.distance)
 
     def test_a_policy_keeps_what_it_says_of_itself(self, module):
-        (entrant,) = find_entrants(f"{module}:shipped")
-        assert isinstance(entrant.policy, Policy)
-        assert entrant.problem.name == "both"
+        (contestant,) = find_contestants(f"{module}:shipped")
+        assert isinstance(contestant.policy, Policy)
+        assert contestant.problem.name == "both"
 
     def test_it_may_make_an_environment_by_its_id(self, tmp_path):
         """Commands do not register environments before they are needed."""
@@ -85,12 +85,12 @@ class TestModule:
                 return np.zeros((len(observation), 5)), None
 
         evaluation = evaluate(Still(), "right", trials=5)
-        assert evaluation.entrant.name == "Still"
+        assert evaluation.contestant.name == "Still"
         assert evaluation.success.value == evaluate("zero", "right", trials=5).success.value
 
     def test_missing_names_are_listed(self, module):
         with pytest.raises(UnknownNameError, match="'nothing'; available: .*towards") as caught:
-            find_entrants(f"{module}:nothing")
+            find_contestants(f"{module}:nothing")
         assert {"towards", "remembering", "plain", "shipped"} <= set(caught.value.available)
         assert "_hidden" not in caught.value.available
 
@@ -104,12 +104,12 @@ class TestModule:
     def test_modules_that_cannot_be_imported(self, module, tmp_path, name, message):
         (tmp_path / "broken_for_tests.py").write_text("raise RuntimeError('oh no')")
         with pytest.raises(InvalidInputError, match=message):
-            find_entrants(name)
+            find_contestants(name)
 
     @pytest.mark.parametrize("name", ["number", "Plain"])
     def test_what_chooses_no_actions(self, module, name):
         with pytest.raises(InvalidInputError, match="neither a function of observations nor"):
-            find_entrants(f"{module}:{name}")
+            find_contestants(f"{module}:{name}")
 
 
 @pytest.fixture(scope="module")
@@ -127,10 +127,10 @@ def model():
 class TestModel:
     def test_takes_part_on_the_problem_that_is_given(self, model, tmp_path):
         model.save(tmp_path / "model.zip")
-        (entrant,) = find_entrants(tmp_path / "model.zip", "right")
-        assert (entrant.name, entrant.algorithm, entrant.recipe) == ("model", "ppo", "sb3")
-        assert (entrant.seed, entrant.note) == (1, "")
-        assert entrant.problem.digest == PROBLEMS["right"].digest
+        (contestant,) = find_contestants(tmp_path / "model.zip", "right")
+        assert (contestant.name, contestant.algorithm, contestant.recipe) == ("model", "ppo", "sb3")
+        assert (contestant.seed, contestant.note) == (1, "")
+        assert contestant.problem.digest == PROBLEMS["right"].digest
         evaluation = evaluate(tmp_path / "model.zip", "right", trials=10)
         expected = evaluate(Policy.from_sb3(tmp_path / "model.zip", "right"), trials=10)
         np.testing.assert_array_equal(evaluation.rollouts.distance, expected.rollouts.distance)
@@ -151,11 +151,11 @@ class TestModel:
         beside.parent.mkdir(parents=True, exist_ok=True)
         model.save(path)
         model.get_vec_normalize_env().save(beside)
-        (entrant,) = find_entrants(path, "right")
-        assert entrant.note == f"{path.stem}: observations normalised by {beside}"
+        (contestant,) = find_contestants(path, "right")
+        assert contestant.note == f"{path.stem}: observations normalised by {beside}"
         own = Policy.from_sb3(model)
         seen = np.random.default_rng(0).normal(size=(20, 48))
-        np.testing.assert_array_equal(entrant.policy(seen), own(seen))
+        np.testing.assert_array_equal(contestant.policy(seen), own(seen))
 
     def test_statistics_of_other_models_are_left_alone(self, tmp_path):
         for name in ("rl_model_vecnormalize_400_steps.pkl", "other/vecnormalize.pkl"):
@@ -167,11 +167,11 @@ class TestModel:
     def test_needs_a_problem(self, model, tmp_path):
         model.save(tmp_path / "model.zip")
         with pytest.raises(InvalidInputError, match="model.zip': the model does not say which"):
-            find_entrants(tmp_path / "model.zip")
+            find_contestants(tmp_path / "model.zip")
 
     def test_a_missing_file(self, model, tmp_path):
         with pytest.raises(PolicyFileError, match="cannot read model"):
-            find_entrants(tmp_path / "gone.zip", "right")
+            find_contestants(tmp_path / "gone.zip", "right")
 
 
 @pytest.mark.parametrize("policy", ["ppo-tuned-both", "ars-tuned-both"])

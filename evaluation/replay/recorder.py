@@ -1,9 +1,9 @@
-"""Record what entrants do in trials."""
+"""Record what contestants do in trials."""
 
 from collections.abc import Sequence
 from functools import partial
 
-from kinarm.evaluation.entrants import Entrant
+from kinarm.evaluation.contestants import Contestant
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle.solution import OracleSolutions
 from kinarm.policies.provenance import package_versions, source_commit
@@ -12,18 +12,18 @@ from kinarm.rollouts import Rollouts
 
 
 def record(
-    entrant: Entrant,
+    contestant: Contestant,
     trials: TrialSet,
     numbers: Sequence[int] | None = None,
     *,
     bounds: OracleSolutions | None = None,
     allow_other_arm: bool = False,
 ) -> list[Recording]:
-    """Run an entrant on trials and record its motions, state by state.
+    """Run an contestant on trials and record its motions, state by state.
 
     Parameters
     ----------
-    entrant : Entrant
+    contestant : Contestant
         The policy, baseline or oracle.
     trials : TrialSet
         The trials that it faces.
@@ -41,24 +41,26 @@ def record(
     PolicyFileError
         If the policy was trained for another arm and that is not allowed.
     """
-    entrant.check(trials.simulator.arm, allow_other_arm=allow_other_arm)
-    return recordings_of(entrant, trials, entrant.run(trials, record=True), numbers, bounds=bounds)
+    contestant.check(trials.simulator.arm, allow_other_arm=allow_other_arm)
+    return recordings_of(
+        contestant, trials, contestant.run(trials, record=True), numbers, bounds=bounds
+    )
 
 
 def recordings_of(
-    entrant: Entrant,
+    contestant: Contestant,
     trials: TrialSet,
     rollouts: Rollouts,
     numbers: Sequence[int] | None = None,
     *,
     bounds: OracleSolutions | None = None,
 ) -> list[Recording]:
-    """What an entrant did, as recordings; rollouts kept the configurations, else as `record`."""
-    made = entrant.policy.provenance.to_json() if entrant.policy else None
+    """What an contestant did, as recordings; rollouts kept the configurations, else as `record`."""
+    made = contestant.policy.provenance.to_json() if contestant.policy else None
     return record_rollouts(
         trials.simulator,
         rollouts,
-        entrant.name,
+        contestant.name,
         numbers,
         steps_lower_bound=None if bounds is None else partial(_lower_bound, bounds),
         provenance={

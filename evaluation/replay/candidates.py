@@ -7,11 +7,11 @@ from pathlib import Path
 
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.bounds import oracle_bounds
+from kinarm.evaluation.contestants import ORACLE, UNTRAINED, Contestant, find_contestants
 from kinarm.evaluation.document import EvaluationDocument
-from kinarm.evaluation.entrants import ORACLE, UNTRAINED_ENTRANTS, Entrant, find_entrants
 from kinarm.evaluation.imported import is_import_path
-from kinarm.evaluation.replays.request import ReplayRequest
-from kinarm.evaluation.replays.runs import FacedRun, RecordedRun, Run
+from kinarm.evaluation.replay.request import ReplayRequest
+from kinarm.evaluation.replay.runs import FacedRun, RecordedRun, Run
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.library import BEST, group_of, policy_names
 from kinarm.problem import ReachProblem
@@ -61,10 +61,10 @@ class Chosen:
     heading: str = ""
 
 
-def first_entrant(name: str | None, problem: ReachProblem | None = None) -> Entrant:
-    """The entrant of a name; of a group, its first seed.
+def first_contestant(name: str | None, problem: ReachProblem | None = None) -> Contestant:
+    """The contestant of a name; of a group, its first seed.
 
-    Where the entrant does not say which problem it is for, it is this one.
+    Where the contestant does not say which problem it is for, it is this one.
 
     Raises
     ------
@@ -73,24 +73,24 @@ def first_entrant(name: str | None, problem: ReachProblem | None = None) -> Entr
     """
     if name is None:
         raise InvalidInputError("name a --policy, or a file of recordings or of an evaluation")
-    return find_entrants(name, problem)[0]
+    return find_contestants(name, problem)[0]
 
 
 def faced_problem(
-    entrants: Sequence[Entrant], options: ProblemOptions, stated: ReachProblem | None
+    contestants: Sequence[Contestant], options: ProblemOptions, stated: ReachProblem | None
 ) -> ReachProblem:
-    """The problem that is stated, or what options make of that of the first trained entrant.
+    """The problem that is stated, or what options make of that of the first trained contestant.
 
     Raises
     ------
     InvalidInputError
-        If no entrant was trained and no option names a problem.
+        If no contestant was trained and no option names a problem.
     """
     if stated is not None:
         return stated
-    trained = [entrant.problem for entrant in entrants if entrant.problem is not None]
+    trained = [contestant.problem for contestant in contestants if contestant.problem is not None]
     if not trained:
-        raise InvalidInputError(f"{entrants[0].name!r} was not trained: name a --problem")
+        raise InvalidInputError(f"{contestants[0].name!r} was not trained: name a --problem")
     return options.resolve(trained[0])
 
 
@@ -119,12 +119,12 @@ def find_candidates(request: ReplayRequest) -> Candidates:
 def _fresh_candidates(request: ReplayRequest, names: Sequence[str | None]) -> Candidates:
     """Run policies on trials that are drawn now."""
     stated = stated_problem(request, names)
-    entrants = [first_entrant(name, stated) for name in names]
+    contestants = [first_contestant(name, stated) for name in names]
     searched = request.trial or request.worst or request.collisions
     count = request.trials or (FAILING if request.failures else SEARCHED if searched else PLAYED)
-    trials = TrialSet.draw(faced_problem(entrants, request, stated), count, request.seed or 0)
+    trials = TrialSet.draw(faced_problem(contestants, request, stated), count, request.seed or 0)
     options = {"allow_other_arm": request.allow_other_arm}
-    runs = [FacedRun.of(entrant, trials, **options) for entrant in entrants]
+    runs = [FacedRun.of(contestant, trials, **options) for contestant in contestants]
     return Candidates(runs, _solved_bounds(trials), count, trials)
 
 
@@ -135,18 +135,18 @@ def _evaluated_candidates(
     document = EvaluationDocument.load(path)
     chosen = []
     for name in names:
-        entrant = None
+        contestant = None
         if name is not None and (Path(name).suffix in (".npz", ".zip") or is_import_path(name)):
             faced = problem or next(iter(document.protocol["problems"]))
-            entrant = first_entrant(name, document.problem(faced))
-        row = document.result(_name_in(document, entrant) if entrant else name, problem)
+            contestant = first_contestant(name, document.problem(faced))
+        row = document.result(_name_in(document, contestant) if contestant else name, problem)
         problem = row["problem"]
-        chosen.append((row, entrant or _known_entrant(row["policy"], path)))
+        chosen.append((row, contestant or _known_contestant(row["policy"], path)))
     faced = min(len(row["outcomes"]["steps"]) for row, _ in chosen)
     trials = document.trials(str(problem)).chosen(range(faced))
     runs = []
-    for row, entrant in chosen:
-        run = FacedRun.of(entrant, trials, allow_other_arm=True)
+    for row, contestant in chosen:
+        run = FacedRun.of(contestant, trials, allow_other_arm=True)
         document.check_same(row, run.ends)
         runs.append(run)
     known = document.floors(trials.problem.name)
@@ -156,18 +156,18 @@ def _evaluated_candidates(
     return Candidates(runs, lambda numbers: list(map(floors.get, numbers)), PLAYED, trials)
 
 
-def _known_entrant(name: str, path: Path) -> Entrant:
-    """The entrant of a name, as long as that does not stand for a file of the user's."""
-    if name in (*UNTRAINED_ENTRANTS, *policy_names()) or is_import_path(name):
-        return first_entrant(name)
+def _known_contestant(name: str, path: Path) -> Contestant:
+    """The contestant of a name, as long as that does not stand for a file of the user's."""
+    if name in (*UNTRAINED, *policy_names()) or is_import_path(name):
+        return first_contestant(name)
     raise InvalidInputError(f"policy {name!r} of {str(path)!r} is a file: name it with --policy")
 
 
-def _name_in(document: EvaluationDocument, entrant: Entrant) -> str:
-    """What an evaluation calls an entrant: by its file alone, or by its folder, too."""
+def _name_in(document: EvaluationDocument, contestant: Contestant) -> str:
+    """What an evaluation calls an contestant: by its file alone, or by its folder, too."""
     names = {row["policy"] for row in document.results}
-    whole = f"{entrant.source.parent.name}/{entrant.name}" if entrant.source else ""
-    return whole if whole in names and entrant.name not in names else entrant.name
+    whole = f"{contestant.source.parent.name}/{contestant.name}" if contestant.source else ""
+    return whole if whole in names and contestant.name not in names else contestant.name
 
 
 def _solved_bounds(trials: TrialSet) -> LowerBounds:

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
-from kinarm.evaluation.entrants import Entrant
+from kinarm.evaluation.contestants import Contestant
 from kinarm.evaluation.failures import Cause, failure_causes
 from kinarm.evaluation.outcomes import is_early
-from kinarm.evaluation.replays.recorder import recordings_of
+from kinarm.evaluation.replay.recorder import recordings_of
 from kinarm.evaluation.trials import TrialSet
 from kinarm.recording import Recording, outcome_of
 from kinarm.rollouts import Rollouts
@@ -40,21 +40,21 @@ class Run(Protocol):
 class FacedRun:
     """Trials that run now; the chosen ones become recordings."""
 
-    entrant: Entrant
+    contestant: Contestant
     trials: TrialSet
     rollouts: Rollouts
 
     @classmethod
-    def of(cls, entrant: Entrant, trials: TrialSet, *, allow_other_arm: bool) -> "FacedRun":
-        """Let an entrant face trials.
+    def of(cls, contestant: Contestant, trials: TrialSet, *, allow_other_arm: bool) -> "FacedRun":
+        """Let an contestant face trials.
 
         Raises
         ------
         PolicyFileError
             If it was trained for another arm and that is not allowed.
         """
-        entrant.check(trials.simulator.arm, allow_other_arm=allow_other_arm)
-        return cls(entrant, trials, entrant.run(trials, record=True))
+        contestant.check(trials.simulator.arm, allow_other_arm=allow_other_arm)
+        return cls(contestant, trials, contestant.run(trials, record=True))
 
     @property
     def numbers(self) -> Sequence[int]:
@@ -76,7 +76,7 @@ class FacedRun:
 
     def recorded(self, positions: Sequence[int]) -> list[Recording]:
         """Recordings of some of them."""
-        return recordings_of(self.entrant, self.trials, self.rollouts, positions)
+        return recordings_of(self.contestant, self.trials, self.rollouts, positions)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,12 +8,12 @@ import pytest
 from reseeded import reseeded
 
 import kinarm  # noqa: F401 registers the environments
-from kinarm.evaluation.entrants import ORACLE, Entrant, find_entrants
+from kinarm.evaluation.contestants import ORACLE, Contestant, find_contestants
 from kinarm.evaluation.estimates import estimate_metrics
 from kinarm.evaluation.evaluation import evaluate, pool, run_trials
-from kinarm.evaluation.held import AIM, Held, held_trials
-from kinarm.evaluation.metrics import CLOSE, HELD_WITHIN
-from kinarm.evaluation.outcomes import HELD_STEPS, Outcomes
+from kinarm.evaluation.holding import AIM, Holding, measure_holding
+from kinarm.evaluation.metrics import CLOSE, HOLDING_WITHIN
+from kinarm.evaluation.outcomes import HOLDING_STEPS, Outcomes
 from kinarm.evaluation.trials import TrialSet
 from kinarm.problem import PROBLEMS
 
@@ -32,14 +32,14 @@ def stepped(skilled, trials):
             tool = env.simulator.arm.tool_position(env.episodes.q[0])  # through Pinocchio
             distances.append(np.linalg.norm(tool - goal))
             over |= terminated
-        found.append((min(distances), max(distances[-HELD_STEPS:]), terminated, len(distances)))
+        found.append((min(distances), max(distances[-HOLDING_STEPS:]), terminated, len(distances)))
     closest, at_end, touched, steps = map(np.array, zip(*found, strict=True))
     return closest, at_end, touched, steps
 
 
 @pytest.fixture(scope="module")
-def held(skilled, trials) -> Held:
-    return held_trials(Entrant.from_policy("skilled", skilled), trials)
+def held(skilled, trials) -> Holding:
+    return measure_holding(Contestant.from_policy("skilled", skilled), trials)
 
 
 def test_every_trial_is_that_of_an_environment_that_nothing_satisfies(held, stepped):
@@ -54,37 +54,37 @@ def test_every_trial_is_that_of_an_environment_that_nothing_satisfies(held, step
 
 def test_figures_are_shares_without_contact(skilled, trials, stepped):
     closest, at_end, touched, _ = stepped
-    evaluation = run_trials(Entrant.from_policy("skilled", skilled), trials, hold=True)
+    evaluation = run_trials(Contestant.from_policy("skilled", skilled), trials, hold=True)
     figures = evaluation.metrics
     for limit in CLOSE:
         expected = np.mean((closest <= limit) & ~touched)
         assert figures[f"closer_than_{1000 * limit:g}_mm"].value == expected
-    assert figures["held"].value == np.mean((at_end <= HELD_WITHIN) & ~touched)
+    assert figures["held"].value == np.mean((at_end <= HOLDING_WITHIN) & ~touched)
     assert figures["held_collision"].value == touched.mean()
     assert figures["median_approach"].value == pytest.approx(np.median(closest), abs=1e-12)
     assert figures["p95_approach"].value == pytest.approx(np.quantile(closest, 0.95), abs=1e-12)
 
 
 def test_what_ends_at_success_stays_as_it_was(skilled, trials, skilled_evaluation):
-    evaluation = run_trials(Entrant.from_policy("skilled", skilled), trials, hold=True)
+    evaluation = run_trials(Contestant.from_policy("skilled", skilled), trials, hold=True)
     rows = [each.to_json() for each in (skilled_evaluation, evaluation)]
     for name, estimate in rows[0]["metrics"].items():
         if estimate["value"] is not None:
             assert rows[1]["metrics"][name] == estimate
     assert rows[1]["outcomes"] == rows[0]["outcomes"]
     assert set(rows[1]) - set(rows[0]) == {"held"}
-    assert rows[1]["held"]["closest"] == evaluation.held.closest.tolist()
+    assert rows[1]["held"]["closest"] == evaluation.holding.closest.tolist()
 
 
 def test_the_oracle_aims_closer_and_stays(trials):
-    held = held_trials(ORACLE, trials)
+    held = measure_holding(ORACLE, trials)
     assert (held.closest <= AIM + 1e-9).all()
     assert (held.farthest_at_end <= AIM + 1e-9).all()
     assert not held.collision.any()
 
 
 def test_a_policy_that_does_not_move_stays_where_it_is(trials):
-    held = held_trials(find_entrants("zero")[0], trials)
+    held = measure_holding(find_contestants("zero")[0], trials)
     distance = trials.simulator.world.distances(trials.starts, trials.goals)
     np.testing.assert_allclose(held.closest, distance, atol=1e-12)
     np.testing.assert_allclose(held.farthest_at_end, distance, atol=1e-12)
@@ -93,30 +93,30 @@ def test_a_policy_that_does_not_move_stays_where_it_is(trials):
 
 def test_a_horizon_shorter_than_what_is_held():
     trials = TrialSet.draw(PROBLEMS["right"].replace(horizon=3), 4, 0)
-    held = held_trials(find_entrants("zero")[0], trials)
+    held = measure_holding(find_contestants("zero")[0], trials)
     np.testing.assert_allclose(held.closest, held.farthest_at_end)
 
 
 def test_functions_and_random_actions_are_held_too(trials):
     moved = evaluate(lambda seen: np.zeros((len(seen), 5)), "right", trials=3, hold=True)
     assert moved.metrics["held"].value == 0
-    first = held_trials(find_entrants("random")[0], trials)
-    again = held_trials(find_entrants("random")[0], trials)
+    first = measure_holding(find_contestants("random")[0], trials)
+    again = measure_holding(find_contestants("random")[0], trials)
     np.testing.assert_array_equal(first.closest, again.closest)
 
 
 def test_seeds_are_pooled(skilled, trials):
     members = [
         run_trials(
-            Entrant.from_policy(f"made-seed{seed}", reseeded(skilled, seed)), trials, hold=True
+            Contestant.from_policy(f"made-seed{seed}", reseeded(skilled, seed)), trials, hold=True
         )
         for seed in range(2)
     ]
     members[1] = replace(
-        members[1], held=replace(members[1].held, closest=2 * members[1].held.closest)
+        members[1], holding=replace(members[1].holding, closest=2 * members[1].holding.closest)
     )
     (pooled,) = pool(members)
-    closest = np.concatenate([each.held.closest for each in members])
+    closest = np.concatenate([each.holding.closest for each in members])
     assert pooled.metrics["median_approach"].value == np.median(closest)
 
 
@@ -127,7 +127,7 @@ def test_without_it_there_is_nothing_to_tell(skilled_evaluation):
 
 def test_what_is_shown_of_it():
     touched = np.array([True, False, True])
-    held = Held(
+    held = Holding(
         closest=np.zeros(3), farthest_at_end=np.ones(3), collision=touched, steps=np.full(3, 64)
     )
-    assert repr(held) == "Held(3 trials, 2 collisions)"
+    assert repr(held) == "Holding(3 trials, 2 collisions)"

@@ -1,1 +1,0 @@
-"""What is replayed: finding and choosing trials, recording entrants, following them live."""
