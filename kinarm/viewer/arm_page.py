@@ -12,9 +12,9 @@ from kinarm.arm_specification import ArmSpecification
 from kinarm.collision import ContactModel
 from kinarm.errors import ArmError
 from kinarm.scene import Scene
-from kinarm.viewer.arm_data import arm_data
-from kinarm.viewer.html_page import HtmlPage, page_html
-from kinarm.viewer.scene_commands import arm_commands
+from kinarm.viewer.drawing import SHAPE, CapturingWindow, draw_stage, put
+from kinarm.viewer.html_page import HtmlPage, arm_data, page_html
+from kinarm.viewer.visual_shapes import collision_parts
 
 NEARER = 0.8
 """Distance of the camera, as a share of that in replays, which show more than the arm."""
@@ -62,35 +62,28 @@ def arm_page(
 
 
 def _arm_html(arm: Arm, scene: Scene) -> str:
-    """Page of an arm in a scene."""
+    """Page of an arm in a scene, with the shapes and pairs that are tested for contact."""
     model = ContactModel.build(arm, scene)
-    data = {**arm_data(arm, scene), **_motion_data(arm), **_contact_data(model)}
-    data["scale"] *= NEARER
-    title = f"{arm.name} · kinarm arm"
-    return page_html("arm_page", title, arm_commands(model, scene), data, ("contact", "arm_page"))
-
-
-def _motion_data(arm: Arm) -> dict[str, Any]:
-    """Joints and their limits."""
-    return {
+    window = CapturingWindow()
+    frames = draw_stage(window.top, arm, scene)
+    for number, part in enumerate(collision_parts(arm)):
+        put(frames[part.joint][f"shape_{number}"], SHAPE, part.mesh)
+    objects = zip(model.geometry.geometryObjects, model.body_names, strict=True)
+    data = arm_data(arm, scene) | {
         "joints": list(arm.joint_names),
         "lower": arm.lower.tolist(),
         "upper": arm.upper.tolist(),
         "home": arm.home.tolist(),
         "reach": arm.reach,
-    }
-
-
-def _contact_data(model: ContactModel) -> dict[str, Any]:
-    """Shapes and pairs that are tested."""
-    objects = zip(model.geometry.geometryObjects, model.body_names, strict=True)
-    return {
         "bodies": [
             {"name": name, "joint": shape.parentJoint, **_shape_data(shape)}
             for shape, name in objects
         ],
         "pairs": [[pair.first, pair.second] for pair in model.geometry.collisionPairs],
     }
+    data["scale"] *= NEARER
+    title = f"{arm.name} · kinarm arm"
+    return page_html("arm_page", title, window.content, data, ("contact", "arm_page"))
 
 
 def _shape_data(shape: pin.GeometryObject) -> dict[str, Any]:

@@ -1,6 +1,8 @@
 """Draw an arm and its scene into a Meshcat window: a page in the making, or a live one."""
 
+import struct
 from collections import defaultdict
+from typing import Any
 
 import numpy as np
 import umsgpack
@@ -12,20 +14,21 @@ from numpy.typing import NDArray
 from kinarm.arm import Arm
 from kinarm.problem import ReachProblem
 from kinarm.scene import Obstacle, Scene
-from kinarm.viewer.arm_shapes import arm_parts
+from kinarm.viewer.camera import stage_scale
+from kinarm.viewer.lighting import SUN, SUN_PLACE
 from kinarm.viewer.meshes import Mesh, capsule, cylinder, tube
-from kinarm.viewer.parts import Finish
+from kinarm.viewer.parts import OUTCOME_COLOURS, TRACES, Finish
 from kinarm.viewer.surroundings import (
+    FLASH_RADIUS,
     FLOOR_RADIUS,
     GRID_RADIUS,
     GRID_STEP,
-    OUTCOME_COLOURS,
     TRACE_RADIUS,
     TRACE_SIDES,
-    TRACES,
     cube_mesh,
     obstacle_meshes,
 )
+from kinarm.viewer.visual_shapes import arm_parts
 
 FLOOR = Finish(0xE9ECEF, roughness=0.95)
 OBSTACLE = Finish(0xB4BCC6, roughness=0.8)
@@ -37,12 +40,47 @@ SHAPE = Finish(0x56B4E9, roughness=0.6, opacity=0.34)
 GRID_COLOUR = 0xC6CCD3
 BACKGROUND = [0.93, 0.945, 0.96]
 
-SUN_PLACE = [-2.0, -1.0, 3.4]
 CLUTTER = ("/Axes", "/Grid", "/Lights/PointLightPositiveX", "/Lights/PointLightNegativeX")
 """What Meshcat shows by default and a replay does not."""
 DIMMED = {"/Lights/AmbientLight/<object>": 0.42, "/Lights/FillLight/<object>": 0.2}
 FIELD_OF_VIEW, CAMERA_PLACE = 32, (-2.4, 1.6, 1.9)
 """Of the live page [degrees, m], in the frame of three.js, whose y axis points up."""
+
+
+class CapturingWindow:
+    """Stands in for Meshcat's window and keeps every command as bytes, in order.
+
+    The same drawing gives the same bytes: Meshcat's random ids are replaced by numbers.
+
+    Attributes
+    ----------
+    top : meshcat.Visualizer
+        What to draw on.
+    """
+
+    def __init__(self) -> None:
+        self.top = Visualizer(window=self)
+        self._commands: list[bytes] = []
+        self._numbers: dict[str, str] = {}
+
+    def send(self, command: Any) -> None:
+        """Keep a command; Meshcat calls this."""
+        self._commands.append(umsgpack.packb(self._renumbered(command.lower())))
+
+    @property
+    def content(self) -> bytes:
+        """All commands, each led by its length."""
+        return b"".join(struct.pack("<I", len(each)) + each for each in self._commands)
+
+    def _renumbered(self, value: Any, key: str = "") -> Any:
+        """Part of a command with its ids replaced."""
+        if isinstance(value, dict):
+            return {name: self._renumbered(entry, name) for name, entry in value.items()}
+        if isinstance(value, list):
+            return [self._renumbered(entry) for entry in value]
+        if key in ("uuid", "geometry", "material"):
+            return self._numbers.setdefault(value, f"id-{len(self._numbers)}")
+        return value
 
 
 class _BufferGeometry(Geometry):
@@ -114,7 +152,7 @@ class _Sun(Object):
         light = {
             "uuid": self.uuid,
             "type": "DirectionalLight",
-            "color": 0xFFF6E8,
+            "color": SUN,
             "intensity": 0.5,
         }
         return {"object": {**light, "shadow": {**shadow, "camera": camera}}}
@@ -140,6 +178,23 @@ def put(window: Visualizer, finish: Finish, *meshes: Mesh) -> None:
     window.set_object(DrawnMesh(_QuantisedGeometry(Mesh.joined(meshes)), _FinishMaterial(finish)))
 
 
+def draw_stage(window: Visualizer, arm: Arm, scene: Scene) -> list[Visualizer]:
+    """Draw surroundings, the ball that marks a contact, and an arm; return the arm's frames.
+
+    Parameters
+    ----------
+    window : meshcat.Visualizer
+        Where to draw.
+    arm : Arm
+        The arm.
+    scene : Scene
+        What stands around it.
+    """
+    draw_surroundings(window, scene)
+    put(window["flash"], FLASH, capsule(0.0, stage_scale(arm, scene) * FLASH_RADIUS))
+    return draw_arm(window["arm"], arm)
+
+
 def draw_surroundings(window: Visualizer, scene: Scene) -> None:
     """Lights, floor with a grid, and obstacles."""
     for path in CLUTTER:
@@ -149,7 +204,7 @@ def draw_surroundings(window: Visualizer, scene: Scene) -> None:
     for end in ("top_color", "bottom_color"):
         window["/Background"].set_property(end, BACKGROUND)
     window["sun"].set_object(_Sun())
-    window["sun"]["<object>"].set_property("position", SUN_PLACE)
+    window["sun"]["<object>"].set_property("position", list(SUN_PLACE))
     if scene.ground:
         put(window["floor"], FLOOR, cylinder(0.002, FLOOR_RADIUS, 0.0).moved((0, 0, -0.002)))
         grid = _BufferGeometry(position=_grid_lines().astype(np.float32))

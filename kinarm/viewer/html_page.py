@@ -3,6 +3,7 @@
 import base64
 import gzip
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -14,6 +15,10 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
 
 from kinarm._files import write_text
+from kinarm.arm import Arm
+from kinarm.scene import Scene
+from kinarm.viewer.camera import stage_scale
+from kinarm.viewer.visual_shapes import arm_parts, link_joints
 
 NOTEBOOK_HEIGHT = 560
 """Height of a page in a notebook [pixels]."""
@@ -88,6 +93,29 @@ def page_html(
         data=_gzip_base64(described.encode()),
         scripts=[_own_text(f"{name}.js") for name in ("page", "stage", *parts)],
     )
+
+
+def arm_data(arm: Arm, scene: Scene) -> dict[str, Any]:
+    """Describe an arm: its axes and tool, which joint carries which body, its colour and size."""
+    chain, painted = arm.chain, Counter[int]()
+    for part in arm_parts(arm):
+        painted[part.finish.colour] += len(part.mesh.faces)
+    return {
+        "arm": arm.name,
+        "axes": [
+            {
+                "translation": chain.translation[k].tolist(),
+                "rotation": chain.rotation[k].tolist(),
+                "axis": chain.axis[k].tolist(),
+                "slides": bool(chain.prismatic[k]),
+            }
+            for k in range(arm.n_joints)
+        ],
+        "tool": chain.tool.tolist(),
+        "links": link_joints(arm),
+        "scale": stage_scale(arm, scene),
+        "swatch": f"#{painted.most_common(1)[0][0]:06x}",
+    }
 
 
 def _own_text(name: str) -> Markup:

@@ -4,7 +4,9 @@ from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
+
+from kinarm.viewer.parts import channels
 
 Array = NDArray[np.float64]
 
@@ -30,27 +32,6 @@ DIRECTIONS = 4096
 
 IRRADIANCE_NODES, REFLECTION_NODES = 17, 33
 """Nodes along each side of the octahedral maps."""
-
-
-def channels(colour: int) -> Array:
-    """Red, green and blue of 0xRRGGBB, from 0 to 1."""
-    return np.array([colour >> 16 & 255, colour >> 8 & 255, colour & 255]) / 255.0
-
-
-def to_linear(encoded: ArrayLike) -> Array:
-    """Decode sRGB."""
-    value = np.asarray(encoded, dtype=float)
-    linear: Array = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
-    return linear
-
-
-def to_srgb(linear: ArrayLike) -> Array:
-    """Encode as sRGB."""
-    value = np.asarray(linear, dtype=float)
-    encoded: Array = np.where(
-        value <= 0.0031308, 12.92 * value, 1.055 * np.maximum(value, 0) ** (1 / 2.4) - 0.055
-    )
-    return encoded
 
 
 @lru_cache(maxsize=1)

@@ -1,19 +1,21 @@
-"""A scene served to browsers of this machine while it is drawn, by a thread of this process."""
+"""A scene served to browsers of this machine while it is drawn, by threads of this process."""
 
-import asyncio
 import errno
-import socket
+import struct
+import sys
 import threading
-from functools import cache
+from collections.abc import Iterator, Mapping
+from functools import cache, partial
+from http.server import BaseHTTPRequestHandler
 from importlib import resources
+from socketserver import ThreadingTCPServer
 from typing import Any
 
+import umsgpack
 from meshcat import Visualizer
 
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError, OutputError
-from kinarm.viewer.live_scene import LiveScene
-from kinarm.viewer.live_visits import File, Reception
 
 HOST = "127.0.0.1"
 PORT, LAST_PORT = 7000, 65535
@@ -23,7 +25,7 @@ PORTS_TRIED = 100
 class LiveServer:
     """Serves a scene to browsers on this machine while it is drawn; use it in a ``with`` block.
 
-    It runs in a thread and ends with the process, however that ends.
+    Its threads end with the process, however that ends.
 
     Parameters
     ----------
@@ -46,15 +48,11 @@ class LiveServer:
     """
 
     def __init__(self, port: int = PORT) -> None:
-        self._listening = _listening_socket(port)
-        self.port = self._listening.getsockname()[1]
         self._scene = LiveScene()
-        self._reception = Reception(_files(), self._scene)
-        self._loop = asyncio.new_event_loop()
-        self._over = asyncio.Event()
-        self._thread = threading.Thread(target=self._run, name="kinarm live", daemon=True)
-        self._thread.start()
+        self._server = _listening_server(port, self._scene)
+        self.port: int = self._server.server_address[1]
         self.window = Visualizer(window=self)
+        threading.Thread(target=self._server.serve_forever, args=(0.05,), daemon=True).start()
 
     @property
     def address(self) -> str:
@@ -64,13 +62,12 @@ class LiveServer:
     def send(self, command: Any) -> None:
         """Pass a drawing command on; Meshcat calls this."""
         self._scene.add(command.lower())
-        self._loop.call_soon_threadsafe(self._reception.tell)
 
     def close(self) -> None:
         """Stop serving."""
-        if self._thread.is_alive():
-            self._loop.call_soon_threadsafe(self._over.set)
-            self._thread.join()
+        self._scene.close()
+        self._server.shutdown()
+        self._server.server_close()
 
     def __enter__(self) -> "LiveServer":
         return self
@@ -78,31 +75,107 @@ class LiveServer:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _run(self) -> None:
-        self._loop.set_exception_handler(_say_nothing_of_the_network)
-        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
-            runner.run(self._serve())
 
-    async def _serve(self) -> None:
-        server = await self._reception.open(self._listening)
-        await self._over.wait()
-        server.close()
-        self._reception.close()
+class LiveScene:
+    """The drawing commands that still count; any thread may add some.
+
+    A command takes the place of an earlier one for the same part of the same node, so that the
+    scene grows with what is seen, not with time, and a page that is slow leaves out what is past.
+    """
+
+    def __init__(self) -> None:
+        self._commands: dict[tuple[str, str, str], tuple[int, bytes]] = {}
+        self._last, self._closed = 0, False
+        self._changed = threading.Condition()
+
+    def add(self, command: Mapping[str, Any]) -> None:
+        """Take one of Meshcat's commands."""
+        packed = umsgpack.packb(command)
+        path, kind = command["path"], command["type"]
+        key = (path, kind, command.get("property", ""))
+        below = f"{path.rstrip('/')}/"
+        with self._changed:
+            for other in [*self._commands] if kind == "delete" else ():
+                if other[0] == path or other[0].startswith(below):
+                    del self._commands[other]
+            self._commands.pop(key, None)  # so that the order is that of the latest commands
+            self._last += 1
+            self._commands[key] = self._last, struct.pack("<I", len(packed)) + packed
+            self._changed.notify_all()
+
+    def close(self) -> None:
+        """End all `changes`."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+
+    def changes(self) -> Iterator[bytes]:
+        """All commands that count now, and then those that come, until the scene is closed.
+
+        Each is led by its length.
+        """
+        seen = 0
+        while True:
+            with self._changed:
+                while not self._closed and self._last == seen:
+                    self._changed.wait()
+                if self._closed:
+                    return
+                news = [told for number, told in self._commands.values() if number > seen]
+                seen = self._last
+            yield from news
 
 
-def _say_nothing_of_the_network(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-    """Connections that break, and descriptors that are used up, are no news to a user."""
-    if not isinstance(context.get("exception"), OSError):
-        loop.default_exception_handler(context)
+class _Server(ThreadingTCPServer):
+    """Answers each visitor in a thread of its own."""
+
+    allow_reuse_address = daemon_threads = True
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Connections that break are no news to a user."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
 
 
-def _listening_socket(port: int) -> socket.socket:
-    """Open the port, or the next free one."""
+class _Visit(BaseHTTPRequestHandler):
+    """Answers a visitor with a file of the page, or with the scene as a stream without end.
+
+    Only requests to a name of this machine are answered: sites can make theirs point here.
+    """
+
+    timeout = 10.0
+    """So long a visitor may keep silent, or not take what is sent [s]."""
+
+    def __init__(self, scene: LiveScene, *connection: Any) -> None:
+        self._scene = scene
+        super().__init__(*connection)
+
+    def do_GET(self) -> None:
+        """Answer."""
+        kind, content = _files().get(self.path.partition("?")[0], (None, b""))
+        if self.headers.get("Host", "").partition(":")[0] not in ("localhost", HOST):
+            self.send_error(403)
+        elif kind is None:
+            self.send_error(404)
+        else:
+            self.send_response(200)
+            self.send_header("Content-Type", kind)
+            self.send_header("Cache-Control", "no-store")
+            self.end_headers()
+            for piece in [content] if content else self._scene.changes():
+                self.wfile.write(piece)
+
+    def log_message(self, *_: Any) -> None:
+        """Say nothing about requests."""
+
+
+def _listening_server(port: int, scene: LiveScene) -> _Server:
+    """Listen on a port, or on the next free one."""
     if whole_number("port", port, 0) > LAST_PORT:
         raise InvalidInputError(f"port must be at most {LAST_PORT}, got {port}")
     for candidate in range(port, min(port + PORTS_TRIED, LAST_PORT) + 1):
         try:
-            return socket.create_server((HOST, candidate))
+            return _Server((HOST, candidate), partial(_Visit, scene))
         except OSError as error:
             reason = error.strerror
             if error.errno != errno.EADDRINUSE:
@@ -111,13 +184,13 @@ def _listening_socket(port: int) -> socket.socket:
 
 
 @cache
-def _files() -> dict[str, File]:
-    """What a page consists of, by address."""
+def _files() -> dict[str, tuple[str, bytes]]:
+    """Type and content of what a page consists of, by address; the scene has no fixed content."""
     own = resources.files("kinarm.viewer")
-    page, script = own / "live_page.html", own / "live_page.js"
     meshcat = resources.files("meshcat") / "viewer/dist/main.min.js"
     return {
-        "/": File("text/html; charset=utf-8", page.read_bytes()),
-        "/live_page.js": File("text/javascript; charset=utf-8", script.read_bytes()),
-        "/meshcat.js": File("text/javascript; charset=utf-8", meshcat.read_bytes()),
+        "/": ("text/html; charset=utf-8", (own / "live_page.html").read_bytes()),
+        "/live_page.js": ("text/javascript", (own / "live_page.js").read_bytes()),
+        "/meshcat.js": ("text/javascript; charset=utf-8", meshcat.read_bytes()),
+        "/scene": ("application/octet-stream", b""),
     }

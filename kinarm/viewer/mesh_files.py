@@ -18,8 +18,8 @@ from kinarm._files import first_line
 from kinarm.errors import ArmError, MissingExtraError
 from kinarm.mesh_content import mesh_content
 from kinarm.urdf_schema import FARTHEST
-from kinarm.viewer.finishes import original_colour, packed_colour
 from kinarm.viewer.meshes import Mesh
+from kinarm.viewer.parts import packed_colour
 
 TOLERANCE = 3e-4
 """How far a simplified surface may lie from the planes of the triangles that it replaces [m]."""
@@ -34,6 +34,15 @@ logging.getLogger("trimesh").addHandler(logging.NullHandler())  # else it prints
 
 READERS = ("trimesh", "pycollada", "fast-simplification")
 """Packages of the extra ``robots`` that meshes are read and simplified with."""
+
+UNIVERSAL_ROBOTS = np.array(
+    [(0.49, 0.678, 0.8), (0.82, 0.82, 0.82), (0.279, 0.279, 0.279), (0.58, 0.58, 0.58), (0.1,) * 3]
+)
+"""Colours of the maker's caps, links, joints, rims and seals."""
+
+DIMMING, MOST_TIMES, SAME_COLOUR = 0.8, 6, 0.003
+"""The meshes in ``ur_description`` went through a modeller a few times, each of which left them
+this share of their light; links that went through it more often than others look darker."""
 
 
 class PaintedMesh(NamedTuple):
@@ -158,6 +167,17 @@ def _colour(geometry: Any, path: Path) -> int | None:
         return None
     colour = (look.material if look.kind == "texture" else look).main_color
     return packed_colour(original_colour(path, np.asarray(colour[:3]) / 255))
+
+
+def original_colour(path: Path, colour: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Colour of a part as its maker made it, shape (3,), for one that a mesh file states."""
+    if "ur_description" in path.parts:
+        for times in range(MOST_TIMES + 1):
+            apart = np.abs(UNIVERSAL_ROBOTS * DIMMING**times - colour).max(axis=1)
+            if apart.min() < SAME_COLOUR:
+                original: NDArray[np.float64] = UNIVERSAL_ROBOTS[apart.argmin()]
+                return original
+    return colour
 
 
 def _simplified(mesh: Mesh) -> Mesh:

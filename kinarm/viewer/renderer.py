@@ -16,14 +16,8 @@ from kinarm.viewer.kernels.lighting import Lights, Materials
 from kinarm.viewer.kernels.rasterising import draw_shadow, draw_view, project
 from kinarm.viewer.kernels.shading import paint_floor, shade
 from kinarm.viewer.kernels.views import Backdrop, Balls, Eye, Surfaces, View
-from kinarm.viewer.parts import Finish
-from kinarm.viewer.surroundings import (
-    FLASH_RADIUS,
-    FLOOR_RADIUS,
-    GRID_RADIUS,
-    GRID_STEP,
-    OUTCOME_COLOURS,
-)
+from kinarm.viewer.parts import OUTCOME_COLOURS, Finish, channels, to_linear, to_srgb
+from kinarm.viewer.surroundings import FLASH_RADIUS, FLOOR_RADIUS, GRID_RADIUS, GRID_STEP
 from kinarm.viewer.triangle_scene import CUBE, TriangleScene
 
 Array = NDArray[np.float64]
@@ -46,7 +40,7 @@ SHADOW_REACH = 1.75
 HALO_OPACITY = 0.16
 FLASH_OPACITY, FLASH_SWELL = 0.55, 1.5
 
-GAMMA = lighting.to_srgb(np.linspace(0, 1, 4096))
+GAMMA = to_srgb(np.linspace(0, 1, 4096))
 
 
 class Renderer:
@@ -183,7 +177,7 @@ class Renderer:
             flash = (contact.point, size, OUTCOME_COLOURS["collision"])
             balls.append((*flash, FLASH_OPACITY, True))
         centres, radii, colours, opacities, on_top = zip(*balls, strict=True)
-        encoded = [lighting.channels(colour) for colour in colours]
+        encoded = [channels(colour) for colour in colours]
         return Balls(*(np.array(each) for each in (centres, radii, encoded, opacities, on_top)))
 
     def _make_eye(self) -> Eye:
@@ -194,8 +188,8 @@ class Renderer:
     def _make_backdrop(self) -> Backdrop:
         away = float(np.linalg.norm(self.camera.position))
         return Backdrop(
-            colour=lighting.channels(BACKGROUND),
-            grid=lighting.channels(GRID_COLOUR),
+            colour=channels(BACKGROUND),
+            grid=channels(GRID_COLOUR),
             fog=away + np.array(FADING),
             floor_radius=FLOOR_RADIUS if self.problem.scene.ground else 0.0,
             grid_radius=GRID_RADIUS,
@@ -220,7 +214,7 @@ def _materials(finishes: Sequence[Finish]) -> Materials:
     roughness = [finish.roughness for finish in finishes]
     known = sorted(set(roughness))
     return Materials(
-        colour=lighting.to_linear([lighting.channels(finish.colour) for finish in finishes]),
+        colour=to_linear([channels(finish.colour) for finish in finishes]),
         emission=np.zeros((len(finishes), 3)),
         roughness=np.array(roughness),
         metalness=np.array([finish.metalness for finish in finishes]),
@@ -232,14 +226,14 @@ def _lights(finishes: Sequence[Finish], texels: int) -> Lights:
     """The replay page's light for some finishes, with an empty shadow map."""
     places = np.array([lighting.SUN_PLACE, lighting.FILL_PLACE])
     directions = places / np.linalg.norm(places, axis=1, keepdims=True)
-    sun = lighting.SUN_INTENSITY * lighting.channels(lighting.SUN)
-    fill = lighting.FILL_INTENSITY * lighting.channels(lighting.FILL)
+    sun = lighting.SUN_INTENSITY * channels(lighting.SUN)
+    fill = lighting.FILL_INTENSITY * channels(lighting.FILL)
     known = sorted({finish.roughness for finish in finishes})
     return Lights(
         directions=directions,
         colours=np.array([sun, fill]),
-        sky=lighting.SKY_INTENSITY * lighting.channels(lighting.SKY),
-        ground=lighting.SKY_INTENSITY * lighting.channels(lighting.GROUND),
+        sky=lighting.SKY_INTENSITY * channels(lighting.SKY),
+        ground=lighting.SKY_INTENSITY * channels(lighting.GROUND),
         irradiance=lighting.irradiance_map(),
         reflections=np.array([lighting.reflection_map(roughness) for roughness in known]),
         sunward=_sunward(directions[0], texels),

@@ -1,4 +1,4 @@
-"""What stands around an arm, and the colours of what may happen to it."""
+"""The surroundings of an arm: obstacles and the cube as meshes, and sizes of what is drawn."""
 
 from typing import NamedTuple
 
@@ -6,16 +6,6 @@ import numpy as np
 
 from kinarm.scene import GoalRegion, Obstacle, Scene
 from kinarm.viewer.meshes import Mesh, box
-from kinarm.viewer.parts import Finish
-
-OUTCOME_COLOURS = {"success": 0x0072B2, "collision": 0xD55E00, "truncated": 0xE69F00}
-"""Distinguishable with any colour vision (Okabe and Ito)."""
-
-TRACES: dict[str | None, Finish] = {
-    None: Finish(0x4D5A68, roughness=0.5),
-    **{outcome: Finish(colour, roughness=0.5) for outcome, colour in OUTCOME_COLOURS.items()},
-}
-"""Finish of the tool's way, by outcome; None while the episode goes on."""
 
 FLOOR_RADIUS, GRID_RADIUS, GRID_STEP = 12.0, 2.0, 0.25
 """Of the floor, and of the lines on it [m]."""

@@ -7,22 +7,14 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from kinarm.arm import Arm
-from kinarm.collision import body_names
 from kinarm.problem import ReachProblem
-from kinarm.viewer.arm_shapes import arm_parts
 from kinarm.viewer.camera import stage_scale
 from kinarm.viewer.kernels.rasterising import place
 from kinarm.viewer.kernels.views import Surfaces
-from kinarm.viewer.lighting import channels
 from kinarm.viewer.meshes import Mesh, tube
-from kinarm.viewer.parts import Finish
-from kinarm.viewer.surroundings import (
-    TRACE_RADIUS,
-    TRACE_SIDES,
-    TRACES,
-    cube_mesh,
-    obstacle_meshes,
-)
+from kinarm.viewer.parts import TRACES, Finish, channels
+from kinarm.viewer.surroundings import TRACE_RADIUS, TRACE_SIDES, cube_mesh, obstacle_meshes
+from kinarm.viewer.visual_shapes import arm_parts, link_joints
 
 Array = NDArray[np.float64]
 
@@ -59,10 +51,7 @@ class TriangleScene:
         self.scale = stage_scale(arm, problem.scene)
         self._arm, self._data = arm, arm.model.createData()
         self._goal_frame = arm.n_joints + 1
-        self._links = {
-            name: shape.parentJoint
-            for name, shape in zip(body_names(arm), arm.geometry.geometryObjects, strict=True)
-        }
+        self._links = link_joints(arm)
         parts = _parts(problem, arm, self._goal_frame)
         self._arm_owners = {(part.joint, part.finish) for part in arm_parts(arm)}
         # Each frame has materials of its own, so that a link can light up.

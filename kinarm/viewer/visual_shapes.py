@@ -1,23 +1,71 @@
-"""The visual shapes of a URDF as parts of an arm, in the colours that it or its meshes state."""
+"""The looks of an arm: an industrial one if its dimensions fit, else its own shapes."""
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 from xml.etree import ElementTree
 
+import coal
 import numpy as np
 import pinocchio as pin
 
 from kinarm.arm import Arm
-from kinarm.errors import ArmError
+from kinarm.collision import body_names
+from kinarm.errors import ArmError, KinarmError
 from kinarm.urdf_schema import FARTHEST, check_numbers
-from kinarm.viewer.finishes import packed_colour, shape_finish
+from kinarm.viewer import industrial_arm
 from kinarm.viewer.mesh_files import PaintedMesh, read_mesh_file
-from kinarm.viewer.meshes import box, capsule, cylinder
-from kinarm.viewer.parts import PLAIN, ArmPart
+from kinarm.viewer.meshes import Mesh, box, capsule, cylinder, from_coal
+from kinarm.viewer.parts import ACCENT, PLAIN, ArmPart, packed_colour, shape_finish
 
 Element = ElementTree.Element
+
+TOOL_RADIUS = 0.012
+"""Of the ball at the tool point; a share of the arm's reach if that is less than 1 m [m]."""
+
+
+@lru_cache(maxsize=8)
+def arm_parts(arm: Arm) -> tuple[ArmPart, ...]:
+    """All parts of an arm.
+
+    One with the geometry of the shipped ones looks like an industrial arm; any other shows the
+    visual shapes of its URDF, or where there are none that can be read, its collision shapes. Why
+    they cannot is logged as a warning, in one line.
+    """
+    if industrial_arm.fits(arm):
+        return tuple(industrial_arm.parts(arm))
+    try:
+        found = tuple(visual_parts(arm))
+    except KinarmError as error:
+        logging.getLogger(__name__).warning(
+            "%s is shown by its collision shapes: %s", arm.name, error
+        )
+        found = ()
+    tool = from_coal(coal.Sphere(TOOL_RADIUS * min(arm.reach, 1.0))).moved(arm.chain.tool)
+    return (*(found or collision_parts(arm)), ArmPart(arm.n_joints, ACCENT, tool))
+
+
+def collision_parts(arm: Arm) -> tuple[ArmPart, ...]:
+    """The shapes that decide about contact, in colours of our own."""
+    return tuple(
+        _placed_part(shape.parentJoint, None, from_coal(shape.geometry), shape.placement)
+        for shape in arm.geometry.geometryObjects
+    )
+
+
+def _placed_part(joint: int, colour: int | None, mesh: Mesh, placement: pin.SE3) -> ArmPart:
+    """A shape where it stands on a joint; without a colour, links have two by turns."""
+    finish = PLAIN[joint % len(PLAIN)] if colour is None else shape_finish(colour)
+    return ArmPart(joint, finish, mesh.moved(placement.translation, placement.rotation))
+
+
+def link_joints(arm: Arm) -> dict[str, int]:
+    """Number of the joint that carries each link with a collision shape; 0 is the base."""
+    shapes = arm.geometry.geometryObjects
+    return {name: shape.parentJoint for name, shape in zip(body_names(arm), shapes, strict=True)}
 
 
 def visual_parts(arm: Arm) -> Iterator[ArmPart]:
@@ -49,10 +97,7 @@ def visual_parts(arm: Arm) -> Iterator[ArmPart]:
             alike = len({piece.colour for piece in pieces}) == 1
             for mesh, colour in pieces:
                 chosen = stated if stated is not None and alike else colour
-                plain = PLAIN[frame.parentJoint % len(PLAIN)]
-                finish = plain if chosen is None else shape_finish(chosen)
-                moved = mesh.moved(placement.translation, placement.rotation)
-                yield ArmPart(frame.parentJoint, finish, moved)
+                yield _placed_part(frame.parentJoint, chosen, mesh, placement)
 
 
 def _shapes(visual: Element, arm: Arm) -> tuple[PaintedMesh, ...]:

@@ -11,11 +11,10 @@ import pytest
 from kinarm.arm import Arm
 from kinarm.errors import ArmError, MissingExtraError
 from kinarm.viewer import arm_page, mesh_files
-from kinarm.viewer.arm_shapes import arm_parts, collision_parts
-from kinarm.viewer.finishes import original_colour, packed_colour, shape_finish
-from kinarm.viewer.mesh_files import TOLERANCE, read_mesh_file
+from kinarm.viewer.mesh_files import TOLERANCE, original_colour, read_mesh_file
 from kinarm.viewer.meshes import Mesh, box, capsule
-from kinarm.viewer.visual_shapes import visual_parts
+from kinarm.viewer.parts import packed_colour, shape_finish
+from kinarm.viewer.visual_shapes import arm_parts, collision_parts, visual_parts
 
 pytest.importorskip("trimesh", reason="pip install 'kinarm[robots]'")
 
@@ -283,7 +282,7 @@ class TestWithoutTheExtra:
         arm = Arm.load(simulators["mesh"].arm.specification)
         path = next(iter(simulators["mesh"].arm.urdf_path.parent.glob("*.stl")))
         monkeypatch.setattr(
-            "kinarm.viewer.arm_shapes.visual_parts", lambda _: read_mesh_file(path, (1, 1, 1))
+            "kinarm.viewer.visual_shapes.visual_parts", lambda _: read_mesh_file(path, (1, 1, 1))
         )
         parts = arm_parts(arm)
         assert len(parts) == len(collision_parts(arm)) + 1

@@ -12,7 +12,8 @@ from kinarm.problem import ReachProblem
 from kinarm.scene import Obstacle, Scene
 from kinarm.viewer import Camera, Renderer
 from kinarm.viewer.kernels.rasterising import draw_view, project
-from kinarm.viewer.lighting import SUN_PLACE, irradiance_map, reflection_map, to_linear, to_srgb
+from kinarm.viewer.lighting import SUN_PLACE, irradiance_map, reflection_map
+from kinarm.viewer.parts import to_linear, to_srgb
 from kinarm.viewer.triangle_scene import TriangleScene
 
 CAMERAS = (

@@ -23,7 +23,6 @@ from kinarm.recording import record_rollouts
 from kinarm.scene import GoalRegion, Obstacle, Scene, rotation_matrix
 from kinarm.viewer import Camera, arm_page, replay_page
 from kinarm.viewer.arm_page import _shape_data
-from kinarm.viewer.arm_shapes import arm_parts
 from kinarm.viewer.camera import stage_scale
 from kinarm.viewer.meshes import (
     Mesh,
@@ -36,6 +35,7 @@ from kinarm.viewer.meshes import (
     tube,
 )
 from kinarm.viewer.surroundings import obstacle_meshes
+from kinarm.viewer.visual_shapes import arm_parts
 
 
 def waving(simulator, count=3, seed=0):

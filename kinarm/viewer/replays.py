@@ -3,12 +3,25 @@
 from collections.abc import Sequence
 from itertools import zip_longest
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError
+from kinarm.paths import record_path
+from kinarm.problem import ProblemLike
 from kinarm.recording import Recording
-from kinarm.viewer.html_page import HtmlPage, page_html
-from kinarm.viewer.player_data import player_data
-from kinarm.viewer.scene_commands import replay_commands
+from kinarm.viewer.camera import stage_scale
+from kinarm.viewer.drawing import CapturingWindow, draw_goal, draw_stage, draw_trace
+from kinarm.viewer.html_page import HtmlPage, arm_data, page_html
+from kinarm.viewer.parts import OUTCOME_COLOURS
+from kinarm.viewer.surroundings import TRACE_SIDES
+from kinarm.world import World
+
+Trials = Sequence[Sequence[Recording]]
+"""One or two recordings of each trial."""
 
 
 class ReplayPage(HtmlPage):
@@ -60,6 +73,31 @@ def replay_page(
     return page
 
 
+def replay_path(
+    problem: ProblemLike | World,
+    path: ArrayLike,
+    file: str | Path | None = None,
+    *,
+    goal: ArrayLike | None = None,
+    name: str = "path",
+) -> ReplayPage:
+    """Make a page that plays your own path; it ends at contact, and shows it.
+
+    Parameters
+    ----------
+    problem, path, goal, name
+        As for `kinarm.record_path`.
+    file : str or Path, optional
+        Where to write the page, if at all.
+
+    Raises
+    ------
+    KinarmError
+        As `kinarm.record_path` and `kinarm.viewer.replay_page` do.
+    """
+    return replay_page(record_path(problem, path, goal=goal, name=name), file)
+
+
 def _check_recordings(recordings: Sequence[Recording], ghosts: Sequence[Recording]) -> None:
     """See that recordings can share a page."""
     if not recordings:
@@ -92,13 +130,56 @@ def _replay_html(
     heading: str,
 ) -> str:
     """Page of recordings that can share one."""
-    arm = recordings[0].problem.load_arm()
+    arm, scene = recordings[0].problem.load_arm(), recordings[0].problem.scene
     trials = [[run for run in runs if run is not None] for runs in zip_longest(recordings, ghosts)]
     policies = dict.fromkeys(run.policy for runs in trials for run in runs)
-    return page_html(
-        "player",
-        f"{' and '.join(policies)} · kinarm replay",
-        replay_commands(trials, arm),
-        player_data(trials, arm, groups, heading),
-        ("replay_stage", "trial_list", "player"),
-    )
+    data = {
+        **arm_data(arm, scene),
+        "traceIndices": 6 * TRACE_SIDES,
+        "colours": {name: f"#{colour:06x}" for name, colour in OUTCOME_COLOURS.items()},
+        "trials": [_trial_data(runs) for runs in trials],
+        "groups": list(groups),
+        "heading": heading,
+    }
+    title = f"{' and '.join(policies)} · kinarm replay"
+    scripts = ("replay_stage", "trial_list", "player")
+    return page_html("player", title, _replay_commands(trials, arm), data, scripts)
+
+
+def _replay_commands(trials: Trials, arm: Arm) -> bytes:
+    """Draw a stage, the goal, and the ways of the tool in each trial's recordings."""
+    window, problem = CapturingWindow(), trials[0][0].problem
+    draw_stage(window.top, arm, problem.scene)
+    draw_goal(window.top["goal"], problem)
+    scale = stage_scale(arm, problem.scene)
+    for number, runs in enumerate(trials):
+        for name, run in zip(("run", "ghost"), runs, strict=False):
+            points = np.array([arm.tool_position(state) for state in run.states])
+            draw_trace(window.top[f"trials/{number}/{name}"], points, run.outcome, scale)
+    return window.content
+
+
+def _trial_data(runs: Sequence[Recording]) -> dict[str, Any]:
+    """The trial that recordings are of, and what happened in it, as JSON."""
+    first, problem = runs[0], runs[0].problem
+    return {
+        "problem": problem.name,
+        "trial": first.trial,
+        "goal": first.goal.tolist(),
+        "tolerance": problem.task.tolerance,
+        "horizon": problem.task.horizon,
+        "timeStep": problem.stepping.time_step,
+        "floor": first.steps_lower_bound,
+        "runs": [_run_data(run) for run in runs],
+    }
+
+
+def _run_data(run: Recording) -> dict[str, Any]:
+    arrays = {
+        "contactPoint": run.contact_point,
+        "refused": run.refused,
+        "states": run.states,
+        "distances": run.distances,
+    }
+    lists = {name: None if value is None else value.tolist() for name, value in arrays.items()}
+    return {"policy": run.policy, "outcome": run.outcome, "contact": run.contact, **lists}
