@@ -13,3 +13,16 @@ pair : int
 poses : ndarray, shape (n_joints + 1, POSE)
     Forward kinematics: row 0 is the world, row k the frame of the k-th joint.
 """
+
+import numba
+
+from kinarm.errors import KinarmError
+
+TESTED = (0, 62), (0, 68)
+"""First and last version of Numba whose compiler the kernels are known to work with."""
+
+if not TESTED[0] <= numba.version_info.short <= TESTED[1]:
+    raise KinarmError(
+        f"kinarm works with Numba {TESTED[0][0]}.{TESTED[0][1]} to {TESTED[1][0]}.{TESTED[1][1]}, "
+        f"not {numba.__version__}: pip install 'numba<{TESTED[1][0]}.{TESTED[1][1] + 1}'"
+    )

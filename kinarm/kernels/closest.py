@@ -18,9 +18,6 @@ from kinarm.kernels.planes import rotated_back
 from kinarm.kernels.separation import lowest_corner
 from kinarm.kernels.simplex import of_segment, of_triangle, shrink
 
-LAYOUT = "a34e770460ea"
-"""Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
-
 CORNERS_TRIED = 64
 """Corners after which a distance is taken as it is."""
 

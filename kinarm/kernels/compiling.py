@@ -1,13 +1,14 @@
 """How kernels are compiled: without the GIL and without reordering of floating-point operations."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, TypeVar, cast
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from kinarm.kernels.caching import ForgivingCache
+from kinarm.kernels.caching import KernelCache
 from kinarm.kernels.linking import HelperCompiler, KernelCompiler, LeanCompiler, compiled_once
 
 Array = NDArray[np.float64]
@@ -33,11 +34,9 @@ def _called_by_python(function: Function, **more: Any) -> Function:
         "no_cfunc_wrapper": True,
         "pipeline_class": KernelCompiler,
     } | more
-    try:
-        compiled: Any = njit(cache=True, **options)(function)
-    except RuntimeError:
-        return cast("Function", njit(**options)(function))
-    compiled._cache = ForgivingCache(compiled._cache)
+    compiled: Any = njit(**options)(function)
+    with suppress(RuntimeError):  # of Numba, if there is no folder that it can write to
+        compiled._cache = KernelCache(function)
     return cast("Function", compiled)
 
 

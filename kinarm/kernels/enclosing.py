@@ -7,9 +7,6 @@ import numpy as np
 from kinarm.kernels.compiling import Array, kernel
 from kinarm.kernels.simplex import shrink
 
-LAYOUT = "4f25c0fc3aa6"
-"""Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
-
 ITERATIONS = 64
 """Corners that are tried for a point before its distance is taken as it is."""
 

@@ -8,9 +8,6 @@ from kinarm.kernels.jacobian import spatial_jacobian
 from kinarm.kernels.kinematics import POSE, forward_kinematics, to_world
 from kinarm.kernels.planes import rotated
 
-LAYOUT = "212549befa8e"
-"""Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
-
 
 @kernel
 def place_frame(

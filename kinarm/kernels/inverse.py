@@ -20,9 +20,6 @@ from kinarm.kernels.lanes import LANES, as_lanes, as_numbers, lane_bits
 from kinarm.kernels.limits import take_out_blocked, take_step
 from kinarm.kernels.planes import rotated
 
-LAYOUT = "4df4a3c859b5"
-"""Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
-
 PRECISION = 1e-10
 """Error at which a seed has arrived: lengths as shares of the arm's reach, and angles [rad]."""
 

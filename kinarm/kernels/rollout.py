@@ -30,13 +30,6 @@ from kinarm.kernels.session import Session
 from kinarm.kernels.sharing import take_number
 from kinarm.kernels.touching import deepest_overlap, first_contact, overlaps
 
-LAYOUT = "5d7b3d3fc21f"
-"""Hash of what is compiled in from other files; a test tells when to renew it.
-
-Numba's disk cache notices changes only in this file, so changing this line is what makes it
-compile anew.
-"""
-
 
 @lean_kernel
 def screen(

@@ -7,9 +7,6 @@ from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import Array, kernel
 
-LAYOUT = "e1df61d23bda"
-"""Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
-
 
 @kernel
 def propose_starts(

@@ -9,9 +9,6 @@ from kinarm.kernels.compiling import Array, inlined, kernel
 from kinarm.kernels.elementary import LOG_2, LOG_2_REST, sine_cosine
 from kinarm.kernels.lanes import as_lanes, power_of_two, select
 
-LAYOUT = "40e499f859c4"
-"""Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
-
 TURN = 6.283185307179586
 
 

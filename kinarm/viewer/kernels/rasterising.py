@@ -8,9 +8,6 @@ from numpy.typing import NDArray
 from kinarm.kernels.compiling import Array, kernel
 from kinarm.viewer.kernels.edges import edge, within
 
-LAYOUT = "77378cba4c43"
-"""Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
-
 NEAR = 0.01
 """Distance from the camera below which corners do not bound a triangle's picture [m]."""
 

@@ -10,9 +10,6 @@ from kinarm.viewer.kernels.edges import edge
 from kinarm.viewer.kernels.lighting import Lights, Materials, light_up, sunlit, unit
 from kinarm.viewer.kernels.views import Backdrop, Balls, Eye, Surfaces, View
 
-LAYOUT = "9acf34e521d6"
-"""Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
-
 FLOOR = 0
 """Material of the floor."""
 

@@ -37,9 +37,6 @@ from kinarm.policies.oracle.kernels.boxes import (
 )
 from kinarm.policies.oracle.kernels.overlap import overlaps
 
-LAYOUT = "879b2d127009"
-"""Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
-
 
 class ArmInScene(NamedTuple):
     """What proofs know of an arm in a scene: its kinematics, motion bounds and contact pairs."""

@@ -15,9 +15,6 @@ from kinarm.kernels.lanes import LANES, as_numbers, lane_bits, lanes, select
 from kinarm.kernels.limits import take_out_blocked, take_step
 from kinarm.kernels.records import Fixed, Layout
 
-LAYOUT = "821e01399206"
-"""Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
-
 ITERATIONS = 24
 """Newton steps before a configuration is given up."""
 

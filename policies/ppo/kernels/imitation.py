@@ -18,9 +18,6 @@ from kinarm.policies.ppo.kernels.layers import (
 )
 from kinarm.policies.ppo.kernels.tiles import Numbers
 
-LAYOUT = "a751486dd8e5"
-"""Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
-
 
 @kernel
 def add_imitation_gradients(

@@ -34,9 +34,6 @@ from kinarm.policies.ppo.kernels.loss import (
 )
 from kinarm.policies.ppo.kernels.tiles import LANES, Numbers
 
-LAYOUT = "9b589d8c361c"
-"""Hash of what is compiled in from other files; see `kinarm.kernels.rollout.LAYOUT`."""
-
 
 class Descent(NamedTuple):
     """Settings of Adam.
