@@ -1,27 +1,24 @@
 """``kinarm-bench``: how fast everything is on this machine."""
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from kinarm._command_line import run_request
 from kinarm._console import open_console
-from kinarm._files import check_folder, only_writer
+from kinarm._files import check_folder, only_writer, write_text
 from kinarm._validation import whole_number
-
-if TYPE_CHECKING:
-    from rich.console import Console
+from kinarm.evaluation.markdown import markdown_table
 
 EPILOG = """
---peers needs the extra peers, and the extra vamp for VAMP: pip install 'kinarm[peers]'. What is
-not installed is named and left out; so are arms with meshes without the extra robots.
+What is not installed is named and left out: Stable-Baselines3, and arms with meshes without the
+extra robots.
 
 examples:
-  kinarm-bench                                            a table, in a minute or two
-  kinarm-bench --peers                                    other simulators beside kinarm as well
-  kinarm-bench --ppo --limits --peers --out speed         everything, with files
+  kinarm-bench                              a table, in a minute or two
+  kinarm-bench --ppo --out speed            with a training by PPO, and files
 """
 
 
@@ -37,12 +34,6 @@ class BenchmarkRequest:
         Trained policy to run, on the problem that it is for.
     ppo : bool
         Time a training with PPO as well, a minute or two.
-    limits : bool
-        Count the operations of a step and say where time goes as well, a minute or two.
-    peers : bool
-        Measure other simulators and learners beside kinarm as well, a few minutes.
-    studies : bool
-        Time studies by one and two processes as well, a few minutes.
     out : Path
         Output folder, for a document and a page.
     json : bool
@@ -57,14 +48,11 @@ class BenchmarkRequest:
     repetitions: int = 7
     policy: str = field(default="ars-tuned-both", metadata={"metavar": "NAME_OR_FILE"})
     ppo: bool = False
-    limits: bool = False
-    peers: bool = False
-    studies: bool = False
     out: Path | None = field(default=None, metadata={"metavar": "DIR"})
     json: bool = False
 
     GROUPS: ClassVar = {
-        "what is measured": ("repetitions", "policy", "ppo", "limits", "peers", "studies"),
+        "what is measured": ("repetitions", "policy", "ppo"),
         "output": ("out", "json"),
     }
     DEFAULTS: ClassVar = {"out": "a table on standard output alone"}
@@ -73,7 +61,7 @@ class BenchmarkRequest:
         whole_number("repetitions", self.repetitions, 1)
 
     def run(self, command: str | None = None) -> dict[str, Any]:
-        """Measure everything.
+        """Measure everything, and write ``speed.json`` and ``SPEED.md`` if there is a folder.
 
         Parameters
         ----------
@@ -83,35 +71,26 @@ class BenchmarkRequest:
         Returns
         -------
         dict
-            Figures that JSON can hold: rates [1/s], shares, and times [s].
+            Figures that JSON can hold, of `kinarm.evaluation.bench.measure`.
 
         Raises
         ------
         KinarmError
             If the policy cannot be used, or the folder cannot be written to.
         """
-        from kinarm.evaluation.measurements.document import write_all
-
         if self.out is None:
             return self._measure()
         check_folder(self.out)
         with only_writer(self.out):
-            document = self._measure()
-            write_all(document, self.out, command or repr(self))
+            document = {"command": command or repr(self), **self._measure()}
+            write_text(self.out / "speed.json", json.dumps(document, indent=1) + "\n")
+            write_text(self.out / "SPEED.md", speed_page(document))
         return document
 
     def _measure(self) -> dict[str, Any]:
-        """Measure what the options name."""
-        from kinarm.evaluation.measurements import benchmark
+        from kinarm.evaluation import bench
 
-        return benchmark.measure(
-            self.policy,
-            self.repetitions,
-            ppo=self.ppo,
-            limits=self.limits,
-            peers=self.peers,
-            studies=self.studies,
-        )
+        return bench.measure(self.policy, self.repetitions, ppo=self.ppo)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -121,40 +100,107 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _report(request: BenchmarkRequest, command: str) -> None:
     """Run a request, and print its figures."""
-    from kinarm.evaluation.measurements import table
+    from rich.table import Table
 
     document = request.run(command)
     if request.json:
         print(json.dumps(document))
         return
-    console = open_console()
-    title = f"kinarm-bench, policy {document['policy']}"
-    _print_table(console, title, table.HEADER, table.rows(document))
-    if "limits" in document:
-        console.print(table.limit_text(document))
-        limits = document["limits"]
-        _print_table(console, "", table.OPERATION_HEADER, table.operation_rows(limits))
-        _print_table(console, "", table.TIME_HEADER, table.time_rows(limits))
-    if "peers" in document:
-        _print_table(console, "peers", table.PEER_HEADER, table.peer_rows(document["peers"]))
-
-
-WORDS = ("what", "peer", "where", "time of", "spent in")
-"""Headings of columns that hold no numbers."""
-
-
-def _print_table(
-    console: "Console", title: str, header: Sequence[str], rows: Iterable[tuple[str, ...]]
-) -> None:
-    """Print a table; an empty row ends a section."""
-    from rich.table import Table
-
-    table = Table(title=title or None, title_justify="left")
-    for heading in header:
-        table.add_column(heading, justify="left" if heading in WORDS else "right")
-    for row in rows:
+    table = Table(title=f"kinarm-bench, policy {document['policy']}", title_justify="left")
+    for heading in HEADER:
+        table.add_column(heading, justify="left" if heading == "what" else "right")
+    for row in rows(document):
         table.add_row(*row) if row else table.add_section()
-    console.print(table)
+    open_console().print(table)
+
+
+HEADER = ("what", "median", "best", "judged by Coal")
+
+Row = tuple[str, ...]
+
+
+def speed_page(document: dict[str, Any]) -> str:
+    """``SPEED.md``: everything that was measured, in one table."""
+    threads, architecture = document["machine"]["threads"], document["machine"]["architecture"]
+    table = ((*row, *[""] * (len(HEADER) - len(row))) for row in rows(document) if row)
+    versions = ", ".join(f"{name} {version}" for name, version in document["versions"].items())
+    return (
+        "# Measured\n\n"
+        f"Made by `{document['command']}` on {threads} threads of a machine of type "
+        f"{architecture}, with the policy `{document['policy']}`; medians of "
+        f"{document['repetitions']} repetitions.\n\n{markdown_table(HEADER, table)}\n{versions}.\n"
+    )
+
+
+def rows(document: dict[str, Any]) -> Iterator[Row]:
+    """What was measured, as rows of text; an empty row ends a section."""
+    for row in document["rollouts"]:
+        yield _rollout_row("rollouts", row)
+    yield ()
+    for row in document["robots"]:
+        yield from _skipped(row, "arms with meshes") or [_rollout_row(row["arm"], row)]
+    yield ()
+    yield "batch environment, 64 arms", *_rates(document["vector_environment"])
+    yield "single environment", *_rates(document["single_environment"])
+    sb3 = document["stable_baselines3"]
+    yield from _skipped(sb3, "for Stable-Baselines3") or [
+        ("for Stable-Baselines3, 64 arms", *_rates(sb3["native"])),
+        ("its DummyVecEnv, 64 single environments", *_rates(sb3["dummy"])),
+        ("speed-up over its DummyVecEnv", f"{sb3['speed_up']:.0f} x"),
+    ]
+    yield "reference path (Pinocchio + Coal)", *_rates(document["reference"])
+    yield "pictures, 480 x 360, one thread", *_rates(document["pictures"], "pictures")
+    yield (
+        "speed-up over the reference (512 trained)",
+        f"{document['speed_up_over_reference']:.0f} x",
+    )
+    yield ()
+    yield from _training_rows(document)
+    yield from _evaluation_rows(document["evaluation"])
+
+
+def _training_rows(document: dict[str, Any]) -> Iterator[Row]:
+    """Rows of trainings and of the oracle."""
+    ars, oracle = document["table_1_training"], document["oracle"]
+    seconds = (f"{ars['seconds'][name]:.2f} s" for name in ("median", "best"))
+    yield f"training of Table 1 ({_millions(ars)})", *seconds
+    if ppo := document.get("ppo_training"):
+        yield from _skipped(ppo, "training with PPO") or [
+            (f"training with PPO ({_millions(ppo)})", f"{ppo['seconds']:.1f} s"),
+            ("share of it in the simulator", f"{ppo['simulator_share']:.1%}"),
+        ]
+    rates = oracle["trials_per_second"]
+    seconds = (f"{oracle['trials'] / rates[name]:.1f} s" for name in ("median", "best"))
+    yield f"oracle, {oracle['trials']} trials", *seconds
+
+
+def _evaluation_rows(evaluation: dict[str, float]) -> Iterator[Row]:
+    """Rows of ``kinarm-eval``, a process of its own."""
+    memory = f"{evaluation['peak_memory_mb']:.0f} MB"
+    yield "kinarm-eval --trials 200, nothing compiled", f"{evaluation['seconds_first']:.1f} s"
+    for known, name in (("unknown", "seconds_without_bounds"), ("known", "seconds")):
+        what = f"kinarm-eval --trials 200, bounds {known}"
+        yield what, f"{evaluation[name]:.1f} s", memory
+
+
+def _rollout_row(what: str, row: dict[str, Any]) -> Row:
+    plural = "s" if row["threads"] > 1 else ""
+    episodes = f"{row['batch']} {row['actions']} episodes, {row['threads']} thread{plural}"
+    judged = f"{100 * row['judged_share']:.3f} %"
+    return f"{what}, {episodes}", *_rates(row["steps_per_second"]), judged
+
+
+def _skipped(measured: dict[str, Any], what: str) -> list[Row]:
+    """Rows that say why something was not measured; none if it was."""
+    return [(what, "skipped"), (measured["skipped"],)] if "skipped" in measured else []
+
+
+def _millions(training: dict[str, Any]) -> str:
+    return f"{training['environment_steps'] / 1e6:.1f} million steps"
+
+
+def _rates(timing: dict[str, float], unit: str = "steps") -> list[str]:
+    return [f"{timing[name]:,.0f} {unit}/s" for name in ("median", "best")]
 
 
 if __name__ == "__main__":

@@ -77,7 +77,7 @@ def test_learners_have_help_of_their_own(run, learner):
             "kinarm-compare",
             "--learners --problems --seeds --steps --trials --settings --out --jobs --no-train",
         ),
-        ("kinarm-bench", "--repetitions --policy --ppo --limits --peers --out --json"),
+        ("kinarm-bench", "--repetitions --policy --ppo --out --json"),
     ],
 )
 def test_help_names_every_option(run, program, options):
@@ -197,7 +197,7 @@ gymnasium.make("kinarm/ReachRight-v0").reset(seed=0)
 """
 
 
-@pytest.mark.parametrize("module", ["envs", "evaluation.measurements.environments"])
+@pytest.mark.parametrize("module", ["envs", "evaluation.bench"])
 def test_what_makes_environments_in_a_command_has_their_ids(module):
     pytest.importorskip("stable_baselines3")
     code = AS_A_COMMAND.format(module=module)

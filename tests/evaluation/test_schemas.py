@@ -40,7 +40,6 @@ WRITERS = {
     "evaluation/commands/problem.py": "problem-check",
     "evaluation/comparison/document.py": "comparison",
     "evaluation/comparison/runs.py": "compared-run",
-    "evaluation/measurements/document.py": "benchmark",
     "evaluation/ranking.py": "ranking",
     "evaluation/reproduction/document.py": "claims",
     "evaluation/request.py": "evaluation",
@@ -52,7 +51,6 @@ WRITERS = {
 NO_DOCUMENT = {
     "evaluation/commands/reproduce.py": "a marker with one word",
     "evaluation/document.py": "makes text of what others write",
-    "evaluation/measurements/operations.py": "speaks to another process",
     "evaluation/report/svg.py": "names parts of a drawing",
     "evaluation/reproduction/runs.py": "a list of seconds, and an archive's header",
     "evaluation/studies/planning.py": "is hashed",

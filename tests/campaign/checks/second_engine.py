@@ -7,7 +7,7 @@ from xml.etree.ElementTree import SubElement
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.evaluation.measurements.peers.mjcf import body_name, joint_name, mjcf
+from docs.measurements.mjcf import body_name, joint_name, mjcf
 from kinarm.world import World
 
 MARGIN = 1.1e-6

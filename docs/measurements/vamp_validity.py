@@ -1,16 +1,17 @@
-"""VAMP's check of configurations of a UR5, beside `World.screen`."""
+"""VAMP's check of configurations of a UR5, beside `World.screen`.
 
-from collections.abc import Iterator
+VAMP is built from source, by CMake and a C++ compiler: ``pip install 'kinarm[vamp]'``.
+"""
+
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 import vamp
 from numpy.typing import NDArray
 
-from kinarm.evaluation.measurements.peers.comparing import Comparison, compared
-from kinarm.evaluation.measurements.robots import robot_problem
-from kinarm.policies.policy import Policy
-from kinarm.scene import PAPER_BENCHES, Obstacle, Scene
+from kinarm.problem import PROBLEMS
+from kinarm.scene import PAPER_BENCHES, Scene
 from kinarm.world import World
 
 RAKE = 8
@@ -24,18 +25,16 @@ TERMS = (
     "convex hulls of the meshes, float64, any arm, and tool points as well"
 )
 
+Compared = tuple[str, str, str, Callable[[], int], Callable[[], int]]
+"""What is done, its unit, what is alike, and how both do it."""
 
-def compare(_: Policy, repetitions: int) -> Iterator[Comparison]:
-    """Configurations in one call, and in one call each.
 
-    Raises
-    ------
-    MissingExtraError
-        If the package with UR5 is missing.
-    """
-    scene = Scene(ground=False)
-    world = World(robot_problem("ur5").replace(scene=scene), threads=1)
-    surroundings = environment(scene.obstacles)
+def compare() -> Iterator[Compared]:
+    """Configurations in one call, and in one call each."""
+    problem = PROBLEMS["right"].replace(arm="ur5", scene=Scene(ground=False))
+    world, surroundings = World(problem, threads=1), vamp.Environment()
+    for box in PAPER_BENCHES:
+        surroundings.add_cuboid(vamp.Cuboid(list(box.centre), [0.0] * 3, list(box.size / 2)))
     waypoints = free_walk(world, surroundings, np.random.default_rng(0))
     path = vamp.ur5.Path()
     for waypoint in waypoints:
@@ -60,19 +59,10 @@ def compare(_: Policy, repetitions: int) -> Iterator[Comparison]:
             world.screen(waypoint[None])
         return CALLS
 
-    about = {"unit": "configurations/s", "terms": TERMS}
+    about = ("configurations/s", TERMS)
     many = f"{len(raked):,} configurations of UR5 in one call"
-    yield compared(theirs_together, ours_together, repetitions, what=many, **about)
-    one = "configurations of UR5, one call each"
-    yield compared(theirs_singly, ours_singly, repetitions, what=one, **about)
-
-
-def environment(obstacles: tuple[Obstacle, ...] = PAPER_BENCHES) -> Any:
-    """Boxes for VAMP."""
-    found = vamp.Environment()
-    for box in obstacles:
-        found.add_cuboid(vamp.Cuboid(list(box.centre), [0.0, 0.0, 0.0], list(box.size / 2)))
-    return found
+    yield many, *about, theirs_together, ours_together
+    yield "configurations of UR5, one call each", *about, theirs_singly, ours_singly
 
 
 def free_walk(world: World, surroundings: Any, rng: np.random.Generator) -> NDArray[np.float32]:

@@ -1,1 +1,0 @@
-"""What ``kinarm-bench`` measures: one concept a module, put together by `benchmark`."""

@@ -1,1 +1,0 @@
-"""Other people's simulators and learners beside kinarm, in the same run."""

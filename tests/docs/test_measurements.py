@@ -1,0 +1,206 @@
+"""The scripts in ``docs/measurements``: MuJoCo's arm is kinarm's, and operations are counted."""
+
+import math
+import time
+from types import SimpleNamespace
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from known_arms import INSTALLED
+from numba import njit
+
+from docs.measurements import limits
+from docs.measurements.counting import OperationCounter, source_name
+from docs.measurements.mjcf import mjcf
+from kinarm.evaluation.trials import TrialSet
+from kinarm.kernels.lanes import LANES, as_lanes
+from kinarm.kernels.network import affine_layer
+from kinarm.policies import load_policy
+from kinarm.problem import PROBLEMS
+from kinarm.simulator import Simulator
+from kinarm.world import World
+
+
+def counted(function, *arguments):
+    """Operations of each kind in a call of a function, which is compiled anew."""
+    counter = OperationCounter()
+    with counter.active():
+        compiled = njit(error_model="numpy")(function)
+        compiled(*arguments)
+    counter.reset()
+    compiled(*arguments)
+    found = {}
+    for counts in counter.by_function().values():
+        for kind, count in counts.items():
+            found[kind] = found.get(kind, 0) + count
+    return {kind: count for kind, count in found.items() if count}
+
+
+class TestOperations:
+    @pytest.mark.parametrize("n", [0, 3, 100])
+    def test_loops_count_as_often_as_they_run(self, n):
+        def horner(x, n):
+            value = 0.0
+            for _ in range(n):
+                value = value * x + 1.0
+            return value
+
+        assert counted(horner, 0.5, n) == ({"sums": n, "products": n} if n else {})
+
+    def test_branches_count_if_they_are_taken(self):
+        def root_or_square(x):
+            return math.sqrt(x) if x > 1.0 else x * x
+
+        assert counted(root_or_square, 4.0) == {"comparisons": 1, "roots": 1}
+        assert counted(root_or_square, 0.5) == {"comparisons": 1, "products": 1}
+
+    def test_lanes_count_one_for_each(self):
+        def scale(space):
+            values = as_lanes(space)
+            values[0] = values[0] * values[1] + 1.0
+
+        assert counted(scale, np.zeros((2, LANES))) == {"sums": LANES, "products": LANES}
+
+    def test_layer_takes_a_product_and_a_sum_for_each_weight(self):
+        weights, inputs, outputs = np.zeros(49 * 5), np.zeros((1, 48)), np.zeros((1, 5))
+        found = counted(affine_layer.py_func, weights, 0, 48, 5, inputs, 0, outputs, 0)
+        assert found == {"sums": 48 * 5, "products": 48 * 5}
+
+    def test_names_are_those_of_the_source(self):
+        mangled = "_ZN6kinarm7kernels7network3actB3v64B52c8tJT"
+        assert source_name(mangled) == "kinarm.kernels.network.act"
+
+    @pytest.mark.slow
+    def test_steps_are_counted_in_a_process_of_its_own(self):
+        found = limits.measure_operations("ars-tuned-both-seed0")
+        functions = found["functions"]
+        assert found["total"] == pytest.approx(sum(functions.values()))
+        # The policy: five sums of 48 products, in lanes that are not all busy to the end.
+        policy = functions["kinarm.kernels.network.affine_layer"]
+        assert 480 <= policy < 1.1 * 480
+
+    def test_attainable_rate_multiplies_and_adds_in_every_lane(self):
+        space = np.zeros((2 + limits.CHAINS, LANES))
+        space[0], space[1] = 0.5, 3.0
+        space[2:] = np.arange(limits.CHAINS * LANES, dtype=float).reshape(limits.CHAINS, LANES)
+        expected = space[2:].copy()
+        limits.multiply_and_add(10, space)
+        for _ in range(10):
+            expected = expected * 0.5 + 3.0
+        assert np.array_equal(space[2:], expected)
+
+    def test_time_is_shared_out_by_module(self):
+        shares = limits.time_shares(lambda: (Simulator("right", threads=1), time.sleep(0.2)))
+        assert sum(shares.values()) == pytest.approx(1)
+        assert shares["Python"] > 0.2
+
+
+class TestMuJoCo:
+    @pytest.fixture(params=["paper", "lrmate200ic_5l", pytest.param("ur5", marks=INSTALLED)])
+    def worlds(self, request):
+        """An arm, in kinarm and in MuJoCo."""
+        mujoco = pytest.importorskip("mujoco")
+        world = World(PROBLEMS["both"].replace(arm=request.param))
+        model = mujoco.MjModel.from_xml_string(mjcf(world, 0.02))
+        return world, model, mujoco.MjData(model)
+
+    def configurations(self, world, n):
+        q = np.tile(world.arm.home, (n, 1))
+        moved, rng = slice(0, world.n_actions), np.random.default_rng(0)
+        q[:, moved] = rng.uniform(world.arm.lower[moved], world.arm.upper[moved], q[:, moved].shape)
+        return q
+
+    def test_joints_are_where_ours_are(self, worlds):
+        import mujoco
+
+        world, model, data = worlds
+        moved = slice(0, world.n_actions)
+        assert model.nq == model.nu == world.n_actions
+        assert model.jnt_range[:, 0] == pytest.approx(world.arm.lower[moved])
+        assert model.actuator_ctrlrange[:, 1] == pytest.approx(world.arm.upper[moved])
+        for q in self.configurations(world, 20):
+            data.qpos[:] = q[: model.nq]
+            mujoco.mj_kinematics(model, data)
+            last = data.body(f"link{world.arm.n_joints}")
+            tool = last.xpos + last.xmat.reshape(3, 3) @ world.arm.chain.tool
+            assert tool == pytest.approx(world.arm.tool_position(q), abs=1e-12)
+
+    def test_same_bodies_touch(self, worlds):
+        """But for configurations where they only just do, by either engine's tolerance."""
+        import mujoco
+
+        world, model, data = worlds
+        q = self.configurations(world, 400)
+        touching, found = world.screen(q)[1], np.zeros(400, dtype=bool)
+        for i, configuration in enumerate(q):
+            data.qpos[:] = configuration[: model.nq]
+            mujoco.mj_forward(model, data)
+            found[i] = data.ncon > 0
+        assert 0.05 < touching.mean() < 0.95
+        assert (found != touching).mean() <= 0.005
+
+    def test_every_solid_has_its_size(self, make_joint, make_collision, write_robot):
+        """The mass that MuJoCo gives a solid of density 1000 is that of its volume."""
+        mujoco = pytest.importorskip("mujoco")
+        shapes = {
+            1: make_collision('<cylinder radius="0.1" length="0.3"/>', rpy="0.3 0.2 0.1"),
+            2: make_collision('<sphere radius="0.1"/>'),
+            3: make_collision('<box size="0.1 0.2 0.3"/>'),
+        }
+        path = write_robot([make_joint(), make_joint(xyz="0 0 0.5"), make_joint()], shapes)
+        document = ElementTree.fromstring(mjcf(World(PROBLEMS["right"].replace(arm=path)), 0.02))
+        for body in document.iter("body"):
+            for inertial in body.findall("inertial"):
+                body.remove(inertial)  # so that MuJoCo works it out
+        model = mujoco.MjModel.from_xml_string(ElementTree.tostring(document, encoding="unicode"))
+        volumes = [np.pi * 0.1**2 * 0.3, 4 / 3 * np.pi * 0.1**3, 0.1 * 0.2 * 0.3]
+        masses = [model.body(f"link{k}").mass[0] for k in (1, 2, 3)]
+        assert masses == pytest.approx(1000 * np.array(volumes))
+
+
+class TestPeers:
+    @pytest.fixture
+    def peers(self, monkeypatch):
+        pytest.importorskip("stable_baselines3")
+        from docs.measurements import peers
+
+        for name in ("EPISODES", "SINGLE_STEPS", "VECTOR_STEPS", "TRIALS", "ROBOT_ITERATIONS"):
+            monkeypatch.setattr(peers, name, 3)
+        monkeypatch.setattr(peers, "BUDGET", 0.0)
+        return peers
+
+    @pytest.mark.slow
+    @pytest.mark.filterwarnings("ignore")
+    def test_everybody_is_compared_with(self, peers):
+        policy = load_policy("ars-tuned-both-seed0")
+        table = "\n".join(peers.page(policy, 1))
+        assert all(f"| {package}" in table for package in peers.PEERS)
+
+    def test_arms_are_driven_along_the_paths_of_the_policy(self, peers):
+        simulator, policy = Simulator("right", threads=1), load_policy("ars-tuned-both-seed0")
+        starts, goals = simulator.sample(np.random.default_rng(0), 6)
+        targets = peers.joint_targets(simulator, policy, starts, goals)
+        rollouts = simulator.rollout(policy, starts, goals, record=True)
+        assert (np.abs(np.diff(targets, axis=1)) <= simulator.step_limit + 1e-12).all()
+        for way, steps, path in zip(targets, rollouts.steps, rollouts.paths[..., :5], strict=True):
+            assert np.array_equal(way[:steps], path[1 : steps + 1])
+            back = min(steps, 64 - steps)
+            assert np.array_equal(way[steps : steps + back], path[:steps][::-1][:back])
+
+    def test_trainings_are_looked_at_now_and_then_until_the_budget_is_spent(
+        self, peers, monkeypatch
+    ):
+        """Ten iterations of a second each, and a look at every second one."""
+        clock = iter(range(100))
+        monkeypatch.setattr(peers, "time", SimpleNamespace(perf_counter=lambda: next(clock)))
+        for name, value in {"BUDGET": 10.0, "BETWEEN": 2.0, "LEVEL": 1.1}.items():
+            monkeypatch.setattr(peers, name, value)
+        looks = []
+
+        def policy():
+            looks.append(len(looks))
+            return lambda seen: np.zeros((len(seen), 5))
+
+        seconds, steps, _ = peers.attempt(lambda: 7, policy, TrialSet.draw(PROBLEMS["right"], 4, 0))
+        assert (seconds, steps, len(looks)) == (10.0, 7, 5)
