@@ -10,7 +10,6 @@ from .learners import TrainingResult as TrainingResult
 from .learners import TrainingState as TrainingState
 from .learners import find_learner as find_learner
 from .learners import learner_names as learner_names
-from .learners import register_learner as register_learner
 from .learners import state_policy as state_policy
 from .learners import train_policy as train_policy
 from .library import load_policy as load_policy

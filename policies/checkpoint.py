@@ -13,7 +13,7 @@ from kinarm._archive import Arrays, load_archive, reading, save_archive
 from kinarm._fields import from_plain, to_plain
 from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.policies.config import TrainingConfig
-from kinarm.policies.learners import TrainingState, find_learner, learner_of
+from kinarm.policies.learners import TrainingState, find_learner
 
 FORMAT_VERSION = 2
 
@@ -51,7 +51,7 @@ def save_checkpoint(path: str | Path, config: TrainingConfig, state: TrainingSta
         If the file cannot be written.
     """
     header = {
-        "learner": learner_of(config).name,
+        "learner": config.learner,
         "config": to_plain(config),
         "arm_digest": config.problem.arm_digest,
     }
@@ -116,5 +116,7 @@ def rebuilt(kind: Any, name: str, arrays: Arrays) -> Any:
 
 
 def _field_names(kind: Any) -> Iterable[str]:
-    """Names of the fields of a dataclass or named tuple."""
-    return [item.name for item in fields(kind)] if is_dataclass(kind) else kind._fields
+    """Names of the fields of a dataclass or named tuple that are saved."""
+    if not is_dataclass(kind):
+        return tuple(kind._fields)
+    return [item.name for item in fields(kind) if "unsaved" not in item.metadata]

@@ -103,7 +103,12 @@ class TrainingConfig:
         return self.problem.replace(reward=self.reward)
 
     @property
-    def prolongable(self) -> bool:
+    def learner(self) -> str:
+        """Name by which the learner is found: ``LEARNER`` of their module, unless they say more."""
+        return f"{type(self).__module__}:LEARNER"
+
+    @property
+    def can_extend(self) -> bool:
         """Whether a training with more iterations begins just as this one goes."""
         return False
 

@@ -1,15 +1,22 @@
-"""What a learner is, where learners are found, and the loop that they all train in.
+"""The contract of a learner, the one way to find learners, and the loop that they all train in.
 
-A learner is a module with an attribute ``LEARNER`` and an entry in the registry; it needs no base
-class. The module of ARS, for example, is ``kinarm.policies.ars``.
+A learner is an attribute ``LEARNER`` of a module; it needs no base class. The module of ARS, for
+example, is ``kinarm.policies.ars``. Learners of other packages are found by a name that the package
+gives them in the entry-point group ``kinarm.learners``, or as ``module:LEARNER``. Either name works
+wherever a learner is named, in every process.
 """
 
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from importlib import import_module
+from importlib.metadata import entry_points
 from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 
+from kinarm._files import first_line
 from kinarm.errors import InvalidInputError, MissingExtraError, UnknownNameError
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.curve import CurvePoint
@@ -76,7 +83,7 @@ class Learner(Generic[ConfigT, StateT]):
     config, state : type
         Settings, and state of a training.
     recipes : mapping of str to config
-        Settings by name; ``"paper"`` has to be among them.
+        Settings by name; the first of them where none is named.
     summaries : mapping of str to str
         What recipes are, in a few words by name, for help.
     begin : callable
@@ -105,6 +112,11 @@ class Learner(Generic[ConfigT, StateT]):
     options: tuple[str, ...] = ()
     packages: tuple[str, ...] = ()
     extra: str = ""
+
+    @property
+    def first_recipe(self) -> str:
+        """Name of the recipe that is taken where none is named."""
+        return next(iter(self.recipes))
 
     def check_installed(self, *others: str) -> None:
         """Refuse to go on without the packages that the learner needs, and others.
@@ -147,39 +159,56 @@ class TrainingResult(NamedTuple):
         return f"{type(self).__name__}({self.policy!r}, {made})"
 
 
-_MODULES = {"ars": "kinarm.policies.ars", "ppo": "kinarm.policies.ppo"}
+GROUP = "kinarm.learners"
+"""Entry-point group in which packages name their learners."""
+
+_SHIPPED = {
+    "ars": "kinarm.policies.ars:LEARNER",
+    "ppo": "kinarm.policies.ppo:LEARNER",
+    "a2c": "kinarm.policies.sb3.learners:A2C",
+    "ddpg": "kinarm.policies.sb3.learners:DDPG",
+    "sac": "kinarm.policies.sb3.learners:SAC",
+    "sb3-ppo": "kinarm.policies.sb3.learners:PPO",
+    "td3": "kinarm.policies.sb3.learners:TD3",
+    "tqc": "kinarm.policies.sb3.learners:TQC",
+    "trpo": "kinarm.policies.sb3.learners:TRPO",
+}
 
 
-def register_learner(name: str, module: str) -> None:
-    """Make a learner known, for this process.
-
-    Parameters
-    ----------
-    name : str
-        Its name.
-    module : str
-        The module whose attribute ``LEARNER`` is the learner; imported when it is first needed.
-    """
-    _MODULES[name] = module
+@cache
+def _installed() -> dict[str, str]:
+    """Where the learners of installed packages are, by name."""
+    return {point.name: point.value for point in entry_points(group=GROUP)}
 
 
 def learner_names() -> tuple[str, ...]:
-    """Names of all learners."""
-    return tuple(_MODULES)
+    """Names of kinarm's learners and of those that installed packages bring."""
+    return tuple({**_SHIPPED, **_installed()})
 
 
 def find_learner(name: str) -> Learner[Any, Any]:
-    """Look a learner up by name.
+    """Look a learner up by name, or as ``module:LEARNER``, also of the current directory.
 
     Raises
     ------
     UnknownNameError
         If there is no such learner.
+    InvalidInputError
+        If it cannot be imported, or is something else.
     """
-    if name not in _MODULES:
-        raise UnknownNameError("learner", name, _MODULES)
-    learner: Learner[Any, Any] = import_module(_MODULES[name]).LEARNER
-    return learner
+    place = name if ":" in name else _SHIPPED.get(name) or _installed().get(name)
+    if place is None:
+        raise UnknownNameError("learner", name, (*learner_names(), "module:LEARNER"))
+    if place is name and str(Path.cwd()) not in sys.path:
+        sys.path.insert(0, str(Path.cwd()))
+    module, _, attribute = place.partition(":")
+    try:
+        found = getattr(import_module(module), attribute)
+    except Exception as error:  # a module can raise anything
+        raise InvalidInputError(f"cannot import learner {name!r}: {first_line(error)}") from error
+    if not isinstance(found, Learner):
+        raise InvalidInputError(f"learner {name!r} is no kinarm.policies.Learner: it is {found!r}")
+    return found
 
 
 def learner_of(config: TrainingConfig) -> Learner[Any, Any]:
@@ -190,11 +219,7 @@ def learner_of(config: TrainingConfig) -> Learner[Any, Any]:
     InvalidInputError
         If they are no learner's.
     """
-    for name in _MODULES:
-        learner = find_learner(name)
-        if type(config) is learner.config:
-            return learner
-    raise InvalidInputError(f"expected settings of {', '.join(_MODULES)}, got {config!r}")
+    return find_learner(config.learner)
 
 
 def train_policy(

@@ -15,20 +15,21 @@ PER_TRAINING = ("problem", "seed")
 """Settings that vary from one training with a recipe to the next."""
 
 
-def recipe(learner: str, name_or_file: str | Path = "paper", **changes: Any) -> Any:
+def recipe(learner: str, name_or_file: str | Path | None = None, **changes: Any) -> Any:
     """Look settings up, adapt them to the problem and replace some of them.
 
     Parameters
     ----------
     learner : str
-        Name of the learner.
-    name_or_file : str or Path
+        Name of the learner, or ``module:LEARNER``.
+    name_or_file : str or Path, optional
         Name of a recipe, or a TOML file with some of the learner's settings; the others are those
-        of the recipe that its entry ``base`` names, or of ``"paper"``.
+        of the recipe that its entry ``base`` names. Where none is named it is the learner's first:
+        that of the paper for ARS and PPO.
     **changes
-        Fields of the learner's settings to replace; None leaves a field as it is. A mapping for
-        ``reward`` replaces the weights that it names. If another field than problem and seed
-        changes, the recipe's name in the result gets a star.
+        Fields of the learner's settings to replace; None leaves a field as it is. A mapping
+        replaces the entries that it names, such as weights of the ``reward``. If another field
+        than problem and seed changes, the recipe's name in the result gets a star.
 
     Returns
     -------
@@ -48,10 +49,11 @@ def recipe(learner: str, name_or_file: str | Path = "paper", **changes: Any) -> 
             raise UnknownNameError(f"setting of {learner}", change, available)
     given = {key: value for key, value in changes.items() if value is not None}
     circumstances = {key: given.pop(key) for key in PER_TRAINING if key in given}
-    if str(name_or_file).endswith(".toml"):
-        standard = _read_recipe(found, Path(name_or_file), circumstances)
+    named = str(name_or_file or found.first_recipe)
+    if named.endswith(".toml"):
+        standard = _read_recipe(found, Path(named), circumstances)
     else:
-        standard = _named_recipe(found, str(name_or_file), circumstances)
+        standard = _named_recipe(found, named, circumstances)
     made = standard.changed(given)
     if made == standard:
         return made
@@ -68,17 +70,20 @@ def _named_recipe(learner: Learner[Any, Any], name: str, circumstances: Mapping[
 def _read_recipe(learner: Learner[Any, Any], path: Path, circumstances: Mapping[str, Any]) -> Any:
     """Settings of a file for a problem and a seed, which may be in the file."""
     entries = read_toml(path, "recipe")
-    base = take_base(entries, str(path), learner.recipes, "paper")
+    base = take_base(entries, str(path), learner.recipes, learner.first_recipe)
     known = {**circumstances}
     problem = entries.pop("problem", None)
     if problem is not None and "problem" not in known:
         known["problem"] = _problem_of_file(problem, path)
     standard = _named_recipe(learner, base, known)
     given = {"recipe": path.stem, **{key: v for key, v in entries.items() if key not in known}}
-    if isinstance(given.get("reward"), Mapping):
-        weights = standard.reward or standard.problem.task.reward
-        given["reward"] = {**to_plain(weights), **given["reward"]}
-    made = from_plain(learner.config, {**to_plain(standard), **given}, str(path))
+    plain = {**to_plain(standard), "reward": to_plain(standard.training_problem.task.reward)}
+    if "reward" not in given and standard.reward is None:
+        del plain["reward"]
+    for name, entry in given.items():
+        if isinstance(entry, Mapping) and isinstance(plain.get(name), Mapping):
+            given[name] = {**plain[name], **entry}
+    made = from_plain(learner.config, {**plain, **given}, str(path))
     return replace(made, problem=standard.problem)
 
 

@@ -174,10 +174,11 @@ class SeedsRequest:
         """The trainings, whether finished or not."""
         tasks = []
         first = self.training.config()
-        learner_of(first).check_installed()
+        learner = learner_of(first)
+        learner.check_installed()
         for seed in self.seeds:
             config = replace(first, seed=seed)
-            parts = (self.training.learner, config.recipe, config.problem.name)
+            parts = (learner.name, config.recipe, config.problem.name)
             name = re.sub(r"[^\w.-]+", "", "-".join(parts))
             tasks.append(SeedTask(config, self.folder / f"{name}-seed{seed}.npz"))
         return tasks

@@ -18,8 +18,8 @@ from kinarm.policies.training_request import TrainRequest
 
 PROG = "kinarm-train"
 
-CIRCUMSTANCES = ("problem", "seed", "recipe")
-"""Settings that a `TrainRequest` has fields of its own for."""
+CIRCUMSTANCES = ("problem", "seed", "recipe", "algorithm")
+"""Settings that a `TrainRequest` has fields of its own for, or that the learner determines."""
 
 LEARNERS_EPILOG = """
 kinarm-train LEARNER --help lists recipes and options.
@@ -28,6 +28,7 @@ examples:
   kinarm-train ars --recipe tuned --out right.npz           one policy
   kinarm-train ars --recipe tuned --seeds 5 --out right     five, in the folder right
   kinarm-train ppo --recipe tuned --problem both --out both.npz   both benches, with PPO (extra ppo)
+  kinarm-train my_module:LEARNER --out mine.npz             a learner of your own
 """
 
 EPILOG = """
@@ -45,11 +46,11 @@ examples:
       half as long, for the problem right
 """
 
-SETTINGS = "settings of the learner (defaults of the recipe paper)"
+SETTINGS = "settings of the learner (defaults of the recipe {})"
 
 
-def build_parser() -> Parser:
-    """The options of the command."""
+def build_parser(named: str | None = None) -> Parser:
+    """The options of the command, of all learners or of the one that is named."""
     parser = Parser(prog=PROG, description="Train a policy.", epilog=LEARNERS_EPILOG)
     learners = parser.add_subparsers(
         title="learners",
@@ -58,36 +59,36 @@ def build_parser() -> Parser:
         metavar="LEARNER",
         parser_class=CommandParser,
     )
-    for name in learner_names():
-        _add_learner(learners, find_learner(name))
+    for name in learner_names() if named is None else (named,):
+        _add_learner(learners, name, find_learner(name))
     return parser
 
 
 def _add_learner(
-    parsers: "argparse._SubParsersAction[CommandParser]", learner: Learner[Any, Any]
+    parsers: "argparse._SubParsersAction[CommandParser]", name: str, learner: Learner[Any, Any]
 ) -> None:
     """Options of a learner: those of every training, and one for each of its settings."""
     needs = f"\nneeds the extra {learner.extra}: pip install 'kinarm[{learner.extra}]'\n"
     parser = parsers.add_parser(
-        learner.name,
+        name,
         help=learner.title,
         description=f"Train a policy with {learner.title}.",
-        epilog=(needs if learner.extra else "") + _epilog(learner),
+        epilog=(needs if learner.extra else "") + _epilog(name, learner),
     )
     unused = () if "tensorboard" in learner.options else ("tensorboard",)
     recipes = {"recipe": tuple(learner.recipes)}
     add_options(parser, TrainRequest, skip=("learner", "settings", *unused), names=recipes)
     add_options(parser, SeedsRequest, skip=("training",))
-    settings = parser.add_argument_group(SETTINGS)
+    settings = parser.add_argument_group(SETTINGS.format(learner.first_recipe))
     add_options(settings, learner.config, skip=CIRCUMSTANCES, explicit=True)
 
 
-def _epilog(learner: Learner[Any, Any]) -> str:
+def _epilog(name: str, learner: Learner[Any, Any]) -> str:
     """What the recipes of a learner are, and examples with the one to try first."""
-    recipe = "tuned" if "tuned" in learner.recipes else "paper"
-    lines = (f"  {name:<8} {learner.summaries[name]}\n" for name in learner.summaries)
+    recipe = "tuned" if "tuned" in learner.recipes else learner.first_recipe
+    lines = (f"  {each:<8} {summary}\n" for each, summary in learner.summaries.items())
     return EPILOG.format(
-        name=learner.name,
+        name=name,
         recipes="recipes:\n" + "".join(lines) if learner.summaries else "",
         recipe=recipe,
         half=learner.recipes[recipe].iterations // 2,
@@ -96,7 +97,13 @@ def _epilog(learner: Learner[Any, Any]) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line."""
-    run_command(PROG, lambda: _train(build_parser().parse_args(arguments)))
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    run_command(PROG, lambda: _train(build_parser(_named(given)).parse_args(given)))
+
+
+def _named(arguments: Sequence[str]) -> str | None:
+    """The learner that a command line names; None if it names none."""
+    return arguments[0] if arguments and not arguments[0].startswith("-") else None
 
 
 def _train(options: argparse.Namespace) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from kinarm._fields import to_plain
 from kinarm._files import check_output, only_writer
 from kinarm.errors import InvalidInputError, PolicyFileError
-from kinarm.policies.learners import TrainingResult, learner_of
+from kinarm.policies.learners import TrainingResult, find_learner, learner_of
 from kinarm.policies.recipes import recipe
 from kinarm.policies.training_files import checkpoint_path, refuse_unfinished, train_to_file
 from kinarm.problem_options import ProblemOptions, say_choices
@@ -60,7 +60,7 @@ class TrainRequest(ProblemOptions):
     }
     DEFAULTS: ClassVar = {
         **ProblemOptions.DEFAULTS,
-        "recipe": "paper",
+        "recipe": "the first one",
         "seed": "0",
         "problem": "the recipe's: right",
     }
@@ -99,10 +99,9 @@ class TrainRequest(ProblemOptions):
         KinarmError
             If they cannot be used.
         """
-        named = self.recipe or "paper"
-        problem = self.resolve(default=recipe(self.learner, named).problem)
+        problem = self.resolve(default=recipe(self.learner, self.recipe).problem)
         config: TrainingConfig = recipe(
-            self.learner, named, problem=problem, seed=self.seed, **self.settings
+            self.learner, self.recipe, problem=problem, seed=self.seed, **self.settings
         )
         return config
 
@@ -120,8 +119,8 @@ class TrainRequest(ProblemOptions):
             raise PolicyFileError(f"nothing to resume: there is no {str(path)!r}")
         checkpoint = load_checkpoint(path)
         config = checkpoint.config
-        if (other := learner_of(config).name) != self.learner:
-            raise InvalidInputError(f"{str(path)!r} is of the learner {other}")
+        if (other := learner_of(config)) is not find_learner(self.learner):
+            raise InvalidInputError(f"{str(path)!r} is of the learner {other.name}")
         if changed := self._changed(config):
             raise InvalidInputError(
                 f"the checkpoint has {' and '.join(changed.values())}: "

@@ -120,7 +120,7 @@ def train_recipe(run: PlannedRun, judge: Judge) -> None:
 
 def train_sb3(run: PlannedRun, judge: Judge) -> None:
     """Train an algorithm of Stable-Baselines3 or sb3-contrib, on one thread."""
-    from kinarm.policies.ppo.learner import alone_in_torch
+    from kinarm.policies.sb3.training import alone_in_torch
 
     length = run.learner.environment_steps
     with alone_in_torch():

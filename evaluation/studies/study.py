@@ -199,7 +199,7 @@ class Study:
 
     def _starts(self, missing: Sequence[PlannedRun]) -> dict[PlannedRun, Start]:
         """Where trainings can go on that shorter ones began."""
-        wanted = {run.lineage: run for run in missing if run.config.prolongable}
+        wanted = {run.lineage: run for run in missing if run.config.can_extend}
         shorter = self.store.shorter_runs(wanted) if wanted else {}
         starts = {}
         for run in missing:

@@ -185,7 +185,7 @@ def train(
         last=point_of(state, rollouts),
         outcomes=outcomes_of(rollouts),
         policy=policy,
-        state=state if config.prolongable else None,
+        state=state if config.can_extend else None,
     )
     seconds = earlier.seconds + state.wall_time
     spent = earlier.processor_seconds + time.process_time() - began

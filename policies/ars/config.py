@@ -86,7 +86,12 @@ class ARSConfig(TrainingConfig):
             )
 
     @property
-    def prolongable(self) -> bool:
+    def learner(self) -> str:
+        """Name by which the learner is found."""
+        return "ars"
+
+    @property
+    def can_extend(self) -> bool:
         """Whether a training with more iterations begins just as this one goes."""
         return self.step_size_schedule == "constant"
 

@@ -187,7 +187,12 @@ class PPOConfig(TrainingConfig):
         return Replay(share=self.replay_share, size=self.replay_size)
 
     @property
-    def prolongable(self) -> bool:
+    def learner(self) -> str:
+        """Name by which the learner is found."""
+        return "ppo"
+
+    @property
+    def can_extend(self) -> bool:
         """Whether a training with more iterations begins just as this one goes."""
         settled = self.widening == 0 and self.initial_penalty == 1
         unset = self.final_log_std is None and self.initial_tolerance is None

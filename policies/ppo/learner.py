@@ -1,12 +1,9 @@
 """Training with PPO, one iteration at a time."""
 
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 from stable_baselines3.common.logger import KVWriter, Logger, TensorBoardOutputFormat
 
@@ -23,6 +20,7 @@ from kinarm.policies.ppo.networks import ActorCritic
 from kinarm.policies.ppo.parameters import initial_parameters, split_parameters
 from kinarm.policies.ppo.state import PPOState
 from kinarm.policies.ppo.training_env import TrainingVecEnv
+from kinarm.policies.sb3.training import alone_in_torch
 from kinarm.policies.warm_start import starting_policy, statistics
 from kinarm.streams import Stream, stream_generator
 
@@ -31,19 +29,6 @@ IMITATING = "learning from the oracle's motions first"
 
 NORMALIZED_OVER = 10_000
 """Random starts whose observations are the statistics of the normaliser."""
-
-
-@contextmanager
-def alone_in_torch() -> Iterator[None]:
-    """Keep torch to one thread, and put back the global random states that PPO draws from."""
-    threads, numpy_state = torch.get_num_threads(), np.random.get_state()  # noqa: NPY002
-    with torch.random.fork_rng(devices=[]):
-        torch.set_num_threads(1)
-        try:
-            yield
-        finally:
-            torch.set_num_threads(threads)
-            np.random.set_state(numpy_state)  # noqa: NPY002
 
 
 def seed_iteration(seed: int, iteration: int) -> tuple[np.random.Generator, np.random.Generator]:

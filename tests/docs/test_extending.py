@@ -7,6 +7,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -42,17 +43,22 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def toy(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """The learner of the page, in one file and registered by one line."""
-    monkeypatch.syspath_prepend(str(ROOT / "docs" / "how-to"))
-    monkeypatch.setattr(learners, "_MODULES", dict(learners._MODULES))
-    exec(BLOCKS["register"])
+    """The learner of the page, in one file, in a package that names it by the entry point shown."""
+    installed = folder / "toy_learner-1.0.dist-info"
+    installed.mkdir()
+    (installed / "METADATA").write_text("Metadata-Version: 2.1\nName: toy_learner\nVersion: 1.0\n")
+    ((group, points),) = tomllib.loads(BLOCKS["entry-point"])["project"]["entry-points"].items()
+    lines = [f"[{group}]", *(f"{name} = {place}" for name, place in points.items())]
+    (installed / "entry_points.txt").write_text("\n".join(lines))
+    shutil.copy(ROOT / "docs" / "how-to" / "toy_learner.py", folder)
+    monkeypatch.syspath_prepend(str(folder))
+    learners._installed.cache_clear()
     yield
+    learners._installed.cache_clear()
     sys.modules.pop("toy_learner", None)
 
 
-def test_a_learner_is_one_file_and_one_registration(
-    toy: None, folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_learner_is_one_file(toy: None, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     train_it, evaluate_it = BLOCKS["toy-commands"].strip().splitlines()
     run(train_it)
     policy = load_policy(folder / "toy.npz")
@@ -64,6 +70,11 @@ def test_a_learner_is_one_file_and_one_registration(
     results = json.loads(capsys.readouterr().out)["results"]
     ends = {row["policy"]: row["metrics"]["mean_distance"]["value"] for row in results}
     assert ends["toy"] < ends["zero"]
+
+
+def test_workers_train_the_learner_of_a_package(toy: None, folder: Path) -> None:
+    run("kinarm-train toy --seeds 3 --jobs 2 --iterations 4 --out seeds")
+    assert len(list((folder / "seeds").glob("toy-paper-right-seed?.npz"))) == 3
 
 
 def test_a_registered_learner_resumes_exactly(

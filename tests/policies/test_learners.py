@@ -1,12 +1,11 @@
 """The registry of learners, and its contract held by the toy of the docs: one file, one line."""
 
-import importlib.util
-import sys
+import importlib
 from pathlib import Path
 
 import pytest
 
-from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.errors import InvalidInputError
 from kinarm.policies import (
     Policy,
     TrainingConfig,
@@ -15,7 +14,6 @@ from kinarm.policies import (
     learners,
     load_checkpoint,
     recipe,
-    register_learner,
     save_checkpoint,
     state_policy,
     train,
@@ -27,14 +25,10 @@ TOY = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "toy_learner.py"
 
 @pytest.fixture
 def toy(monkeypatch):
-    """The module of the toy, registered."""
-    specification = importlib.util.spec_from_file_location("toy_learner", TOY)
-    module = importlib.util.module_from_spec(specification)
-    monkeypatch.setitem(sys.modules, "toy_learner", module)
-    specification.loader.exec_module(module)
-    monkeypatch.setattr(learners, "_MODULES", dict(learners._MODULES))
-    register_learner("toy", "toy_learner")
-    return module
+    """The module of the toy, which an installed package names."""
+    monkeypatch.syspath_prepend(TOY.parent)
+    monkeypatch.setattr(learners, "_installed", lambda: {"toy": "toy_learner:LEARNER"})
+    return importlib.import_module("toy_learner")
 
 
 def command(*arguments):
@@ -45,24 +39,41 @@ def command(*arguments):
 
 
 def test_names():
-    assert learner_names() == ("ars", "ppo")
+    assert {"ars", "ppo", "a2c", "ddpg", "sac", "sb3-ppo", "td3", "tqc", "trpo"} <= set(
+        learner_names()
+    )
     for name in learner_names():
         learner = find_learner(name)
         assert learner.name == name
-        assert {"paper", "tuned"} <= set(learner.recipes)
         for key, config in learner.recipes.items():
             assert (type(config), config.recipe) == (learner.config, key)
+            assert learners.learner_of(config) is learner
         assert list(learner.summaries) == list(learner.recipes)
+        assert recipe(name).recipe == learner.first_recipe
 
 
-def test_unknown_learner():
-    with pytest.raises(UnknownNameError, match="unknown learner 'toy'; available: ars, ppo"):
-        find_learner("toy")
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("toy", "unknown learner 'toy'; available: ars, ppo, .*, module:LEARNER"),
+        ("nowhere:LEARNER", "cannot import learner 'nowhere:LEARNER': No module named 'nowhere'"),
+        ("kinarm.task:LEARNER", "cannot import learner .* has no attribute 'LEARNER'"),
+        ("kinarm.task:ReachTask", "learner 'kinarm.task:ReachTask' is no kinarm.policies.Learner"),
+    ],
+)
+def test_what_is_no_learner(name, message):
+    with pytest.raises(InvalidInputError, match=message):
+        find_learner(name)
 
 
 def test_settings_of_nobody():
-    with pytest.raises(InvalidInputError, match="expected settings of ars, ppo, got Training"):
+    with pytest.raises(InvalidInputError, match="cannot import learner"):
         train_policy(TrainingConfig())
+
+
+def test_a_learner_is_found_by_its_module_or_by_the_name_that_a_package_gives_it(toy):
+    assert find_learner("toy") is find_learner("toy_learner:LEARNER") is toy.LEARNER
+    assert "toy" in learner_names()
 
 
 def test_the_library_trains_it(toy):
@@ -134,4 +145,4 @@ def test_a_result_describes_itself_in_a_line():
 def test_what_settings_say_of_a_training_if_a_learner_says_no_more():
     config = TrainingConfig(iterations=7)
     assert config.cost == 7.0
-    assert not config.prolongable
+    assert not config.can_extend

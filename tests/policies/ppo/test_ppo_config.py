@@ -124,8 +124,8 @@ def test_starts_widen_to_the_spread_of_the_task():
 )
 def test_a_longer_training_begins_alike_only_where_nothing_changes_in_its_course(changes):
     constant = PPOConfig(iterations=10)
-    assert constant.prolongable
-    assert not replace(constant, **changes).prolongable
+    assert constant.can_extend
+    assert not replace(constant, **changes).can_extend
 
 
 def test_training_differs_from_the_problem_in_reward_and_tolerance():

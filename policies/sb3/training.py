@@ -1,0 +1,226 @@
+"""Training with an algorithm of Stable-Baselines3 or sb3-contrib, one step of all arms at a time.
+
+The algorithm's own ``learn`` runs in a thread that waits after every step, so that any algorithm
+can be evaluated in the course of its training. What an algorithm knows - replay buffer, optimisers,
+generators - cannot all be saved without pickle. A training therefore goes on by repeating what was
+done, which leads to the same bits.
+"""
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from copy import deepcopy
+from dataclasses import replace
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+
+from kinarm._activities import doing
+from kinarm._files import first_line
+from kinarm.errors import InvalidInputError
+from kinarm.policies.curve import CurvePoint
+from kinarm.policies.policy import Policy
+from kinarm.policies.provenance import Provenance
+from kinarm.policies.sb3.environment import sb3_vec_env
+from kinarm.policies.sb3.learners import ALGORITHMS, SB3Config, SB3State
+
+if TYPE_CHECKING:
+    from stable_baselines3.common.base_class import BaseAlgorithm
+
+REPEATING = "repeating what was done before"
+"""What is told while a training repeats its beginning."""
+
+REFUSALS = (AssertionError, AttributeError, KeyError, RuntimeError, TypeError, ValueError)
+"""What algorithms raise if they cannot use a setting, or diverge."""
+
+
+@contextmanager
+def alone_in_torch() -> Iterator[None]:
+    """Keep torch to one thread, and put back the global generators that algorithms draw from."""
+    threads, numpy_state = torch.get_num_threads(), np.random.get_state()  # noqa: NPY002
+    with torch.random.fork_rng(devices=[]):
+        torch.set_num_threads(1)
+        try:
+            yield
+        finally:
+            torch.set_num_threads(threads)
+            np.random.set_state(numpy_state)  # noqa: NPY002
+
+
+class SteppedLearning:
+    """``model.learn`` in a thread of its own, which waits after every step of all arms.
+
+    Parameters
+    ----------
+    model : BaseAlgorithm
+        The algorithm.
+    steps : int
+        Steps of all arms, in the last of which it does all that is left to do.
+    """
+
+    def __init__(self, model: "BaseAlgorithm", steps: int) -> None:
+        self.model = model
+        self.taken, self._steps = 0, steps
+        self._may_go_on, self._has_stopped = threading.Semaphore(0), threading.Semaphore(0)
+        self._error: Exception | None = None
+        self._abandoned = False
+        threading.Thread(target=self._learn, daemon=True).start()
+
+    def step(self) -> None:
+        """Let it take one step.
+
+        Raises
+        ------
+        InvalidInputError
+            If the algorithm refuses to; it says why.
+        """
+        self._may_go_on.release()
+        self._has_stopped.acquire()
+        if self._error is not None:
+            raise InvalidInputError(first_line(self._error)) from self._error
+
+    def abandon(self) -> None:
+        """Let the thread end."""
+        self._abandoned = True
+        self._may_go_on.release()
+
+    def _learn(self) -> None:
+        """What the thread does."""
+        self._may_go_on.acquire()
+        torch.set_num_threads(1)
+        environment_steps = self._steps * self.model.n_envs
+        try:
+            self.model.learn(environment_steps, callback=self._after_step)
+        except REFUSALS as error:
+            self._error = error
+        self._has_stopped.release()
+
+    def _after_step(self, *_: object) -> bool:
+        """Wait, unless it was the last step; whether to go on."""
+        self.taken += 1
+        if self.taken < self._steps:
+            self._has_stopped.release()
+            self._may_go_on.acquire()
+        return not self._abandoned
+
+
+class SB3Training:
+    """A training under way; a state tells how far it is.
+
+    The algorithm computes on one thread.
+    """
+
+    def __init__(self, config: SB3Config) -> None:
+        self.config = config
+        self._begin()
+
+    def _begin(self) -> None:
+        """Build the algorithm anew, and go back to the beginning."""
+        with alone_in_torch():
+            self._learning = SteppedLearning(sb3_model(self.config), self.config.iterations)
+            self._keep_generators()
+        self._done = 0
+
+    def _keep_generators(self) -> None:
+        """Note the states of the global generators."""
+        self._generators = torch.get_rng_state(), np.random.get_state()  # noqa: NPY002
+
+    def initial_state(self) -> SB3State:
+        """State before the first iteration."""
+        return SB3State(training=self)
+
+    def iterate(self, state: SB3State) -> SB3State:
+        """One step of all arms, and the updates that are due before it."""
+        self._go_to(state.iteration)
+        began, model = time.perf_counter(), self._learning.model
+        self._step()
+        episodes, successes = model.ep_info_buffer or (), model.ep_success_buffer or ()
+        returns = [episode["r"] for episode in episodes]
+        point = CurvePoint(
+            mean_return=float(np.mean(returns)) if returns else float("nan"),
+            std_return=float(np.std(returns)) if returns else float("nan"),
+            success=float(np.mean(successes)) if successes else float("nan"),
+            environment_steps=model.num_timesteps,
+            wall_time=state.wall_time + time.perf_counter() - began,
+        )
+        return SB3State(curve=(*state.curve, point), training=self)
+
+    def policy(self, state: SB3State) -> Policy:
+        """The policy in a state of the training."""
+        self._go_to(state.iteration)
+        config = self.config
+        policy = Policy.from_sb3(self._learning.model, config.problem)
+        made = Provenance.of(config.algorithm, config, state.environment_steps)
+        return replace(policy, provenance=made)
+
+    def _go_to(self, iteration: int) -> None:
+        """Repeat what leads to a state, unless the algorithm is in it."""
+        if self._done == iteration:
+            return
+        with doing(REPEATING):
+            if not 0 <= self._done < iteration:
+                self._learning.abandon()
+                self._begin()
+            while self._done < iteration:
+                self._step()
+
+    def _step(self) -> None:
+        """Take a step with the generators of the algorithm."""
+        done, self._done = self._done, -1  # until the step is over: it may be interrupted
+        with alone_in_torch():
+            torch.set_rng_state(self._generators[0])
+            np.random.set_state(self._generators[1])  # noqa: NPY002
+            self._learning.step()
+            self._keep_generators()
+        self._done = done + 1
+
+
+def trained_policy(config: SB3Config, state: SB3State) -> Policy:
+    """Freeze a state of the training into a policy."""
+    training = state.training or SB3Training(config)
+    policy: Policy = training.policy(state)
+    return policy
+
+
+def sb3_model(config: SB3Config) -> "BaseAlgorithm":
+    """Build the algorithm, with its environment.
+
+    Raises
+    ------
+    InvalidInputError
+        If the algorithm refuses its hyperparameters.
+    """
+    from stable_baselines3.common.noise import NormalActionNoise
+    from stable_baselines3.common.utils import LinearSchedule
+    from stable_baselines3.common.vec_env import VecEnv, VecNormalize
+
+    problem = config.training_problem
+    if config.training_tolerance is not None:
+        problem = problem.replace(tolerance=config.training_tolerance)
+    kind = "sparse" if config.hindsight else None
+    env: VecEnv = sb3_vec_env(problem, config.n_envs, reward_type=kind, threads=1)
+    if config.normalize:
+        env = VecNormalize(env, norm_reward=False)
+    given: dict[str, Any] = {
+        "policy": "MultiInputPolicy" if config.hindsight else "MlpPolicy",
+        **deepcopy(config.hyperparameters),  # which the algorithm changes
+    }
+    if config.hindsight:
+        from kinarm.policies.sb3.hindsight import HindsightReplayBuffer
+
+        given["replay_buffer_class"] = HindsightReplayBuffer
+    if config.action_noise:
+        zero = np.zeros(env.action_space.shape or ())
+        given["action_noise"] = NormalActionNoise(zero, zero + config.action_noise)
+    if config.learning_rate_schedule == "linear":
+        given["learning_rate"] = LinearSchedule(given["learning_rate"], 0.0, 1.0)
+    module, _, name = ALGORITHMS[config.algorithm].partition(":")
+    algorithm = getattr(import_module(module), name)
+    try:
+        model: BaseAlgorithm = algorithm(env=env, seed=config.seed, device="cpu", **given)
+    except REFUSALS as error:
+        raise InvalidInputError(f"{config.algorithm}: {first_line(error)}") from error
+    return model
