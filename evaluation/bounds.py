@@ -10,15 +10,14 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from kinarm._archive import load_archive, save_archive
-from kinarm._cache import cache_folder
+from kinarm import SEMANTICS
+from kinarm._archive import cache_folder, load_archive, save_archive
 from kinarm._files import check_folder
 from kinarm.errors import InvalidInputError, OutputError
 from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle import ORACLE_SEMANTICS, Oracle, OracleSolutions, Progress
 from kinarm.policies.provenance import package_versions
-from kinarm.semantics import SEMANTICS
 
 KEPT_FILES, KEPT_BYTES = 200, 256 * 2**20
 """Trial sets whose bounds are kept, and how large their files may be together."""

@@ -9,6 +9,18 @@ import lazy_loader
 
 __version__ = "1.0.0"
 
+SEMANTICS = "4"
+"""The version of what simulator and learners compute: every number that settings and seeds make.
+
+Drawn starts, goals and trials, rollouts and iterations of the learners; what the oracle makes of
+them has a version of its own, `kinarm.policies.oracle.ORACLE_SEMANTICS`. Finished trainings are
+recognised by it; how the code is written, named and laid out does not matter.
+
+Raise it in the commit that changes such a number on purpose, and record the golden digests anew:
+``python tests/golden/digests.py --record`` (which refuses other digests under the same version, as
+the tests do). Finished trainings are then made anew.
+"""
+
 # What there is stands in __init__.pyi, and is imported when it is first used.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 

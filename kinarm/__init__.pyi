@@ -47,4 +47,5 @@ from .task import RewardWeights as RewardWeights
 from .viewer import ReplayPage as ReplayPage
 from .world import World as World
 
+SEMANTICS: str
 __version__: str

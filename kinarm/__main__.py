@@ -1,4 +1,4 @@
-"""``python -m kinarm`` lists the commands; ``python -m kinarm eval`` runs one of them."""
+"""``kinarm``, or ``python -m kinarm``, lists the commands; ``kinarm eval`` runs one of them."""
 
 import argparse
 import subprocess
@@ -7,23 +7,22 @@ from collections.abc import Sequence
 from importlib import import_module
 
 from kinarm._command_line import run_command
-from kinarm._completion import SHELLS
-from kinarm._parser import CommandParser
+from kinarm._parser import SHELLS, CommandParser
 
-PROG = "python -m kinarm"
+PROG = "kinarm"
 
 COMMANDS = {
-    "eval": ("kinarm.evaluation.commands.evaluate", "evaluate policies beside the oracle"),
-    "replay": ("kinarm.evaluation.commands.replay", "watch trials in a browser"),
     "train": ("kinarm.policies.train", "train a policy"),
-    "study": ("kinarm.evaluation.commands.study", "train many policies from one file"),
+    "eval": ("kinarm.evaluation.commands.evaluate", "evaluate policies beside the oracle"),
+    "replay": ("kinarm.evaluation.commands.replay", "watch what policies do, in a browser"),
+    "study": ("kinarm.evaluation.commands.study", "study learners: many trainings, one file"),
     "compare": ("kinarm.evaluation.commands.compare", "compare learners on the same problems"),
-    "reproduce": ("kinarm.evaluation.commands.reproduce", "train what the paper trained"),
-    "problem": ("kinarm.evaluation.commands.problem", "list, show and check problems"),
-    "arms": ("kinarm.evaluation.commands.arms", "list arms, and describe one"),
+    "problem": ("kinarm.evaluation.commands.problem", "look at problems, and check your own"),
+    "arms": ("kinarm.evaluation.commands.arms", "look at arms, and check your own"),
     "bench": ("kinarm.evaluation.commands.bench", "measure how fast everything is here"),
+    "reproduce": ("kinarm.evaluation.commands.reproduce", "reproduce what the paper reports"),
 }
-"""Modules of the commands, and what they are for, by name without ``kinarm-``."""
+"""Modules of the commands, and what one wants who uses them, by name without ``kinarm-``."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -39,12 +38,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _explain(typed: Sequence[str]) -> None:
     """Print the help, the version or completion scripts, or refuse an unknown command."""
-    lines = (f"  {name:<10} {purpose}  (kinarm-{name})" for name, (_, purpose) in COMMANDS.items())
+    lines = (f"  {purpose:<42} {PROG}-{name}" for name, (_, purpose) in COMMANDS.items())
     parser = CommandParser(
         prog=PROG,
         usage=f"{PROG} COMMAND ... [options]",
-        description="Learn to reach with a simulated robot arm.\n\ncommands:\n" + "\n".join(lines),
-        epilog="COMMAND --help says more.",
+        description="Learn to reach with a simulated robot arm.\n\nto:\n" + "\n".join(lines),
+        epilog=f"{PROG} COMMAND, or {PROG}-COMMAND, runs one; with --help it says more.",
     )
     parser.add_argument(
         "command", nargs="?", choices=COMMANDS, metavar="COMMAND", help=argparse.SUPPRESS

@@ -1,35 +1,38 @@
-"""The only reader of files with results: ``.npz`` with a header in JSON, without pickle; JSON."""
+"""Files with results, their only reader: ``.npz`` with a header in JSON, without pickle; JSON.
 
+Results that are only computed to be used again lie in the user's cache folder.
+"""
+
+import hashlib
 import json
-import math
 import os
+import tempfile
 import warnings
-import zipfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from kinarm._files import first_line, read_file, write_atomically
-from kinarm.errors import KinarmError
+from kinarm._files import check_folder, first_line, read_file, write_atomically
+from kinarm.errors import InvalidInputError, KinarmError, OutputError
 
 KINDS = "biufU"
 """Kinds of what an array may hold: truth values, whole numbers, numbers and texts."""
 
-GROWTH, SLACK = 4, 50 * 10**6
-"""How much larger than its file what is read may be: by a factor, and a number of bytes."""
+GROWTH, SMALL = 4, 10**9
+"""A file may claim to hold so many times its size, or so many bytes."""
 
-JSON_SIZES = {"[": 90, "{": 200, ",": 36, '"': 26}
-"""Memory that a value takes at most for each of its signs [bytes]."""
+CACHE_VARIABLE = "KINARM_CACHE"
+"""Environment variable that names another cache folder."""
 
 Arrays = Mapping[str, NDArray[Any]]
 
 
 class Archive(NamedTuple):
-    """What a file holds.
+    """Content of a file.
 
     Attributes
     ----------
@@ -52,9 +55,22 @@ def save_archive(
     *,
     compress: bool = False,
 ) -> None:
-    """Write arrays and a header, which JSON can hold; ``kind`` says of what, such as ``"policy"``.
+    """Write arrays and a header; an existing file is replaced only when the new one is complete.
 
-    An existing file is replaced only when the new one is complete.
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    kind : str
+        What it holds, such as ``"policy"``.
+    version : int
+        Version of the format.
+    arrays : mapping of str to ndarray
+        The arrays by name.
+    header : mapping
+        Everything else, in terms that JSON can hold.
+    compress : bool
+        Whether arrays are compressed.
 
     Raises
     ------
@@ -75,17 +91,14 @@ def write_archive(
     *,
     compress: bool = False,
 ) -> None:
-    """Write what `save_archive` does to an open file."""
+    """Write to an open file what `save_archive` writes; it has the same parameters."""
     content: dict[str, Any] = {
         "format": np.array(f"kinarm-{kind.replace(' ', '-')}"),
         "version": np.array(version),
         "header": np.array(json.dumps(header, sort_keys=True)),
         **arrays,
     }
-    # What is larger could not be told from a small file that claims to hold much.
-    small = sum(array.nbytes for array in arrays.values()) < SLACK
-    write = np.savez_compressed if compress and small else np.savez
-    write(file, **content)
+    (np.savez_compressed if compress else np.savez)(file, **content)
 
 
 def load_archive(
@@ -96,7 +109,20 @@ def load_archive(
     *,
     unless: tuple[str, ...] = (),
 ) -> Archive:
-    """Read what `save_archive` wrote, but for arrays whose names begin as those in ``unless``.
+    """Read what `save_archive` wrote.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    kind : str
+        What it has to hold.
+    version : int
+        Version of the format that it has to have.
+    error : type
+        Type of the errors.
+    unless : tuple of str
+        How the names of arrays begin that are left out.
 
     Raises
     ------
@@ -110,24 +136,46 @@ def load_archive(
         content = {} if is_other else _arrays(file, unless)
         if "format" not in content:
             raise error(f"{name} is not a kinarm {kind}")
-        held = str(content["format"])
+        held = str(content.pop("format"))
         if held != wanted:
             raise error(f"{name} holds {held[:40]!r}, not {wanted!r}")
-        found = int(content["version"])
+        found = int(content.pop("version"))
         if found != version:
             age = "a later" if found > version else "an earlier"
             raise error(
                 f"{name} has format version {found}, of {age} kinarm; this one reads {version}"
             )
-        header = parse_json(str(content["header"]))
+        header = json.loads(str(content.pop("header")))
         if not isinstance(header, dict):
             raise error(f"{name} is not a complete kinarm {kind}: its header is no table")
-        skip = ("format", "version", "header")
-        return Archive(header, {key: content[key] for key in content if key not in skip})
+        return Archive(header, content)
+
+
+def _arrays(file: IO[bytes], unless: tuple[str, ...]) -> dict[str, NDArray[Any]]:
+    """Arrays of a ``.npz`` file, but for those whose names begin as some."""
+    file.seek(0)
+    with warnings.catch_warnings(action="ignore"), np.load(file, allow_pickle=False) as content:
+        claimed = sum(member.file_size for member in content.zip.infolist())
+        if claimed > max(GROWTH * os.fstat(file.fileno()).st_size, SMALL):
+            raise ValueError(f"it claims to hold {claimed / 1e6:.0f} MB")
+        arrays = {name: content[name] for name in content.files if not name.startswith(unless)}
+    for name, array in arrays.items():
+        if not isinstance(array, np.ndarray) or array.dtype.kind not in KINDS:
+            raise ValueError(f"{name} holds {getattr(array, 'dtype', 'no array')}")
+    return arrays
 
 
 def load_json(path: str | Path, kind: str, error: type[KinarmError]) -> Any:
     """Read a JSON document.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    kind : str
+        What it holds, for messages.
+    error : type
+        Type of the errors.
 
     Raises
     ------
@@ -135,54 +183,7 @@ def load_json(path: str | Path, kind: str, error: type[KinarmError]) -> Any:
         Of the given type, in one line: if the file is missing or no JSON.
     """
     with reading(repr(str(path)), kind, error):
-        return parse_json(read_file(path).decode())
-
-
-def parse_json(text: str) -> Any:
-    """The value of a JSON document, if it takes little more memory than the document.
-
-    Raises
-    ------
-    ValueError
-        If it is no JSON, or takes more than `GROWTH` and `SLACK` allow.
-    """
-    memory = len(text) + sum(size * text.count(sign) for sign, size in JSON_SIZES.items())
-    if memory > GROWTH * len(text) + SLACK:
-        raise ValueError(f"it would take {memory / 1e6:.0f} MB of memory")
-    return json.loads(text)
-
-
-def _arrays(file: IO[bytes], unless: tuple[str, ...]) -> dict[str, NDArray[Any]]:
-    """Arrays of a ``.npz`` file, but for those whose names begin as some.
-
-    Whatever it claims to hold, little more than its size is read.
-    """
-    arrays: dict[str, NDArray[Any]] = {}
-    with warnings.catch_warnings(action="ignore"), zipfile.ZipFile(file) as archive:
-        members = archive.infolist()
-        claimed = sum(member.file_size for member in members)
-        if claimed > GROWTH * os.fstat(file.fileno()).st_size + SLACK:
-            raise ValueError(f"it claims to hold {claimed / 1e6:.0f} MB")
-        for member in members:
-            if unless and member.filename.startswith(unless):
-                continue
-            with archive.open(member) as stored:
-                arrays[member.filename.removesuffix(".npy")] = _array(stored, member)
-    return arrays
-
-
-def _array(stored: IO[bytes], member: zipfile.ZipInfo) -> NDArray[Any]:
-    """Read one array, if it is of numbers or texts and as large as its file."""
-    version = np.lib.format.read_magic(stored)
-    read_header = getattr(np.lib.format, f"read_array_header_{version[0]}_0")
-    shape, by_column, dtype = read_header(stored)
-    size = math.prod(shape) * dtype.itemsize
-    if dtype.kind not in KINDS or min(shape, default=0) < 0:
-        raise ValueError(f"{member.filename} holds {dtype}")
-    if size != member.file_size - stored.tell():
-        raise ValueError(f"{member.filename} does not hold {shape} values")
-    array = np.frombuffer(stored.read(size), dtype=dtype) if size else np.empty(0, dtype)
-    return array.reshape(shape, order="F" if by_column else "C").copy()
+        return json.loads(read_file(path))
 
 
 @contextmanager
@@ -191,7 +192,16 @@ def reading(
 ) -> Iterator[None]:
     """Turn what reading a damaged file raises, or making something of it, into one line.
 
-    The name of the file comes quoted; errors of the given type pass as they are.
+    Parameters
+    ----------
+    name : str
+        Name of the file, quoted.
+    kind : str
+        What it holds.
+    error : type
+        Type of the errors; those that have it already pass as they are.
+    of : str
+        Whose file it is.
     """
     try:
         yield
@@ -201,3 +211,42 @@ def reading(
         raise error(f"cannot read {kind} {name}: {problem.strerror}") from problem
     except Exception as problem:  # a damaged file can raise anything
         raise error(f"{name} is not a complete {of} {kind}: {first_line(problem)}") from problem
+
+
+def cache_folder() -> Path:
+    """Folder of the cache: ``$KINARM_CACHE``, or ``kinarm`` in the user's cache folder."""
+    chosen, users = os.environ.get(CACHE_VARIABLE), os.environ.get("XDG_CACHE_HOME")
+    if chosen:
+        return Path(chosen)
+    try:
+        return (Path(users) if users else Path.home() / ".cache") / "kinarm"
+    except RuntimeError:  # a user without a home
+        return Path(tempfile.gettempdir()) / "kinarm"
+
+
+def cached_arrays(
+    kind: str, version: int, made_of: bytes, make: Callable[[], Mapping[str, ArrayLike]]
+) -> Arrays:
+    """Look arrays up in the cache, or make and keep them.
+
+    A file that cannot be read is replaced; where none can be written, nothing is kept.
+
+    Parameters
+    ----------
+    kind : str
+        What they are, one word.
+    version : int
+        To be raised when the same content makes other arrays.
+    made_of : bytes
+        Everything that they depend on.
+    make : callable
+        Makes them.
+    """
+    path = cache_folder() / f"{kind}-{hashlib.sha256(made_of).hexdigest()[:24]}.npz"
+    with suppress(InvalidInputError):
+        return load_archive(path, kind, version, InvalidInputError).arrays
+    arrays = {name: np.asarray(array) for name, array in make().items()}
+    with suppress(OutputError):
+        check_folder(path.parent)
+        save_archive(path, kind, version, arrays, {})
+    return arrays

@@ -1,4 +1,4 @@
-"""Command lines: how they run, the statuses that they end with, and the tables that they print."""
+"""Command lines: how they run, and the statuses that they end with."""
 
 import io
 import os
@@ -171,23 +171,3 @@ def run_commands(
         command.report(request_of(options, command.kind))
 
     run_command(prog, run)
-
-
-def print_table(
-    headings: Sequence[str], rows: Sequence[Sequence[str]], expendable: Sequence[str] = ()
-) -> None:
-    """Print a table on standard output; columns that are expendable go first if it is narrow."""
-    from rich.table import Table
-
-    from kinarm._console import open_console, print_fitting
-
-    def table_without(left_out: Collection[str]) -> Table:
-        shown = [k for k, heading in enumerate(headings) if heading not in left_out]
-        table = Table(box=None, header_style="bold", pad_edge=False)
-        for k in shown:
-            table.add_column(headings[k])
-        for row in rows:
-            table.add_row(*(row[k] for k in shown))
-        return table
-
-    print_fitting(open_console(), table_without, expendable, "a wider terminal shows them")

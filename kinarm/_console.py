@@ -1,21 +1,64 @@
-"""Terminals as the commands use them."""
+"""Terminals as the commands use them: tables, what is being done, and how far it is."""
 
+import math
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+import time
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
+from datetime import timedelta
 from importlib.util import find_spec
 from typing import IO, TYPE_CHECKING
 
-from kinarm._activities import told_of_activities
-
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.progress import Task
     from rich.table import Table
-
 
 UNBOUNDED = 1000
 """Width that has room for every table."""
+
+COMPILING = "compiling, once: up to half a minute"
+"""What is told while kernels are compiled."""
+
+LINE_SECONDS = 30.0
+"""How often a line of progress is printed where there is no terminal."""
+
+_listeners: list[Callable[[str], object]] = []
+_activities: list[str] = []
+
+
+@contextmanager
+def told_of_activities(listener: Callable[[str], object]) -> Iterator[None]:
+    """Tell a listener what begins, in words, and what goes on when that is over, or nothing: ""."""
+    _listeners.append(listener)
+    try:
+        yield
+    finally:
+        _listeners.remove(listener)
+
+
+@contextmanager
+def doing(activity: str) -> Iterator[None]:
+    """Tell all listeners of what takes long; the same activity within it belongs to it."""
+    before = _latest()
+    _activities.append(activity)
+    _tell(before)
+    try:
+        yield
+    finally:
+        _activities.remove(activity)
+        _tell(activity)
+
+
+def _latest() -> str:
+    return _activities[-1] if _activities else ""
+
+
+def _tell(before: str) -> None:
+    if (now := _latest()) != before:
+        for listener in _listeners:
+            listener(now)
 
 
 def open_console(*, stderr: bool = False, file: IO[str] | None = None) -> "Console":
@@ -50,7 +93,7 @@ def open_console(*, stderr: bool = False, file: IO[str] | None = None) -> "Conso
 
 def print_fitting(
     console: "Console",
-    table_without: Callable[[Sequence[str]], "Table"],
+    table_without: Callable[[Collection[str]], "Table"],
     expendable: Sequence[str],
     advice: str,
 ) -> None:
@@ -79,6 +122,32 @@ def print_fitting(
         console.print(note, style="dim")
 
 
+def print_table(
+    headings: Sequence[str], rows: Sequence[Sequence[str]], expendable: Sequence[str] = ()
+) -> None:
+    """Print a table of texts on standard output.
+
+    Parameters
+    ----------
+    headings : sequence of str
+        Headings of the columns.
+    rows : sequence of sequence of str
+        A text for each column.
+    expendable : sequence of str
+        Headings of columns that are left out, in that order, where the terminal is too narrow.
+    """
+    from rich.table import Table
+
+    def table_without(left_out: Collection[str]) -> Table:
+        shown = [k for k, heading in enumerate(headings) if heading not in left_out]
+        table = Table(*(headings[k] for k in shown), box=None, header_style="bold", pad_edge=False)
+        for row in rows:
+            table.add_row(*(row[k] for k in shown))
+        return table
+
+    print_fitting(open_console(), table_without, expendable, "a wider terminal shows them")
+
+
 @contextmanager
 def working(doing: str) -> Iterator[Callable[[str], object]]:
     """Say on standard error what a command is doing, while it does it, if that is a terminal.
@@ -98,3 +167,77 @@ def working(doing: str) -> Iterator[Callable[[str], object]]:
 
         with told_of_activities(tell):
             yield say
+
+
+class ProgressLine:
+    """Shows progress and the remaining time: a bar on a terminal, elsewhere a line now and then.
+
+    Parameters
+    ----------
+    title : str
+        What is under way.
+    total : float
+        How much there is to do.
+    unit : str
+        What is counted, for the lines where there is no terminal.
+    console : rich.console.Console, optional
+        Where to show it; standard error by default.
+    """
+
+    def __init__(
+        self, title: str, total: float, unit: str, console: "Console | None" = None
+    ) -> None:
+        from rich.progress import BarColumn, Progress, TextColumn
+        from rich.text import Text
+
+        class Words(TextColumn):
+            """All but the bar; what has no room is cut off."""
+
+            def render(self, task: "Task") -> Text:
+                return Text(_line_of(task, " "), no_wrap=True, overflow="ellipsis")
+
+        self._unit, self._printed = unit, time.monotonic()
+        self._console = console or open_console(stderr=True)
+        self._progress = Progress(
+            BarColumn(10),
+            Words(""),
+            console=self._console,
+            disable=not self._console.is_terminal,
+            speed_estimate_period=math.inf,
+        )
+        self._task = self._progress.add_task(title, total=total, words=(), count="", unit="")
+
+    def __enter__(self) -> "ProgressLine":
+        self._progress.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if not self._progress.disable:  # before Rich 15, stopping would print an empty line
+            self._progress.stop()
+
+    def update(self, done: float | None = None, words: Sequence[str] = (), count: str = "") -> None:
+        """Show how far it is.
+
+        Parameters
+        ----------
+        done : float, optional
+            How much is done; as before if it is left out.
+        words : sequence of str
+            Texts at the end of the line.
+        count : str
+            How much that is; in numbers of what is done and of all if it is left out.
+        """
+        self._progress.update(self._task, completed=done, words=tuple(words), count=count)
+        if self._progress.disable and time.monotonic() - self._printed > LINE_SECONDS:
+            self._printed = time.monotonic()
+            self._console.print(_line_of(self._progress.tasks[0], ", ", f" {self._unit}"))
+
+
+def _line_of(task: "Task", separator: str, unit: str = "") -> str:
+    """The texts of a line of progress, those first that matter most."""
+    count = task.fields["count"] or f"{task.completed:.0f}/{task.total:.0f}"
+    seconds = task.time_remaining
+    left = "-:--:--" if seconds is None else timedelta(seconds=math.ceil(seconds))
+    return separator.join(
+        [f"{task.description}: {count}{unit}", f"{left} left", *task.fields["words"]]
+    )

@@ -4,80 +4,63 @@ Each function that writes raises `OutputError`, in one line, where it cannot.
 """
 
 import fcntl
-import glob
 import io
 import os
 import stat
 import tempfile
-import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
 from kinarm.errors import OutputError
 
-HALF_WRITTEN = ".part"
-"""Ending of a file that is being written."""
-
 ENDLESS = 10**7
 """What is no regular file, such as a pipe, is read up to so many bytes."""
 
-IN_USE = 2.0
-"""Age below which a half-written file is left alone in any case [s]."""
+is_file, is_folder = os.path.isfile, os.path.isdir
+"""Whether there is such a file or folder; not, if none can have this name."""
+
+
+@contextmanager
+def _reported(path: str | Path, doing: str = "write") -> Iterator[None]:
+    """Report in one line why a path cannot be written."""
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"cannot {doing} {str(path)!r}: {error.strerror}") from error
 
 
 def write_atomically(path: str | Path, write: Callable[[IO[bytes]], object]) -> None:
     """Let ``write`` fill a file beside its place, which is moved there when it is complete.
 
     A link is followed. What is no regular file, such as a device, is written to as it stands.
-    What an earlier process was killed over is swept away.
+    What a process was killed over lies in the way of nobody: the next one writes over it.
     """
     target = Path(os.path.realpath(path))
-    try:
+    beside = target.with_name(f".{target.name}.part")
+    with _reported(path):
         if target.exists() and not (target.is_file() or target.is_dir()):
-            _write_into(target, write)
-        else:
-            _replace(target, write)
-    except OSError as error:
-        raise OutputError(f"cannot write {str(path)!r}: {error.strerror}") from error
+            write(content := io.BytesIO())
+            target.write_bytes(content.getvalue())
+            return
+        with _locked(beside, wait=True) as file:
+            try:
+                if target.exists():
+                    beside.chmod(target.stat().st_mode)
+                file.truncate()
+                write(file)
+                file.flush()
+                os.fsync(file.fileno())
+                beside.replace(target)
+            except BaseException:
+                beside.unlink(missing_ok=True)
+                raise
 
 
-def _write_into(target: Path, write: Callable[[IO[bytes]], object]) -> None:
-    """Write to what cannot be replaced."""
-    content = io.BytesIO()
-    write(content)
-    with target.open("wb") as file:
-        file.write(content.getvalue())
-
-
-def _replace(target: Path, write: Callable[[IO[bytes]], object]) -> None:
-    """Write beside a file, and put it in its place."""
-    beside = target.with_name(f".{target.name}.{os.urandom(4).hex()}{HALF_WRITTEN}")
-    try:
-        with beside.open("xb") as file:
-            fcntl.flock(file, fcntl.LOCK_EX)
-            if target.exists():
-                beside.chmod(target.stat().st_mode)
-            write(file)
-            file.flush()
-            os.fsync(file.fileno())
-            beside.replace(target)
-    except BaseException:
-        beside.unlink(missing_ok=True)
-        raise
-    _sweep(target)
-
-
-def _sweep(target: Path) -> None:
-    """Remove what other processes left half written, unless they are at it."""
-    for left in target.parent.glob(f".{glob.escape(target.name)}.*{HALF_WRITTEN}"):
-        with suppress(OSError):
-            if time.time() - left.stat().st_mtime < IN_USE:
-                continue
-            with left.open("rb") as file:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                left.unlink()
+def write_text(path: str | Path, text: str) -> None:
+    """Write a text file in UTF-8, as `write_atomically` does."""
+    write_atomically(path, lambda file: file.write(text.encode()))
 
 
 @contextmanager
@@ -90,12 +73,11 @@ def only_writer(path: str | Path) -> Iterator[None]:
         If another process is making it.
     """
     lock = _lock_of(path)
-    try:
-        file = _locked(lock)
-    except BlockingIOError:
-        raise OutputError(f"another process is writing {str(path)!r}") from None
-    except OSError as error:
-        raise OutputError(f"cannot write {str(path)!r}: {error.strerror}") from error
+    with _reported(path):
+        try:
+            file = _locked(lock)
+        except BlockingIOError:
+            raise OutputError(f"another process is writing {str(path)!r}") from None
     with file:
         try:
             yield
@@ -121,13 +103,14 @@ def _lock_of(path: str | Path) -> Path:
     return target / ".lock" if target.is_dir() else target.with_name(f".{target.name}.lock")
 
 
-def _locked(lock: Path) -> IO[bytes]:
-    """Open and lock a file that its last owner may just be removing."""
+def _locked(path: Path, *, wait: bool = False) -> IO[bytes]:
+    """Open and lock a file that its last owner may just be moving or removing."""
+    operation = fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB
     while True:
-        file = lock.open("ab")
+        file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b")
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            if os.path.samestat(os.fstat(file.fileno()), lock.stat()):
+            fcntl.flock(file, operation)
+            if os.path.samestat(os.fstat(file.fileno()), path.stat()):
                 return file
         except FileNotFoundError:
             pass
@@ -157,33 +140,12 @@ def read_file(path: str | Path, most: int = 0) -> bytes:
     return content
 
 
-def is_file(path: str | Path) -> bool:
-    """Whether there is such a file; not, if no file can have this name."""
-    try:
-        return Path(path).is_file()
-    except (OSError, ValueError):
-        return False
-
-
-def is_folder(path: str | Path) -> bool:
-    """Whether there is such a folder; not, if no folder can have this name."""
-    try:
-        return Path(path).is_dir()
-    except (OSError, ValueError):
-        return False
-
-
 def absolute(path: str | Path) -> Path:
     """The absolute path without links; as it stands if no file can have this name."""
     try:
         return Path(os.path.realpath(path))
     except (OSError, ValueError):
         return Path(path)
-
-
-def write_text(path: str | Path, text: str) -> None:
-    """Write a text file in UTF-8, as `write_atomically` does."""
-    write_atomically(path, lambda file: file.write(text.encode()))
 
 
 def first_line(error: BaseException) -> str:
@@ -194,13 +156,18 @@ def first_line(error: BaseException) -> str:
 def check_output(path: str | Path, *, overwrite: bool = False, suffix: str = "") -> None:
     """See that a file can be written, before any work is done for it; its folder is made.
 
-    It must not exist unless ``overwrite`` says so, and its name must end in ``suffix``.
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    overwrite : bool
+        Whether it may exist.
+    suffix : str
+        What its name has to end in.
     """
     file = Path(path)
-    try:
+    with _reported(path):
         is_folder, exists = file.is_dir(), file.exists()
-    except OSError as error:
-        raise OutputError(f"cannot write {str(path)!r}: {error.strerror}") from error
     if is_folder or (suffix and file.suffix != suffix):
         ending = f" that ends in {suffix}" if suffix else ""
         raise OutputError(f"the output must be a file{ending}, got {str(path)!r}")
@@ -213,9 +180,7 @@ def check_output(path: str | Path, *, overwrite: bool = False, suffix: str = "")
 
 def check_folder(folder: str | Path) -> None:
     """Make a folder if it is missing, and see that files can be written to it."""
-    try:
+    with _reported(folder, "write to"):
         Path(folder).mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
-    except OSError as error:
-        raise OutputError(f"cannot write to {str(folder)!r}: {error.strerror}") from error

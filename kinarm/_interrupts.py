@@ -1,26 +1,25 @@
-"""Requests to end: Ctrl-C and its like reach a command once, and it ends in order.
+"""Requests to end: Ctrl-C and its like end a command in order, in one line and with one status.
 
-A command answers them from its first line on, which is that of this module. While it starts,
-there is nothing to lose: it ends at once. While it runs, an `Interruption` is raised, once:
-further requests are ignored until the process is over. Some libraries drop exceptions or make
-others of them; what got lost is raised again, and `was_interrupted` knows of it in any case.
-Processes that only import kinarm keep their own ways.
+While a command starts, which it does from its first line on, that of this module, there is nothing
+to lose, and it ends at once. While it runs, an `Interruption` is raised; some libraries drop it or
+make another error of it, so it is raised again after a while, and `was_interrupted` knows of it in
+any case. Once the command ends, requests are ignored. Processes that only import kinarm keep their
+own ways.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import signal
 import sys
 from contextlib import contextmanager
-from itertools import pairwise
 
 TYPE_CHECKING = False  # `typing` takes longer to load than all the rest
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-    from sys import UnraisableHookArgs
-    from types import FrameType, TracebackType
-    from typing import Literal
+    from collections.abc import Callable, Iterator
+    from types import FrameType
+    from typing import Any
 
 REQUESTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 EXIT_STATUS = 130
@@ -29,6 +28,12 @@ GOES_ON = "interrupted; what is finished is kept, and the same command goes on"
 
 AGAIN = 0.5
 """After so long, an interruption that got lost is raised again [s]."""
+
+PATIENCE = 3.0
+"""So long may work that is asked to stop take to do so [s]."""
+
+_requested = False
+_stop: Callable[[], object] | None = None
 
 
 class Interruption(KeyboardInterrupt):
@@ -39,57 +44,37 @@ class Interruption(KeyboardInterrupt):
     """
 
 
-PATIENCE = 3.0
-"""So long may work that is asked to stop take to do so [s]."""
-
-_phase: Literal["foreign", "starting", "running", "ending"] = "foreign"
-_requested = False
-_ask: Callable[[], object] | None = None
-
-
 def is_command() -> bool:
     """Whether this process is a command of kinarm: by its script, or by ``python -m kinarm``."""
     program = sys.argv[0] if sys.argv else ""
-    if program == "-m":  # so it stands while Python looks for the module
-        return _module(sys.orig_argv).partition(".")[0] == "kinarm"
-    return os.path.basename(program).startswith("kinarm-") and program in sys.orig_argv  # noqa: PTH119
+    if program == "-m":  # so it stands while Python looks for the module, which may be ours
+        return any(re.fullmatch(r"(-\w*m)?kinarm(\..+)?", word) for word in sys.orig_argv)
+    name = os.path.basename(program)  # noqa: PTH119
+    return name.partition("-")[0] == "kinarm" and program in sys.orig_argv
 
 
-def _module(words: Sequence[str]) -> str:
-    """The module that a command line of Python names by ``-m``, which may follow other letters."""
-    for option, word in pairwise([*words, ""]):
-        if option.startswith("-m") and len(option) > 2:
-            return option[2:]
-        if option.startswith("-") and not option.startswith("--") and option.endswith("m"):
-            return word
-    return ""
-
-
-def _take_over() -> None:
-    """Answer requests from now on, but for those that were ignored before."""
-    global _phase
-    _phase = "starting"
-    for request in REQUESTS:
+def _answer_by(handler: Callable[[int, FrameType | None], object] | signal.Handlers) -> None:
+    """Answer requests, and the reminder that there was one, but for those that are ignored."""
+    for request in (*REQUESTS, signal.SIGALRM):
         if signal.getsignal(request) is not signal.SIG_IGN:
-            signal.signal(request, _answer)
-    signal.signal(signal.SIGALRM, _answer)
-    sys.unraisablehook, sys.excepthook = _tell_unraisable, _tell_printed
+            signal.signal(request, handler)
 
 
-def _answer(_: int, __: FrameType | None) -> None:
-    """Answer a request, or the reminder that there was one."""
+def _end_at_once(_: int, __: FrameType | None) -> None:
+    os._exit(EXIT_STATUS)
+
+
+def _interrupt(_: int, __: FrameType | None) -> None:
+    """Ask what can stop in order to do so; raise an interruption if nothing can, or it has not."""
     global _requested
-    if _phase == "starting":
-        os._exit(EXIT_STATUS)
-    if _phase == "running" and not _on_its_way():
-        if _ask is not None and not _requested:
-            _requested = True
-            signal.setitimer(signal.ITIMER_REAL, PATIENCE, AGAIN)
-            _ask()
-            return
-        _requested = True
-        signal.setitimer(signal.ITIMER_REAL, AGAIN, AGAIN)
+    if _on_its_way():
+        return
+    ask = None if _requested else _stop
+    _requested = True
+    signal.setitimer(signal.ITIMER_REAL, PATIENCE if ask else AGAIN, AGAIN)
+    if ask is None:
         raise Interruption
+    ask()
 
 
 def _on_its_way() -> bool:
@@ -100,35 +85,27 @@ def _on_its_way() -> bool:
     return error is not None
 
 
-def _tell_unraisable(failure: UnraisableHookArgs) -> None:
-    """Say nothing of an interruption that has no way to go; it is raised again."""
-    if not isinstance(failure.exc_value, Interruption):
-        sys.__unraisablehook__(failure)
+def _unless_requested(report: Callable[..., object]) -> Callable[..., None]:
+    """Report errors that have no way to go, but for those that follow from a request to end."""
 
+    def told(*failure: Any) -> None:
+        if not _requested:
+            report(*failure)
 
-def _tell_printed(
-    kind: type[BaseException], error: BaseException, traceback: TracebackType | None
-) -> None:
-    """Say nothing of an interruption that compiled code prints in place of passing it on."""
-    if not isinstance(error, Interruption):
-        sys.__excepthook__(kind, error, traceback)
+    return told
 
 
 def begin() -> None:
     """From now on there is something to lose: requests are raised."""
-    global _phase
-    if _phase == "starting":
-        _phase = "running"
+    if _COMMAND:
+        _answer_by(_interrupt)
 
 
 def end() -> None:
     """From now on the process ends, and requests are ignored."""
-    global _phase
-    if _phase != "foreign":
-        _phase = "ending"
+    if _COMMAND:
         signal.setitimer(signal.ITIMER_REAL, 0)
-        for request in REQUESTS:
-            signal.signal(request, signal.SIG_IGN)
+        _answer_by(signal.SIG_IGN)
 
 
 def was_interrupted(error: BaseException) -> bool:
@@ -154,12 +131,12 @@ def asking(stop: Callable[[], object]) -> Iterator[None]:
     The request is raised afterwards, or when the work has not stopped after `PATIENCE`, or at the
     second request.
     """
-    global _ask
-    _ask = stop
+    global _stop
+    _stop = stop
     try:
         yield
     finally:
-        _ask = None
+        _stop = None
     if _requested:
         raise Interruption
 
@@ -174,5 +151,8 @@ def kept_from_children() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-if is_command():
-    _take_over()  # pragma: no cover - tests are no command; test_interrupts starts some
+_COMMAND = is_command()
+if _COMMAND:  # pragma: no cover - tests are no command; test_interrupts starts some
+    _answer_by(_end_at_once)
+    sys.unraisablehook = _unless_requested(sys.unraisablehook)
+    sys.excepthook = _unless_requested(sys.excepthook)

@@ -2,16 +2,35 @@
 
 import argparse
 import re
+import shlex
 import sys
 import textwrap
-from collections.abc import Iterable, Sequence
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from difflib import get_close_matches
 from typing import Any, ClassVar, NoReturn
 
 from kinarm.errors import one_line
 
-EXAMPLE = re.compile(r"  (\S.*?) {2,}(\S.*)$")
+EXAMPLE = re.compile(r"(?m)^  (\S.*?) {2,}(\S.*)$")
 """A line of help with an example and its meaning."""
+
+SHELLS = ("bash", "zsh", "fish")
+
+DETAILS = re.compile(r" \(default: |\. Names: |[;:] ")
+"""Where the help of an option goes into details, which completion leaves out."""
+
+FUNCTIONS: dict[str, Callable[[Iterable[str], str], str]] = {
+    "bash": lambda names, call: (
+        f"{call}() {{ compgen -W {shlex.quote(' '.join(names))} -- $1; _shtab_compgen_files $1; }}"
+    ),
+    "zsh": lambda names, call: f"{call}() {{ compadd -- {shlex.join(names)}; _files }}",
+    "fish": lambda names, call: (
+        f"function {call}; printf '%s\\n' {shlex.join(names)}; "
+        "__fish_complete_path (commandline -ct); end"
+    ),
+}
+"""Functions of shells that list names and files."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -33,11 +52,9 @@ class Parser(argparse.ArgumentParser):
             "--version", action=_ShowVersion, nargs=0, help="Show the version of kinarm and exit"
         )
         if self.completable:
-            from kinarm._completion import SHELLS, PrintCompletion
-
             self.add_argument(
                 "--print-completion",
-                action=PrintCompletion,
+                action=_PrintCompletion,
                 choices=SHELLS,
                 help="Print the completion script of a shell and exit",
             )
@@ -48,15 +65,12 @@ class Parser(argparse.ArgumentParser):
         """Parse, and refuse what is unknown here: the parser of a command knows its own options."""
         parsed, unknown = super().parse_known_args(args, namespace)
         if unknown:
-            self.error(f"unrecognized arguments: {' '.join(unknown)}{self._suggestion(unknown)}")
+            given = (word.partition("=")[0] for word in unknown if word.startswith("--"))
+            known = self._option_string_actions
+            meant = [name for word in given for name in get_close_matches(word, known, 1)]
+            hint = f"; did you mean {', '.join(meant)}?" if meant else ""
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
         return parsed, unknown
-
-    def _suggestion(self, unknown: Sequence[str]) -> str:
-        """Options that are spelt like the unknown ones."""
-        given = (word.partition("=")[0] for word in unknown if word.startswith("--"))
-        known = self._option_string_actions
-        meant = [name for word in given for name in get_close_matches(word, known, 1)]
-        return f"; did you mean {', '.join(meant)}?" if meant else ""
 
     def error(self, message: str) -> NoReturn:
         """Print one line on standard error and exit."""
@@ -84,10 +98,10 @@ def group_of_options(parser: argparse._ActionsContainer, title: str) -> argparse
 
 
 class HelpFormatter(argparse.HelpFormatter):
-    """Wraps paragraphs, and leaves lines that are indented as they are, if they are short enough.
+    """Wraps paragraphs, and leaves blocks with lines that are indented as they are.
 
-    Where an example is not, all have their meaning on a line of its own; one that is still too long
-    goes on in the next line, as shells accept it. Usage names what has to be given.
+    Where an example is too long, all of its block have their meaning on a line of its own. Usage
+    names what has to be given.
     """
 
     def _format_usage(
@@ -118,41 +132,16 @@ class HelpFormatter(argparse.HelpFormatter):
         return textwrap.wrap(" ".join(text.split()), width, break_on_hyphens=False)
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
-        blocks = (block.strip("\n") for block in re.split(r"\n{2,}", text.strip("\n")))
-        return "\n\n".join(self._block(block, width, indent) for block in blocks)
+        blocks = re.split(r"\n{2,}", text.strip("\n"))
+        return "\n\n".join(textwrap.indent(self._block(each, width), indent) for each in blocks)
 
-    def _block(self, block: str, width: int, indent: str) -> str:
+    def _block(self, block: str, width: int) -> str:
         """A paragraph, or lines of which some are indented."""
-        if "\n " not in block and not block.startswith(" "):
-            return textwrap.fill(
-                block,
-                width,
-                initial_indent=indent,
-                subsequent_indent=indent,
-                break_on_hyphens=False,
-            )
-        lines = block.splitlines()
-        if max(map(len, lines)) > width:
-            apart = "\n".join(EXAMPLE.sub(r"  \1\n      \2", line) for line in lines)
-            lines = [part for line in apart.splitlines() for part in _continued(line, width)]
-        return "\n".join(indent + line for line in lines)
-
-
-def _continued(line: str, width: int) -> list[str]:
-    """A line of help in lines of this width at most; those of an example end in backslashes."""
-    if len(line) <= width:
-        return [line]
-    start = line[: len(line) - len(line.lstrip())]
-    mark, further = (" \\", "  ") if len(start) == 2 else ("", "")
-    *parts, last = textwrap.wrap(
-        line.strip(),
-        width - len(mark),
-        initial_indent=start,
-        subsequent_indent=start + further,
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
-    return [*(part + mark for part in parts), last]
+        if not re.search(r"(?m)^ ", block):
+            return textwrap.fill(block, width, break_on_hyphens=False)
+        if max(map(len, block.splitlines())) <= width:
+            return block
+        return EXAMPLE.sub(r"  \1\n      \2", block)
 
 
 class _ShowVersion(argparse.Action):
@@ -166,3 +155,55 @@ class _ShowVersion(argparse.Action):
 
         sys.stdout.write(f"kinarm {version('kinarm')}\n")
         parser.exit()
+
+
+class _PrintCompletion(argparse.Action):
+    """Print the script with which a shell completes a command, and exit."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**{**options, "default": argparse.SUPPRESS})
+
+    def __call__(self, parser: argparse.ArgumentParser, *given: Any) -> None:
+        _, shell, *_ = given
+        sys.stdout.write(completion_script(parser, shell))
+        parser.exit()
+
+
+def completion_script(parser: argparse.ArgumentParser, shell: str) -> str:
+    """The script with which a shell completes the options of a parser.
+
+    Options that take files have ``file`` or ``folder`` as their ``completes``; those that take
+    names, too, have a function that lists these.
+    """
+    import shtab
+
+    for action in _actions(parser):
+        if action.help:
+            action.help = textwrap.shorten(DETAILS.split(action.help)[0], 60, placeholder=" ...")
+        completes = getattr(action, "completes", None)
+        if completes in ("file", "folder"):
+            action.complete = shtab.FILE if completes == "file" else shtab.DIRECTORY  # type: ignore[attr-defined]
+        elif completes is not None:
+            action.complete = _names_or_files(shell, tuple(completes()))  # type: ignore[attr-defined]
+    script: str = shtab.complete(parser, shell=shell)
+    return script + "\n"
+
+
+def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
+    """All options of a parser and of the commands that it has."""
+    for action in parser._actions:
+        yield action
+        if isinstance(action, argparse._SubParsersAction):
+            for inner in action.choices.values():
+                yield from _actions(inner)
+
+
+def _names_or_files(shell: str, names: tuple[str, ...]) -> dict[str, Any]:
+    """How a shell completes one of some names, or a file."""
+    call = f"_kinarm_files_or_names_{zlib.crc32(' '.join(names).encode()):08x}"
+    return {
+        "bash": call,
+        "zsh": f"{{{call}}}",
+        "fish": f"({call})",
+        "preamble": {shell: FUNCTIONS[shell](names, call)},
+    }

@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from kinarm._cache import cached_arrays
+from kinarm._archive import cached_arrays
 from kinarm.errors import ArmError
 
 VERSION = 1

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import HalfspaceIntersection
 
-from kinarm._archive import Arrays
-from kinarm._cache import cached_arrays
+from kinarm._archive import Arrays, cached_arrays
 from kinarm._files import first_line
 from kinarm.errors import ArmError
 from kinarm.mesh_content import check_vertices, mesh_content

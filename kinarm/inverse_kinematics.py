@@ -14,7 +14,7 @@ from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError
 from kinarm.frames import Frame
 from kinarm.kernels.inverse import TURN, Search, solve_targets
-from kinarm.spread import evenly_spread
+from kinarm.randomness import low_discrepancy_points
 
 if TYPE_CHECKING:
     from kinarm.world import World
@@ -94,7 +94,7 @@ def solve(
         axes=axes,
         scale=1.0 / arm.reach,
         near=start,
-        seeds=evenly_spread(SEEDS, moved),
+        seeds=low_discrepancy_points(SEEDS, moved),
         least=LEAST_SEEDS if isolated else 0,
         separation=float(separation),
     )

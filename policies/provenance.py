@@ -10,10 +10,10 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from kinarm import SEMANTICS
 from kinarm._fields import from_plain, to_plain
 from kinarm.policies.config import TrainingConfig
 from kinarm.problem import ReachProblem
-from kinarm.semantics import SEMANTICS
 
 RECORDED_PACKAGES = (
     *("kinarm", "numpy", "numba", "pin", "coal", "gymnasium", "scipy"),
@@ -44,7 +44,7 @@ class Provenance:
     commit : str
         Commit of kinarm's source, with ``-dirty`` if it was changed; empty if unknown.
     semantics : str, optional
-        Version of what kinarm computes (`kinarm.semantics`) with which it was trained; unknown in
+        Version of what kinarm computes (`kinarm.SEMANTICS`) with which it was trained; unknown in
         older files and for policies that were trained elsewhere.
     """
 

@@ -287,7 +287,7 @@ def _train(
 @contextmanager
 def _shown(board: "ProgressBoard", tasks: list[SeedTask]) -> Iterator[None]:
     """Show how far all trainings are, in one line."""
-    from kinarm._progress import ProgressLine
+    from kinarm._console import ProgressLine
 
     config = tasks[0].config
     title = f"{learner_of(config).name} {config.recipe} {config.problem.name} {len(tasks)} seeds"

@@ -4,12 +4,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Protocol
 
-from kinarm._activities import told_of_activities
+from kinarm._console import told_of_activities
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import TrainingState, learner_of
 
 if TYPE_CHECKING:
-    from kinarm._progress import ProgressLine
+    from kinarm._console import ProgressLine
 
 STARTING = "starting"
 """What a training does before its first iteration, unless it says something else."""
@@ -45,7 +45,7 @@ class TrainingProgress:
 @contextmanager
 def shown_progress(config: TrainingConfig) -> Iterator[TrainingProgress]:
     """Show how far a training with these settings is."""
-    from kinarm._progress import ProgressLine
+    from kinarm._console import ProgressLine
 
     title = f"{learner_of(config).name} {config.recipe} {config.problem.name} seed {config.seed}"
     with ProgressLine(title, config.iterations, "iterations") as line:

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kinarm._command_line import Command, print_table, run_commands
+from kinarm._command_line import Command, run_commands
+from kinarm._console import print_table
 from kinarm._files import check_output
 from kinarm.arm_specification import PACKAGE, ArmFile, arm_names
 

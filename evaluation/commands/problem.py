@@ -8,7 +8,8 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
-from kinarm._command_line import Command, print_table, run_commands
+from kinarm._command_line import Command, run_commands
+from kinarm._console import print_table
 from kinarm._files import check_output, write_atomically, write_text
 from kinarm._validation import MOST_TRIALS, whole_number
 from kinarm.problem_files import problem_names

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
-from kinarm._command_line import print_table, run_request
+from kinarm._command_line import run_request
+from kinarm._console import print_table
 from kinarm._interrupts import GOES_ON, telling
 from kinarm._validation import whole_number
 from kinarm.evaluation.running.options import RunningOptions

@@ -10,6 +10,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from kinarm import SEMANTICS
 from kinarm._archive import load_json, reading
 from kinarm._fields import to_plain
 from kinarm._files import write_text
@@ -19,7 +20,6 @@ from kinarm.evaluation.comparison.learners import ComparedLearner
 from kinarm.policies.provenance import package_versions
 from kinarm.policies.recipes import PER_TRAINING, recipe
 from kinarm.problem import ReachProblem
-from kinarm.semantics import SEMANTICS
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm import SEMANTICS
 from kinarm._archive import load_archive, load_json, reading, save_archive
 from kinarm._files import check_folder, write_text
 from kinarm.errors import KinarmError, PolicyFileError
 from kinarm.evaluation.reproduction.study import PlannedTraining, Protocol
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import package_versions
-from kinarm.semantics import SEMANTICS
 
 ARCHIVE = ("trained run", 1)
 """Kind and version of the files."""

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import kinarm
+from kinarm import SEMANTICS
 from kinarm.errors import WorkerError
 from kinarm.policies.oracle import ORACLE_SEMANTICS
 from kinarm.policies.provenance import package_versions
-from kinarm.semantics import SEMANTICS
 
 
 @cache

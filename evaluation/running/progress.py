@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol
 
-from kinarm._progress import ProgressLine
+from kinarm._console import ProgressLine
 
 if TYPE_CHECKING:
     from rich.console import Console

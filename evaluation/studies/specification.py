@@ -11,7 +11,7 @@ from kinarm._fields import OPTIONAL, check_fields, from_plain, read_toml, to_pla
 from kinarm._validation import MOST_TRIALS, whole_number
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.studies.ranges import RANGE, check_range, draw
-from kinarm.streams import Stream, stream_generator
+from kinarm.randomness import Stream, stream_generator
 
 MOST_TRAININGS = 100_000
 """Trainings of a study at most: all of them are planned before the first begins."""

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kinarm import SEMANTICS
 from kinarm._files import first_line
 from kinarm.evaluation.studies.planning import PlannedRun
 from kinarm.evaluation.studies.runs import (
@@ -33,7 +34,6 @@ from kinarm.policies.oracle import ORACLE_SEMANTICS, Oracle
 from kinarm.policies.policy import Policy
 from kinarm.problem import ReachProblem
 from kinarm.rollouts import Rollouts
-from kinarm.semantics import SEMANTICS
 
 
 class Start(NamedTuple):

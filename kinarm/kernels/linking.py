@@ -13,7 +13,7 @@ from numba import types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 
-from kinarm._activities import COMPILING, doing
+from kinarm._console import COMPILING, doing
 
 WITHOUT = {
     "WithLifting",

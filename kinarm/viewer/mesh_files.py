@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm._cache import cached_arrays
+from kinarm._archive import cached_arrays
 from kinarm._files import first_line
 from kinarm.errors import ArmError, MissingExtraError
 from kinarm.mesh_content import mesh_content

@@ -29,8 +29,8 @@ from kinarm.policies.normalizer import Normalizer, input_scale
 from kinarm.policies.policy import Layer, Policy
 from kinarm.policies.provenance import Provenance
 from kinarm.policies.warm_start import starting_policy, statistics
+from kinarm.randomness import Stream, stream_generator
 from kinarm.simulator import Simulator
-from kinarm.streams import Stream, stream_generator
 from kinarm.world import World
 
 

@@ -15,8 +15,8 @@ from kinarm._validation import finite_array, whole_number
 from kinarm.errors import InvalidInputError
 from kinarm.policies.oracle.kernels.projection import damped_least_squares, layout
 from kinarm.policies.oracle.motion import steps_between
+from kinarm.randomness import low_discrepancy_points
 from kinarm.simulator import Simulator
-from kinarm.spread import evenly_spread
 
 RESERVE = 1e-6
 """Share of the tolerance that is left against rounding."""
@@ -108,7 +108,7 @@ def solve_within(
     """
     m, n_joints = len(starts), simulator.arm.n_joints
     box = step_box(simulator, starts, steps)
-    spread = evenly_spread(samples, simulator.n_actions + 1)
+    spread = low_discrepancy_points(samples, simulator.n_actions + 1)
     lower, upper, moved = box[0][:, None], box[1][:, None], slice(simulator.n_actions)
     beginnings = np.repeat(starts[:, None], samples, axis=1)
     beginnings[:, :, moved] = lower + spread[:, :-1] * (upper - lower)

@@ -13,8 +13,8 @@ from kinarm.policies.oracle.inverse import (
     step_box,
 )
 from kinarm.policies.oracle.motion import along_path, steps_between, straight, two_segments
+from kinarm.randomness import low_discrepancy_points
 from kinarm.simulator import Simulator
-from kinarm.spread import evenly_spread
 
 SAMPLES = (8, 48, 512)
 """Configurations from which goals are sought for each number of steps: a few, then more."""
@@ -154,7 +154,7 @@ class MotionSearch:
         index = np.concatenate(chosen)
         owner, ends = solutions.owner[index], solutions.configurations[index]
         starts, total, moved = self.starts[rows[owner]], steps[owner], self.simulator.n_actions
-        spread = np.tile(evenly_spread(VIAS, moved + 1), (len(chosen), 1))
+        spread = np.tile(low_discrepancy_points(VIAS, moved + 1), (len(chosen), 1))
         turn = np.rint((0.25 + 0.5 * spread[:, -1]) * total).astype(np.int64)
         turn = np.clip(turn, 1, total - 1)
         from_start = step_box(self.simulator, starts, turn)

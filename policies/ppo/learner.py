@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.logger import KVWriter, Logger, TensorBoardOutputFormat
 
-from kinarm._activities import doing
+from kinarm._console import doing
 from kinarm.errors import InvalidInputError
 from kinarm.policies.curve import CurvePoint
 from kinarm.policies.learners import learner_of
@@ -22,7 +22,7 @@ from kinarm.policies.ppo.state import PPOState
 from kinarm.policies.ppo.training_env import TrainingVecEnv
 from kinarm.policies.sb3.training import alone_in_torch
 from kinarm.policies.warm_start import starting_policy, statistics
-from kinarm.streams import Stream, stream_generator
+from kinarm.randomness import Stream, stream_generator
 
 IMITATING = "learning from the oracle's motions first"
 """What is told before a training that begins with demonstrations."""

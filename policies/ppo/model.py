@@ -21,7 +21,7 @@ from kinarm.policies.ppo.kernels.tiles import Numbers
 from kinarm.policies.ppo.kernels.update import Descent, choose, fill_in_scales
 from kinarm.policies.ppo.networks import ActorCritic
 from kinarm.policies.ppo.update import UpdateRecords, update
-from kinarm.streams import Stream, stream_generator
+from kinarm.randomness import Stream, stream_generator
 
 
 class CutShort(NamedTuple):

@@ -17,9 +17,9 @@ from kinarm.envs.rendering import EnvPictures
 from kinarm.episodes import SUCCESS, Episodes
 from kinarm.errors import InvalidInputError
 from kinarm.failed_scenarios import FailedScenarios, Replay, StartsAndGoals
+from kinarm.randomness import Stream, stream_generator
 from kinarm.scenarios import ScenarioStream
 from kinarm.simulator import Simulator
-from kinarm.streams import Stream, stream_generator
 
 StepReturn = tuple[Observations, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]
 Indices = int | Iterable[int] | None

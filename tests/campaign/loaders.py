@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from kinarm._cache import CACHE_VARIABLE, cached_arrays
+from kinarm._archive import CACHE_VARIABLE, cached_arrays
 from kinarm.arm import Arm
 from kinarm.errors import KinarmError
 from kinarm.evaluation import bounds
@@ -154,7 +154,7 @@ LOADERS: dict[str, Loader] = {
         ("kinarm.recording.load_recordings",), samples.recordings, damaged_archive, load_recordings
     ),
     "cached arrays": Loader(
-        ("kinarm._cache.cached_arrays",),
+        ("kinarm._archive.cached_arrays",),
         lambda: [samples.written(partial(_save_cached))],
         damaged_archive,
         _cached,

@@ -15,7 +15,7 @@ from functools import cache, partial
 from pathlib import Path
 from unittest import mock
 
-from kinarm._cache import CACHE_VARIABLE
+from kinarm._archive import CACHE_VARIABLE
 from kinarm._command_line import run_command
 from kinarm.evaluation.commands import arms, evaluate, problem, replay
 from kinarm.evaluation.evaluation import Evaluation

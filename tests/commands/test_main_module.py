@@ -1,4 +1,4 @@
-"""``python -m kinarm``, and the version that every command tells."""
+"""``kinarm`` and ``python -m kinarm``, and the version that every command tells."""
 
 import subprocess
 import sys
@@ -11,7 +11,7 @@ from kinarm.__main__ import COMMANDS, main
 SCRIPTS = {
     script.name: script.value.removesuffix(":main")
     for script in metadata.distribution("kinarm").entry_points
-    if script.group == "console_scripts"
+    if script.group == "console_scripts" and script.name != "kinarm"
 }
 
 
@@ -40,7 +40,7 @@ def test_without_a_command_it_lists_them(run_main):
     status, out, err = run_main()
     assert (status, err) == (0, "")
     assert all(name in out for name in SCRIPTS)
-    assert out.index("commands:") < out.index("kinarm-eval") < out.index("--help")
+    assert out.index("to:") < out.index("kinarm-eval") < out.index("--help")
     assert all(len(line) <= 80 for line in out.splitlines())
 
 

@@ -179,7 +179,7 @@ def test_tensorboard(run, tmp_path):
 
 
 def test_progress_is_shown(run, tmp_path, monkeypatch):
-    monkeypatch.setattr("kinarm._progress.LINE_SECONDS", -1.0)
+    monkeypatch.setattr("kinarm._console.LINE_SECONDS", -1.0)
     answer = run(
         "kinarm-train", "ppo", "--iterations", 3, *TINY_OPTIONS, "--out", tmp_path / "p.npz"
     )

@@ -14,7 +14,7 @@ from oracle_calls import count_calls
 from trial_bounds import draw, same
 
 import kinarm
-from kinarm._cache import cache_folder
+from kinarm._archive import cache_folder
 from kinarm.arm import Arm
 from kinarm.evaluation import bounds
 from kinarm.evaluation.bounds import bounds_document, oracle_bounds

@@ -11,8 +11,7 @@ import pytest
 from oracle_calls import count_calls
 from trial_bounds import draw, same
 
-from kinarm._archive import save_archive
-from kinarm._cache import cache_folder
+from kinarm._archive import cache_folder, save_archive
 from kinarm.evaluation import bounds
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.policies.oracle import Oracle

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from kinarm import SEMANTICS
 from kinarm._fields import to_plain
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.ars.state import ARSState
@@ -26,14 +27,13 @@ from kinarm.policies.oracle import ORACLE_SEMANTICS, Oracle
 from kinarm.policies.recipes import recipe
 from kinarm.problem import PROBLEMS
 from kinarm.rollouts import Rollouts
-from kinarm.semantics import SEMANTICS
 from kinarm.simulator import Simulator
 
 RECORDED = Path(__file__).with_name("digests.json")
 ARMS = ("lrmate200ic_5l", "paper", "paper_flange")
 TASKS = ("left", "right", "both")
 EPISODES = 96
-RAISE = "if that is meant, raise SEMANTICS in kinarm/semantics.py or, for bounds, ORACLE_SEMANTICS"
+RAISE = "if that is meant, raise SEMANTICS in kinarm/__init__.py or, for bounds, ORACLE_SEMANTICS"
 
 
 def digest(arrays: Iterable[object], decimals: int = 8) -> str:

@@ -18,8 +18,8 @@ from digests import (
     trial_digests,
 )
 
+from kinarm import SEMANTICS
 from kinarm.policies.oracle import ORACLE_SEMANTICS
-from kinarm.semantics import SEMANTICS
 
 RECORD = json.loads(RECORDED.read_text())
 ANEW = f"results changed: {RAISE}, and run python tests/golden/digests.py --record"

@@ -10,9 +10,8 @@ import pytest
 
 pytest.importorskip("shtab")
 
-from kinarm._completion import SHELLS, completion_script
 from kinarm._options import add_options
-from kinarm._parser import CommandParser, Parser
+from kinarm._parser import SHELLS, CommandParser, Parser, completion_script
 from kinarm.evaluation.replay.request import ReplayRequest
 
 

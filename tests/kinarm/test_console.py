@@ -1,12 +1,147 @@
-"""Bars and messages in a notebook."""
+"""Bars and messages: of what takes long, and how far it is; in a notebook, too."""
 
 import builtins
 import io
+import os
+import pty
+import re
+import subprocess
+import sys
 
+import numpy as np
 import pytest
+from rich.console import Console
 from rich.progress import track
 
-from kinarm._console import open_console
+from kinarm import _console
+from kinarm._console import (
+    COMPILING,
+    ProgressLine,
+    doing,
+    open_console,
+    told_of_activities,
+    working,
+)
+from kinarm.kernels.compiling import inlined, kernel
+
+
+def test_a_kernel_is_told_of_once_and_its_helpers_are_not():
+    @inlined
+    def doubled(x):
+        return 2.0 * x
+
+    @kernel
+    def fill(numbers):
+        for i in range(len(numbers)):
+            numbers[i] = doubled(numbers[i])
+
+    heard = []
+    with told_of_activities(heard.append):
+        for _ in range(2):
+            fill(np.ones(3))
+    assert heard == [COMPILING, ""]
+    fill(np.ones(3, dtype=np.float32))  # compiled anew, and nobody listens
+    assert heard == [COMPILING, ""]
+
+
+def test_a_failure_ends_it_too():
+    heard = []
+    with told_of_activities(heard.append), pytest.raises(ValueError, match="no"), doing(COMPILING):
+        raise ValueError("no")
+    assert heard == [COMPILING, ""]
+
+
+def test_one_within_another_is_told_of_and_the_same_is_not():
+    heard = []
+    with told_of_activities(heard.append), doing("learning"):
+        for each in ("learning", COMPILING):
+            with doing(each), doing(each):
+                pass
+    assert heard == ["learning", COMPILING, "learning", ""]
+
+
+def test_what_was_said_comes_back(monkeypatch):
+    said = []
+    monkeypatch.setattr("rich.status.Status.update", lambda _, text: said.append(text))
+    with working("evaluating") as say:
+        say("right: 2 of 3")
+        with doing(COMPILING):
+            pass
+    assert said == ["right: 2 of 3", f"right: 2 of 3; {COMPILING}", "right: 2 of 3"]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a pseudo-terminal")
+def test_the_first_run_says_so_and_the_second_does_not(tmp_path):
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "TERM": "xterm"}
+    command = [sys.executable, "-m", "kinarm", "eval", "--policy", "zero", "--no-oracle"]
+    texts = []
+    for _ in range(2):
+        terminal, line = pty.openpty()
+        with subprocess.Popen(
+            [*command, "--trials", "2", "--problem", "right"],
+            stdout=subprocess.DEVNULL,
+            stderr=line,
+            env=environment,
+        ) as process:
+            os.close(line)
+            texts.append(read_all(terminal))
+        assert process.returncode == 0
+    assert COMPILING in texts[0]
+    assert COMPILING not in texts[1]
+    assert "evaluating" in texts[1]
+
+
+def read_all(terminal):
+    """Everything that is written to a terminal until its other end is closed."""
+    parts = []
+    while True:
+        try:
+            part = os.read(terminal, 4096)
+        except OSError:  # what Linux says then
+            break
+        if not part:
+            break
+        parts.append(part)
+    os.close(terminal)
+    return b"".join(parts).decode()
+
+
+def shown(monkeypatch, width=80, **settings):
+    """What a line of progress shows on a console."""
+    monkeypatch.setattr(_console, "LINE_SECONDS", 0.0)
+    file = io.StringIO()
+    with ProgressLine("baking", 4, "loaves", Console(file=file, width=width, **settings)) as line:
+        line.update(0, ["starting"])
+        line.update(2, ["crisp"])
+        line.update(4, count="all", words=["done"])
+    return file.getvalue()
+
+
+def test_without_a_terminal_there_are_lines_of_progress_now_and_then(monkeypatch):
+    first, *_, last = shown(monkeypatch).splitlines()
+    assert first == "baking: 0/4 loaves, -:--:-- left, starting"
+    assert last == "baking: all loaves, 0:00:00 left, done"
+
+
+@pytest.mark.parametrize("colourful", [True, False])
+def test_on_a_terminal_there_is_a_bar(monkeypatch, colourful):
+    monkeypatch.setenv("TERM", "xterm-256color")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    if not colourful:
+        monkeypatch.setenv("NO_COLOR", "1")
+    text = shown(monkeypatch, force_terminal=True)
+    assert bool(re.search(r"\x1b\[[0-9;]*3\d", text)) is colourful
+    plain = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", text)
+    assert "---------- baking: all 0:00:00 left done" in plain.replace(
+        "\N{BOX DRAWINGS HEAVY HORIZONTAL}", "-"
+    )
+
+
+def test_what_matters_least_is_cut_off_where_there_is_no_room(monkeypatch):
+    text = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", shown(monkeypatch, 27, force_terminal=True))
+    assert "baking: all 0:00:00 left" in text.splitlines()[-1]
+    assert "done" not in text
 
 
 class ZMQInteractiveShell:

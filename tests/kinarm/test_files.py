@@ -121,11 +121,11 @@ class TestWhatIsNoPlainFile:
         os.close(reader)
 
 
-def _write_forever(path):
+def _write_slowly(path):
     def write(file):
         file.write(b"half")
         file.flush()
-        time.sleep(60)
+        time.sleep(1)
 
     write_atomically(path, write)
 
@@ -136,34 +136,31 @@ def _hold(path, held):
         time.sleep(60)
 
 
-class TestKilledProcesses:
-    def test_what_they_left_is_swept_away(self, tmp_path):
-        path = tmp_path / "file.bin"
-        process = multiprocessing.get_context("spawn").Process(target=_write_forever, args=(path,))
+class TestOtherWriters:
+    @pytest.fixture
+    def writer(self, tmp_path):
+        """A process that has half written a file, and goes on in a second."""
+        process = multiprocessing.get_context("spawn").Process(
+            target=_write_slowly, args=(tmp_path / "file.bin",)
+        )
         process.start()
         while not any(left.stat().st_size for left in tmp_path.iterdir()):
             time.sleep(0.01)
-        os.kill(process.pid, signal.SIGKILL)
-        process.join()
-        (left,) = tmp_path.iterdir()
-        write_text(path, "young leftovers stay, for their writer may be about to lock them")
-        assert left.exists()
-        os.utime(left, (0, 0))
-        write_text(path, "old ones go")
-        assert list(tmp_path.iterdir()) == [path]
-
-    def test_files_of_running_writers_stay(self, tmp_path):
-        path = tmp_path / "file.bin"
-        process = multiprocessing.get_context("spawn").Process(target=_write_forever, args=(path,))
-        process.start()
-        while not any(left.stat().st_size for left in tmp_path.iterdir()):
-            time.sleep(0.01)
-        (left,) = tmp_path.iterdir()
-        os.utime(left, (0, 0))
-        write_text(path, "new")
-        assert left.exists()
+        yield process
         process.kill()
         process.join()
+
+    def test_what_was_killed_is_written_over(self, tmp_path, writer):
+        os.kill(writer.pid, signal.SIGKILL)
+        writer.join()
+        assert [path.name for path in tmp_path.iterdir()] == [".file.bin.part"]
+        write_text(tmp_path / "file.bin", "new")
+        assert [path.read_text() for path in tmp_path.iterdir()] == ["new"]
+
+    def test_they_are_waited_for(self, tmp_path, writer):
+        write_text(tmp_path / "file.bin", "new")
+        writer.join()
+        assert [path.read_text() for path in tmp_path.iterdir()] == ["new"]
 
 
 class TestOnlyWriter:

@@ -8,6 +8,8 @@ import textwrap
 
 import pytest
 
+from kinarm import _interrupts
+
 BEFORE = """
 import atexit, os, signal, sys, time
 from kinarm._command_line import run_command
@@ -248,3 +250,55 @@ def test_children_that_are_kept_from_it(run):
     run_command('bake', ask)
     """
     assert run(source) == INTERRUPTED
+
+
+def test_work_is_asked_to_stop_before_it_is_interrupted(run):
+    source = """
+    from kinarm._interrupts import asking
+    stopped = []
+    def command():
+        with asking(lambda: stopped.append(True)):
+            ask()
+            while not stopped:
+                pass
+            sys.stderr.write("in order\\n")
+        print("not reached")
+    run_command('bake', command)
+    """
+    assert run(source) == (130, "", "in order\nbake: interrupted\n")
+
+
+def test_work_that_does_not_stop_is_interrupted(run):
+    source = """
+    import kinarm._interrupts as interrupts
+    interrupts.PATIENCE = 0.1
+    def command():
+        with interrupts.asking(lambda: None):
+            ask()
+            wait()
+    run_command('bake', command)
+    """
+    assert run(source) == INTERRUPTED
+
+
+@pytest.mark.parametrize(
+    ("program", "words", "expected"),
+    [
+        ("/x/kinarm-eval", ["python", "/x/kinarm-eval", "--help"], True),
+        ("/x/kinarm", ["python", "/x/kinarm", "eval"], True),
+        ("/x/kinarm-eval", ["python", "-c", "..."], False),
+        ("mine.py", ["python", "mine.py"], False),
+        ("-m", ["python", "-m", "kinarm.policies.train"], True),
+        ("-m", ["python", "-mkinarm.policies.train"], True),
+        ("-m", ["python", "-m", "kinarm", "eval"], True),
+        ("-m", ["python", "-X", "importtime", "-Im", "kinarm"], True),
+        ("-m", ["python", "-m", "pytest"], False),
+        ("-m", ["python", "-m", "kinarmor"], False),
+        ("-m", ["python"], False),
+        (None, ["python"], False),
+    ],
+)
+def test_which_processes_are_commands(monkeypatch, program, words, expected):
+    monkeypatch.setattr(sys, "argv", [] if program is None else [program])
+    monkeypatch.setattr(sys, "orig_argv", words)
+    assert _interrupts.is_command() is expected

@@ -2,7 +2,7 @@
 
 import pytest
 
-from kinarm._activities import COMPILING, doing
+from kinarm._console import COMPILING, doing
 from kinarm.policies.curve import CurvePoint
 from kinarm.policies.learners import TrainingState
 from kinarm.policies.progress_board import BoardWatcher, ProgressBoard

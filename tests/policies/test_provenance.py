@@ -7,6 +7,7 @@ from importlib import metadata
 
 import pytest
 
+from kinarm import SEMANTICS
 from kinarm.errors import InvalidInputError
 from kinarm.policies.provenance import (
     Provenance,
@@ -15,7 +16,6 @@ from kinarm.policies.provenance import (
     source_commit,
 )
 from kinarm.problem import ReachProblem
-from kinarm.semantics import SEMANTICS
 
 
 def test_round_trip_through_json(provenance):

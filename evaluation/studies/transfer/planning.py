@@ -8,13 +8,13 @@ from functools import cache, cached_property
 from itertools import product
 from typing import TYPE_CHECKING, Any, Literal
 
+from kinarm import SEMANTICS
 from kinarm._fields import to_plain
 from kinarm._validation import MOST_TRIALS, whole_number
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.provenance import package_versions
 from kinarm.policies.recipes import recipe
 from kinarm.problem import PROBLEMS, ReachProblem
-from kinarm.semantics import SEMANTICS
 
 if TYPE_CHECKING:
     from kinarm.evaluation.studies.transfer.study import TransferStudy

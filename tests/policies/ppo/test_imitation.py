@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 
-from kinarm._activities import told_of_activities
+from kinarm._console import told_of_activities
 from kinarm.errors import InvalidInputError
 from kinarm.policies import PPOConfig
 from kinarm.policies.normalizer import Normalizer

@@ -1,13 +1,15 @@
-"""Random streams by name."""
+"""Random streams by name, and points of low discrepancy."""
 
 from itertools import product
 
+import numpy as np
 import pytest
+from scipy.stats import qmc
 
 from kinarm.evaluation.trials import trial_generator
 from kinarm.policies.ars.algorithm import ARSTraining
 from kinarm.policies.recipes import recipe
-from kinarm.streams import Stream, stream_generator
+from kinarm.randomness import Stream, low_discrepancy_points, stream_generator
 
 
 def test_a_stream_is_what_it_was():
@@ -41,3 +43,29 @@ def test_a_training_of_ars_begins_with_its_stream():
     config = recipe("ars", "paper", problem="right", seed=5)
     begun = stream_generator(Stream.ARS, 5).bit_generator.state
     assert ARSTraining(config, threads=1).initial_state().generator == begun
+
+
+@pytest.mark.parametrize("dimensions", [1, 2, 3, 6, 7])
+def test_shape_and_range(dimensions):
+    points = low_discrepancy_points(500, dimensions)
+    assert points.shape == (500, dimensions)
+    assert ((points >= 0) & (points < 1)).all()
+    assert len(np.unique(points, axis=0)) == 500
+
+
+def test_one_dimension_is_the_golden_ratio():
+    golden = (np.sqrt(5) - 1) / 2
+    expected = (0.5 + golden * np.arange(1, 30)) % 1
+    np.testing.assert_allclose(low_discrepancy_points(29, 1)[:, 0], expected, atol=1e-12)
+
+
+def test_more_points_continue_the_sequence():
+    np.testing.assert_array_equal(low_discrepancy_points(10, 4), low_discrepancy_points(99, 4)[:10])
+
+
+@pytest.mark.parametrize("dimensions", [1, 2, 3, 6])
+@pytest.mark.parametrize("count", [48, 512])
+def test_is_more_even_than_chance(dimensions, count):
+    chance = np.random.default_rng(10).random((8, count, dimensions))
+    usual = np.mean([qmc.discrepancy(points) for points in chance])
+    assert qmc.discrepancy(low_discrepancy_points(count, dimensions)) < 0.5 * usual

@@ -1,4 +1,4 @@
-"""Random generators by purpose: no two purposes share numbers, for any seeds.
+"""Random generators by purpose: no two purposes share numbers, for any seeds; and even points.
 
 A generator's key is the hash of the purpose's name, followed by numbers of its own. The trials of
 an evaluation (``kinarm.evaluation.trials.trial_generator``) are older than the names: their keys
@@ -9,6 +9,7 @@ import hashlib
 from enum import StrEnum
 
 import numpy as np
+from numpy.typing import NDArray
 
 
 class Stream(StrEnum):
@@ -37,3 +38,17 @@ def stream_generator(stream: Stream, seed: int, *numbers: int) -> np.random.Gene
     name = np.frombuffer(hashlib.sha256(stream.encode()).digest()[:16], dtype="<u4")
     key = (*map(int, name), *numbers)
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
+
+
+def low_discrepancy_points(count: int, dimensions: int) -> NDArray[np.float64]:
+    """Points that fill the unit cube evenly, shape (count, dimensions).
+
+    They are multiples of powers of a root, modulo 1. The root solves x^(d + 1) = x + 1, which for
+    d = 1 is the golden ratio (Roberts 2018).
+    """
+    root = 2.0
+    for _ in range(64):
+        root = (1.0 + root) ** (1.0 / (dimensions + 1))
+    strides = root ** -np.arange(1.0, dimensions + 1)
+    points: NDArray[np.float64] = (0.5 + np.arange(1, count + 1)[:, None] * strides) % 1.0
+    return points
