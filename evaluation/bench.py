@@ -15,7 +15,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from kinarm._cache import CACHE_VARIABLE
+from kinarm._archive import CACHE_VARIABLE
 from kinarm._parallel import available_threads
 from kinarm.envs import ReachEnv, ReachVectorEnv
 from kinarm.errors import MissingExtraError, WorkerError
