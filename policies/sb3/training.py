@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import torch
 
-from kinarm._activities import doing
+from kinarm._console import doing
 from kinarm._files import first_line
 from kinarm.errors import InvalidInputError
 from kinarm.policies.curve import CurvePoint
