@@ -145,10 +145,10 @@ def measure_rollouts(
     }
     rows = []
     for name, run in runs.items():
-        judged_before = simulator.judged
+        judged_before = simulator.checked_by_coal
         steps = run()
         row = {"batch": batch, "actions": name}
-        judged_share = (simulator.judged - judged_before) / (tested * steps)
+        judged_share = (simulator.checked_by_coal - judged_before) / (tested * steps)
         for threads in sorted({1, available_threads()}):
             simulator.threads = threads
             rates = {"threads": threads, "steps_per_second": timed(run, repetitions)}

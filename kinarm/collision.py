@@ -1,8 +1,8 @@
 """Contact between the arm, the scene and itself: Coal decides, enclosing shapes prove freedom.
 
-`ContactModel` holds one list of pairs twice: as a Pinocchio/Coal geometry model, which judges a
-configuration, and as flat arrays of enclosing shapes and motion bounds (`ContactShapes`), from
-which the compiled simulator proves that most configurations need no judge.
+`ContactModel` holds one list of pairs twice: as a Pinocchio/Coal geometry model, which decides
+about a configuration, and as flat arrays of enclosing shapes and motion bounds (`ContactShapes`),
+from which the compiled simulator proves that most configurations need no such decision.
 """
 
 import warnings
@@ -115,7 +115,7 @@ class ContactModel:
         )
 
     @cached_property
-    def _judge(self) -> pin.TreeBroadPhaseManagerPool_DynamicAABBTreeCollisionManager:
+    def _coal(self) -> pin.TreeBroadPhaseManagerPool_DynamicAABBTreeCollisionManager:
         pool = pin.TreeBroadPhaseManagerPool_DynamicAABBTreeCollisionManager(
             self.arm.model, self.geometry, 1
         )
@@ -151,7 +151,7 @@ class ContactModel:
         if len(configurations) == 0:
             return np.zeros(0, dtype=bool)
         columns = np.asfortranarray(configurations.T)
-        verdicts = pin.computeCollisionsInParallel(1, self._judge, columns, True)
+        verdicts = pin.computeCollisionsInParallel(1, self._coal, columns, True)
         return np.array(verdicts, dtype=bool).reshape(-1)
 
     def contact_pair(self, configuration: NDArray[np.float64]) -> tuple[str, str] | None:

@@ -79,7 +79,7 @@ def _around(points: NDArray[np.float64], most: int) -> Enclosure:
 
 def _fitted(points: NDArray[np.float64], most: int) -> dict[str, Any]:
     """Corners and rounding of what encloses the hull of points."""
-    from kinarm.kernels.enclosing import distances_from_hull
+    from kinarm.kernels.distance import distances_from_hull
 
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     chosen = [int(np.square(points - middle).sum(axis=1).argmax())]

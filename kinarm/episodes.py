@@ -95,7 +95,7 @@ class Episodes(NamedTuple):
     touched : ndarray of int, shape (n,)
         Number, from 1, of the pair that refused the last step; 0 if none did, or nobody looked.
     cleared : ndarray of bool, shape (n,)
-        The step under way was judged free.
+        Coal has found the step under way free.
     planes : ndarray, shape (n, n_pairs, PLANE)
         Separating plane of each pair and the height above it at ``q``; see
         ``kinarm.kernels.planes``.

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.errors import ProblemError
-from kinarm.kernels.starting import propose_starts, rejected_rows
+from kinarm.kernels.screening import propose_starts, rejected_rows
 from kinarm.world import World
 
 START_ATTEMPTS = 2000

@@ -13,9 +13,9 @@ from kinarm._parallel import run_rows, run_together
 from kinarm._validation import finite_array
 from kinarm.arm import Arm
 from kinarm.batches import Batch, IdleBatch, SteppedBatch, begin_some
+from kinarm.doubtful_steps import decide_doubtful_steps
 from kinarm.episodes import PAUSED, RUNNING, Episodes
 from kinarm.errors import InvalidInputError, StartInContactError
-from kinarm.judging import judge_steps
 from kinarm.kernels.rollout import advance, allow_one_step, results_of_step
 from kinarm.kernels.session import Session
 from kinarm.networks import CompiledPolicy, Networks, network_control, table_control
@@ -55,14 +55,14 @@ class Simulator:
         Arm and scene, and what can be asked about configurations.
     threads : int
         Threads for large batches.
-    judged : int
+    checked_by_coal : int
         Configurations that rollouts and steps have asked Coal about so far.
     """
 
     def __init__(self, problem: ProblemLike, *, threads: int | None = None) -> None:
         self.world = World(problem, threads=threads)
         self.threads = self.world.threads
-        self.judged = 0
+        self.checked_by_coal = 0
         self._last: SteppedBatch | None = None
         self._idle = IdleBatch()
 
@@ -242,7 +242,7 @@ class Simulator:
         )
 
     def begin(self, episodes: Episodes, rows: NDArray[np.int64]) -> None:
-        """Start some episodes at their ``q`` and ``goal``; Coal judges doubtful starts.
+        """Start some episodes at their ``q`` and ``goal``; Coal decides about doubtful starts.
 
         Parameters
         ----------
@@ -330,7 +330,7 @@ class Simulator:
         """Advance episodes to their stop, asking Coal about every step that is in doubt."""
         while run_together(advance, work, self.threads, session.of_thread):
             paused = np.flatnonzero(episodes.status == PAUSED)
-            self.judged += judge_steps(self.world, session, episodes, paused)
+            self.checked_by_coal += decide_doubtful_steps(self.world, session, episodes, paused)
             resumed = paused[episodes.cleared[paused]]
             if resumed.size == 0:
                 return

@@ -20,7 +20,7 @@ from kinarm.errors import ProblemError
 from kinarm.frames import Frames
 from kinarm.inverse_kinematics import InverseSolutions, solve
 from kinarm.kernels.block import Alone, Block, work_space
-from kinarm.kernels.frames import move_frame, place_frame
+from kinarm.kernels.kinematics import move_frame, place_frame
 from kinarm.kernels.records import recorded
 from kinarm.kernels.rollout import begin, screen
 from kinarm.kernels.session import Session
@@ -179,7 +179,7 @@ class World:
     def proven(
         self, q: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], int]:
-        """What kernels know of finite configurations: Coal has to judge the others.
+        """What kernels know of finite configurations: Coal decides about the others.
 
         Tool points [m], which configurations surely are free, which surely touch, and how many
         these are together.
@@ -251,7 +251,7 @@ class World:
         return Clearance(*(each[0] for each in found)) if one else found
 
     def in_contact(self, configurations: ArrayLike) -> NDArray[np.bool_]:
-        """Tell which configurations touch something, shape () or (n,); Coal is the judge.
+        """Tell which configurations touch something, shape () or (n,); Coal decides.
 
         Parameters
         ----------
@@ -271,9 +271,9 @@ class World:
             Joint positions [rad or m].
         """
         q = finite_array("configurations", configurations, (None, self.arm.n_joints))
-        judge, touching = self.contact_model, self.in_contact(q)
+        touching = self.in_contact(q)
         return tuple(
-            judge.contact_pair(each) if touches else None
+            self.contact_model.contact_pair(each) if touches else None
             for each, touches in zip(q, touching, strict=True)
         )
 

@@ -49,8 +49,8 @@ class Block(NamedTuple):
         Parameters, if every episode has a network of its own.
     distance, total, steps, stop : (1,)
         Distance to the goal [m], return, steps taken, and step at which to hand back.
-    alive, judged : (1,)
-        1 where there is an episode, and where its step under way was judged already; else 0.
+    alive, cleared : (1,)
+        1 where there is an episode, and where its step under way was found free by Coal; else 0.
     terms : (1, n_terms)
         Weighted terms of the last reward.
     row : (LANES,) of whole numbers, not of lanes
@@ -79,7 +79,7 @@ class Block(NamedTuple):
     steps: Array
     stop: Array
     alive: Array
-    judged: Array
+    cleared: Array
     terms: Array
     first: Array
     second: Array
@@ -156,7 +156,7 @@ def layouts(
         "action": (ONE, n_actuated),
         "hidden": (Fixed(2), widest),
         "weights": (own,),
-        **dict.fromkeys(("distance", "total", "steps", "stop", "alive", "judged"), (ONE,)),
+        **dict.fromkeys(("distance", "total", "steps", "stop", "alive", "cleared"), (ONE,)),
         "terms": (ONE, n_terms),
         "first": (summed,),
         "second": (summed,),
@@ -178,7 +178,7 @@ def layouts(
 
 
 @inlined
-def take_in(e: int, lane: int, control: Control, episodes: Episodes, block: Block) -> None:
+def load_episode(e: int, lane: int, control: Control, episodes: Episodes, block: Block) -> None:
     """Put an episode into a lane; its observation only if something depends on it."""
     q = as_numbers(block.q)
     target = as_numbers(block.target)
@@ -192,7 +192,7 @@ def take_in(e: int, lane: int, control: Control, episodes: Episodes, block: Bloc
     total = as_numbers(block.total)
     steps = as_numbers(block.steps)
     stop = as_numbers(block.stop)
-    judged = as_numbers(block.judged)
+    cleared = as_numbers(block.cleared)
     alive = as_numbers(block.alive)
     for joint in range(block.q.shape[1]):
         q[0, joint, lane] = episodes.q[e, joint]
@@ -214,12 +214,12 @@ def take_in(e: int, lane: int, control: Control, episodes: Episodes, block: Bloc
     total[0, lane] = episodes.total[e]
     steps[0, lane] = episodes.steps[e]
     stop[0, lane] = episodes.stop[e]
-    judged[0, lane] = 1.0 if episodes.cleared[e] else 0.0
+    cleared[0, lane] = 1.0 if episodes.cleared[e] else 0.0
     alive[0, lane] = 1.0
 
 
 @inlined
-def put_back(lane: int, e: int, episodes: Episodes, block: Block) -> None:
+def store_episode(lane: int, e: int, episodes: Episodes, block: Block) -> None:
     """Hand an episode back from a lane, which is then free."""
     q = as_numbers(block.q)
     target = as_numbers(block.target)

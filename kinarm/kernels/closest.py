@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, Vector, helper, inlined, kernel
-from kinarm.kernels.kinematics import POSE, forward_kinematics, to_world
-from kinarm.kernels.planes import rotated_back
+from kinarm.kernels.distance import of_segment, of_triangle, shrink
+from kinarm.kernels.kinematics import POSE, forward_kinematics, rotated_back, to_world
 from kinarm.kernels.separation import lowest_corner
-from kinarm.kernels.simplex import of_segment, of_triangle, shrink
 
 CORNERS_TRIED = 64
 """Corners after which a distance is taken as it is."""
@@ -118,6 +117,7 @@ def between(
     ``simplex``, shape (4, 3), and ``tried``, shape (CORNERS_TRIED, 9), are work space.
     """
     size, norm, x, y, z = 0, math.inf, 0.0, 0.0, 1.0
+    # Walk towards the difference of two points of the bodies that is closest to the origin.
     for number in range(CORNERS_TRIED):
         low = lowest_in_world(bodies, first, poses, x, y, z)
         high = lowest_in_world(bodies, second, poses, -x, -y, -z)
@@ -136,6 +136,7 @@ def between(
         if shorter >= norm:
             break
         norm = shorter
+    # The closest points are the same combinations of the corners that the differences are of.
     weights = (1.0, 0.0, 0.0)
     if size == 2:
         here, there = of_segment(simplex, 0, 1)
@@ -155,6 +156,7 @@ def between(
         for k in range(3):
             points[0, k] += weights[i] * tried[number, 3 + k]
             points[1, k] += weights[i] * tried[number, 6 + k]
+    # Shift them from the polytopes to the surfaces of the rounded bodies.
     inner, outer = bodies.rounding[first] / norm, bodies.rounding[second] / norm
     for k in range(3):
         normal = x if k == 0 else y if k == 1 else z
@@ -186,6 +188,7 @@ def closest_pairs(
     known = np.empty(n_pairs, dtype=np.bool_)
     for row in range(first, last):
         forward_kinematics(*chain[:4], configurations, row, poses)
+        # Bound all distances from below, then measure those of the least bounds.
         for pair in range(n_pairs):
             one, other = bodies.pairs[pair, 0], bodies.pairs[pair, 1]
             bounds[row, pair] = least_distance(bodies, one, other, poses)

@@ -1,15 +1,24 @@
-"""How kernels are compiled: without the GIL and without reordering of floating-point operations."""
+"""How kernels are compiled: without the GIL and without reordering of floating-point operations.
 
+Numba optimises every function and makes machine code of it, though code of helpers that only
+kernels call reaches these as LLVM code and is optimised once more in there. Here a helper is only
+simplified before it is linked. What this module takes from within Numba, and `records`, `lanes` and
+`caching`, is all that kinarm does.
+"""
+
+import gc
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, TypeVar, cast
 
 import numpy as np
-from numba import njit
+from numba import njit, types
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numpy.typing import NDArray
 
+from kinarm._console import COMPILING, doing
 from kinarm.kernels.caching import KernelCache
-from kinarm.kernels.linking import HelperCompiler, KernelCompiler, LeanCompiler, compiled_once
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -59,3 +68,108 @@ def _linked(function: Function, **more: Any) -> Function:
         "pipeline_class": HelperCompiler,
     }
     return cast("Function", compiled_once(njit(**options, **more)(function)))
+
+
+WITHOUT = {
+    "WithLifting",
+    "InlineClosureLikes",
+    "RewriteDynamicRaises",
+    "MakeFunctionToJitFunction",
+    "InlineInlinables",
+    "FindLiterallyCalls",
+    "LiteralUnroll",
+    "LiteralPropagationSubPipelinePass",
+    "InlineOverloads",
+    "NopythonRewrites",
+}
+"""Numba's passes for what kernels do without: contexts, closures, messages of errors, functions
+that are spliced in, literals, and expressions of whole arrays. They take a twelfth of the time."""
+
+
+class KernelCompiler(CompilerBase):
+    """Numba's compiler, without collecting garbage: it keeps nearly all that it makes."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Take those of Numba's passes that do something for kernels."""
+        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes.passes = [each for each in passes.passes if each[0].__name__ not in WITHOUT]
+        return [passes]
+
+    def compile_extra(self, func: Callable[..., Any]) -> Any:
+        """Compile a function, and the helpers that it calls."""
+        collects = gc.isenabled()
+        gc.disable()
+        try:
+            with doing(COMPILING):
+                return super().compile_extra(func)
+        finally:
+            if collects:
+                gc.enable()
+
+
+class LeanCompiler(KernelCompiler):
+    """Compiles a kernel into a `LeanLibrary`."""
+
+    def compile_extra(self, func: Callable[..., Any]) -> Any:
+        """Compile a kernel, and the helpers that it calls."""
+        codegen = self.state.targetctx.codegen()
+        self.state.library = LeanLibrary(codegen, func.__qualname__)
+        self.state.library.enable_object_caching()
+        return super().compile_extra(func)
+
+
+class LeanLibrary(JITCodeLibrary):
+    """Code of a kernel in lanes, optimised once; Numba does so twice, to prune reference counts.
+
+    LLVM does not look for loops to make vectors of: lanes are vectors already.
+    """
+
+    def _optimize_final_module(self) -> None:
+        passes, builder = self._codegen._module_pass_manager(loop_vectorize=False)
+        passes.run(self._final_module, builder)
+
+
+class HelperCompiler(KernelCompiler):
+    """Compiles what only kernels call, into a `LinkedLibrary`."""
+
+    def compile_extra(self, func: Callable[..., Any]) -> Any:
+        """Compile a helper, and those that it calls."""
+        codegen = self.state.targetctx.codegen()
+        self.state.library = LinkedLibrary(codegen, func.__qualname__)
+        return super().compile_extra(func)
+
+
+class LinkedLibrary(JITCodeLibrary):
+    """Code to be linked into kernels, which never becomes machine code of its own."""
+
+    @property
+    def codegen(self) -> "LinkedLibrary":
+        """What is told of the environment of the function: nobody, since it has no address."""
+        return self
+
+    def set_env(self, name: str, environment: object) -> None:
+        """Leave the environment alone; Python objects, which it would hold, are not for helpers."""
+
+    def finalize(self) -> None:
+        """Link in what is called, and leave optimisation and machine code to kernels."""
+        for library in dict.fromkeys(self._linking_libraries):
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        self._final_module.verify()
+        self._finalized = True
+
+    def get_pointer_to_function(self, _: str) -> int:
+        """Finalize; there is no machine code to point to."""
+        self._ensure_finalized()
+        return 0
+
+
+def compiled_once(dispatcher: Any) -> Any:
+    """Let a helper be compiled once for all numbers: by itself, Numba does so for each literal."""
+    find = dispatcher.get_call_template
+
+    def get_call_template(arguments: list[Any], keywords: dict[str, Any]) -> Any:
+        named = {name: types.unliteral(kind) for name, kind in keywords.items()}
+        return find([types.unliteral(kind) for kind in arguments], named)
+
+    dispatcher.get_call_template = get_call_template
+    return dispatcher

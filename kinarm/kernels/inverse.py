@@ -14,11 +14,8 @@ from numpy.typing import NDArray
 from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, Vector, helper, inlined, kernel
 from kinarm.kernels.elementary import nearest_whole
-from kinarm.kernels.jacobian import spatial_jacobian
-from kinarm.kernels.kinematics import POSE, forward_kinematics, to_world
-from kinarm.kernels.lanes import LANES, as_lanes, as_numbers, lane_bits
-from kinarm.kernels.limits import take_out_blocked, take_step
-from kinarm.kernels.planes import rotated
+from kinarm.kernels.kinematics import POSE, forward_kinematics, rotated, spatial_jacobian, to_world
+from kinarm.kernels.lanes import LANES, any_lane, as_lanes, as_numbers, lane_bits, select
 
 PRECISION = 1e-10
 """Error at which a seed has arrived: lengths as shares of the arm's reach, and angles [rad]."""
@@ -234,6 +231,7 @@ def solve_targets(
                 wanted[i, k] = directions[target, i, k]
         found, tried, waiting, n_moving, free = 0, 0, 0, 0, everything
         while True:
+            # Put the next seeds into lanes that are free: first ``near``, then the others.
             for lane in range(LANES):
                 if free >> lane & 1 and waiting < n_seeds + 1:
                     for k in range(n_joints):
@@ -245,6 +243,7 @@ def solve_targets(
                     waiting, n_moving, free = waiting + 1, n_moving + 1, free & ~(1 << lane)
             if n_moving == 0:
                 break
+            # Errors of position and orientation, and the Jacobian by which they change.
             forward_kinematics(prismatic, translation, rotation, axis, q, 0, poses)
             point = to_world(poses, n_joints, tool[0], tool[1], tool[2])
             spatial_jacobian(chain, poses, point, jacobian)
@@ -259,12 +258,14 @@ def solve_targets(
                 for i in range(3):
                     error[3 + i] = turn[i]
                     squared += turn[i] * turn[i]
+            # A damped Newton step, without the joints that it would push beyond a limit.
             arrived = squared <= PRECISION * PRECISION
             damping = DAMPING * squared + LEAST_DAMPING
             blocked = True
             while blocked:
                 damped_step(jacobian, error, damping, square, step)
                 blocked = take_out_blocked(q, lowest, highest, step, jacobian)
+            # Take out what has arrived, which may be a new solution, and what gets no further.
             stuck = (iteration[0] >= PATIENCE) & (squared > PROGRESS * before[0])
             ended = arrived | stuck | (iteration[0] >= ITERATIONS)
             before[0] = squared
@@ -285,6 +286,7 @@ def solve_targets(
                             found,
                         )
             free |= ended_bits
+            # End as soon as there are enough solutions, or every one was found often enough.
             if found == most:
                 break
             if search.least > 0 and tried >= search.least and found > 0:
@@ -296,3 +298,38 @@ def solve_targets(
             take_step(q, lowest, highest, step)
             iteration[0] += 1.0
         counts[target] = found
+
+
+LONGEST_STEP = 0.5
+"""Largest move of a joint in an iteration [rad or m]."""
+
+
+@inlined
+def take_out_blocked(q: Array, lower: Array, upper: Array, step: Array, jacobian: Array) -> bool:
+    """Zero the Jacobian's columns of joints at a limit that would leave it; whether there is one.
+
+    The others then have to make up for them, which changes the step.
+    """
+    blocked = False
+    for k in range(step.shape[0]):
+        outward = ((q[0, k] >= upper[k]) & (step[k] > 0.0)) | (
+            (q[0, k] <= lower[k]) & (step[k] < 0.0)
+        )
+        if any_lane(outward):
+            blocked = True
+            for i in range(jacobian.shape[0]):
+                jacobian[i, k] = select(outward, 0.0, jacobian[i, k])
+    return blocked
+
+
+@inlined
+def take_step(q: Array, lower: Array, upper: Array, step: Array) -> float:
+    """Move configurations by a step, within their limits; return its largest part [rad or m]."""
+    # Scaled down as a whole, a step keeps its direction, in which the tool nears the goal.
+    longest = 0.0 * step[0] + LONGEST_STEP
+    for k in range(step.shape[0]):
+        longest = max(longest, abs(step[k]))
+    for k in range(step.shape[0]):
+        moved = q[0, k] + LONGEST_STEP / longest * step[k]
+        q[0, k] = min(max(moved, lower[k]), upper[k])
+    return longest

@@ -1,10 +1,10 @@
-"""Forward kinematics and Jacobian."""
+"""Forward kinematics, frames and Jacobians, for a number or lanes."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.chain import Chain
-from kinarm.kernels.compiling import Array, Vector, helper, inlined
+from kinarm.kernels.compiling import Array, Vector, helper, inlined, kernel
 from kinarm.kernels.elementary import sine_cosine
 
 POSE = 16
@@ -28,11 +28,13 @@ def forward_kinematics(
     for i in range(POSE):
         poses[0, i] = 1.0 if i == 0 or i == 4 or i == 8 or i == 12 else 0.0
     for k in range(configurations.shape[1]):
+        # The origin of the frame, in the one before.
         c = k + 1
         tx, ty, tz = translation[k, 0], translation[k, 1], translation[k, 2]
         poses[c, 13] = poses[k, 13] + (poses[k, 4] * tx + poses[k, 5] * ty + poses[k, 6] * tz)
         poses[c, 14] = poses[k, 14] + (poses[k, 7] * tx + poses[k, 8] * ty + poses[k, 9] * tz)
         poses[c, 15] = poses[k, 15] + (poses[k, 10] * tx + poses[k, 11] * ty + poses[k, 12] * tz)
+        # The frame's turn about its axis, after its fixed rotation.
         fw, fx, fy, fz = rotation[k, 0], rotation[k, 1], rotation[k, 2], rotation[k, 3]
         ax, ay, az = axis[k, 0], axis[k, 1], axis[k, 2]
         sine, cosine = 0.0, 1.0
@@ -46,6 +48,7 @@ def forward_kinematics(
             jx = fw * ux + fx * cosine + fy * uz - fz * uy
             jy = fw * uy - fx * uz + fy * cosine + fz * ux
             jz = fw * uz + fx * uy - fy * ux + fz * cosine
+        # Times the quaternion of the frame before; and the rotation matrix of the product.
         pw, px, py, pz = poses[k, 0], poses[k, 1], poses[k, 2], poses[k, 3]
         w = pw * jw - px * jx - py * jy - pz * jz
         x = pw * jx + px * jw + py * jz - pz * jy
@@ -111,3 +114,92 @@ def point_jacobian(
             jacobian[0, k] = wy * rz - wz * ry
             jacobian[1, k] = wz * rx - wx * rz
             jacobian[2, k] = wx * ry - wy * rx
+
+
+@inlined
+def rotated(poses: Array, frame: int, x: float, y: float, z: float) -> Vector:
+    """Turn a vector of a joint frame into the world's."""
+    if frame == 0:
+        return x, y, z
+    return (
+        poses[frame, 4] * x + poses[frame, 5] * y + poses[frame, 6] * z,
+        poses[frame, 7] * x + poses[frame, 8] * y + poses[frame, 9] * z,
+        poses[frame, 10] * x + poses[frame, 11] * y + poses[frame, 12] * z,
+    )
+
+
+@inlined
+def rotated_back(poses: Array, frame: int, x: float, y: float, z: float) -> Vector:
+    """Turn a vector of the world into a joint frame's."""
+    return (
+        poses[frame, 4] * x + poses[frame, 7] * y + poses[frame, 10] * z,
+        poses[frame, 5] * x + poses[frame, 8] * y + poses[frame, 11] * z,
+        poses[frame, 6] * x + poses[frame, 9] * y + poses[frame, 12] * z,
+    )
+
+
+@inlined
+def spatial_jacobian(chain: Chain, poses: Array, point: Vector, jacobian: Array) -> None:
+    """Fill in the velocity of a point and the angular velocity of its link, in the world frame.
+
+    Per unit speed of each of the first joints, beyond which the point lies; the Jacobian has the
+    shape (6, n), or (3, n) without angular velocities.
+    """
+    prismatic, axis = chain[0], chain[3]
+    point_jacobian(prismatic, axis, poses, point, jacobian)
+    for k in range(jacobian.shape[1] if jacobian.shape[0] == 6 else 0):
+        x, y, z = rotated(poses, k + 1, axis[k, 0], axis[k, 1], axis[k, 2])
+        turns = 0.0 if prismatic[k] else 1.0
+        jacobian[3, k], jacobian[4, k], jacobian[5, k] = turns * x, turns * y, turns * z
+
+
+@kernel
+def place_frame(
+    first: int,
+    last: int,
+    chain: Chain,
+    joint: int,
+    placement: Array,
+    configurations: Array,
+    transforms: Array,
+) -> None:
+    """Write where a frame is at some rows of the configurations.
+
+    The frame is fixed to a joint, 0 being the world, at a ``placement`` of shape (4, 4), as are
+    the ``transforms``.
+    """
+    poses = np.zeros((configurations.shape[1] + 1, POSE))
+    for row in range(first, last):
+        forward_kinematics(*chain[:4], configurations, row, poses)
+        for k in range(3):
+            x, y, z = placement[0, k], placement[1, k], placement[2, k]
+            x, y, z = rotated(poses, joint, x, y, z)
+            transforms[row, 0, k], transforms[row, 1, k], transforms[row, 2, k] = x, y, z
+            transforms[row, 3, k] = 0.0
+        x, y, z = to_world(poses, joint, placement[0, 3], placement[1, 3], placement[2, 3])
+        transforms[row, 0, 3], transforms[row, 1, 3], transforms[row, 2, 3] = x, y, z
+        transforms[row, 3, 3] = 1.0
+
+
+@kernel
+def move_frame(
+    first: int,
+    last: int,
+    chain: Chain,
+    joint: int,
+    placement: Array,
+    configurations: Array,
+    jacobians: Array,
+) -> None:
+    """Write how a frame moves at some rows of the configurations, shape (n, 6, n_joints).
+
+    What the joints beyond the frame do is left as it is.
+    """
+    poses, jacobian = np.zeros((configurations.shape[1] + 1, POSE)), np.empty((6, joint))
+    for row in range(first, last):
+        forward_kinematics(*chain[:4], configurations, row, poses)
+        point = to_world(poses, joint, placement[0, 3], placement[1, 3], placement[2, 3])
+        spatial_jacobian(chain, poses, point, jacobian)
+        for i in range(6):
+            for k in range(joint):
+                jacobians[row, i, k] = jacobian[i, k]

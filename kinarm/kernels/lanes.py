@@ -160,12 +160,7 @@ _teach(abs, lanes, lanes, 1, _call("fabs"))
 _teach(math.sqrt, lanes, lanes, 1, _call("sqrt"))
 
 
-def _instruction(function: Callable[..., Any]) -> Any:
-    """Let kernels call what a function of the types of its arguments describes."""
-    return intrinsic(function)
-
-
-@_instruction
+@intrinsic
 def power_of_two(_: Any, exponent: types.Type) -> Any:
     """2 to the power of a whole number between -1022 and 1023, for a number or lanes."""
 
@@ -183,7 +178,7 @@ def power_of_two(_: Any, exponent: types.Type) -> Any:
     return exponent(exponent), code
 
 
-@_instruction
+@intrinsic
 def select(_: Any, condition: types.Type, first: types.Type, second: types.Type) -> Any:
     """``first`` where a condition holds, else ``second``: without a branch, for each episode."""
     many = condition == mask
@@ -199,7 +194,7 @@ def select(_: Any, condition: types.Type, first: types.Type, second: types.Type)
     return result(condition, result, result), code
 
 
-@_instruction
+@intrinsic
 def any_lane(_: Any, condition: types.Type) -> Any:
     """Whether a condition holds for some episode."""
 
@@ -213,7 +208,7 @@ def any_lane(_: Any, condition: types.Type) -> Any:
     return types.boolean(condition), code
 
 
-@_instruction
+@intrinsic
 def lane_bits(_: Any, condition: types.Type) -> Any:
     """The truth values of a mask as the bits of a whole number."""
 
@@ -224,7 +219,7 @@ def lane_bits(_: Any, condition: types.Type) -> Any:
     return types.int64(condition), code
 
 
-@_instruction
+@intrinsic
 def as_lanes(_: Any, array: types.Array) -> Any:
     """View a C-contiguous array of float64 whose last axis has `LANES` entries as one of lanes."""
     view = types.Array(lanes, array.ndim - 1, "C", aligned=False)
@@ -235,7 +230,7 @@ def as_lanes(_: Any, array: types.Array) -> Any:
     return view(array), code
 
 
-@_instruction
+@intrinsic
 def as_numbers(_: Any, array: types.Array) -> Any:
     """View a C-contiguous array of lanes as one of float64, which has one axis more."""
     view = types.Array(types.float64, array.ndim + 1, "C")

@@ -14,7 +14,7 @@ import math
 from kinarm.contact_shapes import GROUND, ContactShapes
 from kinarm.kernels.compiling import Array, Vector, helper, inlined
 from kinarm.kernels.distance import between_segments
-from kinarm.kernels.kinematics import to_world
+from kinarm.kernels.kinematics import rotated, rotated_back, to_world
 from kinarm.kernels.lanes import select
 
 EVERYDAY, FINE = 0, 1
@@ -25,28 +25,6 @@ OFFSET, GAP = 3, 4
 
 ALTERNATIONS = 3
 """Projections between box and segment by which a first plane is proposed."""
-
-
-@inlined
-def rotated(poses: Array, frame: int, x: float, y: float, z: float) -> Vector:
-    """Turn a vector of a joint frame into the world's."""
-    if frame == 0:
-        return x, y, z
-    return (
-        poses[frame, 4] * x + poses[frame, 5] * y + poses[frame, 6] * z,
-        poses[frame, 7] * x + poses[frame, 8] * y + poses[frame, 9] * z,
-        poses[frame, 10] * x + poses[frame, 11] * y + poses[frame, 12] * z,
-    )
-
-
-@inlined
-def rotated_back(poses: Array, frame: int, x: float, y: float, z: float) -> Vector:
-    """Turn a vector of the world into a joint frame's."""
-    return (
-        poses[frame, 4] * x + poses[frame, 7] * y + poses[frame, 10] * z,
-        poses[frame, 5] * x + poses[frame, 8] * y + poses[frame, 11] * z,
-        poses[frame, 6] * x + poses[frame, 9] * y + poses[frame, 12] * z,
-    )
 
 
 @inlined

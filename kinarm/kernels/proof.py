@@ -13,7 +13,7 @@ from kinarm.contact_shapes import GROUND, PLANE, ContactShapes
 from kinarm.kernels.block import Alone, Block
 from kinarm.kernels.compiling import Array, helper, inlined
 from kinarm.kernels.kinematics import POSE, place
-from kinarm.kernels.lanes import any_lane, as_numbers, select
+from kinarm.kernels.lanes import any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.planes import EVERYDAY, FINE, GAP, height_above, propose
 from kinarm.kernels.separation import separate
 
@@ -141,6 +141,7 @@ def prove_alone(
         as_numbers(block.bend),
         as_numbers(block.bound),
     )
+    # Give each pair that is not proven a better plane, and list those that remain.
     take_poses(lane, poses, alone.after)
     at_start, n_open, all_open, target_bit = False, 0, 0, 1 << (tested - 1)
     for pair in range(shapes.planes.shape[0]):
@@ -166,6 +167,7 @@ def prove_alone(
         alone.listed[n_open, 0], alone.listed[n_open, 1] = pair, unproven
         n_open += 0 if unproven == 0 else 1
         all_open |= unproven
+    # Look at the configurations between, pair by pair, up to the first that stays in doubt.
     doubt = all_open & target_bit
     for k in range(1, tested):
         bit = 1 << (k - 1)
@@ -206,7 +208,9 @@ def propose_planes(shapes: ContactShapes, poses: Array, block: Block) -> float:
 
 
 @helper
-def stands_free(lane: int, shapes: ContactShapes, poses: Array, block: Block, alone: Alone) -> bool:
+def prove_configuration(
+    lane: int, shapes: ContactShapes, poses: Array, block: Block, alone: Alone
+) -> bool:
     """Prove the configuration of a single episode free as far as first planes have not."""
     plane, planes, free = alone.plane, as_numbers(block.planes), True
     take_poses(lane, poses, alone.after)
@@ -232,3 +236,16 @@ def take_poses(lane: int, poses: Array, single: Array) -> None:
     for frame in range(single.shape[0]):
         for i in range(POSE):
             single[frame, i] = numbers[frame, i, lane]
+
+
+@inlined
+def prove_configurations(
+    shapes: ContactShapes, touched: int, filled: int, block: Block, alone: Alone
+) -> int:
+    """Bits of the arms that are proven free of contact; ``touched`` are those that are not."""
+    free = lane_bits(is_apart(propose_planes(shapes, block.after, block)))
+    for lane in range(filled):
+        open_here = (free | touched) >> lane & 1 == 0
+        if open_here and prove_configuration(lane, shapes, block.after, block, alone):
+            free |= 1 << lane
+    return free

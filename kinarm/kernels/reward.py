@@ -1,10 +1,15 @@
-"""The reward of a step, term by term (paper, section 3.3: closer is positive, farther negative).
+"""Observation, distance and reward of a step.
 
-A new term is a field of `kinarm.task.RewardWeights` and its formula here, in the same order.
+The reward is a sum of terms (paper, section 3.3: closer is positive, farther negative). A new
+term is a field of `kinarm.task.RewardWeights` and its formula here, in the same order.
 """
 
+import math
+
 from kinarm.kernels.compiling import Array, inlined
+from kinarm.kernels.kinematics import to_world
 from kinarm.kernels.lanes import select
+from kinarm.observation import write_observation
 
 PROGRESS, CLOSER, STEP, COLLISION, SUCCESS = range(5)
 """Columns of the terms; from `COLLISION` on, they are paid when an episode ends."""
@@ -37,3 +42,12 @@ def add_reward(
     total[e] += of_every_step
     for term in range(COLLISION, weights.shape[0]):
         total[e] += terms[e, term]
+
+
+@inlined
+def observe(tool: Array, poses: Array, goals: Array, row: int, observations: Array) -> float:
+    """Fill in a row of the observations and return the distance from the tool to the goal [m]."""
+    point = to_world(poses, poses.shape[0] - 1, tool[0], tool[1], tool[2])
+    write_observation(poses, point, goals, row, observations, 0)
+    dx, dy, dz = goals[row, 0] - point[0], goals[row, 1] - point[1], goals[row, 2] - point[2]
+    return math.sqrt(dx * dx + dy * dy + dz * dz)

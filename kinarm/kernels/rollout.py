@@ -1,73 +1,30 @@
-"""The kernels that Python calls: whole episodes, their beginning, and single configurations.
+"""Kernels of rollouts: the beginning of episodes, whole episodes, and their results.
 
-What an episode's numbers depend on is nothing but its inputs. A step that is not proven free of
-contact pauses the episode until Coal has judged it.
+An episode's numbers depend on nothing but its inputs. A step that is not proven free of contact
+pauses the episode until Coal has decided about it.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.chain import Chain
-from kinarm.contact_shapes import PLANE, ContactShapes
+from kinarm.contact_shapes import PLANE
 from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Episodes, Rules
-from kinarm.kernels.acting import choose_actions, shared_policy
-from kinarm.kernels.block import Alone, Block, put_back, take_in
+from kinarm.kernels.block import load_episode, store_episode
 from kinarm.kernels.compiling import Array, inlined, lean_kernel
-from kinarm.kernels.kinematics import place, to_world
+from kinarm.kernels.kinematics import place
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, select
-from kinarm.kernels.observing import observe
+from kinarm.kernels.network import choose_actions, shared_policy
 from kinarm.kernels.planes import GAP
 from kinarm.kernels.proof import (
     is_apart,
-    propose_planes,
     prove_alone,
+    prove_configurations,
     prove_step,
     renew_planes,
-    stands_free,
 )
-from kinarm.kernels.reward import add_reward
-from kinarm.kernels.session import Session
-from kinarm.kernels.sharing import take_number
-from kinarm.kernels.touching import deepest_overlap, first_contact, overlaps
-
-
-@lean_kernel
-def screen(
-    first: int,
-    last: int,
-    block: Block,
-    alone: Alone,
-    chain: Chain,
-    shapes: ContactShapes,
-    configurations: Array,
-    tools: Array,
-    free: NDArray[np.bool_],
-    touching: NDArray[np.bool_],
-) -> int:
-    """Find the tool points of configurations, shape (n, 3) [m], and which surely are free or touch.
-
-    Returns of how many one of both is proven; Coal has to judge the others.
-    """
-    n_joints, tool = configurations.shape[1], chain.tool
-    q, points, n_proven = as_numbers(block.q), as_numbers(block.goal), 0
-    for start in range(first, last, LANES):
-        filled = min(last - start, LANES)
-        for lane in range(LANES):
-            row = start + min(lane, filled - 1)
-            for joint in range(n_joints):
-                q[0, joint, lane] = configurations[row, joint]
-        place(chain, block.q, block.after)
-        touched = lane_bits(overlaps(deepest_overlap(shapes, block.after)))
-        apart = stand(shapes, touched, filled, block, alone)
-        x, y, z = to_world(block.after, n_joints, tool[0], tool[1], tool[2])
-        block.goal[0, 0], block.goal[0, 1], block.goal[0, 2] = x, y, z
-        for lane in range(filled):
-            free[start + lane] = apart >> lane & 1 != 0
-            touching[start + lane] = touched >> lane & 1 != 0
-            n_proven += (apart | touched) >> lane & 1
-            for axis in range(3):
-                tools[start + lane, axis] = points[0, axis, lane]
-    return n_proven
+from kinarm.kernels.reward import add_reward, observe
+from kinarm.kernels.session import Session, take_number
+from kinarm.kernels.touching import first_contact
 
 
 @lean_kernel
@@ -86,6 +43,7 @@ def begin(first: int, last: int, rows: NDArray[np.int64], session: Session) -> i
     proposed, n_paused = as_numbers(block.planes), 0
     for start in range(first, last, LANES):
         filled = min(last - start, LANES)
+        # Load starts and goals; the last one repeats where there are no more.
         for lane in range(LANES):
             e = rows[start + min(lane, filled - 1)]
             for joint in range(n_joints):
@@ -93,8 +51,9 @@ def begin(first: int, last: int, rows: NDArray[np.int64], session: Session) -> i
             for axis in range(3):
                 goals[0, axis, lane] = episodes.goal[e, axis]
         place(chain, block.q, block.after)
-        free = stand(shapes, 0, filled, block, alone)
+        free = prove_configurations(shapes, 0, filled, block, alone)
         block.distance[0] = observe(chain.tool, block.after, block.goal, 0, block.observation)
+        # Store all that an episode begins with.
         for lane in range(filled):
             e = rows[start + lane]
             episodes.status[e] = RUNNING if free >> lane & 1 else PAUSED
@@ -114,17 +73,6 @@ def begin(first: int, last: int, rows: NDArray[np.int64], session: Session) -> i
                 for joint in range(n_joints):
                     path[e, 0, joint] = q[e, joint]
     return n_paused
-
-
-@inlined
-def stand(shapes: ContactShapes, touched: int, filled: int, block: Block, alone: Alone) -> int:
-    """Bits of the arms that are proven free of contact; ``touched`` are those that are not."""
-    free = lane_bits(is_apart(propose_planes(shapes, block.after, block)))
-    for lane in range(filled):
-        open_here = (free | touched) >> lane & 1 == 0
-        if open_here and stands_free(lane, shapes, block.after, block, alone):
-            free |= 1 << lane
-    return free
 
 
 @lean_kernel
@@ -150,18 +98,20 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
         row[lane] = -1
     waiting, n_alive, n_paused, changed = 0, 0, 0, True
     while True:
+        # Fill the lanes that are empty.
         for lane in range(row.shape[0]):
             if row[lane] < 0 and waiting < n_episodes:
                 waiting = next_waiting(counters, episodes)
                 if waiting < n_episodes:
                     row[lane] = waiting
-                    take_in(waiting, lane, control, episodes, block)
+                    load_episode(waiting, lane, control, episodes, block)
                     n_alive += 1
                     changed = True
         if n_alive == 0:
             return n_paused
+        # Act, but where the step under way is one that Coal has found free.
         choose_actions(control, shared, row, block)
-        fresh = (block.alive[0] > 0.0) & ~(block.judged[0] > 0.0)
+        fresh = (block.alive[0] > 0.0) & ~(block.cleared[0] > 0.0)
         for i in range(summed):
             centred = select(fresh, block.observation[0, i] - episodes.shift[i], 0.0)
             block.first[i] += centred
@@ -170,6 +120,7 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
             moved = block.q[0, axis] + block.action[0, axis] * rules.step_limit[axis]
             moved = min(max(moved, lower[axis]), upper[axis])
             block.target[0, axis] = select(fresh, moved, block.target[0, axis])
+        # Prove the steps free of contact: all together, then by new planes, then one by one.
         before, poses = poses, before
         place(chain, block.target, poses)
         unproven = ~is_apart(prove_step(shapes, rules.tested, poses, block)) & fresh
@@ -185,8 +136,9 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
                     continue
                 doubt = prove_alone(lane, chain, shapes, rules.tested, poses, block, alone)
                 if doubt != 0:
+                    # The episode leaves the block: it ends here, or waits for Coal.
                     e, row[lane] = row[lane], -1
-                    put_back(lane, e, episodes, block)
+                    store_episode(lane, e, episodes, block)
                     for pair in range(n_pairs):
                         # It has not moved yet.
                         episodes.planes[e, pair, GAP] = as_numbers(block.height)[pair, lane]
@@ -201,8 +153,9 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
                         n_paused += 1
             if n_alive == 0:
                 continue
+        # Move the others, observe, and reward.
         changed = False
-        block.judged[0] = 0.0
+        block.cleared[0] = 0.0
         nearer = block.distance[0]
         after = observe(tool, poses, block.goal, 0, block.observation)
         block.distance[0] = after
@@ -217,6 +170,7 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
                     step = int(as_numbers(block.steps)[0, lane])
                     for joint in range(n_joints):
                         episodes.path[row[lane], step, joint] = as_numbers(block.q)[0, joint, lane]
+        # Take out what has ended or is to be handed back.
         late = block.steps[0] >= rules.horizon
         finished = lane_bits((block.steps[0] >= block.stop[0]) | reached | late)
         if finished != 0:
@@ -224,7 +178,7 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
             for lane in range(row.shape[0]):
                 if finished >> lane & 1 and row[lane] >= 0:
                     e, row[lane] = row[lane], -1
-                    put_back(lane, e, episodes, block)
+                    store_episode(lane, e, episodes, block)
                     n_alive -= 1
                     if successes >> lane & 1:
                         episodes.status[e] = SUCCESS

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from kinarm.contact_shapes import ContactShapes
 from kinarm.kernels.compiling import Array, Vector, helper, inlined
-from kinarm.kernels.planes import FINE, GAP, OFFSET, rotated_back
-from kinarm.kernels.simplex import shrink
+from kinarm.kernels.distance import shrink
+from kinarm.kernels.kinematics import rotated_back
+from kinarm.kernels.planes import FINE, GAP, OFFSET
 
 CORNERS_TRIED = 24
 """Corners after which the search ends."""

@@ -2,6 +2,10 @@
 
 from typing import Any, NamedTuple
 
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
 from kinarm.chain import Chain
 from kinarm.contact_shapes import ContactShapes
 from kinarm.episodes import Control, Episodes, Rules
@@ -9,8 +13,8 @@ from kinarm.kernels.block import Alone, Block, work_space
 from kinarm.kernels.records import Record, table
 
 
-class Parts(NamedTuple):
-    """What kernels see as the attributes of a `Session`: records of it."""
+class SessionFields(NamedTuple):
+    """The records that kernels find as attributes of a `Session`."""
 
     chain: Chain
     shapes: ContactShapes
@@ -40,14 +44,7 @@ class Session(Record):
     block: Block
     alone: Alone
 
-    def __init__(
-        self,
-        chain: Any,
-        shapes: Any,
-        rules: Any,
-        control: Any,
-        episodes: Any,
-    ) -> None:
+    def __init__(self, chain: Any, shapes: Any, rules: Any, control: Any, episodes: Any) -> None:
         weights, layers = control.values.weights, control.values.layers.tolist()
         q, observation = episodes.values.q, episodes.values.observation
         space = work_space(
@@ -60,7 +57,7 @@ class Session(Record):
             own=weights.shape[1] if weights.shape[0] > 1 else 0,
             summed=observation.shape[1] if len(episodes.values.moments) > 0 else 0,
         )
-        parts = Parts(chain, shapes, rules, control, episodes, *space)
+        parts = SessionFields(chain, shapes, rules, control, episodes, *space)
         super().__init__(*table(parts), parts)
         self._others: list[Session] = []
 
@@ -76,3 +73,21 @@ class Session(Record):
         while len(self._others) < number:
             self._others.append(self.another())
         return self._others[number - 1] if number else self
+
+
+@intrinsic
+def take_number(_: Any, counters: types.Array, place: types.Integer) -> Any:
+    """Raise one of some counters, an array of int64, by one; returns what it was.
+
+    Threads that do so at the same time get different numbers.
+    """
+
+    def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        from numba.np.arrayobj import make_array
+
+        array = make_array(counters)(context, builder, arguments[0])
+        index = context.cast(builder, arguments[1], place, types.intp)
+        one = ir.Constant(ir.IntType(64), 1)
+        return builder.atomic_rmw("add", builder.gep(array.data, [index]), one, "monotonic")
+
+    return types.int64(counters, place), code

@@ -413,9 +413,9 @@ def test_coal_is_asked_only_where_nothing_is_proven(simulators, name, asked):
     simulator, rng = simulators[name], np.random.default_rng(27)
     starts, goals = simulator.sample(rng, 200)
     actions = rng.uniform(-1, 1, (200, simulator.task.horizon, simulator.n_actions))
-    before = simulator.judged
+    before = simulator.checked_by_coal
     assert simulator.rollout_actions(actions, starts, goals).collision.any()
-    assert (simulator.judged > before) == asked
+    assert (simulator.checked_by_coal > before) == asked
 
 
 class TestBatchesThatServeAgain:

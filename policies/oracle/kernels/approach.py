@@ -31,8 +31,8 @@ from kinarm.policies.oracle.kernels.boxes import (
     WAITING,
     Boxes,
     halve,
-    put_back,
-    take_in,
+    load_boxes,
+    store_box,
     within_steps,
 )
 from kinarm.policies.oracle.kernels.overlap import overlaps
@@ -93,7 +93,7 @@ def search(
     offset, step, scale = model[0], model[1], model[2]
     slope, least, bend = model[3], model[4], model[5]
     places = (as_numbers(block.q), as_numbers(block.tried))
-    found, floors = as_numbers(block.distance), as_numbers(block.proven)
+    found, lower_bounds = as_numbers(block.distance), as_numbers(block.proven)
     shares = as_numbers(block.share)
     for i in range(n_joints):
         block.q[0, i] = start[i]
@@ -116,9 +116,10 @@ def search(
         if steps <= fewest if fewer else closest <= enough:
             break
         count = min(waiting, LANES, budget - examined)
-        take_in(stack, waiting - 1, count, block)
+        load_boxes(stack, waiting - 1, count, block)
         waiting -= count
         examined += count
+        # Cut the boxes to what is still of interest, and find their centres.
         narrowest = 0.0 * block.lower[0]
         for i in range(n):
             block.lower[i] = max(block.lower[i], lower[i])
@@ -128,6 +129,7 @@ def search(
             narrowest = min(narrowest, block.half[i])
         # Nothing is left of a box that takes no fewer steps than what was found.
         empty = narrowest < 0.0
+        # Bound the distance over a box by a linear model at its centre and its curvature.
         block.distance[0] = offset_from_goal(chain, block.q, goal, block.poses, offset)
         tool = (goal[0] + offset[0], goal[1] + offset[1], goal[2] + offset[2])
         point_jacobian(chain.prismatic, chain.axis, block.poses, tool, jacobian)
@@ -148,6 +150,7 @@ def search(
         for i in range(n):
             block.tried[0, i] = block.q[0, i] + step[i]
         block.distance[1] = offset_from_goal(chain, block.tried, goal, block.between, offset)
+        # Of centres and steps, those count that come closer than what was found, and are free.
         far = enough if fewer else closest
         at_centre = ~empty & (block.distance[0] <= far)
         at_step = ~empty & (block.distance[1] <= far)
@@ -191,25 +194,26 @@ def search(
             # throughout holds no configuration that counts: nothing is to be proven of it.
             work = (block.half, 1.0, ends, turns)
             empty = empty | overlaps(~beyond & ~empty, chain, shapes, block.poses, *work)
+        # Leave out boxes that are decided, and put what is left of the others back, or halves.
         excluded, gone = lane_bits(beyond), lane_bits(empty)
         for lane in range(count - 1, -1, -1):
             if gone >> lane & 1:
                 continue
             if excluded >> lane & 1:
                 # Nothing in the box comes closer than this.
-                proven = min(proven, floors[0, lane])
+                proven = min(proven, lower_bounds[0, lane])
                 continue
             if shares[0, lane] < 1.0:
                 proven = min(proven, cutoff)
             if shares[0, lane] < 0.5:
-                put_back(stack, waiting, lane, block)
+                store_box(stack, waiting, lane, block)
                 waiting += 1
             elif halve(stack, waiting, lane, lever, block):
                 waiting += 2
             else:
                 # Such boxes are left where bounds meet what is asked for, or proofs of contact end.
                 undecided = True
-                proven = min(proven, floors[0, lane])
+                proven = min(proven, lower_bounds[0, lane])
     complete = (waiting == 0 and not undecided) or (steps <= fewest if fewer else closest <= enough)
     # Of boxes that still wait, no more is known than of those that they are halves of.
     for i in range(waiting):

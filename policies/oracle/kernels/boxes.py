@@ -101,7 +101,7 @@ def within_steps(
 
 
 @inlined
-def take_in(stack: Array, last: int, count: int, boxes: Boxes) -> None:
+def load_boxes(stack: Array, last: int, count: int, boxes: Boxes) -> None:
     """Put the boxes at the end of the stack into lanes; the last one repeats where there is none.
 
     A row of the ``stack`` holds the corners of a box, and the distance proven of it.
@@ -121,7 +121,7 @@ def take_in(stack: Array, last: int, count: int, boxes: Boxes) -> None:
 
 
 @inlined
-def put_back(stack: Array, row: int, lane: int, boxes: Boxes) -> None:
+def store_box(stack: Array, row: int, lane: int, boxes: Boxes) -> None:
     """Put a box from a lane into the stack."""
     lower, upper = as_numbers(boxes.lower), as_numbers(boxes.upper)
     n = lower.shape[0]
@@ -148,8 +148,8 @@ def halve(stack: Array, row: int, lane: int, lever: Array, boxes: Boxes) -> bool
     if farthest < SMALLEST:
         return False
     middle = 0.5 * (lower[widest, lane] + upper[widest, lane])
-    put_back(stack, row, lane, boxes)
-    put_back(stack, row + 1, lane, boxes)
+    store_box(stack, row, lane, boxes)
+    store_box(stack, row + 1, lane, boxes)
     # The last box is examined next.
     near_lower = as_numbers(boxes.tried)[0, widest, lane] <= middle
     above, below = (row, row + 1) if near_lower else (row + 1, row)

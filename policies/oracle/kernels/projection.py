@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, Vector, inlined, lean_kernel
+from kinarm.kernels.inverse import take_out_blocked, take_step
 from kinarm.kernels.kinematics import POSE, place, point_jacobian, to_world
 from kinarm.kernels.lanes import LANES, as_numbers, lane_bits, lanes, select
-from kinarm.kernels.limits import take_out_blocked, take_step
 from kinarm.kernels.records import Fixed, Layout
 
 ITERATIONS = 24
@@ -142,6 +142,7 @@ def damped_least_squares(
     found, iterations = as_numbers(moving.distance), as_numbers(moving.iteration)
     waiting, n_moving, free = first, 0, (1 << LANES) - 1
     while True:
+        # Put the next rows into lanes that are free.
         for lane in range(LANES if waiting < last else 0):
             if free >> lane & 1 and waiting < last:
                 goal, rows[lane] = owner[waiting], waiting
@@ -159,6 +160,7 @@ def damped_least_squares(
                 free &= ~(1 << lane)
         if n_moving == 0:
             return
+        # Measure the distance to the goal, and take out what has come close enough.
         place(chain, moving.q, poses)
         point = to_world(poses, n_joints, tool[0], tool[1], tool[2])
         x, y, z = moving.goal[0] - point[0], moving.goal[1] - point[1], moving.goal[2] - point[2]

@@ -10,8 +10,8 @@ from kinarm.policies.ppo.kernels.layers import (
     Network,
     backward,
     forward,
+    load_sample,
     padded,
-    take_in,
     whole_tiles,
     widest,
     work_length,
@@ -63,7 +63,7 @@ def add_imitation_gradients(
             rows = chosen[start : min(start + BLOCK, end)]
             samples, tiled = len(rows), whole_tiles(len(rows))
             for s in range(samples):
-                take_in(observations, rows[s], layers, work, s)
+                load_sample(observations, rows[s], layers, work, s)
             forward(actor, tiled, work)
             for s in range(samples):
                 for j in range(n_actions):

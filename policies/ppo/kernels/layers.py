@@ -139,7 +139,7 @@ def backward(
 
 
 @inlined
-def take_in(
+def load_sample(
     observations: Numbers, i: int, layers: NDArray[np.int64], work: Numbers, s: int
 ) -> None:
     """Copy an observation into a work space."""

@@ -18,8 +18,8 @@ from kinarm.policies.ppo.kernels.layers import (
     Network,
     backward,
     forward,
+    load_sample,
     padded,
-    take_in,
     whole_tiles,
     widest,
     work_length,
@@ -65,7 +65,7 @@ def evaluate(
     for begin in range(first, last, BLOCK):
         samples = min(BLOCK, last - begin)
         for s in range(samples):
-            take_in(observations, begin + s, layers, work, s)
+            load_sample(observations, begin + s, layers, work, s)
         forward(network, whole_tiles(samples), work)
         for s in range(samples):
             for j in range(outputs.shape[1]):
@@ -191,7 +191,7 @@ def add_gradients(
             rows = chosen[start : min(start + BLOCK, end)]
             samples, tiled = len(rows), whole_tiles(len(rows))
             for s in range(samples):
-                take_in(experience.observations, rows[s], actor.layers, work, s)
+                load_sample(experience.observations, rows[s], actor.layers, work, s)
             forward(actor, tiled, work)
             derive_by_means(
                 actor.layers,
@@ -240,6 +240,7 @@ def descend(
     steps : int
         Which step it is, counted from 1.
     """
+    # The whole gradient, and its length in a fixed order of sums.
     n_parts, n_weights = gradients.shape
     whole, weights = gradients[0], actor.weights
     for part in range(1, n_parts):
@@ -252,6 +253,7 @@ def descend(
     total = 0.0
     for lane in range(LANES):
         total += squares[lane]
+    # Clip its length, and move against the mean gradient over its root mean square.
     shrink = np.float32(min(descent.max_norm / (math.sqrt(total) + 1e-6), 1.0))
     kept, squares_kept = np.float32(descent.first_decay), np.float32(descent.second_decay)
     taken, squares_taken = (

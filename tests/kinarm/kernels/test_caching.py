@@ -13,7 +13,7 @@ import resource, sys
 import numpy as np
 if "full" in sys.argv:
     resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
-from kinarm.kernels.starting import propose_starts
+from kinarm.kernels.screening import propose_starts
 rows = np.arange(2)
 starts = propose_starts(rows, np.full((2, 3), 0.5), np.zeros(3), np.ones(3), np.zeros((2, 3)))
 assert (starts == 0.5).all()

@@ -6,8 +6,7 @@ import pytest
 from numba import njit
 from numba.core.errors import TypingError
 
-from kinarm.kernels.compiling import helper, inlined, kernel
-from kinarm.kernels.linking import KernelCompiler
+from kinarm.kernels.compiling import KernelCompiler, helper, inlined, kernel
 
 
 @inlined

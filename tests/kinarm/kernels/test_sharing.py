@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numba import njit
 
-from kinarm.kernels.sharing import take_number
+from kinarm.kernels.session import take_number
 
 
 @njit(nogil=True)

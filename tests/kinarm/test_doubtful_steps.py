@@ -3,7 +3,7 @@
 import numpy as np
 from configurations import contact_boundary, jittered
 
-from kinarm.judging import _one_by_one, _together
+from kinarm.doubtful_steps import _one_by_one, _together
 
 
 def ways_in_doubt(simulator):

@@ -1,4 +1,4 @@
-"""Coal's verdicts on the steps that the kernels have not proven free of contact."""
+"""Steps that the kernels have proven neither free nor in contact: Coal decides about them."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +12,13 @@ from kinarm.world import World
 Bits = NDArray[np.int64]
 
 FEW = 4
-"""Up to so many episodes in doubt are judged one by one, which also tells what touches."""
+"""Up to so many episodes in doubt are decided one by one, which also tells what touches."""
 
 
-def judge_steps(world: World, session: Session, episodes: Episodes, paused: Bits) -> int:
+def decide_doubtful_steps(world: World, session: Session, episodes: Episodes, paused: Bits) -> int:
     """Refuse steps that touch something, and clear the others.
 
-    Configurations are judged in the order of the motion, and not beyond the first contact.
+    Coal is asked in the order of the motion, and not beyond the first contact.
 
     Parameters
     ----------
@@ -37,8 +37,8 @@ def judge_steps(world: World, session: Session, episodes: Episodes, paused: Bits
         Configurations that Coal was asked about.
     """
     ways = world.substeps(episodes.q[paused], episodes.target[paused])
-    judge = _one_by_one if paused.size <= FEW else _together
-    touched, asked = judge(world.contact_model, ways, episodes.doubt[paused])
+    ask = _one_by_one if paused.size <= FEW else _together
+    touched, asked = ask(world.contact_model, ways, episodes.doubt[paused])
     episodes.touched[paused] = touched
     refused = touched != 0
     episodes.status[paused[~refused]] = RUNNING

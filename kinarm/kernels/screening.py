@@ -1,0 +1,93 @@
+"""Kernels that screen configurations for contact, and those that draw starts.
+
+Starts are few numbers, for which calls of NumPy take longer than the sums.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.chain import Chain
+from kinarm.contact_shapes import ContactShapes
+from kinarm.kernels.block import Alone, Block
+from kinarm.kernels.compiling import Array, kernel, lean_kernel
+from kinarm.kernels.kinematics import place, to_world
+from kinarm.kernels.lanes import LANES, as_numbers, lane_bits
+from kinarm.kernels.proof import prove_configurations
+from kinarm.kernels.touching import deepest_overlap, overlaps
+
+
+@kernel
+def propose_starts(
+    rows: NDArray[np.int64], uniforms: Array, lower: Array, extent: Array, starts: Array
+) -> Array:
+    """Place the first joints of some starts within their range, and return these starts.
+
+    Uniform numbers in [0, 1) have the shape (n_rows, n_actuated).
+    """
+    proposed = np.empty((rows.shape[0], starts.shape[1]))
+    for i in range(rows.shape[0]):
+        for joint in range(uniforms.shape[1]):
+            starts[rows[i], joint] = lower[joint] + uniforms[i, joint] * extent[joint]
+        for joint in range(starts.shape[1]):
+            proposed[i, joint] = starts[rows[i], joint]
+    return proposed
+
+
+@kernel
+def rejected_rows(
+    rows: NDArray[np.int64],
+    goals: Array,
+    tools: Array,
+    touching: NDArray[np.bool_],
+    tolerance: float,
+) -> NDArray[np.int64]:
+    """Rows of the starts that touch something or have their tool at the goal already."""
+    rejected, count = np.empty_like(rows), 0
+    for i in range(rows.shape[0]):
+        e = rows[i]
+        x, y, z = tools[i, 0] - goals[e, 0], tools[i, 1] - goals[e, 1], tools[i, 2] - goals[e, 2]
+        if touching[i] or math.sqrt(x * x + y * y + z * z) <= tolerance:
+            rejected[count] = e
+            count += 1
+    return rejected[:count]
+
+
+@lean_kernel
+def screen(
+    first: int,
+    last: int,
+    block: Block,
+    alone: Alone,
+    chain: Chain,
+    shapes: ContactShapes,
+    configurations: Array,
+    tools: Array,
+    free: NDArray[np.bool_],
+    touching: NDArray[np.bool_],
+) -> int:
+    """Find the tool points of configurations, shape (n, 3) [m], and which surely are free or touch.
+
+    Returns of how many one of both is proven; Coal has to decide about the others.
+    """
+    n_joints, tool = configurations.shape[1], chain.tool
+    q, points, n_proven = as_numbers(block.q), as_numbers(block.goal), 0
+    for start in range(first, last, LANES):
+        filled = min(last - start, LANES)
+        for lane in range(LANES):
+            row = start + min(lane, filled - 1)
+            for joint in range(n_joints):
+                q[0, joint, lane] = configurations[row, joint]
+        place(chain, block.q, block.after)
+        touched = lane_bits(overlaps(deepest_overlap(shapes, block.after)))
+        apart = prove_configurations(shapes, touched, filled, block, alone)
+        x, y, z = to_world(block.after, n_joints, tool[0], tool[1], tool[2])
+        block.goal[0, 0], block.goal[0, 1], block.goal[0, 2] = x, y, z
+        for lane in range(filled):
+            free[start + lane] = apart >> lane & 1 != 0
+            touching[start + lane] = touched >> lane & 1 != 0
+            n_proven += (apart | touched) >> lane & 1
+            for axis in range(3):
+                tools[start + lane, axis] = points[0, axis, lane]
+    return n_proven
