@@ -10,7 +10,7 @@ from sphinx.util.docutils import SphinxDirective
 
 from kinarm import PROBLEMS, REWARD_TERMS, Arm, RewardWeights, Scene, Simulator
 from kinarm._fields import summary_of
-from kinarm.capsules import enclosing_capsule
+from kinarm.enclosures import enclosing_capsule
 from kinarm.envs.registration import ENVIRONMENTS
 from kinarm.evaluation import METRICS
 from kinarm.evaluation.commands import arms, problem

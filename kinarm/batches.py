@@ -58,14 +58,6 @@ class Batch(NamedTuple):
         return True
 
 
-class SteppedBatch(NamedTuple):
-    """Episodes that are stepped, their actions, shape (n, n_actions), and the session of both."""
-
-    episodes: Episodes
-    actions: Array
-    session: Session
-
-
 class IdleBatch:
     """A batch that no rollout is using, kept for the next one.
 

@@ -1,23 +1,25 @@
 """What the compiled kernels know of the shapes that may touch."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from itertools import product
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from kinarm.capsules import enclosing_capsule, is_capsule
+from kinarm.arm import Arm
 from kinarm.chain import Chain
-from kinarm.enclosures import FEW, MANY, Enclosure, enclosing_polytope
+from kinarm.enclosures import (
+    FEW,
+    MANY,
+    Enclosure,
+    enclosing_capsule,
+    enclosing_polytope,
+    is_capsule,
+)
 from kinarm.motion_bounds import point_speed
-
-if TYPE_CHECKING:
-    from kinarm.arm import Arm
-    from kinarm.scene import Obstacle, Scene
+from kinarm.scene import Obstacle, Scene
 
 BETWEEN_CAPSULES, WITH_BOX, WITH_GROUND = range(3)
 """Kinds of pairs in `ContactShapes.pairs`."""
@@ -93,7 +95,7 @@ class ContactShapes(NamedTuple):
         pairs: list[tuple[int, int, int]],
         n_shapes: int,
         close: Collection[int],
-    ) -> ContactShapes:
+    ) -> "ContactShapes":
         """Flatten the shapes of an arm in a scene.
 
         Parameters

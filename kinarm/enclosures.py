@@ -1,4 +1,4 @@
-"""Rounded polytopes around collision shapes, from which the kernels prove freedom from contact."""
+"""Polytopes and capsules around collision shapes, from which kernels prove freedom from contact."""
 
 from typing import Any, NamedTuple
 
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from kinarm._archive import cached_arrays
 from kinarm.errors import ArmError
+from kinarm.kernels.distance import distances_from_hull
 
 VERSION = 1
 """To be raised when the same points are enclosed by something else."""
@@ -41,23 +42,30 @@ def enclosing_polytope(shape: pin.GeometryObject, most: int = MANY) -> Enclosure
     ArmError
         If the shape is no capsule, sphere, cylinder, box or convex hull.
     """
-    body = shape.geometry
-    if isinstance(body, coal.Sphere):
-        local = Enclosure(np.zeros((1, 3)), float(body.radius))
-    elif isinstance(body, coal.Capsule):
-        half = np.array([0.0, 0.0, float(body.halfLength)])
-        local = Enclosure(np.array([-half, half]), float(body.radius))
-    elif isinstance(body, coal.Box):
-        local = Enclosure(np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T * body.halfSide, 0)
-    elif isinstance(body, coal.Cylinder):
-        local = _around(_prism(float(body.radius), float(body.halfLength)), most)
-    elif isinstance(body, coal.ConvexBase):
-        local = _around(np.array(body.points()), most)
-    else:
-        raise ArmError(f"collision shape {shape.name!r} is a {type(body).__name__}: not supported")
+    corners, radius = _core(shape)
+    local = Enclosure(corners, radius)
+    if isinstance(shape.geometry, coal.Cylinder):
+        local = _around(_prism(radius, float(corners[1, 2])), most)
+    elif isinstance(shape.geometry, coal.ConvexBase):
+        local = _around(corners, most)
     return Enclosure(
         np.array([shape.placement.act(each) for each in local.corners]), local.rounding
     )
+
+
+def _core(shape: pin.GeometryObject) -> tuple[NDArray[np.float64], float]:
+    """Corners, shape (n, 3), and a radius: widened by it, their hull is or encloses a shape."""
+    body = shape.geometry
+    if isinstance(body, coal.Sphere):
+        return np.zeros((1, 3)), float(body.radius)
+    if isinstance(body, coal.Capsule | coal.Cylinder):
+        half = np.array([0.0, 0.0, float(body.halfLength)])
+        return np.array([-half, half]), float(body.radius)
+    if isinstance(body, coal.Box):
+        return np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T * body.halfSide, 0.0
+    if isinstance(body, coal.ConvexBase):
+        return np.array(body.points()), 0.0
+    raise ArmError(f"collision shape {shape.name!r} is a {type(body).__name__}: not supported")
 
 
 def _prism(radius: float, half_length: float) -> NDArray[np.float64]:
@@ -79,8 +87,6 @@ def _around(points: NDArray[np.float64], most: int) -> Enclosure:
 
 def _fitted(points: NDArray[np.float64], most: int) -> dict[str, Any]:
     """Corners and rounding of what encloses the hull of points."""
-    from kinarm.kernels.distance import distances_from_hull
-
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     chosen = [int(np.square(points - middle).sum(axis=1).argmax())]
     distances = np.empty(len(points))
@@ -91,3 +97,46 @@ def _fitted(points: NDArray[np.float64], most: int) -> dict[str, Any]:
             rounding = float(distances[farthest]) * (1 + 1e-9) + 1e-9
             return {"corners": points[chosen], "rounding": rounding}
         chosen.append(farthest)
+
+
+class Capsule(NamedTuple):
+    """A segment with a radius, in the frame of the joint that carries it."""
+
+    start: NDArray[np.float64]
+    end: NDArray[np.float64]
+    radius: float
+
+
+def enclosing_capsule(shape: pin.GeometryObject) -> Capsule:
+    """Capsule around a shape, in the frame of its joint; it equals a capsule or sphere.
+
+    Raises
+    ------
+    ArmError
+        If the shape is no capsule, sphere, cylinder, box or convex hull.
+    """
+    corners, radius = _core(shape)
+    few = len(corners) <= 2
+    local = Capsule(corners[0], corners[-1], radius) if few else _capsule_around(corners)
+    placement = shape.placement
+    return Capsule(placement.act(local.start), placement.act(local.end), local.radius)
+
+
+def _capsule_around(points: NDArray[np.float64]) -> Capsule:
+    """Capsule along the longest principal direction of a set of points, shape (n, 3)."""
+    centre = (points.min(axis=0) + points.max(axis=0)) / 2
+    _, _, directions = np.linalg.svd(points - centre, full_matrices=False)
+    direction = directions[0]
+    along = (points - centre) @ direction
+    across = np.linalg.norm(points - centre - along[:, None] * direction, axis=1)
+    radius = float(across.max()) * (1 + 1e-9)
+    cap = np.sqrt(np.maximum(radius**2 - across**2, 0.0))
+    low, high = float((along + cap).min()), float((along - cap).max())
+    if low > high:
+        low = high = (low + high) / 2
+    return Capsule(centre + low * direction, centre + high * direction, radius)
+
+
+def is_capsule(shape: pin.GeometryObject) -> bool:
+    """Whether a shape equals the capsule that encloses it."""
+    return isinstance(shape.geometry, coal.Capsule | coal.Sphere)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._validation import finite_array
-from kinarm.episodes import ELU, HARDTANH, LEAKY_RELU, LINEAR, RELU, SILU, TANH, Control
+from kinarm.episodes import Control
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.kernels.network import LEAK
 from kinarm.observation import GOAL_SIDE
@@ -37,15 +37,8 @@ ACTIVATIONS: dict[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
 """Activation functions by name, as the kernels apply them."""
 
 Activation = Literal["linear", "tanh", "relu", "hardtanh", "elu", "leaky_relu", "silu"]
-ACTIVATION_CODES = {
-    "linear": LINEAR,
-    "tanh": TANH,
-    "relu": RELU,
-    "hardtanh": HARDTANH,
-    "elu": ELU,
-    "leaky_relu": LEAKY_RELU,
-    "silu": SILU,
-}
+ACTIVATION_CODES = {name: code for code, name in enumerate(ACTIVATIONS)}
+"""Their numbers in the kernels, in the order of `kinarm.episodes`."""
 
 
 class Mirror(NamedTuple):

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm._parallel import run_rows, run_together
 from kinarm._validation import finite_array
 from kinarm.arm import Arm
-from kinarm.batches import Batch, IdleBatch, SteppedBatch, begin_some
+from kinarm.batches import Batch, IdleBatch, begin_some
 from kinarm.doubtful_steps import decide_doubtful_steps
 from kinarm.episodes import PAUSED, RUNNING, Episodes
 from kinarm.errors import InvalidInputError, StartInContactError
@@ -63,7 +63,7 @@ class Simulator:
         self.world = World(problem, threads=threads)
         self.threads = self.world.threads
         self.checked_by_coal = 0
-        self._last: SteppedBatch | None = None
+        self._last: Batch | None = None
         self._idle = IdleBatch()
 
     def __getstate__(self) -> dict[str, Any]:
@@ -281,7 +281,7 @@ class Simulator:
         """Allocate and start episodes for stepping."""
         at_rest = table_control(np.zeros((len(starts), 1, self.n_actions)))
         batch = Batch.bound(self.world, at_rest, starts, goals, record=record, shift=shift)
-        self._last = SteppedBatch(batch.episodes, at_rest.actions[:, 0], batch.session)
+        self._last = batch
         self._start(batch.episodes, np.arange(len(starts)), batch.session)
         return batch.episodes
 
@@ -306,17 +306,17 @@ class Simulator:
             raise StartInContactError(index, pair or ("arm", "scene"))
         episodes.status[paused] = RUNNING
 
-    def _stepped(self, episodes: Episodes) -> SteppedBatch:
-        """The session and table that step episodes, kept until other episodes come."""
+    def _stepped(self, episodes: Episodes) -> Batch:
+        """The batch by which episodes are stepped, kept until other episodes come."""
         if self._last is None or self._last.episodes is not episodes:
-            table = np.zeros((len(episodes.status), 1, self.n_actions))
-            session = self.world.session(table_control(table), episodes)
-            self._last = SteppedBatch(episodes, table[:, 0], session)
+            control = table_control(np.zeros((len(episodes.status), 1, self.n_actions)))
+            self._last = Batch(control, episodes, self.world.session(control, episodes))
         return self._last
 
     def _step(self, episodes: Episodes, actions: ArrayLike) -> Session:
         """Advance running episodes by one step."""
-        _, table, session = self._stepped(episodes)
+        control, _, session = self._stepped(episodes)
+        table = control.actions[:, 0]
         plain = isinstance(actions, np.ndarray) and actions.dtype.kind == "f"
         if not plain or np.shape(actions) != table.shape:
             actions = finite_array("actions", actions, table.shape)

@@ -17,20 +17,19 @@ from kinarm.collision import Contact, ContactModel
 from kinarm.contact_shapes import ContactShapes
 from kinarm.episodes import Control, Episodes, Rules
 from kinarm.errors import ProblemError
-from kinarm.frames import Frames
-from kinarm.inverse_kinematics import InverseSolutions, solve
 from kinarm.kernels.block import Alone, Block, work_space
-from kinarm.kernels.kinematics import move_frame, place_frame
 from kinarm.kernels.records import recorded
-from kinarm.kernels.rollout import begin, screen
+from kinarm.kernels.rollout import begin
+from kinarm.kernels.screening import screen
 from kinarm.kernels.session import Session
+from kinarm.kinematics import Kinematics
 from kinarm.networks import table_control
 from kinarm.observation import observation_size
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.task import Goals
 
 
-class World:
+class World(Kinematics):
     """An arm in a scene.
 
     Parameters
@@ -97,11 +96,6 @@ class World:
         # A copy may get other rules, and has work space of its own.
         kept = {name: value for name, value in self.__dict__.items() if name != "records"}
         return kept | {"_idle": []}
-
-    @cached_property
-    def frames(self) -> Frames:
-        """Frames that `poses` and `jacobians` know; ``frames.names`` lists them."""
-        return Frames(self.arm)
 
     @cached_property
     def goals(self) -> Goals:
@@ -191,49 +185,6 @@ class World:
         n_proven = run_rows(self._screen_some, n, n, self.threads, *arrays)
         return tools, free, touching, n_proven
 
-    def poses(self, configurations: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
-        """Poses of a frame, compiled.
-
-        Parameters
-        ----------
-        configurations : array_like, shape (n_joints,) or (n, n_joints)
-            Joint positions [rad or m].
-        frame : str, optional
-            Name of a joint or link; the tool, its origin in the tool point, by default.
-
-        Returns
-        -------
-        ndarray, shape (4, 4) or (n, 4, 4)
-            Homogeneous transforms from the frame to the world [m].
-        """
-        q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
-        joint, placement = self.frames[frame]
-        transforms = np.empty((len(q), 4, 4))
-        arrays = (self.arm.chain, joint, placement, q, transforms)
-        run_rows(place_frame, len(q), len(q), self.threads, *arrays)
-        return transforms[0] if one else transforms
-
-    def jacobians(self, configurations: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
-        """Jacobians of a frame: how it moves per unit speed of each joint, compiled.
-
-        Parameters
-        ----------
-        configurations, frame
-            As for `poses`.
-
-        Returns
-        -------
-        ndarray, shape (6, n_joints) or (n, 6, n_joints)
-            Velocity of the frame's origin, then angular velocity, along the world's axes
-            [m/rad and rad/rad; m/m and 0 of a joint that slides].
-        """
-        q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
-        joint, placement = self.frames[frame]
-        jacobians = np.zeros((len(q), 6, self.arm.n_joints))
-        arrays = (self.arm.chain, joint, placement, q, jacobians)
-        run_rows(move_frame, len(q), len(q), self.threads, *arrays)
-        return jacobians[0] if one else jacobians
-
     def clearance(self, configurations: ArrayLike) -> Clearance:
         """Measure how far the closest of the tested pairs is apart, and where.
 
@@ -307,71 +258,6 @@ class World:
         """
         contact = self.contact(configuration, target)
         return contact.pair if contact else None
-
-    def inverse_kinematics(
-        self,
-        targets: ArrayLike,
-        directions: ArrayLike | None = None,
-        *,
-        near: ArrayLike | None = None,
-        free: bool = False,
-        tool_axis: ArrayLike | None = None,
-        joints: int | None = None,
-        turns: bool = False,
-        most: int = 64,
-        separation: float | None = None,
-    ) -> InverseSolutions:
-        """Find all configurations within the limits that bring the tool to positions or poses.
-
-        Damped Newton steps move seeds all over the joints' ranges, to an error of 1e-10
-        of the arm's reach and 1e-10 rad. Solutions are *isolated* if no more joints move than the
-        target has coordinates: 3 of a position, 5 with a direction, 6 of a pose. Each isolated
-        solution is returned once. Else, and at singular configurations, there is a continuum, and
-        the returned solutions are spread over it. The result for a target depends on nothing else.
-
-        Parameters
-        ----------
-        targets : array_like, shape (3,), (n, 3), (4, 4) or (n, 4, 4)
-            Positions of the tool point [m], or poses of the tool as `poses` gives them.
-        directions : array_like, shape (3,) or (n, 3), optional
-            Directions of the tool's axis at these positions.
-        near : array_like, shape (n_joints,), optional
-            Solutions nearest to it come first. Of solutions that differ by whole turns, the nearest
-            one is returned. Joints that do not move rest there. Home by default [rad or m].
-        free : bool
-            Keep only solutions without contact.
-        tool_axis : array_like, shape (3,), optional
-            The tool's axis, in the tool frame; along the last joint's axis and away from the joint
-            before, by default.
-        joints : int, optional
-            How many joints move, counted from the base. By default those that actions move
-            for positions, and all that matter for poses.
-        turns : bool
-            Give solutions that differ by whole turns one by one.
-        most : int
-            Largest number of solutions of a target, before contact and whole turns count.
-        separation : float, optional
-            Least difference of two solutions in some joint; 0.001 if they are isolated, else 0.2
-            by default [rad or m].
-
-        Raises
-        ------
-        InvalidInputError
-            If a shape is wrong, an entry is not finite, a matrix is no pose, a direction is zero,
-            ``near`` is beyond the limits or a number is out of range.
-        """
-        return solve(
-            self,
-            targets,
-            directions,
-            near=near,
-            tool_axis=tool_axis,
-            joints=joints,
-            free=free,
-            turns=turns,
-            most=most,
-            separation=separation,
-        )
 
     def substeps(
         self, configurations: NDArray[np.float64], targets: NDArray[np.float64]

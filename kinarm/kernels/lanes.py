@@ -160,7 +160,12 @@ _teach(abs, lanes, lanes, 1, _call("fabs"))
 _teach(math.sqrt, lanes, lanes, 1, _call("sqrt"))
 
 
-@intrinsic
+def instruction(function: Callable[..., Any]) -> Any:
+    """Numba's ``intrinsic``: kernels call what is written for the types of their arguments."""
+    return intrinsic(function)
+
+
+@instruction
 def power_of_two(_: Any, exponent: types.Type) -> Any:
     """2 to the power of a whole number between -1022 and 1023, for a number or lanes."""
 
@@ -178,7 +183,7 @@ def power_of_two(_: Any, exponent: types.Type) -> Any:
     return exponent(exponent), code
 
 
-@intrinsic
+@instruction
 def select(_: Any, condition: types.Type, first: types.Type, second: types.Type) -> Any:
     """``first`` where a condition holds, else ``second``: without a branch, for each episode."""
     many = condition == mask
@@ -194,7 +199,7 @@ def select(_: Any, condition: types.Type, first: types.Type, second: types.Type)
     return result(condition, result, result), code
 
 
-@intrinsic
+@instruction
 def any_lane(_: Any, condition: types.Type) -> Any:
     """Whether a condition holds for some episode."""
 
@@ -208,7 +213,7 @@ def any_lane(_: Any, condition: types.Type) -> Any:
     return types.boolean(condition), code
 
 
-@intrinsic
+@instruction
 def lane_bits(_: Any, condition: types.Type) -> Any:
     """The truth values of a mask as the bits of a whole number."""
 
@@ -219,7 +224,7 @@ def lane_bits(_: Any, condition: types.Type) -> Any:
     return types.int64(condition), code
 
 
-@intrinsic
+@instruction
 def as_lanes(_: Any, array: types.Array) -> Any:
     """View a C-contiguous array of float64 whose last axis has `LANES` entries as one of lanes."""
     view = types.Array(lanes, array.ndim - 1, "C", aligned=False)
@@ -230,7 +235,7 @@ def as_lanes(_: Any, array: types.Array) -> Any:
     return view(array), code
 
 
-@intrinsic
+@instruction
 def as_numbers(_: Any, array: types.Array) -> Any:
     """View a C-contiguous array of lanes as one of float64, which has one axis more."""
     view = types.Array(types.float64, array.ndim + 1, "C")

@@ -4,12 +4,12 @@ from typing import Any, NamedTuple
 
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic
 
 from kinarm.chain import Chain
 from kinarm.contact_shapes import ContactShapes
 from kinarm.episodes import Control, Episodes, Rules
 from kinarm.kernels.block import Alone, Block, work_space
+from kinarm.kernels.lanes import instruction
 from kinarm.kernels.records import Record, table
 
 
@@ -75,7 +75,7 @@ class Session(Record):
         return self._others[number - 1] if number else self
 
 
-@intrinsic
+@instruction
 def take_number(_: Any, counters: types.Array, place: types.Integer) -> Any:
     """Raise one of some counters, an array of int64, by one; returns what it was.
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kinarm.arm import Arm
-from kinarm.capsules import enclosing_capsule
+from kinarm.enclosures import enclosing_capsule
 from kinarm.errors import InvalidInputError
 
 AXIS_NAMES = tuple(f"axis_{number}" for number in range(1, 7))

@@ -5,7 +5,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from kinarm.capsules import _capsule_around, enclosing_capsule
+from kinarm.enclosures import _capsule_around, enclosing_capsule
 from kinarm.errors import ArmError
 
 

@@ -1,9 +1,10 @@
-"""Inverse kinematics: configurations that bring the tool to positions or poses."""
+"""Kinematics of an arm: poses, Jacobians, and configurations that bring the tool to targets."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,14 +13,12 @@ from kinarm._parallel import run_rows
 from kinarm._validation import finite_array, one_or_many, whole_number
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError
-from kinarm.frames import Frame
+from kinarm.frames import Frame, Frames
 from kinarm.kernels.inverse import TURN, Search, solve_targets
+from kinarm.kernels.kinematics import move_frame, place_frame
 from kinarm.randomness import low_discrepancy_points
 
-if TYPE_CHECKING:
-    from kinarm.world import World
-
-ISOLATED_SEPARATION, SPREAD_SEPARATION = 1e-3, 0.2
+ISOLATED_SEPARATION, CONTINUUM_SEPARATION = 1e-3, 0.2
 """Least difference in some joint of isolated solutions, and of those of a continuum [rad or m]."""
 
 SEEDS, LEAST_SEEDS = 1024, 128
@@ -64,57 +63,176 @@ class InverseSolutions:
         return chosen
 
 
-def solve(
-    world: World,
-    targets: ArrayLike,
-    directions: ArrayLike | None,
-    *,
-    near: ArrayLike | None,
-    tool_axis: ArrayLike | None,
+class Kinematics(ABC):
+    """Kinematics of an arm, compiled; a `World` also tells what the arm touches."""
+
+    arm: Arm
+    threads: int
+
+    @abstractmethod
+    def in_contact(self, configurations: ArrayLike) -> NDArray[np.bool_]:
+        """Tell which configurations touch something."""
+
+    @cached_property
+    def frames(self) -> Frames:
+        """Frames that `poses` and `jacobians` know; ``frames.names`` lists them."""
+        return Frames(self.arm)
+
+    def poses(self, configurations: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
+        """Poses of a frame, compiled.
+
+        Parameters
+        ----------
+        configurations : array_like, shape (n_joints,) or (n, n_joints)
+            Joint positions [rad or m].
+        frame : str, optional
+            Name of a joint or link; the tool, its origin in the tool point, by default.
+
+        Returns
+        -------
+        ndarray, shape (4, 4) or (n, 4, 4)
+            Homogeneous transforms from the frame to the world [m].
+        """
+        q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
+        joint, placement = self.frames[frame]
+        transforms = np.empty((len(q), 4, 4))
+        arrays = (self.arm.chain, joint, placement, q, transforms)
+        run_rows(place_frame, len(q), len(q), self.threads, *arrays)
+        return transforms[0] if one else transforms
+
+    def jacobians(self, configurations: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
+        """Jacobians of a frame: how it moves per unit speed of each joint, compiled.
+
+        Parameters
+        ----------
+        configurations, frame
+            As for `poses`.
+
+        Returns
+        -------
+        ndarray, shape (6, n_joints) or (n, 6, n_joints)
+            Velocity of the frame's origin, then angular velocity, along the world's axes
+            [m/rad and rad/rad; m/m and 0 of a joint that slides].
+        """
+        q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
+        joint, placement = self.frames[frame]
+        jacobians = np.zeros((len(q), 6, self.arm.n_joints))
+        arrays = (self.arm.chain, joint, placement, q, jacobians)
+        run_rows(move_frame, len(q), len(q), self.threads, *arrays)
+        return jacobians[0] if one else jacobians
+
+    def inverse_kinematics(
+        self,
+        targets: ArrayLike,
+        directions: ArrayLike | None = None,
+        *,
+        near: ArrayLike | None = None,
+        free: bool = False,
+        tool_axis: ArrayLike | None = None,
+        joints: int | None = None,
+        turns: bool = False,
+        most: int = 64,
+        separation: float | None = None,
+    ) -> InverseSolutions:
+        """Find all configurations within the limits that bring the tool to positions or poses.
+
+        Damped Newton steps move seeds all over the joints' ranges, to an error of 1e-10
+        of the arm's reach and 1e-10 rad. Solutions are *isolated* if no more joints move than the
+        target has coordinates: 3 of a position, 5 with a direction, 6 of a pose. Each isolated
+        solution is returned once. Else, and at singular configurations, there is a continuum, and
+        the returned solutions are spread over it. The result for a target depends on nothing else.
+
+        Parameters
+        ----------
+        targets : array_like, shape (3,), (n, 3), (4, 4) or (n, 4, 4)
+            Positions of the tool point [m], or poses of the tool as `poses` gives them.
+        directions : array_like, shape (3,) or (n, 3), optional
+            Directions of the tool's axis at these positions.
+        near : array_like, shape (n_joints,), optional
+            Solutions nearest to it come first. Of solutions that differ by whole turns, the nearest
+            one is returned. Joints that do not move rest there. Home by default [rad or m].
+        free : bool
+            Keep only solutions without contact.
+        tool_axis : array_like, shape (3,), optional
+            The tool's axis, in the tool frame; along the last joint's axis and away from the joint
+            before, by default.
+        joints : int, optional
+            How many joints move, counted from the base. By default those that actions move
+            for positions, and all that matter for poses.
+        turns : bool
+            Give solutions that differ by whole turns one by one.
+        most : int
+            Largest number of solutions of a target, before contact and whole turns count.
+        separation : float, optional
+            Least difference of two solutions in some joint; 0.001 if they are isolated, else 0.2
+            by default [rad or m].
+
+        Raises
+        ------
+        InvalidInputError
+            If a shape is wrong, an entry is not finite, a matrix is no pose, a direction is zero,
+            ``near`` is beyond the limits or a number is out of range.
+        """
+        arm = self.arm
+        positions, wanted, axes = _targets(arm, self.frames.tool, targets, directions, tool_axis)
+        start = _near(arm, near)
+        search = _search(arm, axes, start, joints, separation)
+        moved, isolated = search.seeds.shape[1], search.least > 0
+        configurations, owner = self._solutions(search, positions, wanted, most)
+        if free:
+            kept = ~self.in_contact(configurations)
+            configurations, owner = configurations[kept], owner[kept]
+        if turns:
+            configurations, owner = _turned(arm, configurations, owner, moved)
+        order = np.lexsort((np.abs(configurations - start).max(axis=1, initial=0.0), owner))
+        return InverseSolutions(configurations[order], owner[order], isolated)
+
+    def _solutions(
+        self,
+        search: Search,
+        positions: NDArray[np.float64],
+        directions: NDArray[np.float64],
+        most: int,
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Configurations at positions (n, 3) and directions (n, n_axes, 3), and their targets."""
+        n_joints = self.arm.n_joints
+        found, counts = [], np.empty(len(positions), dtype=np.int64)
+        for first in range(0, len(positions), LOT):
+            lot = slice(first, first + LOT)
+            n = len(positions[lot])
+            rows = np.empty((n, whole_number("most", most, 1) + 1, n_joints))
+            arrays = (self.arm.chain, search, positions[lot], directions[lot], rows, counts[lot])
+            run_rows(solve_targets, n, 100 * n, self.threads, *arrays)
+            found += [row[:count] for row, count in zip(rows, counts[lot], strict=True)]
+        owner = np.repeat(np.arange(len(positions)), counts)
+        return np.concatenate([np.empty((0, n_joints)), *found]), owner
+
+
+def _search(
+    arm: Arm,
+    axes: NDArray[np.float64],
+    near: NDArray[np.float64],
     joints: int | None,
-    free: bool,
-    turns: bool,
-    most: int,
     separation: float | None,
-) -> InverseSolutions:
-    """Find configurations at targets; see `World.inverse_kinematics`."""
-    arm = world.arm
-    positions, wanted, axes = _targets(arm, world.frames.tool, targets, directions, tool_axis)
-    start = _near(arm, near)
+) -> Search:
+    """Check what is looked for, and complete it; see `Kinematics.inverse_kinematics`."""
     moved = _moved(arm, axes) if joints is None else whole_number("joints", joints, 1)
     if moved > arm.n_joints:
         raise InvalidInputError(f"joints must be at most {arm.n_joints}, got {moved}")
     isolated = moved <= {0: 3, 1: 5, 3: 6}[len(axes)]
     if separation is None:
-        separation = ISOLATED_SEPARATION if isolated else SPREAD_SEPARATION
+        separation = ISOLATED_SEPARATION if isolated else CONTINUUM_SEPARATION
     if not separation > 0:
         raise InvalidInputError(f"separation must be greater than 0, got {separation}")
-    search = Search(
+    return Search(
         tool=arm.chain.tool,
         axes=axes,
         scale=1.0 / arm.reach,
-        near=start,
+        near=near,
         seeds=low_discrepancy_points(SEEDS, moved),
         least=LEAST_SEEDS if isolated else 0,
         separation=float(separation),
     )
-    found, counts = [], np.empty(len(positions), dtype=np.int64)
-    for first in range(0, len(positions), LOT):
-        lot = slice(first, first + LOT)
-        n = len(positions[lot])
-        rows = np.empty((n, whole_number("most", most, 1) + 1, arm.n_joints))
-        arrays = (arm.chain, search, positions[lot], wanted[lot], rows, counts[lot])
-        run_rows(solve_targets, n, 100 * n, world.threads, *arrays)
-        found += [row[:count] for row, count in zip(rows, counts[lot], strict=True)]
-    configurations = np.concatenate([np.empty((0, arm.n_joints)), *found])
-    owner = np.repeat(np.arange(len(positions)), counts)
-    if free:
-        kept = ~world.in_contact(configurations)
-        configurations, owner = configurations[kept], owner[kept]
-    if turns:
-        configurations, owner = _turned(arm, configurations, owner, moved)
-    order = np.lexsort((np.abs(configurations - start).max(axis=1, initial=0.0), owner))
-    return InverseSolutions(configurations[order], owner[order], isolated)
 
 
 def _targets(
