@@ -12,7 +12,8 @@ from simulators import changed
 
 from kinarm.episodes import COLLISION, RUNNING
 from kinarm.errors import InvalidInputError, StartInContactError, UnknownNameError
-from kinarm.kernels.rollout import advance, begin, screen
+from kinarm.kernels.rollout import advance, begin
+from kinarm.kernels.screening import screen
 from kinarm.networks import Mirror, Networks
 from kinarm.observation import observation_signs
 from kinarm.problem import PROBLEMS
