@@ -7,6 +7,8 @@ from .evaluation import Evaluation as Evaluation
 from .evaluation import PooledEvaluation as PooledEvaluation
 from .evaluation import evaluate as evaluate
 from .evaluation import pool as pool
+from .experiments.experiment import Experiment as Experiment
+from .experiments.study import Study as Study
 from .figures import distance_histograms as distance_histograms
 from .figures import save_figure as save_figure
 from .metrics import METRICS as METRICS
@@ -23,6 +25,4 @@ from .request import EvaluationRequest as EvaluationRequest
 from .schemas import document_schema as document_schema
 from .schemas import schema_names as schema_names
 from .statistics import Estimate as Estimate
-from .studies.specification import StudySpecification as StudySpecification
-from .studies.study import Study as Study
 from .trials import TrialSet as TrialSet

@@ -12,13 +12,14 @@
     ├── RecordingFileError  a file of recordings that cannot be read or used here
     ├── OutputError         a file or folder that cannot be written
     ├── MissingExtraError   an optional package that is not installed; says how to install it
-    └── WorkerError         a worker process that ended unexpectedly
+    ├── WorkerError         a worker process that ended unexpectedly
+    └── TrainingFailedError trainings that failed, with their names and reasons
 
-Command lines turn any of them into one line on standard error and exit status 2, or 1 for a
-WorkerError, which is a failure of the machine.
+Command lines turn any of them into one line on standard error and exit status 2, or 1 for the last
+two, which are failures of a run.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 LONGEST = 1500
 """Characters of a message; of a longer one, the middle is left out."""
@@ -118,6 +119,28 @@ class WorkerError(KinarmError):
     """A worker process ended unexpectedly."""
 
     exit_status = 1
+
+
+class TrainingFailedError(KinarmError):
+    """Trainings of an experiment failed; all others are finished.
+
+    Parameters
+    ----------
+    reasons : mapping of str to str
+        Why they failed, in a line, by their names.
+    trainings : int
+        Trainings of the experiment.
+    """
+
+    exit_status = 1
+
+    def __init__(self, reasons: Mapping[str, str], trainings: int) -> None:
+        self.reasons, self.trainings = dict(reasons), trainings
+        told = "; ".join(f"{name}: {reason}" for name, reason in reasons.items())
+        super().__init__(f"{len(reasons)} of {trainings} trainings failed: {told}")
+
+    def __reduce__(self) -> tuple[type, tuple[dict[str, str], int]]:
+        return type(self), (self.reasons, self.trainings)
 
 
 class MissingExtraError(KinarmError):

@@ -1,4 +1,4 @@
-"""``kinarm-study``: many trainings from one file."""
+"""``kinarm-study``: the trainings of an experiment."""
 
 import sys
 from collections.abc import Sequence
@@ -10,16 +10,17 @@ from kinarm._command_line import run_request
 from kinarm._console import print_table
 from kinarm._interrupts import GOES_ON, telling
 from kinarm._validation import whole_number
-from kinarm.evaluation.running.options import RunningOptions
+from kinarm.errors import TrainingFailedError
+from kinarm.evaluation.experiments.options import RunningOptions
 
 if TYPE_CHECKING:
-    from kinarm.evaluation.running.executor import Executor
-    from kinarm.evaluation.studies.study import Study
+    from kinarm.evaluation.experiments.executors import Executor
+    from kinarm.evaluation.experiments.study import Study
 
 PROG = "kinarm-study"
 
 EPILOG = """
-A study file names learners, recipes, problems and seeds, and the fields that vary:
+An experiment is a file that names learners, recipes, problems and seeds, and the fields that vary:
 
   learner = "ars"
   recipe = "tuned"
@@ -37,9 +38,10 @@ A study file names learners, recipes, problems and seeds, and the fields that va
   "problem.task.start_spread" = [0.2, 1.0]
 
 The same command goes on with what is missing, whatever stopped it. More seeds, values or iterations
-extend a study: nothing is trained twice.
+extend an experiment: nothing is trained twice.
 
 examples:
+  kinarm-study learners                    an experiment that ships with kinarm: learners compared
   kinarm-study steps.toml                  into the folder steps
   kinarm-study steps.toml --jobs 1         one training at a time
   kinarm-study steps.toml --ray auto       on the Ray cluster that this machine is part of
@@ -50,12 +52,12 @@ examples:
 
 @dataclass(frozen=True, kw_only=True)
 class StudyRequest(RunningOptions):
-    """Run the trainings of a study, and write their results.
+    """Run the trainings of an experiment, and write their results.
 
     Parameters
     ----------
-    study : Path
-        The study file.
+    experiment : Path
+        The file of the experiment, or the name of a shipped one.
     out : Path
         Output folder.
     threads : int
@@ -69,12 +71,15 @@ class StudyRequest(RunningOptions):
         If a number is out of range.
     """
 
-    study: Path = field(metadata={"flag": "study", "metavar": "STUDY.toml"})
+    experiment: Path = field(metadata={"flag": "experiment", "metavar": "EXPERIMENT"})
     out: Path | None = field(default=None, metadata={"metavar": "DIR"})
     threads: int = 1
     train: bool = True
 
-    GROUPS: ClassVar = {"study": ("study", "out", "train", "threads"), **RunningOptions.GROUPS}
+    GROUPS: ClassVar = {
+        "experiment": ("experiment", "out", "train", "threads"),
+        **RunningOptions.GROUPS,
+    }
     DEFAULTS: ClassVar = {
         **RunningOptions.DEFAULTS,
         "out": "the name of the file without its ending",
@@ -89,7 +94,7 @@ class StudyRequest(RunningOptions):
     @property
     def folder(self) -> Path:
         """Where the files go."""
-        return self.out or Path(self.study.stem)
+        return self.out or Path(self.experiment.stem)
 
     def run(self, executor: "Executor | None" = None, command: str | None = None) -> "Study":
         """Run the missing trainings, and write the results.
@@ -109,31 +114,39 @@ class StudyRequest(RunningOptions):
         Raises
         ------
         KinarmError
-            If the file cannot be used, the folder is another study's, or a package is missing.
+            If the file cannot be used, the folder is another experiment's, or a package is missing.
+        TrainingFailedError
+            If trainings failed; what the others came to is written.
         KeyboardInterrupt
             If it is interrupted; what is finished is kept, and the message says so.
         """
-        from kinarm.evaluation.studies.page import write_all
-        from kinarm.evaluation.studies.study import Study
+        from kinarm.evaluation.experiments.page import write_all
+        from kinarm.evaluation.experiments.study import Study
 
-        study = Study(self.study, self.folder)
+        study = Study(self.experiment, self.folder)
         with telling(lambda: GOES_ON):
-            if self.train:
-                chosen = executor or self.elsewhere(self.folder, self.threads)
-                study.run(jobs=self.jobs, threads=self.threads, executor=chosen)
+            failed = None
+            try:
+                if self.train:
+                    chosen = executor or self.executor(self.folder, self.threads)
+                    study.run(threads=self.threads, executor=chosen)
+            except TrainingFailedError as error:
+                failed = error
             if len(study):
                 write_all(study, command or repr(self))
+            if failed is not None:
+                raise failed
         return study
 
 
 @dataclass(frozen=True, kw_only=True)
 class StatusRequest:
-    """Say how far a study is.
+    """Say how far an experiment is.
 
     Parameters
     ----------
     folder : Path
-        Folder of the study.
+        Folder of the experiment.
     """
 
     folder: Path = field(metadata={"flag": "folder", "metavar": "DIR"})
@@ -149,19 +162,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _carry_out(request: StudyRequest, command: str) -> None:
     """Run a request, and print the best settings."""
-    from kinarm.evaluation.studies.page import HEADINGS, group_row
+    from kinarm.evaluation.experiments.page import group_row, headings
 
     study = request.run(command=command)
     if len(study):
-        print_table(HEADINGS, [group_row(group) for group in study.best(SHOWN)])
+        print_table(headings(), [group_row(group) for group in study.best(SHOWN)])
         print(f"written: {request.folder / 'index.html'}, with tables and figures beside it")
-    failed = study.failures
-    for run, error in failed.items():
-        sys.stderr.write(f"failed: {run.name}: {error}\n")
-    if request.train and failed:
-        sys.stderr.write(f"{PROG}: {len(failed)} of {len(study.runs)} trainings failed\n")
-        sys.exit(1)
-    if not len(study):
+    else:
         print("no training is finished")
 
 
@@ -170,11 +177,10 @@ SHOWN = 20
 
 
 def _status(request: StatusRequest, command: str) -> None:  # noqa: ARG001
-    """Print how far a study is."""
-    from kinarm.evaluation.studies.status import StudyStatus
-    from kinarm.evaluation.studies.study import Study
+    """Print how far an experiment is."""
+    from kinarm.evaluation.experiments.study import Study
 
-    print("\n".join(StudyStatus.of(Study.load(request.folder)).lines()))
+    print("\n".join(Study.load(request.folder).status()))
 
 
 if __name__ == "__main__":

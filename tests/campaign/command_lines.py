@@ -153,7 +153,7 @@ PROGRAMS: dict[str, Program] = {
         study.main,
         lambda: _flags(study.StudyRequest),
         ([STUDY], [STUDY, "--out", "out"], [STUDY, "--no-train"], ["status", "out"]),
-        ("kinarm.evaluation.studies.study.Study.run",),
+        ("kinarm.evaluation.experiments.study.Study.run",),
     ),
     "kinarm-train": Program(
         train.main,

@@ -5,10 +5,10 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from kinarm.evaluation.studies.runs import load_bounds, load_whole_run, planned_run
-from kinarm.evaluation.studies.specification import StudySpecification
-from kinarm.evaluation.studies.store import StudyStore
-from kinarm.evaluation.studies.study import Study
+from kinarm.evaluation.experiments.runs import load_bounds, load_whole_run, planned_run
+from kinarm.evaluation.experiments.experiment import Experiment
+from kinarm.evaluation.experiments.store import Store
+from kinarm.evaluation.experiments.study import Study
 from kinarm.evaluation.studies.transfer.planning import Protocol
 from kinarm.evaluation.studies.transfer.runs import load_run, policy_path, save_run
 from kinarm.evaluation.studies.transfer.study import TransferStudy
@@ -63,7 +63,7 @@ KEY = PLANNED.runs[0].key
 def _study(path: Path) -> Study:
     """A study that knows its trainings, and nothing else yet."""
     study = copy(PLANNED)
-    study.store = StudyStore(path.parents[1])
+    study.store = Store(path.parents[1])
     return study
 
 
@@ -85,7 +85,7 @@ def _load_failure(path: Path) -> None:
 
 
 def _load_file(path: Path) -> None:
-    repr(Study(StudySpecification.load(path), path.parent))
+    repr(Study(Experiment.load(path), path.parent))
 
 
 TRANSFER = TransferStudy(
@@ -121,7 +121,7 @@ LOADERS = {
         _save_transferred,
     ),
     "study": Loader(
-        ("evaluation.studies.specification.load",),
+        ("evaluation.studies.experiment.load",),
         lambda: [FILE],
         damaged_toml,
         _load_file,

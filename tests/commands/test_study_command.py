@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from kinarm.evaluation.commands.study import StudyRequest
-from kinarm.evaluation.studies.study import Study
+from kinarm.evaluation.experiments.study import Study
 
 STUDY = """
 problems = ["right"]
@@ -54,7 +54,7 @@ def test_from_a_file_to_a_page(run, file, tmp_path, monkeypatch):
 
 
 def test_from_python(file, tmp_path):
-    study = StudyRequest(study=file, out=tmp_path / "it", jobs=1).run()
+    study = StudyRequest(experiment=file, out=tmp_path / "it", jobs=1).run()
     assert len(study) == 6
     assert (tmp_path / "it" / "runs.csv").exists()
 
@@ -67,14 +67,13 @@ def test_what_is_finished_can_be_written_without_training(run, file, tmp_path):
 
 
 def test_failures(run, file, tmp_path, monkeypatch):
-    def fail(*_):
+    def fail(*_, **__):
         raise ValueError("of all things")
 
-    monkeypatch.setattr("kinarm.evaluation.studies.training.train", fail)
+    monkeypatch.setattr("kinarm.evaluation.experiments.train.train", fail)
     answer = run("kinarm-study", file, "--out", tmp_path / "it", "--jobs", 1)
     assert answer.status == 1
-    assert answer.err.splitlines()[-1] == "kinarm-study: 6 of 6 trainings failed"
-    assert "failed: ars paper* right seed 0, step_size 0.02: of all things" in answer.err
+    assert "6 of 6 trainings failed: ars paper* right seed 0, step_size 0.02: of" in answer.err
 
 
 class TestBadInput:
@@ -86,7 +85,7 @@ class TestBadInput:
             ("[grid]\nstep = [1]", "unknown field of a recipe or problem 'step'"),
             ("[fixed]\nnoise = 'x'", "steps.toml: noise must be a number, got 'x'"),
             ("problem = 'nowhere'", "steps.toml: unknown problem 'nowhere'"),
-            ("seeds = ", "steps.toml: not a study file: Invalid value"),
+            ("seeds = ", "steps.toml: not an experiment file: Invalid value"),
         ],
     )
     def test_a_file(self, run, file, tmp_path, text, words):

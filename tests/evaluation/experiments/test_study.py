@@ -1,34 +1,26 @@
-"""Studies: what is trained, once, and what it comes to."""
+"""Studies: what is trained, once, wherever and whatever happens, and what it comes to."""
 
+import errno
 import json
 import math
+import os
+import pickle
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_studies import SMALL, contents
+from small_studies import SMALL, Counting, contents
 
-from kinarm.errors import InvalidInputError, OutputError
+from kinarm import _files
+from kinarm.errors import InvalidInputError, OutputError, TrainingFailedError
 from kinarm.evaluation import evaluate, oracle_bounds
-from kinarm.evaluation.studies import training
-from kinarm.evaluation.studies.study import Study
+from kinarm.evaluation.experiments import train as training
+from kinarm.evaluation.experiments.clusters import RayExecutor, SlurmExecutor
+from kinarm.evaluation.experiments.executors import LocalExecutor
+from kinarm.evaluation.experiments.study import Study
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies import Policy, recipe, train_policy
-from kinarm.workers import Finished
-
-
-class Counting:
-    """An executor that carries out at most so many tasks in this process."""
-
-    def __init__(self, limit=1000):
-        self.tasks, self._limit = [], limit
-
-    def carry_out(self, work, tasks):
-        for number, task in enumerate(tasks):
-            if len(self.tasks) == self._limit:
-                raise KeyboardInterrupt
-            self.tasks.append(task)
-            yield Finished(number, work(task))
 
 
 class TestResults:
@@ -75,7 +67,7 @@ class TestResults:
         assert Policy.load(tmp_path / "it.npz").provenance.seed == run.config.seed
 
     def test_a_specification_is_taken_as_it_is(self, finished):
-        again = Study(finished.specification, finished.store.folder)
+        again = Study(finished.experiment, finished.store.folder)
         assert [run.key for run in again.runs] == [run.key for run in finished.runs]
 
     def test_reprs_and_lengths(self, finished):
@@ -173,28 +165,39 @@ class TestGoingOn:
         straight = small("straight", **long).run(jobs=1)
         assert contents(straight.store.folder).items() <= contents(study.store.folder).items()
 
-    def test_nor_if_the_state_was_not_kept(self, small, monkeypatch):
-        """Without it, a longer training begins anew, and comes to the same."""
+    def test_nor_if_the_state_was_not_kept(self, small):
         study = small().run(jobs=1)
-        found = study.store.shorter_runs(
-            {run.lineage for run in small(fixed={**SMALL["fixed"], "iterations": 8}).runs}
-        )
-        for each in (each for kept in found.values() for each in kept):
-            path = study.store.run_path(each[0])
+        for path in study.store.folder.glob("runs/*"):
             with np.load(path) as archive:
-                arrays = {
-                    name: archive[name] for name in archive.files if not name.startswith("state.")
-                }
-            assert len(arrays) < len(archive.files)
+                kept = [name for name in archive.files if not name.startswith("state.")]
+                arrays = {name: archive[name] for name in kept}
             np.savez(path, **arrays)
         executor = Counting()
-        longer = small(fixed={**SMALL["fixed"], "iterations": 8}).run(executor=executor)
+        small(fixed={**SMALL["fixed"], "iterations": 8}).run(executor=executor)
         assert [task.start for task in executor.tasks] == [None] * 4
-        straight = small("straight", fixed=longer.specification.fixed).run(jobs=1)
-        for run in longer.runs:
-            assert longer.store.run_path(run).read_bytes() == (
-                straight.store.run_path(run).read_bytes()
-            )
+
+    def test_an_interrupted_training_goes_on_where_it_was(self, small, monkeypatch):
+        monkeypatch.setattr(training, "CHECKPOINT_SECONDS", 0.0)
+        details = {"points": 3, "spacing": "geometric", "count": 5, "seed": 1}
+        changes = {"seeds": 1, "grid": {}, "trials": {"count": 12, "curve": details}}
+        straight = small("straight", **changes).run(jobs=1)
+        study = small(**changes)
+        save = training.save_checkpoint
+
+        def interrupt(path, run, checkpoint):
+            save(path, run, checkpoint)
+            if checkpoint.state.iteration == 2:
+                raise KeyboardInterrupt
+
+        monkeypatch.setattr(training, "save_checkpoint", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            study.run(executor=Counting())
+        monkeypatch.undo()
+        executor = Counting()
+        study.run(executor=executor)
+        assert [task.start.state.iteration for task in executor.tasks] == [2]
+        assert contents(study.store.folder) == contents(straight.store.folder)
+        assert list(study.store.folder.glob("checkpoints/*")) == []
 
     def test_a_run_with_fewer_trials_is_made_anew(self, small):
         study = small().run(jobs=1)
@@ -229,13 +232,52 @@ class TestGoingOn:
 
     def test_a_folder_of_another_study(self, small):
         small().run(jobs=1)
-        with pytest.raises(InvalidInputError, match="holds the study 'small', not 'other'"):
+        with pytest.raises(InvalidInputError, match="is of the experiment 'small', not of"):
             small(name="other").run()
 
     def test_one_process_at_a_time(self, small):
         study = small()
-        with study.store.writing(study.specification), pytest.raises(OutputError, match="another"):
+        with study.store.writing(study.experiment), pytest.raises(OutputError, match="another"):
             small().run()
+
+
+ERRORS = {
+    "no space": lambda: OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)),
+    "not permitted": lambda: OSError(errno.EACCES, os.strerror(errno.EACCES)),
+    "interrupted": KeyboardInterrupt,
+}
+
+
+@pytest.mark.parametrize("error", ERRORS)
+def test_each_write_fails_in_turn(small, monkeypatch, error):
+    """Afterwards the same study goes on to the same results."""
+    straight = small("straight", seeds=1).run(jobs=1)
+    replace, calls, failures = _files._replace, [], 0
+
+    def failing(target, write):
+        def interrupted(file):
+            write(file)
+            if len(calls) == failing_at:
+                raise ERRORS[error]()
+
+        calls.append(target)
+        replace(target, interrupted)
+
+    for failing_at in range(1, 50):
+        calls.clear()
+        study = small(f"study{failing_at}", seeds=1)
+        monkeypatch.setattr(_files, "_replace", failing)
+        try:
+            study.run(executor=LocalExecutor(1))
+        except (OutputError, KeyboardInterrupt):
+            failures += 1
+            monkeypatch.setattr(_files, "_replace", replace)
+            study.run(executor=LocalExecutor(1))
+        assert contents(study.store.folder) == contents(straight.store.folder)
+        assert list(study.store.folder.rglob("*.part")) == []
+        if len(calls) < failing_at:
+            break
+    assert failures == len(calls) == 1 + 1 + 2 * 2  # the experiment, the bounds, two trainings
 
 
 class TestFailures:
@@ -244,18 +286,23 @@ class TestFailures:
         """Trainings with the step size 0.2 fail."""
         train = training.train
 
-        def sometimes(task, threads):
+        def sometimes(task, threads, **options):
             if task.run.config.step_size == 0.2:
                 raise ZeroDivisionError("much too fast\nindeed")
-            return train(task, threads)
+            return train(task, threads, **options)
 
         monkeypatch.setattr(training, "train", sometimes)
 
     def test_others_go_on(self, small, failing, monkeypatch, finished):
-        study = small().run(executor=Counting())
+        study = small()
+        name = "ars paper* right seed 0, step_size 0.2"
+        with pytest.raises(TrainingFailedError, match="2 of 4 trainings failed: ars") as caught:
+            study.run(executor=Counting())
+        assert caught.value.reasons[name] == "much too fast"
+        assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
         assert len(study) == 2
         assert set(study.failures.values()) == {"much too fast"}
-        assert {run.config.step_size for run in study.failures} == {0.2}
+        assert study.status()[1] == f"failed: {name}: much too fast"
         record = json.loads(study.store.failure_path(study.missing[0]).read_text())
         assert "ZeroDivisionError" in record["trace"]
         monkeypatch.undo()
@@ -268,8 +315,71 @@ class TestFailures:
             raise MemoryError
 
         monkeypatch.setattr(training, "find_bounds", fail)
-        study = small(seeds=1).run(executor=Counting())
+        study = small(seeds=1)
+        with pytest.raises(TrainingFailedError, match="oracle right: MemoryError"):
+            study.run(executor=Counting())
         assert len(study) == 2
         assert study.bounds == {}
-        assert study.store.failure(study.bound_tasks[0]) == "MemoryError"
         assert np.isnan(study.table()["relative_success"]).all()
+
+
+class TestStatus:
+    def test_stopped_and_done(self, small, finished):
+        stopped = "small: 0 of 4 trainings finished, stopped; the command that made it goes on"
+        assert small().status() == [stopped]
+        assert finished.status() == ["small: 4 of 4 trainings finished"]
+
+    def test_under_way(self, small):
+        small().run(jobs=1)
+        study = small(seeds=3)
+        finished = [study.store.run_path(run) for run in study.runs]
+        for number, path in enumerate(path for path in finished if path.exists()):
+            os.utime(path, (1000.0 + 30 * number, 1000.0 + 30 * number))
+        with study.store.writing(study.experiment):
+            first, second = study.status()
+        assert first == "small: 4 of 6 trainings finished, running"
+        assert second.startswith("2.0 a minute; 2 remain, until about ")
+
+
+class Disturbed:
+    """A Ray cluster that loses a node amid the work and gets another one."""
+
+    shares_files = False
+
+    def __init__(self, cluster, lost):
+        self._cluster, self._lost = cluster, lost
+
+    def map(self, work, tasks):
+        for count, done in enumerate(RayExecutor(self._cluster.address).map(work, tasks)):
+            yield done
+            if count == 3:
+                with suppress(AssertionError):  # on a busy machine, its processes end later
+                    self._cluster.remove_node(self._lost, allow_graceful=False)
+            if count == 5:
+                self._cluster.add_node(num_cpus=1)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")  # Ray's own
+class TestElsewhere:
+    """The same files, byte for byte."""
+
+    def test_on_a_ray_cluster_whose_nodes_come_and_go(self, small, monkeypatch):
+        pytest.importorskip("ray")
+        from ray.cluster_utils import Cluster
+
+        monkeypatch.setenv("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
+        straight = small("straight", seeds=5).run(jobs=1)
+        cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+        try:
+            lost, _ = cluster.add_node(num_cpus=1), cluster.add_node(num_cpus=1)
+            cluster.wait_for_nodes()
+            study = small(seeds=5).run(executor=Disturbed(cluster, lost))
+        finally:
+            cluster.shutdown()
+        assert contents(study.store.folder) == contents(straight.store.folder)
+
+    def test_as_array_jobs(self, small, finished, tmp_path):
+        pytest.importorskip("submitit")
+        study = small().run(executor=SlurmExecutor(tmp_path / "slurm", bundle=3, cluster="local"))
+        assert contents(study.store.folder) == contents(finished.store.folder)

@@ -3,7 +3,7 @@
 import pytest
 from small_studies import SMALL
 
-from kinarm.evaluation.studies.study import Study
+from kinarm.evaluation.experiments.study import Study
 
 
 @pytest.fixture

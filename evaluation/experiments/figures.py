@@ -1,22 +1,22 @@
-"""Figures of a study."""
+"""Figures of an experiment."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm.evaluation.experiments.curve import CurvePoint
+from kinarm.evaluation.experiments.plan import Run
+from kinarm.evaluation.experiments.results import Group, identity, shorter, shown, timed_curve
 from kinarm.evaluation.figures import COLOURS, DASHES, draw_band
 from kinarm.evaluation.statistics import Estimate, share_over_seeds
-from kinarm.evaluation.studies.planning import PlannedRun
-from kinarm.evaluation.studies.runs import TrainedRun
-from kinarm.evaluation.studies.table import Group, identity, shorter, shown
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from kinarm.evaluation.studies.study import Study
+    from kinarm.evaluation.experiments.study import Study
 
 LINES, BARS = 8, 24
 """How many groups of trainings a figure shows of a problem, the best ones."""
@@ -56,20 +56,16 @@ def learning_curves(study: "Study") -> "Figure | None":
     problems = {name: groups for name, groups in problems.items() if groups}
     if not problems:
         return None
-    times = _times(study)
     size = (10.0, 1.2 + 3.2 * len(problems))
     figure = Figure(figsize=size, layout="constrained")
     panels = figure.subplots(len(problems), 2, squeeze=False, sharey=True)
     for (problem, groups), (steps, seconds) in zip(problems.items(), panels, strict=True):
         for number, group in enumerate(groups):
-            curves = [_curve(run) for run in group.runs]
-            _band(steps, curves, group.label, number)
-            timed = [
-                (np.array(times[id(run)]), curve[1])
-                for run, curve in zip(group.runs, curves, strict=True)
-                if len(times[id(run)]) == len(curve[1])
+            curves = [
+                timed_curve(run, clock) for run, clock in zip(group.runs, group.clocks, strict=True)
             ]
-            _band(seconds, timed, group.label, number)
+            for axes, against in ((steps, _steps_of), (seconds, _seconds_of)):
+                _band(axes, [_line(curve, against) for curve in curves], group.label, number)
         for axes in (steps, seconds):
             axes.axhline(groups[0].reachable, color="#444444", linestyle=":", lw=1)
             axes.set(ylim=(0, 1.02), title=problem, xscale="log")
@@ -82,22 +78,22 @@ def learning_curves(study: "Study") -> "Figure | None":
     return figure
 
 
-def _times(study: "Study") -> dict[int, tuple[float, ...]]:
-    """When each training was judged [s], the end included."""
-    return {
-        id(trained): (*made.get("points", ()), made.get("seconds", float("nan")))
-        for run, trained in study.finished.items()
-        for made in [study.store.made(run)]
-    }
+TimedPoint = tuple[CurvePoint, float, float]
 
 
-def _curve(run: TrainedRun) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Environment steps and success, the end included."""
-    points = (*run.curve, run.last)
-    return (
-        np.array([float(point.environment_steps) for point in points]),
-        np.array([point.success for point in points]),
-    )
+def _steps_of(point: TimedPoint) -> float:
+    return float(point[0].environment_steps)
+
+
+def _seconds_of(point: TimedPoint) -> float:
+    return point[1]
+
+
+def _line(
+    curve: Sequence[TimedPoint], against: Callable[[TimedPoint], float]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Success against steps or seconds."""
+    return np.array([*map(against, curve)]), np.array([point.success for point, *_ in curve])
 
 
 def _band(
@@ -142,7 +138,7 @@ def effects(study: "Study") -> "Figure | None":
     return figure
 
 
-def _settings(run: PlannedRun) -> dict[str, Any]:
+def _settings(run: Run) -> dict[str, Any]:
     """What can vary of a training, by field."""
     return {**{k: v for k, v in identity(run).items() if k != "seed"}, **run.choices}
 
@@ -160,7 +156,7 @@ def _varying(study: "Study") -> dict[str, list[Any]]:
 
 def _draw_effect(axes: "Axes", study: "Study", field: str) -> None:
     """Draw the success of each value of a field."""
-    runs: dict[str, list[PlannedRun]] = {}
+    runs: dict[str, list[Run]] = {}
     values: dict[str, Any] = {}
     for run in study.finished:
         settings = _settings(run)
@@ -176,7 +172,7 @@ def _draw_effect(axes: "Axes", study: "Study", field: str) -> None:
         low, high = min(places.values()), max(places.values())
         if low > 0 and high / low >= 10:
             axes.set_xscale("log")
-    drawn = (*study.specification.random, *study.specification.search)
+    drawn = (*study.experiment.random, *study.experiment.search)
     if field in drawn and numeric:
         for name in names:
             for run in runs[name]:
@@ -200,7 +196,7 @@ def _draw_effect(axes: "Axes", study: "Study", field: str) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _mean_success(study: "Study", runs: Sequence[PlannedRun]) -> Estimate:
+def _mean_success(study: "Study", runs: Sequence[Run]) -> Estimate:
     """Mean success over everything but the seed, and its interval over seeds and trials."""
     by_seed: dict[int, list[NDArray[np.float64]]] = {}
     for run in runs:

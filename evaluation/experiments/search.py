@@ -1,4 +1,4 @@
-"""Search for the best settings of a learner, by Optuna, in the folder of a study."""
+"""Search for the best settings of a learner, by Optuna, in the folder of an experiment."""
 
 import math
 from collections.abc import Mapping
@@ -12,14 +12,14 @@ import tomli_w
 from kinarm._fields import to_plain
 from kinarm._files import first_line, write_text
 from kinarm.errors import MissingExtraError
-from kinarm.evaluation.studies.planning import PlannedRun, planned_runs
-from kinarm.evaluation.studies.runs import RunPoint, run_content
-from kinarm.evaluation.studies.specification import StudySpecification
-from kinarm.evaluation.studies.store import StudyStore
-from kinarm.evaluation.studies.training import RunTask, TaskResult, train
+from kinarm.evaluation.experiments.curve import CurvePoint
+from kinarm.evaluation.experiments.executors import LocalExecutor
+from kinarm.evaluation.experiments.experiment import Experiment
+from kinarm.evaluation.experiments.plan import Run, plan
+from kinarm.evaluation.experiments.store import Store
+from kinarm.evaluation.experiments.train import RunTask, train
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.recipes import PER_TRAINING
-from kinarm.workers import LocalExecutor
 
 if TYPE_CHECKING:
     import optuna
@@ -31,15 +31,13 @@ STUDY = "kinarm"
 """Name of the search in its journal."""
 
 
-def open_search(
-    specification: StudySpecification, folder: Path, draws: int = 0
-) -> "optuna.study.Study":
+def open_search(experiment: Experiment, folder: Path, draws: int = 0) -> "optuna.study.Study":
     """Open the search of a study, or begin it.
 
     Parameters
     ----------
-    specification : StudySpecification
-        The study.
+    experiment : Experiment
+        The experiment.
     folder : Path
         Its folder.
     draws : int
@@ -57,7 +55,7 @@ def open_search(
     except ImportError as error:
         raise MissingExtraError("optuna", "tune") from error
     optuna.logging.set_verbosity(optuna.logging.ERROR)
-    said = specification.search
+    said = experiment.search
     seed = int(np.random.SeedSequence([said.get("seed", 0), draws]).generate_state(1)[0])
     samplers: dict[str, Any] = {
         "tpe": partial(optuna.samplers.TPESampler, constant_liar=True),
@@ -79,15 +77,13 @@ def open_search(
     )
 
 
-def carry_out_search(
-    specification: StudySpecification, folder: Path, jobs: int, threads: int
-) -> None:
+def carry_out_search(experiment: Experiment, folder: Path, jobs: int, threads: int) -> None:
     """Try settings until there are as many as the study says; what was under way is tried again.
 
     Parameters
     ----------
-    specification : StudySpecification
-        The study.
+    experiment : Experiment
+        The experiment.
     folder : Path
         Its folder, to which no other process may write.
     jobs : int
@@ -100,18 +96,18 @@ def carry_out_search(
     # A process that was killed may have left its lock.
     for left in folder.glob(f"{JOURNAL}.lock*"):
         left.unlink(missing_ok=True)
-    search = open_search(specification, folder)
+    search = open_search(experiment, folder)
     for trial in search.get_trials(deepcopy=False, states=(optuna.trial.TrialState.RUNNING,)):
         search.tell(trial.number, state=optuna.trial.TrialState.FAIL)
         search.enqueue_trial(trial.params)
-    missing = specification.search["count"] - len(_counted(search))
+    missing = experiment.search["count"] - len(_counted(search))
     if missing > 0:
         jobs = min(jobs, missing)
         shares = [len(range(number, missing, jobs)) for number in range(jobs)]
-        work = partial(_try_settings, specification, folder, threads)
+        work = partial(_try_settings, experiment, folder, threads)
         tasks = [(share, len(search.trials) + number) for number, share in enumerate(shares)]
-        list(LocalExecutor(jobs, threads).carry_out(work, tasks))
-    write_recipe(specification, folder)
+        list(LocalExecutor(jobs, threads).map(work, tasks))
+    write_recipe(experiment, folder)
 
 
 def _counted(search: "optuna.study.Study") -> list[Any]:
@@ -122,18 +118,18 @@ def _counted(search: "optuna.study.Study") -> list[Any]:
 
 
 def _try_settings(
-    specification: StudySpecification, folder: Path, threads: int, task: tuple[int, int]
+    experiment: Experiment, folder: Path, threads: int, task: tuple[int, int]
 ) -> None:
     """Try a share of the settings, one after the other."""
     import optuna
 
     share, draws = task
-    search, store = open_search(specification, folder, draws), StudyStore(folder)
+    search, store = open_search(experiment, folder, draws), Store(folder)
     failed = 0
     while share > 0:
         trial = search.ask()
         try:
-            success = _mean_success(specification, store, trial, threads)
+            success = _mean_success(experiment, store, trial, threads)
         except optuna.TrialPruned:
             search.tell(trial, state=optuna.trial.TrialState.PRUNED)
         except Exception as error:  # settings can be impossible: another proposal takes their place
@@ -150,29 +146,25 @@ FAILURES = 20
 """Proposals of a worker that may be impossible before they count."""
 
 
-def _mean_success(
-    specification: StudySpecification, store: StudyStore, trial: Any, threads: int
-) -> float:
+def _mean_success(experiment: Experiment, store: Store, trial: Any, threads: int) -> float:
     """Train with the settings of a trial on all problems with all seeds."""
     import optuna
 
-    choices = {key: _suggest(trial, key, entry) for key, entry in specification.searched.items()}
-    shares, looks = [], 0
+    choices = {key: _suggest(trial, key, entry) for key, entry in experiment.searched.items()}
+    shares, points = [], 0
 
-    def on_point(point: RunPoint) -> None:
-        nonlocal looks
-        trial.report(point.success, looks)
-        looks += 1
+    def on_point(point: CurvePoint) -> None:
+        nonlocal points
+        trial.report(point.success, points)
+        points += 1
         if trial.should_prune():
             raise optuna.TrialPruned
 
-    for number, run in enumerate(planned_runs(specification, [choices])):
-        trained = store.load(run)
-        if trained is None:
+    for number, run in enumerate(plan(experiment, [choices])):
+        if run not in store.load([run]):
             task = RunTask(run)
-            trained, clock = train(task, threads, on_point if number == 0 else None)
-            store.save(task, TaskResult(run_content(trained), clock))
-        shares.append(float(trained.outcomes.success.mean()))
+            store.save(task, train(task, threads, on_point=on_point if number == 0 else None))
+        shares.append(float(store.load([run])[run].outcomes.success.mean()))
     return float(np.mean(shares))
 
 
@@ -187,32 +179,30 @@ def _suggest(trial: Any, key: str, entry: Any) -> Any:
     return entry[trial.suggest_categorical(key, list(range(len(entry))))]
 
 
-def searched_runs(specification: StudySpecification, folder: Path) -> tuple[PlannedRun, ...]:
+def searched_runs(experiment: Experiment, folder: Path) -> tuple[Run, ...]:
     """The trainings of the settings that were tried to the end, in their order."""
     if not (folder / JOURNAL).exists():
-        return planned_runs(specification, [])
-    found = [
-        tried_choices(specification, trial.params) for trial in _complete(specification, folder)
-    ]
-    return planned_runs(specification, found)
+        return plan(experiment, [])
+    found = [tried_choices(experiment, trial.params) for trial in _complete(experiment, folder)]
+    return plan(experiment, found)
 
 
-def _complete(specification: StudySpecification, folder: Path) -> list[Any]:
+def _complete(experiment: Experiment, folder: Path) -> list[Any]:
     """Trials that were carried out to the end."""
-    search = open_search(specification, folder)
+    search = open_search(experiment, folder)
     return [trial for trial in search.trials if trial.state.name == "COMPLETE"]
 
 
-def tried_choices(specification: StudySpecification, tried: Mapping[str, Any]) -> dict[str, Any]:
+def tried_choices(experiment: Experiment, tried: Mapping[str, Any]) -> dict[str, Any]:
     """Values of fields that Optuna's values stand for."""
     return {
         key: tried[key] if isinstance(entry, Mapping) else entry[tried[key]]
-        for key, entry in specification.searched.items()
+        for key, entry in experiment.searched.items()
         if key in tried
     }
 
 
-def write_recipe(specification: StudySpecification, folder: Path) -> None:
+def write_recipe(experiment: Experiment, folder: Path) -> None:
     """Write the best settings as a recipe file, for ``kinarm-train --recipe``.
 
     Raises
@@ -220,11 +210,11 @@ def write_recipe(specification: StudySpecification, folder: Path) -> None:
     OutputError
         If it cannot be written.
     """
-    complete = _complete(specification, folder)
+    complete = _complete(experiment, folder)
     if not complete:
         return
     best = max(complete, key=lambda trial: trial.value if trial.value is not None else -math.inf)
-    run = planned_runs(specification, [tried_choices(specification, best.params)])[0]
+    run = plan(experiment, [tried_choices(experiment, best.params)])[0]
     write_text(folder / RECIPE, tomli_w.dumps(recipe_entries(run.config)))
 
 

@@ -11,10 +11,10 @@ import tomli_w
 from small_studies import SMALL
 
 from kinarm.errors import InvalidInputError, MissingExtraError
-from kinarm.evaluation.studies import search as searches
-from kinarm.evaluation.studies.search import open_search, recipe_entries
-from kinarm.evaluation.studies.specification import StudySpecification
-from kinarm.evaluation.studies.study import Study
+from kinarm.evaluation.experiments import search as searches
+from kinarm.evaluation.experiments.search import open_search, recipe_entries
+from kinarm.evaluation.experiments.experiment import Experiment
+from kinarm.evaluation.experiments.study import Study
 from kinarm.policies import recipe
 
 optuna = pytest.importorskip("optuna")
@@ -35,7 +35,7 @@ SEARCH = {
 
 
 def states(study):
-    found = open_search(study.specification, study.store.folder).trials
+    found = open_search(study.experiment, study.store.folder).trials
     return [trial.state.name for trial in found]
 
 
@@ -54,7 +54,7 @@ class TestSearch:
         assert len({run.config.step_size for run in searched.runs}) == len(searched) == 6
 
     def test_values_are_the_success_of_the_policies(self, searched):
-        trials = open_search(searched.specification, searched.store.folder).trials
+        trials = open_search(searched.experiment, searched.store.folder).trials
         by_step_size = {run.config.step_size: each for run, each in searched.finished.items()}
         for trial in trials:
             trained = by_step_size[trial.params["step_size"]]
@@ -85,8 +85,8 @@ class TestSearch:
 
     def test_there_is_no_best_of_nothing(self, tmp_path):
         study = Study(SEARCH, tmp_path)
-        with study.store.writing(study.specification):
-            searches.write_recipe(study.specification, tmp_path)
+        with study.store.writing(study.experiment):
+            searches.write_recipe(study.experiment, tmp_path)
         assert not (tmp_path / "best.toml").exists()
 
     def test_a_search_under_way_is_read(self, tmp_path):
@@ -96,8 +96,8 @@ class TestSearch:
 
     def test_what_was_under_way_is_tried_again(self, tmp_path):
         study = Study(SEARCH, tmp_path)
-        with study.store.writing(study.specification):
-            stuck = open_search(study.specification, tmp_path).ask()
+        with study.store.writing(study.experiment):
+            stuck = open_search(study.experiment, tmp_path).ask()
             stuck.suggest_float("step_size", 0.01, 0.5, log=True)
         (tmp_path / "search.journal.lock").symlink_to("nowhere")
         study.run(jobs=1)
@@ -108,7 +108,7 @@ class TestSearch:
         impossible = {"count": 3, "top_directions": {"low": 3, "high": 6}}
         fixed = {"iterations": 3, "directions": 4}
         study = Study({**SEARCH, "fixed": fixed, "search": impossible}, tmp_path).run(jobs=1)
-        trials = open_search(study.specification, tmp_path).trials
+        trials = open_search(study.experiment, tmp_path).trials
         complete = [trial for trial in trials if trial.state.name == "COMPLETE"]
         assert len(complete) == 3
         assert {trial.params["top_directions"] for trial in complete} <= {3, 4}
@@ -159,7 +159,7 @@ def test_killed_at_any_time(tmp_path):
         ({"search": {"noise": [1]}}, "search.count must be a whole number of at least 1"),
         ({"search": {"count": 2, "noise": []}}, "search.noise must be a list of at least one"),
         ({"grid": {"noise": [1]}}, "search and grid exclude each other"),
-        ({"learners": ["ars", "ppo"]}, "a search has one of learners, got 2"),
+        ({"learners": ["ars", "ppo"]}, "a search has one learner and one recipe, got 2"),
         ({"search": {"count": 2, "sampler": "gp", "noise": [1]}}, "search.sampler must be one of"),
         (
             {"search": {"count": 2, "problem.task.horizon": [1]}},
@@ -169,7 +169,7 @@ def test_killed_at_any_time(tmp_path):
 )
 def test_refused(changes, words):
     with pytest.raises(InvalidInputError, match="^study: ") as caught:
-        StudySpecification.from_json({**SEARCH, **changes}, "study")
+        Experiment.from_json({**SEARCH, **changes}, "study")
     assert words in str(caught.value)
 
 
@@ -180,6 +180,6 @@ def test_unknown_fields(tmp_path):
 
 def test_without_the_extra(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "optuna", None)
-    specification = StudySpecification.from_json(SEARCH, "study")
+    specification = Experiment.from_json(SEARCH, "study")
     with pytest.raises(MissingExtraError, match=r"kinarm\[tune\]"):
         searches.open_search(specification, tmp_path)

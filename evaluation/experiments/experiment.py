@@ -1,0 +1,356 @@
+"""What an experiment is: a file that names learners, problems, seeds and what varies."""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from kinarm._fields import OPTIONAL, check_fields, from_plain, read_toml, to_plain
+from kinarm._validation import whole_number
+from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.evaluation.experiments.curve import TrialSettings
+from kinarm.evaluation.experiments.ranges import RANGE, check_range, draw
+from kinarm.problem_files import shipped_files
+from kinarm.streams import Stream, stream_generator
+
+MOST_TRAININGS = 100_000
+"""Trainings of an experiment at most: all of them are planned before the first begins."""
+
+SEVERAL = ("learners", "recipes", "problems")
+"""Entries of a file that are lists; a text stands for a list of one."""
+
+TABLES = ("fixed", "grid", "random", "search")
+"""Entries of a file that name fields of settings."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Entry:
+    """A learner with a recipe and what is different about it.
+
+    Parameters
+    ----------
+    name : str
+        Unique in the experiment; learner and recipe by default.
+    title : str
+        Its name in tables and figures; what sets it apart by default.
+    source : str
+        Where its settings come from, for the record.
+    learner : str
+        Name of the learner.
+    recipe : str
+        Name or file of the recipe.
+    problems : tuple of str
+        Names or files of problems; those of the experiment by default.
+    seeds : int
+        Trainings with each setting; as many as the experiment says by default (0).
+    first_seed : int, optional
+        Seed of the first of them; that of the experiment by default.
+    fixed : dict
+        Values of fields that stay, beside those of the experiment.
+    grid : dict
+        Lists of values of fields, beside those of the experiment.
+    """
+
+    name: str = field(default="", metadata=OPTIONAL)
+    title: str = field(default="", metadata=OPTIONAL)
+    source: str = field(default="", metadata=OPTIONAL)
+    learner: str = "ars"
+    recipe: str = "paper"
+    problems: tuple[str, ...] = field(default=(), metadata=OPTIONAL)
+    seeds: int = field(default=0, metadata=OPTIONAL)
+    first_seed: int | None = None
+    fixed: dict[str, Any] = field(default_factory=dict, metadata=OPTIONAL)
+    grid: dict[str, Any] = field(default_factory=dict, metadata=OPTIONAL)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if not self.name:
+            recipe = Path(self.recipe).stem if self.recipe.endswith(".toml") else self.recipe
+            object.__setattr__(self, "name", f"{self.learner}-{recipe}")
+        whole_number("seeds", self.seeds, 0, MOST_TRAININGS)
+        whole_number("first_seed", self.first_seed or 0, 0)
+        _check_grid(self.grid)
+        if twice := sorted(self.fixed.keys() & self.grid.keys()):
+            raise InvalidInputError(f"{twice[0]!r} stands in fixed and in grid")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """A set of trainings: every entry, problem, choice and seed with every other.
+
+    Entries are given one by one, or are all learners with all recipes. Fields of settings are named
+    as in a recipe (``step_size``, ``reward.success``), those of a problem by their path
+    (``problem.task.start_spread``, ``problem.arm``). With the name of a learner in front
+    (``ars.step_size``), they concern that learner alone.
+
+    Parameters
+    ----------
+    name : str
+        How page and folder call it.
+    learners : tuple of str
+        Names of learners.
+    recipes : tuple of str
+        Names or files of recipes.
+    entries : tuple of Entry
+        Learners with a recipe and settings of their own, instead of learners and recipes.
+    problems : tuple of str
+        Names or files of problems.
+    seeds : int
+        Trainings with each setting.
+    first_seed : int
+        Seed of the first of them; the others follow.
+    trials : TrialSettings
+        Which trials the policies face.
+    bounds : bool
+        Find what any policy could reach in the trials.
+    fixed : dict
+        Values of fields that stay.
+    grid : dict
+        Lists of values of fields; all combinations are trained.
+    random : dict
+        ``count`` combinations, drawn by ``seed`` (0), of fields with a list of values, or a table
+        of ``low``, ``high`` and, to draw the logarithm evenly, ``log = true``.
+    search : dict
+        ``count`` combinations that Optuna proposes, by ``seed`` (0) and ``sampler`` (tpe), of
+        fields as in ``random``; ``pruner`` (median) says which trainings are broken off.
+    """
+
+    name: str
+    learners: tuple[str, ...] = ("ars",)
+    recipes: tuple[str, ...] = ("paper",)
+    problems: tuple[str, ...] = ("right",)
+    seeds: int = 1
+    first_seed: int = 0
+    trials: TrialSettings = field(default_factory=TrialSettings)
+    bounds: bool = field(default=True, metadata=OPTIONAL)
+    fixed: dict[str, Any] = field(default_factory=dict, metadata=OPTIONAL)
+    grid: dict[str, Any] = field(default_factory=dict, metadata=OPTIONAL)
+    random: dict[str, Any] = field(default_factory=dict, metadata=OPTIONAL)
+    search: dict[str, Any] = field(default_factory=dict, metadata=OPTIONAL)
+    entries: tuple[Entry, ...] = field(default=(), metadata=OPTIONAL)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        whole_number("seeds", self.seeds, 1, MOST_TRAININGS)
+        whole_number("first_seed", self.first_seed, 0)
+        for name in SEVERAL:
+            if not getattr(self, name):
+                raise InvalidInputError(f"{name} must not be empty")
+            _check_distinct(name, getattr(self, name))
+        _check_distinct("entries", [entry.name for entry in self.entries])
+        self._check_tables()
+        if self.size > MOST_TRAININGS:
+            raise InvalidInputError(
+                f"an experiment has at most {MOST_TRAININGS:,} trainings, this one {self.size:,}"
+            )
+        self._check_search()
+
+    def _check_tables(self) -> None:
+        """Refuse fields that stand in two tables, and values that nothing can be made of."""
+        tables = {
+            "fixed": self.fixed,
+            "grid": self.grid,
+            "random": _ranges(self.random),
+            "search": self.searched,
+        }
+        given: dict[str, str] = {}
+        for table, entries in tables.items():
+            for key in entries:
+                if key in given:
+                    raise InvalidInputError(f"{key!r} stands in {given[key]} and in {table}")
+                given[key] = table
+        _check_grid(self.grid)
+        for table, entries in (("random", self.random), ("search", self.search)):
+            if entries:
+                whole_number(f"{table}.count", entries.get("count", 0), 1, MOST_TRAININGS)
+                whole_number(f"{table}.seed", entries.get("seed", 0), 0)
+                for key, entry in _ranges(entries).items():
+                    check_range(f"{table}.{key}", entry)
+
+    @property
+    def all_entries(self) -> tuple[Entry, ...]:
+        """The entries as given, or all learners with all recipes."""
+        return self.entries or tuple(
+            Entry(learner=learner, recipe=recipe)
+            for learner, recipe in product(self.learners, self.recipes)
+        )
+
+    @property
+    def size(self) -> int:
+        """Trainings that it asks for, those that turn out to be the same included."""
+        drawn = self.random.get("count", 1) * self.search.get("count", 1)
+        choices = math.prod(map(len, self.grid.values())) * drawn
+        return sum(
+            len(entry.problems or self.problems)
+            * math.prod(map(len, entry.grid.values()))
+            * (entry.seeds or self.seeds)
+            * choices
+            for entry in self.all_entries
+        )
+
+    def _check_search(self) -> None:
+        """Refuse what cannot be searched."""
+        if not self.search:
+            return
+        for table in ("grid", "random"):
+            if getattr(self, table):
+                raise InvalidInputError(f"search and {table} exclude each other")
+        if len(self.all_entries) > 1:
+            raise InvalidInputError(
+                f"a search has one learner and one recipe, got {len(self.all_entries)} of both"
+            )
+        for name, known in SEARCH_CHOICES.items():
+            if self.search.get(name, known[0]) not in known:
+                raise InvalidInputError(
+                    f"search.{name} must be one of {', '.join(known)}, got {self.search[name]!r}"
+                )
+        if not self.searched:
+            raise InvalidInputError("search names no field")
+        for key in self.searched:
+            if key.startswith("problem."):
+                raise InvalidInputError(f"a search is for settings of a learner, not for {key!r}")
+
+    @property
+    def searched(self) -> dict[str, Any]:
+        """What is searched, by field."""
+        return _ranges(self.search)
+
+    def choices(self) -> Iterator[dict[str, Any]]:
+        """Every combination of the values that vary, by field."""
+        for of_grid in combinations(self.grid):
+            for drawn in self._drawn():
+                yield {**of_grid, **drawn}
+
+    def _drawn(self) -> Iterator[dict[str, Any]]:
+        """Random combinations; a larger number keeps the first ones."""
+        if not self.random:
+            yield {}
+            return
+        for number in range(self.random["count"]):
+            rng = stream_generator(Stream.STUDY, self.random.get("seed", 0), number)
+            yield {key: draw(entry, rng.random()) for key, entry in _ranges(self.random).items()}
+
+    def to_json(self) -> dict[str, Any]:
+        """As a dictionary that TOML and JSON can hold."""
+        entries: dict[str, Any] = to_plain(self)
+        return entries
+
+    @classmethod
+    def from_json(cls, entries: Mapping[str, Any], where: str) -> "Experiment":
+        """Rebuild what `to_json` returned, or what a file holds.
+
+        Parameters
+        ----------
+        entries : mapping
+            The entries of the file.
+        where : str
+            Name of the file, for messages.
+
+        Raises
+        ------
+        InvalidInputError
+            If an entry is missing, unknown or wrong; in one line that names source, key and what
+            is expected.
+        """
+        made = _prepared(entries, SEVERAL)
+        if isinstance(made.get("entries"), list):
+            made["entries"] = [
+                _prepared(each, ("problems",)) if isinstance(each, Mapping) else each
+                for each in made["entries"]
+            ]
+        return from_plain(cls, made, where)
+
+    @classmethod
+    def load(cls, name_or_file: str | Path) -> "Experiment":
+        """Read a file, or find an experiment that ships with kinarm by its name.
+
+        The name of a file is that of the experiment unless it says otherwise. Paths of problems and
+        recipes in it are relative to it.
+
+        Raises
+        ------
+        InvalidInputError
+            If it cannot be used; in one line that names file, key and what is expected.
+        """
+        file = Path(name_or_file)
+        shipped = shipped_files("experiments")
+        if not file.suffix and not file.exists():
+            if str(name_or_file) not in shipped:
+                available = (*shipped, "path/to/experiment.toml")
+                raise UnknownNameError("experiment", str(name_or_file), available)
+            file = shipped[str(name_or_file)]
+        entries = {"name": file.stem, **read_toml(file, "experiment")}
+        return cls.from_json(entries, str(file)).resolved(file.parent)
+
+    def resolved(self, folder: Path) -> "Experiment":
+        """The same experiment, with its files found from wherever it is read."""
+
+        def found(name: str) -> str:
+            beside = folder / name
+            return str(beside.resolve()) if name.endswith(".toml") and beside.is_file() else name
+
+        def each(names: tuple[str, ...]) -> tuple[str, ...]:
+            return tuple(map(found, names))
+
+        entries = tuple(
+            replace(entry, recipe=found(entry.recipe), problems=each(entry.problems))
+            for entry in self.entries
+        )
+        recipes, problems = each(self.recipes), each(self.problems)
+        return replace(self, recipes=recipes, problems=problems, entries=entries)
+
+
+SEARCH_CHOICES = {"sampler": ("tpe", "random", "cmaes"), "pruner": ("median", "none", "hyperband")}
+"""What can be said of a search beside count and seed; the first is the default."""
+
+
+def combinations(grid: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """Every combination of the values in lists, by field."""
+    for values in product(*grid.values()):
+        yield dict(zip(grid, values, strict=True))
+
+
+def _check_distinct(name: str, values: "tuple[str, ...] | list[str]") -> None:
+    if len(set(values)) < len(values):
+        raise InvalidInputError(f"{name} names the same twice: {', '.join(values)}")
+
+
+def _check_grid(grid: Mapping[str, Any]) -> None:
+    for key, values in grid.items():
+        if not isinstance(values, list | tuple) or not values:
+            raise InvalidInputError(
+                f"grid.{key} must be a list of at least one value, got {values!r}"
+            )
+
+
+def _ranges(entries: Mapping[str, Any]) -> dict[str, Any]:
+    """What is drawn or searched, by field."""
+    said = ("count", "seed", *SEARCH_CHOICES)
+    return {key: entry for key, entry in entries.items() if key not in said}
+
+
+def _prepared(entries: Mapping[str, Any], several: Iterable[str]) -> dict[str, Any]:
+    """Entries of a file, with lists for texts, and with paths for tables within tables."""
+    made = dict(entries)
+    for name in several:
+        single = name.removesuffix("s")
+        if single in made and name not in made:
+            made[name] = made.pop(single)
+        if isinstance(made.get(name), str):
+            made[name] = [made[name]]
+    for table in TABLES:
+        if isinstance(made.get(table), Mapping):
+            made[table] = dict(_flat(made[table], ranges=table in ("random", "search")))
+    return made
+
+
+def _flat(entries: Mapping[str, Any], *, ranges: bool, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Entries of tables within tables by their paths; tables that are ranges stay whole."""
+    for key, entry in entries.items():
+        is_range = ranges and isinstance(entry, Mapping) and set(entry) & set(RANGE)
+        if isinstance(entry, Mapping) and not is_range:
+            yield from _flat(entry, ranges=ranges, path=f"{path}{key}.")
+        else:
+            yield f"{path}{key}", entry

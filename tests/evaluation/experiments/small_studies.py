@@ -1,0 +1,36 @@
+"""A small experiment, what its folder holds, and an executor that counts."""
+
+import pickle
+
+from kinarm.evaluation.experiments.executors import Work
+
+SMALL = {
+    "name": "small",
+    "problems": ["right"],
+    "seeds": 2,
+    "trials": {"count": 12, "first": 200, "per_decade": 3},
+    "fixed": {"iterations": 3, "directions": 4, "top_directions": 2},
+    "grid": {"step_size": [0.02, 0.2]},
+}
+
+
+def contents(folder):
+    """All files of the trainings and bounds of a study, by name."""
+    paths = [*folder.glob("runs/*"), *folder.glob("bounds/*")]
+    return {str(path.relative_to(folder)): path.read_bytes() for path in paths}
+
+
+class Counting:
+    """An executor that carries out at most so many tasks in this process."""
+
+    shares_files = True
+
+    def __init__(self, limit=1000):
+        self.tasks, self._limit = [], limit
+
+    def map(self, work, tasks):
+        for task in tasks:
+            if len(self.tasks) == self._limit:
+                raise KeyboardInterrupt
+            self.tasks.append(task)
+            yield task, Work.of(work)(pickle.dumps(task))

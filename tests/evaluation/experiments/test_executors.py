@@ -1,0 +1,200 @@
+"""Executors: every task once, whatever happens to the workers, on this machine and on clusters."""
+
+import os
+import queue
+import sys
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+import small_tasks
+from small_tasks import (
+    kill_own_process_at_seven,
+    kill_own_process_once,
+    seem_to_leak,
+    square,
+    touch,
+)
+
+from kinarm.errors import InvalidInputError, WorkerError
+from kinarm.evaluation.experiments import clusters, executors
+from kinarm.evaluation.experiments.clusters import Bundle, RayExecutor, SlurmExecutor
+from kinarm.evaluation.experiments.executors import Failure, LocalExecutor, Work
+from kinarm.evaluation.experiments.options import RunningOptions
+
+NOBODY = "127.0.0.1:9"
+"""An address that nothing listens at."""
+
+needs_slurm = pytest.mark.skipif(find_spec("submitit") is None, reason="needs the extra slurm")
+needs_ray = pytest.mark.skipif(find_spec("ray") is None, reason="needs the extra ray")
+of_ray = [needs_ray, pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
+
+
+@pytest.fixture(autouse=True)
+def _surroundings(monkeypatch):
+    """Workers find the tasks of these tests."""
+    monkeypatch.setenv("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
+    monkeypatch.setenv("PYTHONPATH", str(Path(small_tasks.__file__).parent))
+    monkeypatch.setattr(clusters, "LOOK_SECONDS", 0.05)
+
+
+@pytest.fixture(
+    params=[
+        "one process",
+        "two processes",
+        pytest.param("ray", marks=of_ray),
+        pytest.param("slurm", marks=[needs_slurm, pytest.mark.slow]),
+    ]
+)
+def executor(request, tmp_path):
+    """Each executor in turn."""
+    return {
+        "one process": LocalExecutor(1),
+        "two processes": LocalExecutor(2),
+        "ray": RayExecutor("local", jobs=2),
+        "slurm": SlurmExecutor(tmp_path / "slurm", bundle=3, cluster="local"),
+    }[request.param]
+
+
+class TestEach:
+    def test_every_task_is_done_once(self, executor, tmp_path):
+        (tmp_path / "done").mkdir()
+        found = dict(executor.map(partial(touch, tmp_path / "done"), range(7)))
+        assert found == dict.fromkeys(range(7))
+        assert sorted(path.name for path in (tmp_path / "done").iterdir()) == [*"0123456"]
+
+    def test_what_a_task_raises_is_its_result(self, executor):
+        found = dict(executor.map(partial(divmod, 6), [0, 2, 3]))
+        assert (found[2], found[3]) == ((3, 0), (2, 0))
+        assert isinstance(found[0], Failure)
+        assert "ZeroDivisionError" in found[0].trace
+
+    def test_nothing_to_do(self, executor):
+        assert list(executor.map(square, [])) == []
+
+    def test_a_worker_that_differs_is_refused(self, executor, monkeypatch):
+        others = (*executors.identity(), ("coal", "0.0.1"))
+        monkeypatch.setattr(executors, "identity", lambda: others)
+        if executor == LocalExecutor(1):
+            monkeypatch.undo()
+            with pytest.raises(WorkerError, match=r"coal is .* there, 0\.0\.1 here"):
+                Work(square, others)(b"")
+            return
+        with pytest.raises(WorkerError, match=r"coal is .* there, 0\.0\.1 here"):
+            list(executor.map(square, [1]))
+
+
+def test_one_at_a_time_tasks_are_done_in_the_given_order():
+    assert list(LocalExecutor(1).map(square, (3, 1, 2))) == [(3, 9), (1, 1), (2, 4)]
+
+
+@pytest.mark.parametrize(
+    "executor", [LocalExecutor(2), pytest.param(RayExecutor("local", 2), marks=of_ray)]
+)
+def test_what_lost_workers_had_begun_is_done_again(executor, tmp_path):
+    done = executor.map(partial(kill_own_process_once, tmp_path), range(4))
+    assert sorted(done) == [(number, number) for number in range(4)]
+
+
+def test_a_task_that_kills_every_worker():
+    with pytest.raises(WorkerError, match="workers ended unexpectedly"):
+        list(LocalExecutor(2).map(kill_own_process_at_seven, range(9)))
+
+
+def test_workers_that_grow_are_replaced_in_silence():
+    """Loky warns of it in a thread of its own, which an error would end, and nothing go on."""
+    done = LocalExecutor(2).map(seem_to_leak, range(8))
+    assert sorted(done) == [(number, number) for number in range(8)]
+
+
+def test_a_worker_ends_when_its_parent_has_ended(monkeypatch):
+    """Linux then gives it another one."""
+    parents, waited, watched = iter([17, 17, 1]), [], queue.SimpleQueue()
+    monkeypatch.setattr(os, "getppid", lambda: next(parents))
+    monkeypatch.setattr(executors, "time", SimpleNamespace(sleep=waited.append))
+    monkeypatch.setattr(os, "_exit", sys.exit)
+    with pytest.raises(SystemExit):
+        executors._end_with_parent(17)
+    assert waited == [executors.WATCHED] * 2
+    monkeypatch.setattr(executors, "_end_with_parent", watched.put)
+    executors._prepare_worker(17)
+    assert watched.get(timeout=30) == 17
+
+
+def test_workers_agree_on_packages_results_and_all_of_the_source(monkeypatch):
+    executors.check_identity(executors.identity())
+    names = {name for name, _ in executors.identity()}
+    assert {"python", "numpy", "numba", "coal", "pin", "semantics", "source of kinarm"} <= names
+    before = executors.source_digest()
+    monkeypatch.setattr(executors, "BESIDE", ("policies",))
+    assert executors.source_digest() != before
+
+
+@needs_ray
+@pytest.mark.parametrize("address", [NOBODY, f"ray://{NOBODY}", "nowhere", "auto"])
+def test_no_cluster(address, monkeypatch):
+    monkeypatch.setenv("RAY_ADDRESS", NOBODY)  # auto would find one that other tests began
+    with pytest.raises(InvalidInputError, match="no Ray cluster answers at"):
+        list(RayExecutor(address).map(square, [1]))
+
+
+@needs_slurm
+def test_without_slurm(tmp_path):
+    with pytest.raises(InvalidInputError, match="Slurm takes no jobs"):
+        list(SlurmExecutor(tmp_path / "slurm").map(square, [1]))
+
+
+@needs_slurm
+def test_what_slurm_takes_away_goes_on_where_it_was():
+    """Slurm interrupts a bundle amid its second task; the rest is what it is to run."""
+    seen = []
+
+    def work(task):
+        seen.append(task)
+        if task == 20 and seen.count(20) == 1:
+            raise KeyboardInterrupt
+        return task + 1
+
+    bundle = Bundle(work, [(0, 10), (1, 20), (2, 30)])
+    with pytest.raises(KeyboardInterrupt):
+        bundle()
+    rest = bundle.checkpoint()
+    assert rest.result() == [(0, 11), (1, 21), (2, 31)]
+    assert seen == [10, 20, 20, 30]
+
+
+class TestOptions:
+    @pytest.mark.parametrize(
+        ("given", "words"),
+        [
+            ({"jobs": 0}, "jobs must be a whole number of at least 1"),
+            ({"bundle": 0}, "bundle must be"),
+            ({"minutes": 0}, "minutes must be"),
+            ({"ray": "auto", "slurm": True}, "--ray and --slurm exclude each other"),
+            ({"jobs": 2, "slurm": True}, "--jobs is for this machine"),
+            ({"bundle": 2}, "--bundle goes with --slurm"),
+            ({"partition": "a", "ray": "auto"}, "--partition goes with --slurm"),
+        ],
+    )
+    def test_refused(self, given, words):
+        with pytest.raises(InvalidInputError, match=words):
+            RunningOptions(**given)
+
+    @pytest.mark.parametrize("given", [{"jobs": 2}, {"ray": "auto"}, {"slurm": True}])
+    def test_without_training_nothing_runs_anywhere(self, given):
+        RunningOptions().refuse_without_training()
+        with pytest.raises(InvalidInputError, match="does not go with --no-train"):
+            RunningOptions(**given).refuse_without_training()
+
+    @pytest.mark.parametrize(
+        ("given", "made"),
+        [
+            ({"jobs": 3}, LocalExecutor(3, 2)),
+            ({"ray": "auto", "jobs": 3}, RayExecutor("auto", 3, 2)),
+            ({"slurm": True, "minutes": 9}, SlurmExecutor(Path("out/slurm"), 1, 9, 2)),
+        ],
+    )
+    def test_the_executor(self, given, made):
+        assert RunningOptions(**given).executor(Path("out"), threads=2) == made

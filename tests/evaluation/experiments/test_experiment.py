@@ -1,0 +1,356 @@
+"""Experiment files: what they can say, which trainings they plan, and what is refused."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from kinarm.errors import InvalidInputError, KinarmError
+from kinarm.evaluation.experiments.experiment import Experiment
+from kinarm.evaluation.experiments.plan import changed_problem, plan
+from kinarm.evaluation.experiments.ranges import LARGEST
+from kinarm.policies.recipes import recipe
+from kinarm.problem import PROBLEMS, ReachProblem
+
+FILE = """
+learner = "ars"
+problems = ["right", "own.toml"]
+seeds = 3
+
+[trials]
+count = 50
+
+[fixed]
+iterations = 7
+reward.success = 2.0
+
+[grid]
+step_size = [0.01, 0.05]
+"problem.task.start_spread" = [0.2, 1.0]
+
+[random]
+count = 4
+noise = { low = 0.001, high = 0.1, log = true }
+problem.task.horizon = { low = 10, high = 12 }
+episodes = [1, 2]
+"""
+
+
+def made(**entries):
+    return Experiment.from_json({"name": "mine", **entries}, "study")
+
+
+@pytest.fixture
+def experiment(tmp_path):
+    path = tmp_path / "steps.toml"
+    path.write_text(FILE)
+    (tmp_path / "own.toml").touch()
+    return Experiment.load(path)
+
+
+class TestFile:
+    def test_what_it_says(self, experiment, tmp_path):
+        assert experiment.name == "steps"
+        assert experiment.learners == ("ars",)
+        assert experiment.recipes == ("paper",)
+        assert experiment.problems == ("right", str(tmp_path / "own.toml"))
+        assert experiment.trials.count == 50
+        assert experiment.fixed == {"iterations": 7, "reward.success": 2.0}
+        assert list(experiment.grid) == ["step_size", "problem.task.start_spread"]
+
+    def test_written_and_read_again(self, experiment):
+        assert Experiment.from_json(experiment.to_json(), "it") == experiment
+
+    def test_it_is_found_from_elsewhere(self, tmp_path):
+        (tmp_path / "study.toml").write_text('recipe = "mine.toml"\nproblem = "gone.toml"')
+        (tmp_path / "mine.toml").touch()
+        read = Experiment.load(tmp_path / "study.toml")
+        assert read.recipes == (str(tmp_path / "mine.toml"),)
+        assert read.problems == ("gone.toml",)
+
+
+class TestChoices:
+    def test_every_value_with_every_other(self, experiment):
+        choices = list(experiment.choices())
+        assert len(choices) == 2 * 2 * 4
+        grid = {(c["step_size"], c["problem.task.start_spread"]) for c in choices}
+        assert grid == {(0.01, 0.2), (0.01, 1.0), (0.05, 0.2), (0.05, 1.0)}
+
+    def test_draws_are_the_same_for_every_value_of_the_grid(self, experiment):
+        choices = list(experiment.choices())
+        assert [c["noise"] for c in choices[:4]] == [c["noise"] for c in choices[4:8]]
+
+    def test_more_draws_begin_with_the_same_ones(self):
+        entries = {"noise": {"low": 0.0, "high": 1.0}, "seed": 3}
+        few, many = (list(made(random={"count": n, **entries}).choices()) for n in (3, 20))
+        assert many[:3] == few
+        assert len({c["noise"] for c in many}) == 20
+
+    def test_another_seed_draws_others(self):
+        ranges = {"count": 5, "noise": {"low": 0.0, "high": 1.0}}
+        first, second = (list(made(random={**ranges, "seed": n}).choices()) for n in (0, 1))
+        assert first != second
+
+    def test_draws_fill_their_range(self):
+        ranges = {"low": 1, "high": 3}, {"low": 0.001, "high": 10.0, "log": True}
+        entries = {"count": 400, "episodes": ranges[0], "noise": ranges[1], "size": ["a", "b"]}
+        drawn = list(made(random=entries).choices())
+        assert {c["episodes"] for c in drawn} == {1, 2, 3}
+        assert {c["size"] for c in drawn} == {"a", "b"}
+        logs = sorted(math.log10(c["noise"]) for c in drawn)
+        assert -3 <= logs[0] < -2.9
+        assert 0.9 < logs[-1] <= 1
+        assert logs[200] == pytest.approx(-1, abs=0.4)
+
+    @pytest.mark.parametrize("number", [float, int])
+    @pytest.mark.parametrize("log", [True, False])
+    def test_draws_from_the_widest_ranges_are_finite(self, log, number):
+        low = 1 / LARGEST if log else -LARGEST
+        widest = {"low": number(low) or 1, "high": number(LARGEST), "log": log}
+        drawn = [c["noise"] for c in made(random={"count": 9, "noise": widest}).choices()]
+        assert all(widest["low"] <= value <= widest["high"] for value in drawn)
+        assert len(set(drawn)) == 9
+
+    def test_shipped_ones_are_found_by_name(self):
+        with pytest.raises(InvalidInputError, match="unknown experiment 'nothing'; available: "):
+            Experiment.load("nothing")
+
+    def test_nothing_varies(self):
+        assert list(made().choices()) == [{}]
+
+
+TOY = {"learner": "ars", "recipe": "tuned"}
+
+
+@pytest.mark.parametrize(
+    ("entries", "words"),
+    [
+        ({"entries": [TOY, TOY]}, "entries names the same twice: ars-tuned, ars-tuned"),
+        ({"entries": [{**TOY, "fixed": {"noise": 1}, "grid": {"noise": [1]}}]}, "'noise' stands in"),
+        ({"entries": [{**TOY, "grid": {"noise": 1}}]}, "grid.noise must be a list"),
+        ({"trials": {"curve": {"points": 0}}}, "points must be a whole number of at least 1"),
+        ({"trials": {"curve": {"spacing": "wide"}}}, "trials.curve.spacing must be"),
+        ({"seeds": 0}, "seeds must be a whole number of at least 1, got 0"),
+        ({"seeds": 2**63}, "seeds must be at most 100000, got 9223372036854775808"),
+        (
+            {"random": {"count": 10**6, "noise": [1]}},
+            "random.count must be at most 100000, got 1000000",
+        ),
+        (
+            {"seeds": 1000, "grid": {"noise": [1, 2], "step_size": [0.1] * 100}},
+            "an experiment has at most 100,000 trainings, this one 200,000",
+        ),
+        ({"learners": []}, "learners must not be empty"),
+        ({"problems": ["right", "right"]}, "problems names the same twice: right, right"),
+        ({"grid": {"noise": []}}, "grid.noise must be a list of at least one value, got []"),
+        ({"grid": {"noise": 0.1}}, "grid.noise must be a list of at least one value, got 0.1"),
+        ({"grid": {"noise": [1]}, "fixed": {"noise": 1}}, "'noise' stands in fixed and in grid"),
+        ({"random": {"noise": [1]}}, "random.count must be a whole number of at least 1"),
+        ({"random": {"count": 1, "noise": {"low": 1, "high": 1}}}, "low below high"),
+        ({"random": {"count": 1, "noise": {"low": 1, "hihg": 2}}}, "low below high"),
+        ({"random": {"count": 1, "noise": {"low": True, "high": 2}}}, "low below high"),
+        ({"random": {"count": 1, "noise": []}}, "random.noise must be a list of at least one"),
+        ({"random": {"count": 1, "noise": 3}}, "random.noise must be a list of values"),
+        (
+            {"random": {"count": 1, "noise": {"low": 0, "high": 2, "log": True}}},
+            "random.noise.low must be greater than 0 with log, got 0",
+        ),
+        (
+            {"random": {"count": 1, "noise": {"low": 1, "high": 10**400, "log": True}}},
+            "random.noise.high must be between 1e-30 and 1e+30, got 10000",
+        ),
+        (
+            {"search": {"count": 1, "noise": {"low": -(10**400), "high": 1}}},
+            "search.noise.low must be between -1e+30 and 1e+30, got -10000",
+        ),
+        (
+            {"random": {"count": 1, "noise": {"low": 0.0, "high": math.inf}}},
+            "random.noise.high must be between -1e+30 and 1e+30, got inf",
+        ),
+        (
+            {"random": {"count": 1, "noise": {"low": 5e-324, "high": 1, "log": True}}},
+            "random.noise.low must be between 1e-30 and 1e+30, got 5e-324",
+        ),
+        ({"trials": {"count": 0}}, "trials: count must be a whole number of at least 1"),
+        ({"trials": {"count": 10**8}}, "trials: count must be at most 10000000, got 100000000"),
+        ({"trials": {"per_decade": 10**4}}, "trials: per_decade must be at most 1000, got 10000"),
+        ({"trials": {"cuont": 5}}, "unknown key 'trials.cuont'; available: count"),
+        ({"sedes": 5}, "unknown key 'sedes'; available: name, learners"),
+        ({"grid": 5}, "grid must be a table, got 5"),
+    ],
+)
+def test_refused(entries, words):
+    with pytest.raises(InvalidInputError, match="^study: ") as caught:
+        made(**entries)
+    assert words in str(caught.value)
+
+
+def planned(**entries):
+    return plan(Experiment.from_json({"name": "mine", **entries}, "study"))
+
+
+class TestRuns:
+    def test_every_setting_with_every_seed(self):
+        runs = planned(
+            problems=["left", "right"],
+            recipes=["paper", "brs"],
+            seeds=3,
+            grid={"noise": [0.1, 0.2]},
+        )
+        assert len(runs) == len({run.key for run in runs}) == 2 * 2 * 3 * 2
+        assert [run.config.seed for run in runs] == sorted(run.config.seed for run in runs)
+        assert {run.config.noise for run in runs} == {0.1, 0.2}
+
+    def test_settings_are_those_of_the_recipe(self):
+        (run,) = planned(recipes="tuned", problems="both", first_seed=4, fixed={"iterations": 9})
+        expected = recipe("ars", "tuned", problem=PROBLEMS["both"].pinned, seed=4, iterations=9)
+        assert run.config == expected
+
+    def test_recipes_adapt_to_the_changed_problem(self):
+        (run,) = planned(recipes="tuned", fixed={"problem.arm": "lrmate200ic_5l"})
+        problem = PROBLEMS["right"].replace(arm="lrmate200ic_5l")
+        assert run.config.reward == recipe("ars", "tuned", problem=problem).reward
+        assert run.config.problem.arm_digest == problem.arm_digest
+
+    def test_fields_of_one_learner_leave_the_others_alone(self):
+        runs = planned(
+            learners=["ars", "ppo"],
+            fixed={"ars.iterations": 5, "clip_range": 0.1},
+            grid={"ppo.n_epochs": [1, 2], "noise": [0.01, 0.02]},
+        )
+        assert len(runs) == 2 + 2
+        ars = [run.config for run in runs if run.learner == "ars"]
+        ppo = [run.config for run in runs if run.learner == "ppo"]
+        assert {config.iterations for config in ars} == {5}
+        assert {config.noise for config in ars} == {0.01, 0.02}
+        assert {config.n_epochs for config in ppo} == {1, 2}
+        assert {config.clip_range for config in ppo} == {0.1}
+        assert ppo[0].iterations == recipe("ppo", "paper").iterations
+
+    def test_weights_of_the_reward(self):
+        (run,) = planned(fixed={"reward.success": 3.0, "reward": {"progress": 2.0}})
+        assert (run.config.reward.success, run.config.reward.progress) == (3.0, 2.0)
+
+    def test_entries_have_settings_problems_and_seeds_of_their_own(self):
+        entries = [
+            {"name": "a", "learner": "ars", "fixed": {"noise": 0.5}, "grid": {"episodes": [1, 2]}},
+            {"name": "b", "learner": "ppo", "problem": "left", "seeds": 1, "first_seed": 7},
+        ]
+        runs = planned(entries=entries, seeds=2, problem="both", fixed={"noise": 0.1, "n_epochs": 2})
+        found = [(r.entry.name, r.learner, r.config.problem.name, r.config.seed) for r in runs]
+        first = [("a", "ars", "both", 0)] * 2
+        assert found == [*first, ("b", "ppo", "left", 7), *[("a", "ars", "both", 1)] * 2]
+        assert [run.choices for run in runs[:3]] == [{"episodes": 1}, {"episodes": 2}, {}]
+        assert (runs[0].config.noise, runs[2].config.n_epochs) == (0.5, 2)
+
+    def test_entries_that_come_to_the_same_are_both_told_of(self):
+        runs = planned(entries=[{"name": "a"}, {"name": "b"}])
+        assert [run.entry.name for run in runs] == ["a", "b"]
+        assert runs[0].key == runs[1].key
+
+    def test_choices_are_what_varies(self):
+        runs = planned(grid={"problem.task.tolerance": [0.05, 0.1]}, fixed={"noise": 0.2})
+        assert [run.choices for run in runs] == [
+            {"problem.task.tolerance": 0.05},
+            {"problem.task.tolerance": 0.1},
+        ]
+
+
+class TestKey:
+    def test_everything_that_matters_is_in_it(self):
+        base = {"seeds": 1, "fixed": {"iterations": 5}}
+        others = (
+            {},
+            {"first_seed": 1},
+            {"fixed": {"iterations": 6}},
+            {"fixed": {"iterations": 5, "noise": 0.5}},
+            {"trials": {"count": 7}},
+            {"problems": "left"},
+            {"fixed": {"iterations": 5, "problem.task.horizon": 5}},
+        )
+        keys = [planned(**{**base, **other})[0].key for other in others]
+        assert len(set(keys)) == len(keys)
+
+    def test_semantics_are_in_it(self, monkeypatch):
+        (before,) = planned()
+        monkeypatch.setattr("kinarm.evaluation.experiments.plan.SEMANTICS", "0")
+        (after,) = planned()
+        assert before.key != after.key
+
+    def test_the_base_key_is_without_iterations(self):
+        short, long = (planned(fixed={"iterations": n})[0] for n in (5, 6))
+        other = planned(fixed={"iterations": 6, "noise": 0.3})[0]
+        assert short.base_key == long.base_key != other.base_key
+
+
+class TestProblem:
+    @pytest.mark.parametrize(
+        ("path", "value", "found"),
+        [
+            ("task.start_spread", 0.3, lambda p: p.task.start_spread),
+            ("task.reward.success", 2.0, lambda p: p.task.reward.success),
+            ("stepping.time_step", 0.2, lambda p: p.stepping.time_step),
+            ("horizon", 9, lambda p: p.task.horizon),
+        ],
+    )
+    def test_a_field(self, path, value, found):
+        assert found(changed_problem(PROBLEMS["right"], path, value)) == value
+
+    def test_the_rest_stays(self):
+        problem = changed_problem(PROBLEMS["both"], "task.start_spread", 0.5)
+        assert problem == PROBLEMS["both"].replace(start_spread=0.5)
+
+    def test_a_field_of_a_pinned_arm_makes_another_arm(self):
+        """The hash of the arm that it was is not held against it."""
+        pinned = PROBLEMS["right"].pinned
+        problem = changed_problem(pinned, "arm.tool_offset", [0.0, 0.0, 0.2])
+        expected = PROBLEMS["right"].replace(
+            arm=replace(PROBLEMS["right"].arm, tool_offset=(0.0, 0.0, 0.2))
+        )
+        assert problem.arm_digest == expected.arm_digest != pinned.arm_digest
+
+    def test_a_scene_by_name(self):
+        problem = changed_problem(PROBLEMS["right"], "scene", "table")
+        assert problem.scene == ReachProblem.load("right").replace(scene="table").scene
+
+    @pytest.mark.parametrize(
+        ("path", "words"),
+        [
+            ("task.spread", "unknown field of problem.task 'spread'"),
+            ("tusk.spread", "unknown field of problem 'tusk'"),
+            ("task.horizon.x", "unknown field of problem.task.horizon 'x'"),
+        ],
+    )
+    def test_unknown(self, path, words):
+        with pytest.raises(KinarmError) as caught:
+            changed_problem(PROBLEMS["right"], path, 1)
+        assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("entries", "words"),
+    [
+        ({"fixed": {"learning_rate": 1.0}}, "unknown field of a recipe or problem 'learning_rate'"),
+        ({"grid": {"ppo.noise": [1]}}, "unknown field of a recipe or problem 'ppo.noise'"),
+        ({"fixed": {"seed": 1}}, "unknown field of a recipe or problem 'seed'"),
+        ({"fixed": {"noise": "much"}}, "noise must be a number, got 'much'"),
+        ({"grid": {"noise": [0.1, -1.0]}}, "noise must be greater than 0, got -1.0"),
+        (
+            {"grid": {"problem.task.start_spread": [0.2, 3.0]}},
+            "problem.task.start_spread: problem: task: start_spread must",
+        ),
+        (
+            {"fixed": {"problem.task.sperad": 1}},
+            "problem.task.sperad: unknown field of problem.task",
+        ),
+        ({"entries": [{"learner": "ars", "fixed": {"n_epochs": 1}}]}, "problem 'n_epochs'"),
+        ({"learners": "arse"}, "unknown learner 'arse'"),
+        ({"recipes": "tunde"}, "unknown recipe 'tunde'"),
+        ({"problems": "rihgt"}, "rihgt"),
+    ],
+)
+def test_plans_that_are_refused(entries, words):
+    with pytest.raises(InvalidInputError) as caught:
+        planned(**entries)
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
