@@ -2,9 +2,11 @@
 
 import hashlib
 import json
+import pickle
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, is_dataclass, replace
+from dataclasses import fields as dataclass_fields
 from functools import cached_property
 from itertools import product
 from typing import Any
@@ -49,6 +51,10 @@ class Run:
     choices: Mapping[str, Any] = field(default_factory=dict)
     entry: Entry = field(default_factory=Entry)
     plain: Mapping[str, Any] | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        fields = {item.name: getattr(self, item.name) for item in dataclass_fields(self)}
+        return _unpacked, (self.learner, pickle.dumps(fields))
 
     @cached_property
     def settings(self) -> dict[str, Any]:
@@ -106,6 +112,12 @@ class Run:
     def cost(self) -> float:
         """Rough duration relative to other trainings [s of a core]."""
         return self.config.cost
+
+
+def _unpacked(learner: str, fields: bytes) -> Run:
+    """A run in another process, which first finds its learner, wherever that is."""
+    find_learner(learner)
+    return Run(**pickle.loads(fields))
 
 
 def hash_of(entries: Any) -> str:

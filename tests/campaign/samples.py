@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from kinarm.evaluation.comparison.learners import read_learners
-from kinarm.evaluation.comparison.runs import CurvePoint, Run, plan, save_run
+from kinarm.evaluation.comparison.runs import CurvePoint, PlannedRun, planned_runs, save_run
 from kinarm.evaluation.comparison.runs import Protocol as ComparisonProtocol
 from kinarm.evaluation.contestants import find_contestants
 from kinarm.evaluation.document import document_text, evaluation_document
@@ -123,10 +123,10 @@ def save_training(folder: Path) -> None:
 
 
 @cache
-def planned_run() -> Run:
+def planned_run() -> PlannedRun:
     """A training of a comparison."""
     table = read_learners()
-    return plan([table["ars-paper"]], [trials().problem], 1, None, ComparisonProtocol())[0]
+    return planned_runs([table["ars-paper"]], [trials().problem], 1, None, ComparisonProtocol())[0]
 
 
 def save_comparison(folder: Path) -> None:

@@ -5,12 +5,13 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from kinarm.evaluation.experiments.runs import load_bounds, load_whole_run, planned_run
 from kinarm.evaluation.experiments.experiment import Experiment
+from kinarm.evaluation.experiments.runs import load_bounds, load_run, run_of_file
 from kinarm.evaluation.experiments.store import Store
 from kinarm.evaluation.experiments.study import Study
 from kinarm.evaluation.studies.transfer.planning import Protocol
-from kinarm.evaluation.studies.transfer.runs import load_run, policy_path, save_run
+from kinarm.evaluation.studies.transfer.runs import load_run as load_transferred
+from kinarm.evaluation.studies.transfer.runs import policy_path, save_run
 from kinarm.evaluation.studies.transfer.study import TransferStudy
 from kinarm.evaluation.studies.transfer.training import carry_out
 
@@ -69,8 +70,7 @@ def _study(path: Path) -> Study:
 
 def _load_run(path: Path) -> None:
     study = _study(path)
-    planned = planned_run(path)
-    load_whole_run(path, planned)
+    load_run(path, run_of_file(path), whole=True)
     len(study.table())
 
 
@@ -116,12 +116,12 @@ LOADERS = {
         ("evaluation.studies.transfer.runs.load_run",),
         lambda: [_transfer_files()[0]],
         damaged_json,
-        lambda path: load_run(path.parent, TRANSFER),
+        lambda path: load_transferred(path.parent, TRANSFER),
         f"{TRANSFER.name}.json",
         _save_transferred,
     ),
     "study": Loader(
-        ("evaluation.studies.experiment.load",),
+        ("evaluation.experiments.experiment.load",),
         lambda: [FILE],
         damaged_toml,
         _load_file,
@@ -129,9 +129,8 @@ LOADERS = {
     ),
     "study run": Loader(
         (
-            "evaluation.studies.runs.load_run",
-            "evaluation.studies.runs.load_whole_run",
-            "evaluation.studies.runs.planned_run",
+            "evaluation.experiments.runs.load_run",
+            "evaluation.experiments.runs.run_of_file",
         ),
         lambda: [_files()["runs"]],
         damaged_archive,
@@ -139,20 +138,20 @@ LOADERS = {
         f"runs/{KEY}.npz",
     ),
     "study bounds": Loader(
-        ("evaluation.studies.runs.load_bounds",),
+        ("evaluation.experiments.runs.load_bounds",),
         lambda: [_files()["bounds"]],
         damaged_archive,
         lambda path: load_bounds(path, 5),
     ),
     "record of a study run": Loader(
-        ("evaluation.studies.store.made",),
+        ("evaluation.experiments.store.made",),
         lambda: [_files()["made"]],
         damaged_json,
         _load_made,
         f"made/{KEY}.json",
     ),
     "failure of a study run": Loader(
-        ("evaluation.studies.store.failure",),
+        ("evaluation.experiments.store.failure",),
         lambda: [b'{"name": "a run", "error": "too much", "trace": ""}'],
         damaged_json,
         _load_failure,

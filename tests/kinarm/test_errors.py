@@ -15,6 +15,7 @@ from kinarm.errors import (
     ProblemError,
     RecordingFileError,
     StartInContactError,
+    TrainingFailedError,
     UnknownNameError,
     WorkerError,
 )
@@ -30,6 +31,7 @@ EXAMPLES = [
     OutputError("no space"),
     MissingExtraError("torch", "ppo"),
     WorkerError("a worker ended"),
+    TrainingFailedError({"ars right seed 0": "too fast"}, 4),
 ]
 
 

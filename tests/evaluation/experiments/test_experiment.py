@@ -126,7 +126,10 @@ TOY = {"learner": "ars", "recipe": "tuned"}
     ("entries", "words"),
     [
         ({"entries": [TOY, TOY]}, "entries names the same twice: ars-tuned, ars-tuned"),
-        ({"entries": [{**TOY, "fixed": {"noise": 1}, "grid": {"noise": [1]}}]}, "'noise' stands in"),
+        (
+            {"entries": [{**TOY, "fixed": {"noise": 1}, "grid": {"noise": [1]}}]},
+            "'noise' stands in",
+        ),
         ({"entries": [{**TOY, "grid": {"noise": 1}}]}, "grid.noise must be a list"),
         ({"trials": {"curve": {"points": 0}}}, "points must be a whole number of at least 1"),
         ({"trials": {"curve": {"spacing": "wide"}}}, "trials.curve.spacing must be"),
@@ -236,7 +239,9 @@ class TestRuns:
             {"name": "a", "learner": "ars", "fixed": {"noise": 0.5}, "grid": {"episodes": [1, 2]}},
             {"name": "b", "learner": "ppo", "problem": "left", "seeds": 1, "first_seed": 7},
         ]
-        runs = planned(entries=entries, seeds=2, problem="both", fixed={"noise": 0.1, "n_epochs": 2})
+        runs = planned(
+            entries=entries, seeds=2, problem="both", fixed={"noise": 0.1, "n_epochs": 2}
+        )
         found = [(r.entry.name, r.learner, r.config.problem.name, r.config.seed) for r in runs]
         first = [("a", "ars", "both", 0)] * 2
         assert found == [*first, ("b", "ppo", "left", 7), *[("a", "ars", "both", 1)] * 2]

@@ -12,8 +12,8 @@ from small_studies import SMALL
 
 from kinarm.errors import InvalidInputError, MissingExtraError
 from kinarm.evaluation.experiments import search as searches
-from kinarm.evaluation.experiments.search import open_search, recipe_entries
 from kinarm.evaluation.experiments.experiment import Experiment
+from kinarm.evaluation.experiments.search import open_search, recipe_entries
 from kinarm.evaluation.experiments.study import Study
 from kinarm.policies import recipe
 
