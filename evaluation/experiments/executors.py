@@ -16,12 +16,12 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 import kinarm
+from kinarm import SEMANTICS
 from kinarm._files import first_line
 from kinarm._interrupts import kept_from_children
 from kinarm.errors import WorkerError
 from kinarm.policies.oracle import ORACLE_SEMANTICS
 from kinarm.policies.provenance import package_versions
-from kinarm.semantics import SEMANTICS
 
 TaskT = TypeVar("TaskT")
 ResultT = TypeVar("ResultT")

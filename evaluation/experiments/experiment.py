@@ -13,7 +13,7 @@ from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.experiments.curve import TrialSettings
 from kinarm.evaluation.experiments.ranges import RANGE, check_range, draw
 from kinarm.problem_files import shipped_files
-from kinarm.streams import Stream, stream_generator
+from kinarm.randomness import Stream, stream_generator
 
 MOST_TRAININGS = 100_000
 """Trainings of an experiment at most: all of them are planned before the first begins."""

@@ -11,6 +11,7 @@ from functools import cached_property
 from itertools import product
 from typing import Any
 
+from kinarm import SEMANTICS
 from kinarm._fields import alternatives, field_types, from_plain, init_fields, to_plain
 from kinarm.errors import InvalidInputError, KinarmError, UnknownNameError
 from kinarm.evaluation.experiments.curve import TrialSettings
@@ -19,7 +20,6 @@ from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import Learner, find_learner
 from kinarm.policies.recipes import recipe
 from kinarm.problem import ReachProblem
-from kinarm.semantics import SEMANTICS
 
 PROBLEM = "problem."
 """What the path of a field of the problem begins with."""

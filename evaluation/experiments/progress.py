@@ -11,8 +11,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from kinarm._activities import told_of_activities
-from kinarm._progress import ProgressLine
+from kinarm._console import ProgressLine, told_of_activities
 from kinarm.policies.learners import TrainingState
 
 RENEWED = 0.2

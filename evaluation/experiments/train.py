@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from kinarm import SEMANTICS
 from kinarm.evaluation.experiments.curve import Curve, CurvePoint, TrialSettings, face
 from kinarm.evaluation.experiments.plan import Run
 from kinarm.evaluation.experiments.progress import Watcher
@@ -36,7 +37,6 @@ from kinarm.policies.learners import (
 from kinarm.policies.oracle import ORACLE_SEMANTICS, Oracle
 from kinarm.policies.policy import Policy
 from kinarm.problem import ReachProblem
-from kinarm.semantics import SEMANTICS
 
 CHECKPOINT_SECONDS = 5.0
 """How often a training saves how far it is [s]."""

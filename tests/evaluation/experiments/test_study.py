@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from small_studies import SMALL, Counting, contents
 
-from kinarm import _files
 from kinarm.errors import InvalidInputError, OutputError, TrainingFailedError
 from kinarm.evaluation import evaluate, oracle_bounds
 from kinarm.evaluation.experiments import train as training
@@ -252,26 +251,23 @@ ERRORS = {
 def test_each_write_fails_in_turn(small, monkeypatch, error):
     """Afterwards the same study goes on to the same results."""
     straight = small("straight", seeds=1).run(jobs=1)
-    replace, calls, failures = _files._replace, [], 0
+    sync, calls, failures = os.fsync, [], 0
 
-    def failing(target, write):
-        def interrupted(file):
-            write(file)
-            if len(calls) == failing_at:
-                raise ERRORS[error]()
-
-        calls.append(target)
-        replace(target, interrupted)
+    def failing(file):
+        calls.append(file)
+        if len(calls) == failing_at:
+            raise ERRORS[error]()
+        sync(file)
 
     for failing_at in range(1, 50):
         calls.clear()
         study = small(f"study{failing_at}", seeds=1)
-        monkeypatch.setattr(_files, "_replace", failing)
+        monkeypatch.setattr(os, "fsync", failing)
         try:
             study.run(executor=LocalExecutor(1))
         except (OutputError, KeyboardInterrupt):
             failures += 1
-            monkeypatch.setattr(_files, "_replace", replace)
+            monkeypatch.setattr(os, "fsync", sync)
             study.run(executor=LocalExecutor(1))
         assert contents(study.store.folder) == contents(straight.store.folder)
         assert list(study.store.folder.rglob("*.part")) == []
