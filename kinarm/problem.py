@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING, Any
 import tomli_w
 
 from kinarm._fields import check_fields, from_plain, init_fields, to_plain
-from kinarm._files import write_text
+from kinarm._files import absolute, write_text
 from kinarm._validation import whole_number
 from kinarm.arm_specification import ArmSpecification
-from kinarm.errors import InvalidInputError, ProblemError, UnknownNameError
+from kinarm.errors import ProblemError, UnknownNameError
+from kinarm.problem_files import PAPER_TASKS, find_scene, find_task, problem_file, read_problem
 from kinarm.scene import Scene
 from kinarm.task import ReachTask, RewardWeights
 
@@ -54,11 +55,7 @@ class Stepping:
         check_fields(self)
         if not (math.isfinite(self.time_step) and self.time_step > 0):
             raise ProblemError(f"time_step must be finite and above 0 s, got {self.time_step}")
-        whole_number("tested_configurations", self.tested_configurations, 1)
-        if self.tested_configurations > 32:
-            raise InvalidInputError(
-                f"tested_configurations must be at most 32, got {self.tested_configurations}"
-            )
+        whole_number("tested_configurations", self.tested_configurations, 1, 32)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,9 +129,11 @@ class ReachProblem:
             return problem
         if isinstance(problem, Mapping):
             return cls.from_json(problem)
-        from kinarm.problem_files import find_problem
-
-        return find_problem(problem)
+        if str(problem) in PROBLEMS:
+            return PROBLEMS[str(problem)]
+        path = problem_file(problem)
+        read = cls.from_json(read_problem(path), str(path))
+        return replace(read, arm=read.arm.resolved(absolute(path).parent))
 
     def replace(self, **overrides: Any) -> "ReachProblem":
         """Change some parts of it.
@@ -159,9 +158,11 @@ class ReachProblem:
         if not given:
             return self
         changes = _taken(given, ReachProblem)
-        for name, convert in PARTS.items():
-            if name in changes:
-                changes[name] = convert(changes[name])
+        if "arm" in changes:
+            changes["arm"] = _specification(changes["arm"])
+        for name, find in PARTS.items():
+            if isinstance(changes.get(name), str | Path):
+                changes[name] = find(changes[name])
         task, stepping = changes.get("task", self.task), changes.get("stepping", self.stepping)
         if isinstance(overrides.get("scene"), str | Path) and "task" not in changes:
             regions = {region.name for region in changes["scene"].goal_regions}
@@ -293,37 +294,22 @@ ProblemLike = ReachProblem | str | Path | Mapping[str, Any]
 """A problem, its name, the path of its file, or what `ReachProblem.to_json` returned."""
 
 PROBLEMS = {
-    "left": ReachProblem(name="left", task=ReachTask(goal_regions=("left",))),
-    "right": ReachProblem(name="right", task=ReachTask(goal_regions=("right",))),
-    "both": ReachProblem(name="both", task=ReachTask(goal_regions=("left", "right"))),
+    name: ReachProblem(name=name, task=ReachTask(goal_regions=regions))
+    for name, regions in PAPER_TASKS.items()
 }
 """The paper's tasks 1, 2 and 3 by name."""
+
+
+PARTS: dict[str, Callable[[Any], Any]] = {"scene": find_scene, "task": find_task}
+"""Parts of a problem that can be named, and how they are found."""
 
 
 def _specification(arm: "Arm | ArmSpecification | str | Path") -> ArmSpecification:
     from kinarm.arm import Arm
 
-    if isinstance(arm, Arm):
-        return arm.specification
     if isinstance(arm, ArmSpecification):
         return arm.resolved(Path())
-    return Arm.load(arm).specification
-
-
-def _scene(scene: "Scene | str | Path") -> Scene:
-    from kinarm.problem_files import find_scene
-
-    return scene if isinstance(scene, Scene) else find_scene(scene)
-
-
-def _task(task: "ReachTask | str | Path") -> ReachTask:
-    from kinarm.problem_files import find_task
-
-    return task if isinstance(task, ReachTask) else find_task(task)
-
-
-PARTS: dict[str, Callable[[Any], Any]] = {"arm": _specification, "scene": _scene, "task": _task}
-"""How `ReachProblem.replace` understands what it is given for some parts."""
+    return arm.specification if isinstance(arm, Arm) else Arm.load(arm).specification
 
 
 def _taken(given: dict[str, Any], kind: type) -> dict[str, Any]:

@@ -6,16 +6,21 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
-from kinarm._fields import from_plain, init_fields, read_toml, summary_of, take_base, to_plain
-from kinarm._files import absolute, is_file
+from kinarm._fields import from_plain, read_toml, summary_of, take_base, to_plain
+from kinarm._files import is_file
 from kinarm.errors import InvalidInputError, UnknownNameError
-from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.scene import Scene
 from kinarm.task import ReachTask
 
 Part = TypeVar("Part", Scene, ReachTask)
+
+PAPER_TASKS = {"left": ("left",), "right": ("right",), "both": ("left", "right")}
+"""Goal regions of the paper's tasks 1, 2 and 3 by the names of their problems."""
+
+KEYS = {"base", "name", "arm", "scene", "task", "stepping"}
+"""Keys of a problem file."""
 
 
 @cache
@@ -27,7 +32,7 @@ def shipped_files(folder: str) -> Mapping[str, Path]:
 
 def problem_names() -> tuple[str, ...]:
     """Names of the problems that ship with kinarm."""
-    return (*PROBLEMS, *shipped_files("problems"))
+    return (*PAPER_TASKS, *shipped_files("problems"))
 
 
 def scene_names() -> tuple[str, ...]:
@@ -35,19 +40,42 @@ def scene_names() -> tuple[str, ...]:
     return tuple(shipped_files("scenes"))
 
 
-def find_problem(name: str | Path) -> ReachProblem:
-    """Find a problem by name, or read it from a file.
+def problem_file(name: str | Path) -> Path:
+    """The file of a problem, by its name or path.
 
     Raises
     ------
     UnknownNameError
         If there is no such problem.
-    InvalidInputError
-        If the file cannot be used.
     """
-    if str(name) in PROBLEMS:
-        return PROBLEMS[str(name)]
-    return read_problem(_file("problem", name, "problems", tuple(PROBLEMS)))
+    return _file("problem", name, "problems", tuple(PAPER_TASKS))
+
+
+def read_problem(path: Path) -> dict[str, Any]:
+    """Read a problem file, as a table of what differs from the defaults of a problem.
+
+    Its parts are tables; ``arm``, ``scene`` and ``task`` may also be names or files. What is left
+    out is that of the problem ``base``. Without a word on goal regions, another scene's are all
+    to be reached.
+
+    Raises
+    ------
+    InvalidInputError
+        If the file, or that of a part, cannot be used.
+    """
+    entries = read_toml(path, "problem")
+    regions = PAPER_TASKS[take_base(entries, str(path), PAPER_TASKS, "right")]
+    scene, task = entries.get("scene"), entries.get("task", {})
+    if isinstance(entries.get("arm"), str):
+        entries["arm"] = {"source": entries["arm"]}
+    if isinstance(scene, str):
+        entries["scene"] = to_plain(find_scene(_beside(path, scene)))
+    if isinstance(task, str):
+        entries["task"] = to_plain(find_task(_beside(path, task)))
+    elif isinstance(task, Mapping):
+        new = isinstance(scene, str) or (isinstance(scene, Mapping) and "goal_regions" in scene)
+        entries["task"] = {"goal_regions": () if new else regions, **task}
+    return {"name": path.stem, **entries}
 
 
 def find_scene(name: str | Path) -> Scene:
@@ -73,46 +101,26 @@ def find_task(name: str | Path) -> ReachTask:
     InvalidInputError
         If the file cannot be used.
     """
+    if str(name) in PAPER_TASKS:
+        return ReachTask(goal_regions=PAPER_TASKS[str(name)])
     return _find_part(ReachTask, "task", name)
-
-
-def read_problem(path: Path) -> ReachProblem:
-    """Read a problem file.
-
-    Its parts are tables; ``arm``, ``scene`` and ``task`` may also be names or files. What is left
-    out is that of the problem ``base``. Without a word on goal regions, another scene's are all
-    to be reached.
-
-    Raises
-    ------
-    InvalidInputError
-        If it cannot be used; names file, key and what is expected.
-    """
-    entries = read_toml(path, "problem")
-    base = to_plain(PROBLEMS[take_base(entries, str(path), PROBLEMS, "right")])
-    scene, task = entries.get("scene"), entries.get("task")
-    if isinstance(entries.get("arm"), str):
-        entries["arm"] = {"source": entries["arm"]}
-    if isinstance(scene, str):
-        entries["scene"] = base["scene"] = to_plain(find_scene(_beside(path, scene)))
-    if isinstance(task, str):
-        entries["task"] = base["task"] = to_plain(find_task(_beside(path, task)))
-    elif isinstance(scene, str) or (isinstance(scene, Mapping) and "goal_regions" in scene):
-        base["task"]["goal_regions"] = []
-    given = {"name": path.stem, **entries}
-    problem = from_plain(ReachProblem, _merged(base, given), str(path))
-    return replace(problem, arm=problem.arm.resolved(absolute(path).parent))
 
 
 def _find_part(kind: type[Part], what: str, name: str | Path) -> Part:
     """Find a scene or a task."""
-    folder = f"{what}s"
-    if str(name) in problem_names() and str(name) not in shipped_files(folder):
-        return cast("Part", getattr(find_problem(name), what))
-    path = _file(what, name, folder, problem_names())
+    if str(name) in PAPER_TASKS:
+        return kind()
+    available = shipped_files(f"{what}s")
+    of_problem = str(name) in shipped_files("problems") and str(name) not in available
+    path = problem_file(name) if of_problem else _file(what, name, f"{what}s", problem_names())
     entries = read_toml(path, what)
-    if entries.keys() & ({"base"} | init_fields(ReachProblem).keys()):
-        return cast("Part", getattr(read_problem(path), what))
+    if entries.keys() & KEYS:
+        entries = read_problem(path)
+        part = from_plain(kind, entries.get(what, {}), str(path), f"{what}.")
+        if isinstance(part, ReachTask) and not part.goal_regions:
+            scene = from_plain(Scene, entries.get("scene", {}), str(path), "scene.")
+            part = replace(part, goal_regions=tuple(each.name for each in scene.goal_regions))
+        return part
     if kind is Scene:
         if "goal_regions" not in entries:
             wanted = summary_of(Scene, "goal_regions").lower()
@@ -137,10 +145,3 @@ def _beside(path: Path, name: str) -> str | Path:
     """What a file calls another one: a name, or a path that starts at its folder."""
     beside = path.parent / name
     return beside if is_file(beside) else name
-
-
-def _merged(below: Any, above: Any) -> Any:
-    """Merge tables key by key; other values come from ``above``."""
-    if not (isinstance(below, Mapping) and isinstance(above, Mapping)):
-        return above
-    return {**below, **{key: _merged(below.get(key), entry) for key, entry in above.items()}}

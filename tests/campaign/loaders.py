@@ -32,7 +32,7 @@ from kinarm.policies.checkpoint import load_checkpoint
 from kinarm.policies.conversion.sb3_models import sb3_model
 from kinarm.policies.conversion.vec_normalize import load_vec_normalize
 from kinarm.policies.learners import state_policy
-from kinarm.problem_files import find_scene, find_task, read_problem
+from kinarm.problem_files import find_scene, find_task
 from kinarm.recording import load_recordings
 from kinarm.viewer.mesh_files import read_mesh_file
 from kinarm.viewer.visual_shapes import visual_parts
@@ -76,7 +76,7 @@ def _evaluation(path: Path) -> None:
 
 
 def _problem(path: Path) -> None:
-    read_problem(path).to_toml()
+    ReachProblem.load(path).to_toml()
 
 
 def _arm(path: Path) -> None:

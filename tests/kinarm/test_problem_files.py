@@ -8,7 +8,6 @@ from kinarm.arm import ArmSpecification
 from kinarm.errors import ArmError, InvalidInputError, OutputError, ProblemError, UnknownNameError
 from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.problem_files import (
-    find_problem,
     find_scene,
     find_task,
     problem_names,
@@ -198,7 +197,7 @@ class TestFile:
 class TestShippedProblems:
     @pytest.mark.parametrize("name", shipped_files("problems"))
     def test_each_has_a_name_an_arm_and_a_scene_that_ships(self, name):
-        problem = find_problem(name)
+        problem = ReachProblem.load(name)
         assert problem.name == name
         assert name == f"{name.rpartition('-')[0]}-{problem.arm.name}"
         scene = find_scene(name.rpartition("-")[0])
@@ -230,7 +229,7 @@ class TestScenesAndTasks:
 
     def test_of_a_problem_by_name_or_file(self, write):
         assert find_scene("both") == Scene()
-        assert find_scene("shelf-panda") == find_problem("shelf-panda").scene
+        assert find_scene("shelf-panda") == ReachProblem.load("shelf-panda").scene
         assert find_task("left") == PROBLEMS["left"].task
         path = write('base = "left"\n[task]\nhorizon = 7')
         assert find_task(path) == PROBLEMS["left"].replace(horizon=7).task
@@ -244,7 +243,7 @@ class TestScenesAndTasks:
         write("horizon = 9", "task.toml")
         path = write('arm = "paper_flange"\nscene = "scene.toml"\ntask = "task.toml"')
         monkeypatch.chdir("/")
-        problem = find_problem(path)
+        problem = ReachProblem.load(path)
         assert problem.arm == ArmSpecification(source="paper_flange")
         assert problem.task == ReachTask(goal_regions=("top",), horizon=9)
         assert problem.scene.obstacles[0].name == "box"
