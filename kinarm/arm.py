@@ -19,8 +19,7 @@ from kinarm.arm_specification import AllowedContact, ArmSpecification
 from kinarm.chain import Chain
 from kinarm.errors import ArmError, UnknownNameError
 from kinarm.motion_bounds import link_lengths
-from kinarm.urdf import Description, read_urdf
-from kinarm.urdf_files import find_urdf
+from kinarm.urdf import Description, find_urdf, read_urdf
 
 DEFAULT_ARM = "paper"
 

@@ -11,7 +11,7 @@ import pinocchio as pin
 from kinarm._files import first_line
 from kinarm._validation import finite_array
 from kinarm.errors import ArmError
-from kinarm.hulls import hull_of_mesh
+from kinarm.meshes import hull_of_mesh
 from kinarm.urdf import Description
 
 

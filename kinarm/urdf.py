@@ -7,6 +7,7 @@ get a range, and the names of meshes become paths.
 
 import math
 from collections.abc import Collection, Mapping
+from importlib import metadata
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -15,19 +16,25 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from kinarm._files import first_line, read_file
-from kinarm.arm_specification import ArmSpecification
+from kinarm._files import absolute, first_line, is_file, is_folder
+from kinarm.arm_specification import PACKAGE, ArmSpecification, arm_names
 from kinarm.errors import ArmError, InvalidInputError, UnknownNameError
-from kinarm.urdf_files import resolve_meshes
-from kinarm.urdf_schema import FARTHEST, FARTHEST_POSITION, apply_schema
-from kinarm.urdf_tree import MOVING, TreeJoint, chain_to, read_joints
-from kinarm.xml_files import parse_xml
+from kinarm.meshes import resolve_meshes
+from kinarm.urdf_tree import (
+    FARTHEST,
+    FARTHEST_POSITION,
+    MOVING,
+    TreeJoint,
+    chain_to,
+    read_joints,
+    read_robot,
+)
 
 USUAL_TOOL = "tool0"
 """Name of the tool frame by ROS's convention."""
 
-LARGEST = 5 * 10**6
-"""Size of a URDF at most [bytes]."""
+FOLLOWING = (("multiplier", "1"), ("offset", "0"))
+"""Attributes of a mimicking joint, and what they are where they are left out."""
 
 
 class Description(NamedTuple):
@@ -57,6 +64,43 @@ class Description(NamedTuple):
     notes: tuple[str, ...]
 
 
+def find_urdf(source: str) -> Path:
+    """Resolve the source of a completed specification to a file.
+
+    Raises
+    ------
+    ArmError
+        If there is no such file.
+    UnknownNameError
+        If it is no path but a name.
+    """
+    if source.startswith(PACKAGE):
+        return _installed(source)
+    path = Path(source)
+    if is_file(path):
+        return absolute(path)
+    if is_folder(path):
+        raise ArmError(f"{source!r} is a folder, not a URDF")
+    if path.suffix == ".urdf" or path.parent != Path():
+        raise ArmError(f"URDF {source!r} does not exist")
+    raise UnknownNameError("arm", source, (*arm_names(), "path/to/robot.urdf", "path/to/arm.toml"))
+
+
+def _installed(source: str) -> Path:
+    """Find a file of the installed package of robot descriptions."""
+    name, _, inside = source.partition(":")
+    try:
+        package = metadata.distribution(name)
+    except metadata.PackageNotFoundError:
+        raise ArmError(
+            f"{Path(inside).name} is part of the package {name}: pip install 'kinarm[robots]'"
+        ) from None
+    share = Path(str(package.locate_file(f"cmeel.prefix/share/{name}/robots")))
+    if not (share / inside).is_file():
+        raise ArmError(f"the package {name} {package.version} has no {inside}: another version?")
+    return (share / inside).resolve()
+
+
 def read_urdf(path: Path, specification: ArmSpecification) -> Description:
     """Read a URDF and reduce it to a chain.
 
@@ -74,12 +118,12 @@ def read_urdf(path: Path, specification: ArmSpecification) -> Description:
     UnknownNameError
         If the specification names a joint that there is none of.
     """
-    robot = _parsed(path)
+    robot = read_robot(path)
     try:
         return _reduced(robot, path, specification)
     except InvalidInputError:
         raise
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise ArmError(f"{path.name} is not a readable URDF: {first_line(error)}") from error
 
 
@@ -119,23 +163,6 @@ def _reduced(
         held=held,
         notes=notes,
     )
-
-
-def _parsed(path: Path) -> ElementTree.Element:
-    """Parse the file."""
-    try:
-        robot = parse_xml(read_file(path, LARGEST))
-    except (OSError, ValueError) as error:
-        raise ArmError(f"{path.name} is not a readable URDF: {first_line(error)}") from error
-    if robot.tag != "robot":
-        raise ArmError(
-            f"{path.name} is not a readable URDF: its root is <{robot.tag}>, not <robot>"
-        )
-    capsules = robot.find("link/collision/geometry/capsule") is not None
-    if capsules and robot.get("version", "1.0") not in ("1.1", "1.2"):
-        raise ArmError(f'{path.name} has capsules, which need <robot version="1.2">')
-    apply_schema(robot, path.name)
-    return robot
 
 
 def _tool_frame(
@@ -234,10 +261,6 @@ def _held_positions(
                 f"most {FARTHEST_POSITION:g}"
             )
     return {name: positions[name] for name in joints if name in positions}
-
-
-FOLLOWING = (("multiplier", "1"), ("offset", "0"))
-"""Attributes of a mimicking joint, and what they are where they are left out."""
 
 
 def _near_zero(joint: TreeJoint) -> float:

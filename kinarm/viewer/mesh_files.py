@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm._archive import cached_arrays
 from kinarm._files import first_line
 from kinarm.errors import ArmError, MissingExtraError
-from kinarm.mesh_content import mesh_content
-from kinarm.urdf_schema import FARTHEST
+from kinarm.meshes import mesh_content
+from kinarm.urdf_tree import FARTHEST
 from kinarm.viewer.meshes import Mesh
 from kinarm.viewer.parts import packed_colour
 

@@ -15,7 +15,7 @@ import pinocchio as pin
 from kinarm.arm import Arm
 from kinarm.collision import body_names
 from kinarm.errors import ArmError, KinarmError
-from kinarm.urdf_schema import FARTHEST, check_numbers
+from kinarm.urdf_tree import FARTHEST, check_numbers
 from kinarm.viewer import industrial_arm
 from kinarm.viewer.mesh_files import PaintedMesh, read_mesh_file
 from kinarm.viewer.meshes import Mesh, box, capsule, cylinder, from_coal

@@ -26,12 +26,13 @@ from kinarm.evaluation.comparison.learners import read_learners
 from kinarm.evaluation.comparison.runs import load_run
 from kinarm.evaluation.document import EvaluationDocument
 from kinarm.evaluation.imported import imported_policy
-from kinarm.hulls import hull_of_mesh
+from kinarm.meshes import hull_of_mesh
 from kinarm.policies import Policy, recipe
 from kinarm.policies.checkpoint import load_checkpoint
 from kinarm.policies.conversion.sb3_models import sb3_model
 from kinarm.policies.conversion.vec_normalize import load_vec_normalize
 from kinarm.policies.learners import state_policy
+from kinarm.problem import ReachProblem
 from kinarm.problem_files import find_scene, find_task
 from kinarm.recording import load_recordings
 from kinarm.viewer.mesh_files import read_mesh_file
@@ -243,14 +244,14 @@ LOADERS: dict[str, Loader] = {
         "file.toml",
     ),
     "urdf": Loader(
-        ("kinarm.urdf._parsed",),
+        ("kinarm.urdf_tree.read_robot",),
         samples.urdfs,
         damaged_xml,
         _arm,
         "file.urdf",
     ),
     "urdf with meshes": Loader(
-        ("kinarm.urdf._parsed",),
+        ("kinarm.urdf_tree.read_robot",),
         lambda: [URDF_WITH_MESHES],
         damaged_xml,
         _seen_arm,
@@ -307,7 +308,7 @@ def _mesh_loaders() -> dict[str, Loader]:
         "dae": (samples.dae, damaged_xml),
     }
     readers: dict[str, tuple[str, Callable[..., Any]]] = {
-        "hull": ("kinarm.hulls.hull_of_mesh", hull_of_mesh),
+        "hull": ("kinarm.meshes.hull_of_mesh", hull_of_mesh),
         "looks": ("kinarm.viewer.mesh_files.read_mesh_file", read_mesh_file),
     }
     return {

@@ -1,4 +1,4 @@
-"""Hulls of meshes: never smaller than the mesh, little larger, and the same every time."""
+"""Mesh files and their hulls: never smaller than the mesh, little larger, always the same."""
 
 import numpy as np
 import pytest
@@ -6,9 +6,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from kinarm import hulls
+from kinarm import meshes
 from kinarm.errors import ArmError
-from kinarm.hulls import EXCESS, MANY_VERTICES, PLANES, enclosing_corners, hull_of_mesh
+from kinarm.meshes import (
+    EXCESS,
+    MANY_VERTICES,
+    PLANES,
+    enclosing_corners,
+    hull_of_mesh,
+    mesh_content,
+)
 
 
 @st.composite
@@ -86,7 +93,7 @@ def test_of_a_mesh_encloses_its_vertices(tmp_path, count):
 def test_is_looked_up_the_second_time(tmp_path, monkeypatch):
     write_ball(tmp_path / "ball.obj", 100)
     first = hull_of_mesh(tmp_path / "ball.obj", np.ones(3))
-    monkeypatch.setattr(hulls, "_corners", None)
+    monkeypatch.setattr(meshes, "_corners", None)
     second = hull_of_mesh(tmp_path / "ball.obj", np.ones(3))
     np.testing.assert_array_equal(first.points(), second.points())
     with pytest.raises(TypeError):
@@ -101,3 +108,29 @@ def test_what_is_no_mesh_is_refused(tmp_path, name):
     ) as caught:
         hull_of_mesh(tmp_path / name, np.ones(3))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("number", "reason"), [("nan", "away"), ("1e30", "away"), ("0", "volume")])
+def test_meshes_that_are_refused(tmp_path, number, reason):
+    corners = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, number)]
+    faces = "f 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"
+    path = tmp_path / "part.obj"
+    path.write_text("".join("v {} {} {}\n".format(*corner) for corner in corners) + faces)
+    with pytest.raises(ArmError, match=f"'part.obj'.*{reason}"):
+        hull_of_mesh(path, np.ones(3))
+
+
+def test_meshes_with_words_in_place_of_numbers(tmp_path):
+    path = tmp_path / "mesh.dae"
+    path.write_text("<COLLADA><float_array>1.0 two 3.0</float_array></COLLADA>")
+    with pytest.raises(ArmError, match=r"'mesh.dae' cannot .*<float_array> holds what is no"):
+        mesh_content(path)
+
+
+@pytest.mark.parametrize("count", ["-1e308", "-1", "24.5", "many", "", "99999999"])
+@pytest.mark.parametrize("name", ["count", "offset", "stride", "set"])
+def test_collada_whose_counts_are_none(tmp_path, name, count):
+    path = tmp_path / "mesh.dae"
+    path.write_text(f'<COLLADA><float_array {name}="{count}">1.0 2.0</float_array></COLLADA>')
+    with pytest.raises(ArmError, match=f"'mesh.dae' cannot .*{name} of <float_array> is no count"):
+        mesh_content(path)

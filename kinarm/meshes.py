@@ -1,7 +1,13 @@
-"""Convex hulls of meshes, with few vertices: never smaller than the hull of the mesh."""
+"""Mesh files: where they lie, what they hold, and their convex hulls.
+
+A hull has few vertices, and is never smaller than that of the mesh.
+"""
 
 import itertools
+import re
+from collections.abc import Collection
 from pathlib import Path
+from xml.etree import ElementTree
 
 import coal
 import numpy as np
@@ -9,9 +15,29 @@ from numpy.typing import NDArray
 from scipy.spatial import HalfspaceIntersection
 
 from kinarm._archive import Arrays, cached_arrays
-from kinarm._files import first_line
+from kinarm._files import absolute, first_line, is_file, read_file
 from kinarm.errors import ArmError
-from kinarm.mesh_content import check_vertices, mesh_content
+from kinarm.urdf_tree import FARTHEST, parse_xml
+
+FORMATS = (".dae", ".obj", ".stl")
+"""Endings of files that are read."""
+
+INDEX_TAGS = ("p", "h", "v", "vcount", "int_array")
+NUMBER_TAGS = ("float_array", "matrix", "translate", "rotate", "scale", "skew", "lookat", "color")
+"""Elements of Collada that hold numbers, whole or not."""
+
+COUNTS = ("count", "offset", "stride", "set")
+"""Attributes of Collada that are whole numbers, none of them negative."""
+
+INDICES = re.compile(r"\s*(?:-?\d{1,9}(?:\s+|$))*")
+NUMBERS = re.compile(r"\s*(?:[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?:\s+|$))*")
+
+FLAT = 1e-9
+"""Thickness over width of what has no volume."""
+
+LARGEST = 200 * 10**6
+"""Size of a mesh file at most [bytes]."""
+
 
 VERSION = 1
 """To be raised when the same mesh gets another hull."""
@@ -27,6 +53,87 @@ EXCESS = 1e-4
 
 GRID = 1e-9
 """Normals and offsets are multiples of this [1 and m], so that machines agree on them."""
+
+
+def resolve_meshes(robot: ElementTree.Element, path: Path, folders: Collection[str]) -> None:
+    """Replace names of meshes by paths; those that are missing are refused, if they can touch."""
+    for use in ("collision", "visual"):
+        for mesh in robot.findall(f"link/{use}/geometry/mesh"):
+            name = mesh.get("filename", "")
+            found = _mesh_path(name, path, folders)
+            if found is not None:
+                mesh.set("filename", str(found))
+            elif use == "collision":
+                raise ArmError(
+                    f"mesh {name!r} of {path.name} is not found; package_dirs names the folders "
+                    "of package:// meshes"
+                )
+
+
+def _mesh_path(name: str, path: Path, folders: Collection[str]) -> Path | None:
+    """Find a mesh in the package folders, or in one that the URDF lies in."""
+    scheme, separator, inside = name.partition("://")
+    if scheme == "file":
+        return Path(inside) if is_file(inside) else None
+    if not separator:
+        beside = path.parent / name
+        return absolute(beside) if is_file(beside) else None
+    around = (*map(Path, folders), *path.parents)
+    own = (folder.parent for folder in around if folder.name == inside.partition("/")[0])
+    for folder in (*around, *own):
+        if is_file(folder / inside):
+            return absolute(folder / inside)
+    return None
+
+
+def mesh_content(path: Path) -> bytes:
+    """Read a mesh file, of which nothing is known yet but that it claims no more than it holds.
+
+    Raises
+    ------
+    ArmError
+        If it cannot be read, is of another format, or claims more than it holds.
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise ArmError(f"mesh {path.name!r} must be a file of {', '.join(FORMATS)}")
+    try:
+        content = read_file(path, LARGEST)
+        if path.suffix.lower() == ".dae":
+            _check_collada(content)
+    except OSError as error:
+        raise ArmError(f"cannot read mesh {path.name!r}: {error.strerror}") from error
+    except ValueError as error:
+        raise ArmError(f"mesh {path.name!r} cannot be read: {first_line(error)}") from error
+    return content
+
+
+def _check_collada(content: bytes) -> None:
+    """Refuse a Collada file without numbers where they belong: Assimp hangs or ends the process."""
+    for element in parse_xml(content).iter():
+        tag = element.tag.rpartition("}")[2]
+        for name in COUNTS:
+            given = element.get(name, "0").strip()
+            if not (re.fullmatch(r"\d{1,9}", given) and int(given) <= len(content)):
+                raise ValueError(f"{name} of <{tag}> is no count of what the file can hold")
+        pattern = INDICES if tag in INDEX_TAGS else NUMBERS if tag in NUMBER_TAGS else None
+        if pattern is not None and not pattern.fullmatch(element.text or ""):
+            raise ValueError(f"<{tag}> holds what is no number")
+
+
+def check_vertices(path: Path, vertices: NDArray[np.float64]) -> None:
+    """Refuse a mesh whose vertices, shape (n, 3), span no volume or are too far away [m].
+
+    Raises
+    ------
+    ArmError
+        If they do.
+    """
+    farthest = np.abs(vertices).max(initial=0.0)
+    if not farthest <= FARTHEST:
+        raise ArmError(f"mesh {path.name!r} has a vertex {farthest:g} m away")
+    extents = np.linalg.svd(vertices - vertices.mean(axis=0), compute_uv=False)
+    if len(extents) < 3 or extents[2] <= FLAT * extents[0]:
+        raise ArmError(f"mesh {path.name!r} has no volume")
 
 
 def hull_of_mesh(path: Path, scale: NDArray[np.float64]) -> coal.ConvexBase:
