@@ -1,18 +1,190 @@
 """The goal-conditioned environments: goals to be relabelled with hindsight."""
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Literal, get_args
 
 import numpy as np
+from gymnasium.spaces import Dict, Space
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from kinarm.envs.interface import GoalInterface, RewardType
+from kinarm.envs.environment import ArmEnvironment
+from kinarm.envs.interface import (
+    Array,
+    Observations,
+    StepOutcome,
+    bounded_space,
+    checked_dtype,
+    state_bounds,
+)
 from kinarm.envs.reach import ReachEnv
 from kinarm.envs.vector import ReachVectorEnv
+from kinarm.episodes import TRUNCATED, Episodes
+from kinarm.errors import InvalidInputError
+from kinarm.observation import OBSERVATION, part_slices
 from kinarm.problem import ProblemLike
+from kinarm.rollouts import StepResult
 from kinarm.simulator import Simulator
 
+RewardType = Literal["sparse", "dense"]
 
-class ReachGoalEnv(ReachEnv):
+
+class GoalInterface:
+    """Goals as a dictionary, and rewards that can be computed for any goals.
+
+    A move that would touch something is refused and costs the problem's reward for a collision.
+    The episode goes on, so giving up never pays.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        The simulator that the environment shows.
+    dtype : dtype_like
+        Type of observations and goals: float64 or float32.
+    reward_type : {"sparse", "dense"}
+        -1 for every step that does not reach the goal and 0 for the one that does, or minus the
+        distance [m].
+
+    Raises
+    ------
+    InvalidInputError
+        If there is no such type.
+    """
+
+    tells_terms = False
+
+    def __init__(
+        self,
+        simulator: Simulator,
+        dtype: DTypeLike = np.float64,
+        reward_type: RewardType = "sparse",
+    ) -> None:
+        if reward_type not in get_args(RewardType):
+            raise InvalidInputError(
+                f"reward_type must be one of {list(get_args(RewardType))}, got {reward_type!r}"
+            )
+        self._dtype = checked_dtype(dtype)
+        self._sparse, self._tolerance = reward_type == "sparse", simulator.task.tolerance
+        self._horizon, self._collision = simulator.task.horizon, simulator.task.reward.collision
+        n_joints = simulator.arm.n_joints
+        self._places = part_slices(n_joints)
+        self._own = [self._places[part.name] for part in OBSERVATION if not part.of_goal]
+        lower, upper = state_bounds(simulator)
+        goals, reach = self._places["goal"], np.full(3, simulator.arm.reach)
+        bounds = {
+            "observation": (self._own_parts(lower), self._own_parts(upper)),
+            "achieved_goal": (-reach, reach),
+            "desired_goal": (lower[goals], upper[goals]),
+        }
+        spaces = {name: bounded_space(pair, self._dtype) for name, pair in bounds.items()}
+        self.observation_space: Space[Any] = Dict(spaces)
+
+    def observe(self, observations: Array) -> Observations:
+        """Split observations into ``observation``, ``achieved_goal`` and ``desired_goal``."""
+        achieved, desired = self._goals(observations)
+        own = self._own_parts(observations).astype(self._dtype, copy=False)
+        return {"observation": own, "achieved_goal": achieved, "desired_goal": desired}
+
+    def _own_parts(self, observations: Array) -> Array:
+        """Copy what does not depend on the goal, shape (..., n)."""
+        return np.concatenate([observations[..., place] for place in self._own], axis=-1)
+
+    def _goals(self, observations: Array) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Copy tool points and goals, shape (n, 3) each [m]."""
+        goals = observations[:, self._places["goal"]]
+        tools = goals - observations[:, self._places["goal_minus_tool"]]
+        return tools.astype(self._dtype, copy=False), goals.astype(self._dtype)
+
+    def step_outcome(self, episodes: Episodes, result: StepResult) -> StepOutcome:
+        """Reward by the goals, and let episodes go on whose move was refused."""
+        truncated = result.truncated
+        if np.count_nonzero(result.collision):
+            episodes.resume(result.collision.nonzero()[0], self._horizon)
+            truncated = truncated | (episodes.status == TRUNCATED) & result.collision
+        info = {"collision": result.collision}
+        reward = self.compute_reward(*self._goals(episodes.observation), info)
+        return StepOutcome(reward, result.success, truncated)
+
+    def compute_reward(
+        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
+    ) -> Array:
+        """Reward of having achieved one goal while another was desired.
+
+        Parameters
+        ----------
+        achieved_goal, desired_goal : array_like, shape (..., 3)
+            Tool point and goal [m].
+        info : mapping or sequence of mapping
+            That of the step, or one for each: whether there was a ``collision``.
+
+        Returns
+        -------
+        ndarray, shape (...)
+        """
+        distance = _distance(achieved_goal, desired_goal)
+        reached = np.where(distance <= self._tolerance, 0.0, -1.0) if self._sparse else -distance
+        return reached + self._collision * _collided(info)
+
+    def compute_terminated(self, achieved_goal: ArrayLike, desired_goal: ArrayLike) -> Any:
+        """Whether goals, shape (..., 3) [m], are reached."""
+        return _distance(achieved_goal, desired_goal) <= self._tolerance
+
+
+class GoalRewards(ArmEnvironment):
+    """The rewards and endings of an environment for any goals, as hindsight replay needs them."""
+
+    reward_type: RewardType
+
+    def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> GoalInterface:
+        self._goals = GoalInterface(simulator, dtype, self.reward_type)
+        return self._goals
+
+    def compute_reward(
+        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
+    ) -> Any:
+        """Reward of having achieved one goal while another was desired.
+
+        Parameters
+        ----------
+        achieved_goal, desired_goal : array_like, shape (..., 3)
+            Tool point and goal [m].
+        info : mapping or sequence of mapping
+            That of the step, or one for each: whether there was a ``collision``.
+
+        Returns
+        -------
+        float or ndarray, shape (...)
+        """
+        return self._goals.compute_reward(achieved_goal, desired_goal, info)[()]
+
+    def compute_terminated(
+        self,
+        achieved_goal: ArrayLike,
+        desired_goal: ArrayLike,
+        info: object,  # noqa: ARG002
+    ) -> Any:
+        """Whether goals are reached.
+
+        Parameters
+        ----------
+        achieved_goal, desired_goal, info
+            As for `compute_reward`; infos have no effect.
+        """
+        return self._goals.compute_terminated(achieved_goal, desired_goal)[()]
+
+    def compute_truncated(
+        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
+    ) -> Any:
+        """False: only the number of the step decides.
+
+        Parameters
+        ----------
+        achieved_goal, desired_goal, info
+            As for `compute_reward`.
+        """
+        return self.compute_terminated(achieved_goal, desired_goal, info) & False
+
+
+class ReachGoalEnv(GoalRewards, ReachEnv):
     """`ReachEnv` with goals as a dictionary, in the convention of Gymnasium-Robotics.
 
     Parameters
@@ -40,7 +212,7 @@ class ReachGoalEnv(ReachEnv):
     **End**: terminated when the tool is within the tolerance of the goal; truncated at the
     horizon. A move that would touch something is refused, the arm stays where it is, and the
     episode goes on. An end by contact would not follow from the goals, and would reward giving up.
-    ``kinarm-eval`` judges by the rules of `ReachEnv`, where contact ends an episode.
+    ``kinarm-eval`` goes by the rules of `ReachEnv`, where contact ends an episode.
 
     **Info**: that of `ReachEnv`, without reward terms; ``collision`` and ``contact`` are about
     the last step.
@@ -58,30 +230,8 @@ class ReachGoalEnv(ReachEnv):
         self.reward_type = reward_type
         super().__init__(problem, **settings)
 
-    def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> GoalInterface:
-        self._goals = GoalInterface(simulator, dtype, self.reward_type)
-        return self._goals
 
-    def compute_reward(
-        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
-    ) -> Any:
-        """Reward of goals, shape (..., 3) [m]: a float for one pair of them, else an array."""
-        return self._goals.compute_reward(achieved_goal, desired_goal, info)[()]
-
-    def compute_terminated(
-        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
-    ) -> Any:
-        """Whether goals, shape (..., 3) [m], are reached."""
-        return self._goals.compute_terminated(achieved_goal, desired_goal, info)[()]
-
-    def compute_truncated(
-        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
-    ) -> Any:
-        """False: only the number of the step decides."""
-        return self._goals.compute_truncated(achieved_goal, desired_goal, info)[()]
-
-
-class ReachGoalVectorEnv(ReachVectorEnv):
+class ReachGoalVectorEnv(GoalRewards, ReachVectorEnv):
     """A native batch of `ReachGoalEnv`.
 
     Parameters
@@ -103,12 +253,18 @@ class ReachGoalVectorEnv(ReachVectorEnv):
         self.reward_type = reward_type
         super().__init__(num_envs, problem, **settings)
 
-    def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> GoalInterface:
-        self._goals = GoalInterface(simulator, dtype, self.reward_type)
-        return self._goals
 
-    def compute_reward(
-        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
-    ) -> NDArray[np.float64]:
-        """Rewards of goals, shape (n, 3) each [m]."""
-        return self._goals.compute_reward(achieved_goal, desired_goal, info)
+def _collided(info: Any) -> NDArray[np.bool_]:
+    """Whether infos tell of a collision; one of a step, of a batch, or a sequence of them."""
+    if isinstance(info, Mapping):
+        return np.asarray(info.get("collision", False))
+    return np.array([each.get("collision", False) for each in info], dtype=bool)
+
+
+def _distance(first: ArrayLike, second: ArrayLike) -> Array:
+    """Distances between points, shape (..., 3) each."""
+    apart = np.asarray(first, dtype=np.float64) - np.asarray(second, dtype=np.float64)
+    squares = apart**2
+    # Term by term, so that the sum does not depend on how many points there are.
+    distance: Array = np.sqrt(squares[..., 0] + squares[..., 1] + squares[..., 2])
+    return distance

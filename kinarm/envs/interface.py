@@ -1,18 +1,17 @@
-"""What an environment shows of the simulator: observations, rewards and how episodes end.
+"""The interface of an environment: observations, rewards and how episodes end.
 
-The single environment, the native batch and the one for Stable-Baselines3 share an interface.
+The single environment, the native batch and the one for Stable-Baselines3 share it.
 """
 
-from collections.abc import Mapping
-from typing import Any, Literal, NamedTuple, Protocol, cast, get_args
+from typing import Any, NamedTuple, Protocol, cast
 
 import numpy as np
-from gymnasium.spaces import Box, Dict, Space
-from numpy.typing import ArrayLike, DTypeLike, NDArray
+from gymnasium.spaces import Box, Space
+from numpy.typing import DTypeLike, NDArray
 
-from kinarm.episodes import TRUNCATED, Episodes
+from kinarm.episodes import Episodes
 from kinarm.errors import InvalidInputError
-from kinarm.observation import OBSERVATION, Ranges, observation_bounds, part_slices
+from kinarm.observation import Ranges, observation_bounds
 from kinarm.rollouts import StepResult
 from kinarm.simulator import Simulator
 
@@ -20,12 +19,11 @@ Array = NDArray[np.float64]
 Observations = Any
 """An array, or a dictionary of arrays; one row per arm."""
 
-RewardType = Literal["sparse", "dense"]
 DTYPES = ("float64", "float32")
 
 
-class Verdict(NamedTuple):
-    """What a step came to, as a learner sees it; arrays of shape (n,).
+class StepOutcome(NamedTuple):
+    """The outcome of a step, as a learner sees it; arrays of shape (n,).
 
     Attributes
     ----------
@@ -41,7 +39,7 @@ class Verdict(NamedTuple):
 
 
 class Interface(Protocol):
-    """What an environment shows.
+    """The way in which an environment shows its simulator.
 
     Attributes
     ----------
@@ -57,7 +55,7 @@ class Interface(Protocol):
     def observe(self, observations: Array) -> Observations:
         """Copy the simulator's observations, shape (n, n_observations), as they are shown."""
 
-    def judge(self, episodes: Episodes, result: StepResult) -> Verdict:
+    def step_outcome(self, episodes: Episodes, result: StepResult) -> StepOutcome:
         """Reward a step, and say which episodes are over; may let episodes go on."""
 
 
@@ -76,134 +74,15 @@ class FlatInterface:
 
     def __init__(self, simulator: Simulator, dtype: DTypeLike = np.float64) -> None:
         self._dtype = checked_dtype(dtype)
-        self.observation_space = _box(*_bounds(simulator), self._dtype)
+        self.observation_space = bounded_space(state_bounds(simulator), self._dtype)
 
     def observe(self, observations: Array) -> Observations:
         """Copy observations in the type asked for."""
         return observations.astype(self._dtype)
 
-    def judge(self, episodes: Episodes, result: StepResult) -> Verdict:  # noqa: ARG002
+    def step_outcome(self, episodes: Episodes, result: StepResult) -> StepOutcome:  # noqa: ARG002
         """Take the simulator's reward and endings."""
-        return Verdict(result.reward, result.terminated, result.truncated)
-
-
-class GoalInterface:
-    """Goals as a dictionary, and rewards that can be computed for any goals.
-
-    A move that would touch something is refused and costs the problem's reward for a collision.
-    The episode goes on, so giving up never pays.
-
-    Parameters
-    ----------
-    simulator : Simulator
-        The simulator that the environment shows.
-    dtype : dtype_like
-        Type of observations and goals: float64 or float32.
-    reward_type : {"sparse", "dense"}
-        -1 for every step that does not reach the goal and 0 for the one that does, or minus the
-        distance [m].
-
-    Raises
-    ------
-    InvalidInputError
-        If there is no such type.
-    """
-
-    tells_terms = False
-
-    def __init__(
-        self,
-        simulator: Simulator,
-        dtype: DTypeLike = np.float64,
-        reward_type: RewardType = "sparse",
-    ) -> None:
-        if reward_type not in get_args(RewardType):
-            raise InvalidInputError(
-                f"reward_type must be one of {list(get_args(RewardType))}, got {reward_type!r}"
-            )
-        self._dtype = checked_dtype(dtype)
-        self._sparse, self._tolerance = reward_type == "sparse", simulator.task.tolerance
-        self._horizon, self._collision = simulator.task.horizon, simulator.task.reward.collision
-        n_joints = simulator.arm.n_joints
-        self._places = part_slices(n_joints)
-        self._own = [self._places[part.name] for part in OBSERVATION if not part.of_goal]
-        lower, upper = bounds = _bounds(simulator)
-        own_lower, own_upper = (
-            np.concatenate([bound[place] for place in self._own]) for bound in bounds
-        )
-        goals = self._places["goal"]
-        reach = np.full(3, simulator.arm.reach)
-        self.observation_space: Space[Any] = Dict(
-            {
-                "observation": _box(own_lower, own_upper, self._dtype),
-                "achieved_goal": _box(-reach, reach, self._dtype),
-                "desired_goal": _box(lower[goals], upper[goals], self._dtype),
-            }
-        )
-
-    def observe(self, observations: Array) -> Observations:
-        """Split observations into ``observation``, ``achieved_goal`` and ``desired_goal``."""
-        own = [observations[:, place] for place in self._own]
-        achieved, desired = self._goals(observations)
-        return {
-            "observation": np.concatenate(own, axis=1, dtype=self._dtype),
-            "achieved_goal": achieved,
-            "desired_goal": desired,
-        }
-
-    def _goals(self, observations: Array) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Copy tool points and goals, shape (n, 3) each [m]."""
-        goals = observations[:, self._places["goal"]]
-        tools = goals - observations[:, self._places["goal_minus_tool"]]
-        return tools.astype(self._dtype, copy=False), goals.astype(self._dtype)
-
-    def judge(self, episodes: Episodes, result: StepResult) -> Verdict:
-        """Reward by the goals, and let episodes go on whose move was refused."""
-        truncated = result.truncated
-        if np.count_nonzero(result.collision):
-            episodes.resume(result.collision.nonzero()[0], self._horizon)
-            truncated = truncated | (episodes.status == TRUNCATED) & result.collision
-        info = {"collision": result.collision}
-        reward = self.compute_reward(*self._goals(episodes.observation), info)
-        return Verdict(reward, result.success, truncated)
-
-    def compute_reward(
-        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
-    ) -> Array:
-        """Reward of having achieved one goal while another was desired.
-
-        Parameters
-        ----------
-        achieved_goal, desired_goal : array_like, shape (..., 3)
-            Tool point and goal [m].
-        info : mapping or sequence of mapping
-            That of the step, or one for each: whether there was a ``collision``.
-
-        Returns
-        -------
-        ndarray, shape (...)
-        """
-        distance = _distances(achieved_goal, desired_goal)
-        reached = np.where(distance <= self._tolerance, 0.0, -1.0) if self._sparse else -distance
-        return reached + self._collision * _collisions(info)
-
-    def compute_terminated(
-        self,
-        achieved_goal: ArrayLike,
-        desired_goal: ArrayLike,
-        info: object,  # noqa: ARG002
-    ) -> NDArray[np.bool_]:
-        """Whether the goal is reached; arguments as for `compute_reward`."""
-        return _distances(achieved_goal, desired_goal) <= self._tolerance
-
-    def compute_truncated(
-        self,
-        achieved_goal: ArrayLike,
-        desired_goal: ArrayLike,
-        info: object,  # noqa: ARG002
-    ) -> NDArray[np.bool_]:
-        """False: only the number of the step decides; arguments as for `compute_reward`."""
-        return np.zeros(_distances(achieved_goal, desired_goal).shape, dtype=bool)
+        return StepOutcome(result.reward, result.terminated, result.truncated)
 
 
 def one_by_one(observations: Observations, count: int) -> list[Any]:
@@ -230,23 +109,7 @@ def checked_dtype(dtype: DTypeLike) -> np.dtype[Any]:
     return np.dtype(name)
 
 
-def _collisions(info: Any) -> NDArray[np.bool_]:
-    """Whether infos tell of a collision; one of a step, of a batch, or a sequence of them."""
-    if isinstance(info, Mapping):
-        return np.asarray(info.get("collision", False))
-    return np.array([each.get("collision", False) for each in info], dtype=bool)
-
-
-def _distances(first: ArrayLike, second: ArrayLike) -> Array:
-    """Distances between points, shape (..., 3) each."""
-    apart = np.asarray(first, dtype=np.float64) - np.asarray(second, dtype=np.float64)
-    squares = apart**2
-    # Term by term, so that the sum does not depend on how many points there are.
-    distance: Array = np.sqrt(squares[..., 0] + squares[..., 1] + squares[..., 2])
-    return distance
-
-
-def _bounds(simulator: Simulator) -> tuple[Array, Array]:
+def state_bounds(simulator: Simulator) -> tuple[Array, Array]:
     """Bounds of an observation: goals to within the tolerance, quaternions to within rounding."""
     task = simulator.task
     regions = [simulator.scene.goal_region(name) for name in task.goal_regions]
@@ -258,5 +121,7 @@ def _bounds(simulator: Simulator) -> tuple[Array, Array]:
     return observation_bounds(ranges, simulator.arm.n_joints)
 
 
-def _box(lower: Array, upper: Array, dtype: np.dtype[Any]) -> Space[Any]:
-    return cast("Space[Any]", Box(lower.astype(dtype), upper.astype(dtype), dtype=dtype.type))
+def bounded_space(bounds: tuple[Array, Array], dtype: np.dtype[Any]) -> Space[Any]:
+    """Space of vectors of a type between a lower and an upper bound, shape (n,) each."""
+    lower, upper = (bound.astype(dtype) for bound in bounds)
+    return cast("Space[Any]", Box(lower, upper, dtype=dtype.type))

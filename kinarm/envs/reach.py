@@ -1,61 +1,33 @@
 """The Gymnasium environment: one arm."""
 
-from collections.abc import Mapping
-from typing import Any, cast
+from typing import Any
 
 import gymnasium
 import numpy as np
-from gymnasium.spaces import Box, Space
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import DTypeLike
 
 from kinarm._validation import finite_array
-from kinarm.envs.contacts import Contacts
-from kinarm.envs.errors import UnexpectedArgumentError
-from kinarm.envs.infos import TERM_KEYS
-from kinarm.envs.interface import FlatInterface, Interface, Observations
-from kinarm.envs.lifecycle import Lifecycle
-from kinarm.envs.portable import PortableSpec
+from kinarm.envs.environment import (
+    ArmEnvironment,
+    action_space,
+    environment_metadata,
+    make_simulator,
+    pick_scenario,
+)
+from kinarm.envs.infos import TERM_KEYS, Contacts
+from kinarm.envs.interface import Array, Observations
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
 from kinarm.episodes import COLLISION, RUNNING, SUCCESS, TRUNCATED, Episodes
-from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.observation import observation_table
-from kinarm.problem import ProblemLike, ReachProblem
+from kinarm.problem import ProblemLike
 from kinarm.rollouts import StepResult
 from kinarm.scenarios import ScenarioStream
-from kinarm.simulator import Simulator
-
-Array = NDArray[np.float64]
 
 FIRST_ROW = np.zeros(1, dtype=np.int64)
 """The only row of a batch of one."""
 
 
-def make_simulator(
-    problem: ProblemLike, threads: int | None, overrides: Mapping[str, Any]
-) -> Simulator:
-    """Build the simulator of an environment from the environment's arguments."""
-    try:
-        return Simulator(ReachProblem.load(problem).replace(**overrides), threads=threads)
-    except UnknownNameError as error:
-        if error.given not in overrides:
-            raise
-        raise UnexpectedArgumentError(
-            f"unexpected keyword argument {error.given!r}; available: {', '.join(error.available)}"
-        ) from error
-
-
-def action_space(simulator: Simulator) -> Space[Any]:
-    """Fractions of the velocity limits."""
-    return cast("Space[Any]", Box(-1.0, 1.0, (simulator.n_actions,), dtype=np.float32))
-
-
-def environment_metadata(simulator: Simulator, **others: Any) -> dict[str, Any]:
-    """What Gymnasium asks for: how it can be rendered, and how many steps make a second."""
-    rate = round(1 / simulator.problem.stepping.time_step)
-    return {"render_modes": list(RENDER_MODES), "render_fps": max(rate, 1), **others}
-
-
-class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
+class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
     """Reach a cube on a bench with a six-axis arm (paper, section 3).
 
     Parameters
@@ -134,10 +106,6 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
         self._told = ("distance", *(TERM_KEYS if self.interface.tells_terms else ()))
         self._stream: ScenarioStream | None = None
 
-    def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> Interface:
-        """What the environment shows of its simulator."""
-        return FlatInterface(simulator, dtype)
-
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, dict[str, Any]]:
@@ -168,7 +136,7 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
         except ValueError:  # of the simulator, or of NumPy
             self._check_action(action)
             raise
-        reward, terminated, truncated = self.interface.judge(episode, result)
+        reward, terminated, truncated = self.interface.step_outcome(episode, result)
         self._contacts.find(episode, result)
         self._pictures.step(episode)
         return (
@@ -213,7 +181,7 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
         return shown[0]
 
     def _info(self, result: StepResult) -> dict[str, Any]:
-        """What there is to tell about a step."""
+        """Tell about a step."""
         told = dict(zip(self._told, result.numbers[1:, 0].tolist(), strict=False))
         _, success, collision = result.flags[:, 0].tolist()
         told["success"] = told["is_success"] = success
@@ -223,11 +191,6 @@ class ReachEnv(Lifecycle, PortableSpec, gymnasium.Env[Any, Array]):
     def _check_action(self, action: Array) -> None:
         """Refuse an action that is not one number for each actuated joint."""
         finite_array("action", action, (self.simulator.n_actions,))
-
-    @property
-    def contact_names(self) -> tuple[tuple[str, str] | None, ...]:
-        """Names of the two bodies of a contact, by its number in the info."""
-        return self._contacts.names
 
 
 def _rst_table(rows: "list[tuple[str, ...]]") -> str:
@@ -244,23 +207,3 @@ def _rst_table(rows: "list[tuple[str, ...]]") -> str:
 ReachEnv.__doc__ = (ReachEnv.__doc__ or "").replace(
     "OBSERVATION_TABLE", _rst_table([("Index", "Meaning", "Unit"), *observation_table(6)])
 )
-
-
-def pick_scenario(
-    options: Mapping[str, Any] | None, start: Array, goal: Array
-) -> tuple[Array, Array]:
-    """Replace a start and a goal by what the options of a reset set.
-
-    Raises
-    ------
-    InvalidInputError
-        If an option is unknown, or has the wrong shape or an entry that is not finite.
-    """
-    given = dict(options or {})
-    unknown = set(given) - {"start", "goal"}
-    if unknown:
-        raise InvalidInputError(f"unknown reset options {sorted(unknown)}; available: start, goal")
-    return (
-        finite_array("start", given.get("start", start), start.shape),
-        finite_array("goal", given.get("goal", goal), goal.shape),
-    )

@@ -9,27 +9,23 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import DTypeLike, NDArray
 
 from kinarm._validation import whole_number
-from kinarm.envs.contacts import Contacts
-from kinarm.envs.infos import StepInfos, taken_out
-from kinarm.envs.interface import FlatInterface, Interface, Observations, one_by_one
-from kinarm.envs.lifecycle import Lifecycle
-from kinarm.envs.portable import PortableSpec
-from kinarm.envs.reach import (
-    Array,
+from kinarm.envs.environment import (
+    ArmEnvironment,
     action_space,
     environment_metadata,
     make_simulator,
     pick_scenario,
 )
+from kinarm.envs.infos import Contacts, StepInfos, taken_out
+from kinarm.envs.interface import Array, Observations, one_by_one
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
 from kinarm.envs.scenario_queues import ScenarioQueues
 from kinarm.episodes import RUNNING, Episodes
 from kinarm.errors import InvalidInputError
 from kinarm.problem import ProblemLike
-from kinarm.simulator import Simulator
 
 
-class ReachVectorEnv(Lifecycle, PortableSpec, VectorEnv[Any, Array, NDArray[Any]]):
+class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
     """A native batch of `ReachEnv`: all arms are stepped by one call of the compiled simulator.
 
     Sub-environment i behaves like a `ReachEnv` reset with ``seed + i``. Spaces, rewards, endings
@@ -99,10 +95,6 @@ class ReachVectorEnv(Lifecycle, PortableSpec, VectorEnv[Any, Array, NDArray[Any]
         self._infos = StepInfos(tells_terms=self.interface.tells_terms)
         self._queues: ScenarioQueues
 
-    def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> Interface:
-        """What the environment shows of its simulator."""
-        return FlatInterface(simulator, dtype)
-
     def reset(
         self,
         *,
@@ -152,7 +144,7 @@ class ReachVectorEnv(Lifecycle, PortableSpec, VectorEnv[Any, Array, NDArray[Any]
             over = np.flatnonzero(~running).tolist()
             raise InvalidInputError(f"episodes {over} are over: reset them with reset_mask")
         result = self.simulator.step(episodes, actions)
-        reward, terminated, truncated = self.interface.judge(episodes, result)
+        reward, terminated, truncated = self.interface.step_outcome(episodes, result)
         self._pictures.step(episodes)
         self._contacts.find(episodes, result)
         tables = self._infos.tables(result)
@@ -170,11 +162,6 @@ class ReachVectorEnv(Lifecycle, PortableSpec, VectorEnv[Any, Array, NDArray[Any]
         """Take a picture of every arm; see ``render_mode``."""
         _ = self.episodes  # refuses if there are none
         return self._pictures.render()
-
-    @property
-    def contact_names(self) -> tuple[tuple[str, str] | None, ...]:
-        """Names of the two bodies of a contact, by the numbers that infos tell; see `ReachEnv`."""
-        return self._contacts.names
 
     def close_extras(self, **_: Any) -> None:
         """Close the live page, if there is one; the environment cannot be used any more."""

@@ -6,7 +6,8 @@ import numpy as np
 from gymnasium.spaces import Box, Dict
 from numpy.typing import NDArray
 
-from kinarm.envs.interface import FlatInterface, GoalInterface, Interface
+from kinarm.envs.goal import GoalInterface
+from kinarm.envs.interface import FlatInterface, Interface
 from kinarm.errors import InvalidInputError
 from kinarm.observation import Ranges, observation_bounds, part_slices
 from kinarm.policies.conversion.vec_normalize import WHOLE

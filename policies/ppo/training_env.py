@@ -7,7 +7,7 @@ import numpy as np
 from gymnasium.spaces import Box, Space
 from numpy.typing import NDArray
 
-from kinarm.envs.interface import Verdict
+from kinarm.envs.interface import StepOutcome
 from kinarm.episodes import Episodes
 from kinarm.failed_scenarios import FailedScenarios, Replay, StartsAndGoals
 from kinarm.kernels.reward import COLLISION, SUCCESS
@@ -55,13 +55,13 @@ class NormalizedInterface:
         shown: NDArray[np.float32] = ((observations - self._mean) * self._scale).astype(np.float32)
         return shown
 
-    def judge(self, episodes: Episodes, result: StepResult) -> Verdict:
+    def step_outcome(self, episodes: Episodes, result: StepResult) -> StepOutcome:
         """Take the simulator's reward and endings, except for the penalty and for what passes."""
         passing = result.success & self.passes
         episodes.resume(passing.nonzero()[0], self._horizon)
         remitted = (1.0 - self.penalty) * result.terms[:, COLLISION]
         remitted += np.where(passing, result.terms[:, SUCCESS], 0.0)
-        return Verdict(result.reward - remitted, result.terminated & ~passing, result.truncated)
+        return StepOutcome(result.reward - remitted, result.terminated & ~passing, result.truncated)
 
 
 class EndedEpisodes(NamedTuple):

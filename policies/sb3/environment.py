@@ -7,7 +7,7 @@ from gymnasium.envs.registration import load_env_creator
 from numpy.typing import DTypeLike
 
 from kinarm._validation import whole_number
-from kinarm.envs.registration import ENVIRONMENTS
+from kinarm.envs import ENVIRONMENTS
 from kinarm.errors import UnknownNameError
 from kinarm.failed_scenarios import Replay
 from kinarm.policies.learners import find_learner

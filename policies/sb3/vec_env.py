@@ -10,9 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 
+from kinarm.envs.environment import Lifecycle, action_space, environment_metadata, pick_scenario
 from kinarm.envs.interface import Interface, Observations, one_by_one
-from kinarm.envs.lifecycle import Lifecycle
-from kinarm.envs.reach import action_space, environment_metadata, pick_scenario
 from kinarm.envs.rendering import EnvPictures
 from kinarm.episodes import SUCCESS, Episodes
 from kinarm.errors import InvalidInputError
@@ -220,7 +219,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
         """
         episodes = self.episodes
         result = self.simulator.step(episodes, self._actions)
-        verdict = self.interface.judge(episodes, result)
+        verdict = self.interface.step_outcome(episodes, result)
         self._returns += verdict.reward
         self._pictures.step(episodes)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]

@@ -58,7 +58,7 @@ NO_DOCUMENT = {
     "evaluation/studies/transfer/runs.py": "counts beside a policy",
     "evaluation/training_seeds.py": "is compared",
     "kinarm/_archive.py": "an archive's header",
-    "kinarm/envs/portable.py": "asks whether something can be written",
+    "kinarm/envs/environment.py": "asks whether something can be written",
     "kinarm/problem.py": "is hashed",
     "kinarm/viewer/html_page.py": "data of a page",
     "kinarm/viewer/mesh_files.py": "is hashed",

@@ -4,7 +4,7 @@ import gymnasium
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from kinarm.envs.registration import ENVIRONMENTS
+from kinarm.envs import ENVIRONMENTS
 
 
 @pytest.mark.parametrize("dtype", ["float64", "float32"])

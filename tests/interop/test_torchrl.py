@@ -5,7 +5,7 @@ import multiprocessing
 import gymnasium
 import pytest
 
-from kinarm.envs.registration import ENVIRONMENTS
+from kinarm.envs import ENVIRONMENTS
 
 pytestmark = pytest.mark.filterwarnings("default")  # those that importing torchrl raises
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from kinarm.envs.goal import ReachGoalEnv
-from kinarm.envs.interface import GoalInterface
+from kinarm.envs.goal import GoalInterface, ReachGoalEnv
 from kinarm.errors import InvalidInputError
 from kinarm.policies import load_policy
 from kinarm.policies.goal_observation import flat_observation

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kinarm.envs.contacts import Contacts
+from kinarm.envs.infos import Contacts
 from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
 

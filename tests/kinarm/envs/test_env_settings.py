@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
 
-from kinarm.envs.errors import UnexpectedArgumentError
+from kinarm.envs import UnexpectedArgumentError
 from kinarm.envs.reach import ReachEnv
 from kinarm.errors import InvalidInputError, ProblemError, UnknownNameError
 from kinarm.observation import observation_table

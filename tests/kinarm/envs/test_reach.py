@@ -11,8 +11,8 @@ import pytest
 from gymnasium.utils.env_checker import check_env, data_equivalence
 
 import kinarm
+from kinarm.envs import ENVIRONMENTS, register_environments
 from kinarm.envs.reach import ReachEnv
-from kinarm.envs.registration import ENVIRONMENTS, register_environments
 from kinarm.errors import InvalidInputError, StartInContactError
 from kinarm.problem import ReachProblem
 from kinarm.simulator import Simulator

@@ -4,7 +4,7 @@ import inspect
 
 import pytest
 
-from kinarm.envs.registration import ENVIRONMENTS
+from kinarm.envs import ENVIRONMENTS
 from kinarm.errors import UnknownNameError
 from kinarm.policies import zoo_hyperparameters
 
