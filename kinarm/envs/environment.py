@@ -14,7 +14,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from kinarm._validation import finite_array
 from kinarm.envs.infos import Contacts
-from kinarm.envs.interface import FlatInterface, Interface
+from kinarm.envs.interface import Interface
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
 from kinarm.episodes import Episodes
 from kinarm.errors import InvalidInputError, UnknownNameError
@@ -105,7 +105,7 @@ class ArmEnvironment(Lifecycle):
 
     def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> Interface:
         """Choose how the simulator is shown."""
-        return FlatInterface(simulator, dtype)
+        return Interface(simulator, dtype)
 
 
 def make_simulator(

@@ -4,12 +4,13 @@ from collections.abc import Mapping
 from typing import Any, Literal, get_args
 
 import numpy as np
-from gymnasium.spaces import Dict, Space
+from gymnasium.spaces import Dict
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from kinarm.envs.environment import ArmEnvironment
 from kinarm.envs.interface import (
     Array,
+    Interface,
     Observations,
     StepOutcome,
     bounded_space,
@@ -28,7 +29,7 @@ from kinarm.simulator import Simulator
 RewardType = Literal["sparse", "dense"]
 
 
-class GoalInterface:
+class GoalInterface(Interface):
     """Goals as a dictionary, and rewards that can be computed for any goals.
 
     A move that would touch something is refused and costs the problem's reward for a collision.
@@ -76,7 +77,7 @@ class GoalInterface:
             "desired_goal": (lower[goals], upper[goals]),
         }
         spaces = {name: bounded_space(pair, self._dtype) for name, pair in bounds.items()}
-        self.observation_space: Space[Any] = Dict(spaces)
+        self.observation_space = Dict(spaces)
 
     def observe(self, observations: Array) -> Observations:
         """Split observations into ``observation``, ``achieved_goal`` and ``desired_goal``."""

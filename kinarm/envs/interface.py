@@ -3,7 +3,7 @@
 The single environment, the native batch and the one for Stable-Baselines3 share it.
 """
 
-from typing import Any, NamedTuple, Protocol, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from gymnasium.spaces import Box, Space
@@ -38,8 +38,15 @@ class StepOutcome(NamedTuple):
     truncated: NDArray[np.bool_]
 
 
-class Interface(Protocol):
-    """The way in which an environment shows its simulator.
+class Interface:
+    """The way in which an environment shows its simulator: with its own observation and reward.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        What is shown.
+    dtype : dtype_like
+        Of observations: float64 or float32.
 
     Attributes
     ----------
@@ -50,26 +57,6 @@ class Interface(Protocol):
     """
 
     observation_space: Space[Any]
-    tells_terms: bool
-
-    def observe(self, observations: Array) -> Observations:
-        """Copy the simulator's observations, shape (n, n_observations), as they are shown."""
-
-    def step_outcome(self, episodes: Episodes, result: StepResult) -> StepOutcome:
-        """Reward a step, and say which episodes are over; may let episodes go on."""
-
-
-class FlatInterface:
-    """The simulator's own observation and reward.
-
-    Parameters
-    ----------
-    simulator : Simulator
-        What is shown.
-    dtype : dtype_like
-        Of observations: float64 or float32.
-    """
-
     tells_terms = True
 
     def __init__(self, simulator: Simulator, dtype: DTypeLike = np.float64) -> None:
@@ -77,11 +64,11 @@ class FlatInterface:
         self.observation_space = bounded_space(state_bounds(simulator), self._dtype)
 
     def observe(self, observations: Array) -> Observations:
-        """Copy observations in the type asked for."""
+        """Copy the simulator's observations, shape (n, n_observations), as they are shown."""
         return observations.astype(self._dtype)
 
     def step_outcome(self, episodes: Episodes, result: StepResult) -> StepOutcome:  # noqa: ARG002
-        """Take the simulator's reward and endings."""
+        """Reward a step, and say which episodes are over; may let episodes go on."""
         return StepOutcome(result.reward, result.terminated, result.truncated)
 
 

@@ -7,7 +7,7 @@ from gymnasium.spaces import Box, Dict
 from numpy.typing import NDArray
 
 from kinarm.envs.goal import GoalInterface
-from kinarm.envs.interface import FlatInterface, Interface
+from kinarm.envs.interface import Interface
 from kinarm.errors import InvalidInputError
 from kinarm.observation import Ranges, observation_bounds, part_slices
 from kinarm.policies.conversion.vec_normalize import WHOLE
@@ -50,14 +50,14 @@ def model_inputs(policy: Any, simulator: Simulator) -> ModelInputs:
     _check_actions(policy.action_space, simulator)
     actor = getattr(policy, "actor", None)
     extractor = policy.pi_features_extractor if actor is None else actor.features_extractor
-    kinds = {"FlattenExtractor": FlatInterface, "CombinedExtractor": GoalInterface}
+    kinds = {"FlattenExtractor": Interface, "CombinedExtractor": GoalInterface}
     parts = {type(part).__name__ for part in getattr(extractor, "extractors", {}).values()}
     if type(extractor).__name__ not in kinds or parts - {"Flatten"}:
         raise InvalidInputError(
             f"the model computes features of observations ({type(extractor).__name__}): only "
             "policies whose networks see the observation itself can be converted"
         )
-    interface: Interface = kinds[type(extractor).__name__](simulator)
+    interface = kinds[type(extractor).__name__](simulator)
     _check_observations(policy.observation_space, interface, simulator)
     keys = [*extractor.extractors] if isinstance(interface, GoalInterface) else [WHOLE]
     units = np.eye(simulator.n_observations)

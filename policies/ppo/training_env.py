@@ -1,13 +1,13 @@
 """The environment of a PPO training: normalised, on one side, and to be resumed."""
 
 import time
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from gymnasium.spaces import Box, Space
+from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from kinarm.envs.interface import StepOutcome
+from kinarm.envs.interface import Interface, StepOutcome
 from kinarm.episodes import Episodes
 from kinarm.failed_scenarios import FailedScenarios, Replay, StartsAndGoals
 from kinarm.kernels.reward import COLLISION, SUCCESS
@@ -20,7 +20,7 @@ from kinarm.rollouts import StepResult
 from kinarm.simulator import Simulator
 
 
-class NormalizedInterface:
+class NormalizedInterface(Interface):
     """The simulator's observation, normalised, and its own reward.
 
     Parameters
@@ -41,7 +41,7 @@ class NormalizedInterface:
     def __init__(self, simulator: Simulator) -> None:
         self._horizon, n_observations = simulator.task.horizon, simulator.n_observations
         unbounded = Box(-np.inf, np.inf, (n_observations,), dtype=np.float32)
-        self.observation_space: Space[Any] = unbounded
+        self.observation_space = unbounded
         self.penalty = 1.0
         self.passes: NDArray[np.bool_] = np.zeros(1, dtype=np.bool_)
         self.normalize_by(Normalizer.empty(n_observations))
