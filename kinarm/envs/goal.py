@@ -125,9 +125,32 @@ class GoalInterface(Interface):
         reached = np.where(distance <= self._tolerance, 0.0, -1.0) if self._sparse else -distance
         return reached + self._collision * _collided(info)
 
-    def compute_terminated(self, achieved_goal: ArrayLike, desired_goal: ArrayLike) -> Any:
-        """Whether goals, shape (..., 3) [m], are reached."""
+    def compute_terminated(
+        self,
+        achieved_goal: ArrayLike,
+        desired_goal: ArrayLike,
+        info: object,  # noqa: ARG002
+    ) -> Any:
+        """Whether the goal is reached.
+
+        Parameters
+        ----------
+        achieved_goal, desired_goal, info
+            As for `compute_reward`; infos have no effect.
+        """
         return _distance(achieved_goal, desired_goal) <= self._tolerance
+
+    def compute_truncated(
+        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
+    ) -> Any:
+        """False: only the number of the step decides.
+
+        Parameters
+        ----------
+        achieved_goal, desired_goal, info
+            As for `compute_reward`.
+        """
+        return self.compute_terminated(achieved_goal, desired_goal, info) & False
 
 
 class GoalRewards(ArmEnvironment):
@@ -142,35 +165,26 @@ class GoalRewards(ArmEnvironment):
     def compute_reward(
         self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
     ) -> Any:
-        """Reward of having achieved one goal while another was desired.
+        """Rewards of goals: a float for one pair of them, else an array.
 
         Parameters
         ----------
-        achieved_goal, desired_goal : array_like, shape (..., 3)
-            Tool point and goal [m].
-        info : mapping or sequence of mapping
-            That of the step, or one for each: whether there was a ``collision``.
-
-        Returns
-        -------
-        float or ndarray, shape (...)
+        achieved_goal, desired_goal, info
+            As for `GoalInterface.compute_reward`.
         """
         return self._goals.compute_reward(achieved_goal, desired_goal, info)[()]
 
     def compute_terminated(
-        self,
-        achieved_goal: ArrayLike,
-        desired_goal: ArrayLike,
-        info: object,  # noqa: ARG002
+        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
     ) -> Any:
         """Whether goals are reached.
 
         Parameters
         ----------
         achieved_goal, desired_goal, info
-            As for `compute_reward`; infos have no effect.
+            As for `GoalInterface.compute_reward`.
         """
-        return self._goals.compute_terminated(achieved_goal, desired_goal)[()]
+        return self._goals.compute_terminated(achieved_goal, desired_goal, info)[()]
 
     def compute_truncated(
         self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
@@ -180,9 +194,9 @@ class GoalRewards(ArmEnvironment):
         Parameters
         ----------
         achieved_goal, desired_goal, info
-            As for `compute_reward`.
+            As for `GoalInterface.compute_reward`.
         """
-        return self.compute_terminated(achieved_goal, desired_goal, info) & False
+        return self._goals.compute_truncated(achieved_goal, desired_goal, info)[()]
 
 
 class ReachGoalEnv(GoalRewards, ReachEnv):
