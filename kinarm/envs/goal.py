@@ -25,11 +25,76 @@ from kinarm.observation import OBSERVATION, part_slices
 from kinarm.problem import ProblemLike
 from kinarm.rollouts import StepResult
 from kinarm.simulator import Simulator
+from kinarm.task import ReachTask
 
 RewardType = Literal["sparse", "dense"]
 
 
-class GoalInterface(Interface):
+class GoalRewards:
+    """Rewards and endings that follow from goals, as hindsight replay needs them."""
+
+    _sparse: bool
+    _tolerance: float
+    _collision: float
+
+    def _reward_by(self, task: ReachTask, reward_type: RewardType) -> None:
+        """Reward as a type says, and as the task says of collisions."""
+        if reward_type not in get_args(RewardType):
+            raise InvalidInputError(
+                f"reward_type must be one of {list(get_args(RewardType))}, got {reward_type!r}"
+            )
+        self._sparse = reward_type == "sparse"
+        self._tolerance, self._collision = task.tolerance, task.reward.collision
+
+    def compute_reward(
+        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
+    ) -> Any:
+        """Reward of having achieved goals while others were desired.
+
+        Parameters
+        ----------
+        achieved_goal, desired_goal : array_like, shape (..., 3)
+            Tool point and goal [m].
+        info : mapping or sequence of mapping
+            That of the step, or one for each: whether there was a ``collision``.
+
+        Returns
+        -------
+        float or ndarray, shape (...)
+        """
+        distance = _distance(achieved_goal, desired_goal)
+        reached = np.where(distance <= self._tolerance, 0.0, -1.0) if self._sparse else -distance
+        return (reached + self._collision * _collided(info))[()]
+
+    def compute_terminated(
+        self,
+        achieved_goal: ArrayLike,
+        desired_goal: ArrayLike,
+        info: object,  # noqa: ARG002
+    ) -> Any:
+        """Whether goals are reached.
+
+        Parameters
+        ----------
+        achieved_goal, desired_goal, info
+            As for `compute_reward`; infos have no effect.
+        """
+        return _distance(achieved_goal, desired_goal) <= self._tolerance
+
+    def compute_truncated(
+        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
+    ) -> Any:
+        """False: only the number of the step decides.
+
+        Parameters
+        ----------
+        achieved_goal, desired_goal, info
+            As for `compute_reward`; infos have no effect.
+        """
+        return self.compute_terminated(achieved_goal, desired_goal, info) & False
+
+
+class GoalInterface(GoalRewards, Interface):
     """Goals as a dictionary, and rewards that can be computed for any goals.
 
     A move that would touch something is refused and costs the problem's reward for a collision.
@@ -59,13 +124,9 @@ class GoalInterface(Interface):
         dtype: DTypeLike = np.float64,
         reward_type: RewardType = "sparse",
     ) -> None:
-        if reward_type not in get_args(RewardType):
-            raise InvalidInputError(
-                f"reward_type must be one of {list(get_args(RewardType))}, got {reward_type!r}"
-            )
         self._dtype = checked_dtype(dtype)
-        self._sparse, self._tolerance = reward_type == "sparse", simulator.task.tolerance
-        self._horizon, self._collision = simulator.task.horizon, simulator.task.reward.collision
+        self._reward_by(simulator.task, reward_type)
+        self._horizon = simulator.task.horizon
         n_joints = simulator.arm.n_joints
         self._places = part_slices(n_joints)
         self._own = [self._places[part.name] for part in OBSERVATION if not part.of_goal]
@@ -105,101 +166,18 @@ class GoalInterface(Interface):
         reward = self.compute_reward(*self._goals(episodes.observation), info)
         return StepOutcome(reward, result.success, truncated)
 
-    def compute_reward(
-        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
-    ) -> Array:
-        """Reward of having achieved one goal while another was desired.
 
-        Parameters
-        ----------
-        achieved_goal, desired_goal : array_like, shape (..., 3)
-            Tool point and goal [m].
-        info : mapping or sequence of mapping
-            That of the step, or one for each: whether there was a ``collision``.
-
-        Returns
-        -------
-        ndarray, shape (...)
-        """
-        distance = _distance(achieved_goal, desired_goal)
-        reached = np.where(distance <= self._tolerance, 0.0, -1.0) if self._sparse else -distance
-        return reached + self._collision * _collided(info)
-
-    def compute_terminated(
-        self,
-        achieved_goal: ArrayLike,
-        desired_goal: ArrayLike,
-        info: object,  # noqa: ARG002
-    ) -> Any:
-        """Whether the goal is reached.
-
-        Parameters
-        ----------
-        achieved_goal, desired_goal, info
-            As for `compute_reward`; infos have no effect.
-        """
-        return _distance(achieved_goal, desired_goal) <= self._tolerance
-
-    def compute_truncated(
-        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
-    ) -> Any:
-        """False: only the number of the step decides.
-
-        Parameters
-        ----------
-        achieved_goal, desired_goal, info
-            As for `compute_reward`.
-        """
-        return self.compute_terminated(achieved_goal, desired_goal, info) & False
-
-
-class GoalRewards(ArmEnvironment):
-    """The rewards and endings of an environment for any goals, as hindsight replay needs them."""
+class GoalEnvironment(GoalRewards, ArmEnvironment):
+    """An environment that shows its simulator by a `GoalInterface`."""
 
     reward_type: RewardType
 
     def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> GoalInterface:
-        self._goals = GoalInterface(simulator, dtype, self.reward_type)
-        return self._goals
-
-    def compute_reward(
-        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
-    ) -> Any:
-        """Rewards of goals: a float for one pair of them, else an array.
-
-        Parameters
-        ----------
-        achieved_goal, desired_goal, info
-            As for `GoalInterface.compute_reward`.
-        """
-        return self._goals.compute_reward(achieved_goal, desired_goal, info)[()]
-
-    def compute_terminated(
-        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
-    ) -> Any:
-        """Whether goals are reached.
-
-        Parameters
-        ----------
-        achieved_goal, desired_goal, info
-            As for `GoalInterface.compute_reward`.
-        """
-        return self._goals.compute_terminated(achieved_goal, desired_goal, info)[()]
-
-    def compute_truncated(
-        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
-    ) -> Any:
-        """False: only the number of the step decides.
-
-        Parameters
-        ----------
-        achieved_goal, desired_goal, info
-            As for `GoalInterface.compute_reward`.
-        """
-        return self._goals.compute_truncated(achieved_goal, desired_goal, info)[()]
+        self._reward_by(simulator.task, self.reward_type)
+        return GoalInterface(simulator, dtype, self.reward_type)
 
 
-class ReachGoalEnv(GoalRewards, ReachEnv):
+class ReachGoalEnv(GoalEnvironment, ReachEnv):
     """`ReachEnv` with goals as a dictionary, in the convention of Gymnasium-Robotics.
 
     Parameters
@@ -246,7 +224,7 @@ class ReachGoalEnv(GoalRewards, ReachEnv):
         super().__init__(problem, **settings)
 
 
-class ReachGoalVectorEnv(GoalRewards, ReachVectorEnv):
+class ReachGoalVectorEnv(GoalEnvironment, ReachVectorEnv):
     """A native batch of `ReachGoalEnv`.
 
     Parameters

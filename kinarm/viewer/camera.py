@@ -68,19 +68,17 @@ class Camera(NamedTuple):
         InvalidInputError
             If it is neither, or a camera that sees nothing.
         """
-        fields = f"expected {', '.join(cls._fields)}"
-        if isinstance(camera, Mapping):
-            unknown = sorted(set(camera) - set(cls._fields))
-            if unknown or not {"position", "target"} <= set(camera):
-                raise InvalidInputError(f"camera has {sorted(camera)}; {fields}")
-            camera = tuple(camera.get(name, FIELD_OF_VIEW) for name in cls._fields)
-        if not isinstance(camera, Sequence) or isinstance(camera, str) or len(camera) not in (2, 3):
-            raise InvalidInputError(f"camera must be a Camera, got {camera!r}; {fields}")
+        try:
+            given = cls(**camera) if isinstance(camera, Mapping) else cls(*camera)
+        except TypeError as error:
+            raise InvalidInputError(
+                f"camera must be a Camera, got {camera!r}; expected {', '.join(cls._fields)}"
+            ) from error
         position, target = (
             finite_array(f"camera's {name}", value, (3,))
-            for name, value in zip(cls._fields, camera[:2], strict=False)
+            for name, value in zip(cls._fields, given[:2], strict=False)
         )
-        angle = camera[2] if len(camera) == 3 else FIELD_OF_VIEW
+        angle: object = given.field_of_view
         if isinstance(angle, bool) or not isinstance(angle, int | float) or not 0 < angle < 180:
             raise InvalidInputError(
                 f"camera's field_of_view must be between 0 and 180 degrees, got {angle!r}"

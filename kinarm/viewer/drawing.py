@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from kinarm.arm import Arm
 from kinarm.problem import ReachProblem
-from kinarm.scene import Obstacle, Scene
+from kinarm.scene import Scene
 from kinarm.viewer.camera import stage_scale
 from kinarm.viewer.lighting import SUN, SUN_PLACE
 from kinarm.viewer.meshes import Mesh, capsule, cylinder, tube
@@ -149,12 +149,7 @@ class _Sun(Object):
         sides = {"left": -1.7, "right": 1.7, "top": 1.7, "bottom": -1.7, "near": 0.5, "far": 8.0}
         shadow = {"mapSize": [2048, 2048], "bias": -0.0004, "normalBias": 0.004, "radius": 3}
         camera = {"uuid": f"{self.uuid}-camera", "type": "OrthographicCamera", "zoom": 1, **sides}
-        light = {
-            "uuid": self.uuid,
-            "type": "DirectionalLight",
-            "color": SUN,
-            "intensity": 0.5,
-        }
+        light = {"uuid": self.uuid, "type": "DirectionalLight", "color": SUN, "intensity": 0.5}
         return {"object": {**light, "shadow": {**shadow, "camera": camera}}}
 
 
@@ -210,15 +205,10 @@ def draw_surroundings(window: Visualizer, scene: Scene) -> None:
         grid = _BufferGeometry(position=_grid_lines().astype(np.float32))
         window["grid"].set_object(LineSegments(grid, LineBasicMaterial(color=GRID_COLOUR)))
     for number, obstacle in enumerate(scene.obstacles):
-        _draw_obstacle(window[f"obstacles/{number}"], obstacle, scene)
-
-
-def _draw_obstacle(window: Visualizer, obstacle: Obstacle, scene: Scene) -> None:
-    """A box; with a slab like a bench if goals lie on it."""
-    meshes = obstacle_meshes(obstacle, scene)
-    if meshes.top is not None:
-        put(window["top"], GOAL_SLAB, meshes.top)
-    put(window["body"], OBSTACLE, meshes.body)
+        place, meshes = window[f"obstacles/{number}"], obstacle_meshes(obstacle, scene)
+        if meshes.top is not None:
+            put(place["top"], GOAL_SLAB, meshes.top)
+        put(place["body"], OBSTACLE, meshes.body)
 
 
 def _grid_lines() -> NDArray[np.float64]:
@@ -262,6 +252,18 @@ def draw_arm(window: Visualizer, arm: Arm) -> list[Visualizer]:
 def draw_trace(
     window: Visualizer, points: NDArray[np.float64], outcome: str | None, scale: float
 ) -> None:
-    """The path of the tool, shape (n, 3) [m], in the colour of the outcome; none for a point."""
+    """Draw the way of the tool; none for a point.
+
+    Parameters
+    ----------
+    window : meshcat.Visualizer
+        Where to draw.
+    points : ndarray, shape (n, 3)
+        Where the tool has been [m].
+    outcome : {"success", "collision", "truncated"}, optional
+        How the episode ended, if it has, which decides about the colour.
+    scale : float
+        Size of the stage; see `kinarm.viewer.camera.stage_scale`.
+    """
     if len(points) > 1:
         put(window, TRACES[outcome], tube(points, scale * TRACE_RADIUS, TRACE_SIDES))

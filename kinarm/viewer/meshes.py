@@ -125,7 +125,15 @@ def lathe(profile: Sequence[tuple[float, float]], axis: str = "z") -> Mesh:
 
 
 def cylinder(length: float, radius: float, chamfer: float, axis: str = "z") -> Mesh:
-    """A cylinder about the origin with chamfered rims [m]."""
+    """A cylinder about the origin with chamfered rims.
+
+    Parameters
+    ----------
+    length, radius, chamfer : float
+        Its sizes [m].
+    axis : {"x", "y", "z"}
+        Where it points.
+    """
     half = length / 2
     profile = [(-half, radius - chamfer), (-half + chamfer, radius)]
     return lathe([*profile, (half - chamfer, radius), (half, radius - chamfer)], axis)
@@ -192,7 +200,17 @@ def capsule(length: float, radius: float) -> Mesh:
 
 
 def tube(points: ArrayLike, radius: float, sides: int = 6) -> Mesh:
-    """A tube along at least two points [m], with 2 * ``sides`` faces for each stretch in turn."""
+    """A tube along points, with 2 * ``sides`` faces for each stretch in turn.
+
+    Parameters
+    ----------
+    points : array_like, shape (n, 3)
+        At least two points [m].
+    radius : float
+        Radius of the tube [m].
+    sides : int
+        Corners of its cross section.
+    """
     middle = np.asarray(points, dtype=float)
     forward = np.gradient(middle, axis=0)
     lengths = np.linalg.norm(forward, axis=1)

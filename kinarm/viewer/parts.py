@@ -1,4 +1,4 @@
-"""What drawn things are made of: meshes with a finish, carried by a joint; and their colours."""
+"""Parts of drawn things: meshes with a finish, carried by a joint; and colours."""
 
 from typing import NamedTuple
 

@@ -12,10 +12,9 @@ from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.recording import OUTCOMES
 from kinarm.viewer import lighting
 from kinarm.viewer.camera import Camera, CameraLike, picture_size
-from kinarm.viewer.kernels.lighting import Lights, Materials
 from kinarm.viewer.kernels.rasterising import draw_shadow, draw_view, project
 from kinarm.viewer.kernels.shading import paint_floor, shade
-from kinarm.viewer.kernels.views import Backdrop, Balls, Eye, Surfaces, View
+from kinarm.viewer.kernels.views import Backdrop, Balls, Eye, Lights, Materials, Surfaces, View
 from kinarm.viewer.parts import OUTCOME_COLOURS, Finish, channels, to_linear, to_srgb
 from kinarm.viewer.surroundings import FLASH_RADIUS, FLOOR_RADIUS, GRID_RADIUS, GRID_STEP
 from kinarm.viewer.triangle_scene import CUBE, TriangleScene

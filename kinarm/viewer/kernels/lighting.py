@@ -1,62 +1,9 @@
-"""What light does at a place of a surface, by the formulas of three.js' standard material."""
+"""The light that a place of a surface sends out, by three.js' standard material."""
 
 import math
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import Array, Vector, inlined
-
-
-class Materials(NamedTuple):
-    """Surfaces, one a row.
-
-    Attributes
-    ----------
-    colour, emission : ndarray, shape (n, 3)
-        Reflected and emitted light, red, green and blue, linear.
-    roughness, metalness : ndarray, shape (n,)
-        Of three.js' standard material.
-    room : ndarray of int, shape (n,)
-        Which of the reflections of `Lights` has this roughness.
-    """
-
-    colour: Array
-    emission: Array
-    roughness: Array
-    metalness: Array
-    room: NDArray[np.int64]
-
-
-class Lights(NamedTuple):
-    """Where light comes from; colours are linear.
-
-    Attributes
-    ----------
-    directions, colours : ndarray, shape (2, 3)
-        Towards two lights from afar, and how bright they are; the first, the sun, casts shadows.
-    sky, ground : ndarray, shape (3,)
-        Light from the left (y) and from the right, which fade into each other.
-    irradiance : ndarray, shape (n, n, 3)
-        Light of the room on surfaces that face a direction, as an octahedral map.
-    reflections : ndarray, shape (n_rooms, n, n, 3)
-        Light of the room, blurred as it is seen in a rough surface.
-    sunward : ndarray, shape (3, 4)
-        World to shadow map.
-    shadow : ndarray, shape (n, n)
-        How near the sun the last surface is that keeps it off [m].
-    """
-
-    directions: Array
-    colours: Array
-    sky: Array
-    ground: Array
-    irradiance: Array
-    reflections: Array
-    sunward: Array
-    shadow: NDArray[np.float32]
-
+from kinarm.viewer.kernels.views import Lights, Materials
 
 SHADOW_BIAS = 0.002
 """How much nearer the sun a shadow's cause must be [m]."""
@@ -69,14 +16,15 @@ Cell = tuple[int, int, float, float]
 
 
 @inlined
-def unit(x: float, y: float, z: float) -> Vector:
+def unit(vector: Vector) -> Vector:
     """Scale a vector to length 1."""
+    x, y, z = vector
     scale = 1.0 / max(math.sqrt(x * x + y * y + z * z), 1e-12)
     return x * scale, y * scale, z * scale
 
 
 @inlined
-def octahedral(x: float, y: float, z: float, size: int) -> Cell:
+def _octahedral(x: float, y: float, z: float, size: int) -> Cell:
     """Cell of an octahedral map that a direction falls into."""
     span = 1.0 / max(abs(x) + abs(y) + abs(z), 1e-12)
     u, v = x * span, y * span
@@ -88,7 +36,7 @@ def octahedral(x: float, y: float, z: float, size: int) -> Cell:
 
 
 @inlined
-def look_up(table: Array, cell: Cell, channel: int) -> float:
+def _look_up(table: Array, cell: Cell, channel: int) -> float:
     """Value of a map between its nodes."""
     row, column, v, u = cell
     upper = (1.0 - u) * table[row, column, channel] + u * table[row, column + 1, channel]
@@ -98,8 +46,9 @@ def look_up(table: Array, cell: Cell, channel: int) -> float:
 
 
 @inlined
-def sunlit(lights: Lights, x: float, y: float, z: float) -> float:
+def sunlit(lights: Lights, place: Vector) -> float:
     """Share of the sun that reaches a place, averaged over three by three texels."""
+    x, y, z = place
     m, shadow = lights.sunward, lights.shadow
     u = m[0, 0] * x + m[0, 1] * y + m[0, 2] * z + m[0, 3] - 1.5
     v = m[1, 0] * x + m[1, 1] * y + m[1, 2] * z + m[1, 3] - 1.5
@@ -120,10 +69,10 @@ def sunlit(lights: Lights, x: float, y: float, z: float) -> float:
 
 
 @inlined
-def shine(
+def _shine(
     lights: Lights, light: int, normal: Vector, view: Vector, square: float, facing: float
 ) -> Vector:
-    """What a light from afar does to a surface.
+    """Light from afar on a surface.
 
     Returns the cosine of the light's angle, and the cosine times GGX with Smith's visibility, in
     two parts by Schlick's Fresnel term: for a mirror of colour 1, and for any surface.
@@ -134,7 +83,7 @@ def shine(
     cosine = x * lx + y * ly + z * lz
     if cosine <= 0.0:
         return 0.0, 0.0, 0.0
-    hx, hy, hz = unit(lx + view[0], ly + view[1], lz + view[2])
+    hx, hy, hz = unit((lx + view[0], ly + view[1], lz + view[2]))
     half = max(x * hx + y * hy + z * hz, 0.0)
     tilt = view[0] * hx + view[1] * hy + view[2] * hz
     fresnel = math.exp(LOG_2 * (-5.55473 * tilt - 6.98316) * tilt)
@@ -154,12 +103,23 @@ def light_up(
     normal: Vector,
     view: Vector,
 ) -> Vector:
-    """Light that a surface sends to the eye, if a share of the sun reaches it.
-
-    ``normal`` and ``view`` are unit vectors.
+    """Light that a surface sends to the eye: red, green and blue, linear.
 
     The room's light follows Karis' fit of what a rough surface mirrors, and Fdez-Aguera's of what
     it mirrors more than once.
+
+    Parameters
+    ----------
+    materials : Materials
+        All materials.
+    lights : Lights
+        Where light comes from.
+    material : int
+        Row of the surface's material.
+    share : float
+        Share of the sun that reaches it.
+    normal, view : tuple of float
+        Unit vectors: away from the surface, and towards the eye.
     """
     x, y, z = normal
     roughness, metalness = materials.roughness[material], materials.metalness[material]
@@ -167,33 +127,36 @@ def light_up(
     along = x * view[0] + y * view[1] + z * view[2]
     facing = max(along, 0.0)
 
+    # How a rough surface mirrors the room: once, in parts by its colour, and what is lost.
     bend = math.exp(-9.28 * LOG_2 * facing)
     bend = min((1.0 - roughness) ** 2, bend) * (1.0 - roughness) + 0.0425 - 0.0275 * roughness
     slope = 1.04 - 0.572 * roughness - 1.04 * bend  # per mirrored light of a colour
     base = 0.022 * roughness - 0.04 + 1.04 * bend  # and of any
     lost = 1.0 - slope - base
-    around = octahedral(x, y, z, lights.irradiance.shape[0])
+    # Where the maps of the room are looked up, and the two lights from afar.
+    around = _octahedral(x, y, z, lights.irradiance.shape[0])
     table = lights.reflections[materials.room[material]]
-    mirrored = octahedral(
+    mirrored = _octahedral(
         (2.0 * along * x - view[0]) * (1.0 - alpha) + x * alpha,
         (2.0 * along * y - view[1]) * (1.0 - alpha) + y * alpha,
         (2.0 * along * z - view[2]) * (1.0 - alpha) + z * alpha,
         table.shape[0],
     )
-    sun = shine(lights, 0, normal, view, alpha * alpha, facing)
-    fill = shine(lights, 1, normal, view, alpha * alpha, facing)
+    sun = _shine(lights, 0, normal, view, alpha * alpha, facing)
+    fill = _shine(lights, 1, normal, view, alpha * alpha, facing)
 
+    # Sums of all light, by channel.
     light = (0.0, 0.0, 0.0)
     for channel in range(3):
         colour = materials.colour[material, channel]
         body = colour * (1.0 - metalness)
         mirror = 0.04 + (colour - 0.04) * metalness
-        room = look_up(lights.irradiance, around, channel)
+        room = _look_up(lights.irradiance, around, channel)
         once = mirror * slope + base
         mean = mirror + (1.0 - mirror) * 0.047619
         again = once * mean / (1.0 - lost * mean) * lost
         total = materials.emission[material, channel]
-        total += once * look_up(table, mirrored, channel)
+        total += once * _look_up(table, mirrored, channel)
         total += room * (again + body * (1.0 - once - again))
         ground, sky = lights.ground[channel], lights.sky[channel]
         total += body * (ground + (0.5 + 0.5 * y) * (sky - ground))

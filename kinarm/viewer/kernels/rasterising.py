@@ -5,14 +5,32 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.kernels.compiling import Array, kernel
-from kinarm.viewer.kernels.edges import edge, within
+from kinarm.kernels.compiling import Array, Vector, inlined, kernel
 
 NEAR = 0.01
 """Distance from the camera below which corners do not bound a triangle's picture [m]."""
 
 WIDE = 6
 """Columns from which on it is worth while to find those of a row that a triangle reaches."""
+
+
+@inlined
+def edge(a: Vector, b: Vector) -> Vector:
+    """Coefficients of x, y and 1 of a function that is zero on the line through two corners."""
+    ax, ay, aw = a
+    bx, by, bw = b
+    return ay * bw - by * aw, aw * bx - bw * ax, ax * by - bx * ay
+
+
+@inlined
+def _within(a: float, b: float, c: float, row: int, first: int, last: int) -> tuple[int, int]:
+    """Columns from first to last in whose pixels of a row a x + b y + c may be 0 or more."""
+    most = b * (row + (1 if b > 0.0 else 0)) + c
+    if a > 0.0:
+        return max(first, math.floor(min(-most / a, last + 1.0)) - 1), last
+    if a < 0.0:
+        return first, min(last, math.floor(max(-most / a, first - 1.0)))
+    return (first, last) if most >= 0.0 else (first, first - 1)
 
 
 @kernel
@@ -24,7 +42,19 @@ def place(
     places: Array,
     facings: Array,
 ) -> None:
-    """Move vertices and normals from frames with poses, shape (n_frames, 3, 4), to the world."""
+    """Move vertices and normals from their frames to the world.
+
+    Parameters
+    ----------
+    vertices, normals : ndarray, shape (n_vertices, 3)
+        In their frames [m].
+    frames : ndarray of int, shape (n_vertices,)
+        Frame of each vertex.
+    poses : ndarray, shape (n_frames, 3, 4)
+        Frames in the world.
+    places, facings : ndarray, shape (n_vertices, 3)
+        Vertices and normals in the world; filled in.
+    """
     for i in range(vertices.shape[0]):
         pose = frames[i]
         x, y, z = vertices[i, 0], vertices[i, 1], vertices[i, 2]
@@ -37,7 +67,17 @@ def place(
 
 @kernel
 def project(places: Array, projection: Array, corners: Array) -> None:
-    """Apply a projection, shape (3, 4), to places."""
+    """Apply a projection to places.
+
+    Parameters
+    ----------
+    places : ndarray, shape (n, 3)
+        In the world [m].
+    projection : ndarray, shape (3, 4)
+        For columns of x, y, z and 1.
+    corners : ndarray, shape (n, 3)
+        Filled in.
+    """
     for i in range(places.shape[0]):
         x, y, z = places[i, 0], places[i, 1], places[i, 2]
         for k in range(3):
@@ -61,6 +101,19 @@ def draw_view(
 
     Barycentric coordinates over the distance are linear in the picture (Olano and Greer, 1997),
     so triangles that reach behind the camera need no clipping.
+
+    Parameters
+    ----------
+    corners : ndarray, shape (n_vertices, 3)
+        Vertices as the camera sees them: column and row of the picture times the distance along
+        the line of sight, and that distance [m].
+    faces : ndarray of int, shape (n_faces, 3)
+        Vertices of each triangle.
+    offsets : ndarray, shape (n_samples, 2)
+        Where in a pixel its samples lie, from its upper left corner.
+    nearness, index : ndarray, shape (height, width, n_samples)
+        What a sample shows: the inverse of its distance [1/m], and the triangle, -1 for none;
+        changed in place.
     """
     height, width, n_samples = index.shape
     for face in range(faces.shape[0]):
@@ -68,10 +121,12 @@ def draw_view(
         xi, yi, wi = corners[i, 0], corners[i, 1], corners[i, 2]
         xj, yj, wj = corners[j, 0], corners[j, 1], corners[j, 2]
         xk, yk, wk = corners[k, 0], corners[k, 1], corners[k, 2]
-        ai, bi, ci = edge(xj, yj, wj, xk, yk, wk)
+        # Six times the volume between the camera and the triangle; positive ones face away.
+        ai, bi, ci = edge((xj, yj, wj), (xk, yk, wk))
         volume = ai * xi + bi * yi + ci * wi
         if volume >= 0.0 or max(wi, wj, wk) < NEAR:
             continue
+        # Pixels around the three corners; all of them if one is behind the camera.
         left, right, top, bottom = 0, width - 1, 0, height - 1
         if min(wi, wj, wk) >= NEAR:
             ui, uj, uk, vi, vj, vk = xi / wi, xj / wj, xk / wk, yi / wi, yj / wj, yk / wk
@@ -79,18 +134,20 @@ def draw_view(
             right = min(right, math.floor(min(max(ui, uj, uk), width + 0.0)))
             top = max(top, math.floor(max(min(vi, vj, vk), -1.0)))
             bottom = min(bottom, math.floor(min(max(vi, vj, vk), height + 0.0)))
-        aj, bj, cj = edge(xk, yk, wk, xi, yi, wi)
-        ak, bk, ck = edge(xi, yi, wi, xj, yj, wj)
+        # Barycentric coordinates over the distance, as functions of column and row.
+        aj, bj, cj = edge((xk, yk, wk), (xi, yi, wi))
+        ak, bk, ck = edge((xi, yi, wi), (xj, yj, wj))
         scale = 1.0 / volume
         ai, bi, ci = ai * scale, bi * scale, ci * scale
         aj, bj, cj = aj * scale, bj * scale, cj * scale
         ak, bk, ck = ak * scale, bk * scale, ck * scale
+        # Samples inside of all three edges, if nothing nearer is seen there.
         for row in range(top, bottom + 1):
             first, last = left, right
             if last - first > WIDE:
-                first, last = within(ai, bi, ci, row, first, last)
-                first, last = within(aj, bj, cj, row, first, last)
-                first, last = within(ak, bk, ck, row, first, last)
+                first, last = _within(ai, bi, ci, row, first, last)
+                first, last = _within(aj, bj, cj, row, first, last)
+                first, last = _within(ak, bk, ck, row, first, last)
             for column in range(first, last + 1):
                 for sample in range(n_samples):
                     x, y = column + offsets[sample, 0], row + offsets[sample, 1]
@@ -109,6 +166,15 @@ def draw_shadow(shadowed: Array, faces: NDArray[np.int64], depth: NDArray[np.flo
     """Keep how near the sun the nearest back of a triangle is, at the middle of every texel.
 
     Backs instead of fronts keep what the sun shines on from shadowing itself.
+
+    Parameters
+    ----------
+    shadowed : ndarray, shape (n_vertices, 3)
+        Vertices as the sun sees them: column and row of the shadow map, and how near the sun [m].
+    faces : ndarray of int, shape (n_faces, 3)
+        Vertices of each triangle.
+    depth : ndarray, shape (n_texels, n_texels)
+        The map; changed in place.
     """
     height, width = depth.shape
     for face in range(faces.shape[0]):

@@ -6,23 +6,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import Array, Vector, helper, inlined, kernel
-from kinarm.viewer.kernels.edges import edge
-from kinarm.viewer.kernels.lighting import Lights, Materials, light_up, sunlit, unit
-from kinarm.viewer.kernels.views import Backdrop, Balls, Eye, Surfaces, View
+from kinarm.viewer.kernels.lighting import light_up, sunlit, unit
+from kinarm.viewer.kernels.rasterising import edge
+from kinarm.viewer.kernels.views import Backdrop, Balls, Eye, Lights, Materials, Surfaces, View
 
 FLOOR = 0
 """Material of the floor."""
 
 
 @inlined
-def encoded(gamma: Array, value: float) -> float:
+def _encoded(gamma: Array, value: float) -> float:
     """Encode a linear value as sRGB."""
     code: float = gamma[int(min(max(value, 0.0), 1.0) * (gamma.shape[0] - 1) + 0.5)]
     return code
 
 
 @inlined
-def line_of_sight(eye: Eye, x: float, y: float) -> Vector:
+def _line_of_sight(eye: Eye, x: float, y: float) -> Vector:
     """Direction of a place in the picture."""
     rays = eye.rays
     return (
@@ -33,25 +33,25 @@ def line_of_sight(eye: Eye, x: float, y: float) -> Vector:
 
 
 @inlined
-def shares(surfaces: Surfaces, face: int, x: float, y: float) -> Vector:
+def _shares(surfaces: Surfaces, face: int, x: float, y: float) -> Vector:
     """Barycentric coordinates of the place of a triangle that is seen at a place of the picture."""
     corners, faces = surfaces.corners, surfaces.faces
     i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
-    xi, yi, wi = corners[i, 0], corners[i, 1], corners[i, 2]
-    xj, yj, wj = corners[j, 0], corners[j, 1], corners[j, 2]
-    xk, yk, wk = corners[k, 0], corners[k, 1], corners[k, 2]
-    a, b, c = edge(xj, yj, wj, xk, yk, wk)
+    at_i = corners[i, 0], corners[i, 1], corners[i, 2]
+    at_j = corners[j, 0], corners[j, 1], corners[j, 2]
+    at_k = corners[k, 0], corners[k, 1], corners[k, 2]
+    a, b, c = edge(at_j, at_k)
     share_i = a * x + b * y + c
-    a, b, c = edge(xk, yk, wk, xi, yi, wi)
+    a, b, c = edge(at_k, at_i)
     share_j = a * x + b * y + c
-    a, b, c = edge(xi, yi, wi, xj, yj, wj)
+    a, b, c = edge(at_i, at_j)
     share_k = a * x + b * y + c
     scale = 1.0 / (share_i + share_j + share_k)
     return share_i * scale, share_j * scale, share_k * scale
 
 
 @inlined
-def mixed(table: Array, corners: tuple[int, int, int], share: Vector) -> Vector:
+def _mixed(table: Array, corners: tuple[int, int, int], share: Vector) -> Vector:
     """Row of a table between three rows."""
     i, j, k = corners
     a, b, c = share
@@ -63,7 +63,7 @@ def mixed(table: Array, corners: tuple[int, int, int], share: Vector) -> Vector:
 
 
 @inlined
-def line_cover(across: float, radius: float, step: float, slope: float, width: float) -> float:
+def _line_cover(across: float, radius: float, step: float, slope: float, width: float) -> float:
     """Share of a pixel that the nearest of lines covers; ``slope`` is a pixel's size [m]."""
     line = step * math.floor(across / step + 0.5)
     if abs(line) >= radius:
@@ -72,10 +72,10 @@ def line_cover(across: float, radius: float, step: float, slope: float, width: f
 
 
 @inlined
-def grid_cover(eye: Eye, backdrop: Backdrop, x: float, y: float, ahead: float) -> float:
+def _grid_cover(eye: Eye, backdrop: Backdrop, x: float, y: float, ahead: float) -> float:
     """Share of a pixel that is covered by lines, where the floor is seen there."""
     rays = eye.rays
-    dx, dy, dz = line_of_sight(eye, x, y)
+    dx, dy, dz = _line_of_sight(eye, x, y)
     px, py = eye.position[0] + ahead * dx, eye.position[1] + ahead * dy
     radius, step, width = backdrop.grid_radius, backdrop.grid_step, backdrop.line_width
     if px * px + py * py > radius * radius:
@@ -87,12 +87,12 @@ def grid_cover(eye: Eye, backdrop: Backdrop, x: float, y: float, ahead: float) -
     slope_x = math.sqrt(column_x * column_x + row_x * row_x)
     slope_y = math.sqrt(column_y * column_y + row_y * row_y)
     return max(
-        line_cover(px, radius, step, slope_x, width), line_cover(py, radius, step, slope_y, width)
+        _line_cover(px, radius, step, slope_x, width), _line_cover(py, radius, step, slope_y, width)
     )
 
 
 @inlined
-def faded(backdrop: Backdrop, ahead: float) -> float:
+def _faded(backdrop: Backdrop, ahead: float) -> float:
     """How much of a surface at a distance is lost in the background."""
     share = (ahead - backdrop.fog[0]) / (backdrop.fog[1] - backdrop.fog[0])
     share = min(max(share, 0.0), 1.0)
@@ -101,10 +101,14 @@ def faded(backdrop: Backdrop, ahead: float) -> float:
 
 
 @inlined
-def finished(backdrop: Backdrop, light: Vector, lines: float, fog: float) -> Vector:
+def _finished(backdrop: Backdrop, light: Vector, lines: float, fog: float) -> Vector:
     """Encode light, with lines over it, in the fog."""
     back, grid, gamma = backdrop.colour, backdrop.grid, backdrop.gamma
-    red, green, blue = encoded(gamma, light[0]), encoded(gamma, light[1]), encoded(gamma, light[2])
+    red, green, blue = (
+        _encoded(gamma, light[0]),
+        _encoded(gamma, light[1]),
+        _encoded(gamma, light[2]),
+    )
     return (
         (1.0 - fog) * (red + lines * (grid[0] - red)) + fog * back[0],
         (1.0 - fog) * (green + lines * (grid[1] - green)) + fog * back[1],
@@ -113,7 +117,7 @@ def finished(backdrop: Backdrop, light: Vector, lines: float, fog: float) -> Vec
 
 
 @inlined
-def surface_colour(
+def _surface_colour(
     eye: Eye,
     surfaces: Surfaces,
     materials: Materials,
@@ -124,26 +128,26 @@ def surface_colour(
     y: float,
 ) -> Vector:
     """Colour of a triangle that is seen at a place of the picture."""
-    dx, dy, dz = line_of_sight(eye, x, y)
+    dx, dy, dz = _line_of_sight(eye, x, y)
     corners = surfaces.faces[face, 0], surfaces.faces[face, 1], surfaces.faces[face, 2]
-    share = shares(surfaces, face, x, y)
-    px, py, pz = mixed(surfaces.places, corners, share)
-    nx, ny, nz = mixed(surfaces.normals, corners, share)
+    share = _shares(surfaces, face, x, y)
+    px, py, pz = _mixed(surfaces.places, corners, share)
+    nx, ny, nz = _mixed(surfaces.normals, corners, share)
     ahead = (
         share[0] * surfaces.corners[corners[0], 2]
         + share[1] * surfaces.corners[corners[1], 2]
         + share[2] * surfaces.corners[corners[2], 2]
     )
     material = surfaces.materials[corners[0]]
-    view, sun = unit(-dx, -dy, -dz), sunlit(lights, px, py, pz)
-    light = light_up(materials, lights, material, sun, unit(nx, ny, nz), view)
-    return finished(backdrop, light, 0.0, faded(backdrop, ahead))
+    view, sun = unit((-dx, -dy, -dz)), sunlit(lights, (px, py, pz))
+    light = light_up(materials, lights, material, sun, unit((nx, ny, nz)), view)
+    return _finished(backdrop, light, 0.0, _faded(backdrop, ahead))
 
 
 @inlined
-def floor_distance(eye: Eye, backdrop: Backdrop, x: float, y: float) -> float:
+def _floor_distance(eye: Eye, backdrop: Backdrop, x: float, y: float) -> float:
     """Distance ahead of the floor that is seen at a place of the picture; 0 if none is."""
-    dx, dy, dz = line_of_sight(eye, x, y)
+    dx, dy, dz = _line_of_sight(eye, x, y)
     if dz >= 0.0 or eye.position[2] <= 0.0:
         return 0.0
     ahead = -eye.position[2] / dz
@@ -160,26 +164,34 @@ def paint_floor(
     backdrop: Backdrop,
     floor: NDArray[np.float32],
 ) -> None:
-    """Colour floor and background, shape (height, width, 2, 3): in shadow, and in the sun."""
+    """Colour floor and background, in shadow and in the sun.
+
+    Parameters
+    ----------
+    eye, materials, lights, backdrop
+        Parts of a `View`.
+    floor : ndarray of float32, shape (height, width, 2, 3)
+        Filled in.
+    """
     back = backdrop.colour
     for row in range(floor.shape[0]):
         for column in range(floor.shape[1]):
             x, y = column + 0.5, row + 0.5
-            ahead = floor_distance(eye, backdrop, x, y)
+            ahead = _floor_distance(eye, backdrop, x, y)
             for sun in range(2):
                 colour = back[0], back[1], back[2]
                 if ahead > 0.0:
-                    dx, dy, dz = line_of_sight(eye, x, y)
-                    up, view = (0.0, 0.0, 1.0), unit(-dx, -dy, -dz)
+                    dx, dy, dz = _line_of_sight(eye, x, y)
+                    up, view = (0.0, 0.0, 1.0), unit((-dx, -dy, -dz))
                     light = light_up(materials, lights, FLOOR, float(sun), up, view)
-                    lines = grid_cover(eye, backdrop, x, y, ahead)
-                    colour = finished(backdrop, light, lines, faded(backdrop, ahead))
+                    lines = _grid_cover(eye, backdrop, x, y, ahead)
+                    colour = _finished(backdrop, light, lines, _faded(backdrop, ahead))
                 for channel in range(3):
                     floor[row, column, sun, channel] = colour[channel]
 
 
 @inlined
-def floor_colour(
+def _floor_colour(
     eye: Eye,
     lights: Lights,
     backdrop: Backdrop,
@@ -188,11 +200,11 @@ def floor_colour(
     column: int,
 ) -> Vector:
     """Colour of the floor at a pixel."""
-    ahead = floor_distance(eye, backdrop, column + 0.5, row + 0.5)
+    ahead = _floor_distance(eye, backdrop, column + 0.5, row + 0.5)
     sun = 1.0
     if ahead > 0.0:
-        dx, dy, _ = line_of_sight(eye, column + 0.5, row + 0.5)
-        sun = sunlit(lights, eye.position[0] + ahead * dx, eye.position[1] + ahead * dy, 0.0)
+        dx, dy, _ = _line_of_sight(eye, column + 0.5, row + 0.5)
+        sun = sunlit(lights, (eye.position[0] + ahead * dx, eye.position[1] + ahead * dy, 0.0))
     return (
         floor[row, column, 0, 0] + sun * (floor[row, column, 1, 0] - floor[row, column, 0, 0]),
         floor[row, column, 0, 1] + sun * (floor[row, column, 1, 1] - floor[row, column, 0, 1]),
@@ -201,7 +213,7 @@ def floor_colour(
 
 
 @inlined
-def ball_cover(
+def _ball_cover(
     eye: Eye,
     balls: Balls,
     ball: int,
@@ -217,7 +229,7 @@ def ball_cover(
     covered, n_samples = 0, eye.offsets.shape[0]
     for sample in range(n_samples):
         x, y = column + eye.offsets[sample, 0], row + eye.offsets[sample, 1]
-        dx, dy, dz = line_of_sight(eye, x, y)
+        dx, dy, dz = _line_of_sight(eye, x, y)
         square = dx * dx + dy * dy + dz * dz
         along = dx * cx + dy * cy + dz * cz
         bend = along * along - square * beyond
@@ -233,7 +245,7 @@ def ball_cover(
 
 
 @helper
-def shade_row(row: int, view: View, picture: NDArray[np.uint8]) -> None:
+def _shade_row(row: int, view: View, picture: NDArray[np.uint8]) -> None:
     """Colour a row of pixels."""
     eye, surfaces, materials, lights, backdrop, balls, floor, nearness, index = view
     offsets = eye.offsets
@@ -257,15 +269,15 @@ def shade_row(row: int, view: View, picture: NDArray[np.uint8]) -> None:
             done += count
             x, y = column + x / count, row + y / count
             if face < 0:
-                r, g, b = floor_colour(eye, lights, backdrop, floor, row, column)
+                r, g, b = _floor_colour(eye, lights, backdrop, floor, row, column)
             else:
-                r, g, b = surface_colour(eye, surfaces, materials, lights, backdrop, face, x, y)
+                r, g, b = _surface_colour(eye, surfaces, materials, lights, backdrop, face, x, y)
             red += count * r
             green += count * g
             blue += count * b
         red, green, blue = red / n_samples, green / n_samples, blue / n_samples
         for ball in range(balls.radii.shape[0]):
-            veil = balls.opacities[ball] * ball_cover(eye, balls, ball, nearness, row, column)
+            veil = balls.opacities[ball] * _ball_cover(eye, balls, ball, nearness, row, column)
             red += veil * (balls.colours[ball, 0] - red)
             green += veil * (balls.colours[ball, 1] - green)
             blue += veil * (balls.colours[ball, 2] - blue)
@@ -281,4 +293,4 @@ def shade(view: View, picture: NDArray[np.uint8]) -> None:
     What is seen at several samples of a pixel is lit once, in their middle.
     """
     for row in range(picture.shape[0]):
-        shade_row(row, view, picture)
+        _shade_row(row, view, picture)

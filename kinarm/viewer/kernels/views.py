@@ -1,4 +1,4 @@
-"""What is seen, and from where, as the kernels need it."""
+"""A picture's contents as the kernels need them: the eye, surfaces, materials, lights."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import Array
-from kinarm.viewer.kernels.lighting import Lights, Materials
 
 
 class Eye(NamedTuple):
@@ -51,8 +50,57 @@ class Surfaces(NamedTuple):
     materials: NDArray[np.int64]
 
 
+class Materials(NamedTuple):
+    """Surfaces, one a row.
+
+    Attributes
+    ----------
+    colour, emission : ndarray, shape (n, 3)
+        Reflected and emitted light, red, green and blue, linear.
+    roughness, metalness : ndarray, shape (n,)
+        Of three.js' standard material.
+    room : ndarray of int, shape (n,)
+        Which of the reflections of `Lights` has this roughness.
+    """
+
+    colour: Array
+    emission: Array
+    roughness: Array
+    metalness: Array
+    room: NDArray[np.int64]
+
+
+class Lights(NamedTuple):
+    """Where light comes from; colours are linear.
+
+    Attributes
+    ----------
+    directions, colours : ndarray, shape (2, 3)
+        Towards two lights from afar, and how bright they are; the first, the sun, casts shadows.
+    sky, ground : ndarray, shape (3,)
+        Light from the left (y) and from the right, which fade into each other.
+    irradiance : ndarray, shape (n, n, 3)
+        Light of the room on surfaces that face a direction, as an octahedral map.
+    reflections : ndarray, shape (n_rooms, n, n, 3)
+        Light of the room, blurred as it is seen in a rough surface.
+    sunward : ndarray, shape (3, 4)
+        World to shadow map.
+    shadow : ndarray, shape (n, n)
+        How near the sun the last surface is that keeps it off [m].
+    """
+
+    directions: Array
+    colours: Array
+    sky: Array
+    ground: Array
+    irradiance: Array
+    reflections: Array
+    sunward: Array
+    shadow: NDArray[np.float32]
+
+
 class Backdrop(NamedTuple):
-    """What is around the scene; colours are encoded as sRGB.
+    """The surroundings of a scene; colours are encoded as sRGB.
 
     Attributes
     ----------
@@ -103,7 +151,7 @@ class Balls(NamedTuple):
 
 
 class View(NamedTuple):
-    """What a picture shows, for its pixels to be coloured.
+    """All that a picture shows, for its pixels to be coloured.
 
     Attributes
     ----------

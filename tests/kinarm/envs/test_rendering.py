@@ -13,7 +13,7 @@ from gymnasium.utils.env_checker import check_env
 from live_pages import commands
 
 from kinarm.envs import ReachEnv, ReachGoalEnv, ReachVectorEnv
-from kinarm.envs.rendering import RENDER_MODES, EnvPictures
+from kinarm.envs.rendering import EnvPictures
 from kinarm.errors import InvalidInputError
 from kinarm.viewer import Renderer, live_stage
 
@@ -79,9 +79,6 @@ class TestPicture:
         assert above.shape == (30, 50, 3)
         np.testing.assert_array_equal(above, same)
 
-    def test_default_size(self):
-        assert moved(ReachEnv(render_mode="rgb_array")).render().shape == (360, 480, 3)
-
     def test_copies_have_renderers_of_their_own(self):
         env = moved(ReachEnv(render_mode="rgb_array", **SMALL))
         picture = env.render()
@@ -113,15 +110,6 @@ class TestFrames:
         env = moved(ReachEnv(render_mode="rgb_array_list", **SMALL))
         env.reset(seed=1)
         assert len(env.render()) == 1
-
-    def test_of_a_batch(self):
-        env = ReachVectorEnv(2, render_mode="rgb_array_list", horizon=3, **SMALL)
-        env.reset(seed=0)
-        for _ in range(3):
-            env.step(np.zeros((2, 5)))
-        frames = env.render()
-        assert len(frames) == 4
-        assert [len(frame) for frame in frames] == [2] * 4
 
     @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
     def test_last_frame_shows_what_was_begun(self, mode):
@@ -203,12 +191,6 @@ class TestHuman:
         first.close()
         second.close()
 
-    def test_of_a_batch_shows_the_first_arm(self, opened):
-        env = ReachVectorEnv(2, render_mode="human", horizon=2)
-        moved(env, 4)
-        assert len(opened) == 1
-        env.close()
-
     def test_copies_can_be_made(self, opened):
         env = moved(ReachEnv(render_mode="human"), 1)
         other = copy.deepcopy(env)
@@ -271,6 +253,3 @@ class TestBadInput:
     def test_is_refused_at_once(self, kind, settings, message):
         with pytest.raises(InvalidInputError, match=message):
             kind(**settings)
-
-    def test_modes_are_those_of_the_metadata(self):
-        assert ReachEnv.metadata["render_modes"] == list(RENDER_MODES)

@@ -43,11 +43,6 @@ OF_NEXT_STEP = {
     *("NormalizeObservation", "TransformObservation", "VectorizeTransformObservation"),
     *("FlattenObservation", "ReshapeObservation", "RescaleObservation", "DtypeObservation"),
 }
-OF_PICTURES_OR_DICTIONARIES = {
-    *("GrayscaleObservation", "ResizeObservation", "FilterObservation"),
-    *("RecordVideo", "HumanRendering"),
-}
-OF_OTHER_ARRAYS = {"ArrayConversion", "JaxToNumpy", "JaxToTorch", "NumpyToTorch"}
 
 
 def pair(name, autoreset_mode):
@@ -95,10 +90,6 @@ def test_wrapped_batch_equals_wrapped_loop(name, mode):
     batch.close(), loop.close()
 
 
-def test_every_wrapper_is_accounted_for():
-    assert set(vector.__all__) == {*WRAPPERS, *OF_PICTURES_OR_DICTIONARIES, *OF_OTHER_ARRAYS}
-
-
 def test_dictionaries_of_goals_can_be_flattened_and_filtered():
     for wrapper, length in (
         (vector.FlattenObservation, 48),
@@ -113,16 +104,6 @@ def test_dictionaries_of_goals_can_be_flattened_and_filtered():
         observations, _ = env.reset(seed=0)
         assert observations.shape == (NUMBER, length)
         assert env.step(env.action_space.sample())[0].shape == (NUMBER, length)
-
-
-def test_torch():
-    pytest.importorskip("array_api_compat")
-    torch = pytest.importorskip("torch")
-    env = vector.NumpyToTorch(gymnasium.make_vec("kinarm/ReachRight-v0", num_envs=NUMBER))
-    observations, _ = env.reset(seed=0)
-    assert isinstance(observations, torch.Tensor)
-    results = env.step(torch.zeros((NUMBER, 5)))
-    assert all(isinstance(result, torch.Tensor) for result in results[:4])
 
 
 def test_statistics_of_single_environments():
