@@ -82,6 +82,17 @@ class Watched:
         """Evaluate a script in the page."""
         return self.page.evaluate(script)
 
+    def check_fit(self, size: tuple[int, int], *names: str) -> None:
+        """See that the page is as large as the screen, and that elements lie on it."""
+        self.page.wait_for_timeout(50)
+        root = "document.documentElement"
+        assert self.tell(f"[{root}.scrollWidth, {root}.scrollHeight]") == list(size)
+        for name in names:
+            box = self.page.locator(name).bounding_box()
+            assert min(box["x"], box["y"]) >= 0, name
+            assert box["x"] + box["width"] <= size[0], name
+            assert box["y"] + box["height"] <= size[1], name
+
     @property
     def state(self) -> dict[str, object]:
         return self.tell("window.kinarm.state")

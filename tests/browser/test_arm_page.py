@@ -23,7 +23,7 @@ POSES = """(q) => {
 CONTACTS = "(qs) => qs.map((q) => kinarm.contacts(q).map(([a, b]) => [a, b]))"
 
 
-class Judge:
+class PairChecker:
     """Coal's verdict on each pair."""
 
     def __init__(self, model):
@@ -81,19 +81,19 @@ def watched(paper_page):
     return paper_page
 
 
-def near_contact(arm, judge, rng, count):
+def near_contact(arm, coal_pairs, rng, count):
     """Configurations on both sides of where something starts to touch, some 1e-6 m from it."""
     found = []
     while len(found) < count:
         ends = rng.uniform(arm.lower, arm.upper, (2, arm.n_joints))
-        first, second = (bool(judge.touching(end)) for end in ends)
+        first, second = (bool(coal_pairs.touching(end)) for end in ends)
         if first == second:
             continue
         low, high = 0.0, 1.0
         while high - low > 1e-12:
             middle = (low + high) / 2
             q = ends[0] + middle * (ends[1] - ends[0])
-            low, high = (middle, high) if bool(judge.touching(q)) == first else (low, middle)
+            low, high = (middle, high) if bool(coal_pairs.touching(q)) == first else (low, middle)
         length = np.abs(ends[1] - ends[0]).sum()
         for step in (3e-6, 3e-5, 1e-3):
             found += [
@@ -104,16 +104,16 @@ def near_contact(arm, judge, rng, count):
 
 def test_contacts_are_those_of_coal(page, name):
     arm = Arm.load(name)
-    judge, rng = Judge(ContactModel.build(arm, SCENE)), np.random.default_rng(0)
+    coal_pairs, rng = PairChecker(ContactModel.build(arm, SCENE)), np.random.default_rng(0)
     anywhere = rng.uniform(arm.lower, arm.upper, (400, arm.n_joints))
-    configurations = np.concatenate([anywhere, near_contact(arm, judge, rng, 240)])
+    configurations = np.concatenate([anywhere, near_contact(arm, coal_pairs, rng, 240)])
     found = page.page.evaluate(CONTACTS, configurations.tolist())
     touched = 0
     for q, seen in zip(configurations, found, strict=True):
-        expected, told = judge.touching(q), {tuple(pair) for pair in seen}
+        expected, told = coal_pairs.touching(q), {tuple(pair) for pair in seen}
         touched += bool(expected)
         for pair in expected ^ told:
-            assert abs(judge.distance(q, pair)) < judge.doubt(pair), (name, pair, q)
+            assert abs(coal_pairs.distance(q, pair)) < coal_pairs.doubt(pair), (name, pair, q)
     assert 120 < touched < len(configurations) - 120
 
 
@@ -121,15 +121,18 @@ def test_contact_points_lie_in_both_bodies(page, name):
     """A tiny ball about the point touches both, as Coal sees it."""
     arm = Arm.load(name)
     model = ContactModel.build(arm, SCENE)
-    judge = Judge(model)
+    coal_pairs = PairChecker(model)
     rng = np.random.default_rng(1)
     ball, checked = coal.Sphere(1e-6), 0
     for q in rng.uniform(arm.lower, arm.upper, (100, arm.n_joints)):
         contacts = page.page.evaluate("(q) => kinarm.contacts(q)", q.tolist())
-        judge.touching(q)
+        coal_pairs.touching(q)
         for first, second, point in contacts:
             for body in (first, second):
-                shape, place = model.geometry.geometryObjects[body], judge.geometry_data.oMg[body]
+                shape, place = (
+                    model.geometry.geometryObjects[body],
+                    coal_pairs.geometry_data.oMg[body],
+                )
                 result = coal.CollisionResult()
                 there = coal.Transform3s(place.rotation, place.translation)
                 ball_there = coal.Transform3s(np.eye(3), np.array(point))
@@ -199,23 +202,22 @@ def test_collision_shapes_are_switched_on(watched):
 
 def test_keys(watched):
     press = watched.page.keyboard.press
-    press("ArrowDown")
-    press("ArrowDown")
-    press("ArrowRight")
-    assert watched.state["configuration"][1] == pytest.approx(np.deg2rad(1))
-    press("Shift+ArrowLeft")
-    assert watched.state["configuration"][1] == pytest.approx(np.deg2rad(-9))
-    press("ArrowUp")
-    press("End")
-    assert watched.state["configuration"][0] == pytest.approx(Arm.load("paper").upper[0])
-    press("h")
-    assert watched.state["configuration"] == [0] * 6
-    press("c")
-    assert watched.state["shapes"]
-    press("c")
-    press("t")
-    assert watched.state["theme"] == "dark"
-    press("t")
+    for key, joint, value in (
+        ("ArrowDown", 0, 0.0),
+        ("ArrowDown", 1, 0.0),
+        ("ArrowRight", 1, np.deg2rad(1)),
+        ("Shift+ArrowLeft", 1, np.deg2rad(-9)),
+        ("ArrowUp", 1, np.deg2rad(-9)),
+        ("End", 0, Arm.load("paper").upper[0]),
+        ("h", 0, 0.0),
+    ):
+        press(key)
+        assert watched.state["configuration"][joint] == pytest.approx(value), key
+    for key, what, value in (("c", "shapes", True), ("t", "theme", "dark")):
+        before = watched.state[what]
+        press(key)
+        assert watched.state[what] == value != before
+        press(key)
     press("?")
     assert watched.page.locator("#keys").is_visible()
     press("?")
@@ -233,15 +235,7 @@ def test_everything_has_a_name(watched):
 def test_a_phone_shows_everything(watched, size):
     watched.page.set_viewport_size({"width": size[0], "height": size[1]})
     watched.tell("kinarm.set([0, 2.3, 0, 0, 0, 0])")
-    watched.page.wait_for_timeout(50)
-    assert watched.tell("document.documentElement.scrollWidth") == size[0]
-    assert watched.tell("document.documentElement.scrollHeight") == size[1]
-    for name in ("#card", "#dock"):
-        box = watched.page.locator(name).bounding_box()
-        assert box["x"] >= 0
-        assert box["y"] >= 0
-        assert box["x"] + box["width"] <= size[0]
-        assert box["y"] + box["height"] <= size[1]
+    watched.check_fit(size, "#card", "#dock")
     watched.page.locator("#joints input").last.scroll_into_view_if_needed()
     assert watched.page.locator("#joints input").last.is_visible()
     watched.page.set_viewport_size({"width": 800, "height": 600})

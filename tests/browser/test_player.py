@@ -92,36 +92,29 @@ def test_the_card_says_what_happens(watched, recorded):
 
 
 def test_buttons(watched, recorded):
-    click = watched.page.click
+    page, trials = watched.page, [each.trial for each in recorded]
     show(watched, 0, 7)
-    click("#forward")
-    assert watched.state["frame"] == 8
-    click("#back")
-    click("#back")
-    assert watched.state["frame"] == 6
-    click("#first")
-    assert watched.state["frame"] == 0
-    click("#play")
-    assert watched.state["playing"]
-    watched.page.wait_for_function("() => window.kinarm.state.frame > 1")
-    click("#play")
-    assert not watched.state["playing"]
-    click("#next")
-    assert watched.state["trial"] == recorded[1].trial
-    click("#previous")
-    click("#previous")
-    assert watched.state["trial"] == recorded[2].trial
-    watched.page.select_option("#speed", "2")
+    for button, what, value in (
+        *(("forward", "frame", 8), ("back", "frame", 7), ("first", "frame", 0)),
+        *(("play", "playing", True), ("play", "playing", False)),
+        *(("next", "trial", trials[1]), ("previous", "trial", trials[0])),
+        *(
+            ("previous", "trial", trials[2]),
+            ("theme", "theme", "dark"),
+            ("theme", "theme", "light"),
+        ),
+    ):
+        page.click(f"#{button}")
+        assert watched.state[what] == value, button
+        if watched.state["playing"]:
+            page.wait_for_function("() => window.kinarm.state.frame > 1")
+    page.select_option("#speed", "2")
     assert watched.state["speed"] == 2
-    watched.page.select_option("#trial", "1")
-    assert watched.state["trial"] == recorded[1].trial
-    click("#theme")
-    assert watched.state["theme"] == "dark"
-    click("#theme")
-    click("#help")
-    assert watched.page.locator("#keys").is_visible()
-    click("#help")
-    assert not watched.page.locator("#keys").is_visible()
+    page.select_option("#trial", "1")
+    assert watched.state["trial"] == trials[1]
+    for visible in (True, False):
+        page.click("#help")
+        assert page.locator("#keys").is_visible() == visible
 
 
 def test_the_scrubber(watched):
@@ -137,38 +130,28 @@ def test_the_scrubber(watched):
 
 
 def test_keys(watched, recorded):
-    press = watched.page.keyboard.press
     show(watched, 0, 7)
     watched.tell("document.activeElement.blur()")
-    press("ArrowRight")
-    assert watched.state["frame"] == 8
-    press("ArrowLeft")
-    press("ArrowLeft")
-    assert watched.state["frame"] == 6
-    press("End")
-    assert watched.state["frame"] == recorded[0].steps
-    press("Home")
-    assert watched.state["frame"] == 0
-    press(" ")
-    assert watched.state["playing"]
-    press(" ")
-    assert not watched.state["playing"]
-    press("n")
-    assert watched.state["trial"] == recorded[1].trial
-    press("p")
-    assert watched.state["trial"] == recorded[0].trial
-    watched.tell("document.querySelector('#speed').value")
-    before = watched.state["speed"]
-    press(",")
-    assert watched.state["speed"] < before
-    press(".")
-    assert watched.state["speed"] == before
-    press("t")
-    assert watched.state["theme"] == "dark"
-    press("t")
-    press("?")
-    assert watched.page.locator("#keys").is_visible()
-    press("?")
+    speed, (first, second, _) = watched.state["speed"], (each.trial for each in recorded)
+    for key, what, value in (
+        *(
+            ("ArrowRight", "frame", 8),
+            ("ArrowLeft", "frame", 7),
+            ("End", "frame", recorded[0].steps),
+        ),
+        *(("Home", "frame", 0), (" ", "playing", True), (" ", "playing", False)),
+        *(("n", "trial", second), ("p", "trial", first), ("t", "theme", "dark")),
+        ("t", "theme", "light"),
+    ):
+        watched.page.keyboard.press(key)
+        assert watched.state[what] == value, key
+    watched.page.keyboard.press(",")
+    assert watched.state["speed"] < speed
+    watched.page.keyboard.press(".")
+    assert watched.state["speed"] == speed
+    for visible in (True, False):
+        watched.page.keyboard.press("?")
+        assert watched.page.locator("#keys").is_visible() == visible
 
 
 def test_everything_can_be_reached_and_has_a_name(watched):
@@ -191,19 +174,7 @@ def test_meshcats_own_controls_are_hidden(watched):
 def test_a_phone_shows_everything(watched, size):
     watched.page.set_viewport_size({"width": size[0], "height": size[1]})
     show(watched, 2, 3)
-    watched.page.wait_for_timeout(50)
-    assert watched.tell("document.documentElement.scrollWidth") == size[0]
-    assert watched.tell("document.documentElement.scrollHeight") == size[1]
-    boxes = {name: watched.page.locator(name).bounding_box() for name in ("#card", "#dock")}
-    for box in boxes.values():
-        assert box["x"] >= 0
-        assert box["y"] >= 0
-        assert box["x"] + box["width"] <= size[0]
-        assert box["y"] + box["height"] <= size[1]
-    for name in ("#play", "#frame", "#speed", "#trial", "#next"):
-        box = watched.page.locator(name).bounding_box()
-        assert box["x"] >= 0
-        assert box["x"] + box["width"] <= size[0]
+    watched.check_fit(size, "#card", "#dock", "#play", "#frame", "#speed", "#trial", "#next")
     watched.page.set_viewport_size({"width": 800, "height": 600})
 
 
