@@ -91,7 +91,15 @@ def write_archive(
     *,
     compress: bool = False,
 ) -> None:
-    """Write to an open file what `save_archive` writes; it has the same parameters."""
+    """Write arrays and a header to an open file.
+
+    Parameters
+    ----------
+    file : binary file
+        The file.
+    kind, version, arrays, header, compress
+        As for `save_archive`.
+    """
     content: dict[str, Any] = {
         "format": np.array(f"kinarm-{kind.replace(' ', '-')}"),
         "version": np.array(version),

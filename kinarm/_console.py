@@ -19,7 +19,7 @@ UNBOUNDED = 1000
 """Width that has room for every table."""
 
 COMPILING = "compiling, once: up to half a minute"
-"""What is told while kernels are compiled."""
+"""Activity that is told while kernels are compiled."""
 
 LINE_SECONDS = 30.0
 """How often a line of progress is printed where there is no terminal."""

@@ -37,7 +37,7 @@ OPTIONAL: Mapping[str, Any] = {"optional": True}
 
 
 def to_plain(value: Any) -> Any:
-    """Turn a dataclass into what TOML and JSON hold.
+    """Turn a dataclass into plain values, as TOML and JSON hold them.
 
     Fields that are None are left out, and those marked as ``OPTIONAL`` at their default.
     """
@@ -55,13 +55,11 @@ def to_plain(value: Any) -> Any:
 
 def _omitted(item: Field[Any], entry: Any) -> bool:
     """Whether plain values leave a field out."""
-    if entry is None:
-        return True
-    return "optional" in item.metadata and bool(entry == default_of(item))
+    return entry is None or ("optional" in item.metadata and bool(entry == default_of(item)))
 
 
 def default_of(item: Field[Any]) -> Any:
-    """What a field is if it is not given."""
+    """Value of a field that is not given."""
     make = item.default_factory
     return item.default if make is MISSING else make()
 
@@ -91,6 +89,17 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
 def take_base(entries: dict[str, Any], where: str, bases: Collection[str], default: str) -> str:
     """Remove the entry ``base`` of a file, and return it, or the default if there is none.
 
+    Parameters
+    ----------
+    entries : dict
+        Entries of the file.
+    where : str
+        Name of the file.
+    bases : collection of str
+        Values that the entry may have.
+    default : str
+        One of them.
+
     Raises
     ------
     InvalidInputError
@@ -103,14 +112,24 @@ def take_base(entries: dict[str, Any], where: str, bases: Collection[str], defau
 
 
 def from_plain(kind: type[T], entries: object, where: str, path: str = "") -> T:
-    """Build a dataclass from plain values by the names of its fields, or say what is wrong.
+    """Build a dataclass from plain values by the names of its fields.
+
+    Parameters
+    ----------
+    kind : type
+        The dataclass.
+    entries : mapping
+        Plain values.
+    where : str
+        Name of their source.
+    path : str
+        Names of the tables around them, such as ``"scene."``.
 
     Raises
     ------
     InvalidInputError
         If a key is unknown or missing, or a value has the wrong type or is refused by the
-        dataclass; in one line that names the source ``where``, the key, led by the ``path`` of
-        the tables around it, and what is expected.
+        dataclass; in one line that names source, key and what is expected.
     """
     if not isinstance(entries, Mapping):
         table = path.removesuffix(".") or "it"
@@ -202,7 +221,7 @@ def is_scalar(hint: Any, entry: object) -> bool:
 
 
 def expected(hint: Any) -> str:
-    """What a type hint asks for, in words."""
+    """Values of a type, in words."""
     origin, arguments = get_origin(hint), get_args(hint)
     if origin is Literal:
         return f"one of {', '.join(map(str, arguments))}"
@@ -230,7 +249,7 @@ def init_fields(kind: type) -> dict[str, Field[Any]]:
 
 @cache
 def field_docs(kind: type) -> dict[str, str]:
-    """What the Parameters of a dataclass, and of its bases, say about its fields."""
+    """Descriptions of fields, from the Parameters of a dataclass and of its bases."""
     found: dict[str, str] = {}
     for base in reversed(kind.__mro__):
         text = re.sub(r"(?m)^    ", "", base.__dict__.get("__doc__") or "")

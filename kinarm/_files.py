@@ -16,7 +16,7 @@ from typing import IO
 from kinarm.errors import OutputError
 
 ENDLESS = 10**7
-"""What is no regular file, such as a pipe, is read up to so many bytes."""
+"""Bytes that are read at most of a pipe or a device."""
 
 is_file, is_folder = os.path.isfile, os.path.isdir
 """Whether there is such a file or folder; not, if none can have this name."""
@@ -149,7 +149,7 @@ def absolute(path: str | Path) -> Path:
 
 
 def first_line(error: BaseException) -> str:
-    """What an error says, in one line; its name if it says nothing."""
+    """Message of an error, in one line; its name if it has none."""
     return str(error).splitlines()[0] if str(error) else type(error).__name__
 
 

@@ -3,16 +3,19 @@
 import argparse
 import math
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import MISSING, Field, is_dataclass
 from pathlib import Path
-from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeVar, get_args, get_origin
 
-from kinarm._fields import alternatives, expected, init_fields, summary_of
+from kinarm._fields import alternatives, expected, field_types, init_fields, summary_of
 from kinarm._parser import group_of_options
-from kinarm.errors import KinarmError
+from kinarm.errors import InvalidInputError, KinarmError
 
 Request = TypeVar("Request")
+
+
+METAVARS = {int: "N", float: "X", Path: "FILE"}
 
 
 def add_options(
@@ -25,17 +28,16 @@ def add_options(
 ) -> None:
     """Add an option for every field of a dataclass; only those that are given are parsed.
 
-    Names, types and help come from the dataclass and its docstring. Its attribute ``GROUPS``, if it
-    has one, puts fields into groups of options by their titles, in this order; the others come
-    last. The fields of a nested dataclass get its name as a prefix, such as ``--reward-success``.
+    Names, types and help come from the dataclass and its docstring. The fields of a nested
+    dataclass get its name as a prefix, such as ``--reward-success``. A class attribute ``GROUPS``
+    puts fields into groups of options by their titles; ``DEFAULTS`` says what happens without an
+    option whose field has no telling default, and such a field need not be given.
 
     A field's metadata may hold ``flag`` (another name of the option, or one without dashes for a
     positional argument), ``metavar``, ``repeat`` (a tuple is collected from repetitions of the
     option), ``several`` (and each takes one or more), ``parse`` (makes the value of the text),
     ``names`` (a function that lists the names that an option takes, for help and completion) and
-    ``completes`` (the same, for completion alone). The attribute ``DEFAULTS`` of the dataclass
-    says what happens without an option whose field has no telling default; such a field need not
-    be given.
+    ``completes`` (the same, for completion alone).
 
     Parameters
     ----------
@@ -51,26 +53,15 @@ def add_options(
     names : mapping, optional
         Names that options take, by field, where the metadata do not list them.
     """
-    items = init_fields(kind)
-    for name, group in _grouped(parser, kind):
-        if name not in skip:
-            _add_option(group, kind, items[name], explicit=explicit, names=names or {})
-
-
-def _grouped(
-    parser: argparse._ActionsContainer, kind: type
-) -> Iterator[tuple[str, argparse._ActionsContainer]]:
-    """Fields of a dataclass, and the group of options that each goes to."""
     groups: Mapping[str, Sequence[str]] = getattr(kind, "GROUPS", {})
+    titles = {name: title for title, members in groups.items() for name in members}
     is_parser = isinstance(parser, argparse.ArgumentParser)
     rest = group_of_options(parser, "options") if is_parser else parser
-    for title, names in groups.items():
-        for name in names:
-            yield name, group_of_options(parser, title)
-    grouped = {name for names in groups.values() for name in names}
-    for name in init_fields(kind):
-        if name not in grouped:
-            yield name, rest
+    items = init_fields(kind)
+    for name in dict.fromkeys((*titles, *items)):
+        if name not in skip:
+            group = group_of_options(parser, titles[name]) if name in titles else rest
+            _add_option(group, kind, items[name], explicit=explicit, names=names or {})
 
 
 def _add_option(
@@ -83,23 +74,21 @@ def _add_option(
     names: Mapping[str, Sequence[str]],
 ) -> None:
     """Add the option of one field, or those of a nested dataclass."""
-    hint = alternatives(get_type_hints(kind)[item.name])[0]
+    hint = alternatives(field_types(kind)[item.name])[0]
     if isinstance(hint, type) and is_dataclass(hint):
-        prefix = f"{prefix}{item.name}."
         for inner in init_fields(hint).values():
-            _add_option(parser, hint, inner, prefix, explicit=True, names=names)
+            _add_option(parser, hint, inner, f"{prefix}{item.name}.", explicit=True, names=names)
         return
     flag = option_name(item, prefix)
     known = names.get(item.name) or item.metadata.get("names", tuple)()
-    default = option_default(kind, item, explicit=explicit)
+    default = _default(kind, item, explicit=explicit)
     options: dict[str, Any] = {
         "default": argparse.SUPPRESS,
         "help": _help(summary_of(kind, item.name), known, default),
     }
     if flag.startswith("--"):
-        options["dest"] = f"{prefix}{item.name}"
         without = item.default is MISSING and item.default_factory is MISSING
-        options["required"] = without and not default
+        options |= {"dest": f"{prefix}{item.name}", "required": without and not default}
     elif item.default is not MISSING:
         options["nargs"] = "?"
     if hint is bool:
@@ -128,11 +117,37 @@ def _value_options(item: Field[Any], hint: Any, flag: str) -> dict[str, Any]:
     else:
         usual = METAVARS.get(hint, "NAME") if flag.startswith("--") else flag
         options["metavar"] = item.metadata.get("metavar", usual)
-    return {**options, "type": _parser_of(hint)}
+    return {**options, "type": _checked(lambda text: _value(hint, text))}
+
+
+def _checked(parse: Callable[[str], Any]) -> Callable[[str], Any]:
+    """Argument type: a value of a text, which may be refused."""
+
+    def parsed(text: str) -> Any:
+        if text is argparse.SUPPRESS:  # a positional argument that is not given
+            return text
+        try:
+            return parse(text)
+        except KinarmError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+
+    return parsed
+
+
+def _value(hint: Any, text: str) -> Any:
+    """The value of a text, which has to be of a type."""
+    try:
+        value = hint(text) if hint in (int, float, Path) else text
+    except ValueError:
+        value = math.nan
+    if isinstance(value, float) and not math.isfinite(value):
+        wanted = "a finite number" if hint is float else expected(hint)
+        raise InvalidInputError(f"must be {wanted}, got {text!r}")
+    return value
 
 
 def _completes(item: Field[Any], hint: Any, known: Sequence[str]) -> Any:
-    """What completes the value of an option: ``"file"``, ``"folder"``, or what lists names."""
+    """How a value is completed: as a ``"file"`` or ``"folder"``, or by a function's names."""
     if "completes" in item.metadata:
         return item.metadata["completes"]
     if known:
@@ -143,16 +158,13 @@ def _completes(item: Field[Any], hint: Any, known: Sequence[str]) -> Any:
 
 
 def option_name(item: Field[Any], prefix: str = "") -> str:
-    """What the option of a field is called."""
+    """Name of the option of a field."""
     usual = "--" + re.sub(r"[._]", "-", f"{prefix}{item.name}")
     return str(item.metadata.get("flag", usual))
 
 
-METAVARS = {int: "N", float: "X", Path: "FILE"}
-
-
-def option_default(kind: type, item: Field[Any], *, explicit: bool) -> str:
-    """What happens without an option; empty if that goes without saying."""
+def _default(kind: type, item: Field[Any], *, explicit: bool) -> str:
+    """Value without an option, in words; empty if that goes without saying."""
     defaults: Mapping[str, str] = getattr(kind, "DEFAULTS", {})
     default = item.default
     if item.name in defaults:
@@ -176,38 +188,8 @@ def _help(said: str, names: Sequence[str], default: str) -> str:
     return said.replace("%", "%%")
 
 
-def _checked(parse: Callable[[str], Any]) -> Callable[[str], Any]:
-    """Argument type: what a function makes of a text, which it may refuse."""
-
-    def parsed(text: str) -> Any:
-        try:
-            return parse(text)
-        except KinarmError as error:
-            raise argparse.ArgumentTypeError(str(error)) from error
-
-    return parsed
-
-
-def _parser_of(hint: Any) -> Callable[[str], Any]:
-    """Argument type: refuses texts that are not of a type."""
-
-    def parse(text: str) -> Any:
-        if text is argparse.SUPPRESS:  # a positional argument that is not given
-            return text
-        try:
-            value = hint(text) if hint in (int, float) else text
-        except ValueError:
-            value = math.nan
-        if isinstance(value, float) and not math.isfinite(value):
-            wanted = "a finite number" if hint is float else expected(hint)
-            raise argparse.ArgumentTypeError(f"must be {wanted}, got {text!r}")
-        return Path(text) if hint is Path else value
-
-    return parse
-
-
 def given_options(options: argparse.Namespace, kind: type) -> dict[str, Any]:
-    """What the command line gives of a dataclass's fields; nested ones as mappings."""
+    """Fields of a dataclass that the command line gives; nested ones as mappings."""
     given: dict[str, Any] = {}
     for name, value in vars(options).items():
         outer, _, inner = name.partition(".")

@@ -26,8 +26,20 @@ def run_rows(
     """Call ``kernel(first, last, *arrays)`` for ranges that cover n rows; add up what it returns.
 
     Kernels release the GIL and treat rows independently, so the result depends neither on the
-    number of threads nor on the ranges. Little ``work``, estimated in episode steps, is done by
-    the calling thread.
+    number of threads nor on the ranges.
+
+    Parameters
+    ----------
+    kernel : callable
+        Works on the rows of a range.
+    n : int
+        Number of rows.
+    work : int
+        Estimated work [episode steps]; little is done by the calling thread.
+    threads : int
+        Threads at most.
+    *arrays
+        Passed on to the kernel.
     """
     if threads == 1 or n == 0 or work < PARALLEL_STEPS:
         return kernel(0, n, *arrays) or 0
@@ -46,9 +58,19 @@ def run_together(
     """Call ``kernel(counters, given(thread))`` on several threads; add up what it returns.
 
     The kernels share out the rows among them by a counter, zero at first, so that none is left
-    with more than the others. The calling thread is one of them, that of number 0, and the only
-    one for little ``work``, estimated in episode steps. A thread that comes too late is not waited
-    for.
+    with more than the others. The calling thread is one of them, that of number 0. A thread that
+    comes too late is not waited for.
+
+    Parameters
+    ----------
+    kernel : callable
+        Works on rows as long as there are any.
+    work : int
+        Estimated work [episode steps]; little is done by the calling thread alone.
+    threads : int
+        Threads at most.
+    given : callable
+        Second argument of the kernel, by the number of the thread.
     """
     counters = np.zeros(1, dtype=np.int64)
     if threads == 1 or work < SHARED_STEPS:

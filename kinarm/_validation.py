@@ -16,11 +16,19 @@ MOST_TRIALS = 10_000_000
 def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
     """Copy an argument into a contiguous float64 array.
 
+    Parameters
+    ----------
+    name : str
+        Name of the argument, for messages.
+    value : array_like
+        The argument.
+    shape : tuple
+        Shape that it has to have, in which None stands for any length.
+
     Raises
     ------
     InvalidInputError
-        If it is not numeric, has another shape, in which None stands for any length, or holds an
-        entry that is not finite.
+        If it is not numeric, has another shape, or holds an entry that is not finite.
     """
     try:
         array = np.array(value, dtype=np.float64, order="C")
@@ -39,6 +47,15 @@ def one_or_many(
     name: str, value: ArrayLike, shape: tuple[int, ...]
 ) -> tuple[NDArray[np.float64], bool]:
     """Copy one item of a shape, or n of them, into an array of n; and whether it was one.
+
+    Parameters
+    ----------
+    name : str
+        Name of the argument, for messages.
+    value : array_like, shape ``shape`` or (n, *shape)
+        The argument.
+    shape : tuple of int
+        Shape of an item.
 
     Raises
     ------
@@ -62,7 +79,22 @@ def _matches(actual: tuple[int, ...], expected: tuple[int | None, ...]) -> bool:
 
 
 def whole_number(name: str, value: object, at_least: int, at_most: float = math.inf) -> int:
-    """Return a whole number that is in range, or raise InvalidInputError."""
+    """Return a whole number that is in range.
+
+    Parameters
+    ----------
+    name : str
+        Name of the argument, for messages.
+    value : int
+        The argument.
+    at_least, at_most : int
+        Its range.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is no whole number, or out of range.
+    """
     if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < at_least:
         raise InvalidInputError(
             f"{name} must be a whole number of at least {at_least}, got {value!r}"

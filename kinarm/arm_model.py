@@ -50,6 +50,15 @@ def limit_velocities(
 ) -> None:
     """Set the given velocity limits, or check those of the URDF.
 
+    Parameters
+    ----------
+    model : pinocchio.Model
+        The model whose limits are set.
+    given : tuple of float, optional
+        Velocity limits of all joints [rad/s or m/s].
+    description : Description
+        The URDF.
+
     Raises
     ------
     ArmError

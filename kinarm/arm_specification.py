@@ -10,7 +10,7 @@ from kinarm._files import absolute, is_file
 from kinarm.errors import ArmError
 
 PACKAGE = "example-robot-data:"
-"""What a source begins with that lies in the installed package of that name."""
+"""Prefix of sources that lie in the installed package of that name."""
 
 
 @cache

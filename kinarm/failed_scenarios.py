@@ -91,7 +91,17 @@ class FailedScenarios(NamedTuple):
     def followed_by(
         self, starts: NDArray[np.float64], goals: NDArray[np.float64], size: int
     ) -> "FailedScenarios":
-        """Add newer ones; the last ``size`` remain."""
+        """Add newer ones, and forget the oldest.
+
+        Parameters
+        ----------
+        starts : ndarray, shape (n, n_joints)
+            Configurations [rad or m].
+        goals : ndarray, shape (n, 3)
+            Goal positions [m].
+        size : int
+            How many remain, the last ones.
+        """
         parts = zip(self, (starts, goals), strict=True)
         return FailedScenarios(*(np.concatenate(pair)[-size:] for pair in parts))
 

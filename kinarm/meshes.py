@@ -56,7 +56,22 @@ GRID = 1e-9
 
 
 def resolve_meshes(robot: ElementTree.Element, path: Path, folders: Collection[str]) -> None:
-    """Replace names of meshes by paths; those that are missing are refused, if they can touch."""
+    """Replace names of meshes in a URDF by paths.
+
+    Parameters
+    ----------
+    robot : xml.etree.ElementTree.Element
+        Root of the URDF.
+    path : Path
+        Its file.
+    folders : collection of str
+        Folders of packages, besides those around the file.
+
+    Raises
+    ------
+    ArmError
+        If a mesh is missing that can touch something.
+    """
     for use in ("collision", "visual"):
         for mesh in robot.findall(f"link/{use}/geometry/mesh"):
             name = mesh.get("filename", "")

@@ -142,6 +142,6 @@ def _file(what: str, name: str | Path, folder: str, others: tuple[str, ...]) -> 
 
 
 def _beside(path: Path, name: str) -> str | Path:
-    """What a file calls another one: a name, or a path that starts at its folder."""
+    """Another file by its name, or by its path from the folder of the file that names it."""
     beside = path.parent / name
     return beside if is_file(beside) else name

@@ -66,7 +66,7 @@ class ProblemOptions:
         ),
         "tool_frame": "the arm's",
     }
-    """What happens without an option."""
+    """Values without an option, in words."""
 
     def resolve(self, default: "ProblemLike" = "right") -> "ReachProblem":
         """The problem that the options make of a default one.

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 
 class Stream(StrEnum):
-    """What random numbers are for."""
+    """A purpose of random numbers."""
 
     ARS = "ars"
     PPO_LEARNER = "ppo learner"

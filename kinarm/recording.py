@@ -23,7 +23,7 @@ ARRAYS = ("states", "distances", "goal", "refused", "contact_point")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Recording:
-    """What an arm did in one trial. Arrays are copied and read-only.
+    """The motion of an arm in one trial, and its end. Arrays are copied and read-only.
 
     Parameters
     ----------

@@ -53,13 +53,6 @@ def test_it_runs_the_command_that_is_named(run_main):
     assert run_main("--", "problem", "list") == (0, done.stdout, "")
 
 
-def test_words_are_those_of_the_process_if_none_are_given(monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["kinarm", "arms", "--version"])
-    with pytest.raises(SystemExit):
-        main()
-    assert capsys.readouterr().out == f"kinarm {metadata.version('kinarm')}\n"
-
-
 def test_an_unknown_command_is_refused_in_one_line(run_main):
     status, out, err = run_main("fly")
     assert (status, out) == (2, "")
@@ -80,11 +73,3 @@ def test_it_prints_the_completion_of_all_commands():
     assert (done.returncode, done.stderr) == (0, "")
     ends = [line.split()[-1] for line in done.stdout.splitlines() if line.startswith("complete ")]
     assert sorted(ends) == sorted(SCRIPTS)
-
-
-def test_each_command_prints_its_own_completion(run_main, monkeypatch):
-    started = []
-    monkeypatch.setattr(subprocess, "run", lambda words, check: started.append(words))
-    assert run_main("--print-completion", "zsh")[0] == 0
-    assert [words[2] for words in started] == [module for module, _ in COMMANDS.values()]
-    assert {tuple(words[3:]) for words in started} == {("--print-completion", "zsh")}

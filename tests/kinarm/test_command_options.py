@@ -225,7 +225,3 @@ class TestOptions:
             horizon=5,
             start_spread=0.5,
         )
-
-
-def test_a_usage_that_is_written_out_is_kept():
-    assert Parser(prog="bake", usage="%(prog)s BREAD").format_usage() == "usage: bake BREAD\n"

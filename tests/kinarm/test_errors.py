@@ -56,16 +56,6 @@ def test_unknown_name_says_what_exists():
     assert (error.kind, error.given, error.available) == ("task", "up", ("left", "right"))
 
 
-def test_start_in_contact_says_which_and_what():
-    error = StartInContactError(3, ("hand", "ground"))
-    assert str(error) == "start 3 is in contact: hand touches ground"
-
-
 def test_bad_input_is_a_value_error():
     assert issubclass(InvalidInputError, ValueError)
     assert issubclass(UnknownNameError, InvalidInputError)
-
-
-@pytest.mark.parametrize("error", EXAMPLES, ids=lambda error: type(error).__name__)
-def test_messages_are_one_line(error):
-    assert "\n" not in str(error)

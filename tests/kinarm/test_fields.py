@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 
 from kinarm._fields import (
     check_fields,
-    expected,
     field_docs,
     from_plain,
     init_fields,
@@ -192,11 +191,6 @@ class TestFromPlain:
         with pytest.raises(InvalidInputError, match=r"^it: 'name' is missing: What it is called$"):
             from_plain(Bicycle, {}, "it")
 
-    @pytest.mark.parametrize("entries", [3, None, "name", [("name", "a")]])
-    def test_no_table(self, entries):
-        with pytest.raises(InvalidInputError, match="^it: it must be a table, got"):
-            from_plain(Bicycle, entries, "it")
-
 
 class TestCheckFields:
     def test_values_become_what_is_annotated(self):
@@ -251,20 +245,3 @@ class TestDocs:
     def test_summaries_are_first_sentences(self):
         assert summary_of(Wheel, "radius") == "From the hub to the ground [m]"
         assert summary_of(Bicycle, "unheard_of") == "unheard_of"
-
-    @pytest.mark.parametrize(
-        ("hint", "words"),
-        [
-            (int, "a whole number"),
-            (float, "a number"),
-            (str, "a text"),
-            (bool, "true or false"),
-            (Path, "a path"),
-            (Wheel, "a table"),
-            (tuple[float, float], "a list of 2, each a number"),
-            (tuple[str, ...], "a list, each entry a text"),
-            (Literal["a", "b"], "one of a, b"),
-        ],
-    )
-    def test_types_in_words(self, hint, words):
-        assert expected(hint) == words

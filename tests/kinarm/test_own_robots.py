@@ -32,18 +32,6 @@ def test_home_is_zero_clipped_to_the_limits(make_joint, write_robot):
     np.testing.assert_array_equal(arm.home, [0, 0.3])
 
 
-def test_home_can_be_given(make_joint, write_robot):
-    arm = Arm.load(write_robot([make_joint()]), home=[0.5])
-    np.testing.assert_array_equal(arm.home, [0.5])
-
-
-def test_given_home_is_copied(make_joint, write_robot):
-    home = np.array([0.5])
-    arm = Arm.load(write_robot([make_joint()]), home=home)
-    home[0] = 1.0
-    np.testing.assert_array_equal(arm.home, [0.5])
-
-
 @pytest.mark.parametrize(
     ("last_axes", "tool", "expected"),
     [

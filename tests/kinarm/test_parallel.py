@@ -1,12 +1,11 @@
 """Kernels over ranges of rows."""
 
-import os
 import threading
 
 import numpy as np
 import pytest
 
-from kinarm._parallel import available_threads, run_rows, run_together
+from kinarm._parallel import run_rows, run_together
 
 
 @pytest.mark.parametrize("n", [1, 2, 7, 255, 256, 1000])
@@ -20,18 +19,6 @@ def test_every_row_is_worked_on_once(n, threads, work):
 
     run_rows(kernel, n, work, threads, counts)
     np.testing.assert_array_equal(counts, 1)
-
-
-def test_threads_are_those_that_the_system_grants(monkeypatch):
-    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 2, 5})
-    assert available_threads() == 3
-    monkeypatch.delattr(os, "sched_getaffinity")
-    monkeypatch.setattr(os, "cpu_count", lambda: 7)
-    assert available_threads() == 7
-
-
-def test_no_rows():
-    run_rows(lambda first, last: None, 0, 0, 2)
 
 
 def test_little_work_stays_in_the_calling_thread():
@@ -95,7 +82,3 @@ class TestTogether:
 
         with pytest.raises(RuntimeError, match="no"):
             run_together(fail, 10**6, 2, int)
-
-
-def test_at_least_one_thread():
-    assert available_threads() >= 1

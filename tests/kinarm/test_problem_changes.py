@@ -85,10 +85,6 @@ class TestReplace:
         )
         assert base.replace(task="left", reward={"step": -1}).task.reward == RewardWeights(step=-1)
 
-    def test_the_original_stays(self):
-        RIGHT.replace(tolerance=0.3, reward={"success": 3})
-        assert RIGHT.task == ReachTask(goal_regions=("right",))
-
     @pytest.mark.parametrize(
         ("overrides", "error", "message"),
         [

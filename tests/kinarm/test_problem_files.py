@@ -128,22 +128,15 @@ class TestFile:
             ("horizon = 3", "unknown key 'horizon'; available: name, arm, scene, task, stepping"),
             ("[arm]\nn_actuated = 5", "unknown key 'arm.n_actuated'"),
             ('[task]\ntolerance = "5 cm"', r"task.tolerance must be a number \[m\], got '5 cm'"),
-            ("[task]\nhorizon = 2.5", "task.horizon must be a whole number, got 2.5"),
-            ("[task]\nhorizon = true", "task.horizon must be a whole number, got True"),
             ("[task]\nhorizon = 0", "task: horizon must be a whole number of at least 1, got 0"),
             ("[task]\ntolerance = -1", "task: tolerance must be greater than 0 m, got -1"),
-            ("[task]\ntolerance = nan", "task: tolerance must be greater than 0 m, got nan"),
-            (f"[task]\ntolerance = 1{400 * '0'}", "task.tolerance must be a number"),
             ("[task.reward]\ncollision = 1", "task.reward: .*collision = 1 rewards contact"),
-            ('[task]\ngoal_regions = "left"', "task.goal_regions must be a list, each .* a text"),
             ('[task]\ngoal_regions = ["up"]', "goal region in task.goal_regions: 'up'"),
             ('[task]\ngoal_regions = ["left", "left"]', "goal_regions names one twice: left, left"),
             ("[stepping]\ntime_step = 0", "stepping: time_step must be finite and above 0 s"),
             ("task = 3", "task must be a table, got 3"),
-            ("name = 3", "name must be a text, got 3"),
             ('[arm]\nhome = "zero"', r"arm.home must be a list, each entry a number \[rad or m\]"),
             ('base = "up"', "base must be one of left, right, both, got 'up'"),
-            ('base = ["up"]', "base must be one of left, right, both"),
             ("[task", r"not a problem file: .* \(at line 1, column 6\)"),
             (
                 "[task]\nhorizon = 3\nhorizon = 4",
@@ -181,13 +174,6 @@ class TestFile:
             ReachProblem.load(path)
         assert str(caught.value).startswith(f"{path}: ")
         assert "\n" not in str(caught.value)
-
-    @pytest.mark.parametrize("content", [b"\xff\xfe", b"\x00", bytes(range(256))])
-    def test_binary_content(self, tmp_path, content):
-        path = tmp_path / "mine.toml"
-        path.write_bytes(content)
-        with pytest.raises(InvalidInputError, match=f"{path}: not a problem file: "):
-            ReachProblem.load(path)
 
     def test_folder(self, tmp_path):
         with pytest.raises(InvalidInputError, match="cannot read problem .*directory"):

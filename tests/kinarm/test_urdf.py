@@ -261,12 +261,6 @@ class TestRefusals:
             Arm.load(path)
         assert "\n" not in str(caught.value)
 
-    def test_binary_file(self, tmp_path):
-        path = tmp_path / "binary.urdf"
-        path.write_bytes(bytes(range(256)))
-        with pytest.raises(ArmError, match=r"binary\.urdf"):
-            Arm.load(path)
-
     @pytest.mark.parametrize("kind", ["floating", "planar"])
     def test_moving_base(self, make_joint, write_robot, kind):
         path = write_robot([make_joint(kind, limit=""), make_joint()])
