@@ -1,5 +1,5 @@
-"""The campaign: damaged files, odd arguments and failing machines, thousands of each.
+"""The campaign: damaged files, failing writes, kills, signals, and evidence at scale.
 
-Every module has a small size, which the tests of this folder run, and a large one, which
-``python -m tests.campaign.MODULE`` runs and records.
+The tests of this folder run a small share of each; ``python -m tests.campaign.MODULE --out FILE``
+runs the large one and records it.
 """

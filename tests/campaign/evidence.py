@@ -8,37 +8,39 @@ ends with 1 if a claim did not hold.
 
 import argparse
 import json
-import os
-import platform
 import sys
-import time
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from kinarm._files import write_text
 from kinarm.arm_specification import arm_names
 from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.problem_files import problem_names
-from tests.campaign.checks.floors import check_floors
-from tests.campaign.checks.steps import check_steps
-from tests.campaign.checks.tally import Tally
-from tests.campaign.checks.verdicts import check_verdicts
-from tests.campaign.evidence_page import evidence_page
+
+from .steps import check_policies, check_steps
+from .tally import Tally, table
+from .verdicts import check_verdicts
 
 WHOLE = {"steps": 1_000_000_000, "contact": 10_000_000, "floors": 1_000_000}
 """How many steps, configurations and trials there are in all, by kind."""
-
+TITLES = {
+    "steps": "Steps of the kernels",
+    "contact": "Verdicts of contact",
+    "floors": "Policies and proven bounds",
+}
+CHECKS: dict[str, Callable[[ReachProblem, int, int], Tally]] = {
+    "steps": check_steps,
+    "contact": check_verdicts,
+    "floors": check_policies,
+}
 SEED = 14
-
 SHIPPED = ("paper", "paper_flange", "lrmate200ic_5l")
 """Arms of capsules, whose files ship with kinarm: they take three fifths of the steps. Those of the
 others come with the extra robots."""
-
 FACED = ("left", "right", "both", "post-paper", "table-paper")
 """Problems of the arm that the policies were trained for: three quarters of the trials."""
-
 FITTING = ("benches-ur5", "ring-ur5", "lrmate200ic_5l", "paper_flange", "ur3", "ur10", "z1")
 """Problems and arms with the same joints and observations: the other quarter."""
 
@@ -62,7 +64,7 @@ class Part(NamedTuple):
 
     @property
     def problem(self) -> ReachProblem:
-        """What is looked at."""
+        """The problem whose episodes are looked at."""
         if self.name in problem_names():
             return ReachProblem.load(self.name)
         if self.name in SHIPPED:
@@ -70,62 +72,59 @@ class Part(NamedTuple):
         scene = "desk" if self.name.startswith("so") else "benches"
         return PROBLEMS["both"].replace(arm=self.name, scene=scene, time_step=0.04)
 
-    def file(self, folder: Path) -> Path:
-        """Where it is recorded."""
-        return folder / f"{self.kind}-{self.name}.json"
-
-
-CHECKS: dict[str, Callable[[ReachProblem, int, int], Tally]] = {
-    "steps": check_steps,
-    "contact": check_verdicts,
-    "floors": check_floors,
-}
-
 
 def parts(share: float) -> list[Part]:
     """All parts of some share of the evidence."""
     arms = arm_names()
     scenes = [*arms, *(name for name in problem_names() if name not in PROBLEMS)]
-    sizes = {
-        "steps": dict.fromkeys(arms, 0.4 * WHOLE["steps"] / (len(arms) - len(SHIPPED)))
-        | dict.fromkeys(SHIPPED, 0.6 * WHOLE["steps"] / len(SHIPPED)),
-        "contact": dict.fromkeys(scenes, WHOLE["contact"] / len(scenes)),
-        "floors": dict.fromkeys(FACED, 0.75 * WHOLE["floors"] / len(FACED))
-        | dict.fromkeys(FITTING, 0.25 * WHOLE["floors"] / len(FITTING)),
-    }
+    others = tuple(name for name in arms if name not in SHIPPED)
+    split: tuple[tuple[str, Sequence[str], float], ...] = (
+        *(("steps", SHIPPED, 0.6), ("steps", others, 0.4), ("contact", scenes, 1.0)),
+        *(("floors", FACED, 0.75), ("floors", FITTING, 0.25)),
+    )
     return [
-        Part(kind, name, -int(-share * size // 1))
-        for kind, names in sizes.items()
-        for name, size in names.items()
+        Part(kind, name, -int(-share * weight * WHOLE[kind] / len(names) // 1))
+        for kind, names, weight in split
+        for name in names
     ]
 
 
 def gather(part: Part, folder: Path, command: str) -> dict[str, Any]:
     """Do a part, unless it is done; return what is recorded of it."""
-    path, problem = part.file(folder), part.problem
+    path, problem = folder / f"{part.kind}-{part.name}.json", part.problem
     asked = {**part._asdict(), "seed": SEED, "problem": problem.digest}
     if path.exists():
         known: dict[str, Any] = json.loads(path.read_text())
         if {key: known.get(key) for key in asked} == asked:
             return known
-    began, worked = time.monotonic(), time.process_time()
-    tally = CHECKS[part.kind](problem, part.size, SEED)
-    document = {
-        **asked,
-        "command": command,
-        "counts": tally.counts,
-        "measures": tally.measures,
-        "checked": tally.checked,
-        "failed": tally.failed,
-        "examples": tally.examples,
-        "seconds": round(time.monotonic() - began, 1),
-        "processor_seconds": round(time.process_time() - worked, 1),
-        "machine": {"system": platform.platform(), "processors": os.cpu_count()},
-        "versions": package_versions(),
-        "commit": source_commit(),
-    }
-    write_text(path, json.dumps(document, indent=1) + "\n")
-    return document
+    tally = asdict(CHECKS[part.kind](problem, part.size, SEED))
+    made = {"command": command, "versions": package_versions(), "commit": source_commit()}
+    path.write_text(json.dumps({**asked, **made, **tally}, indent=1) + "\n")
+    return {**asked, **made, **tally}
+
+
+def page(documents: Sequence[dict[str, Any]]) -> str:
+    """The tables of everything that is recorded, in Markdown."""
+    text = "# Evidence\n\nOne file a part lies beside this page.\n"
+    for kind, title in TITLES.items():
+        found = [document for document in documents if document["kind"] == kind]
+        whole = Tally()
+        for document in found:
+            for claim, number in document["checked"].items():
+                whole.checked[claim] = whole.checked.get(claim, 0) + number
+                failed = document["failed"].get(claim, 0)
+                whole.failed[claim] = whole.failed.get(claim, 0) + failed
+            for name, value in document["measures"].items():
+                whole.largest(name, value)
+        if found:
+            claims = {
+                claim: {"checked": number, "did not hold": whole.failed[claim]}
+                for claim, number in whole.checked.items()
+            }
+            counts = {document["name"]: document["counts"] for document in found}
+            text += f"\n## {title}\n\n{table(counts)}\n{table(claims, 'claim')}"
+            text += "".join(f"\nLargest {name}: {v:.2g}\n" for name, v in whole.measures.items())
+    return text
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -135,27 +134,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--share", type=float, default=1.0, help="part of the whole (1)")
     parser.add_argument("--kind", choices=tuple(CHECKS), action="append", help="only this kind")
     parser.add_argument("--name", action="append", help="only this arm or problem")
-    options = parser.parse_args(arguments)
-    command = "python -m tests.campaign.evidence --out FOLDER"
-    command += "" if options.share == 1 else f" --share {options.share:g}"
-    options.out.mkdir(parents=True, exist_ok=True)
-    wanted = [
-        part
-        for part in parts(options.share)
-        if part.kind in (options.kind or CHECKS) and part.name in (options.name or [part.name])
-    ]
+    given = parser.parse_args(arguments)
+    command = f"python -m tests.campaign.evidence --out FOLDER --share {given.share:g}"
+    given.out.mkdir(parents=True, exist_ok=True)
     failures = 0
-    for number, part in enumerate(wanted, start=1):
-        document = gather(part, options.out, command)
-        failed = {claim: count for claim, count in document["failed"].items() if count}
-        failures += sum(failed.values())
-        state = f"failed: {failed}" if failed else "holds"
-        seconds = document["seconds"]
-        line = f"{number}/{len(wanted)} {part.kind} {part.name}: {state}, {seconds:.0f} s\n"
-        sys.stderr.write(line)
-        documents = [json.loads(path.read_text()) for path in sorted(options.out.glob("*-*.json"))]
-        page = evidence_page(documents, WHOLE)
-        write_text(options.out / "EVIDENCE.md", page)
+    for part in parts(given.share):
+        if part.kind in (given.kind or CHECKS) and part.name in (given.name or [part.name]):
+            failed = sum(gather(part, given.out, command)["failed"].values())
+            failures += failed
+            sys.stderr.write(f"{part.kind} {part.name}: {failed} failures\n")
+            done = [json.loads(path.read_text()) for path in sorted(given.out.glob("*-*.json"))]
+            (given.out / "EVIDENCE.md").write_text(page(done))
     return int(failures > 0)
 
 

@@ -1,7 +1,5 @@
 """Valid files of every kind, small ones: what is damaged then."""
 
-import io
-import pickle
 from collections.abc import Callable
 from functools import cache
 from importlib.util import find_spec
@@ -11,17 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from kinarm.evaluation.comparison.learners import read_learners
-from kinarm.evaluation.comparison.runs import CurvePoint, PlannedRun, planned_runs, save_run
-from kinarm.evaluation.comparison.runs import Protocol as ComparisonProtocol
-from kinarm.evaluation.contestants import find_contestants
-from kinarm.evaluation.document import document_text, evaluation_document
-from kinarm.evaluation.evaluation import run_trials
-from kinarm.evaluation.reproduction.runs import RunStore, TrainedRun
-from kinarm.evaluation.reproduction.study import PlannedTraining, Study, quick_study
-from kinarm.evaluation.trials import TrialSet
-from kinarm.policies import Policy, load_policy, recipe, train_policy
-from kinarm.policies.checkpoint import save_checkpoint
+from kinarm.arm import Arm
+from kinarm.evaluation import EvaluationRequest, TrialSet
+from kinarm.policies import load_policy, recipe, save_checkpoint
 from kinarm.policies.learners import begin_training
 from kinarm.problem_files import shipped_files
 from kinarm.recording import record_rollouts, save_recordings
@@ -52,8 +42,7 @@ def checkpoints() -> list[bytes]:
     found = []
     for learner in ("ars", "ppo") if find_spec("torch") else ("ars",):
         config = recipe(learner, "paper", iterations=3)
-        training = begin_training(config)
-        state = training.initial_state()
+        state = begin_training(config).initial_state()
         found.append(written(lambda path, c=config, s=state: save_checkpoint(path, c, s)))
     return found
 
@@ -66,83 +55,36 @@ def trials() -> TrialSet:
 
 def recordings() -> list[bytes]:
     """Of three trials."""
-    simulator = trials().simulator
-    policy = load_policy("ars-tuned-both")
+    simulator, policy = trials().simulator, load_policy("ars-tuned-both-seed0")
     rollouts = simulator.rollout(policy, trials().starts, trials().goals, record=True)
     recorded = record_rollouts(simulator, rollouts, "ars")
     return [written(lambda path: save_recordings(path, recorded))]
 
 
 def evaluations() -> list[bytes]:
-    """An ``evaluation.json`` with the oracle's bounds, one without, one with held trials."""
-    found = []
-    for parts in ({"oracle": True}, {}, {"hold": True}):
-        contestant = find_contestants("ars-tuned-both")[0]
-        document = evaluation_document([run_trials(contestant, trials(), **parts)], "kinarm-eval")
-        found.append(document_text(document).encode())
-    return found
+    """An ``evaluation.json`` with the oracle's bounds, and one without."""
+
+    def save(folder: Path, oracle: bool) -> bytes:
+        EvaluationRequest(
+            policies=("ars-tuned-both-seed0",),
+            problems=("right",),
+            trials=3,
+            oracle=oracle,
+            out=folder,
+        ).run()
+        return (folder / "evaluation.json").read_bytes()
+
+    with TemporaryDirectory() as name:
+        return [save(Path(name) / str(oracle), oracle) for oracle in (True, False)]
 
 
-@cache
-def planned_training() -> PlannedTraining:
-    """A training of the quick reproduction."""
-    return study().trainings[0]
-
-
-@cache
-def trained_policy() -> Policy:
-    """What a training of one iteration came to."""
-    return train_policy(recipe("ars", "paper", iterations=1)).policy
-
-
-@cache
-def study() -> Study:
-    """The quick reproduction, without PPO."""
-    return quick_study(ppo=False)
-
-
-def store(folder: Path) -> RunStore:
-    """A reproduction's folder."""
-    return RunStore(folder, study().protocol)
-
-
-def save_training(folder: Path) -> None:
-    """Write a finished training of a reproduction."""
-    n = 6
-    run = TrainedRun(
-        returns=np.linspace(0, 1, n),
-        environment_steps=1000 * np.arange(1, n + 1),
-        wall_time=np.linspace(0.1, 1, n),
-        snapshots=np.array([1, 3, 5]),
-        snapshot_distance=np.ones((3, 10), dtype=np.float32),
-        distance=np.ones(20),
-        collision=np.zeros(20, dtype=bool),
-        steps=np.full(20, 64),
-    )
-    store(folder).save(planned_training(), trained_policy(), run)
-
-
-@cache
-def planned_run() -> PlannedRun:
-    """A training of a comparison."""
-    table = read_learners()
-    return planned_runs([table["ars-paper"]], [trials().problem], 1, None, ComparisonProtocol())[0]
-
-
-def save_comparison(folder: Path) -> None:
-    """Write a finished training of a comparison."""
-    curve = [CurvePoint(1000 * k, 60.0 * k, 30.0 * k, k, 1, 0.1, 7.0 + k) for k in (1, 2, 3)]
-    save_run(folder, planned_run(), curve)
-
-
-def toml_files(folder: str, *names: str) -> list[bytes]:
+def toml_files(folder: str) -> list[bytes]:
     """Files that ship."""
-    files = shipped_files(folder)
-    return [files[name].read_bytes() for name in names or files]
+    return [path.read_bytes() for path in shipped_files(folder).values() if path.suffix == ".toml"]
 
 
 def recipes() -> list[bytes]:
-    """Recipe files of both learners' shapes."""
+    """Recipe files."""
     return [
         b'base = "tuned"\niterations = 20\nstep_size = 0.05\nproblem = "left"\n'
         b"[reward]\nsuccess = 0.5\ncollision = -2.0\n",
@@ -150,16 +92,38 @@ def recipes() -> list[bytes]:
     ]
 
 
+STUDY = b"""
+learner = "ars"
+problems = ["right"]
+seeds = 2
+
+[trials]
+count = 5
+
+[fixed]
+iterations = 2
+reward.success = 2.0
+
+[grid]
+step_size = [0.01, 0.02]
+"problem.task.start_spread" = [0.2]
+
+[random]
+count = 1
+noise = { low = 0.01, high = 0.1, log = true }
+sharing = ["none", "pair"]
+"""
+
 SMALL_URDF = b"""<?xml version="1.0" encoding="utf-8"?>
 <robot name="made" version="1.2">
 <material name="red"><color rgba="1 0 0 1"/></material>
 <link name="base"><collision><origin xyz="0 0 .1"/>
 <geometry><box size=".2 .2 .2"/></geometry></collision></link>
-<link name="arm"><visual><geometry><cylinder radius=".05" length=".3"/></geometry>
+<link name="arm"><visual><geometry><mesh filename="cube.stl" scale="2 1 1"/></geometry>
 <material name="red"/></visual><collision><origin xyz="0 0 .2" rpy="0 .1 0"/>
 <geometry><capsule radius=".05" length=".2"/></geometry></collision></link>
 <link name="hand"><collision><geometry><sphere radius=".06"/></geometry></collision>
-<collision><geometry><cylinder radius=".05" length=".1"/></geometry></collision></link>
+<collision><geometry><mesh filename="cube.stl" scale="1 1 2"/></geometry></collision></link>
 <link name="tool0"/>
 <joint name="turn" type="continuous"><parent link="base"/><child link="arm"/>
 <origin xyz="0 0 .5" rpy="0 0 0"/><axis xyz="0 0 1"/><limit velocity="3" effort="0"/></joint>
@@ -171,16 +135,9 @@ SMALL_URDF = b"""<?xml version="1.0" encoding="utf-8"?>
 """
 
 
-def urdf(name: str = "paper") -> bytes:
+def urdf() -> bytes:
     """A URDF that ships."""
-    from kinarm.arm import Arm
-
-    return Arm.load(name).urdf_path.read_bytes()
-
-
-def urdfs() -> list[bytes]:
-    """Small ones for the most part: they are damaged and read faster."""
-    return [*[SMALL_URDF] * 7, urdf()]
+    return Arm.load("paper").urdf_path.read_bytes()
 
 
 def stl(binary: bool) -> bytes:
@@ -189,11 +146,11 @@ def stl(binary: bool) -> bytes:
         facets = [(np.zeros(3), *(CUBE[i] for i in face)) for face in FACES]
         content = b"".join(np.array(f, dtype="<f4").tobytes() + b"\x00\x00" for f in facets)
         return b"\x00" * 80 + len(FACES).to_bytes(4, "little") + content
-    lines = []
-    for face in FACES:
-        corners = "".join("vertex {} {} {}\n".format(*CUBE[i]) for i in face)
-        lines.append(f"facet normal 0 0 0\nouter loop\n{corners}endloop\nendfacet\n")
-    return f"solid cube\n{''.join(lines)}endsolid cube\n".encode()
+    corners = ["".join("vertex {} {} {}\n".format(*CUBE[i]) for i in face) for face in FACES]
+    facets = "".join(
+        f"facet normal 0 0 0\nouter loop\n{each}endloop\nendfacet\n" for each in corners
+    )
+    return f"solid cube\n{facets}endsolid cube\n".encode()
 
 
 def obj() -> bytes:
@@ -234,23 +191,6 @@ def sb3_model() -> Any:
     env = VecNormalize(DummyVecEnv([lambda: ReachEnv("right")]))
     settings = {"n_steps": 8, "batch_size": 8, "policy_kwargs": {"net_arch": [4]}}
     return PPO("MlpPolicy", env, device="cpu", **settings)
-
-
-def sb3_models() -> list[bytes]:
-    """A model's file."""
-    return [written(sb3_model().save, "model.zip")]
-
-
-def sb3_statistics() -> list[bytes]:
-    """The file of ``VecNormalize``."""
-    return [written(sb3_model().get_env().save, "vecnormalize.pkl")]
-
-
-def pickled(value: object) -> bytes:
-    """A pickle."""
-    file = io.BytesIO()
-    pickle.dump(value, file)
-    return file.getvalue()
 
 
 MODULE = b"""import numpy as np

@@ -24,6 +24,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "docs"))
 from browser import open_page
 from helpers.pages import DOCS, ROOT, blocks
 
+from kinarm.evaluation.markdown import markdown_table
+
 ENOUGH = 0.85
 """Success of the newcomer's policy."""
 
@@ -103,35 +105,20 @@ def success(clone: Path, environment: dict[str, str]) -> float:
     return float(row["metrics"]["success"]["value"])
 
 
-def picture(page: Path, out: Path) -> None:
-    """Open a replay in a browser, and keep what it shows."""
-    with open_page(page, 1000, 640) as opened:
-        opened.wait_for_selector("body[data-ready]")
-        opened.screenshot(path=out)
-
-
 def table(steps: list[Step], reached: float) -> str:
     """What was typed and how long it took, for the documentation."""
-    rows = [f"| {step.in_one_line} | {step.seconds:.0f} |" for step in steps]
-    total = sum(step.seconds for step in steps)
-    return "\n".join(
-        (
-            "| typed | seconds |",
-            "| --- | --- |",
-            *rows,
-            f"| **all** | {total:.0f} |",
-            "",
-            f"The policy reached {100 * reached:.1f} % of 4000 fresh trials "
-            "(`kinarm-eval --policy mine.npz --trials 4000 --seed 161`).",
-            "",
-        )
+    rows = [(step.in_one_line, f"{step.seconds:.0f}") for step in steps]
+    total = ("**all**", f"{sum(step.seconds for step in steps):.0f}")
+    return (
+        markdown_table(("typed", "seconds"), [*rows, total])
+        + f"\nThe policy reached {100 * reached:.1f} % of 4000 fresh trials "
+        "(`kinarm-eval --policy mine.npz --trials 4000 --seed 161`).\n"
     )
 
 
 def log(steps: list[Step]) -> str:
     """What was typed, and the last lines of what was printed."""
-    terminal = re.compile(r"\x1b\[[0-9;?]*[a-zA-Z]")
-    parts = []
+    terminal, parts = re.compile(r"\x1b\[[0-9;?]*[a-zA-Z]"), []
     for step in steps:
         said = terminal.sub("", step.said).replace("\r", "\n").splitlines()
         last = "\n".join(line.rstrip() for line in said[-SHOWN:])
@@ -154,7 +141,9 @@ def main(out: Path) -> None:
             steps.append(carry_out(command, clone, environment))
             sys.stderr.write(f"{steps[-1].seconds:6.1f} s  {steps[-1].in_one_line}\n")
         reached = success(clone, environment)
-        picture(clone / "failures.html", out.with_suffix(".png"))
+        with open_page(clone / "failures.html", 1000, 640) as opened:
+            opened.wait_for_selector("body[data-ready]")
+            opened.screenshot(path=out.with_suffix(".png"))
     out.with_suffix(".md").write_text(table(steps, reached), encoding="utf-8")
     out.with_suffix(".log").write_text(log(steps), encoding="utf-8")
     sys.exit(reached < ENOUGH)

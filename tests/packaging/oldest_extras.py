@@ -17,7 +17,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 
 TESTS = {
-    "peers": ("evaluation/measurements/test_peers.py",),
+    "peers": ("docs/test_measurements.py",),
     "ppo": (
         *("policies/ppo", "policies/sb3", "policies/test_conversion_sb3.py"),
         *("policies/test_conversion_torch.py", "commands/test_train_ppo.py"),

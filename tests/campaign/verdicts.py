@@ -6,17 +6,15 @@ from numpy.typing import NDArray
 from kinarm.problem import ReachProblem
 from kinarm.simulator import Simulator
 from kinarm.world import World
-from tests.campaign.checks.capsules import capsule_box_distance
-from tests.campaign.checks.second_engine import MARGIN, SecondEngine, is_installed
-from tests.campaign.checks.surviving import surviving
-from tests.campaign.checks.tally import Tally
 from tests.helpers.configurations import contact_boundary, jittered
+
+from .engines import MARGIN, SecondEngine, capsule_box_distance, is_installed, surviving
+from .tally import Tally
 
 Array = NDArray[np.float64]
 
 LOT = 20_000
-"""Configurations that are judged together."""
-
+"""Configurations that are looked at together."""
 JITTERS = 9
 """Configurations around each end of a pair at the boundary of contact, besides the end itself."""
 
@@ -33,44 +31,40 @@ def check_verdicts(problem: ReachProblem, configurations: int, seed: int) -> Tal
     engine = SecondEngine(simulator.world) if is_installed() else None
     lot = min(LOT, -(-configurations // 5))
     while tally.counts.get("configurations", 0) < configurations:
-        for _ in range(2):
-            asked = _tested_in_episodes(tally, simulator, rng, lot)
-            _ask_second_engine(tally, engine, simulator, asked)
         near = _near_contact(simulator, rng, 2 * lot)
-        _check_screening(tally, simulator, near)
-        _ask_second_engine(tally, engine, simulator, near)
-        asked = _tested_from(tally, simulator, rng, near, lot)
-        _ask_second_engine(tally, engine, simulator, asked)
+        _check_proofs(tally, simulator, near)
+        for asked in (
+            _tested_in_episodes(tally, simulator, rng, lot),
+            _tested_in_episodes(tally, simulator, rng, lot),
+            near,
+            _tested_from(tally, simulator, rng, near, lot),
+        ):
+            if engine is not None:
+                _ask_second_engine(tally, engine, simulator.world, asked)
     return tally
 
 
 def _near_contact(simulator: Simulator, rng: np.random.Generator, count: int) -> Array:
     """Configurations at and around the boundary of contact."""
-    pairs = -(-count // (2 * (JITTERS + 1)))
-    ends = np.concatenate(contact_boundary(simulator, _seed(rng), pairs))
-    around = [jittered(ends, _seed(rng)) for _ in range(JITTERS)]
-    return np.concatenate([ends, *around])
+    seeds = rng.integers(2**32, size=JITTERS + 1).tolist()
+    ends = np.concatenate(contact_boundary(simulator, seeds[0], -(-count // (2 * len(seeds)))))
+    return np.concatenate([ends, *(jittered(ends, seed) for seed in seeds[1:])])
 
 
-def _seed(rng: np.random.Generator) -> int:
-    return int(rng.integers(2**32))
-
-
-def _proven(simulator: Simulator, asked: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def proven(simulator: Simulator, asked: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Which configurations kernels prove to be free, and which to touch something."""
     _, free, touching, _ = simulator.world.proven(np.ascontiguousarray(asked))
     return free, touching
 
 
-def _check_screening(tally: Tally, simulator: Simulator, asked: Array) -> None:
+def _check_proofs(tally: Tally, simulator: Simulator, asked: Array) -> None:
     """Check the proofs for single configurations."""
-    n = len(asked)
-    free, touching = _proven(simulator, asked)
+    free, touching = proven(simulator, asked)
     truth = simulator.world.contact_model.in_contact(asked)
     _claim(tally, "what is proven free touches nothing", (~truth)[free], asked[free])
     _claim(tally, "what is proven to touch does", truth[touching], asked[touching])
-    tally.count("configurations", n)
-    tally.count("near contact", n)
+    tally.count("configurations", len(asked))
+    tally.count("near contact", len(asked))
     tally.count("decided without Coal", (free | touching).sum())
 
 
@@ -79,22 +73,19 @@ def _tested_in_episodes(
 ) -> Array:
     """Run episodes of random actions, and check what became of every tested configuration."""
     horizon, tested = simulator.task.horizon, simulator.world.rules.tested
-    parts, found = [], 0
-    while found < count:
+    parts: list[Array] = []
+    while sum(map(len, parts)) < count:
         n = max(count // (64 * tested), 1)
-        starts, goals = simulator.sample(rng, n)
         drawn = rng.uniform(-1.5, 1.5, (n, -(-horizon // 4), simulator.n_actions))
         actions = np.repeat(drawn, 4, axis=1)[:, :horizon]
-        done = simulator.rollout_actions(actions, starts, goals, record=True)
-        last = done.steps[:, None] - 1
-        step = np.arange(horizon)
+        done = simulator.rollout_actions(actions, *simulator.sample(rng, n), record=True)
+        last, step = done.steps[:, None] - 1, np.arange(horizon)
         ends = done.paths[:, 1:].copy()
         refused = (step == last) & done.collision[:, None]
         ends[refused] = done.targets[done.collision]
         taken = step <= last
         ways = simulator.world.substeps(done.paths[:, :-1][taken], ends[taken])
         parts.append(_check_ways(tally, simulator, ways, refused[taken]))
-        found += len(parts[-1])
     return np.concatenate(parts)
 
 
@@ -128,20 +119,13 @@ def _check_ways(
     return asked
 
 
-def _ask_second_engine(
-    tally: Tally,
-    engine: SecondEngine | None,
-    simulator: Simulator,
-    asked: Array,
-) -> None:
+def _ask_second_engine(tally: Tally, engine: SecondEngine, world: World, asked: Array) -> None:
     """Compare Coal's verdicts with the second engine's."""
-    if engine is None:
-        return
-    contact = simulator.world.contact_model
+    contact = world.contact_model
     truth = contact.in_contact(asked)
     other = surviving(lambda row: float(engine.in_contact(asked[row])), len(asked))
-    judged = ~np.isnan(other)
-    differing = np.flatnonzero(judged & (truth != other))
+    answered = ~np.isnan(other)
+    differing = np.flatnonzero(answered & (truth != other))
 
     def distance(number: int) -> float:
         """Of the pair that Coal names, or of the contacts that MuJoCo finds."""
@@ -152,25 +136,21 @@ def _ask_second_engine(
 
     distances = surviving(distance, len(differing))
     measured = ~np.isnan(distances)
-    judged[differing[~measured]] = False
-    differing, distances = differing[measured], distances[measured]
-    alone = truth[differing]
-    tally.count("configurations of the second engine", judged.sum())
-    tally.count("configurations at which MuJoCo ends the process", (~judged).sum())
-    tally.count("touching", truth.sum())
-    tally.count("touching for Coal alone", alone.sum())
-    tally.count("touching for MuJoCo alone", (~alone).sum())
+    answered[differing[~measured]] = False
     gaps = np.zeros(len(asked))
-    gaps[differing] = distances
+    gaps[differing[measured]] = distances[measured]
     doubtful = np.flatnonzero(truth & (gaps > MARGIN))
-    overlooked = [row for row in doubtful if _box_is_entered(simulator.world, asked[row])]
+    overlooked = [row for row in doubtful if _box_is_entered(world, asked[row])]
     gaps[overlooked] = 0.0
+    tally.count("configurations of the second engine", answered.sum())
+    tally.count("configurations at which MuJoCo ends the process", (~answered).sum())
+    tally.count("touching for Coal alone", truth[differing[measured]].sum())
+    tally.count("touching for MuJoCo alone", (~truth)[differing[measured]].sum())
     tally.count("contacts of a capsule and a box that MuJoCo overlooks", len(overlooked))
-    gap, depth = gaps[truth].max(initial=0.0), gaps[~truth].max(initial=0.0)
-    tally.largest("gap where Coal alone sees contact [m]", gap)
-    tally.largest("depth where Coal alone sees none [m]", depth)
+    tally.largest("gap where Coal alone sees contact [m]", gaps[truth].max(initial=0.0))
+    tally.largest("depth where Coal alone sees none [m]", gaps[~truth].max(initial=0.0))
     claim, agree = f"engines agree, but for {MARGIN:g} m about contact", np.abs(gaps) <= MARGIN
-    _claim(tally, claim, agree[judged], asked[judged], gaps[judged])
+    _claim(tally, claim, agree[answered], asked[answered])
 
 
 def _box_is_entered(world: World, configuration: Array) -> bool:
@@ -180,15 +160,5 @@ def _box_is_entered(world: World, configuration: Array) -> bool:
     return distance is not None and distance <= 0
 
 
-def _claim(
-    tally: Tally,
-    claim: str,
-    holds: NDArray[np.bool_],
-    asked: Array,
-    distances: Array | None = None,
-) -> None:
-    def describe(row: int) -> dict[str, object]:
-        found = {} if distances is None else {"distance": float(distances[row])}
-        return {"configuration": asked[row].tolist(), **found}
-
-    tally.check(claim, holds, describe)
+def _claim(tally: Tally, claim: str, holds: NDArray[np.bool_], asked: Array) -> None:
+    tally.check(claim, holds, lambda row: {"configuration": asked[row].tolist()})

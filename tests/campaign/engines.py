@@ -1,11 +1,17 @@
-"""MuJoCo as a second judge of contact: the same shapes and pairs, its own kinematics."""
+"""Second opinions on contact: MuJoCo's, in a process that it may end, and the definition."""
 
+import multiprocessing
+from collections.abc import Callable
 from importlib.util import find_spec
+from multiprocessing.sharedctypes import RawArray
 from xml.etree import ElementTree
 from xml.etree.ElementTree import SubElement
 
+import coal
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from docs.measurements.mjcf import body_name, joint_name, mjcf
 from kinarm.world import World
@@ -13,10 +19,8 @@ from kinarm.world import World
 MARGIN = 1.1e-6
 """Distance or depth within which the engines may differ: Coal calls hulls that are 1e-6 m apart
 touching, its tolerance, and MuJoCo keeps vertices in float32 [m]."""
-
 ACCURACY = 1e-10
 """At which MuJoCo's iteration ends [m]."""
-
 FARTHEST = 0.01
 """Distances above this are not measured [m]."""
 
@@ -66,10 +70,9 @@ class SecondEngine:
 
 def _described(world: World) -> str:
     """The world as MJCF, with all joints free to move and the tested pairs named one by one."""
-    root = ElementTree.fromstring(mjcf(world, 0.01))
+    root, arm = ElementTree.fromstring(mjcf(world, 0.01)), world.arm
     for geom in root.iter("geom"):
         geom.attrib.update(contype="0", conaffinity="0")
-    arm = world.arm
     bodies = {body.get("name"): body for body in root.iter("body")}
     for k in range(world.n_actions, arm.n_joints):
         SubElement(
@@ -86,3 +89,57 @@ def _described(world: World) -> str:
     for pair in world.contact_model.geometry.collisionPairs:
         SubElement(contact, "pair", geom1=f"shape{pair.first}", geom2=f"shape{pair.second}")
     return ElementTree.tostring(root, encoding="unicode")
+
+
+def surviving(call: Callable[[int], float], count: int) -> NDArray[np.float64]:
+    """What a call gives for each number below a count; NaN where it ends the process.
+
+    A child makes the calls, and another one goes on behind a call that ended it.
+    """
+    fork = multiprocessing.get_context("fork")
+    results = np.frombuffer(RawArray("d", max(1, count)))[:count]
+    begun = np.frombuffer(RawArray("q", 1), dtype=np.int64)
+    results[:], begun[0] = np.nan, -1
+
+    def work() -> None:
+        for number in range(int(begun[0]) + 1, count):
+            begun[0] = number
+            results[number] = call(number)
+
+    while begun[0] + 1 < count:
+        child = fork.Process(target=work)
+        child.start()
+        child.join()
+        if child.exitcode is not None and child.exitcode > 0:
+            raise RuntimeError(f"a call ended with status {child.exitcode}")
+    return np.array(results)
+
+
+def capsule_box_distance(
+    world: World, configuration: NDArray[np.float64], pair: int
+) -> float | None:
+    """Distance of a tested pair's capsule from its box by their definition; None for others.
+
+    Where they overlap it is negative, and at least minus the radius [m].
+    """
+    geometry, model = world.contact_model.geometry, world.arm.model
+    placed = geometry.createData()
+    pin.updateGeometryPlacements(model, model.createData(), geometry, placed, configuration)
+    numbers = geometry.collisionPairs[pair].first, geometry.collisionPairs[pair].second
+    shapes = {
+        type(solid): (solid, placed.oMg[number])
+        for number in numbers
+        for solid in [geometry.geometryObjects[number].geometry]
+    }
+    if set(shapes) != {coal.Capsule, coal.Box}:
+        return None
+    (capsule, moved), (box, standing) = shapes[coal.Capsule], shapes[coal.Box]
+
+    def outside(along: float) -> float:
+        """How far a point of the capsule's axis is from the box; a convex function."""
+        point = standing.actInv(moved.act(np.array([0.0, 0.0, along])))
+        return float(np.linalg.norm(np.maximum(np.abs(point) - box.halfSide, 0.0)))
+
+    ends = -capsule.halfLength, capsule.halfLength
+    found = minimize_scalar(outside, bounds=ends, method="bounded", options={"xatol": 1e-12})
+    return min(found.fun, *map(outside, ends)) - float(capsule.radius)

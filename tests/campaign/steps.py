@@ -1,42 +1,31 @@
-"""Steps of the kernels: are they consistent with themselves, the limits and the proven bounds?"""
+"""Steps of the kernels and policies: consistent with themselves, the limits and proven bounds?"""
 
-from collections.abc import Iterator
 from dataclasses import fields
+from itertools import count, cycle
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.envs.interface import Interface
-from kinarm.policies import recipe, train_policy
+from kinarm.envs.interface import FlatInterface
+from kinarm.policies import load_policy, policy_names, recipe, train_policy
 from kinarm.policies.oracle import Oracle, OracleSolutions
-from kinarm.policies.policy import Policy
 from kinarm.problem import ReachProblem
 from kinarm.reference import ReferenceSimulator
 from kinarm.rollouts import Rollouts
 from kinarm.simulator import Simulator
-from tests.campaign.checks.tally import Tally
 from tests.helpers.reference_episodes import assert_equal_outcome, scripted
+
+from .tally import Tally
 
 Array = NDArray[np.float64]
 
-SCENARIOS = 512
-"""Starts and goals of an arm, each with bounds that the oracle proves."""
-
-BATCH = 8192
-"""Episodes that are run together."""
-
-RECORDED = 24
-"""Of so many batches, the first three are run again, recorded and on two threads."""
-
-REFERENCED = 4
-"""Episodes of such a batch that the reference simulator repeats."""
-
-CHUNK = 8192
-"""States that are observed together."""
-
+SCENARIOS, BATCH = 512, 8192
+"""Starts and goals of an arm, with bounds that the oracle proves, and episodes run together."""
+RECORDED, REFERENCED = 24, 4
+"""Of so many batches, the first three are run again, recorded and on two threads; the reference
+simulator repeats so many episodes of each."""
 ROUNDING = 1e-12
 """What a joint may move more than its limits say, for rounding [rad or m]."""
-
 TRAINING = 20
 """Iterations of ARS after which a policy no longer acts at random."""
 
@@ -48,44 +37,56 @@ def check_steps(problem: ReachProblem, steps: int, seed: int) -> Tally:
     plays the oracle's motions with noise, which is where bounds are closest.
     """
     tally, rng = Tally(), np.random.default_rng(seed)
-    oracle = Oracle(problem, threads=1)
-    twins = tuple(Simulator(problem, threads=threads) for threads in (1, 2))
+    one, two = (Simulator(problem, threads=threads) for threads in (1, 2))
     batch = int(np.clip(steps // 500, 64, BATCH))
-    starts, goals = twins[0].sample(rng, min(SCENARIOS, batch))
-    bounds = oracle.solve_batch(starts, goals)
+    starts, goals = one.sample(rng, min(SCENARIOS, batch))
+    bounds = Oracle(problem, threads=1).solve_batch(starts, goals)
     trained = recipe("ars", "paper", problem=problem, iterations=TRAINING, seed=seed)
     policy = train_policy(trained, threads=1).policy
     tally.count("scenarios", len(starts))
-    tally.check("the oracle's motions take no fewer steps than it proves", _kept(bounds))
-    for number, kind in enumerate(_kinds()):
+    kept = ~bounds.reachable | (bounds.steps >= bounds.steps_lower_bound)
+    tally.check("the oracle's motions take no fewer steps than it proves", kept)
+    for number, kind in zip(count(), cycle(("random", "oracle", "policy")), strict=False):
         if tally.counts.get("steps", 0) >= steps:
-            return tally
+            break
         rows = rng.integers(len(starts), size=batch)
-        actions = _actions(kind, twins[0], bounds, rows, rng)
-        scenarios = starts[rows], goals[rows]
-        done = _run(twins[0], actions, policy, scenarios)
+        scenarios, actions = (starts[rows], goals[rows]), _actions(kind, one, bounds, rows, rng)
+        runs = [
+            simulator.rollout(policy, *scenarios, record=record)
+            if actions is None
+            else simulator.rollout_actions(actions, *scenarios, record=record)
+            for simulator, record in ((one, False), (two, True))[: 1 + (number % RECORDED < 3)]
+        ]
+        done = runs[0]
         tally.count("steps", done.steps.sum())
         tally.count("episodes", batch)
         tally.count("successes", done.success.sum())
         tally.count("contacts", done.collision.sum())
-        _check_outcomes(tally, twins[0], done, scenarios, bounds, rows, (kind, seed, number))
-        if number % RECORDED < 3:
-            again = _run(twins[1], actions, policy, scenarios, record=True)
-            _check_equal(tally, done, again)
-            _check_paths(tally, twins[0], again)
+        _check_ends(tally, one, done, {"kind": kind, "seed": seed, "number": number})
+        _check_bounds(tally, done, bounds, rows)
+        if len(runs) > 1:
+            _check_equal(tally, *runs)
+            _check_paths(tally, one, runs[1])
             if actions is not None:
-                _check_reference(tally, twins[0], again, actions)
-    raise AssertionError
+                _check_reference(tally, one, runs[1], actions)
+    return tally
 
 
-def _kinds() -> Iterator[str]:
-    while True:
-        yield from ("random", "oracle", "policy")
-
-
-def _kept(bounds: OracleSolutions) -> NDArray[np.bool_]:
-    kept: NDArray[np.bool_] = ~bounds.reachable | (bounds.steps >= bounds.steps_lower_bound)
-    return kept
+def check_policies(problem: ReachProblem, trials: int, seed: int) -> Tally:
+    """Put all shipped policies to the same scenarios, so many trials or a few more in all."""
+    tally, oracle, names = Tally(), Oracle(problem, threads=1), policy_names()
+    rng, n = np.random.default_rng(seed), -(-trials // len(names))
+    scenarios = oracle.simulator.sample(rng, n)
+    bounds = oracle.solve_batch(*scenarios)
+    tally.count("scenarios", len(bounds))
+    tally.count("scenarios whose floor is exact", bounds.proof_complete.sum())
+    for name in names:
+        done = oracle.simulator.rollout(load_policy(name), *scenarios)
+        tally.count("trials", len(done))
+        tally.count("successes", done.success.sum())
+        _check_ends(tally, oracle.simulator, done, {"policy": name, "seed": seed})
+        _check_bounds(tally, done, bounds, np.arange(n))
+    return tally
 
 
 def _actions(
@@ -102,45 +103,25 @@ def _actions(
     if kind == "oracle":
         size = 10.0 ** rng.uniform(-6, 0, (len(rows), 1, 1))
         return bounds.actions[rows] + size * rng.normal(size=shape)
-    held = int(rng.choice([1, 2, 4, 8, 16, 64]))
-    drawn = rng.uniform(-1.5, 1.5, (shape[0], -(-shape[1] // held), shape[2]))
-    return np.repeat(drawn, held, axis=1)[:, : shape[1]]
+    repeated = int(rng.choice([1, 2, 4, 8, 16, 64]))
+    drawn = rng.uniform(-1.5, 1.5, (shape[0], -(-shape[1] // repeated), shape[2]))
+    return np.repeat(drawn, repeated, axis=1)[:, : shape[1]]
 
 
-def _run(
-    simulator: Simulator,
-    actions: Array | None,
-    policy: Policy,
-    scenarios: tuple[Array, Array],
-    *,
-    record: bool = False,
-) -> Rollouts:
-    if actions is None:
-        return simulator.rollout(policy, *scenarios, record=record)
-    return simulator.rollout_actions(actions, *scenarios, record=record)
-
-
-def _check_outcomes(
-    tally: Tally,
-    simulator: Simulator,
-    done: Rollouts,
-    scenarios: tuple[Array, Array],
-    bounds: OracleSolutions,
-    rows: NDArray[np.int64],
-    where: tuple[str, int, int],
+def _check_ends(
+    tally: Tally, simulator: Simulator, done: Rollouts, where: dict[str, object]
 ) -> None:
     """Check the ends of episodes."""
     arm, task = simulator.arm, simulator.task
     reached, refused = done.success, done.collision
 
-    def describe(row: int) -> dict[str, object]:
-        start, goal = (part[row].tolist() for part in scenarios)
-        return {"batch": where, "start": start, "goal": goal, "steps": int(done.steps[row])}
-
     def claim(what: str, holds: NDArray[np.bool_]) -> None:
+        def describe(row: int) -> dict[str, object]:
+            return {**where, "start": done.starts[row].tolist(), "goal": done.goals[row].tolist()}
+
         tally.check(what, holds, describe)
 
-    moved = np.abs(done.configurations - scenarios[0])[:, : simulator.n_actions]
+    moved = np.abs(done.configurations - done.starts)[:, : simulator.n_actions]
     farthest = done.steps[:, None] * (simulator.step_limit + ROUNDING)
     numbers = (done.distance, done.returns, *done.configurations.T, *done.targets.T)
     claim("no number is infinite or NaN", np.isfinite(numbers).all(axis=0))
@@ -150,12 +131,18 @@ def _check_outcomes(
     claim("success is being within the tolerance", reached == (done.distance <= task.tolerance))
     claim("joints end within their limits", _within(done.configurations, arm.lower, arm.upper))
     claim("joints go no farther than their speeds allow", (moved <= farthest).all(axis=1))
-    # A refused step counts, but a success never ends in one.
-    proven = bounds.steps_lower_bound[rows]
-    claim("no success is faster than is proven possible", (done.steps >= proven)[reached])
-    tally.count("successes as fast as is proven possible", (done.steps == proven)[reached].sum())
+
+
+def _check_bounds(
+    tally: Tally, done: Rollouts, bounds: OracleSolutions, rows: NDArray[np.int64]
+) -> None:
+    """Check that no episode beats what the oracle proves; a refused step counts as one."""
+    reached, proven = done.success, bounds.steps_lower_bound[rows]
     closest = bounds.distance_lower_bound[rows]
-    claim("no episode ends closer than is proven possible", done.distance >= closest)
+    faster = reached & (done.steps < proven)
+    tally.check("no success is faster than is proven possible", ~faster)
+    tally.check("no episode ends closer than is proven possible", done.distance >= closest)
+    tally.count("successes as fast as is proven possible", (done.steps == proven)[reached].sum())
 
 
 def _within(values: Array, lower: Array, upper: Array) -> NDArray[np.bool_]:
@@ -184,10 +171,9 @@ def _check_paths(tally: Tally, simulator: Simulator, done: Rollouts) -> None:
     tally.check("joints stay within their limits", _within(states, arm.lower, arm.upper))
     allowed = (moves[:, :n] <= simulator.step_limit + ROUNDING).all(axis=1)
     tally.check("joints move no faster than they may", allowed & (moves[:, n:] == 0).all(axis=1))
-    space = Interface(simulator).observation_space
-    for first in range(0, len(states), CHUNK):
-        part = slice(first, first + CHUNK)
-        seen = simulator.world.observe(states[part], goals[part])
+    space = FlatInterface(simulator).observation_space
+    for first in range(0, len(states), BATCH):
+        seen = simulator.world.observe(states[first : first + BATCH], goals[first : first + BATCH])
         tally.check("observations are inside their space", _within(seen, space.low, space.high))
 
 
@@ -196,11 +182,11 @@ def _check_reference(tally: Tally, simulator: Simulator, done: Rollouts, actions
     reference = ReferenceSimulator(simulator)
     for row in range(REFERENCED):
         episode = reference.rollout(scripted(actions[row]), done.starts[row], done.goals[row])
+        why = ""
         try:
             assert_equal_outcome(simulator, done, row, episode)
         except AssertionError as error:
-            equal, why = False, str(error)
-        else:
-            equal, why = True, ""
-        tally.check("episodes equal those of the reference", equal, lambda _, why=why: {"why": why})
+            why = str(error)
+        claim = "episodes equal those of the reference"
+        tally.check(claim, not why, lambda _, why=why: {"why": why})
         tally.count("steps of the reference", len(episode.rewards))

@@ -1,0 +1,77 @@
+"""A few kills, signals and failing writes, and several processes on one folder."""
+
+import pytest
+
+from kinarm._files import only_writer
+
+from . import disturbances
+from .disturbances import EVALUATED, LIVE, SHOWN, STUDIED, TRAIN, ended, started, unfit
+from .tally import Tally
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("disturb", "command", "count"),
+    [
+        ("kill", TRAIN, 1),
+        ("kill", STUDIED, 1),
+        ("interrupt", TRAIN, 2),
+        ("interrupt", STUDIED, 2),
+        ("interrupt", LIVE, 1),
+        ("interrupt", SHOWN, 1),
+        ("limit", disturbances.SHORT, 3),
+        ("limit", EVALUATED, 4),
+    ],
+)
+def test_nothing_is_lost_or_left(disturb, command, count):
+    tally = Tally()
+    getattr(disturbances, disturb)(command, count, 0, tally)
+    assert tally.failed == {}, tally.examples
+    assert sum(tally.counts.values()) >= count
+
+
+@pytest.mark.parametrize(
+    ("status", "err", "found"),
+    [
+        (130, "30 of 30\nkinarm-eval: interrupted\n", ""),
+        (130, "", ""),
+        (None, "", "status None"),
+        (1, "", "status 1"),
+        (130, "Traceback (most recent call last):\nValueError: 3\n", "a traceback"),
+        (130, "kinarm-eval: a\nkinarm-eval: b\n", "more than a line"),
+        (130, "kinarm-eval: a\nwarning\n", "more than a line"),
+    ],
+)
+def test_what_counts_as_a_finding(status, err, found):
+    assert unfit("kinarm-eval", status, err, (0, 130)) == found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", [EVALUATED, STUDIED, "kinarm-bench --out out"])
+def test_one_process_at_a_time_writes_to_a_folder(command, tmp_path):
+    (tmp_path / "out").mkdir()
+    with only_writer(tmp_path / "out"), started(command, tmp_path) as process:
+        status, err = ended(process)
+    assert (status, len(err.splitlines())) == (2, 1)
+    assert "another process is writing" in err
+    assert [path for path in (tmp_path / "out").rglob("*") if path.is_file()] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "surroundings",
+    [
+        {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONIOENCODING": "ascii"},
+        {"HOME": "/proc/none", "XDG_CACHE_HOME": "/proc/none", "KINARM_CACHE": "/proc/none"},
+        {"NUMBA_CACHE_DIR": "/proc/none", "TERM": "dumb", "COLUMNS": "0", "LINES": "x"},
+    ],
+)
+def test_commands_end_well_anywhere(surroundings, monkeypatch, tmp_path):
+    for name, value in surroundings.items():
+        monkeypatch.setenv(name, value)
+    commands = (disturbances.SHORT, "kinarm-replay --policy gone/é[/o].npz")
+    for command, expected in zip(commands, (0, 2), strict=True):
+        with started(command, tmp_path) as process:
+            status, err = ended(process)
+        assert status == expected, err
+        assert unfit(command, status, err, (0, 2)) == ""
