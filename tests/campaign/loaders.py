@@ -23,12 +23,13 @@ from kinarm.arm import Arm
 from kinarm.errors import KinarmError
 from kinarm.evaluation import EvaluationDocument, Study, oracle_bounds
 from kinarm.evaluation.imported import imported_policy
-from kinarm.hulls import hull_of_mesh
+from kinarm.meshes import hull_of_mesh
 from kinarm.policies import Policy, load_checkpoint, recipe
 from kinarm.policies.conversion.sb3_models import sb3_model
 from kinarm.policies.conversion.vec_normalize import load_vec_normalize
 from kinarm.policies.learners import state_policy
-from kinarm.problem_files import find_scene, find_task, read_problem
+from kinarm.problem import ReachProblem
+from kinarm.problem_files import find_scene, find_task
 from kinarm.recording import load_recordings
 from kinarm.viewer.mesh_files import read_mesh_file
 from kinarm.viewer.visual_shapes import visual_parts
@@ -49,7 +50,7 @@ from .tally import Tally, main
 
 PATIENCE = 120.0
 """Time after which a call counts as hanging [s]."""
-MEMORY = 1 << 30
+MEMORY = 2 << 30
 """What a loader may take [bytes]."""
 LONGEST = 2000
 """Characters of the longest message."""
@@ -125,6 +126,14 @@ def _bounds_samples() -> list[bytes]:
     return [samples.written(save)]
 
 
+def _study(path: Path) -> None:
+    """Read everything that lies in the folder of a study."""
+    study = Study(samples.SMALL_STUDY, path.parents[1])
+    study.table()
+    study.store.made(study.runs[0])
+    assert len(study.bounds) <= 1
+
+
 def _module(path: Path) -> None:
     sys.modules.pop("mine", None)
     sys.path[0], sys.dont_write_bytecode = str(path.parent), True
@@ -150,7 +159,7 @@ LOADERS: dict[str, Loader] = {
     "problem": Loader(
         partial(samples.toml_files, "problems"),
         damaged_toml,
-        lambda path: read_problem(path).to_toml(),
+        lambda path: ReachProblem.load(path).to_toml(),
         "file.toml",
     ),
     "scene": Loader(partial(samples.toml_files, "scenes"), damaged_toml, find_scene, "file.toml"),
@@ -174,6 +183,14 @@ LOADERS: dict[str, Loader] = {
         lambda path: repr(Study(path, path.parent / "out")),
         "file.toml",
     ),
+    **{
+        f"{folder} of a study": Loader(
+            partial(samples.study_file, folder), damage, _study, f"{folder}/{samples.KEYS[folder]}"
+        )
+        for folder, damage in zip(
+            samples.KEYS, (damaged_archive, damaged_json, damaged_archive), strict=True
+        )
+    },
     "urdf": Loader(
         lambda: [*[samples.SMALL_URDF] * 7, samples.urdf()], damaged_xml, _arm, "file.urdf", _cube
     ),
@@ -257,6 +274,7 @@ def _work(
     """Load files from a number on, and tell what came of each."""
     loader, (first, count, seed) = LOADERS[name], numbers
     path = folder / loader.file
+    path.parent.mkdir(exist_ok=True)
     for other, content in loader.beside().items():
         (folder / other).write_bytes(content)
     path.write_bytes(contents[0])

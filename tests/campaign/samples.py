@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from kinarm.arm import Arm
-from kinarm.evaluation import EvaluationRequest, TrialSet
+from kinarm.evaluation import EvaluationRequest, Study, TrialSet
 from kinarm.policies import load_policy, recipe, save_checkpoint
 from kinarm.policies.learners import begin_training
 from kinarm.problem_files import shipped_files
@@ -113,6 +113,28 @@ count = 1
 noise = { low = 0.01, high = 0.1, log = true }
 sharing = ["none", "pair"]
 """
+
+SMALL_STUDY = {
+    "name": "small",
+    "trials": {"count": 5},
+    "fixed": {"iterations": 1, "directions": 2, "top_directions": 1},
+}
+_PLANNED = Study(SMALL_STUDY, Path())
+_RUN, _BOUNDS = _PLANNED.runs[0], _PLANNED.bound_tasks[0]
+KEYS = {
+    "runs": _PLANNED.store.run_path(_RUN).name,
+    "made": _PLANNED.store.made_path(_RUN).name,
+    "bounds": _PLANNED.store.bounds_path(_BOUNDS).name,
+}
+"""Names of the files of a study whose one training is finished, by their folder."""
+
+
+def study_file(folder: str) -> list[bytes]:
+    """One of these files."""
+    with TemporaryDirectory() as name:
+        Study(SMALL_STUDY, name).run(jobs=1)
+        return [(Path(name) / folder / KEYS[folder]).read_bytes()]
+
 
 SMALL_URDF = b"""<?xml version="1.0" encoding="utf-8"?>
 <robot name="made" version="1.2">
