@@ -6,7 +6,7 @@ from itertools import count, cycle
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.envs.interface import FlatInterface
+from kinarm.envs.interface import Interface
 from kinarm.policies import load_policy, policy_names, recipe, train_policy
 from kinarm.policies.oracle import Oracle, OracleSolutions
 from kinarm.problem import ReachProblem
@@ -171,7 +171,7 @@ def _check_paths(tally: Tally, simulator: Simulator, done: Rollouts) -> None:
     tally.check("joints stay within their limits", _within(states, arm.lower, arm.upper))
     allowed = (moves[:, :n] <= simulator.step_limit + ROUNDING).all(axis=1)
     tally.check("joints move no faster than they may", allowed & (moves[:, n:] == 0).all(axis=1))
-    space = FlatInterface(simulator).observation_space
+    space = Interface(simulator).observation_space
     for first in range(0, len(states), BATCH):
         seen = simulator.world.observe(states[first : first + BATCH], goals[first : first + BATCH])
         tally.check("observations are inside their space", _within(seen, space.low, space.high))
