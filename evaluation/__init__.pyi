@@ -2,10 +2,10 @@ from .bounds import oracle_bounds as oracle_bounds
 from .contestants import Contestant as Contestant
 from .contestants import find_contestants as find_contestants
 from .document import EvaluationDocument as EvaluationDocument
-from .document import evaluation_document as evaluation_document
 from .evaluation import Evaluation as Evaluation
 from .evaluation import PooledEvaluation as PooledEvaluation
 from .evaluation import evaluate as evaluate
+from .evaluation import evaluation_document as evaluation_document
 from .evaluation import pool as pool
 from .experiments.experiment import Experiment as Experiment
 from .experiments.study import Study as Study
@@ -14,9 +14,9 @@ from .figures import save_figure as save_figure
 from .metrics import METRICS as METRICS
 from .metrics import Metric as Metric
 from .outcomes import Outcomes as Outcomes
-from .replay.failures import find_failures as find_failures
-from .replay.recorder import record as record
+from .replay.choosing import find_failures as find_failures
 from .replay.request import ReplayRequest as ReplayRequest
+from .replay.runs import record as record
 from .report.card import policy_card as policy_card
 from .report.card import write_card as write_card
 from .report.page import report_page as report_page

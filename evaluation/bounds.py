@@ -5,22 +5,23 @@ import os
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kinarm import SEMANTICS
 from kinarm._archive import cache_folder, load_archive, save_archive
 from kinarm._files import check_folder
 from kinarm.errors import InvalidInputError, OutputError
+from kinarm.evaluation.schemas import Count, Document, Share
 from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle import ORACLE_SEMANTICS, Oracle, OracleSolutions, Progress
 from kinarm.policies.provenance import package_versions
 
-KEPT_FILES, KEPT_BYTES = 200, 256 * 2**20
-"""Trial sets whose bounds are kept, and how large their files may be together."""
+KEPT_BYTES = 256 * 2**20
+"""How large the files with kept bounds may be together."""
 
 COMPUTING_PACKAGES = ("numpy", "numba", "pin", "coal")
 """Packages that the numbers of a solution come from."""
@@ -28,16 +29,11 @@ COMPUTING_PACKAGES = ("numpy", "numba", "pin", "coal")
 ARCHIVE = ("bounds", 1)
 """Kind and version of the files."""
 
-TRIAL_BOUNDS = (
-    *("reachable", "steps", "steps_lower_bound", "proof_complete"),
-    *("final_distance", "distance_lower_bound"),
-)
-"""What documents hold of every trial."""
-
 MOST_BOUNDED = 2000
-"""Trials whose bounds are looked for beside policies that face more: the first ones."""
+"""Trials whose bounds are looked for beside policies that face more: the first ones.
 
-_bounded: WeakKeyDictionary[TrialSet, TrialSet] = WeakKeyDictionary()
+A proof takes a thousand times as long as a policy's trial, and figures need no more of them.
+"""
 
 _known: WeakKeyDictionary[TrialSet, OracleSolutions] = WeakKeyDictionary()
 
@@ -47,8 +43,8 @@ def oracle_bounds(trials: TrialSet, on_progress: Progress | None = None) -> Orac
 
     Solutions are kept in the cache folder under a name made of the hash of the trials and of the
     oracle's version, for other processes, and in memory as long as the trials are. A file that
-    cannot be read is replaced; where none can be written, nothing is kept. Beyond ``KEPT_FILES``
-    and ``KEPT_BYTES``, the files that were used least recently go.
+    cannot be read is replaced; where none can be written, nothing is kept. Beyond ``KEPT_BYTES``,
+    the files that were used least recently go.
 
     Parameters
     ----------
@@ -66,24 +62,6 @@ def oracle_bounds(trials: TrialSet, on_progress: Progress | None = None) -> Orac
             _save(path, solutions)
         _known[trials] = solutions
     return _known[trials]
-
-
-def bounded_trials(trials: TrialSet) -> TrialSet:
-    """The first `MOST_BOUNDED` trials, or all if there are no more or all bounds are known.
-
-    A proof takes a thousand times as long as a policy's trial, and the figures made of proofs need
-    no more of them.
-    """
-    if len(trials) <= MOST_BOUNDED or trials in _known:
-        return trials
-    if trials not in _bounded:
-        _bounded[trials] = trials.chosen(range(MOST_BOUNDED))
-    return _bounded[trials]
-
-
-def first_bounds(trials: TrialSet, on_progress: Progress | None = None) -> OracleSolutions:
-    """What the oracle knows about the `bounded_trials`; parameters as of `oracle_bounds`."""
-    return oracle_bounds(bounded_trials(trials), on_progress)
 
 
 @cache
@@ -122,10 +100,7 @@ def _save(path: Path, solutions: OracleSolutions) -> None:
 
 
 def _delete_least_recently_used(folder: Path) -> None:
-    """Delete surplus files, and tolerate other processes that change them meanwhile.
-
-    What a process that was killed left half written counts, too.
-    """
+    """Delete surplus files, half-written ones included; other processes may change them, too."""
     used = []
     for path in (*folder.glob("oracle-*.npz"), *folder.glob(".oracle-*.npz.*")):
         with suppress(OSError):
@@ -134,35 +109,81 @@ def _delete_least_recently_used(folder: Path) -> None:
     total = 0
     for rank, (_, size, path) in enumerate(sorted(used, reverse=True)):
         total += size
-        if rank > 0 and (rank >= KEPT_FILES or total > KEPT_BYTES):
+        if rank > 0 and total > KEPT_BYTES:
             with suppress(OSError):
                 path.unlink()
 
 
-def bounds_document(solutions: OracleSolutions) -> dict[str, Any]:
-    """What the oracle knows about a set of trials, as a dictionary that JSON can hold.
+class Unsolved(Document, frozen=True, kw_only=True):
+    """A trial in which the oracle found no motion to the goal, and why."""
 
-    ``bounded`` is the number of trials. ``unsolved`` lists the trials without a motion, and why.
-    ``gap`` is the difference of ``steps`` and ``steps_lower_bound`` in the other trials.
-    ``proof_complete_share`` is the share of trials whose proof is complete.
+    trial: Count
+    reason: str
+
+
+class TrialBounds(Document, frozen=True, kw_only=True):
+    """What the oracle knows about each of the bounded trials.
+
+    Parameters
+    ----------
+    steps, steps_lower_bound : list of int
+        Steps of the motion that was found, and those that are proven to be necessary.
+    final_distance, distance_lower_bound : list of float
+        How close the motion comes, and no motion within the horizon comes closer [m].
     """
+
+    reachable: list[bool]
+    steps: list[Count]
+    steps_lower_bound: list[Count]
+    proof_complete: list[bool]
+    final_distance: list[float]
+    distance_lower_bound: list[float]
+
+
+class Bounds(Document, frozen=True, kw_only=True):
+    """What any policy could do in the trials of a problem.
+
+    Parameters
+    ----------
+    bounded : int
+        The first trials, which have bounds.
+    success : Estimate
+        Share of trials with a motion to the goal.
+    steps, steps_lower_bound, gap : dict of float
+        Mean, median, 95th percentile and maximum: of the motions, of the bounds, and of their
+        difference in trials with a motion.
+    """
+
+    bounded: Count
+    success: Estimate
+    unsolved: list[Unsolved]
+    steps: dict[str, float]
+    steps_lower_bound: dict[str, float]
+    gap: dict[str, float] | None
+    proof_complete_share: Share
+    trials: TrialBounds
+
+
+def bounds_document(solutions: OracleSolutions) -> Bounds:
+    """What the oracle knows about a set of trials, for a document."""
     missed = np.flatnonzero(~solutions.reachable)
     gap = (solutions.steps - solutions.steps_lower_bound)[solutions.reachable]
-    return {
-        "bounded": len(solutions),
-        "success": Estimate.share(solutions.reachable).to_json(),
-        "unsolved": [
-            {"trial": int(trial), "reason": str(solutions.reasons[trial])} for trial in missed
+    trials = {name: getattr(solutions, name).tolist() for name in TrialBounds.__struct_fields__}
+    return Bounds(
+        bounded=len(solutions),
+        success=Estimate.share(solutions.reachable),
+        unsolved=[
+            Unsolved(trial=trial, reason=str(solutions.reasons[trial])) for trial in missed.tolist()
         ],
-        "steps": _summary(solutions.steps),
-        "steps_lower_bound": _summary(solutions.steps_lower_bound),
-        "gap": _summary(gap) if gap.size else None,
-        "proof_complete_share": float(solutions.proof_complete.mean()),
-        "trials": {name: getattr(solutions, name).tolist() for name in TRIAL_BOUNDS},
-    }
+        steps=_summary(solutions.steps),
+        steps_lower_bound=_summary(solutions.steps_lower_bound),
+        gap=_summary(gap) if gap.size else None,
+        proof_complete_share=float(solutions.proof_complete.mean()),
+        trials=TrialBounds(**trials),
+    )
 
 
-def _summary(steps: np.ndarray[Any, np.dtype[np.int64]]) -> dict[str, float]:
+def _summary(steps: NDArray[np.int64]) -> dict[str, float]:
     return {
         "mean": float(steps.mean()),
         "median": float(np.median(steps)),

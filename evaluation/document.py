@@ -1,135 +1,235 @@
 """The document of an evaluation: everything about it, to keep and to face the same trials again."""
 
-import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, Literal
 
-import numpy as np
+import msgspec
 
-from kinarm._archive import load_json
-from kinarm._files import first_line
 from kinarm._validation import finite_array
 from kinarm.errors import InvalidInputError, UnknownNameError
-from kinarm.evaluation.bounds import bounds_document
-from kinarm.evaluation.contestants import check_names
-from kinarm.evaluation.evaluation import Evaluation, pool
-from kinarm.evaluation.statistics import BOOTSTRAP_SEED, LEVEL, RESAMPLES
+from kinarm.evaluation.bounds import Bounds
+from kinarm.evaluation.outcomes import Cause, End, Outcome, Pair
+from kinarm.evaluation.schemas import Count, Digest, Document, Share, read_document
+from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.problem import ReachProblem
 from kinarm.simulator import Simulator
 
-KIND, FORMAT_VERSION = "evaluation", 4
-"""Kind and version of the files."""
-
-READABLE = (2, 3, FORMAT_VERSION)
-"""Versions that can be read: 2 lacks failures, trials that go on, and bounds of a part; 2 and 3
-call complete proofs tight."""
-
-ENDS = ("outcome", "steps", "final_distance")
-"""What has to be the same again."""
+FORMAT_VERSION: Final = 4
+"""Version of the files, which is the only one that can be read."""
 
 
-def evaluation_document(evaluations: Sequence[Evaluation], command: str) -> dict[str, Any]:
-    """Everything about an evaluation, as a dictionary that JSON can hold.
+class Intervals(Document, frozen=True, kw_only=True):
+    """How the 95 % intervals are made."""
+
+    level: Share
+    shares: str
+    distances: str
+    pooled: str
+    resamples: Count
+    bootstrap_seed: Count
+
+
+class FacedProblem(Document, frozen=True, kw_only=True):
+    """A problem, its trials, and what any policy could do there.
 
     Parameters
     ----------
-    evaluations : sequence of Evaluation
-        Made with one trial set per problem.
-    command : str
-        The command that made them.
-
-    Returns
-    -------
-    dict
-        ``protocol`` (problems, their trials with hash and bounds, versions, commit, command),
-        ``results`` (one per policy and problem, with the outcome of every trial) and ``pooled``
-        (one per recipe and problem with several training seeds).
-
-    Raises
-    ------
-    InvalidInputError
-        If two policies on a problem, or two problems, have the same name.
+    arm : str
+        Name of the arm.
+    problem : dict
+        The problem, in the words of problem files.
+    digest, trial_set_hash : str
+        Hashes of the problem, and of its trials.
+    starts : list
+        Joint positions, (trials, n_joints) [rad or m].
+    goals : list
+        Positions, (trials, 3) [m].
+    oracle : Bounds, optional
+        What the oracle found, if it was asked.
     """
-    check_names((each.contestant, each.problem) for each in evaluations)
-    any_set = evaluations[0].trials
-    facing = {each.problem.name: each for each in reversed(evaluations)}
-    return {
-        "protocol": {
-            "format_version": FORMAT_VERSION,
-            "command": command,
-            "trials": len(any_set),
-            "seed": any_set.seed,
-            "hold": any(each.holding is not None for each in evaluations),
-            "intervals": {
-                "level": LEVEL,
-                "shares": "Wilson",
-                "distances": "percentile bootstrap over trials",
-                "pooled": "Student, over training seeds and trials",
-                "resamples": RESAMPLES,
-                "bootstrap_seed": BOOTSTRAP_SEED,
-            },
-            "problems": {name: _problem_entry(facing[name]) for name in reversed(facing)},
-            "versions": package_versions(),
-            "commit": source_commit(),
-        },
-        "results": [evaluation.to_json() for evaluation in evaluations],
-        "pooled": [pooled.to_json() for pooled in pool(evaluations)],
-    }
+
+    arm: str
+    problem: dict[str, Any]
+    digest: Digest
+    trial_set_hash: Digest
+    starts: list[list[float]]
+    goals: list[tuple[float, float, float]]
+    oracle: Bounds | None
 
 
-def document_text(value: Any, indent: str = "\n") -> str:
-    """A document as JSON: objects over several lines, but lists of numbers or words on one."""
-    if isinstance(value, list) and any(isinstance(each, Mapping) for each in value):
-        entries, ends = [document_text(each, indent + " ") for each in value], "[]"
-    elif isinstance(value, Mapping):
-        entries = [f"{json.dumps(key)}: {document_text(value[key], indent + ' ')}" for key in value]
-        ends = "{}"
-    else:
-        return json.dumps(value)
-    return f"{ends[0]}{indent} {f',{indent} '.join(entries)}{indent}{ends[1]}"
+class Protocol(Document, frozen=True, kw_only=True):
+    """Who faced what, and how it was measured.
 
-
-def _problem_entry(evaluation: Evaluation) -> dict[str, Any]:
-    """What was faced, and what any policy could do there."""
-    trials, bounds = evaluation.trials, evaluation.bounds
-    return {
-        "arm": trials.simulator.arm.name,
-        "problem": trials.problem.pinned.to_json(),
-        "digest": trials.problem.digest,
-        "trial_set_hash": trials.digest,
-        "starts": trials.starts.tolist(),
-        "goals": trials.goals.tolist(),
-        "oracle": bounds_document(bounds) if bounds is not None else None,
-    }
-
-
-@dataclass(frozen=True)
-class EvaluationDocument:
-    """What a file ``evaluation.json`` holds.
-
-    Attributes
+    Parameters
     ----------
-    name : str
-        Name of the file.
-    protocol : dict
-        Problems and trials.
-    results : list of dict
-        One for each policy and problem.
-    members : dict
-        Names of the policies of each group of training seeds, by its name and problem.
+    hold : bool
+        Whether trials were run without an end at success, too.
+    versions : dict of str
+        Versions of Python and of the libraries that results may depend on.
+    commit : str, optional
+        Commit of kinarm, -dirty behind it if files were changed; null without Git.
     """
 
-    name: str
-    protocol: dict[str, Any]
-    results: list[dict[str, Any]]
-    members: dict[tuple[str, str], list[str]] = field(default_factory=dict)
+    format_version: Literal[4] = FORMAT_VERSION
+    command: str
+    trials: Count
+    seed: Count
+    hold: bool
+    intervals: Intervals
+    problems: dict[str, FacedProblem]
+    versions: dict[str, str]
+    commit: str | None
+
+
+class Failures(Document, frozen=True, kw_only=True):
+    """Trials that failed for one cause.
+
+    Parameters
+    ----------
+    contact : tuple of str, optional
+        The bodies that touched; null where the steps ran out.
+    early : bool
+        Whether they did within the first steps.
+    """
+
+    contact: Pair | None
+    early: bool
+    trials: Count
+    share_of_failures: Share
+
+    @property
+    def cause(self) -> Cause:
+        """Why they failed."""
+        return Cause(self.contact, self.early)
+
+
+class TrialEnds(Document, frozen=True, kw_only=True):
+    """How each trial ended; distances in [m], and the bodies that touched.
+
+    Their order is that of the trials.
+    """
+
+    final_distance: list[float]
+    steps: list[Count]
+    outcome: list[Outcome]
+    contact: list[Pair | None]
+
+    def ends(self) -> list[End]:
+        """Outcome, steps and final distance of each trial."""
+        return list(zip(self.outcome, self.steps, self.final_distance, strict=False))
+
+
+class TrialHolding(Document, frozen=True, kw_only=True):
+    """What happened in each trial where success did not end it.
+
+    Parameters
+    ----------
+    closest, farthest_at_end : list of float
+        Smallest distance from the goal, and the largest one in the last steps, null where contact
+        ended the trial [m].
+    """
+
+    closest: list[float]
+    farthest_at_end: list[float | None]
+    contact: list[bool]
+    steps: list[Count]
+
+
+class Row(Document, frozen=True, kw_only=True):
+    """A row of the table.
+
+    Parameters
+    ----------
+    trained_on : str, optional
+        Name of the problem that the policy was trained for, if it was trained.
+    metrics : dict of Estimate
+        Figures of merit by their names in kinarm.evaluation.METRICS.
+    failures : list of Failures
+        Why trials failed, the most frequent cause first.
+    """
+
+    policy: str
+    algorithm: str
+    recipe: str
+    problem: str
+    trained_on: str | None
+    trials: Count
+    metrics: dict[str, Estimate]
+    failures: list[Failures]
+
+
+class Result(Row, frozen=True, kw_only=True):
+    """One policy on one problem.
+
+    Parameters
+    ----------
+    note : str
+        A remark, such as the statistics in use.
+    held : TrialHolding
+        What happened without an end at success, if that was asked for.
+    """
+
+    training_seed: int | None
+    note: str
+    outcomes: TrialEnds
+    held: TrialHolding | msgspec.UnsetType = msgspec.UNSET
+
+
+class Spread(Document, frozen=True, kw_only=True):
+    """A figure over the training seeds: its extremes, standard deviation and values."""
+
+    min: float
+    max: float
+    std: float
+    each: list[float]
+
+
+class WorstSeed(Document, frozen=True, kw_only=True):
+    """The training seed with the lowest success."""
+
+    policy: str
+    training_seed: int | None
+    success: Estimate
+
+
+class PooledResult(Row, frozen=True, kw_only=True):
+    """Several training seeds of a recipe on one problem.
+
+    Parameters
+    ----------
+    members : list of str
+        Names of the policies, one a seed.
+    spread : dict of Spread
+        Figures over the seeds, where all have them.
+    """
+
+    members: list[str]
+    training_seeds: list[int | None]
+    spread: dict[str, Spread]
+    worst_seed: WorstSeed
+
+
+class EvaluationDocument(Document, frozen=True, kw_only=True):
+    """An evaluation: evaluation.json of kinarm-eval --out, and what kinarm-eval --json prints.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        Problems, trials, and how it was measured.
+    results : list of Result
+        Every policy on every problem.
+    pooled : list of PooledResult
+        Training seeds of a recipe together.
+    """
+
+    protocol: Protocol
+    results: list[Result]
+    pooled: list[PooledResult]
 
     def __repr__(self) -> str:
-        return f"EvaluationDocument({self.name!r}, {len(self.results)} results)"
+        return f"EvaluationDocument({len(self.results)} results)"
 
     @classmethod
     def load(cls, path: str | Path) -> "EvaluationDocument":
@@ -140,26 +240,9 @@ class EvaluationDocument:
         InvalidInputError
             If the file is missing, damaged, something else, or of another version.
         """
-        name = str(path)
-        content = load_json(path, KIND, InvalidInputError)
-        try:
-            check_shape(content, {"protocol": {"format_version": int}, "results": list}, "it")
-            version = content["protocol"]["format_version"]
-            if version in READABLE:
-                check_document(content)
-        except (ValueError, RecursionError) as error:
-            raise InvalidInputError(
-                f"{name!r} is not a complete kinarm evaluation: {first_line(error)}"
-            ) from error
-        if version not in READABLE:
-            readable = " and ".join(map(str, READABLE))
-            raise InvalidInputError(
-                f"{name!r} has format version {version}; this kinarm reads {readable}"
-            )
-        members = {(row["policy"], row["problem"]): row["members"] for row in content["pooled"]}
-        return cls(name, content["protocol"], content["results"], members)
+        return read_document(path, cls, "evaluation")
 
-    def result(self, policy: str | None, problem: str | None) -> dict[str, Any]:
+    def result(self, policy: str | None, problem: str | None) -> Result:
         """Find the result of a policy, or of a group's first seed, on a problem.
 
         Raises
@@ -167,21 +250,33 @@ class EvaluationDocument:
         InvalidInputError
             If there is none, or several that fit.
         """
-        fitting = [row for row in self.results if problem in (None, row["problem"])]
+        fitting = [row for row in self.results if problem in (None, row.problem)]
         if policy is None:
-            named = [row for row in fitting if row["trained_on"] is not None] or fitting
+            named = [row for row in fitting if row.trained_on is not None] or fitting
             if len(named) != 1:
-                choices = ", ".join(f"{row['policy']} on {row['problem']}" for row in named)
+                choices = ", ".join(f"{row.policy} on {row.problem}" for row in named)
                 raise InvalidInputError(
-                    f"{self.name!r} holds several results, choose with --policy and --problem: "
+                    "the evaluation holds several results, choose with --policy and --problem: "
                     f"{choices or 'none on this problem'}"
                 )
             return named[0]
+        firsts = {(row.policy, row.problem): row.members[0] for row in self.pooled}
         for row in fitting:
-            first, *_ = self.members.get((policy, row["problem"]), [policy])
-            if row["policy"] == first:
+            if row.policy == firsts.get((policy, row.problem), policy):
                 return row
-        raise UnknownNameError("policy", policy, dict.fromkeys(row["policy"] for row in fitting))
+        raise UnknownNameError("policy", policy, dict.fromkeys(row.policy for row in fitting))
+
+    def faced(self, problem: str) -> FacedProblem:
+        """What the protocol says of a problem.
+
+        Raises
+        ------
+        UnknownNameError
+            If none of this name was faced.
+        """
+        if problem not in self.protocol.problems:
+            raise UnknownNameError("problem", problem, self.protocol.problems)
+        return self.protocol.problems[problem]
 
     def problem(self, name: str) -> ReachProblem:
         """One of the problems that were faced.
@@ -189,10 +284,9 @@ class EvaluationDocument:
         Raises
         ------
         InvalidInputError
-            If it cannot be read.
+            If there is none of this name, or it cannot be read.
         """
-        entry = self.protocol["problems"][name]
-        return ReachProblem.from_json(entry["problem"], f"{self.name}: problem {name}")
+        return ReachProblem.from_json(self.faced(name).problem, f"problem {name}")
 
     def trials(self, problem: str) -> TrialSet:
         """The trials of a problem, as they were faced.
@@ -204,118 +298,42 @@ class EvaluationDocument:
         KinarmError
             If the arm is missing or another one by now.
         """
-        entry = self.protocol["problems"][problem]
-        simulator = Simulator(self.problem(problem))
-        starts, goals = np.array(entry["starts"]), np.array(entry["goals"])
-        trials = TrialSet(simulator, self.protocol["seed"], starts, goals)
-        if trials.digest != entry["trial_set_hash"]:
-            raise InvalidInputError(
-                f"the trials of {problem} in {self.name!r} do not match their hash"
-            )
+        faced, simulator = self.faced(problem), Simulator(self.problem(problem))
+        starts = finite_array("starts", faced.starts, (None, simulator.arm.n_joints))
+        goals = finite_array("goals", faced.goals, (len(starts), 3))
+        trials = TrialSet(simulator, self.protocol.seed, starts, goals)
+        if trials.digest != faced.trial_set_hash:
+            raise InvalidInputError(f"the trials of {problem} do not match their hash")
         return trials
 
-    def floors(self, problem: str) -> list[int] | None:
+    def lower_bounds(self, problem: str) -> list[int] | None:
         """Proven numbers of steps of a problem's first trials, if the evaluation had them."""
-        oracle = self.protocol["problems"][problem]["oracle"]
-        return oracle["trials"]["steps_lower_bound"] if oracle else None
-
-    def check_same(self, row: dict[str, Any], ends: Sequence[tuple[str, int, float]]) -> None:
-        """See that trials end as the evaluation says.
-
-        Parameters
-        ----------
-        row : dict
-            The result of a policy.
-        ends : sequence of (str, int, float)
-            Outcomes, steps and final distances [m], of all its trials.
-
-        Raises
-        ------
-        InvalidInputError
-            If one does not: policy or simulator have changed since.
-        """
-        said = list(zip(*(row["outcomes"][part] for part in ENDS), strict=True))
-        for trial, end in enumerate(ends):
-            if len(ends) != len(said) or end != said[trial]:
-                raise InvalidInputError(
-                    f"trial {trial} of {row['policy']!r} ends otherwise than in "
-                    f"{self.name!r}: the policy or kinarm has changed, evaluate again"
-                )
+        oracle = self.faced(problem).oracle
+        return oracle.trials.steps_lower_bound if oracle else None
 
 
-EACH, ENTRY, NULL = "*", "[]", type(None)
-"""Keys that stand for every key of an object and every entry of a list, and the type of null."""
+def check_same(row: Result, ends: Sequence[End]) -> None:
+    """See that trials end as an evaluation says.
 
-SHAPE = {
-    "protocol": {
-        "seed": int,
-        "problems": {
-            EACH: {
-                "problem": dict,
-                "trial_set_hash": str,
-                "starts": list,
-                "goals": list,
-                "oracle": (dict, NULL),
-            }
-        },
-    },
-    "results": {
-        ENTRY: {
-            "policy": str,
-            "problem": str,
-            "trained_on": (str, NULL),
-            "outcomes": dict.fromkeys(ENDS, list),
-        }
-    },
-    "pooled": {ENTRY: {"policy": str, "problem": str, "members": list}},
-}
-"""What is needed of a document to face its trials again: types, by nested keys."""
-
-
-def check_document(content: dict[str, Any]) -> None:
-    """Check that a document holds what is needed to run its trials again.
+    Parameters
+    ----------
+    row : Result
+        What it says of a policy.
+    ends : sequence of End
+        How all its trials end now.
 
     Raises
     ------
     InvalidInputError
-        If something is missing or of another kind, with the place where that is.
+        If one ends otherwise: policy or simulator have changed since.
     """
-    check_shape(content, SHAPE, "it")
-    for name, entry in content["protocol"]["problems"].items():
-        for part in ("starts", "goals"):
-            finite_array(f"{part} of {name!r}", entry[part], (None, None))
-        if entry["oracle"]:
-            bounds = {"trials": {"steps_lower_bound": list}}
-            check_shape(entry["oracle"], bounds, f"oracle of {name!r}")
-    for number, row in enumerate(content["results"]):
-        if row["problem"] not in content["protocol"]["problems"]:
-            raise InvalidInputError(f"results.{number} is of no known problem: {row['problem']!r}")
-        if len({len(row["outcomes"][part]) for part in ENDS}) > 1:
-            raise InvalidInputError(f"results.{number} has outcomes of different lengths")
-
-
-def check_shape(value: Any, shape: Any, where: str) -> None:
-    """See that part of a document is of a type, or an object with some keys; see `SHAPE`.
-
-    Raises
-    ------
-    InvalidInputError
-        If it is not; names the first place that is wrong.
-    """
-    if not isinstance(shape, Mapping):
-        if not isinstance(value, shape):
-            raise InvalidInputError(f"{where} is of the wrong kind")
-        return
-    if ENTRY in shape:
-        if not isinstance(value, list):
-            raise InvalidInputError(f"{where} is no list")
-        for number, entry in enumerate(value):
-            check_shape(entry, shape[ENTRY], f"{where}.{number}")
-        return
-    if not isinstance(value, Mapping):
-        raise InvalidInputError(f"{where} is no object")
-    for key in value if EACH in shape else shape:
-        if key not in value:
-            raise InvalidInputError(f"{where} lacks {key!r}")
-        inner = key if where == "it" else f"{where}.{key}"
-        check_shape(value[key], shape.get(EACH) or shape[key], inner)
+    said = row.outcomes.ends()
+    if list(ends) != said:
+        trial = next(
+            (k for k, pair in enumerate(zip(ends, said, strict=False)) if pair[0] != pair[1]),
+            len(said),
+        )
+        raise InvalidInputError(
+            f"trial {trial} of {row.policy!r} ends otherwise than in the evaluation: the policy or "
+            "kinarm has changed, evaluate again"
+        )

@@ -1,4 +1,4 @@
-"""Put policies to the trials and summarise how they did."""
+"""Put contestants to trials, and sum up how they did."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,18 +10,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.errors import InvalidInputError
-from kinarm.evaluation.bounds import first_bounds
-from kinarm.evaluation.contestants import Contestant, find_contestants
+from kinarm.evaluation.bounds import MOST_BOUNDED, oracle_bounds
+from kinarm.evaluation.contestants import (
+    Contestant,
+    Predictor,
+    find_contestants,
+    policy_function,
+)
+from kinarm.evaluation.document import EvaluationDocument, Intervals, Protocol
 from kinarm.evaluation.estimates import estimate_metrics
-from kinarm.evaluation.failures import failure_rows
 from kinarm.evaluation.holding import Holding, measure_holding
-from kinarm.evaluation.imported import Predictor, policy_function
-from kinarm.evaluation.outcomes import Outcomes
-from kinarm.evaluation.statistics import Estimate, share_over_seeds
+from kinarm.evaluation.outcomes import Outcome, Outcomes, ends_of
+from kinarm.evaluation.rows import faced_problem_of, pooled_result_of, result_of
+from kinarm.evaluation.selection import check_names
+from kinarm.evaluation.statistics import (
+    BOOTSTRAP_SEED,
+    LEVEL,
+    RESAMPLES,
+    Estimate,
+    share_over_seeds,
+)
 from kinarm.evaluation.training_seeds import group_names
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle.solution import OracleSolutions
 from kinarm.policies.policy import Policy
+from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.rollouts import Rollouts
 from kinarm.simulator import PolicyFunction
@@ -92,26 +105,13 @@ class Evaluation:
         return _outcomes((self,)).step_ratio
 
     @property
-    def outcomes(self) -> tuple[str, ...]:
+    def outcomes(self) -> tuple[Outcome, ...]:
         """``"success"``, ``"collision"`` or ``"truncated"``, per trial."""
-        codes = self.rollouts.success + 2 * self.rollouts.collision
-        return tuple(("truncated", "success", "collision")[code] for code in codes)
+        return tuple(outcome for outcome, *_ in ends_of(self.rollouts))
 
     def to_json(self) -> dict[str, Any]:
         """Figures of merit and every trial, as a dictionary that JSON can hold."""
-        return {
-            **_row_head(
-                self.contestant.name, (self,), self.metrics, training_seed=self.contestant.seed
-            ),
-            "note": self.contestant.note,
-            "outcomes": {
-                "final_distance": self.rollouts.distance.tolist(),
-                "steps": self.rollouts.steps.tolist(),
-                "outcome": list(self.outcomes),
-                "contact": [list(pair) if pair else None for pair in self.contacts],
-            },
-            **({"held": self.holding.to_json()} if self.holding else {}),
-        }
+        return result_of(self).to_json()
 
     def __repr__(self) -> str:
         return f"Evaluation({_summary(self.contestant.name, self.trials, self.success)})"
@@ -155,27 +155,13 @@ class PooledEvaluation:
             known = [member.metrics[name].value for member in self.members]
             each = [value for value in known if value is not None]
             if len(each) == len(known):
-                deviation = float(np.std(each, ddof=1))
-                spread[name] = {"min": min(each), "max": max(each), "std": deviation, "each": each}
+                std = float(np.std(each, ddof=1))
+                spread[name] = {"min": min(each), "max": max(each), "std": std, "each": each}
         return spread
 
     def to_json(self) -> dict[str, Any]:
-        """Figures of merit as a dictionary that JSON can hold."""
-        return {
-            **_row_head(
-                self.name,
-                self.members,
-                self.metrics,
-                members=[member.contestant.name for member in self.members],
-                training_seeds=[member.contestant.seed for member in self.members],
-            ),
-            "spread": self.spread,
-            "worst_seed": {
-                "policy": self.worst.contestant.name,
-                "training_seed": self.worst.contestant.seed,
-                "success": self.worst.success.to_json(),
-            },
-        }
+        """Figures of merit, as a dictionary that JSON can hold."""
+        return pooled_result_of(self).to_json()
 
     def __repr__(self) -> str:
         success = share_over_seeds(np.array([each.rollouts.success for each in self.members]))
@@ -191,25 +177,6 @@ def _outcomes(members: Sequence[Evaluation]) -> Outcomes:
         tuple(member.holding for member in members if member.holding),
         members[0].problem.stepping.time_step,
     )
-
-
-def _row_head(
-    name: str, evaluations: Sequence[Evaluation], metrics: dict[str, Estimate], **seeds: Any
-) -> dict[str, Any]:
-    """What a row of a document is about, its figures, and why its trials failed."""
-    evaluation = evaluations[0]
-    contestant = evaluation.contestant
-    return {
-        "policy": name,
-        "algorithm": contestant.algorithm,
-        "recipe": contestant.recipe,
-        "problem": evaluation.problem.name,
-        "trained_on": contestant.problem.name if contestant.problem else None,
-        **seeds,
-        "trials": len(evaluation.trials),
-        "metrics": {key: estimate.to_json() for key, estimate in metrics.items()},
-        "failures": failure_rows([(each.rollouts, each.contacts) for each in evaluations]),
-    }
 
 
 def _summary(name: str, trials: TrialSet, success: Estimate) -> str:
@@ -262,8 +229,10 @@ def evaluate(
     faced = problem if problem is not None else contestant.problem
     if faced is None:
         raise InvalidInputError(f"{contestant.name!r} was not trained for a problem: name one")
-    trial_set = TrialSet.draw(ReachProblem.load(faced).replace(**overrides), trials, seed)
-    return run_trials(contestant, trial_set, allow_other_arm, oracle=oracle, hold=hold)
+    drawn = TrialSet.draw(ReachProblem.load(faced).replace(**overrides), trials, seed)
+    contestant.check(drawn.simulator.arm, allow_other_arm=allow_other_arm)
+    bounds = oracle_bounds(drawn.first(MOST_BOUNDED)) if oracle else None
+    return run_trials(contestant, drawn, bounds=bounds, hold=hold, allow_other_arm=allow_other_arm)
 
 
 def _contestant_of(
@@ -286,12 +255,25 @@ def _contestant_of(
 def run_trials(
     contestant: Contestant,
     trials: TrialSet,
-    allow_other_arm: bool = False,
     *,
-    oracle: bool = False,
+    bounds: OracleSolutions | None = None,
     hold: bool = False,
+    allow_other_arm: bool = False,
 ) -> Evaluation:
-    """Let an contestant face a set of trials; see `evaluate`.
+    """Let a contestant face a set of trials; see `evaluate`.
+
+    Parameters
+    ----------
+    contestant : Contestant
+        Who faces them.
+    trials : TrialSet
+        The trials.
+    bounds : OracleSolutions, optional
+        What any policy could do in them, or in the first ones.
+    hold : bool
+        Whether to run them once more without an end at success.
+    allow_other_arm : bool
+        Whether a policy may face an arm that it was not trained for.
 
     Raises
     ------
@@ -300,14 +282,8 @@ def run_trials(
         not those of this arm.
     """
     contestant.check(trials.simulator.arm, allow_other_arm=allow_other_arm)
-    rollouts = contestant.run(trials)
-    return Evaluation(
-        contestant,
-        trials,
-        rollouts,
-        first_bounds(trials) if oracle else None,
-        measure_holding(contestant, trials) if hold else None,
-    )
+    holding = measure_holding(contestant, trials) if hold else None
+    return Evaluation(contestant, trials, contestant.run(trials), bounds, holding)
 
 
 def pool(evaluations: Sequence[Evaluation]) -> tuple[PooledEvaluation, ...]:
@@ -325,4 +301,46 @@ def pool(evaluations: Sequence[Evaluation]) -> tuple[PooledEvaluation, ...]:
         PooledEvaluation(name, tuple(members))
         for (name, _), members in groups.items()
         if len(members) > 1
+    )
+
+
+def evaluation_document(evaluations: Sequence[Evaluation], command: str) -> EvaluationDocument:
+    """Everything about an evaluation, to be written and read again.
+
+    Parameters
+    ----------
+    evaluations : sequence of Evaluation
+        Made with one trial set per problem.
+    command : str
+        The command that made them.
+
+    Raises
+    ------
+    InvalidInputError
+        If two policies on a problem, or two problems, have the same name.
+    """
+    check_names((each.contestant, each.problem) for each in evaluations)
+    any_set = evaluations[0].trials
+    facing = {each.problem.name: each for each in reversed(evaluations)}
+    protocol = Protocol(
+        command=command,
+        trials=len(any_set),
+        seed=any_set.seed,
+        hold=any(each.holding is not None for each in evaluations),
+        intervals=Intervals(
+            level=LEVEL,
+            shares="Wilson",
+            distances="percentile bootstrap over trials",
+            pooled="Student, over training seeds and trials",
+            resamples=RESAMPLES,
+            bootstrap_seed=BOOTSTRAP_SEED,
+        ),
+        problems={name: faced_problem_of(facing[name]) for name in reversed(facing)},
+        versions=package_versions(),
+        commit=source_commit(),
+    )
+    return EvaluationDocument(
+        protocol=protocol,
+        results=[result_of(each) for each in evaluations],
+        pooled=[pooled_result_of(each) for each in pool(evaluations)],
     )

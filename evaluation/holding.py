@@ -2,7 +2,6 @@
 
 import sys
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,20 +64,6 @@ class Holding:
             steps=rollouts.steps,
         )
 
-    def to_json(self) -> dict[str, Any]:
-        """Every trial, as a dictionary that JSON can hold."""
-        return {
-            "closest": self.closest.tolist(),
-            "farthest_at_end": [
-                None if touched else distance
-                for touched, distance in zip(
-                    self.collision.tolist(), self.farthest_at_end.tolist(), strict=True
-                )
-            ],
-            "contact": self.collision.tolist(),
-            "steps": self.steps.tolist(),
-        }
-
 
 def _distances(
     world: World, paths: NDArray[np.float64], goals: NDArray[np.float64]
@@ -93,7 +78,7 @@ def _distances(
 
 
 def measure_holding(contestant: Contestant, trials: TrialSet) -> Holding:
-    """Let an contestant face trials that success does not end.
+    """Let a contestant face trials that success does not end.
 
     Starts and goals are those of the trials. The oracle aims at `AIM` there, and stays where it
     gets to.

@@ -1,14 +1,18 @@
-"""What one or several training seeds did in the same trials."""
+"""How trials ended in the hands of one or several training seeds, and why they failed."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.errors import InvalidInputError
+from kinarm.rollouts import Rollouts
+
+if TYPE_CHECKING:
+    from kinarm.evaluation.holding import Holding
 
 EARLY_STEPS = 3
 """Contact within so many steps is early: the arm started close to what it touches."""
@@ -17,7 +21,16 @@ HOLDING_STEPS = 10
 """Last steps of a trial over which the goal is to be held."""
 
 
-class Judged(Protocol):
+Pair = tuple[str, str]
+"""Names of two bodies that touch."""
+
+Outcome = Literal["success", "collision", "truncated"]
+
+End = tuple[Outcome, int, float]
+"""How a trial ended: outcome, steps and final distance [m]."""
+
+
+class Ends(Protocol):
     """The part of finished episodes that figures of merit need; see `kinarm.Rollouts`."""
 
     @property
@@ -44,7 +57,7 @@ class Judged(Protocol):
 
 
 class Bounded(Protocol):
-    """What figures of merit need of the bounds, as the oracle's solutions have it."""
+    """The part of the oracle's solutions that figures of merit need."""
 
     @property
     def reachable(self) -> NDArray[np.bool_]:
@@ -53,22 +66,6 @@ class Bounded(Protocol):
     @property
     def steps_lower_bound(self) -> NDArray[np.int64]:
         """Steps that are necessary."""
-
-
-class HoldingLike(Protocol):
-    """What figures of merit need of trials that went on after success; see `Holding`."""
-
-    @property
-    def closest(self) -> NDArray[np.float64]:
-        """Closest approach [m]."""
-
-    @property
-    def farthest_at_end(self) -> NDArray[np.float64]:
-        """Largest distance in the last steps [m]."""
-
-    @property
-    def collision(self) -> NDArray[np.bool_]:
-        """Whether something touched."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,9 +90,9 @@ class Outcomes:
         What was resampled.
     """
 
-    rollouts: tuple[Judged, ...]
+    rollouts: tuple[Ends, ...]
     bounds: Bounded | None = None
-    holding: tuple[HoldingLike, ...] = ()
+    holding: "tuple[Holding, ...]" = ()
     time_step: float = float("nan")
     numbers: NDArray[np.int64] | None = None
     origin: "Outcomes | None" = None
@@ -189,8 +186,7 @@ class Outcomes:
     @property
     def early_collision(self) -> NDArray[np.bool_]:
         """Whether it did within the first three steps."""
-        early: NDArray[np.bool_] = is_early(self.collision, self.steps)
-        return early
+        return self.collision & (self.steps <= EARLY_STEPS)
 
     @property
     def truncated(self) -> NDArray[np.bool_]:
@@ -222,11 +218,6 @@ class Outcomes:
         return self.bounds
 
 
-def is_early(collision: Any, steps: Any) -> Any:
-    """Whether trials, one or an array of them, ended in contact within the first few steps."""
-    return collision & (steps <= EARLY_STEPS)
-
-
 def _resampled_in_order(
     ordered: NDArray[np.float64], order: NDArray[np.int64], numbers: NDArray[np.int64]
 ) -> NDArray[np.float64]:
@@ -246,3 +237,49 @@ def _resampled_in_order(
     times = counts[:, order % n_trials]
     values = np.repeat(np.tile(ordered, len(rows)), times.ravel())
     return values.reshape(*numbers.shape[:-1], len(ordered))
+
+
+class Cause(NamedTuple):
+    """Why a trial failed.
+
+    Attributes
+    ----------
+    pair : tuple of str, or None
+        The bodies that touched; None where the steps ran out.
+    early : bool
+        Whether they did within the first `EARLY_STEPS` steps.
+    """
+
+    pair: Pair | None
+    early: bool
+
+    def __str__(self) -> str:
+        if self.pair is None:
+            return "truncated"
+        when = f"within {EARLY_STEPS} steps" if self.early else f"after {EARLY_STEPS} steps"
+        return f"{self.pair[0]} touches {self.pair[1]} {when}"
+
+
+def ends_of(rollouts: Rollouts) -> list[End]:
+    """How rollouts ended."""
+    codes = (rollouts.success + 2 * rollouts.collision).tolist()
+    outcomes: tuple[Outcome, ...] = ("truncated", "success", "collision")
+    ended = (outcomes[code] for code in codes)
+    return list(zip(ended, rollouts.steps.tolist(), rollouts.distance.tolist(), strict=True))
+
+
+def failure_causes(ends: Sequence[End], contacts: Sequence[Pair | None]) -> dict[int, Cause]:
+    """Causes of the trials that failed, by their numbers.
+
+    Parameters
+    ----------
+    ends : sequence of End
+        How the trials ended.
+    contacts : sequence
+        The bodies that touched, per trial, as `Simulator.contact_pairs` names them.
+    """
+    return {
+        trial: Cause(contacts[trial], outcome == "collision" and steps <= EARLY_STEPS)
+        for trial, (outcome, steps, _) in enumerate(ends)
+        if outcome != "success"
+    }

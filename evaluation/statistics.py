@@ -5,6 +5,7 @@ Written out here, because SciPy's statistics take longer to load than a policy t
 
 import math
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -24,14 +25,15 @@ NUMBERS_AT_ONCE = 400_000
 Interval = tuple[float, float]
 
 
-class Estimate(NamedTuple):
-    """A figure of merit.
+@dataclass(frozen=True)
+class Estimate:
+    """A figure of merit with its interval.
 
-    Attributes
+    Parameters
     ----------
-    value : float or None
+    value : float, optional
         The figure; None where there is nothing to tell.
-    ci95 : tuple of float, or None
+    ci95 : tuple of float, optional
         Its 95 % interval, where it has one.
     """
 

@@ -4,10 +4,11 @@ import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from operator import itemgetter
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from operator import attrgetter
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from kinarm._console import open_console, print_fitting
+from kinarm.evaluation.document import EvaluationDocument, PooledResult, Row
 from kinarm.evaluation.metrics import ALWAYS, METRICS
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ class Column:
     heading: str
     meaning: str
     priority: float
-    cell: Callable[[dict[str, Any]], Cell]
+    cell: Callable[[Row], Cell]
 
 
 def metric_columns() -> list[Column]:
@@ -59,60 +60,59 @@ def metric_columns() -> list[Column]:
     return columns
 
 
-def metric_cell(name: str, row: dict[str, Any]) -> Cell:
+def metric_cell(name: str, row: Row) -> Cell:
     """A metric in a row of the document."""
-    metric, estimate = METRICS[name], row["metrics"][name]
-    if estimate["value"] is None:
+    metric, estimate = METRICS[name], row.metrics[name]
+    if estimate.value is None:
         return Cell()
     beside = ""
-    if metric.shows_interval and estimate["ci95"]:
-        beside = metric.write_range(*estimate["ci95"])
+    if metric.shows_interval and estimate.ci95:
+        beside = metric.write_range(*estimate.ci95)
     if metric.beside:
         other, words = metric.beside
-        beside = words.format(METRICS[other].write(row["metrics"][other]["value"]))
-    return Cell(metric.write(estimate["value"]), beside)
+        beside = words.format(METRICS[other].write(row.metrics[other].value or 0.0))
+    return Cell(metric.write(estimate.value), beside)
 
 
-def spread_cell(name: str, row: dict[str, Any]) -> Cell:
+def spread_cell(name: str, row: Row) -> Cell:
     """A metric's range over training seeds in a row of the document; empty without seeds."""
-    spread = row.get("spread", {}).get(name)
-    if spread is None:
+    if not isinstance(row, PooledResult) or name not in row.spread:
         return Cell()
-    extremes = METRICS[name].write_range(spread["min"], spread["max"])
-    return Cell(extremes, f"{len(spread['each'])} seeds")
+    spread = row.spread[name]
+    return Cell(METRICS[name].write_range(spread.min, spread.max), f"{len(spread.each)} seeds")
 
 
-def text_column(heading: str, text: Callable[[dict[str, Any]], str]) -> Column:
+def text_column(heading: str, text: Callable[[Row], str]) -> Column:
     """Column of a text in a row of the document."""
     return Column(heading, "", ALWAYS, lambda row: Cell(text(row)))
 
 
-def policy_label(row: dict[str, Any]) -> str:
+def policy_label(row: Row) -> str:
     """Name of a row's policy; where it names a recipe, with the star of replaced settings.
 
     Names of files lack the star: ``ars-tuned-right`` is ``ars-tuned*-right``.
     """
-    made, recipe = row["algorithm"], row["recipe"]
-    name: str = row["policy"]
-    return name.replace(f"{made}-{recipe.removesuffix('*')}-", f"{made}-{recipe}-", 1)
+    plain = row.recipe.removesuffix("*")
+    made = row.algorithm
+    return row.policy.replace(f"{made}-{plain}-", f"{made}-{row.recipe}-", 1)
 
 
-def has_star(row: dict[str, Any]) -> bool:
+def has_star(row: Row) -> bool:
     """Whether the label of a row says that settings of the recipe are replaced."""
-    return row["recipe"].endswith("*") and row["recipe"] in policy_label(row)
+    return row.recipe.endswith("*") and row.recipe in policy_label(row)
 
 
-def print_table(document: dict[str, Any], console: "Console", *, markdown: bool = False) -> None:
+def print_table(
+    document: EvaluationDocument, console: "Console", *, markdown: bool = False
+) -> None:
     """Print the figures of a document, without the less important columns if space is scarce.
 
     Markdown is always printed with all columns that say something.
     """
-    rows = [
-        row for problem in document["protocol"]["problems"] for row in table_rows(document, problem)
-    ]
+    rows = [row for problem in document.protocol.problems for row in table_rows(document, problem)]
     figures = [c for c in metric_columns() if any(c.cell(row).value for row in rows)]
     columns = [
-        text_column("problem", itemgetter("problem")),
+        text_column("problem", attrgetter("problem")),
         text_column("policy", policy_label),
         *figures,
     ]
@@ -133,7 +133,7 @@ def print_table(document: dict[str, Any], console: "Console", *, markdown: bool 
 
 
 def evaluation_table(
-    document: dict[str, Any], columns: Sequence[Column], *, markdown: bool = False
+    document: EvaluationDocument, columns: Sequence[Column], *, markdown: bool = False
 ) -> "Table":
     """The figures of a document as a table; several training seeds share a row."""
     from rich import box
@@ -143,7 +143,7 @@ def evaluation_table(
     for column in columns:
         side: Literal["left", "right"] = "right" if column.meaning else "left"
         table.add_column(column.heading, justify=side, no_wrap=True)
-    for problem in document["protocol"]["problems"]:
+    for problem in document.protocol.problems:
         if not markdown:
             table.add_section()
         for row in table_rows(document, problem):
@@ -152,10 +152,10 @@ def evaluation_table(
     return table
 
 
-def table_rows(document: dict[str, Any], problem: str) -> list[dict[str, Any]]:
+def table_rows(document: EvaluationDocument, problem: str) -> list[Row]:
     """Pooled results of a problem and the results that are not part of them, best first."""
-    pooled = [row for row in document["pooled"] if row["problem"] == problem]
-    members = {name for row in pooled for name in row["members"]}
-    single = [row for row in document["results"] if row["problem"] == problem]
-    rows = pooled + [row for row in single if row["policy"] not in members]
-    return sorted(rows, key=lambda row: -row["metrics"]["success"]["value"])
+    pooled = [row for row in document.pooled if row.problem == problem]
+    members = {name for row in pooled for name in row.members}
+    single = [row for row in document.results if row.problem == problem]
+    rows = (*pooled, *(row for row in single if row.policy not in members))
+    return sorted(rows, key=lambda row: -(row.metrics["success"].value or 0.0))

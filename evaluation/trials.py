@@ -96,6 +96,10 @@ class TrialSet:
         rows = list(numbers)
         return replace(self, starts=self.starts[rows], goals=self.goals[rows])
 
+    def first(self, count: int) -> "TrialSet":
+        """The first trials, or all if there are no more."""
+        return self if len(self) <= count else self.chosen(range(count))
+
     def with_tolerance(self, tolerance: float) -> "TrialSet":
         """The same starts and goals, which count as reached at another distance [m]."""
         return replace(self, simulator=self.simulator.with_tolerance(tolerance))

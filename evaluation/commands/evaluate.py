@@ -2,11 +2,14 @@
 
 import json
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 from kinarm._command_line import run_request
 from kinarm._console import open_console, working
 from kinarm.evaluation.request import DOCUMENT, REPORT, EvaluationRequest
+
+if TYPE_CHECKING:
+    from kinarm.evaluation.document import EvaluationDocument
 
 EPILOG = """
 Without --problem, a trained policy faces the problem that it was trained for. Policies that differ
@@ -44,13 +47,13 @@ def _report(request: EvaluationRequest, command: str) -> None:
     with working("evaluating") as say:
         document = request.run(command, say)
     if request.json:
-        print(json.dumps(document))
+        print(json.dumps(document.to_json()))
         return
     console = open_console()
     print_table(document, console, markdown=request.markdown)
     if not request.markdown:
         console.print(_footnote(document), style="dim")
-        if not request.policies and all(row["trained_on"] is None for row in document["results"]):
+        if not request.policies and all(row.trained_on is None for row in document.results):
             console.print("no shipped policy was trained for this", style="dim")
     if request.out is not None:
         console.print(f"written: {request.out / DOCUMENT} and histograms", style="dim")
@@ -61,40 +64,40 @@ def _report(request: EvaluationRequest, command: str) -> None:
         console.print(f"written: {request.card}, {beside}", style="dim")
 
 
-def _footnote(document: dict[str, Any]) -> str:
+def _footnote(document: "EvaluationDocument") -> str:
     """What the figures in the table stand on."""
     from kinarm.evaluation.table import REPLACED, has_star, table_rows
 
-    protocol = document["protocol"]
-    problems = protocol["problems"].items()
-    arms = " and ".join(dict.fromkeys(entry["arm"] for _, entry in problems))
+    protocol = document.protocol
+    problems = protocol.problems.items()
+    arms = " and ".join(dict.fromkeys(faced.arm for _, faced in problems))
     lines = [
-        f"{protocol['trials']} trials a problem, seed {protocol['seed']}, arm {arms}; "
+        f"{protocol.trials} trials a problem, seed {protocol.seed}, arm {arms}; "
         "95 % intervals in brackets"
     ]
-    bounds = {problem: entry["oracle"] for problem, entry in problems if entry["oracle"]}
+    bounds = {problem: faced.oracle for problem, faced in problems if faced.oracle}
     if bounds:
         shares = (
-            f"{name} {100 * each['proof_complete_share']:.1f} %" for name, each in bounds.items()
+            f"{name} {100 * each.proof_complete_share:.1f} %" for name, each in bounds.items()
         )
         lines.append(
             "step ratio: steps divided by the number proven necessary, in trials that succeeded; "
             f"proofs complete: {', '.join(shares)}"
         )
-        bounded = min(each["bounded"] for each in bounds.values())
-        if bounded < protocol["trials"]:
+        bounded = min(each.bounded for each in bounds.values())
+        if bounded < protocol.trials:
             lines.append(
                 f"oracle, relative success and step ratio are of the first {bounded} trials of "
-                f"{protocol['trials']}; --policy oracle bounds all"
+                f"{protocol.trials}; --policy oracle bounds all"
             )
     shown = (row for name, _ in problems for row in table_rows(document, name))
     if any(map(has_star, shown)):
         lines.append(REPLACED)
-    if protocol["hold"]:
+    if protocol.hold:
         lines.append(HOLDING_NOTE)
-    hashes = (f"{problem} {entry['trial_set_hash']}" for problem, entry in problems)
+    hashes = (f"{problem} {faced.trial_set_hash}" for problem, faced in problems)
     lines.append(f"trial sets: {', '.join(hashes)}")
-    lines += dict.fromkeys(row["note"] for row in document["results"] if row["note"])
+    lines += dict.fromkeys(row.note for row in document.results if row.note)
     return "\n".join(lines)
 
 

@@ -106,7 +106,7 @@ class CheckRequest(ShowRequest):
             written.
         """
         from kinarm._console import working
-        from kinarm.evaluation.problem_check import ProblemCheck
+        from kinarm.evaluation.problem_check import check_problem
         from kinarm.world import World
 
         problem = self.resolve()
@@ -116,7 +116,7 @@ class CheckRequest(ShowRequest):
         say_choices([problem])
         world = World(problem)
         with working("checking") as say:
-            check = ProblemCheck.of(
+            check = check_problem(
                 world,
                 self.trials,
                 self.seed,
@@ -171,7 +171,7 @@ def _show(request: ShowRequest) -> None:
 
 def _check(request: CheckRequest) -> None:
     check = request.run()
-    problem = check.trials.problem
+    problem = request.resolve()
     print(
         f"{problem.name}: arm {problem.arm.name}, goals {' and '.join(problem.task.goal_regions)}"
     )

@@ -13,7 +13,7 @@ from kinarm._files import check_output
 from kinarm._options import option_name
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
-from kinarm.evaluation.choices import policy_choices
+from kinarm.evaluation.request import policy_choices
 from kinarm.problem_options import ProblemOptions, say_choices
 
 if TYPE_CHECKING:
@@ -185,12 +185,12 @@ class ReplayRequest(ProblemOptions):
         KinarmError
             If a file, name or number cannot be used.
         """
-        from kinarm.evaluation.replay.candidates import chosen_recordings
+        from kinarm.evaluation.replay.choosing import chosen_recordings
 
         return chosen_recordings(self).runs
 
     def _write(self, report: Callable[[str], object]) -> "ReplayPage":
-        from kinarm.evaluation.replay.candidates import chosen_recordings
+        from kinarm.evaluation.replay.choosing import chosen_recordings
         from kinarm.recording import save_recordings
         from kinarm.viewer import replay_page
 
@@ -223,12 +223,12 @@ class ReplayRequest(ProblemOptions):
 
     def _serve(self, report: Callable[[str], object]) -> None:
         """Serve fresh trials until this is interrupted."""
-        from kinarm.evaluation.replay.candidates import (
+        from kinarm.evaluation.replay.choosing import (
             faced_problem,
             first_contestant,
             stated_problem,
         )
-        from kinarm.evaluation.replay.following import follow, fresh_recordings
+        from kinarm.evaluation.replay.live import follow, fresh_recordings
         from kinarm.simulator import Simulator
         from kinarm.viewer.live_server import PORT, LiveServer
 

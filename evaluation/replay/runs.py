@@ -1,52 +1,54 @@
-"""What one policy did in trials: faced now, or recorded before."""
+"""What contestants do in trials, as recordings: made now, or read from a file."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Protocol
+from functools import partial
+from typing import cast
 
 from kinarm.evaluation.contestants import Contestant
-from kinarm.evaluation.failures import Cause, failure_causes
-from kinarm.evaluation.outcomes import is_early
-from kinarm.evaluation.replay.recorder import recordings_of
+from kinarm.evaluation.outcomes import Cause, End, Outcome, Pair, ends_of, failure_causes
 from kinarm.evaluation.trials import TrialSet
-from kinarm.recording import Recording, outcome_of
+from kinarm.policies.oracle.solution import OracleSolutions
+from kinarm.policies.provenance import package_versions, source_commit
+from kinarm.recording import Recording, record_rollouts
 from kinarm.rollouts import Rollouts
-
-End = tuple[str, int, float]
-"""How a trial ended: outcome, steps and final distance [m]."""
-
-
-class Run(Protocol):
-    """What one policy did in trials, to choose from by their positions."""
-
-    @property
-    def numbers(self) -> Sequence[int]:
-        """Numbers of the trials."""
-
-    @property
-    def ends(self) -> Sequence[End]:
-        """How they ended."""
-
-    @property
-    def causes(self) -> dict[int, Cause]:
-        """Why trials failed, by the positions of those that did."""
-
-    def recorded(self, positions: Sequence[int]) -> list[Recording]:
-        """Recordings of some of them."""
 
 
 @dataclass(frozen=True, eq=False)
-class FacedRun:
-    """Trials that run now; the chosen ones become recordings."""
+class Run:
+    """What one policy did in trials, to choose from by their positions.
 
-    contestant: Contestant
-    trials: TrialSet
-    rollouts: Rollouts
+    Attributes
+    ----------
+    numbers : sequence of int
+        Numbers of the trials.
+    ends : sequence of End
+        How they ended.
+    contacts : sequence
+        The bodies that touched, per trial.
+    recorded : callable
+        From positions to recordings of these trials.
+    """
+
+    numbers: Sequence[int]
+    ends: Sequence[End]
+    contacts: Sequence[Pair | None]
+    recorded: Callable[[Sequence[int]], list[Recording]]
 
     @classmethod
-    def of(cls, contestant: Contestant, trials: TrialSet, *, allow_other_arm: bool) -> "FacedRun":
-        """Let an contestant face trials.
+    def faced(
+        cls, contestant: Contestant, trials: TrialSet, *, allow_other_arm: bool = False
+    ) -> "Run":
+        """Let a contestant face trials; those that are chosen become recordings.
+
+        Parameters
+        ----------
+        contestant : Contestant
+            Who faces them.
+        trials : TrialSet
+            The trials.
+        allow_other_arm : bool
+            Whether a policy may face an arm that it was not trained for.
 
         Raises
         ------
@@ -54,56 +56,89 @@ class FacedRun:
             If it was trained for another arm and that is not allowed.
         """
         contestant.check(trials.simulator.arm, allow_other_arm=allow_other_arm)
-        return cls(contestant, trials, contestant.run(trials, record=True))
+        rollouts = contestant.run(trials, record=True)
+        contacts = trials.simulator.contact_pairs(rollouts)
+        recorded = partial(_recordings, contestant, trials, rollouts)
+        return cls(range(len(rollouts)), ends_of(rollouts), contacts, recorded)
 
-    @property
-    def numbers(self) -> Sequence[int]:
-        """Numbers of the trials."""
-        return range(len(self.rollouts))
-
-    @cached_property
-    def ends(self) -> Sequence[End]:
-        """How they ended."""
-        outcomes = [outcome_of(self.rollouts, number) for number in self.numbers]
-        columns = (self.rollouts.steps.tolist(), self.rollouts.distance.tolist())
-        return list(zip(outcomes, *columns, strict=True))
-
-    @cached_property
-    def causes(self) -> dict[int, Cause]:
-        """Why trials failed, by the positions of those that did."""
-        contacts = self.trials.simulator.contact_pairs(self.rollouts)
-        return failure_causes(self.rollouts, contacts)
-
-    def recorded(self, positions: Sequence[int]) -> list[Recording]:
-        """Recordings of some of them."""
-        return recordings_of(self.contestant, self.trials, self.rollouts, positions)
-
-
-@dataclass(frozen=True, eq=False)
-class RecordedRun:
-    """Recordings of a file."""
-
-    recordings: Sequence[Recording]
-
-    @property
-    def numbers(self) -> Sequence[int]:
-        """Numbers of the trials."""
-        return [recording.trial for recording in self.recordings]
-
-    @property
-    def ends(self) -> Sequence[End]:
-        """How they ended."""
-        return [(each.outcome, each.steps, each.final_distance) for each in self.recordings]
+    @classmethod
+    def of(cls, recordings: Sequence[Recording]) -> "Run":
+        """Recordings of a file."""
+        return cls(
+            [each.trial for each in recordings],
+            [
+                (cast("Outcome", each.outcome), each.steps, each.final_distance)
+                for each in recordings
+            ],
+            [each.contact for each in recordings],
+            lambda positions: [recordings[position] for position in positions],
+        )
 
     @property
     def causes(self) -> dict[int, Cause]:
         """Why trials failed, by the positions of those that did."""
-        return {
-            position: Cause(each.contact, is_early(each.outcome == "collision", each.steps))
-            for position, each in enumerate(self.recordings)
-            if each.outcome != "success"
-        }
+        return failure_causes(self.ends, self.contacts)
 
-    def recorded(self, positions: Sequence[int]) -> list[Recording]:
-        """Recordings of some of them."""
-        return [self.recordings[position] for position in positions]
+
+def record(
+    contestant: Contestant,
+    trials: TrialSet,
+    numbers: Sequence[int] | None = None,
+    *,
+    bounds: OracleSolutions | None = None,
+    allow_other_arm: bool = False,
+) -> list[Recording]:
+    """Run a contestant on trials and record its motions, state by state.
+
+    Parameters
+    ----------
+    contestant : Contestant
+        The policy, baseline or oracle.
+    trials : TrialSet
+        The trials that it faces.
+    numbers : sequence of int, optional
+        Trials to keep, in this order; all by default.
+    bounds : OracleSolutions, optional
+        The oracle's bounds of the trials, or of the first ones, which the replay shows.
+    allow_other_arm : bool
+        Whether a policy may face an arm that it was not trained for.
+
+    Raises
+    ------
+    InvalidInputError
+        If there is no trial of such a number.
+    PolicyFileError
+        If the policy was trained for another arm and that is not allowed.
+    """
+    contestant.check(trials.simulator.arm, allow_other_arm=allow_other_arm)
+    rollouts = contestant.run(trials, record=True)
+    return _recordings(contestant, trials, rollouts, numbers, bounds)
+
+
+def _recordings(
+    contestant: Contestant,
+    trials: TrialSet,
+    rollouts: Rollouts,
+    numbers: Sequence[int] | None = None,
+    bounds: OracleSolutions | None = None,
+) -> list[Recording]:
+    """Rollouts that kept the configurations as recordings; else as `record`."""
+    made = contestant.policy.provenance.to_json() if contestant.policy else None
+    return record_rollouts(
+        trials.simulator,
+        rollouts,
+        contestant.name,
+        numbers,
+        steps_lower_bound=None if bounds is None else partial(_lower_bound, bounds),
+        provenance={
+            "trial_seed": trials.seed,
+            "policy": made,
+            "versions": package_versions(),
+            "commit": source_commit(),
+        },
+    )
+
+
+def _lower_bound(bounds: OracleSolutions, trial: int) -> int | None:
+    """Proven number of steps of a trial, if the oracle was asked about it."""
+    return int(bounds.steps_lower_bound[trial]) if trial < len(bounds) else None

@@ -7,10 +7,12 @@ from typing import Any, NamedTuple
 from kinarm._files import check_output, write_text
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.contestants import ORACLE, Contestant
+from kinarm.evaluation.document import EvaluationDocument, Result
 from kinarm.evaluation.evaluation import Evaluation
 from kinarm.evaluation.metrics import METRICS, Metric
-from kinarm.evaluation.replay.recorder import record
+from kinarm.evaluation.replay.runs import record
 from kinarm.evaluation.report.templating import template_environment
+from kinarm.evaluation.statistics import Estimate
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import Provenance
 from kinarm.problem import ReachProblem
@@ -20,7 +22,7 @@ FIRST, WORST = 3, 3
 """Trials of the replay: the first ones, and those that ended worst."""
 
 
-class Row(NamedTuple):
+class FigureRow(NamedTuple):
     """A figure of merit: its meaning, the policy's, and the oracle's if it is known."""
 
     meaning: str
@@ -57,14 +59,14 @@ def check_card(
         check_output(own, overwrite=overwrite)
 
 
-def write_card(path: Path, document: Mapping[str, Any], evaluations: Sequence[Evaluation]) -> None:
+def write_card(path: Path, document: EvaluationDocument, evaluations: Sequence[Evaluation]) -> None:
     """Write a card, and the policy and a replay beside it, with the same name.
 
     Parameters
     ----------
     path : Path
         The card, in Markdown; its name ends in .md.
-    document : mapping
+    document : EvaluationDocument
         What `evaluation_document` made of the evaluations.
     evaluations : sequence of Evaluation
         Those of the policy, and of the oracle if it took part.
@@ -84,7 +86,7 @@ def write_card(path: Path, document: Mapping[str, Any], evaluations: Sequence[Ev
     replay_page(shown).save(path.with_suffix(".html"))
 
 
-def policy_card(name: str, document: Mapping[str, Any], evaluation: Evaluation) -> str:
+def policy_card(name: str, document: EvaluationDocument, evaluation: Evaluation) -> str:
     """The card of a policy whose files are called ``name``, in Markdown.
 
     Equal input gives equal text.
@@ -95,7 +97,7 @@ def policy_card(name: str, document: Mapping[str, Any], evaluation: Evaluation) 
         If what was evaluated is no trained policy.
     """
     policy = _policy_of(evaluation)
-    rows = {row["policy"]: row for row in document["results"]}
+    rows = {row.policy: row for row in document.results}
     oracle = rows.get(ORACLE.name)
     template = template_environment(keep_trailing_newline=True).get_template("card.md")
     return template.render(
@@ -107,19 +109,19 @@ def policy_card(name: str, document: Mapping[str, Any], evaluation: Evaluation) 
         problem=evaluation.problem.pinned,
         rows=figure_rows(rows[evaluation.contestant.name], oracle),
         has_oracle=oracle is not None,
-        entry=document["protocol"]["problems"][evaluation.problem.name],
-        protocol=document["protocol"],
+        entry=document.faced(evaluation.problem.name),
+        protocol=document.protocol,
         shown=shown_trials(evaluation),
         first=min(FIRST, len(evaluation.trials)),
     )
 
 
-def figure_rows(row: Mapping[str, Any], oracle: Mapping[str, Any] | None) -> list[Row]:
+def figure_rows(row: Result, oracle: Result | None) -> list[FigureRow]:
     """Figures of merit that tables show, with their intervals."""
     return [
-        Row(metric.meaning, _figure(name, metric, row), _figure(name, metric, oracle))
+        FigureRow(metric.meaning, _figure(name, metric, row), _figure(name, metric, oracle))
         for name, metric in METRICS.items()
-        if metric.heading and row["metrics"][name]["value"] is not None
+        if metric.heading and row.metrics[name].value is not None
     ]
 
 
@@ -151,14 +153,14 @@ def _settings(config: Mapping[str, Any], prefix: str = "") -> list[tuple[str, st
     return lines
 
 
-def _figure(name: str, metric: Metric, row: Mapping[str, Any] | None) -> str:
+def _figure(name: str, metric: Metric, row: Result | None) -> str:
     """A figure with its unit and, in brackets, its interval; empty if there is none."""
-    estimate = row["metrics"][name] if row else {"value": None}
-    if estimate["value"] is None:
+    estimate = row.metrics[name] if row else Estimate(None)
+    if estimate.value is None:
         return ""
     unit = f" {metric.unit}" if metric.unit else ""
-    interval = f" ({metric.write_range(*estimate['ci95'])})" if estimate["ci95"] else ""
-    return f"{metric.write(estimate['value'])}{unit}{interval}"
+    interval = f" ({metric.write_range(*estimate.ci95)})" if estimate.ci95 else ""
+    return f"{metric.write(estimate.value)}{unit}{interval}"
 
 
 def _origin(made: Provenance) -> list[tuple[str, str]]:

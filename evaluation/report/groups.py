@@ -3,12 +3,12 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.errors import InvalidInputError
+from kinarm.evaluation.document import EvaluationDocument, FacedProblem, PooledResult, Row
 from kinarm.evaluation.evaluation import Evaluation
 from kinarm.evaluation.figures import series_labels
 from kinarm.evaluation.table import policy_label, table_rows
@@ -32,7 +32,7 @@ class Group:
     The style is the classes of the style sheet that give it its colour and dash.
     """
 
-    row: dict[str, Any]
+    row: Row
     members: tuple[Evaluation, ...]
     style: str
 
@@ -44,7 +44,7 @@ class Group:
     @property
     def is_policy(self) -> bool:
         """Whether it is neither a baseline nor the oracle."""
-        return self.row["algorithm"] not in UNTRAINED_ALGORITHMS
+        return self.row.algorithm not in UNTRAINED_ALGORITHMS
 
     @property
     def is_pooled(self) -> bool:
@@ -62,7 +62,7 @@ class ProblemResults:
     """A problem, what the document's protocol says about it, and its groups as in the table."""
 
     name: str
-    entry: dict[str, Any]
+    entry: FacedProblem
     groups: tuple[Group, ...]
 
     @property
@@ -83,8 +83,7 @@ class ProblemResults:
     @property
     def oracle_rate(self) -> float | None:
         """Share of the trials that the oracle solved, if it was asked."""
-        oracle = self.entry["oracle"]
-        return float(oracle["success"]["value"]) if oracle else None
+        return self.entry.oracle.success.value if self.entry.oracle else None
 
     @property
     def goal_regions(self) -> tuple[GoalRegion, ...]:
@@ -100,7 +99,7 @@ class ProblemResults:
     @property
     def contenders(self) -> tuple[Group, ...]:
         """The policies; where there are none, the baselines; else the oracle."""
-        others = tuple(group for group in self.groups if group.row["algorithm"] != "oracle")
+        others = tuple(group for group in self.groups if group.row.algorithm != "oracle")
         return self.policies or others or self.groups
 
 
@@ -111,7 +110,7 @@ def count_policies(groups: Iterable[Group]) -> str:
 
 
 def group_results(
-    document: dict[str, Any], evaluations: Sequence[Evaluation]
+    document: EvaluationDocument, evaluations: Sequence[Evaluation]
 ) -> tuple[ProblemResults, ...]:
     """Bring the rows of the table together with the evaluations behind them.
 
@@ -121,15 +120,15 @@ def group_results(
         If the document was made of others.
     """
     known = {(each.contestant.name, each.problem.name): each for each in evaluations}
-    if list(known) != [(row["policy"], row["problem"]) for row in document["results"]]:
+    if list(known) != [(row.policy, row.problem) for row in document.results]:
         raise InvalidInputError("a report needs the document of the very evaluations that it shows")
     labels = series_labels(evaluations)
     styles, found = _styles(labels, evaluations), []
     style_of = {pair: styles[label] for pair, label in zip(known, labels, strict=True)}
-    for problem, entry in document["protocol"]["problems"].items():
+    for problem, entry in document.protocol.problems.items():
         groups = []
         for row in table_rows(document, problem):
-            names = row.get("members", [row["policy"]])
+            names = row.members if isinstance(row, PooledResult) else [row.policy]
             members = tuple(known[name, problem] for name in names)
             groups.append(Group(row, members, style_of[names[0], problem]))
         found.append(ProblemResults(problem, entry, tuple(groups)))

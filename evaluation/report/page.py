@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from kinarm._files import check_folder, write_text
 from kinarm.evaluation.contestants import ORACLE
+from kinarm.evaluation.document import EvaluationDocument, Protocol
 from kinarm.evaluation.evaluation import Evaluation
-from kinarm.evaluation.failures import cause_words
 from kinarm.evaluation.outcomes import EARLY_STEPS
 from kinarm.evaluation.report import maps
 from kinarm.evaluation.report.charts import histogram_chart, profile_chart
@@ -33,7 +33,7 @@ MOST_CAUSES = 6
 
 
 def write_report(
-    folder: str | Path, document: dict[str, Any], evaluations: Sequence[Evaluation]
+    folder: str | Path, document: EvaluationDocument, evaluations: Sequence[Evaluation]
 ) -> Path:
     """Write the report of an evaluation as ``index.html``.
 
@@ -60,7 +60,7 @@ def write_report(
     return path
 
 
-def report_page(document: dict[str, Any], evaluations: Sequence[Evaluation]) -> str:
+def report_page(document: EvaluationDocument, evaluations: Sequence[Evaluation]) -> str:
     """The report of an evaluation: one HTML page that fetches nothing.
 
     It holds the table with its intervals drawn, performance profiles, histograms, maps of the
@@ -68,7 +68,7 @@ def report_page(document: dict[str, Any], evaluations: Sequence[Evaluation]) -> 
 
     Parameters
     ----------
-    document : dict
+    document : EvaluationDocument
         What `evaluation_document` made of the evaluations.
     evaluations : sequence of Evaluation
         Made with one trial set per problem.
@@ -83,8 +83,8 @@ def report_page(document: dict[str, Any], evaluations: Sequence[Evaluation]) -> 
     recordings = record_worst([worst for each in chosen for worst in each])
     return page_template().render(
         title=_title(problems),
-        subtitle=_subtitle(document["protocol"], problems),
-        protocol=document["protocol"],
+        subtitle=_subtitle(document.protocol, problems),
+        protocol=document.protocol,
         problems=problems,
         columns=metric_columns(),
         worst=[
@@ -110,7 +110,6 @@ def page_template() -> "Template":
         profile_chart=profile_chart,
         histogram_chart=histogram_chart,
         shown_columns=shown_columns,
-        cause_words=cause_words,
         count_policies=count_policies,
         early_steps=EARLY_STEPS,
         most_causes=MOST_CAUSES,
@@ -137,16 +136,16 @@ def _title(problems: Sequence[ProblemResults]) -> str:
     return count_policies(groups) if groups[0].is_policy else " and ".join(sorted(names))
 
 
-def _subtitle(protocol: dict[str, Any], problems: Sequence[ProblemResults]) -> str:
+def _subtitle(protocol: Protocol, problems: Sequence[ProblemResults]) -> str:
     """How policies were trained and what is beside them; what was faced."""
-    arms = " and ".join(dict.fromkeys(results.entry["arm"] for results in problems))
+    arms = " and ".join(dict.fromkeys(results.entry.arm for results in problems))
     groups = [group for results in problems for group in results.groups]
     said = [
         *_training_seeds(problems),
         *_references(problems),
         f"problem {problems[0].name}" if len(problems) == 1 else f"{len(problems)} problems",
         f"arm {arms}",
-        f"{protocol['trials']} trials each, seed {protocol['seed']}",
+        f"{protocol.trials} trials each, seed {protocol.seed}",
         *([REPLACED] if any(has_star(group.row) for group in groups) else []),
     ]
     return " \N{MIDDLE DOT} ".join(said)

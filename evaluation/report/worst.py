@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from itertools import islice
 from typing import Any, NamedTuple
 
+from kinarm.evaluation.bounds import TrialBounds
 from kinarm.evaluation.evaluation import Evaluation
-from kinarm.evaluation.replay.recorder import record
+from kinarm.evaluation.replay.runs import record
 from kinarm.evaluation.report.groups import Group, ProblemResults
 from kinarm.evaluation.report.maps import OUTCOME_WORDS
 from kinarm.recording import Recording
@@ -65,8 +66,8 @@ def worst_row(results: ProblemResults, worst: WorstTrial) -> dict[str, Any]:
         "outcome": describe_outcome(worst),
         "steps": f"{rollouts.steps[trial]}",
     }
-    if results.entry["oracle"]:
-        figures["oracle steps"] = oracle_steps(results, trial)
+    if results.entry.oracle:
+        figures["oracle steps"] = oracle_steps(results.entry.oracle.trials, trial)
     return {
         "policy": worst.evaluation.contestant.name,
         "style": worst.group.style,
@@ -86,14 +87,13 @@ def describe_outcome(worst: WorstTrial) -> str:
     )
 
 
-def oracle_steps(results: ProblemResults, trial: int) -> str:
+def oracle_steps(bounds: TrialBounds, trial: int) -> str:
     """Steps of the oracle's motion, and how many are proven to be necessary if they are fewer."""
-    bounds = results.entry["oracle"]["trials"]
-    if trial >= len(bounds["reachable"]):
+    if trial >= len(bounds.reachable):
         return "not asked"
-    if not bounds["reachable"][trial]:
+    if not bounds.reachable[trial]:
         return "not reached"
-    steps, proven = bounds["steps"][trial], bounds["steps_lower_bound"][trial]
+    steps, proven = bounds.steps[trial], bounds.steps_lower_bound[trial]
     return f"{steps}" if steps == proven else f"{steps}, proven ≥ {proven}"
 
 

@@ -7,8 +7,7 @@ import pytest
 
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.contestants import ORACLE, find_contestants
-from kinarm.evaluation.document import evaluation_document
-from kinarm.evaluation.evaluation import run_trials
+from kinarm.evaluation.evaluation import evaluation_document, run_trials
 from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.report.groups import group_results
 from kinarm.evaluation.report.page import write_report
@@ -32,9 +31,9 @@ def evaluations():
     made = []
     for problem, names in (("right", ("ars-tuned-both", "ppo-tuned-both")), ("both", ("zero",))):
         trials = TrialSet.draw(problem, 20, seed=3)
-        oracle_bounds(trials)
+        bounds = oracle_bounds(trials)
         contestants = [each for name in names for each in find_contestants(name)]
-        made += [run_trials(each, trials, oracle=True) for each in (*contestants, ORACLE)]
+        made += [run_trials(each, trials, bounds=bounds) for each in (*contestants, ORACLE)]
     return made
 
 

@@ -22,7 +22,7 @@ import numpy as np
 from kinarm.arm import Arm
 from kinarm.errors import KinarmError
 from kinarm.evaluation import EvaluationDocument, Study, oracle_bounds
-from kinarm.evaluation.imported import imported_policy
+from kinarm.evaluation.contestants import imported_policy
 from kinarm.meshes import hull_of_mesh
 from kinarm.policies import Policy, load_checkpoint, recipe
 from kinarm.policies.conversion.sb3_models import sb3_model

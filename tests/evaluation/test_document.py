@@ -1,50 +1,48 @@
 """The document of an evaluation holds what it promises, and the table shows all of it."""
 
-import json
 from io import StringIO
 
+import msgspec
 import numpy as np
 import pytest
 from rich.console import Console
 
 from kinarm.errors import InvalidInputError
-from kinarm.evaluation.bounds import bounds_document
+from kinarm.evaluation.bounds import bounds_document, oracle_bounds
 from kinarm.evaluation.contestants import ORACLE, Contestant
-from kinarm.evaluation.document import evaluation_document
-from kinarm.evaluation.evaluation import evaluate, run_trials
+from kinarm.evaluation.document import EvaluationDocument
+from kinarm.evaluation.evaluation import evaluate, evaluation_document, run_trials
 from kinarm.evaluation.metrics import METRICS, Metric
 from kinarm.evaluation.table import print_table
 from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.reference import ReferenceSimulator
 from kinarm.simulator import Simulator
 
-RESULT_FIELDS = {
-    "policy": str,
-    "algorithm": str,
-    "recipe": str,
-    "problem": str,
-    "trials": int,
-    "metrics": dict,
-}
+
+def made_of(evaluations, command=""):
+    """The document as a file holds it."""
+    return evaluation_document(evaluations, command).to_json()
 
 
 @pytest.fixture(scope="module", params=["evaluations", "bounded_evaluations"])
 def document(request):
     """With and without bounds."""
-    return evaluation_document(request.getfixturevalue(request.param), "kinarm-eval --matrix")
+    return made_of(request.getfixturevalue(request.param), "kinarm-eval --matrix")
 
 
 @pytest.fixture(scope="module")
 def bounded_document(bounded_evaluations):
     """With a row for the oracle, too."""
     trial_sets = {each.problem.name: each.trials for each in bounded_evaluations}
-    oracle = [run_trials(ORACLE, trials, oracle=True) for trials in trial_sets.values()]
-    return evaluation_document([*bounded_evaluations, *oracle], "kinarm-eval")
+    oracle = [
+        run_trials(ORACLE, trials, bounds=oracle_bounds(trials)) for trials in trial_sets.values()
+    ]
+    return made_of([*bounded_evaluations, *oracle], "kinarm-eval")
 
 
 def printed(document, width: int = 320, **settings) -> str:
     console = Console(file=StringIO(), width=width)
-    print_table(document, console, **settings)
+    print_table(msgspec.convert(document, EvaluationDocument), console, **settings)
     return console.file.getvalue()
 
 
@@ -64,14 +62,6 @@ def cells(line: str, border: str) -> list[str]:
     return [cell.strip() for cell in inside.split(border)]
 
 
-def test_document_is_plain_json_without_nan(document):
-    assert json.loads(json.dumps(document, allow_nan=False)) == document
-
-
-def test_document_has_protocol_and_results_at_the_top(document):
-    assert {"protocol", "results"} <= set(document)
-
-
 def test_results_are_one_per_policy_and_task(document):
     assert [(row["policy"], row["problem"]) for row in document["results"]] == [
         ("made-right-seed0", "right"),
@@ -84,8 +74,6 @@ def test_results_are_one_per_policy_and_task(document):
 
 def test_every_result_has_every_field(document):
     for row in (*document["results"], *document["pooled"]):
-        for name, kind in RESULT_FIELDS.items():
-            assert type(row[name]) is kind, name
         assert list(row["metrics"]) == list(METRICS)
         for name, metric in METRICS.items():
             value, ci95 = row["metrics"][name]["value"], row["metrics"][name]["ci95"]
@@ -125,7 +113,6 @@ def test_every_trial_of_every_result_is_listed(document):
 
 def test_listed_trials_can_be_simulated_again(document, skilled):
     """By the reference path, from nothing but the numbers in the document."""
-    document = json.loads(json.dumps(document))
     entry, row = document["protocol"]["problems"]["right"], document["results"][1]
     reference = ReferenceSimulator(Simulator(ReachProblem.from_json(entry["problem"])))
     for i in range(row["trials"]):
@@ -134,21 +121,6 @@ def test_listed_trials_can_be_simulated_again(document, skilled):
         assert row["outcomes"]["final_distance"][i] == pytest.approx(episode.distance, abs=1e-9)
         assert row["outcomes"]["steps"][i] == len(episode.rewards)
         assert row["outcomes"]["contact"][i] == (episode.contact and list(episode.contact))
-
-
-def test_training_seeds_are_recorded(document):
-    assert [row["training_seed"] for row in document["results"]] == [0, 1, 2, None, 0]
-    assert document["pooled"][0]["training_seeds"] == [0, 1, 2]
-
-
-def test_table_has_a_column_per_figure(document):
-    headings = list(shown(document)[0])
-    figures = ("success", "best seed", "0.1", "0.2", "median", "mean", "p95", "collision", "steps")
-    for name in ("problem", "policy", *figures):
-        assert any(name in heading for heading in headings), name
-    bounded = any(row["metrics"]["step_ratio"]["value"] for row in document["results"])
-    assert ("step ratio" in headings) == ("relative success %" in headings) == bounded
-    assert "held %" not in headings
 
 
 def test_table_has_a_row_per_recipe_and_baseline(document):
@@ -172,7 +144,6 @@ def test_table_shows_the_figures_of_the_document(document):
 
 
 def test_results_stand_beside_the_oracle(bounded_document, bounded_evaluations):
-    assert json.loads(json.dumps(bounded_document, allow_nan=False)) == bounded_document
     for row, evaluation in zip(bounded_document["results"], bounded_evaluations, strict=False):
         ratios = evaluation.step_ratio
         figures = {name: entry["value"] for name, entry in row["metrics"].items()}
@@ -184,18 +155,10 @@ def test_results_stand_beside_the_oracle(bounded_document, bounded_evaluations):
 def test_protocol_tells_the_bounds_of_its_tasks(bounded_document, bounded_evaluations):
     entries = bounded_document["protocol"]["problems"]
     for evaluation in bounded_evaluations:
-        expected = json.loads(json.dumps(bounds_document(evaluation.bounds)))
+        expected = bounds_document(evaluation.bounds).to_json()
         assert entries[evaluation.problem.name]["oracle"] == expected
         column = entries[evaluation.problem.name]["oracle"]["trials"]["steps_lower_bound"]
         assert len(column) == len(entries[evaluation.problem.name]["starts"])
-
-
-def test_without_bounds_there_are_none(evaluations):
-    document = evaluation_document(evaluations, "")
-    assert all(entry["oracle"] is None for entry in document["protocol"]["problems"].values())
-    for row in (*document["results"], *document["pooled"]):
-        assert row["metrics"]["relative_success"]["value"] is None
-    assert not {"relative success %", "step ratio"} & set(shown(document)[0])
 
 
 def test_table_shows_the_bounds(bounded_document):
@@ -211,16 +174,6 @@ def test_table_shows_the_bounds(bounded_document):
     )
 
 
-def test_table_has_one_row_a_task_for_the_oracle(bounded_document):
-    rows = [row for row in shown(bounded_document) if row["policy"] == "oracle"]
-    assert [(row["problem"], row["relative success %"]) for row in rows] == [
-        ("right", "100.0"),
-        ("left", "100.0"),
-    ]
-    assert all(row["step ratio"].startswith("1.") for row in rows)
-    assert all(row["success %"].startswith("100.0 ") for row in rows)
-
-
 def test_table_is_sorted_by_success(document):
     rows = (*document["results"], *document["pooled"])
     rates = {row["policy"]: row["metrics"]["success"]["value"] for row in rows}
@@ -232,13 +185,8 @@ def test_table_is_sorted_by_success(document):
 def test_table_keeps_a_policy_beside_a_group_of_its_recipe(evaluations, skilled, trials):
     """One's own policy does not vanish because shipped seeds share its recipe."""
     mine = run_trials(Contestant.from_policy("mine", skilled), trials)
-    document = evaluation_document([*evaluations, mine], "")
+    document = made_of([*evaluations, mine])
     assert "mine" in [row["policy"] for row in shown(document)]
-
-
-def test_table_works_for_a_single_trial(skilled):
-    document = evaluation_document([evaluate(skilled, trials=1)], "")
-    assert [row["problem"] for row in shown(document)] == ["right"]
 
 
 @pytest.mark.parametrize("width", [80, 100, 120, 160])
@@ -248,12 +196,6 @@ def test_a_narrow_table_has_fewer_columns_but_whole_figures(document, width):
     assert max(map(len, text.splitlines())) <= width
     for name in ("problem", "policy", "success", "median", "made-right", "made-left-seed0"):
         assert name in text
-
-
-def test_a_wider_table_has_no_fewer_columns(document):
-    counts = [printed(document, width).splitlines()[0].count("┳") for width in range(60, 180, 10)]
-    assert counts == sorted(counts)
-    assert counts[0] < counts[-1]
 
 
 def test_markdown_holds_the_same_rows_at_every_width(document):
@@ -279,7 +221,7 @@ def test_a_new_metric_is_one_entry(evaluations, monkeypatch):
     )
     monkeypatch.setitem(METRICS, "within_0.5", metric)
     again = [type(each)(each.contestant, each.trials, each.rollouts) for each in evaluations]
-    document = evaluation_document(again, "")
+    document = made_of(again)
     for row, evaluation in zip(document["results"], again, strict=True):
         assert row["metrics"]["within_0.5"] == evaluation.within(0.5).to_json()
     rates = [100 * each.within(0.5).value for each in again[:3]]
@@ -293,7 +235,7 @@ def test_two_problems_of_one_name_are_refused(skilled):
     with pytest.raises(InvalidInputError, match=r"called 'right': .* task.tolerance is 0.1, not"):
         evaluation_document(both, "")
     named = evaluate(skilled, PROBLEMS["right"].replace(name="lax", tolerance=0.1), trials=2)
-    assert len(evaluation_document([both[0], named], "")["protocol"]["problems"]) == 2
+    assert len(made_of([both[0], named])["protocol"]["problems"]) == 2
 
 
 def test_where_nothing_fits_only_the_least_is_shown(document):

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinarm.errors import InvalidInputError, PolicyFileError
-from kinarm.evaluation.contestants import BASELINES, ORACLE, Contestant, find_contestants
+from kinarm.errors import InvalidInputError
+from kinarm.evaluation.bounds import oracle_bounds
+from kinarm.evaluation.contestants import find_contestants
 from kinarm.evaluation.evaluation import evaluate, pool, run_trials
-from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle import Oracle
 
 COMPARED = ("relative_success", "step_ratio", "step_ratio_p95")
@@ -62,11 +62,6 @@ def test_without_the_oracle_there_are_no_bounds(skilled_evaluation):
         _ = skilled_evaluation.step_ratio
 
 
-def test_evaluations_are_made_without_the_oracle_unless_asked_for(skilled, monkeypatch):
-    monkeypatch.setattr(Oracle, "solve_batch", None)
-    assert evaluate(skilled, trials=3, seed=99).bounds is None
-
-
 def test_the_oracle_changes_nothing_but_the_bounds(skilled_evaluation, bounded):
     alone, beside = skilled_evaluation.to_json(), bounded.to_json()
     for name in COMPARED:
@@ -85,17 +80,6 @@ def test_the_oracle_evaluated_by_name():
     np.testing.assert_array_equal(
         evaluation.step_ratio, expected.steps / expected.steps_lower_bound
     )
-
-
-def test_the_oracle_evaluated_without_bounds():
-    evaluation = evaluate("oracle", "right", trials=5, seed=5)
-    assert evaluation.success.value == 1
-    assert evaluation.bounds is None
-
-
-def test_the_oracle_has_no_problem_of_its_own():
-    with pytest.raises(InvalidInputError, match="'oracle' was not trained for a problem"):
-        evaluate("oracle", trials=1)
 
 
 def test_the_oracle_is_all_that_is_possible_where_not_everything_is():
@@ -123,25 +107,11 @@ def test_nobody_is_better_than_proven_possible(arm, name, task):
     assert not rollouts.success[bounds.steps_lower_bound > 64].any()
 
 
-def test_trials_are_solved_once_for_all_who_face_them(skilled, monkeypatch):
-    solve, calls = Oracle.solve_batch, []
-    monkeypatch.setattr(
-        Oracle, "solve_batch", lambda *args, **kw: calls.append(1) or solve(*args, **kw)
-    )
-    trials = TrialSet.draw("right", 3, seed=77)
-    for contestant in (Contestant.from_policy("mine", skilled), ORACLE, BASELINES["zero"]):
-        run_trials(contestant, trials, oracle=True)
-    assert len(calls) == 1
-
-
-def test_a_policy_for_another_arm_is_refused_before_the_oracle_is_asked(skilled, monkeypatch):
-    monkeypatch.setattr(Oracle, "solve_batch", None)
-    with pytest.raises(PolicyFileError, match="trained for arm"):
-        evaluate(skilled, arm="lrmate200ic_5l", trials=2, oracle=True)
-
-
 def test_pooled_step_ratio_is_over_all_seeds(trials):
-    members = [run_trials(e, trials, oracle=True) for e in find_contestants("ars-tuned-both")]
+    members = [
+        run_trials(e, trials, bounds=oracle_bounds(trials))
+        for e in find_contestants("ars-tuned-both")
+    ]
     relative, median, p95 = oracle_figures(pool(members)[0])
     ratios = [
         member.rollouts.steps[trial] / member.bounds.steps_lower_bound[trial]
@@ -153,7 +123,3 @@ def test_pooled_step_ratio_is_over_all_seeds(trials):
     assert median == pytest.approx(np.median(ratios))
     assert p95 == pytest.approx(np.percentile(ratios, 95))
     assert relative == pytest.approx(len(ratios) / faced)
-
-
-def test_pooled_figures_without_bounds_have_none(evaluations):
-    assert oracle_figures(pool(evaluations)[0]) == [None, None, None]

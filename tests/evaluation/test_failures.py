@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from kinarm.evaluation.evaluation import pool
-from kinarm.evaluation.failures import Cause, is_early
-from kinarm.evaluation.outcomes import EARLY_STEPS
+from kinarm.evaluation.outcomes import Cause, failure_causes
 
 
 def counted(rows):
@@ -73,7 +72,11 @@ def test_causes_read_as_words():
     assert str(Cause(None, False)) == "truncated"
 
 
-@pytest.mark.parametrize(("collision", "steps", "early"), [(1, 3, 1), (1, 4, 0), (0, 3, 0)])
-def test_early_is_within_the_first_steps(collision, steps, early):
-    assert is_early(bool(collision), steps) == bool(early)
-    assert EARLY_STEPS == 3
+def test_early_is_within_the_first_steps():
+    pair = ("hand", "bench")
+    ends = [("collision", 3, 0.1), ("collision", 4, 0.1), ("success", 3, 0.0), ("truncated", 3, 1)]
+    assert failure_causes(ends, [pair, pair, None, None]) == {
+        0: Cause(pair, True),
+        1: Cause(pair, False),
+        3: Cause(None, False),
+    }

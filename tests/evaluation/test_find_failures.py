@@ -8,7 +8,7 @@ import pytest
 
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation import ReplayRequest, evaluate, find_failures
-from kinarm.evaluation.replay import failures
+from kinarm.evaluation.replay import choosing
 from kinarm.viewer import replay_page
 
 POLICIES, PROBLEMS = ("ars-tuned-both-seed9", "ppo-paper-both-seed1"), ("left", "both")
@@ -58,6 +58,6 @@ def test_the_oracle_faces_the_same_trials_on_one_page(found):
 
 
 def test_too_many_for_a_page(monkeypatch):
-    monkeypatch.setattr(failures, "MOST_FAILURES", 10)
+    monkeypatch.setattr(choosing, "MOST_FAILURES", 10)
     with pytest.raises(InvalidInputError, match="trials failed, a page holds 10 at most"):
         find_failures(("ppo-paper-both-seed1",), trials=20)

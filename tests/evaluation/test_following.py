@@ -6,11 +6,10 @@ import socket
 import numpy as np
 import pytest
 
-from kinarm.errors import InvalidInputError
 from kinarm.evaluation import ReplayRequest
 from kinarm.evaluation.contestants import ORACLE, find_contestants
-from kinarm.evaluation.replay import following
-from kinarm.evaluation.replay.following import follow, fresh_recordings
+from kinarm.evaluation.replay import live
+from kinarm.evaluation.replay.live import follow, fresh_recordings
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle import Oracle
 from kinarm.simulator import Simulator
@@ -20,7 +19,7 @@ from kinarm.viewer.live_server import LiveServer
 @pytest.fixture
 def no_waiting(monkeypatch):
     waited = []
-    monkeypatch.setattr(following.time, "sleep", waited.append)
+    monkeypatch.setattr(live.time, "sleep", waited.append)
     return waited
 
 
@@ -70,8 +69,8 @@ def test_following_takes_its_time_and_hands_out_what_is_over(left, no_waiting, p
             seen.append(recording)
             assert len(no_waiting) == len(seen) * 65 + len(seen) - 1
     assert seen == recordings
-    slowed = following.SLOWDOWN * left.problem.stepping.time_step
-    assert set(no_waiting) == {slowed, following.REST}
+    slowed = live.SLOWDOWN * left.problem.stepping.time_step
+    assert set(no_waiting) == {slowed, live.REST}
 
 
 class EnoughError(Exception):
@@ -97,22 +96,6 @@ def test_live_request_serves_until_it_is_stopped(no_waiting, monkeypatch, port):
     assert lines[0] == f"zero at {opened[0]} (stop with Ctrl-C)"
     assert [line.split(",")[0] for line in lines[1:]] == ["left 0", "left 1"]
     assert not listens(port)
-
-
-def test_live_request_ends_where_there_is_nothing_more_to_show(left, no_waiting, monkeypatch, port):
-    (contestant,) = find_contestants("zero")
-    few = list(itertools.islice(fresh_recordings(contestant, left, 0), 2))
-    monkeypatch.setattr(following, "fresh_recordings", lambda *_: iter(few))
-    lines = []
-    request = ReplayRequest(policy="zero", problem="left", live=True, port=port, browser=False)
-    assert request.run(lines.append) is None
-    assert [line.split(",")[0] for line in lines[1:]] == ["left 0", "left 1"]
-    assert not listens(port)
-
-
-def test_what_is_no_port_is_refused():
-    with pytest.raises(InvalidInputError, match="port must be at most 65535, got 65536"):
-        ReplayRequest(policy="zero", live=True, port=65536)
 
 
 def test_live_request_says_where_it_goes_instead(no_waiting, port):

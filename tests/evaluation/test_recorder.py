@@ -34,13 +34,6 @@ def test_they_say_what_is_proven_and_where_they_come_from(trials, skilled):
     assert (recording.goal == trials.goals[3]).all()
 
 
-def test_functions_are_recorded(trials):
-    contestant = Contestant.from_function("still", lambda observations: observations[:, :5] * 0)
-    (recording,) = record(contestant, trials, [0])
-    assert (recording.states == trials.starts[0]).all()
-    assert recording.outcome == "truncated"
-
-
 def test_another_arm(skilled):
     trials = TrialSet.draw(ReachProblem.load("right").replace(arm="paper_flange"), 1, seed=0)
     contestant = Contestant.from_policy("skilled", skilled)

@@ -145,7 +145,7 @@ def test_policies_reach(group, problem, floor):
     """300 trials with a seed not used in training; the mean over training seeds."""
     trials = TrialSet.draw(problem, 300, seed=12345)
     rates = [
-        run_trials(contestant, trials, oracle=False).success.value
+        run_trials(contestant, trials).success.value
         for contestant in find_contestants(f"{group}-both")
     ]
     assert sum(rates) / len(rates) >= floor, rates

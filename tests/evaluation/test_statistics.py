@@ -105,16 +105,6 @@ def test_pooled_share_of_equal_seeds_is_that_of_one():
     assert Estimate.share(np.stack([hits] * 4)) == Estimate.share(hits)
 
 
-def test_share_as_json():
-    assert share(1, 4).to_json() == {"value": 0.25, "ci95": list(share(1, 4).ci95)}
-
-
-def test_estimates_read_as_one_line():
-    assert str(Estimate(0.25, (0.0456, 0.7))) == "0.25 (0.0456..0.7)"
-    assert str(Estimate(3.0)) == "3"
-    assert str(Estimate(None)) == "unknown"
-
-
 def test_many_trials_are_resampled_piece_by_piece(monkeypatch):
     """Intervals do not depend on the pieces, and no piece is large."""
     values = np.random.default_rng(0).gamma(1.5, 0.1, 50)

@@ -19,7 +19,7 @@ def trained() -> Policy:
 
 @pytest.fixture
 def contestant(trained):
-    """An contestant that records a training."""
+    """A contestant that records a training."""
 
     def make(name, seed=0, folder="", problem="right", recipe_name="paper", **settings):
         made = replace(

@@ -2,9 +2,9 @@
 
 import pytest
 
+from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.contestants import ORACLE
-from kinarm.evaluation.document import evaluation_document
-from kinarm.evaluation.evaluation import run_trials
+from kinarm.evaluation.evaluation import evaluation_document, run_trials
 from kinarm.evaluation.report.groups import group_results
 from kinarm.evaluation.report.page import report_page
 
@@ -13,7 +13,9 @@ from kinarm.evaluation.report.page import report_page
 def faced(bounded_evaluations):
     """Several policies, seeds and tasks, the baseline and the oracle."""
     trial_sets = {each.problem.name: each.trials for each in bounded_evaluations}
-    oracle = [run_trials(ORACLE, trials, oracle=True) for trials in trial_sets.values()]
+    oracle = [
+        run_trials(ORACLE, trials, bounds=oracle_bounds(trials)) for trials in trial_sets.values()
+    ]
     return [*bounded_evaluations, *oracle]
 
 

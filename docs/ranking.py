@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 
 from kinarm._files import write_text
-from kinarm.evaluation.bounds import first_bounds
+from kinarm.evaluation.bounds import MOST_BOUNDED, oracle_bounds
 from kinarm.evaluation.contestants import find_contestants
 from kinarm.evaluation.metrics import METRICS
-from kinarm.evaluation.outcomes import Bounded, Judged, Outcomes
+from kinarm.evaluation.outcomes import Bounded, Ends, Outcomes
 from kinarm.evaluation.statistics import share_over_seeds
 from kinarm.evaluation.trials import trial_set
 from kinarm.policies.library import RANKING, group_of, policy_names
@@ -47,14 +47,14 @@ def ranking(names: Iterable[str], trials: int = TRIALS) -> dict[str, Any]:
         faced = trial_set(problem, trials, SEED)
         found = {each.name: each.run(faced) for each in contestants if each.serves(problem)}
         if found:
-            bounds = first_bounds(faced)
+            bounds = oracle_bounds(faced.first(MOST_BOUNDED))
             made["success"][name] = {who: float(did.success.mean()) for who, did in found.items()}
             made["step_ratio"][name] = {who: step_ratio([found[who]], bounds) for who in found}
             made["best"][name] = best_of(found, bounds)
     return {"trials": trials, "seed": SEED, **made}
 
 
-def best_of(found: Mapping[str, Judged], bounds: Bounded) -> str:
+def best_of(found: Mapping[str, Ends], bounds: Bounded) -> str:
     """Name of the best of some policies: of the best recipe, the best seed.
 
     Parameters
@@ -64,20 +64,20 @@ def best_of(found: Mapping[str, Judged], bounds: Bounded) -> str:
     bounds : OracleSolutions
         Of the first trials.
     """
-    recipes: dict[str, dict[str, Judged]] = {}
+    recipes: dict[str, dict[str, Ends]] = {}
     for name, did in found.items():
         recipes.setdefault(group_of(name), {})[name] = did
     recipe = _leader({name: list(seeds.values()) for name, seeds in recipes.items()}, bounds)
     return _leader({name: [did] for name, did in recipes[recipe].items()}, bounds)
 
 
-def step_ratio(seeds: list[Judged], bounds: Bounded) -> float | None:
+def step_ratio(seeds: list[Ends], bounds: Bounded) -> float | None:
     """Median of steps divided by the bound, over the successes of all seeds; None without any."""
     ratio: float | None = METRICS["step_ratio"].formula(Outcomes(tuple(seeds), bounds))
     return ratio
 
 
-def _leader(candidates: Mapping[str, list[Judged]], bounds: Bounded) -> str:
+def _leader(candidates: Mapping[str, list[Ends]], bounds: Bounded) -> str:
     """The best candidate, of each of which there are one or several training seeds."""
     names = sorted(candidates)
     hits = {name: np.array([did.success for did in candidates[name]]) for name in names}

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from kinarm.evaluation.contestants import ORACLE, Contestant
-from kinarm.evaluation.replay.recorder import record
+from kinarm.evaluation.replay.runs import record
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle import Oracle
 from kinarm.recording import Recording, record_rollouts

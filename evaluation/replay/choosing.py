@@ -3,15 +3,21 @@
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from pathlib import Path
 
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.bounds import oracle_bounds
-from kinarm.evaluation.contestants import ORACLE, UNTRAINED, Contestant, find_contestants
-from kinarm.evaluation.document import EvaluationDocument
-from kinarm.evaluation.imported import is_import_path
+from kinarm.evaluation.contestants import (
+    ORACLE,
+    UNTRAINED,
+    Contestant,
+    find_contestants,
+    is_import_path,
+)
+from kinarm.evaluation.document import EvaluationDocument, check_same
 from kinarm.evaluation.replay.request import ReplayRequest
-from kinarm.evaluation.replay.runs import FacedRun, RecordedRun, Run
+from kinarm.evaluation.replay.runs import Run
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.library import BEST, group_of, policy_names
 from kinarm.problem import ReachProblem
@@ -124,7 +130,7 @@ def _fresh_candidates(request: ReplayRequest, names: Sequence[str | None]) -> Ca
     count = request.trials or (FAILING if request.failures else SEARCHED if searched else PLAYED)
     trials = TrialSet.draw(faced_problem(contestants, request, stated), count, request.seed or 0)
     options = {"allow_other_arm": request.allow_other_arm}
-    runs = [FacedRun.of(contestant, trials, **options) for contestant in contestants]
+    runs = [Run.faced(contestant, trials, **options) for contestant in contestants]
     return Candidates(runs, _solved_bounds(trials), count, trials)
 
 
@@ -137,23 +143,23 @@ def _evaluated_candidates(
     for name in names:
         contestant = None
         if name is not None and (Path(name).suffix in (".npz", ".zip") or is_import_path(name)):
-            faced = problem or next(iter(document.protocol["problems"]))
+            faced = problem or next(iter(document.protocol.problems))
             contestant = first_contestant(name, document.problem(faced))
         row = document.result(_name_in(document, contestant) if contestant else name, problem)
-        problem = row["problem"]
-        chosen.append((row, contestant or _known_contestant(row["policy"], path)))
-    faced = min(len(row["outcomes"]["steps"]) for row, _ in chosen)
-    trials = document.trials(str(problem)).chosen(range(faced))
+        problem = row.problem
+        chosen.append((row, contestant or _known_contestant(row.policy, path)))
+    count = min(len(row.outcomes.steps) for row, _ in chosen)
+    trials = document.trials(str(problem)).first(count)
     runs = []
     for row, contestant in chosen:
-        run = FacedRun.of(contestant, trials, allow_other_arm=True)
-        document.check_same(row, run.ends)
+        run = Run.faced(contestant, trials, allow_other_arm=True)
+        check_same(row, run.ends)
         runs.append(run)
-    known = document.floors(trials.problem.name)
-    if known is None:
+    bounds = document.lower_bounds(trials.problem.name)
+    if bounds is None:
         return Candidates(runs, _solved_bounds(trials), PLAYED, trials)
-    floors = dict(enumerate(known))
-    return Candidates(runs, lambda numbers: list(map(floors.get, numbers)), PLAYED, trials)
+    known = dict(enumerate(bounds))
+    return Candidates(runs, lambda numbers: list(map(known.get, numbers)), PLAYED, trials)
 
 
 def _known_contestant(name: str, path: Path) -> Contestant:
@@ -164,8 +170,8 @@ def _known_contestant(name: str, path: Path) -> Contestant:
 
 
 def _name_in(document: EvaluationDocument, contestant: Contestant) -> str:
-    """What an evaluation calls an contestant: by its file alone, or by its folder, too."""
-    names = {row["policy"] for row in document.results}
+    """What an evaluation calls a contestant: by its file alone, or by its folder, too."""
+    names = {row.policy for row in document.results}
     whole = f"{contestant.source.parent.name}/{contestant.name}" if contestant.source else ""
     return whole if whole in names and contestant.name not in names else contestant.name
 
@@ -174,8 +180,8 @@ def _solved_bounds(trials: TrialSet) -> LowerBounds:
     """Let the oracle solve no more trials than are played."""
 
     def lower_bounds(numbers: Sequence[int]) -> Sequence[int]:
-        floors: list[int] = oracle_bounds(trials.chosen(numbers)).steps_lower_bound.tolist()
-        return floors
+        bounds: list[int] = oracle_bounds(trials.chosen(numbers)).steps_lower_bound.tolist()
+        return bounds
 
     return lower_bounds
 
@@ -193,10 +199,10 @@ def _recorded_candidates(
         run = [each for each in found if name in (None, each.policy, group_of(each.policy))]
         if name is not None and not run:
             raise UnknownNameError("policy", name, dict.fromkeys(each.policy for each in found))
-        runs.append(RecordedRun(run))
-    if not runs[0].recordings:
+        runs.append(Run.of(run))
+    if not runs[0].numbers:
         raise InvalidInputError(f"{str(path)!r} holds no recording that fits")
-    return Candidates(runs, None, len(runs[0].recordings))
+    return Candidates(runs, None, len(runs[0].numbers))
 
 
 def chosen_recordings(request: ReplayRequest) -> Chosen:
@@ -262,7 +268,7 @@ def _failures(candidates: Candidates, *, oracle: bool) -> Chosen:
 
 def _oracle_ghosts(trials: TrialSet, numbers: Sequence[int]) -> list[Recording]:
     """What the oracle does in some trials, under their numbers."""
-    run = FacedRun.of(ORACLE, trials.chosen(numbers), allow_other_arm=True)
+    run = Run.faced(ORACLE, trials.chosen(numbers), allow_other_arm=True)
     recordings = run.recorded(range(len(numbers)))
     return [replace(each, trial=number) for each, number in zip(recordings, numbers, strict=True)]
 
@@ -293,3 +299,66 @@ def _positions_of_worst(count: int, run: Run) -> list[int]:
             f"--worst {count} asks for more trials than there are: {len(positions)}"
         )
     return list(positions.values())[:count]
+
+
+def find_failures(
+    policies: Sequence[str],
+    problems: Sequence[str] = ("left", "right", "both"),
+    *,
+    trials: int = FAILING,
+    seed: int = 0,
+) -> Chosen:
+    """Record all failures of some policies, and what the oracle does in the same trials.
+
+    They are grouped by recipe and cause, the most frequent cause first. ``kinarm-replay
+    --failures`` shows those of one policy on one problem.
+
+    Parameters
+    ----------
+    policies : sequence of str
+        As `ReplayRequest` takes them, ``"best"`` included.
+    problems : sequence of str
+        Problems of one arm and scene.
+    trials, seed : int
+        Size and seed of the set of trials of each problem.
+
+    Returns
+    -------
+    Chosen
+        For `kinarm.viewer.replay_page`: ``runs``, the recordings of the policies and of the
+        oracle; ``groups`` and ``heading``.
+
+    Raises
+    ------
+    KinarmError
+        If a name or number cannot be used, none fails somewhere, or too many do.
+    """
+    played: list[Recording] = []
+    ghosts: list[Recording] = []
+    causes: list[str] = []
+    for policy, problem in product(policies, problems):
+        request = ReplayRequest(
+            policy=policy, problem=problem, failures=True, trials=trials, seed=seed
+        )
+        found = chosen_recordings(request)
+        played += found.runs[0]
+        ghosts += found.runs[1]
+        causes += found.groups
+    if len(played) > MOST_FAILURES:
+        raise InvalidInputError(
+            f"{len(played)} trials failed, a page holds {MOST_FAILURES} at most: ask for fewer "
+            "trials"
+        )
+    faced = trials * len(policies) * len(problems)
+    recipes = [group_of(each.policy) for each in played]
+    groups = [f"{recipe}: {cause}" for recipe, cause in zip(recipes, causes, strict=True)]
+    rank, frequency = list(dict.fromkeys(recipes)), Counter(groups)
+    order = sorted(
+        range(len(played)),
+        key=lambda k: (rank.index(recipes[k]), -frequency[groups[k]], groups[k]),
+    )
+    return Chosen(
+        [[run[k] for k in order] for run in (played, ghosts)],
+        [groups[k] for k in order],
+        f"{len(played)} of {faced} trials of {', '.join(problems)} failed",
+    )

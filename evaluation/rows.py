@@ -1,0 +1,117 @@
+"""Parts of a document, from what contestants did in trials."""
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from msgspec import UNSET
+
+from kinarm.evaluation.bounds import bounds_document
+from kinarm.evaluation.document import (
+    FacedProblem,
+    Failures,
+    PooledResult,
+    Result,
+    Spread,
+    TrialEnds,
+    TrialHolding,
+    WorstSeed,
+)
+from kinarm.evaluation.holding import Holding
+from kinarm.evaluation.outcomes import ends_of, failure_causes
+from kinarm.evaluation.statistics import Estimate
+
+if TYPE_CHECKING:
+    from kinarm.evaluation.evaluation import Evaluation, PooledEvaluation
+
+
+def faced_problem_of(evaluation: "Evaluation") -> FacedProblem:
+    """What was faced, and what any policy could do there."""
+    trials, bounds = evaluation.trials, evaluation.bounds
+    return FacedProblem(
+        arm=trials.simulator.arm.name,
+        problem=trials.problem.pinned.to_json(),
+        digest=trials.problem.digest,
+        trial_set_hash=trials.digest,
+        starts=trials.starts.tolist(),
+        goals=trials.goals.tolist(),
+        oracle=bounds_document(bounds) if bounds is not None else None,
+    )
+
+
+def result_of(evaluation: "Evaluation") -> Result:
+    """Figures of merit of one policy, and every trial."""
+    rollouts, contestant = evaluation.rollouts, evaluation.contestant
+    return Result(
+        **_row(contestant.name, [evaluation], evaluation.metrics),
+        training_seed=contestant.seed,
+        note=contestant.note,
+        outcomes=TrialEnds(
+            final_distance=rollouts.distance.tolist(),
+            steps=rollouts.steps.tolist(),
+            outcome=list(evaluation.outcomes),
+            contact=list(evaluation.contacts),
+        ),
+        held=_holding(evaluation.holding) if evaluation.holding else UNSET,
+    )
+
+
+def pooled_result_of(pooled: "PooledEvaluation") -> PooledResult:
+    """Figures of merit of several training seeds."""
+    worst = pooled.worst
+    return PooledResult(
+        **_row(pooled.name, pooled.members, pooled.metrics),
+        members=[member.contestant.name for member in pooled.members],
+        training_seeds=[member.contestant.seed for member in pooled.members],
+        spread={name: Spread(**figures) for name, figures in pooled.spread.items()},
+        worst_seed=WorstSeed(
+            policy=worst.contestant.name,
+            training_seed=worst.contestant.seed,
+            success=worst.success,
+        ),
+    )
+
+
+def _row(
+    name: str, evaluations: "Sequence[Evaluation]", metrics: dict[str, Estimate]
+) -> dict[str, Any]:
+    """Fields of a row: what it is about, its figures, and why its trials failed."""
+    contestant, trials = evaluations[0].contestant, evaluations[0].trials
+    return {
+        "policy": name,
+        "algorithm": contestant.algorithm,
+        "recipe": contestant.recipe,
+        "problem": trials.problem.name,
+        "trained_on": contestant.problem.name if contestant.problem else None,
+        "trials": len(trials),
+        "metrics": metrics,
+        "failures": _failures(evaluations),
+    }
+
+
+def _failures(evaluations: "Sequence[Evaluation]") -> list[Failures]:
+    """How many trials of all seeds failed for each cause, the most frequent first."""
+    causes = (failure_causes(ends_of(each.rollouts), each.contacts) for each in evaluations)
+    counts = Counter(cause for each in causes for cause in each.values())
+    ordered = sorted(counts.items(), key=lambda item: (-item[1], str(item[0])))
+    return [
+        Failures(
+            contact=cause.pair,
+            early=cause.early,
+            trials=count,
+            share_of_failures=count / counts.total(),
+        )
+        for cause, count in ordered
+    ]
+
+
+def _holding(holding: Holding) -> TrialHolding:
+    """What happened in each trial where success did not end it."""
+    at_end = holding.farthest_at_end.tolist()
+    return TrialHolding(
+        closest=holding.closest.tolist(),
+        farthest_at_end=[each if np.isfinite(each) else None for each in at_end],
+        contact=holding.collision.tolist(),
+        steps=holding.steps.tolist(),
+    )
