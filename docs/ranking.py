@@ -1,4 +1,4 @@
-"""The best of the shipped policies, chosen by ``python -m kinarm.evaluation.ranking``.
+"""The best of the shipped policies, chosen by ``python docs/ranking.py``.
 
 Run it after policies have been shipped, in the clone that holds them. It writes the file in which
 `kinarm.policies.library.best_policy` looks the best one up. The trials have their own seed, so that

@@ -89,7 +89,7 @@ class Selection:
     def _shipped(self) -> list[Chosen]:
         """Shipped policies for the arm, and for the problems that are named; then the baselines.
 
-        Their names say what they were trained for: no other file is opened.
+        Their names say what they were trained for: others are not opened.
         """
         serving = {
             name

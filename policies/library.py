@@ -16,7 +16,7 @@ BEST = "best"
 """Stands for the best shipped policy for a problem."""
 
 RANKING = "ranking.json"
-"""Which shipped policies are best, beside them: see `kinarm.evaluation.ranking`."""
+"""Which shipped policies are best, beside them: see docs/ranking.py."""
 
 _SEED_SUFFIX = re.compile(r"-seed\d+$")
 

@@ -5,7 +5,6 @@ import json
 from kinarm.evaluation import bounds
 from kinarm.evaluation.document import EvaluationDocument
 from kinarm.evaluation.evaluation import evaluate
-from kinarm.evaluation.request import EvaluationRequest
 
 FILES = {"evaluation.json", "final_distance.png", "final_distance.svg"}
 
@@ -44,13 +43,6 @@ def test_report_is_one_page(run, policy_folder, tmp_path):
     assert "kinarm-eval --policy" in text
 
 
-def test_report_and_results_share_a_folder(run, tmp_path):
-    arguments = ("--policy", "zero", "--task", "left", "--trials", 2, "--json")
-    answer = run("kinarm-eval", *arguments, "--out", tmp_path, "--report", tmp_path)
-    assert {path.name for path in tmp_path.iterdir()} == {*FILES, "index.html"}
-    assert json.loads(answer.out) == json.loads((tmp_path / "evaluation.json").read_text())
-
-
 def test_files_are_the_same_from_every_process(run, run_outside, policy_folder, tmp_path):
     made = tmp_path / "made"
     arguments = ("--policy", policy_folder / "mine-seed0.npz", "--policy", "zero", "--trials", 9)
@@ -77,15 +69,7 @@ def test_the_report_of_more_trials_than_are_bounded(run, policy_folder, tmp_path
     assert (answer.status, answer.err) == (0, "")
     assert "not asked" in (tmp_path / "index.html").read_text(encoding="utf-8")
     document = EvaluationDocument.load(tmp_path / "evaluation.json")
-    assert len(document.floors("right")) == 4
+    assert len(document.lower_bounds("right")) == 4
     page = (*arguments[:2], "--worst", 9, "--out", tmp_path / "worst.html")
     replayed = run("kinarm-replay", tmp_path / "evaluation.json", *page)
     assert replayed.out.count("proven necessary") == 4
-
-
-def test_kept_documents_are_compact(tmp_path):
-    request = EvaluationRequest(policies=("zero",), problem="left", trials=60, out=tmp_path)
-    document = json.loads(json.dumps(request.run()))
-    text = (tmp_path / "evaluation.json").read_text()
-    assert json.loads(text) == document
-    assert len(text.splitlines()) < 1000

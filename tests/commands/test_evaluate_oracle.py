@@ -1,7 +1,5 @@
 """``kinarm-eval`` beside the oracle: what it solves, when, and what is told of it."""
 
-import json
-
 import pytest
 from documents import faced, relative_success
 
@@ -59,14 +57,6 @@ def test_the_oracle_faces_every_task_in_play_once(evaluated, arguments, tasks):
     assert list(document["protocol"]["problems"]) == tasks
 
 
-def test_the_oracle_joins_those_who_are_entered_by_default(evaluated):
-    document = evaluated("--task", "left", "--trials", 2)
-    assert faced(document).count(("oracle", "left")) == 1
-    assert {task for _, task in faced(document)} == {"left"}
-    for row in (*document["results"], *document["pooled"]):
-        assert relative_success(row) is not None
-
-
 def test_without_the_oracle_nothing_is_solved(evaluated, solved, empty_cache):
     document = evaluated("--policy", "zero", "--trials", 2, "--no-oracle")
     assert faced(document) == [("zero", task) for task in ("left", "right", "both")]
@@ -76,35 +66,12 @@ def test_without_the_oracle_nothing_is_solved(evaluated, solved, empty_cache):
     assert not empty_cache.exists()
 
 
-def test_the_oracle_may_be_named_and_its_bounds_left_out(evaluated):
-    document = evaluated("--policy", "oracle", "--task", "left", "--trials", 2, "--no-oracle")
-    (row,) = document["results"]
-    assert (row["metrics"]["success"]["value"], relative_success(row)) == (1, None)
-    assert document["protocol"]["problems"]["left"]["oracle"] is None
-
-
 def test_trials_are_solved_once_and_then_looked_up(evaluated, solved, empty_cache):
     arguments = ("--policy", "zero", "--policy", "random", "--task", "right", "--trials", 3)
     first, second = evaluated(*arguments), evaluated(*arguments)
     assert solved == [3]
     assert len(list(empty_cache.iterdir())) == 1
     assert first == second
-
-
-def test_an_empty_cache_is_filled_without_a_word(run_outside, empty_cache):
-    arguments = ("--policy", "zero", "--task", "right", "--trials", 2)
-    answer = run_outside("kinarm-eval", *arguments)
-    assert (answer.status, answer.err) == (0, "")
-    assert len(list(empty_cache.iterdir())) == 1
-
-
-def test_a_cache_that_cannot_be_used_is_done_without(evaluated, tmp_path, monkeypatch):
-    arguments = ("--policy", "zero", "--task", "right", "--trials", 2)
-    expected = evaluated(*arguments)
-    (tmp_path / "file").write_text("mine")
-    monkeypatch.setenv("KINARM_CACHE", str(tmp_path / "file"))
-    assert evaluated(*arguments) == expected
-    assert (tmp_path / "file").read_text() == "mine"
 
 
 @pytest.mark.parametrize(
@@ -132,17 +99,6 @@ def test_what_is_refused_is_refused_before_trials_are_solved(
         assert word in answer.err
     assert solved == []
     assert not empty_cache.exists()
-
-
-def test_a_file_called_oracle_is_not_mixed_up_with_the_oracle(run, policy, tmp_path):
-    """Either the clash is refused or one can tell the rows apart."""
-    policy.save(tmp_path / "oracle.npz")
-    answer = run("kinarm-eval", "--json", "--policy", tmp_path / "oracle.npz", "--trials", 2)
-    if answer.status == 0:
-        rows = json.loads(answer.out)["results"]
-        assert len({row["policy"] for row in rows}) == len(rows)
-    else:
-        assert "two policies are called 'oracle'" in answer.err
 
 
 def test_table_tells_how_far_the_proofs_got(run):

@@ -49,15 +49,6 @@ def test_the_star_of_replaced_settings_is_shown(run, evaluated, tmp_path, count)
     assert note in text
 
 
-@pytest.mark.parametrize("name", ["ars-tuned-both", "mine-seed0.npz"])
-def test_no_star_is_shown_where_no_name_says_so(run, policy_folder, name):
-    """Shipped policies have the settings of their recipes, and other names tell no recipe."""
-    given = policy_folder / name if name.endswith(".npz") else name
-    out = run("kinarm-eval", "--policy", given, "--trials", 3, "--no-oracle").out
-    assert name.removesuffix(".npz") in out
-    assert "*" not in out
-
-
 def test_trainings_with_other_settings_are_not_pooled(evaluated, policy_folder):
     """Their names say that they are seeds of one recipe; their settings say otherwise."""
     names = ("mine-seed0.npz", "mine-seed1.npz")

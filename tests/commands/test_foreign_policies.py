@@ -85,10 +85,6 @@ class TestModel:
         words = ("model.zip", "which problem it is for", "--problem")
         check_refused(run(command, "--policy", saved), *words)
 
-    def test_several_problems_do_not_say_which_it_is_for(self, run, saved):
-        problems = ("--problem", "right", "--problem", "left")
-        check_refused(run("kinarm-eval", "--policy", saved, *problems), "which problem")
-
     @pytest.mark.parametrize("command", ["kinarm-eval", "kinarm-replay"])
     def test_bad_files(self, run, here, command):
         pytest.importorskip("stable_baselines3")
@@ -110,9 +106,6 @@ class TestModule:
         name = module.replace(":still", ":moving")
         check_refused(run(command, "--policy", name, *options), "'moving'", "still")
         check_refused(run(command, "--policy", "nowhere_at_all:f", *options), "nowhere_at_all")
-
-    def test_needs_a_problem_to_replay(self, run, module):
-        check_refused(run("kinarm-replay", "--policy", module), "--problem")
 
     def test_actions_of_another_shape(self, run, here):
         (here / "wrong_for_tests.py").write_text("def wrong(seen):\n    return seen\n")

@@ -69,16 +69,6 @@ def test_list_names_every_problem(run, words):
     assert [line.split()[0] for line in lines] == list(problem_names())
 
 
-def test_a_narrow_list_has_a_line_a_problem(run, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "60")
-    head, *lines = run("kinarm-problem").out.splitlines()
-    assert "obstacles" not in head
-    assert max(map(len, lines)) <= 60
-    named = [line.split()[0] for line in lines[: len(problem_names())]]
-    assert named == list(problem_names())
-    assert "columns that do not fit here: obstacles" in lines[len(problem_names())]
-
-
 def test_show_prints_what_can_be_read_again(run, write):
     answer = run("kinarm-problem", "show", "both", "--arm", "paper_flange", "--scene", "post")
     assert (answer.status, answer.err) == (0, "")

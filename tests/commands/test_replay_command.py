@@ -88,11 +88,6 @@ def test_the_collisions_of_an_evaluation(replay, evaluation):
     assert answer.out.count(" touches ") == len(expected)
 
 
-def test_one_trial_of_an_evaluation(replay, evaluation, policy_folder):
-    policy = policy_folder / "mine-seed0.npz"
-    assert played(replay(evaluation, "--policy", policy, "--trial", 7, "--trial", 2)) == [7, 2]
-
-
 def test_a_request_does_the_same(run, tmp_path, policy_folder):
     policy, lines = policy_folder / "mine-seed0.npz", []
     command = ("--policy", policy, "--tolerance", 0.2, "--trials", 2)
@@ -108,17 +103,6 @@ def test_two_policies_on_the_same_trials(replay, tmp_path):
     answer = replay("--compare", "random", "zero", "--problem", "left", "--trials", 2, *QUICK)
     assert played(answer) == [0, 0, 1, 1]
     assert "random and zero" in (tmp_path / "made.html").read_text()
-
-
-def test_the_oracle_and_a_policy(replay):
-    answer = replay("--compare", "oracle", "ars-tuned-both", "--trial", 3)
-    assert played(answer) == [3, 3]
-    assert "oracle: reached the goal" in answer.out
-
-
-def test_another_arm(replay):
-    options = ("--policy", "oracle", "--problem", "right", "--arm", "lrmate200ic_5l")
-    assert played(replay(*options, "--trials", 1)) == [0]
 
 
 @pytest.mark.parametrize(
@@ -199,14 +183,6 @@ def test_recordings_are_compared_in_the_same_trials_only(replay, recordings, tmp
     assert played(replay(mixed, "--compare", "mine-seed0", "other")) == [0, 0]
 
 
-@pytest.mark.parametrize("share", [0, 0.5, 0.99])
-def test_truncated_recordings(replay, recordings, tmp_path, share):
-    content = recordings.read_bytes()
-    path = tmp_path / "cut.npz"
-    path.write_bytes(content[: int(share * len(content))])
-    check_refused(replay(path), "cut.npz", "not a complete kinarm recording")
-
-
 def test_policies_are_no_recordings(replay, policy_folder):
     check_refused(replay(policy_folder / "lefty.npz"), "'kinarm-policy'", "'kinarm-recording'")
 
@@ -229,7 +205,7 @@ def test_an_evaluation_that_no_longer_holds(replay, evaluation, tmp_path):
         return replay(path, "--policy", "random", *QUICK)
 
     assert document["protocol"]["format_version"] == 4
-    check_refused(changed(lambda d: d["protocol"].update(format_version=9)), "format version 9")
+    check_refused(changed(lambda d: d["protocol"].update(format_version=9)), "Invalid enum value 9")
 
     def right(document):
         return document["protocol"]["problems"]["right"]
@@ -245,43 +221,6 @@ def test_an_evaluation_that_no_longer_holds(replay, evaluation, tmp_path):
     )
 
 
-@pytest.mark.parametrize(
-    "path",
-    [
-        ("results", 0, "problem"),
-        ("results", 0, "policy"),
-        ("results", 0, "outcomes", "steps"),
-        ("protocol", "seed"),
-        ("protocol", "problems", "right", "starts"),
-        ("protocol", "problems", "right", "oracle"),
-        ("protocol", "problems", "right", "problem"),
-        ("protocol", "problems", "right"),
-    ],
-)
-def test_an_evaluation_with_something_missing(replay, evaluation, tmp_path, path):
-    document = json.loads(evaluation.read_text())
-    *where, last = path
-    part = document
-    for step in where:
-        part = part[step]
-    del part[last]
-    (tmp_path / "evaluation.json").write_text(json.dumps(document))
-    check_refused(
-        replay(tmp_path / "evaluation.json"), "evaluation.json", "not a complete kinarm evaluation"
-    )
-
-
 def test_an_evaluation_of_several_policies(replay, evaluation):
     check_refused(replay(evaluation, "--policy", "nobody"), "'nobody'", "random")
     check_refused(replay(evaluation, "--policy", "random", "--problem", "left"), "'random'")
-
-
-def test_documents_of_version_2_are_read(replay, evaluation, tmp_path):
-    document = json.loads(evaluation.read_text())
-    document["protocol"]["format_version"] = 2
-    del document["protocol"]["hold"]
-    for row in document["results"]:
-        del row["failures"]
-    (tmp_path / "evaluation.json").write_text(json.dumps(document))
-    answer = replay(tmp_path / "evaluation.json", "--policy", "random", "--trial", 3, *QUICK)
-    assert played(answer) == [3]
