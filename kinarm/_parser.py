@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from difflib import get_close_matches
 from typing import Any, ClassVar, NoReturn
 
+from kinarm import __version__
 from kinarm.errors import one_line
 
 EXAMPLE = re.compile(r"(?m)^  (\S.*?) {2,}(\S.*)$")
@@ -49,7 +50,10 @@ class Parser(argparse.ArgumentParser):
         self._optionals.title = "general"
         self.add_argument("-h", "--help", action="help", help="Show this help and exit")
         self.add_argument(
-            "--version", action=_ShowVersion, nargs=0, help="Show the version of kinarm and exit"
+            "--version",
+            action="version",
+            version=f"kinarm {__version__}",
+            help="Show the version of kinarm and exit",
         )
         if self.completable:
             self.add_argument(
@@ -111,22 +115,12 @@ class HelpFormatter(argparse.HelpFormatter):
         groups: Iterable[argparse._MutuallyExclusiveGroup],
         prefix: str | None,
     ) -> str:
-        if usage is None:
-            known = list(actions)
-            needed = [action for action in known if action.required and action.option_strings]
-            words = [f"{each.option_strings[0]} {self._metavar(each)}" for each in needed]
-            words += [self._positional(each) for each in known if not each.option_strings]
-            if len(needed) < sum(bool(each.option_strings) for each in known):
-                words.append("[options]")
-            usage = " ".join(["%(prog)s", *words]).replace("%(prog)s", self._prog)
-            return f"usage: {usage}\n\n" if prefix is None else f"{prefix}{usage}"
-        return super()._format_usage(usage, actions, groups, prefix)
-
-    def _metavar(self, action: argparse.Action) -> str:
-        return self._format_args(action, self._get_default_metavar_for_optional(action))
-
-    def _positional(self, action: argparse.Action) -> str:
-        return self._format_args(action, self._get_default_metavar_for_positional(action))
+        if usage is not None:
+            return super()._format_usage(usage, actions, groups, prefix)
+        known = list(actions)
+        needed = [each for each in known if each.required or not each.option_strings]
+        options = " [options]" if len(needed) < len(known) else ""
+        return super()._format_usage(None, needed, (), prefix).rstrip("\n") + f"{options}\n\n"
 
     def _split_lines(self, text: str, width: int) -> list[str]:
         return textwrap.wrap(" ".join(text.split()), width, break_on_hyphens=False)
@@ -142,19 +136,6 @@ class HelpFormatter(argparse.HelpFormatter):
         if max(map(len, block.splitlines())) <= width:
             return block
         return EXAMPLE.sub(r"  \1\n      \2", block)
-
-
-class _ShowVersion(argparse.Action):
-    """Print the version of kinarm, which is looked up only then, and exit."""
-
-    def __init__(self, **options: Any) -> None:
-        super().__init__(**{**options, "default": argparse.SUPPRESS})
-
-    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        from importlib.metadata import version
-
-        sys.stdout.write(f"kinarm {version('kinarm')}\n")
-        parser.exit()
 
 
 class _PrintCompletion(argparse.Action):
