@@ -108,26 +108,12 @@ def test_positive_axis_two_leans_forward_and_positive_axis_three_raises(shipped_
     assert arm.tool_position([0, 0, 0.1, 0, 0, 0])[2] > zero[2]
 
 
-def test_five_axes_are_actuated(shipped_arms):
-    for arm in shipped_arms.values():
-        assert (arm.n_joints, arm.n_actuated) == (6, 5)
-        np.testing.assert_array_equal(arm.home, np.zeros(6))
-
-
 def test_reach_bounds_the_tool(any_simulator):
     arm = any_simulator.arm
     rng = np.random.default_rng(0)
     tools = [arm.tool_position(rng.uniform(arm.lower, arm.upper)) for _ in range(500)]
     farthest = np.linalg.norm(tools, axis=1).max()
     assert 0.5 * arm.reach < farthest <= arm.reach
-
-
-def test_arm_pickles(shipped_arms):
-    arm = shipped_arms["paper"]
-    other = pickle.loads(pickle.dumps(arm))
-    assert (other.digest, other.specification) == (arm.digest, arm.specification)
-    q = np.linspace(-1, 1, 6)
-    np.testing.assert_array_equal(other.tool_position(q), arm.tool_position(q))
 
 
 @pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda arm: pickle.loads(pickle.dumps(arm))])
@@ -140,9 +126,6 @@ class TestDigest:
     def test_is_the_same_for_every_load(self, shipped_arms):
         for name, arm in shipped_arms.items():
             assert Arm.load(name).digest == arm.digest
-
-    def test_differs_between_arms(self, shipped_arms):
-        assert len({arm.digest for arm in shipped_arms.values()}) == 3
 
     def test_depends_on_home_velocity_limits_and_the_actuated_axes(self, shipped_arms):
         known = {shipped_arms["paper"].digest}

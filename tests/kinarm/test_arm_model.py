@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import pinocchio as pin
 import pytest
 
 from kinarm.arm_model import build_model, build_shapes
@@ -40,13 +39,3 @@ def test_shapes_that_are_not_read():
     description = described(shape="<geometry/>")
     with pytest.raises(ArmError, match=r"^made\.urdf declares 1 collision shapes but 0 were read$"):
         build_shapes(description, build_model(described()))
-
-
-def test_shapes_that_cannot_be_read(monkeypatch):
-    def fail(*_):
-        raise ValueError("no such shape\nat all")
-
-    monkeypatch.setattr(pin, "buildGeomFromUrdfString", fail)
-    words = r"^collision shapes of made\.urdf cannot be loaded: no such shape$"
-    with pytest.raises(ArmError, match=words):
-        build_shapes(described(), build_model(described()))

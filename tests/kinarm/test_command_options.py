@@ -8,7 +8,6 @@ import pytest
 
 from kinarm._options import add_options, given_options, request_of
 from kinarm._parser import Parser
-from kinarm.problem_options import ProblemOptions
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,11 +136,6 @@ class TestOptions:
             "window": (1.0, 2.0),
         }
 
-    def test_fields_can_be_left_out(self, capsys):
-        assert "unrecognized arguments: --guests" in refused(
-            capsys, "--guests", 3, skip=("guests",)
-        )
-
     def test_what_has_no_default_has_to_be_given(self, capsys):
         options = parsed("eggs", "--bowl", "pan", kind=Mixing)
         assert request_of(options, Mixing) == Mixing(what="eggs", bowl="pan")
@@ -152,14 +146,6 @@ class TestOptions:
     def test_what_is_false_by_default_can_be_negated(self):
         options = parsed("--no-quiet", explicit=True)
         assert given_options(options, Baking) == {"quiet": False}
-
-    def test_options_of_others_are_left_alone(self):
-        parser = Parser(prog="bake")
-        add_options(parser, Baking)
-        add_options(parser.add_argument_group("mixing"), Mixing)
-        options = parser.parse_args(["--guests", "3", "--bowl", "pan", "cake.toml", "eggs"])
-        assert given_options(options, Baking) == {"guests": 3, "recipe": Path("cake.toml")}
-        assert request_of(options, Mixing) == Mixing(what="eggs", bowl="pan")
 
     def test_help_comes_from_the_docstring(self, capsys, monkeypatch):
         monkeypatch.setenv("COLUMNS", "200")
@@ -176,14 +162,6 @@ class TestOptions:
         assert shown["--output"] == "--output FILE Where it goes"
         assert shown["--oven-heat"] == "--oven-heat X How hot it is [K] (default: 450.0)"
         assert shown["recipe"] == "recipe File of the recipe"
-
-    def test_every_default_can_be_said(self, capsys, monkeypatch):
-        monkeypatch.setenv("COLUMNS", "200")
-        with pytest.raises(SystemExit):
-            parsed("--help", explicit=True)
-        said = " ".join(capsys.readouterr().out.split())
-        assert "What is strewn on it (default: none)" in said
-        assert "Say nothing (default: no)" in said
 
     @pytest.mark.parametrize(
         ("arguments", "message"),
@@ -209,19 +187,3 @@ class TestOptions:
         assert said.startswith("bake: ")
         assert message in said
         assert said.endswith("(see bake --help)\n")
-
-    def test_problem_options_are_shared_by_the_commands(self):
-        options = parsed(
-            *("--problem", "both", "--arm", "paper_flange", "--tolerance", "0.1"),
-            *("--horizon", "5", "--start-spread", "0.5", "--task", "left", "--scene", "right"),
-            kind=ProblemOptions,
-        )
-        assert request_of(options, ProblemOptions) == ProblemOptions(
-            problem="both",
-            arm="paper_flange",
-            task="left",
-            scene="right",
-            tolerance=0.1,
-            horizon=5,
-            start_spread=0.5,
-        )

@@ -102,10 +102,3 @@ def test_printing_it_is_all_that_a_command_does(capsys):
         parser.parse_args(["--print-completion", "bash"])
     assert not stopped.value.code
     assert "complete -o" in capsys.readouterr().out
-
-
-def test_other_shells_are_refused_in_a_line(capsys):
-    with pytest.raises(SystemExit) as stopped:
-        Parser(prog="bake").parse_args(["--print-completion", "dos"])
-    assert stopped.value.code == 2
-    assert capsys.readouterr().err.count("\n") == 1

@@ -2,11 +2,7 @@
 
 import builtins
 import io
-import os
-import pty
 import re
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -44,13 +40,6 @@ def test_a_kernel_is_told_of_once_and_its_helpers_are_not():
     assert heard == [COMPILING, ""]
 
 
-def test_a_failure_ends_it_too():
-    heard = []
-    with told_of_activities(heard.append), pytest.raises(ValueError, match="no"), doing(COMPILING):
-        raise ValueError("no")
-    assert heard == [COMPILING, ""]
-
-
 def test_one_within_another_is_told_of_and_the_same_is_not():
     heard = []
     with told_of_activities(heard.append), doing("learning"):
@@ -68,43 +57,6 @@ def test_what_was_said_comes_back(monkeypatch):
         with doing(COMPILING):
             pass
     assert said == ["right: 2 of 3", f"right: 2 of 3; {COMPILING}", "right: 2 of 3"]
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a pseudo-terminal")
-def test_the_first_run_says_so_and_the_second_does_not(tmp_path):
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "TERM": "xterm"}
-    command = [sys.executable, "-m", "kinarm", "eval", "--policy", "zero", "--no-oracle"]
-    texts = []
-    for _ in range(2):
-        terminal, line = pty.openpty()
-        with subprocess.Popen(
-            [*command, "--trials", "2", "--problem", "right"],
-            stdout=subprocess.DEVNULL,
-            stderr=line,
-            env=environment,
-        ) as process:
-            os.close(line)
-            texts.append(read_all(terminal))
-        assert process.returncode == 0
-    assert COMPILING in texts[0]
-    assert COMPILING not in texts[1]
-    assert "evaluating" in texts[1]
-
-
-def read_all(terminal):
-    """Everything that is written to a terminal until its other end is closed."""
-    parts = []
-    while True:
-        try:
-            part = os.read(terminal, 4096)
-        except OSError:  # what Linux says then
-            break
-        if not part:
-            break
-        parts.append(part)
-    os.close(terminal)
-    return b"".join(parts).decode()
 
 
 def shown(monkeypatch, width=80, **settings):
@@ -172,8 +124,3 @@ def test_a_pipe_is_as_wide_as_it_takes_or_as_the_environment_says(monkeypatch, c
         monkeypatch.setenv("COLUMNS", columns)
     assert open_console().width == width
     assert open_console(file=io.StringIO()).width == 1000
-
-
-def test_with_ipywidgets_rich_draws_it(notebook, monkeypatch):
-    monkeypatch.setattr("kinarm._console.find_spec", lambda _: True)
-    assert open_console().is_jupyter

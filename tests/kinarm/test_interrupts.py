@@ -183,24 +183,6 @@ def test_a_request_that_is_ignored_from_the_start_stays_ignored(run):
     assert run(source, preexec_fn=ignore) == (0, "bread\n", "")
 
 
-def test_a_reader_that_never_reads_keeps_nobody(run):
-    source = """
-    sys.stdout.reconfigure(write_through=False)
-    def command():
-        sys.stdout.write("x" * 100)
-        os.dup2(os.pipe()[1], 1)  # whose other end nobody reads
-        os.set_blocking(1, False)
-        try:
-            while True:
-                os.write(1, b"x" * 4096)
-        except BlockingIOError:
-            os.set_blocking(1, True)
-        ask()
-    run_command('bake', command)
-    """
-    assert run(source) == INTERRUPTED
-
-
 @pytest.mark.parametrize("name", ["bake", "test_kinarm"])
 def test_programs_that_only_use_kinarm_keep_their_own_ways(run, name):
     source = """

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from kinarm.arm import Arm
-from kinarm.errors import ArmError, KinarmError, UnknownNameError
+from kinarm.errors import ArmError, KinarmError
 from kinarm.problem import ReachProblem
 from kinarm.simulator import Simulator
 
@@ -86,12 +86,6 @@ def test_impossible_home_is_refused(home):
         Arm.load("paper", home=home)
 
 
-def test_any_link_can_carry_the_tool(make_joint, write_robot):
-    path = write_robot([make_joint("prismatic")], tool=None)
-    arm = Arm.load(path, tool_frame="link_1")
-    np.testing.assert_array_equal(arm.chain.tool, [0, 0, 0])
-
-
 def test_every_kind_of_shape_loads(sliding_arm):
     kinds = {type(shape.geometry) for shape in sliding_arm.geometry.geometryObjects}
     assert kinds == {coal.Cylinder, coal.Box, coal.Sphere, coal.Capsule}
@@ -114,13 +108,3 @@ def test_package_dirs_find_meshes(make_joint, make_collision, write_robot, tmp_p
     assert Arm.load(path, package_dirs=[tmp_path]).geometry.ngeoms == 1
     with pytest.raises(ArmError, match="package_dirs names the folders"):
         Arm.load(path)
-
-
-def test_collision_in_a_comment_is_no_shape(make_joint, write_robot):
-    path = write_robot([make_joint()], {1: "<!-- <collision> to be measured -->"})
-    assert Arm.load(path).geometry.ngeoms == 0
-
-
-def test_an_axis_that_there_is_none_of_is_refused():
-    with pytest.raises(UnknownNameError, match="joint in actuated of paper.urdf: 'axis_7'"):
-        Arm.load("paper", actuated=("axis_7",))

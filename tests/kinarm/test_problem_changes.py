@@ -53,25 +53,6 @@ class TestReplace:
         assert RIGHT.replace(task=path).task.horizon == 7
         assert not RIGHT.replace(scene=str(path)).scene.ground
 
-    def test_fields_of_task_and_stepping_by_their_names(self):
-        changed = RIGHT.replace(
-            goal_regions=("left", "right"),
-            goal_weights=(1, 2),
-            tolerance=0.1,
-            horizon=5,
-            start_spread=0.3,
-            time_step=0.1,
-            tested_configurations=7,
-        )
-        assert changed.task == ReachTask(
-            goal_regions=("left", "right"),
-            goal_weights=(1, 2),
-            tolerance=0.1,
-            horizon=5,
-            start_spread=0.3,
-        )
-        assert changed.stepping == Stepping(time_step=0.1, tested_configurations=7)
-
     def test_fields_win_over_the_parts_that_hold_them(self):
         assert RIGHT.replace(task="both", tolerance=0.2).task == ReachTask(
             goal_regions=("left", "right"), tolerance=0.2

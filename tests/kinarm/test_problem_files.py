@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 from kinarm.arm import ArmSpecification
-from kinarm.errors import ArmError, InvalidInputError, OutputError, ProblemError, UnknownNameError
+from kinarm.errors import InvalidInputError, OutputError, ProblemError, UnknownNameError
 from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.problem_files import (
     find_scene,
@@ -109,11 +109,6 @@ class TestFile:
         assert problem.arm.name == "robot"
         assert World(problem).arm.digest == shipped_arms["paper"].digest
 
-    def test_missing_robot_is_named_with_its_folder(self, write, tmp_path):
-        problem = ReachProblem.load(write('[arm]\nsource = "robot.urdf"'))
-        with pytest.raises(ArmError, match=f"URDF '{tmp_path.resolve()}/robot.urdf' does not"):
-            World(problem)
-
     def test_saved_and_loaded(self, tmp_path):
         problem = PROBLEMS["both"].replace(arm="lrmate200ic_5l", name="long").pinned
         problem.save(tmp_path / "long.toml")
@@ -174,10 +169,6 @@ class TestFile:
             ReachProblem.load(path)
         assert str(caught.value).startswith(f"{path}: ")
         assert "\n" not in str(caught.value)
-
-    def test_folder(self, tmp_path):
-        with pytest.raises(InvalidInputError, match="cannot read problem .*directory"):
-            ReachProblem.load(tmp_path)
 
 
 class TestShippedProblems:

@@ -153,11 +153,6 @@ def test_arrays_are_copied_and_read_only(recordings):
         recording.states[0] = 0
 
 
-def test_the_problem_names_the_very_arm(simulator, recordings):
-    assert recordings[0].problem.arm.digest == simulator.arm.digest
-    assert recordings[0].problem.first_difference(simulator.problem) is None
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -172,11 +167,6 @@ def test_the_problem_names_the_very_arm(simulator, recordings):
 def test_nonsense_is_refused(recordings, change, words):
     with pytest.raises(InvalidInputError, match=words):
         replace(recordings[0], **change)
-
-
-def test_more_states_than_steps(recordings):
-    with pytest.raises(InvalidInputError, match="horizon of 3"):
-        elsewhere(recordings[0], horizon=3)
 
 
 def test_missing_entries(recordings, tmp_path):

@@ -66,12 +66,6 @@ def test_goal_region_without_area_is_refused(upper):
         region(upper=upper)
 
 
-def test_goal_region_may_be_flat_or_thick():
-    assert region().upper[2] == 0.4
-    assert region(upper=(1, 0.5, 0.9)).upper[2] == 0.9
-    assert region(lower=(0, -1, 0), upper=(0, 1, 1)).lower[0] == 0
-
-
 @pytest.mark.parametrize("make", [obstacle, region])
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("corner", ["lower", "upper"])

@@ -72,6 +72,3 @@ class TestRewardWeights:
             RewardWeights(**{term: value})
         allowed = RewardWeights(**{term: value}, allow_perverse=True)
         assert getattr(allowed, term) == value
-
-    def test_zero_is_not_perverse(self):
-        assert RewardWeights(collision=0, success=0).vector.tolist() == [1, 0, 0, 0, 0]

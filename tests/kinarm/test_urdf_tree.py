@@ -95,12 +95,6 @@ def test_a_tool_point_far_away_is_refused():
         Arm.load("paper", tool_offset=(0.0, 1e308, 0.0))
 
 
-def test_links_that_nothing_holds(make_joint, write_robot):
-    path = write_robot([make_joint()], extra='<link name="lost"/>')
-    with pytest.raises(ArmError, match="has links that no joint joins: 'link_0', 'lost'"):
-        Arm.load(path)
-
-
 def test_a_wheel_that_carries_nothing_is_held_where_it_is(make_joint, write_robot):
     """A continuous joint has no range to be in the middle of."""
     wheel = (
