@@ -31,7 +31,17 @@ class Batch(NamedTuple):
         record: bool = False,
         shift: Array | None = None,
     ) -> "Batch":
-        """Allocate episodes at their starts, yet to be begun; see `Episodes.allocate`."""
+        """Allocate episodes at their starts, yet to be begun.
+
+        Parameters
+        ----------
+        world : World
+            Where they take place.
+        control : Control
+            Where their actions come from.
+        starts, goals, record, shift
+            As for `Episodes.allocate`.
+        """
         n_pairs, horizon = len(world.contact_model.shapes.pairs), world.problem.task.horizon
         episodes, known = Episodes.allocate(
             starts, goals, n_pairs=n_pairs, horizon=horizon, record=record, shift=shift
@@ -39,7 +49,13 @@ class Batch(NamedTuple):
         return cls(control, episodes, world.session(control, known))
 
     def refill(self, control: Control, starts: Array, goals: Array, shift: Array | None) -> bool:
-        """Take in other networks, starts and goals, if they are as many and of the same form."""
+        """Take other networks, starts and goals, if they are as many and of the same form.
+
+        Parameters
+        ----------
+        control, starts, goals, shift
+            As for `bound`.
+        """
         episodes = self.episodes
         parts = [*zip(_arrays(self.control), _arrays(control), strict=True)]
         collected = 0 if shift is None else len(starts)
@@ -70,7 +86,13 @@ class IdleBatch:
     def taken(
         self, world: World, control: Control, starts: Array, goals: Array, shift: Array | None
     ) -> Batch:
-        """Take the batch and refill it, or make a new one; nobody else gets it until `keep`."""
+        """Take the batch and refill it, or make a new one; nobody else gets it until `keep`.
+
+        Parameters
+        ----------
+        world, control, starts, goals, shift
+            As for `Batch.bound`.
+        """
         try:
             batch = self._kept.pop()
         except IndexError:
@@ -86,7 +108,17 @@ class IdleBatch:
 
 
 def begin_some(first: int, last: int, rows: NDArray[np.int64], session: Session) -> int:
-    """Begin some of the rows, with work space that no other thread uses."""
+    """Begin some of the rows, with work space that no other thread uses.
+
+    Parameters
+    ----------
+    first, last : int
+        Range of the rows.
+    rows : ndarray of int
+        Which episodes.
+    session : Session
+        Theirs; if these are not all rows, another one is made.
+    """
     return begin(first, last, rows, session if last - first == len(rows) else session.another())
 
 

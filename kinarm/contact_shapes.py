@@ -1,4 +1,4 @@
-"""What the compiled kernels know of the shapes that may touch."""
+"""The shapes that may touch as flat arrays, for the compiled kernels."""
 
 from collections.abc import Collection
 from itertools import product
@@ -110,17 +110,7 @@ class ContactShapes(NamedTuple):
             Pairs that are mostly so close to each other that coarse polytopes tell nothing.
         """
         objects = list(arm.geometry.geometryObjects)
-        link = np.array([shape.parentJoint for shape in objects], dtype=np.int64)
-        capsules = [enclosing_capsule(shape) for shape in objects]
-        bodies = [enclosing_polytope(shape, FEW) for shape in objects]
-        bodies += [Enclosure(_corners(each), 0.0) for each in scene.obstacles]
-        links = [*link.tolist(), *(0 for _ in scene.obstacles)]
-        finer = list(range(len(bodies)))
-        for index, shape in enumerate(objects):
-            if len(bodies[index].corners) == FEW:
-                finer[index] = len(bodies)
-                bodies.append(enclosing_polytope(shape, MANY))
-                links.append(links[index])
+        bodies, links, finer = _enclosed(objects, scene)
         ends = np.cumsum([0, *(len(body.corners) for body in bodies)])
         rows, planes, proxies = [], [], []
         travel = np.zeros((arm.n_actuated, len(pairs)))
@@ -138,8 +128,10 @@ class ContactShapes(NamedTuple):
                 corners = bodies[finer[mover]].corners
                 travel[axis, column] = point_speed(arm.chain, axis, links[mover], corners)
         return cls(
-            link=link,
-            capsules=np.array([np.hstack(capsule) for capsule in capsules]).reshape(-1, 7),
+            link=np.array([shape.parentJoint for shape in objects], dtype=np.int64),
+            capsules=np.array([np.hstack(enclosing_capsule(each)) for each in objects]).reshape(
+                -1, 7
+            ),
             boxes=np.array([_turned_back(each) for each in scene.obstacles]).reshape(-1, 2, 3),
             pairs=np.array(rows, dtype=np.int64).reshape(-1, 3),
             travel=travel,
@@ -155,6 +147,22 @@ class ContactShapes(NamedTuple):
             farthest=travel.max(axis=1, initial=0.0),
             turns=np.array([each.rotation[:2, 0] for each in scene.obstacles]).reshape(-1, 2),
         )
+
+
+def _enclosed(
+    objects: list[pin.GeometryObject], scene: Scene
+) -> tuple[list[Enclosure], list[int], list[int]]:
+    """Bodies around shapes and obstacles, the joints that carry them, and each one's finer body."""
+    bodies = [enclosing_polytope(shape, FEW) for shape in objects]
+    bodies += [Enclosure(_corners(each), 0.0) for each in scene.obstacles]
+    links = [*(shape.parentJoint for shape in objects), *(0 for _ in scene.obstacles)]
+    finer = list(range(len(bodies)))
+    for index, shape in enumerate(objects):
+        if len(bodies[index].corners) == FEW:
+            finer[index] = len(bodies)
+            bodies.append(enclosing_polytope(shape, MANY))
+            links.append(links[index])
+    return bodies, links, finer
 
 
 def _corners(obstacle: Obstacle) -> NDArray[np.float64]:

@@ -14,7 +14,7 @@ SAMPLES = 2000
 
 @dataclass(frozen=True, eq=False)
 class ContactStatistics:
-    """What touches, over configurations within the limits.
+    """Which pairs touch at random configurations within the limits.
 
     Attributes
     ----------
@@ -92,6 +92,13 @@ def random_configurations(model: ContactModel, count: int, seed: int = 0) -> NDA
     """Configurations whose actuated joints are uniform within their limits, shape (n, n_joints).
 
     The others stay at home.
+
+    Parameters
+    ----------
+    model : ContactModel
+        An arm in a scene.
+    count, seed : int
+        How many, and the seed that they are drawn from.
     """
     arm, moved = model.arm, slice(model.arm.n_actuated)
     q = np.tile(arm.home, (count, 1))

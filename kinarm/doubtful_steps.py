@@ -9,13 +9,13 @@ from kinarm.kernels.rollout import refuse
 from kinarm.kernels.session import Session
 from kinarm.world import World
 
-Bits = NDArray[np.int64]
-
 FEW = 4
-"""Up to so many episodes in doubt are decided one by one, which also tells what touches."""
+"""Of up to so many episodes in doubt, Coal also tells what touches."""
 
 
-def decide_doubtful_steps(world: World, session: Session, episodes: Episodes, paused: Bits) -> int:
+def decide_doubtful_steps(
+    world: World, session: Session, episodes: Episodes, paused: NDArray[np.int64]
+) -> int:
     """Refuse steps that touch something, and clear the others.
 
     Coal is asked in the order of the motion, and not beyond the first contact.
@@ -37,10 +37,9 @@ def decide_doubtful_steps(world: World, session: Session, episodes: Episodes, pa
         Configurations that Coal was asked about.
     """
     ways = world.substeps(episodes.q[paused], episodes.target[paused])
-    ask = _one_by_one if paused.size <= FEW else _together
-    touched, asked = ask(world.contact_model, ways, episodes.doubt[paused])
-    episodes.touched[paused] = touched
+    touched, asked = first_contacts(world.contact_model, ways, episodes.doubt[paused])
     refused = touched != 0
+    episodes.touched[paused] = touched
     episodes.status[paused[~refused]] = RUNNING
     episodes.cleared[paused] = ~refused
     if refused.any():
@@ -50,24 +49,35 @@ def decide_doubtful_steps(world: World, session: Session, episodes: Episodes, pa
     return asked
 
 
-def _one_by_one(contacts: ContactModel, ways: NDArray[np.float64], doubt: Bits) -> tuple[Bits, int]:
-    """Numbers of the pairs that touch first, from 1, or 0; and how often Coal was asked."""
-    touched, asked = np.zeros(len(ways), dtype=np.int64), 0
-    for row, (way, bits) in enumerate(zip(ways, doubt.tolist(), strict=True)):
-        for k, configuration in enumerate(way):
-            if bits >> k & 1 and not touched[row]:
-                index = contacts.first_in_contact(configuration)
-                touched[row] = 0 if index is None else index + 1
-                asked += 1
-    return touched, asked
+def first_contacts(
+    contacts: ContactModel, ways: NDArray[np.float64], doubt: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], int]:
+    """Find what the doubtful configurations of steps touch first.
 
+    Parameters
+    ----------
+    contacts : ContactModel
+        Who is asked.
+    ways : ndarray, shape (n, n_tested, n_joints)
+        Configurations of the steps, in the order of the motion [rad or m].
+    doubt : ndarray of int, shape (n,)
+        Bit k set: that of number k, from 0, is in doubt.
 
-def _together(contacts: ContactModel, ways: NDArray[np.float64], doubt: Bits) -> tuple[Bits, int]:
-    """Where something touches: -1, or 0; and how many configurations Coal was asked about."""
+    Returns
+    -------
+    touched : ndarray of int, shape (n,)
+        Numbers of the pairs, from 1; -1 where only contact as such is known, 0 where there is none.
+    asked : int
+        Configurations that Coal was asked about.
+    """
     touched, asked = np.zeros(len(ways), dtype=np.int64), 0
     for k in range(ways.shape[1]):
         rows = np.flatnonzero((doubt & 1 << k != 0) & (touched == 0))
         if rows.size:
-            touched[rows] = -contacts.in_contact(ways[rows, k]).astype(np.int64)
+            hit = rows[contacts.in_contact(ways[rows, k])]
+            touched[hit] = -1
             asked += rows.size
+            for row in hit if len(ways) <= FEW else ():
+                index = contacts.first_in_contact(ways[row, k])
+                touched[row] = -1 if index is None else index + 1
     return touched, asked

@@ -146,10 +146,20 @@ class Episodes(NamedTuple):
         record: bool = False,
         shift: NDArray[np.float64] | None = None,
     ) -> "tuple[Episodes, Any]":
-        """Allocate episodes at their starts, and what kernels know them by, in one buffer.
+        """Allocate episodes at their starts, and their record for the kernels, in one buffer.
 
-        The kernel ``begin`` fills in the rest. ``record`` keeps the configurations visited, and a
-        ``shift``, shape (n_observations,), collects sums of the observations about this point.
+        The kernel ``begin`` fills in the rest.
+
+        Parameters
+        ----------
+        starts, goals : ndarray, shape (n, n_joints) and (n, 3)
+            Configurations [rad or m] and goal positions [m].
+        n_pairs, horizon : int
+            Pairs that are tested for contact, and steps to go.
+        record : bool
+            Keep the configurations visited.
+        shift : ndarray, shape (n_observations,), optional
+            Collect sums of the observations about this point.
         """
         n, n_joints = starts.shape
         layout = episodes_layout(n, n_joints, n_pairs, horizon if record else 0, shift is not None)
@@ -170,7 +180,17 @@ class Episodes(NamedTuple):
 
 @lru_cache(maxsize=64)
 def episodes_layout(n: int, n_joints: int, n_pairs: int, horizon: int, collects: bool) -> Layout:
-    """How `Episodes` lie in memory; a horizon of 0 keeps no paths."""
+    """How `Episodes` lie in memory.
+
+    Parameters
+    ----------
+    n, n_joints, n_pairs : int
+        Numbers of episodes, joints and tested pairs.
+    horizon : int
+        Steps of which configurations are kept; 0 for none.
+    collects : bool
+        Whether moments of observations are collected.
+    """
     n_observations = observation_size(n_joints)
     path = (n, horizon + 1, n_joints) if horizon else (0, 0, n_joints)
     shapes: dict[str, tuple[types.Type, tuple[int, ...]]] = {

@@ -9,7 +9,7 @@ from kinarm.chain import Chain
 
 
 class MotionBounds(NamedTuple):
-    """What the compiled search for the closest approach knows of a chain, for its first n joints.
+    """Bounds of a chain's motion, for its first n joints.
 
     Attributes
     ----------
@@ -60,9 +60,16 @@ def point_speed(chain: Chain, axis: int, link: int, points: NDArray[np.float64])
     """Bound on the speed of points of a link per unit speed of a joint [m/rad, or m/m].
 
     A revolute joint moves a point by its distance from the axis. The joint after it starts at a
-    fixed distance from the axis, and the links beyond add at most their lengths. Joints count
-    from 0, links from 1: link k is that of the k-th joint. The points, shape (n, 3) [m], are those
-    of the link's frame; the bound holds for their convex hull.
+    fixed distance from the axis, and the links beyond add at most their lengths.
+
+    Parameters
+    ----------
+    chain : Chain
+        The arm's kinematics.
+    axis, link : int
+        The joint, counted from 0, and the link, counted from 1: link k is that of the k-th joint.
+    points : ndarray, shape (n, 3)
+        Points in the link's frame, for whose convex hull the bound holds [m].
     """
     if chain.prismatic[axis]:
         return 1.0

@@ -182,8 +182,16 @@ def network_control(
 ) -> Control:
     """Arrange the networks of n episodes for the kernels.
 
-    There is one policy for all of them, or one for each, or ``policy_index`` tells which drives
-    which; ``widths`` are the lengths of an observation and of an action.
+    Parameters
+    ----------
+    policies : Networks, policy or sequence of policies
+        One for all episodes, or one for each, or as many as ``policy_index`` chooses from.
+    policy_index : array_like of int, shape (n,), or None
+        Which policy drives which episode.
+    n : int
+        Number of episodes.
+    widths : tuple of int
+        Lengths of an observation and of an action.
 
     Raises
     ------

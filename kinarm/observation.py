@@ -17,7 +17,7 @@ VERSION = 1
 
 
 class Ranges(NamedTuple):
-    """What the entries of an observation range over, in the problem at hand.
+    """Ranges of the entries of an observation, in the problem at hand.
 
     Attributes
     ----------
@@ -96,7 +96,13 @@ def write_goal(
 def write_offset(
     poses: Array, tool: Vector, goals: Array, e: int, k: int, observations: Array, start: int
 ) -> None:
-    """Goal minus tool point."""
+    """Goal minus tool point.
+
+    Parameters
+    ----------
+    poses, tool, goals, e, k, observations, start
+        As for `write_goal`.
+    """
     observations[e, start] = goals[e, 0] - tool[0]
     observations[e, start + 1] = goals[e, 1] - tool[1]
     observations[e, start + 2] = goals[e, 2] - tool[2]
@@ -106,7 +112,13 @@ def write_offset(
 def write_orientation(
     poses: Array, tool: Vector, goals: Array, e: int, k: int, observations: Array, start: int
 ) -> None:
-    """Orientation of a joint frame."""
+    """Orientation of a joint frame.
+
+    Parameters
+    ----------
+    poses, tool, goals, e, k, observations, start
+        As for `write_goal`.
+    """
     for i in range(4):
         observations[e, start + i] = poses[k, i]
 
@@ -115,7 +127,13 @@ def write_orientation(
 def write_position(
     poses: Array, tool: Vector, goals: Array, e: int, k: int, observations: Array, start: int
 ) -> None:
-    """Position of a joint frame."""
+    """Position of a joint frame.
+
+    Parameters
+    ----------
+    poses, tool, goals, e, k, observations, start
+        As for `write_goal`.
+    """
     for i in range(3):
         observations[e, start + i] = poses[k, 13 + i]
 
@@ -217,7 +235,7 @@ def observation_table(n_joints: int) -> list[tuple[str, ...]]:
 def _compose(parts: Sequence[Part]) -> Any:
     """Join the formulas of parts into one kernel, which Numba inlines."""
     write, length, per_joint = parts[0].write, len(parts[0].signs), parts[0].per_joint
-    write_others = _compose(parts[1:]) if len(parts) > 1 else write_nothing
+    write_others = _compose(parts[1:]) if len(parts) > 1 else _write_nothing
 
     @inlined
     def write_parts(
@@ -236,7 +254,7 @@ def _compose(parts: Sequence[Part]) -> Any:
 
 
 @inlined
-def write_nothing(
+def _write_nothing(
     poses: Array, tool: Vector, goals: Array, e: int, observations: Array, start: int
 ) -> None:
     """End of the observation."""

@@ -87,7 +87,7 @@ KEPT = {
     "moments": "moments",
     "paths": "path",
 }
-"""What of the outcome is kept as it is, by the name of its array in `kinarm.episodes.Episodes`."""
+"""Arrays of `kinarm.episodes.Episodes` that are kept as they are, by their names in `Rollouts`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +136,14 @@ class Rollouts:
     ) -> "Rollouts":
         """Collect the outcome of episodes that have ended; its arrays are read-only.
 
-        They are those of the episodes, or copies.
+        Parameters
+        ----------
+        starts : ndarray, shape (n, n_joints)
+            Where they started [rad or m].
+        episodes : Episodes
+            The episodes.
+        copy : bool
+            Copy their arrays, which may then serve others.
         """
         rollouts = cls(
             starts=starts,

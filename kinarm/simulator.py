@@ -74,7 +74,7 @@ class Simulator:
 
     @property
     def problem(self) -> ReachProblem:
-        """What is stepped."""
+        """The problem that is stepped."""
         return self.world.problem
 
     @property
@@ -116,7 +116,18 @@ class Simulator:
     def sample(
         self, rng: np.random.Generator, count: int, *, start_spread: float | None = None
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Draw starts and goals; see `kinarm.scenarios.draw_scenarios`."""
+        """Draw starts and goals.
+
+        Parameters
+        ----------
+        rng, count, start_spread
+            As for `kinarm.scenarios.draw_scenarios`.
+
+        Returns
+        -------
+        starts, goals : ndarray, shape (count, n_joints) and (count, 3)
+            Configurations [rad or m] and goal positions [m].
+        """
         return draw_scenarios(self.world, rng, count, start_spread=start_spread)
 
     def reset(self, starts: ArrayLike, goals: ArrayLike, *, record: bool = False) -> Episodes:

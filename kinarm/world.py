@@ -104,7 +104,7 @@ class World(Kinematics):
 
     @cached_property
     def records(self) -> tuple[Chain, ContactShapes, Rules]:
-        """What kernels know of chain, shapes and rules, by their addresses."""
+        """Chain, shapes and rules for the kernels, by their addresses."""
         parts = (self.arm.chain, self.contact_model.shapes, self.rules)
         chain, shapes, rules = (recorded(part) for part in parts)
         return chain, shapes, rules
@@ -173,10 +173,10 @@ class World(Kinematics):
     def proven(
         self, q: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], int]:
-        """What kernels know of finite configurations: Coal decides about the others.
+        """Tool points [m] of finite configurations, and what kernels prove of these.
 
-        Tool points [m], which configurations surely are free, which surely touch, and how many
-        these are together.
+        Which surely are free, which surely touch, and how many these are together: about the others
+        Coal has to decide.
         """
         n = len(q)
         tools, free, touching = np.empty((n, 3)), np.empty(n, dtype=bool), np.empty(n, dtype=bool)

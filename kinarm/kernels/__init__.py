@@ -1,6 +1,7 @@
 """Compiled kernels: whole episodes, each step proven free of contact or left to Coal.
 
-Arguments that kernels share, whose fields go by their own names where a kernel takes them apart:
+Kernels that Python calls name their parameters. Their helpers (`inlined`, `helper`) share these
+arguments, whose fields go by their own names where a helper takes them apart:
 
 chain, shapes, rules, control, episodes
     `Chain`, `ContactShapes`, `Rules`, `Control` and `Episodes`.

@@ -178,9 +178,20 @@ def closest_pairs(
 ) -> None:
     """Find the closest pair at some rows of the configurations.
 
-    ``bounds``, shape (n, n_pairs), become lower bounds of the distances [m]. That of the pair that
-    is ``nearest`` is its distance, and ``points``, shape (n, 2, 3), tell where its bodies are
-    closest. ``nearest`` is -1 where the polytopes overlap or are not the shapes themselves.
+    Parameters
+    ----------
+    first, last : int
+        Range of the rows.
+    chain, bodies : Chain and Bodies
+        The arm, and what is measured.
+    configurations : ndarray, shape (n, n_joints)
+        Joint positions [rad or m].
+    bounds : ndarray, shape (n, n_pairs)
+        Where lower bounds of the distances go, that of the closest pair being its distance [m].
+    nearest : ndarray of int, shape (n,)
+        Where the closest pair goes; -1 if polytopes overlap or are not the shapes themselves.
+    points : ndarray, shape (n, 2, 3)
+        Where the two points go at which its bodies are closest [m].
     """
     poses = np.zeros((configurations.shape[1] + 1, POSE))
     simplex, tried, found = np.empty((4, 3)), np.empty((CORNERS_TRIED, 9)), np.empty((2, 3))

@@ -144,7 +144,7 @@ class LinkedLibrary(JITCodeLibrary):
 
     @property
     def codegen(self) -> "LinkedLibrary":
-        """What is told of the environment of the function: nobody, since it has no address."""
+        """The library itself, which is told of the environment of the function, and leaves it."""
         return self
 
     def set_env(self, name: str, environment: object) -> None:

@@ -193,9 +193,16 @@ PRECISION = 1e-9
 
 @kernel
 def distances_from_hull(corners: Array, points: Array, distances: Array) -> None:
-    """Bound the distances of points, shape (n, 3), from the hull of corners from above [m].
+    """Bound the distances of points from the hull of corners from above.
 
     Each is that of a point of the hull, (nearly) the closest one.
+
+    Parameters
+    ----------
+    corners, points : ndarray, shape (n_corners, 3) and (n, 3)
+        What the hull is of, and the points [m].
+    distances : ndarray, shape (n,)
+        Where the bounds go [m].
     """
     simplex = np.empty((4, 3))
     for index in range(points.shape[0]):

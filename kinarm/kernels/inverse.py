@@ -39,7 +39,7 @@ TURN = 6.28318530717958647693
 
 
 class Search(NamedTuple):
-    """What is looked for, and where.
+    """Target coordinates and seeds of a search.
 
     Attributes
     ----------
@@ -200,10 +200,20 @@ def solve_targets(
 ) -> None:
     """Find the configurations at which the tool is where it is wanted, for rows of targets.
 
-    ``positions`` has the shape (n_targets, 3) [m], and ``directions``, of the tool's axes,
-    (n_targets, n_axes, 3). Of each target, the ``counts`` first rows of ``configurations``, shape
-    (n_targets, most + 1, n_joints), are filled in. Of solutions that differ by whole turns, the one
-    nearest to ``search.near`` is given.
+    Of solutions that differ by whole turns, the one nearest to ``search.near`` is given.
+
+    Parameters
+    ----------
+    first, last : int
+        Range of the rows.
+    chain, search : Chain and Search
+        The arm, and what is looked for.
+    positions, directions : ndarray, shape (n_targets, 3) and (n_targets, n_axes, 3)
+        Wanted tool points [m], and directions of the tool's axes.
+    configurations : ndarray, shape (n_targets, most + 1, n_joints)
+        Where solutions go [rad or m].
+    counts : ndarray of int, shape (n_targets,)
+        Where it goes how many there are of each target.
     """
     prismatic, translation, rotation, axis = chain[:4]
     n_joints, (n_seeds, n) = configurations.shape[2], search.seeds.shape

@@ -165,8 +165,20 @@ def place_frame(
 ) -> None:
     """Write where a frame is at some rows of the configurations.
 
-    The frame is fixed to a joint, 0 being the world, at a ``placement`` of shape (4, 4), as are
-    the ``transforms``.
+    Parameters
+    ----------
+    first, last : int
+        Range of the rows.
+    chain : Chain
+        The arm.
+    joint : int
+        The joint that carries the frame; 0 is the world.
+    placement : ndarray, shape (4, 4)
+        Where it is in the joint's frame [m].
+    configurations : ndarray, shape (n, n_joints)
+        Joint positions [rad or m].
+    transforms : ndarray, shape (n, 4, 4)
+        Where its poses in the world go [m].
     """
     poses = np.zeros((configurations.shape[1] + 1, POSE))
     for row in range(first, last):
@@ -191,9 +203,14 @@ def move_frame(
     configurations: Array,
     jacobians: Array,
 ) -> None:
-    """Write how a frame moves at some rows of the configurations, shape (n, 6, n_joints).
+    """Write how a frame moves at some rows of the configurations.
 
-    What the joints beyond the frame do is left as it is.
+    Parameters
+    ----------
+    first, last, chain, joint, placement, configurations
+        As for `place_frame`.
+    jacobians : ndarray, shape (n, 6, n_joints)
+        Where its Jacobians go; columns of the joints beyond the frame are left as they are.
     """
     poses, jacobian = np.zeros((configurations.shape[1] + 1, POSE)), np.empty((6, joint))
     for row in range(first, last):

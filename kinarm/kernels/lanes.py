@@ -42,7 +42,7 @@ class LanesType(types.Type):
         return Conversion.safe if isinstance(other, types.Float | types.Integer) else None
 
     def unify(self, _: Any, other: types.Type) -> types.Type | None:
-        """What is a number on one path and lanes on another is lanes."""
+        """Lanes are the type of a value that is a number on one path and lanes on another."""
         return self if isinstance(other, types.Float | types.Integer) else None
 
 

@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from kinarm.kernels.lanes import LANES, lanes
 
 WORD = ir.IntType(64)
-"""What a table consists of: addresses, lengths, whole numbers and the bits of other numbers."""
+"""An entry of a table: address, length, whole number, or the bits of another number."""
 
 CACHE_LINE = 8 * LANES
 """Bytes of a line of the cache, and of a number in lanes."""

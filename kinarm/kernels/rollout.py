@@ -29,9 +29,21 @@ from kinarm.kernels.touching import first_contact
 
 @lean_kernel
 def begin(first: int, last: int, rows: NDArray[np.int64], session: Session) -> int:
-    """Start episodes ``rows[first]`` to ``rows[last - 1]`` at their ``q`` and ``goal``.
+    """Start episodes at their ``q`` and ``goal``.
 
-    An episode whose start is not proven contact-free is left paused; returns how many are.
+    Parameters
+    ----------
+    first, last : int
+        Range of the rows.
+    rows : ndarray of int
+        Which episodes.
+    session : Session
+        Theirs.
+
+    Returns
+    -------
+    int
+        How many are left paused, since their starts are not proven free of contact.
     """
     block, alone = session.block, session.alone
     chain, shapes, episodes = session.chain, session.shapes, session.episodes
@@ -213,7 +225,15 @@ def allow_one_step(session: Session) -> bool:
 def results_of_step(
     session: Session, numbers: Array, flags: NDArray[np.bool_], contact: NDArray[np.int64]
 ) -> None:
-    """Read off the one step that was allowed; see `kinarm.rollouts.StepResult`."""
+    """Read off the one step that was allowed.
+
+    Parameters
+    ----------
+    session : Session
+        The episodes.
+    numbers, flags, contact
+        Tables to fill in; see `kinarm.rollouts.StepResult`.
+    """
     episodes = session.episodes
     for e in range(contact.shape[0]):
         stepped = episodes.steps[e] == episodes.stop[e]

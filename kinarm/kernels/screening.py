@@ -24,7 +24,16 @@ def propose_starts(
 ) -> Array:
     """Place the first joints of some starts within their range, and return these starts.
 
-    Uniform numbers in [0, 1) have the shape (n_rows, n_actuated).
+    Parameters
+    ----------
+    rows : ndarray of int, shape (n_rows,)
+        Which of the starts.
+    uniforms : ndarray, shape (n_rows, n_actuated)
+        Numbers in [0, 1).
+    lower, extent : ndarray, shape (n_joints,)
+        Lower ends and widths of the ranges [rad or m].
+    starts : ndarray, shape (n, n_joints)
+        All starts; changed [rad or m].
     """
     proposed = np.empty((rows.shape[0], starts.shape[1]))
     for i in range(rows.shape[0]):
@@ -43,7 +52,19 @@ def rejected_rows(
     touching: NDArray[np.bool_],
     tolerance: float,
 ) -> NDArray[np.int64]:
-    """Rows of the starts that touch something or have their tool at the goal already."""
+    """Rows of the starts that touch something or have their tool at the goal already.
+
+    Parameters
+    ----------
+    rows : ndarray of int, shape (n_rows,)
+        Rows of the starts in question.
+    goals : ndarray, shape (n, 3)
+        Goals of all starts [m].
+    tools, touching : ndarray, shape (n_rows, 3) and (n_rows,)
+        Tool points of those in question [m], and whether they touch something.
+    tolerance : float
+        Distance within which the goal is reached [m].
+    """
     rejected, count = np.empty_like(rows), 0
     for i in range(rows.shape[0]):
         e = rows[i]
@@ -67,9 +88,27 @@ def screen(
     free: NDArray[np.bool_],
     touching: NDArray[np.bool_],
 ) -> int:
-    """Find the tool points of configurations, shape (n, 3) [m], and which surely are free or touch.
+    """Find the tool points of configurations, and which surely are free or touch.
 
-    Returns of how many one of both is proven; Coal has to decide about the others.
+    Parameters
+    ----------
+    first, last : int
+        Range of rows to work on.
+    block, alone : Block and Alone
+        Work space.
+    chain, shapes : Chain and ContactShapes
+        The arm, and what may touch.
+    configurations : ndarray, shape (n, n_joints)
+        Joint positions [rad or m].
+    tools : ndarray, shape (n, 3)
+        Where tool points go [m].
+    free, touching : ndarray of bool, shape (n,)
+        Where it goes what is proven.
+
+    Returns
+    -------
+    int
+        Of how many one of both is proven; Coal has to decide about the others.
     """
     n_joints, tool = configurations.shape[1], chain.tool
     q, points, n_proven = as_numbers(block.q), as_numbers(block.goal), 0

@@ -58,8 +58,14 @@ def normal_pairs(numbers: Array) -> None:
 def perturbed_weights(theta: Array, step: Array, scale: Array, mean: Array, weights: Array) -> None:
     """Fill in the networks of the policies (theta +- step) diag(scale) (x - mean).
 
-    Steps have the shape (n, n_actions, n_observations). Weights have the shape (2, n,
-    n_parameters): those with plus, then those with minus, each as `kinarm.Networks` keeps it.
+    Parameters
+    ----------
+    theta, step : ndarray, shape (n_actions, n_observations) and (n, n_actions, n_observations)
+        The policy, and its perturbations.
+    scale, mean : ndarray, shape (n_observations,)
+        Of the observations: what they are multiplied by, and their mean.
+    weights : ndarray, shape (2, n, n_parameters)
+        Where the networks go, those with plus first, each as `kinarm.Networks` keeps it.
     """
     n_actions, n_observations = theta.shape
     for k in range(step.shape[0]):
@@ -90,7 +96,15 @@ def mean_and_deviation(values: Array) -> tuple[float, float]:
 
 @kernel
 def weighted_sum(weights: Array, chosen: NDArray[np.int64], delta: Array, total: Array) -> None:
-    """Add up chosen perturbations, each with its weight, onto a total of the same shape."""
+    """Add up chosen perturbations, each with its weight.
+
+    Parameters
+    ----------
+    weights, chosen : ndarray, shape (n_chosen,)
+        Weights, and rows of the perturbations.
+    delta, total : ndarray, shape (n, n_actions, n_observations) and (n_actions, n_observations)
+        The perturbations, and what they are added to.
+    """
     n_actions, n_observations = total.shape
     for k in range(chosen.shape[0]):
         for i in range(n_actions):

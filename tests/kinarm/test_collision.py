@@ -95,7 +95,7 @@ class TestPairs:
         assert Arm.load("paper").tool_position(q)[2] < 0
         assert model.contact_pair(q)[1] == "ground"
 
-    def test_judge_equals_single_queries(self, any_simulator):
+    def test_verdicts_equal_single_queries(self, any_simulator):
         configurations = random_configurations(any_simulator, 1, 2000)
         verdicts = any_simulator.world.contact_model.in_contact(configurations)
         np.testing.assert_array_equal(verdicts, in_contact(any_simulator, configurations))
@@ -105,15 +105,15 @@ class TestPairs:
         free, hit = contact_boundary(any_simulator, 16, 1000)
         near = jittered(np.concatenate([free, hit]), 17)
         order = np.random.default_rng(18).permutation(len(near))
-        judge = any_simulator.world.contact_model.in_contact
-        verdicts = judge(near)
-        np.testing.assert_array_equal(judge(near[order]), verdicts[order])
+        ask = any_simulator.world.contact_model.in_contact
+        verdicts = ask(near)
+        np.testing.assert_array_equal(ask(near[order]), verdicts[order])
         np.testing.assert_array_equal(in_contact(any_simulator, near), verdicts)
 
     def test_no_configurations(self, simulator):
         assert simulator.world.contact_model.in_contact(np.zeros((0, 6))).shape == (0,)
 
-    def test_contact_pair_agrees_with_the_judge(self, any_simulator):
+    def test_contact_pair_agrees_with_the_verdict(self, any_simulator):
         model = any_simulator.world.contact_model
         configurations = random_configurations(any_simulator, 2, 500)
         verdicts = model.in_contact(configurations)
@@ -349,16 +349,16 @@ class TestStepProof:
         starts, goals = any_simulator.sample(rng, 600)
         actions = np.repeat(rng.uniform(-1, 1, (600, 8, any_simulator.n_actions)), 8, axis=1)
         rollouts = any_simulator.rollout_actions(actions, starts, goals, record=True)
-        judge = any_simulator.world.contact_model.in_contact
+        ask = any_simulator.world.contact_model.in_contact
         substeps = any_simulator.world.substeps
         moves = rollouts.steps - rollouts.collision
         for path, count in zip(rollouts.paths, moves, strict=True):
             if count:
                 tested = substeps(path[:count], path[1 : count + 1])
-                assert not judge(tested.reshape(-1, path.shape[1])).any()
+                assert not ask(tested.reshape(-1, path.shape[1])).any()
         refused = substeps(rollouts.configurations, rollouts.targets)[rollouts.collision]
         assert rollouts.collision.sum() > 20
-        assert all(judge(tested).any() for tested in refused)
+        assert all(ask(tested).any() for tested in refused)
 
 
 def test_box_in_the_way_is_an_obstacle(simulator):

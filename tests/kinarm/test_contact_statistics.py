@@ -15,7 +15,7 @@ def model(simulators):
     return simulators["paper"].world.contact_model
 
 
-def test_free_is_what_the_judge_calls_free(any_simulator):
+def test_free_is_what_coal_calls_free(any_simulator):
     model = any_simulator.world.contact_model
     statistics = ContactStatistics.sample(model, 500)
     touching = model.in_contact(random_configurations(model, 500))

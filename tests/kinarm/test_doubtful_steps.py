@@ -1,36 +1,26 @@
-"""Steps in doubt are judged alike one by one and together."""
+"""Steps in doubt are refused at the first doubtful configuration that Coal finds in contact."""
 
 import numpy as np
 from configurations import contact_boundary, jittered
 
-from kinarm.doubtful_steps import _one_by_one, _together
+from kinarm.doubtful_steps import FEW, first_contacts
 
 
-def ways_in_doubt(simulator):
-    """Ways of steps near contact, and random doubts about their configurations."""
-    free, _ = contact_boundary(simulator, 31, 300)
-    starts = jittered(free, 32)
-    rng = np.random.default_rng(33)
-    targets = starts + rng.normal(size=starts.shape) * 10.0 ** rng.uniform(-3, -1, (len(starts), 1))
-    return simulator.world.substeps(starts, targets), rng.integers(0, 16, len(starts))
-
-
-def test_both_ways_refuse_the_same_steps(any_simulator):
-    ways, doubt = ways_in_doubt(any_simulator)
-    contacts = any_simulator.world.contact_model
-    named, asked = _one_by_one(contacts, ways, doubt)
-    flagged, asked_together = _together(contacts, ways, doubt)
-    np.testing.assert_array_equal(named != 0, flagged != 0)
-    assert asked == asked_together
-    assert 20 < (named != 0).sum() < len(ways) - 20
-
-
-def test_pairs_are_those_of_the_first_configuration_in_doubt_that_touches(simulator):
-    ways, doubt = ways_in_doubt(simulator)
-    contacts = simulator.world.contact_model
-    named, _ = _one_by_one(contacts, ways, doubt)
-    for way, bits, number in zip(ways, doubt, named, strict=True):
+def test_few_and_many_steps_are_refused_alike_and_few_name_the_pair(any_simulator):
+    contacts, rng = any_simulator.world.contact_model, np.random.default_rng(33)
+    starts = jittered(contact_boundary(any_simulator, 31, 300)[0], 32)
+    sizes = 10.0 ** rng.uniform(-3, -1, (len(starts), 1))
+    ways = any_simulator.world.substeps(starts, starts + rng.normal(size=starts.shape) * sizes)
+    doubt = rng.integers(0, 1 << ways.shape[1], len(starts))
+    together, asked = first_contacts(contacts, ways, doubt)
+    lots = [slice(k, k + FEW) for k in range(0, len(ways), FEW)]
+    named, asked_each = zip(
+        *(first_contacts(contacts, ways[k], doubt[k]) for k in lots), strict=True
+    )
+    assert sum(asked_each) == asked
+    for way, bits, flag, number in zip(ways, doubt, together, np.concatenate(named), strict=True):
         pairs = [contacts.contact_pair(q) for k, q in enumerate(way) if bits >> k & 1]
-        touching = [pair for pair in pairs if pair is not None]
-        expected = contacts.pair_names[number - 1] if number else None
-        assert (touching[0] if touching else None) == expected
+        first = next((pair for pair in pairs if pair is not None), None)
+        assert flag == (-1 if first else 0)
+        assert (contacts.pair_names[number - 1] if number else None) == first
+    assert 20 < (together != 0).sum() < len(ways) - 20

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.errors import InvalidInputError
 from kinarm.networks import CompiledPolicy, Mirror, Networks
 from kinarm.observation import observation_signs
 
@@ -32,15 +32,6 @@ def test_collect_gathers_one_many_or_a_batch():
     np.testing.assert_array_equal(Networks.collect(one).weights, [[2, 2, 2, 1]])
     np.testing.assert_array_equal(Networks.collect([one, one]).weights, [[2, 2, 2, 1]] * 2)
     assert isinstance(one, CompiledPolicy)
-
-
-def test_collect_refuses_nothing_and_mixtures():
-    narrow = Offering(Networks.linear(np.ones((1, 1, 3)), np.zeros((1, 1))))
-    wide = Offering(Networks.linear(np.ones((1, 1, 4)), np.zeros((1, 1))))
-    with pytest.raises(InvalidInputError, match="polic"):
-        Networks.collect([])
-    with pytest.raises(InvalidInputError, match="must share layers"):
-        Networks.collect([narrow, wide])
 
 
 def test_compiled_deep_network_equals_numpy(simulator):
@@ -82,14 +73,21 @@ def test_weights_have_to_fit_the_layers(layers, weights, message):
         Networks(np.array(layers), weights)
 
 
-def test_unknown_function_lists_those_that_are():
-    with pytest.raises(UnknownNameError, match="function 'sine'; available: linear, tanh, relu"):
-        Networks(np.array([3, 2]), np.zeros((1, 8)), activations=("sine",))
+@pytest.mark.parametrize(
+    ("activations", "message"),
+    [
+        (("sine",), "function 'sine'; available: linear, tanh, relu"),
+        (("tanh", "linear"), "function for each of 1 layers, got 2"),
+    ],
+)
+def test_every_layer_needs_a_function_that_there_is(activations, message):
+    with pytest.raises(InvalidInputError, match=message):
+        Networks(np.array([3, 2]), np.zeros((1, 8)), activations=activations)
 
 
-def test_every_layer_needs_a_function():
-    with pytest.raises(InvalidInputError, match="function for each of 1 layers, got 2"):
-        Networks(np.array([3, 2]), np.zeros((1, 8)), activations=("tanh", "linear"))
+def test_nothing_is_collected_of_no_policies():
+    with pytest.raises(InvalidInputError, match="polic"):
+        Networks.collect([])
 
 
 def test_usual_functions_are_tanh_between_the_layers():
@@ -104,9 +102,9 @@ class TestForm:
     def settings(self):
         return {"activations": ("tanh",), "mirror": Mirror(-np.ones(3), np.ones(2))}
 
-    def make(self, seed, **settings):
-        weights = np.random.default_rng(seed).normal(size=(1, 8))
-        return Offering(Networks(np.array([3, 2]), weights, **settings))
+    def make(self, seed, n_inputs=3, **settings):
+        weights = np.random.default_rng(seed).normal(size=(1, 2 * n_inputs + 2))
+        return Offering(Networks(np.array([n_inputs, 2]), weights, **settings))
 
     def test_is_kept_by_a_batch(self, settings):
         batch = Networks.collect([self.make(seed, **settings) for seed in range(4)])
@@ -117,6 +115,7 @@ class TestForm:
         "change",
         [
             {"activations": ("linear",)},
+            {"n_inputs": 4},
             {"mirror": None},
             {"mirror": Mirror(-np.ones(3), -np.ones(2))},
         ],

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from kinarm.observation import (
     GOAL_SIDE,
-    OBSERVATION,
     Ranges,
     observation_bounds,
     observation_layout,
@@ -78,16 +77,8 @@ class TestTable:
         assert slices[-1].stop == observation_size(n_joints) == 6 + 7 * n_joints
         assert len(observation_signs(n_joints)) == observation_size(n_joints)
 
-    def test_length_is_that_of_the_kernel(self, any_simulator, situations):
-        n = observation_size(any_simulator.arm.n_joints)
-        assert situations[2].shape == (200, n)
-        assert any_simulator.n_observations == any_simulator.world.n_observations == n
-
     def test_layout_names_version_parts_and_lengths(self):
         assert observation_layout() == ("1: goal 3, goal_minus_tool 3, orientation 4n, position 3n")
-
-    def test_names_are_unique(self):
-        assert len({part.name for part in OBSERVATION}) == len(OBSERVATION)
 
     def test_table_for_people(self):
         rows = observation_table(6)

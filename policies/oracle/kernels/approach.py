@@ -39,7 +39,7 @@ from kinarm.policies.oracle.kernels.overlap import overlaps
 
 
 class ArmInScene(NamedTuple):
-    """What proofs know of an arm in a scene: its kinematics, motion bounds and contact pairs."""
+    """An arm in a scene, for proofs: its kinematics, motion bounds and contact pairs."""
 
     chain: Chain
     bounds: MotionBounds
@@ -66,16 +66,32 @@ def search(
 ) -> tuple[bool, int, float, float]:
     """Search a box for the configuration that reaches a goal in the fewest steps, or is closest.
 
-    The box, from ``lower`` to ``upper``, is of the first n joints. If the ``resolution`` is
-    infinite, the search is for a configuration with the tool within a distance of ``enough`` [m] of
-    the goal that takes the fewest steps from the start: from ``fewest`` to ``most``, which are
-    those that the box takes. Else it is for the one closest to the goal, whose distance may exceed
-    what is proven by the resolution [m]. It ends without a proof after ``budget`` boxes. With
-    ``contact``, what is proven to touch something is ruled out.
+    If the resolution is infinite, the search is for a configuration with the tool close enough to
+    the goal that takes the fewest steps from the start. Else it is for the one closest to the goal,
+    whose distance may exceed what is proven by the resolution.
 
-    ``best``, shape (n_joints,), takes what was found; joints beyond the n-th stay as at the start.
-    The box shrinks with every configuration that takes fewer steps. ``stack``, shape
-    (WAITING, 2 n + 1), and the block are work space.
+    Parameters
+    ----------
+    arm : ArmInScene
+        The arm.
+    start, goal, step_limit
+        Where it starts, shape (n_joints,), the goal [m], and moves in a step, shape (n,)
+        [rad or m].
+    fewest, most : int
+        Range of the steps; those that the box takes are the most.
+    enough, resolution : float
+        Distances from the goal that is close enough, and that makes a difference [m].
+    contact : bool
+        Rule out what is proven to touch something.
+    budget : int
+        Boxes after which the search ends without a proof.
+    lower, upper : ndarray, shape (n,)
+        The box of the first n joints; it shrinks with every configuration found that takes fewer
+        steps [rad or m].
+    best : ndarray, shape (n_joints,)
+        Where the configuration found goes; joints beyond the n-th stay as at the start.
+    stack, block : ndarray, shape (WAITING, 2 n + 1), and Boxes
+        Work space.
 
     Returns
     -------

@@ -128,10 +128,24 @@ def damped_least_squares(
 ) -> None:
     """Move configurations until the tool is within a radius of the goal, by damped Newton steps.
 
-    For rows ``first`` to ``last``, ``configurations`` are changed in place, and ``distances`` from
-    the tool to the goal written [m]. ``owner`` says which row of goals and limits (of the first n
-    joints; the others stay) belongs to each, and ``radius`` at which distance it is left [m]. A row
-    that has ended makes room in its lane for the next one.
+    A row that has ended makes room in its lane for the next one.
+
+    Parameters
+    ----------
+    first, last : int
+        Range of the rows.
+    moving, chain : Moving and Chain
+        Work space, and the arm.
+    owner : ndarray of int, shape (n_rows,)
+        Which row of goals and limits belongs to a configuration.
+    lower, upper, goals : ndarray, shape (n_goals, n) twice and (n_goals, 3)
+        Limits of the first n joints, the others stay [rad or m]; goals [m].
+    radius : ndarray, shape (n_rows,)
+        Distance from the goal at which a configuration is left [m].
+    configurations : ndarray, shape (n_rows, n_joints)
+        Joint positions; changed [rad or m].
+    distances : ndarray, shape (n_rows,)
+        Where the distances from the tool to the goal go [m].
     """
     tool, rows = chain.tool, moving.rows
     n_joints, n = configurations.shape[1], lower.shape[1]

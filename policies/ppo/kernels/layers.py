@@ -18,7 +18,7 @@ BLOCK = 64
 ONE = np.float32(1.0)
 
 N_IN, N_OUT, WEIGHTS, TURNED, INPUTS, OUTPUTS = range(6)
-"""What a row of a table of layers holds: widths, and where its arrays begin."""
+"""Columns of a table of layers: widths, and where arrays begin."""
 
 
 class Network(NamedTuple):

@@ -20,7 +20,7 @@ LOSSES = 4
 
 
 class Experience(NamedTuple):
-    """What a rollout brought, one row a step.
+    """Experience of a rollout, one row a step.
 
     Attributes
     ----------

@@ -57,7 +57,17 @@ class Descent(NamedTuple):
 def evaluate(
     first: int, last: int, network: Network, observations: Numbers, outputs: Numbers
 ) -> None:
-    """Fill rows of ``outputs``, shape (n, n_out), with what a network makes of observations."""
+    """Evaluate a network.
+
+    Parameters
+    ----------
+    first, last : int
+        Range of the rows.
+    network : Network
+        The network.
+    observations, outputs : ndarray of float32, shape (n, n_observations) and (n, n_out)
+        What it is given, and where its values go.
+    """
     layers = network.layers
     work = np.zeros(work_length(layers), dtype=np.float32)
     end = layers.shape[0] - 1

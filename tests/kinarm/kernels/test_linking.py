@@ -46,16 +46,6 @@ def test_literals_and_numbers_share_a_helper(both):
     assert len(doubled_sum.signatures) == 1
 
 
-def test_helper_has_no_machine_code_of_its_own(both):
-    both(1.5, 4)
-    (compiled,) = doubled_sum.overloads.values()
-    name = compiled.fndesc.mangled_name
-    engine = compiled.library._codegen._engine
-    assert not engine.is_symbol_defined(name)
-    assert compiled.library.get_pointer_to_function(name) == 0
-    assert engine.is_symbol_defined(both.overloads[both.signatures[0]].fndesc.mangled_name)
-
-
 @pytest.mark.parametrize("collects", [True, False])
 def test_garbage_is_collected_as_before(collects):
     before = gc.isenabled()
