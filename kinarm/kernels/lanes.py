@@ -70,7 +70,7 @@ class _MaskModel(models.PrimitiveModel):
 
 @lower_cast(types.Float, lanes)
 @lower_cast(types.Integer, lanes)
-def _spread(_: Any, builder: Any, given: types.Type, __: types.Type, value: Any) -> Any:
+def _broadcast(_: Any, builder: Any, given: types.Type, __: types.Type, value: Any) -> Any:
     """Repeat a number for each episode."""
     if isinstance(given, types.Integer):
         value = builder.sitofp(value, ir.DoubleType())

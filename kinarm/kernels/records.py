@@ -256,7 +256,7 @@ infer_getattr(
 
 
 @lower_getattr_generic(RecordType)
-def _held(context: Any, builder: Any, record: RecordType, table: Any, name: str) -> Any:
+def _read_field(context: Any, builder: Any, record: RecordType, table: Any, name: str) -> Any:
     """Read from the table. Nothing counts references: the record keeps alive what is in it."""
     kind, place = record.fields[name], record.places[name]
 
