@@ -35,22 +35,22 @@ class Area(NamedTuple):
 
 
 ROLLOUTS = ("kinarm/test_reference.py", "kinarm/test_simulator.py", "kinarm/test_world.py")
-MACHINERY = {"caching", "compiling", "linking", "records", "lanes", "sharing"}
+MACHINERY = {"caching", "compiling", "records", "lanes"}
 """Modules of kernels that compile and lay out, and compute nothing."""
 AREAS = {
     "simulator": Area(("kinarm/simulator.py",), ROLLOUTS, 10),
     "kernels": Area(
         ("kinarm/kernels/*.py",),
         (
-            *("kinarm/kernels/test_*.py", *ROLLOUTS, "kinarm/test_co*.py", "kinarm/test_inv*.py"),
+            *("kinarm/kernels/test_*.py", *ROLLOUTS, "kinarm/test_col*.py", "kinarm/test_inv*.py"),
             *("kinarm/test_clear*.py", "kinarm/test_motion*.py", "kinarm/test_encl*.py"),
             *("kinarm/test_frames.py", "kinarm/test_obs*.py", "kinarm/test_scenarios.py"),
         ),
         20,
     ),
     "statistics": Area(
-        ("evaluation/statistics.py", "evaluation/intervals.py"),
-        ("evaluation/test_statistics.py", "evaluation/test_intervals.py"),
+        ("evaluation/statistics.py",),
+        ("evaluation/test_statistics*.py",),
         10,
     ),
     "ars": Area(("policies/ars/algorithm.py",), ("policies/test_ars*.py",), 8),
