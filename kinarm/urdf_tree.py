@@ -66,6 +66,7 @@ RULES: dict[str, dict[str, Rule]] = {
     "cylinder": {"radius": SIZE, "length": SIZE},
     "capsule": {"radius": SIZE, "length": SIZE},
     "mesh": {"scale": Rule(3, "1 1 1")},
+    "color": {"rgba": Rule(4, "0 0 0 1")},
 }
 """Attributes of elements that hold numbers."""
 

@@ -15,7 +15,7 @@ import pinocchio as pin
 from kinarm.arm import Arm
 from kinarm.collision import body_names
 from kinarm.errors import ArmError, KinarmError
-from kinarm.urdf_tree import FARTHEST, check_numbers
+from kinarm.urdf_tree import check_numbers
 from kinarm.viewer import industrial_arm
 from kinarm.viewer.mesh_files import PaintedMesh, read_mesh_file
 from kinarm.viewer.meshes import Mesh, box, capsule, cylinder, from_coal
@@ -93,33 +93,30 @@ def visual_parts(arm: Arm) -> Iterator[ArmPart]:
             stated = None if material is None else _stated_colour(material)
             if material is not None and stated is None:
                 stated = named[str(material.get("name"))]
-            pieces = _shapes(visual, arm)
+            pieces = _shapes(visual, arm.description.path.name)
             alike = len({piece.colour for piece in pieces}) == 1
             for mesh, colour in pieces:
                 chosen = stated if stated is not None and alike else colour
                 yield _placed_part(frame.parentJoint, chosen, mesh, placement)
 
 
-def _shapes(visual: Element, arm: Arm) -> tuple[PaintedMesh, ...]:
-    """Shapes of a visual element, in its frame."""
-    geometry = visual.find("geometry")
+def _shapes(visual: Element, file: str) -> tuple[PaintedMesh, ...]:
+    """Shapes of a visual element of a file, in the element's frame."""
+    geometry, where = visual.find("geometry"), f"a visual shape of {file}"
     shape = None if geometry is None else next(iter(geometry), None)
     if shape is None:
-        raise ArmError(f"{arm.description.path.name} has a visual shape without geometry")
-    check_numbers(shape, f"a visual shape of {arm.description.path.name}")
+        raise ArmError(f"{file} has a visual shape without geometry")
     if shape.tag == "mesh":
-        return read_mesh_file(Path(shape.get("filename", "")), _numbers(shape, "scale", (1, 1, 1)))
+        return read_mesh_file(Path(shape.get("filename", "")), _numbers(shape, "scale", where))
     if shape.tag == "box":
-        mesh = box(_numbers(shape, "size", (0, 0, 0)))
+        mesh = box(_numbers(shape, "size", where))
     elif shape.tag == "sphere":
-        mesh = capsule(0.0, *_numbers(shape, "radius", (0,)))
+        mesh = capsule(0.0, *_numbers(shape, "radius", where))
     elif shape.tag in ("cylinder", "capsule"):
-        (length,), (radius,) = (_numbers(shape, name, (0,)) for name in ("length", "radius"))
+        (length,), (radius,) = (_numbers(shape, name, where) for name in ("length", "radius"))
         mesh = capsule(length, radius) if shape.tag == "capsule" else cylinder(length, radius, 0.0)
     else:
-        raise ArmError(
-            f"{arm.description.path.name} has a visual shape <{shape.tag}>: not supported"
-        )
+        raise ArmError(f"{file} has a visual shape <{shape.tag}>: not supported")
     return (PaintedMesh(mesh, None),)
 
 
@@ -128,26 +125,17 @@ def _origin(visual: Element) -> pin.SE3:
     origin = visual.find("origin")
     if origin is None:
         return pin.SE3.Identity()
-    check_numbers(origin, "a visual shape")
-    turn = pin.rpy.rpyToMatrix(np.array(_numbers(origin, "rpy", (0, 0, 0))))
-    return pin.SE3(turn, np.array(_numbers(origin, "xyz", (0, 0, 0))))
+    turn = pin.rpy.rpyToMatrix(np.array(_numbers(origin, "rpy")))
+    return pin.SE3(turn, np.array(_numbers(origin, "xyz")))
 
 
 def _stated_colour(material: Element) -> int | None:
     """Colour of a material as 0xRRGGBB, if it is defined here."""
     colour = material.find("color")
-    return None if colour is None else packed_colour(_numbers(colour, "rgba", (0, 0, 0, 1))[:3])
+    return None if colour is None else packed_colour(_numbers(colour, "rgba")[:3])
 
 
-def _numbers(element: Element, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
-    """Numbers of an attribute."""
-    text = element.get(name)
-    if text is None:
-        return default
-    try:
-        numbers = tuple(float(word) for word in text.split())
-    except ValueError:
-        numbers = ()
-    if len(numbers) != len(default) or not all(abs(number) <= FARTHEST for number in numbers):
-        raise ArmError(f"<{element.tag}> has {name}={text!r}; expected {len(default)} numbers")
-    return numbers
+def _numbers(element: Element, name: str, where: str = "a visual shape") -> tuple[float, ...]:
+    """Numbers of an attribute, checked like those that decide about contact."""
+    check_numbers(element, where)
+    return tuple(float(word) for word in element.get(name, "").split())

@@ -41,7 +41,7 @@ def test_shapes_have_their_sizes_and_places(write_robot, make_joint, shape, exte
         (
             '<geometry><sphere radius="1"/></geometry>'
             '<material name="m"><color rgba="x"/></material>',
-            "<color> has rgba='x'; expected 4 numbers",
+            "numbers of rgba of <color> must be 4 from .*, got 'x'",
         ),
     ],
 )

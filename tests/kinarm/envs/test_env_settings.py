@@ -78,14 +78,6 @@ class TestSettings:
         env = ReachEnv(problem, reward=RewardWeights(progress=3))
         assert env.simulator.problem == problem.replace(reward={"progress": 3})
 
-    def test_problem_file(self, tmp_path):
-        problem = ReachProblem.load("both").replace(name="file", time_step=0.01)
-        problem.save(tmp_path / "file.toml")
-        for given in (tmp_path / "file.toml", str(tmp_path / "file.toml")):
-            assert ReachEnv(given).simulator.problem == problem
-            made = gymnasium.make("kinarm/ReachLeft-v0", problem=given)
-            assert made.unwrapped.simulator.problem == problem
-
     @pytest.mark.parametrize(
         "settings",
         [
