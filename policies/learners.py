@@ -19,10 +19,33 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 from kinarm._files import first_line
 from kinarm.errors import InvalidInputError, MissingExtraError, UnknownNameError
 from kinarm.policies.config import TrainingConfig
-from kinarm.policies.curve import CurvePoint
 
 if TYPE_CHECKING:
     from kinarm.policies.policy import Policy
+
+
+class CurvePoint(NamedTuple):
+    """A point of a learning curve: one iteration of the training.
+
+    Attributes
+    ----------
+    mean_return, std_return : float
+        Mean and standard deviation of the returns of the iteration's episodes; for PPO, of those
+        that ended in it, and for algorithms of Stable-Baselines3, of the last hundred that ended.
+        Episodes that replayed a failed scenario do not count; NaN if none does.
+    success : float
+        Share of these episodes that reached the goal.
+    environment_steps : int
+        Steps taken since the training began.
+    wall_time : float
+        Time that iterations took since the training began [s].
+    """
+
+    mean_return: float
+    std_return: float
+    success: float
+    environment_steps: int
+    wall_time: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

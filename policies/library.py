@@ -9,7 +9,7 @@ from pathlib import Path
 from kinarm._files import absolute, is_file, is_folder
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.policies.policy import Policy
-from kinarm.policies.training_files import CHECKPOINT
+from kinarm.policies.training import CHECKPOINT
 from kinarm.problem import ProblemLike, ReachProblem
 
 BEST = "best"

@@ -8,7 +8,7 @@ actions are reflected in turn. It does on one bench exactly what it does on the 
 """
 
 import math
-from contextlib import suppress
+from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
@@ -113,15 +113,34 @@ def _axis_signs(world: World) -> NDArray[np.float64]:
     return signs
 
 
-def task_mirror(symmetric: bool, world: World) -> Mirror | None:
-    """Reflection that a policy has to commute with, if it is to and arm and obstacles have one.
+@lru_cache(maxsize=8)
+def _mirror_or_reason(problem: ReachProblem) -> Mirror | str:
+    """Reflection of arm and obstacles, or why there is none.
+
+    A training asks for it with its recipe, before it, and for its policy, and each time a world
+    would be built, which takes longer than an iteration. The arm of the problem is pinned.
+    """
+    if not obstacles_are_symmetric(problem):
+        return "obstacles are not their own mirror image"
+    try:
+        return find_mirror(World(problem, threads=1))
+    except InvalidInputError as error:
+        return str(error)
+
+
+def problem_mirror(problem: ReachProblem) -> Mirror | None:
+    """Reflection that a policy can commute with, if arm and obstacles have one.
 
     Where the goals lie does not matter: those on the left are seen in the mirror.
     """
-    if symmetric and obstacles_are_symmetric(world.problem):
-        with suppress(InvalidInputError):
-            return find_mirror(world)
-    return None
+    found = _mirror_or_reason(problem.pinned)
+    return None if isinstance(found, str) else found
+
+
+def missing_mirror(problem: ReachProblem) -> str:
+    """Why arm and obstacles are not their own mirror image; an empty text if they are."""
+    found = _mirror_or_reason(problem.pinned)
+    return found if isinstance(found, str) else ""
 
 
 def sample_seen(
@@ -137,17 +156,6 @@ def sample_seen(
     return drawn if mirror is None else mirror.scenarios_from_the_right(*drawn)
 
 
-def missing_mirror(problem: ReachProblem) -> str:
-    """Why arm and obstacles are not their own mirror image; an empty text if they are."""
-    if not obstacles_are_symmetric(problem):
-        return "obstacles are not their own mirror image"
-    try:
-        find_mirror(World(problem, threads=1))
-    except InvalidInputError as error:
-        return str(error)
-    return ""
-
-
 def different_regions(problem: ReachProblem, symmetric: bool) -> int:
     """How many goal regions a policy meets, which sees those on the left in the mirror or not."""
     regions = [problem.scene.goal_region(name) for name in problem.task.goal_regions]
@@ -155,11 +163,6 @@ def different_regions(problem: ReachProblem, symmetric: bool) -> int:
     if symmetric:
         boxes = [_reflected(*box) if box[0][1] >= 0 else box for box in boxes]
     return len(set(boxes))
-
-
-def has_mirror(problem: ReachProblem) -> bool:
-    """Whether arm, obstacles and goals are their own mirror image."""
-    return is_symmetric(problem) and not missing_mirror(problem)
 
 
 def obstacles_are_symmetric(problem: ReachProblem) -> bool:

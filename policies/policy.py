@@ -273,7 +273,7 @@ class Policy:
         MissingExtraError
             If PyTorch is not installed.
         """
-        from kinarm.policies.conversion.torch_modules import policy_from_torch
+        from kinarm.policies.conversion.layers import policy_from_torch
 
         origin = {"algorithm": name, "environment_steps": environment_steps, "seed": seed}
         return policy_from_torch(module, ReachProblem.load(problem), (mean, std), **origin)

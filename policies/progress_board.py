@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from kinarm.policies.learners import TrainingState
-from kinarm.policies.training_progress import STARTING
+from kinarm.policies.training import STARTING
 
 WAITING, PREPARING, TRAINING = range(3)
 """Phases of a training."""

@@ -16,18 +16,19 @@ from kinarm._parallel import available_threads
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError, PolicyFileError, WorkerError
 from kinarm.policies.learners import learner_of
-from kinarm.policies.training_files import (
+from kinarm.policies.training import (
     TrainingStopped,
+    TrainRequest,
     checkpoint_path,
     curve_path,
     refuse_unfinished,
+    say_findings,
     train_to_file,
 )
-from kinarm.policies.training_request import TrainRequest, say_reach, say_symmetry
 
 if TYPE_CHECKING:
     from kinarm.policies.config import TrainingConfig
-    from kinarm.policies.curve import CurvePoint
+    from kinarm.policies.learners import CurvePoint
     from kinarm.policies.progress_board import ProgressBoard
     from kinarm.problem import ReachProblem
 
@@ -159,8 +160,7 @@ class SeedsRequest:
         with only_writer(self.folder):
             waiting = self._waiting(tasks)
             if waiting:
-                say_reach(waiting[0].config)
-                say_symmetry(waiting[0].config)
+                say_findings(waiting[0].config)
             with telling(partial(_what_is_left, tasks, "interrupted")):
                 try:
                     last = self._carry_out(waiting)

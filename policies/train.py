@@ -13,8 +13,7 @@ from kinarm._parser import CommandParser, Parser
 from kinarm.errors import InvalidInputError
 from kinarm.policies.learners import Learner, find_learner, learner_names
 from kinarm.policies.seeds import SeedsRequest
-from kinarm.policies.training_files import curve_path
-from kinarm.policies.training_request import TrainRequest
+from kinarm.policies.training import TrainRequest, curve_path
 
 PROG = "kinarm-train"
 

@@ -18,20 +18,19 @@ from kinarm.policies.ars.networks import (
     initial_network,
     network_layers,
     parameters_of,
+    perturbations,
     perturbed_networks,
 )
-from kinarm.policies.ars.perturbations import perturbations
 from kinarm.policies.ars.scenarios import draw_shared, failed_after
 from kinarm.policies.ars.state import ARSState
-from kinarm.policies.curve import CurvePoint
-from kinarm.policies.mirror import task_mirror
+from kinarm.policies.learners import CurvePoint
+from kinarm.policies.mirror import problem_mirror
 from kinarm.policies.normalizer import Normalizer, input_scale
 from kinarm.policies.policy import Layer, Policy
 from kinarm.policies.provenance import Provenance
 from kinarm.policies.warm_start import starting_policy, statistics
 from kinarm.randomness import Stream, stream_generator
 from kinarm.simulator import Simulator
-from kinarm.world import World
 
 
 class ARSTraining:
@@ -42,7 +41,7 @@ class ARSTraining:
 
     def __init__(self, config: ARSConfig, threads: int | None = None) -> None:
         self.config, self.simulator = config, config.simulator(threads)
-        self.mirror = task_mirror(config.symmetric, self.simulator.world)
+        self.mirror = problem_mirror(config.problem) if config.symmetric else None
         self._rng = stream_generator(Stream.ARS, config.seed)
 
     def initial_state(self) -> ARSState:
@@ -175,8 +174,6 @@ def ars_step(
 
 def trained_policy(config: ARSConfig, state: ARSState) -> Policy:
     """Freeze a state of the training into a policy."""
-    # A world takes longer to build than an iteration: only where there may be a mirror.
-    mirror = task_mirror(True, World(config.problem, threads=1)) if config.symmetric else None
     normalizer = policy_normalizer(config, state.normalizer)
     layers: tuple[Layer, ...] = (Layer(state.theta, np.zeros(len(state.theta))),)
     if config.net_arch:
@@ -186,5 +183,5 @@ def trained_policy(config: ARSConfig, state: ARSState) -> Policy:
         std=normalizer.std,
         layers=layers,
         provenance=Provenance.of("ars", config, state.environment_steps),
-        mirror=mirror,
+        mirror=problem_mirror(config.problem) if config.symmetric else None,
     )

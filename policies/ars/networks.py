@@ -4,6 +4,7 @@ Their order is that of `kinarm.Networks`: layer after layer, weights (inputs x o
 then biases. tanh is between the layers.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
@@ -11,17 +12,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.errors import InvalidInputError
+from kinarm.kernels.lanes import LANES
 from kinarm.networks import Networks
 from kinarm.observation import part_slices
-from kinarm.policies.ars.perturbations import perturbations
+from kinarm.policies.ars.kernels import normal_pairs
 from kinarm.policies.normalizer import Normalizer, fold_normalizer
 from kinarm.policies.policy import Layer, Policy
 
 Numbers = NDArray[np.float64]
 
 
-SPREAD = 1.5
+DEVIATION = 1.5
 """Standard deviation of what a unit of the first layer adds up to, for normalised observations."""
+
+
+def perturbations(rng: np.random.Generator, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Draw independent standard normal numbers, the same bits on every machine.
+
+    Those of NumPy's generator depend on the C library's logarithm.
+    """
+    count = math.prod(shape)
+    half = -(-count // 2)
+    numbers = np.zeros((2, -(-half // LANES) * LANES))
+    numbers[:, :half] = rng.random((2, half))
+    normal_pairs(numbers.reshape(2, -1, LANES))
+    return numbers[:, :half].reshape(-1)[:count].reshape(shape)
 
 
 def first_deviations(n_joints: int) -> Numbers:
@@ -32,7 +47,7 @@ def first_deviations(n_joints: int) -> Numbers:
     """
     parts = list(part_slices(n_joints).values())
     sizes = np.array([part.stop - part.start for part in parts])
-    deviations: Numbers = np.repeat(SPREAD / np.sqrt(len(parts) * sizes), sizes)
+    deviations: Numbers = np.repeat(DEVIATION / np.sqrt(len(parts) * sizes), sizes)
     return deviations
 
 

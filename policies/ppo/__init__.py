@@ -20,7 +20,7 @@ LEARNER = Learner(
     },
     adapt=adapted,
     begin=imported("kinarm.policies.ppo.learner", "PPOTraining"),
-    policy=imported("kinarm.policies.ppo.actor", "actor_policy"),
+    policy=imported("kinarm.policies.ppo.networks", "actor_policy"),
     options=("tensorboard", "threads"),
     packages=("torch", "stable_baselines3"),
     extra="ppo",

@@ -17,8 +17,7 @@ from kinarm.policies.normalizer import Normalizer, input_scale
 from kinarm.policies.ppo.kernels.imitation import add_imitation_gradients
 from kinarm.policies.ppo.kernels.update import Descent, descend
 from kinarm.policies.ppo.networks import ActorCritic
-from kinarm.policies.ppo.sharing import share
-from kinarm.policies.ppo.update import PARTS
+from kinarm.policies.ppo.update import PARTS, run_parts
 from kinarm.simulator import Simulator
 
 EPOCHS = 30
@@ -104,7 +103,7 @@ def imitate(
     for epoch in range(EPOCHS):
         total = 0.0
         for number, chosen in enumerate(_minibatches(rng, len(seen), batches)):
-            share(
+            run_parts(
                 *(add_imitation_gradients, PARTS, threads, networks.actor, *arrays),
                 *(chosen, gradients, losses),
             )

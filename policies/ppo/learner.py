@@ -9,15 +9,13 @@ from stable_baselines3.common.logger import KVWriter, Logger, TensorBoardOutputF
 
 from kinarm._console import doing
 from kinarm.errors import InvalidInputError
-from kinarm.policies.curve import CurvePoint
-from kinarm.policies.learners import learner_of
-from kinarm.policies.mirror import sample_seen, task_mirror
+from kinarm.policies.learners import CurvePoint, learner_of
+from kinarm.policies.mirror import problem_mirror, sample_seen
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.ppo.config import PPOConfig
 from kinarm.policies.ppo.imitation import demonstrate, imitate
 from kinarm.policies.ppo.model import CompiledPPO
-from kinarm.policies.ppo.networks import ActorCritic
-from kinarm.policies.ppo.parameters import initial_parameters, split_parameters
+from kinarm.policies.ppo.networks import ActorCritic, initial_parameters, split_parameters
 from kinarm.policies.ppo.state import PPOState
 from kinarm.policies.ppo.training_env import TrainingVecEnv
 from kinarm.policies.sb3.training import alone_in_torch
@@ -60,14 +58,13 @@ class PPOTraining:
             learner_of(config).check_installed("tensorboard")
             outputs.append(TensorBoardOutputFormat(str(tensorboard)))
         simulator = config.simulator(threads=1)
-        mirror = task_mirror(config.symmetric, simulator.world)
         self.config = config
         _, scenarios = seed_iteration(config.seed, 0)
         self.env = TrainingVecEnv(
             simulator,
             config.n_envs,
             rng=scenarios,
-            mirror=mirror,
+            mirror=problem_mirror(config.problem) if config.symmetric else None,
             replay=config.replay,
             stop_at_goal=config.stop_at_goal,
         )

@@ -215,7 +215,7 @@ class CompiledPPO(PPO):
         networks, experience = self._networks, self._experience()
         networks.load(self.parameters())
         first, second = self.moments()
-        moments = networks.spread(first), networks.spread(second)
+        moments = networks.scattered(first), networks.scattered(second)
         adam = self.policy.optimizer.param_groups[0]
         first_decay, second_decay = adam["betas"]
         records = update(

@@ -1,7 +1,10 @@
 """An update of actor and critic: some epochs of steps of Adam, each by a minibatch."""
 
-from collections.abc import Iterable
-from typing import NamedTuple
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +13,6 @@ from kinarm.policies.ppo.kernels.loss import LOSSES, Experience, Objective
 from kinarm.policies.ppo.kernels.tiles import Numbers
 from kinarm.policies.ppo.kernels.update import Descent, add_gradients, descend, standardisation
 from kinarm.policies.ppo.networks import ActorCritic
-from kinarm.policies.ppo.sharing import share
 
 PARTS = 8
 """Parts of a minibatch whose gradients are found independently of each other."""
@@ -78,7 +80,38 @@ def update(
             standard = standardisation(chosen, experience.advantages)
             arrays = (experience, chosen, objective, standard, gradients, losses)
             nets = (networks.actor, networks.critic)
-            share(add_gradients, PARTS, threads, *nets, *arrays)
+            run_parts(add_gradients, PARTS, threads, *nets, *arrays)
             records.append((*losses.sum(axis=0) * objective.share, networks.log_std.mean()))
             descend(*nets, *moments, gradients, descent, steps_before + len(records))
     return UpdateRecords(*np.array(records).T)
+
+
+def run_parts(kernel: Callable[..., None], n_parts: int, threads: int, *arrays: Any) -> None:
+    """Call ``kernel(part, part + 1, *arrays)`` for every part, on several threads.
+
+    The calling thread works, too, and never waits for one that has not begun: where processors
+    are busy with something else, it does all by itself. Kernels release the GIL and treat parts
+    independently, so the result does not depend on who did what.
+    """
+    parts = iter(range(n_parts))  # whose next number only one thread gets: it holds the GIL
+
+    def work() -> None:
+        for part in parts:
+            kernel(part, part + 1, *arrays)
+
+    helpers = min(threads, n_parts) - 1
+    if helpers == 0:
+        kernel(0, n_parts, *arrays)
+        return
+    pool = _helpers(os.getpid(), helpers)
+    helping = [pool.submit(work) for _ in range(helpers)]
+    work()
+    for helper in helping:
+        if not helper.cancel():
+            helper.result()
+
+
+@cache
+def _helpers(process: int, count: int) -> ThreadPoolExecutor:
+    """A pool per process, since threads do not survive a fork."""
+    return ThreadPoolExecutor(count, thread_name_prefix=f"kinarm-ppo-{process}")

@@ -21,7 +21,7 @@ import torch
 from kinarm._console import doing
 from kinarm._files import first_line
 from kinarm.errors import InvalidInputError
-from kinarm.policies.curve import CurvePoint
+from kinarm.policies.learners import CurvePoint
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import Provenance
 from kinarm.policies.sb3.environment import sb3_vec_env

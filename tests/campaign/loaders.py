@@ -25,8 +25,8 @@ from kinarm.evaluation import EvaluationDocument, Study, oracle_bounds
 from kinarm.evaluation.contestants import imported_policy
 from kinarm.meshes import hull_of_mesh
 from kinarm.policies import Policy, load_checkpoint, recipe
-from kinarm.policies.conversion.sb3_models import sb3_model
-from kinarm.policies.conversion.vec_normalize import load_vec_normalize
+from kinarm.policies.conversion.sb3 import sb3_model
+from kinarm.policies.conversion.sb3_inputs import load_vec_normalize
 from kinarm.policies.learners import state_policy
 from kinarm.problem import ReachProblem
 from kinarm.problem_files import find_scene, find_task

@@ -14,8 +14,7 @@ from kinarm.policies import Policy, policy_names, recipe, seeds, train_policy
 from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
 from kinarm.policies.progress_board import ProgressBoard
 from kinarm.policies.seeds import SeedsRequest, SeedTask, seeds_of
-from kinarm.policies.training_files import CheckpointKeeper, checkpoint_path
-from kinarm.policies.training_request import TrainRequest
+from kinarm.policies.training import CheckpointKeeper, TrainRequest, checkpoint_path
 
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = ("--directions", 2, "--top-directions", 2)

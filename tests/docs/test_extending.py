@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from kinarm.evaluation.commands import evaluate, replay
-from kinarm.policies import learners, load_policy, train, training_files
+from kinarm.policies import learners, load_policy, train, training
 from kinarm.problem import ReachProblem
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -82,18 +82,18 @@ def test_a_registered_learner_resumes_exactly(
 ) -> None:
     command = "kinarm-train toy --iterations 12 --out {}.npz"
     run(command.format("whole"))
-    keep = training_files.CheckpointKeeper.update
+    keep = training.CheckpointKeeper.update
 
-    def interrupted(keeper: training_files.CheckpointKeeper, state: learners.TrainingState) -> None:
+    def interrupted(keeper: training.CheckpointKeeper, state: learners.TrainingState) -> None:
         keep(keeper, state)
         if state.iteration == 5:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(training_files.CheckpointKeeper, "update", interrupted)
+    monkeypatch.setattr(training.CheckpointKeeper, "update", interrupted)
     with pytest.raises(SystemExit) as end:
         train.main(shlex.split(command.format("halves"))[1:])
     assert end.value.code == 130
-    monkeypatch.setattr(training_files.CheckpointKeeper, "update", keep)
+    monkeypatch.setattr(training.CheckpointKeeper, "update", keep)
     run(f"{command.format('halves')} --resume")
     whole, halves = (load_policy(folder / f"{name}.npz") for name in ("whole", "halves"))
     np.testing.assert_array_equal(whole.layers[0].weights, halves.layers[0].weights)

@@ -12,7 +12,7 @@ from kinarm.errors import InvalidInputError, PolicyFileError, UnknownNameError
 from kinarm.evaluation import evaluate, find_contestants
 from kinarm.evaluation.contestants import policy_function
 from kinarm.policies import Policy
-from kinarm.policies.conversion.vec_normalize import find_vec_normalize
+from kinarm.policies.conversion.sb3_inputs import find_vec_normalize
 from kinarm.problem import PROBLEMS
 
 MODULE = """

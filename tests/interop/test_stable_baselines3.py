@@ -12,8 +12,6 @@ from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import (
     SubprocVecEnv,
-    VecCheckNan,
-    VecExtractDictObs,
     VecFrameStack,
     VecMonitor,
     VecNormalize,
@@ -170,17 +168,6 @@ class TestWrappers:
         assert infos[0]["terminal_observation"].shape == (96,)
         np.testing.assert_array_equal(observations[:, :48], 0)
 
-    def test_numbers_are_checked(self):
-        env = VecCheckNan(sb3_vec_env(FLAT, 2), raise_exception=True)
-        env.reset()
-        env.step(np.zeros((2, 5)))
-        with pytest.raises(ValueError, match="nan"):
-            env.step(np.full((2, 5), np.nan))
-
-    def test_part_of_a_dictionary(self):
-        env = VecExtractDictObs(sb3_vec_env(GOALS, 2), "achieved_goal")
-        assert env.reset().shape == (2, 3)
-
     def test_a_film_is_recorded(self, tmp_path):
         pytest.importorskip("moviepy")
         size = {"width": 64, "height": 48, "render_mode": "rgb_array"}
@@ -234,12 +221,6 @@ class TestEvaluation:
         assert log["successes"].shape == (1, 10)
         assert log["successes"].any()
         assert (tmp_path / "best_model.zip").exists()
-
-    def test_successes_are_logged(self):
-        env = sb3_vec_env("right", 4, seed=0, tolerance=0.6, horizon=8)
-        model = PPO("MlpPolicy", env, **rollouts()).learn(128)
-        assert 0 < np.mean(model.ep_success_buffer) < 1
-        assert 0 < np.mean([episode["l"] for episode in model.ep_info_buffer]) <= 8
 
 
 def test_saved_model_acts_on_both_kinds_of_environments(tmp_path):

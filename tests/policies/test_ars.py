@@ -9,10 +9,10 @@ import pytest
 from numba import njit
 from scipy import stats
 
-from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.errors import InvalidInputError
 from kinarm.failed_scenarios import FailedScenarios
 from kinarm.kernels.lanes import LANES
-from kinarm.policies import ARSConfig, Policy, state_policy, train_policy
+from kinarm.policies import ARSConfig, state_policy, train_policy
 from kinarm.policies.ars.algorithm import (
     ARSTraining,
     ars_iteration,
@@ -21,15 +21,14 @@ from kinarm.policies.ars.algorithm import (
     top_directions,
 )
 from kinarm.policies.ars.kernels import logarithm, normal_pairs
-from kinarm.policies.ars.perturbations import perturbations
+from kinarm.policies.ars.networks import perturbations
 from kinarm.policies.ars.scenarios import Scenarios, draw_shared, failed_after
 from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
-from kinarm.policies.mirror import task_mirror
+from kinarm.policies.mirror import problem_mirror
 from kinarm.policies.normalizer import Normalizer
 from kinarm.problem import PROBLEMS
 from kinarm.reference import ReferenceSimulator
 from kinarm.task import RewardWeights
-from kinarm.world import World
 
 SHORT = PROBLEMS["right"].replace(horizon=8)
 TINY = ARSConfig(problem=SHORT, directions=4, top_directions=2, iterations=6, seed=5)
@@ -101,12 +100,6 @@ class TestStep:
         step = ars_step(config, delta, np.full((2, 6), value), 0.02)
         np.testing.assert_array_equal(step, np.zeros((5, 48)))
 
-    def test_step_does_not_depend_on_offset_or_scale_of_the_returns(self):
-        config = ARSConfig(directions=6, top_directions=3)
-        delta, returns = random_round(9)
-        expected = ars_step(config, delta, returns, 0.02)
-        np.testing.assert_allclose(ars_step(config, delta, 7 * returns + 3, 0.02), expected)
-
 
 class TestTopDirections:
     def test_by_hand(self):
@@ -123,10 +116,6 @@ class TestTopDirections:
         expected = sorted(range(500), key=lambda k: -returns[:, k].max())
         for b in (1, 77, 500):
             np.testing.assert_array_equal(top_directions(returns, b), expected[:b])
-
-    def test_all_tied(self):
-        for b in range(1, 31):
-            np.testing.assert_array_equal(top_directions(np.ones((2, 30)), b), np.arange(b))
 
 
 class TestPerturbations:
@@ -263,13 +252,6 @@ class TestIteration:
         expected = perturbed_policies(state.theta, 0.03 * delta, state.normalizer)
         np.testing.assert_array_equal(networks.weights, expected.weights)
 
-    def test_does_not_change_the_old_state(self, tiny_simulator):
-        state = run(TINY, tiny_simulator, 2)[-1]
-        theta, generator = state.theta.copy(), dict(state.generator)
-        ars_iteration(TINY, tiny_simulator, state)
-        np.testing.assert_array_equal(state.theta, theta)
-        assert state.generator == generator
-
     def test_curve(self, tiny_simulator):
         states = run(TINY, tiny_simulator, 4)
         curve = states[-1].curve
@@ -302,12 +284,6 @@ class TestScenarios:
         assert (table == table[:1, :1]).all()
         assert len(np.unique(table.reshape(-1, 9), axis=0)) == 3
 
-    def test_iterations_draw_anew(self, tiny_simulator):
-        config = replace(TINY, sharing="iteration")
-        rng = np.random.default_rng(13)
-        first, second = (drawn(config, tiny_simulator, rng).goals for _ in range(2))
-        assert not np.array_equal(first, second)
-
     def test_with_a_mirror_all_goals_lie_on_the_right(self):
         """What was drawn on the right is as drawn; the rest is its image, free of contact, too."""
         config = replace(TINY, problem="both", symmetric=True, episodes=20)
@@ -315,7 +291,7 @@ class TestScenarios:
         rngs = [np.random.default_rng(14) for _ in range(2)]
         plain = drawn(config, simulator, rngs[0])
         failed = FailedScenarios.none(simulator.arm.n_joints)
-        mirror = task_mirror(True, simulator.world)
+        mirror = problem_mirror(config.problem)
         folded = draw_shared(config, simulator, rngs[1], failed, mirror)
         left = plain.goals[:, 1] > 0
         assert 0.3 < left.mean() < 0.7
@@ -358,13 +334,6 @@ class TestScenarios:
 
 
 class TestTraining:
-    def test_same_seed_same_policy(self):
-        assert_same_policy(train_policy(TINY).policy, train_policy(TINY).policy)
-
-    def test_other_seed_other_policy(self):
-        first, second = train_policy(TINY).policy, train_policy(replace(TINY, seed=6)).policy
-        assert not np.array_equal(first.layers[0].weights, second.layers[0].weights)
-
     def test_threads_do_not_matter(self):
         config = replace(TINY, directions=24, problem=PROBLEMS["right"], iterations=4)
         assert_same_policy(
@@ -430,10 +399,6 @@ class TestTraining:
         config = replace(TINY, problem=SHORT.replace(reward=weights))
         assert config.simulator().task.reward == weights
 
-    def test_the_policy_is_for_the_problem_without_the_weights(self):
-        config = replace(TINY, reward=RewardWeights(success=3), iterations=1)
-        assert train_policy(config).policy.problem.digest == SHORT.digest
-
     @pytest.mark.slow
     @pytest.mark.parametrize(
         "settings",
@@ -497,12 +462,6 @@ class TestResume:
         assert len(seen[-1].failed.goals) == 40
         assert_same_state(rest[-1], seen[-1])
 
-    def test_wall_time_goes_on(self, tiny_simulator):
-        state = run(TINY, tiny_simulator, 2)[-1]
-        late = replace(state, curve=(*state.curve[:-1], state.curve[-1]._replace(wall_time=1000.0)))
-        result = train_policy(TINY, state=late)
-        assert result.curve[-1].wall_time >= 1000
-
     def test_finished_training_stays_as_it_is(self):
         seen = []
         whole = train_policy(TINY, on_iteration=seen.append)
@@ -534,30 +493,6 @@ class TestConfig:
         with pytest.raises(InvalidInputError, match=message):
             ARSConfig(**settings)
 
-    def test_unknown_problem(self):
-        with pytest.raises(UnknownNameError, match="problem 'up'.*left, right, both"):
-            replace(TINY, problem="up")
-
-    def test_other_arm(self):
-        config = replace(TINY, problem=SHORT.replace(arm="paper_flange"), iterations=1)
-        assert train_policy(config).policy.problem.arm.name == "paper_flange"
-
-    def test_trained_policy_survives_its_file(self, tmp_path):
-        policy = train_policy(TINY).policy
-        policy.save(tmp_path / "policy.npz")
-        loaded = Policy.load(tmp_path / "policy.npz")
-        assert_same_policy(policy, loaded)
-        assert loaded.provenance == policy.provenance
-        np.testing.assert_array_equal(policy.networks().weights, loaded.networks().weights)
-
-
-def test_seeds_from_numpy_can_be_written(tmp_path):
-    config = ARSConfig(seed=np.int64(3), iterations=np.int32(1), directions=2, top_directions=1)
-    assert type(config.seed) is int
-    policy = train_policy(config).policy
-    policy.save(tmp_path / "p.npz")
-    assert Policy.load(tmp_path / "p.npz").provenance.seed == 3
-
 
 class TestMirror:
     """Of a policy that treats mirror images alike, at any time of its training."""
@@ -566,13 +501,8 @@ class TestMirror:
         config = replace(TINY, problem="both", symmetric=True)
         states = []
         train_policy(config, on_iteration=states.append)
-        mirror = task_mirror(True, World(config.problem))
+        mirror = problem_mirror(config.problem)
         for state in states:
             policy = state_policy(config, state)
             np.testing.assert_array_equal(policy.mirror.observations, mirror.observations)
             np.testing.assert_array_equal(policy.mirror.actions, mirror.actions)
-
-    def test_the_last_one_is_the_result(self):
-        config = replace(TINY, problem="both", symmetric=True)
-        result = train_policy(config)
-        assert_same_policy(state_policy(config, result.state), result.policy)

@@ -7,7 +7,7 @@ import pytest
 
 from kinarm.errors import InvalidInputError, MissingExtraError, UnknownNameError
 from kinarm.policies import Policy
-from kinarm.policies.conversion.torch_modules import module_pieces
+from kinarm.policies.conversion.layers import module_pieces
 
 torch = pytest.importorskip("torch")
 nn = torch.nn

@@ -54,12 +54,6 @@ class TestPredict:
         of_parts, _ = policy.predict(parts)
         np.testing.assert_allclose(of_parts, actions, rtol=0, atol=1e-12)
 
-    def test_one_arm_after_the_other(self, shown):
-        policy, (flat, parts) = load_policy("ars-tuned-both"), shown
-        action, state = policy.predict(flat[0])
-        assert (action.shape, state) == ((5,), None)
-        assert policy.predict({name: part[0] for name, part in parts.items()})[0].shape == (5,)
-
     def test_drives_a_goal_conditioned_environment(self):
         env, policy = ReachGoalEnv("right"), load_policy("ppo-tuned-both")
         reached = []

@@ -15,7 +15,6 @@ from kinarm.policies import (
     load_checkpoint,
     recipe,
     save_checkpoint,
-    state_policy,
     train,
     train_policy,
 )
@@ -122,12 +121,6 @@ def test_its_settings_are_options_with_help(toy, capsys):
     text = " ".join(capsys.readouterr().out.split())
     assert "--episodes N Episodes whose mean return judges a policy (default: 20)" in text
     assert "--noise X Standard deviation by which" in text
-
-
-def test_its_states_are_policies(toy):
-    config = recipe("toy")
-    state = toy.ToyTraining(config).initial_state()
-    assert state_policy(config, state).provenance.recipe == "paper"
 
 
 def test_its_options_are_its_own(toy):

@@ -15,11 +15,10 @@ from kinarm.observation import observation_signs
 from kinarm.policies.library import load_policy
 from kinarm.policies.mirror import (
     find_mirror,
-    has_mirror,
     is_symmetric,
     mirror_findings,
     missing_mirror,
-    task_mirror,
+    problem_mirror,
 )
 from kinarm.policies.policy import Layer
 from kinarm.problem import PROBLEMS, ReachProblem
@@ -119,20 +118,13 @@ class TestIsSymmetric:
         scene = Scene(goal_regions=(*Scene().goal_regions, other))
         assert is_symmetric(BOTH.replace(scene=scene))
 
-    def test_mirror_of_a_task(self, simulator, mirror):
-        found = task_mirror(True, simulator.world)
-        np.testing.assert_array_equal(found.observations, mirror.observations)
-        assert task_mirror(False, simulator.world) is None
-        assert task_mirror(True, World("left")) is not None
+    def test_mirror_of_a_problem(self, lopsided, mirror):
+        for problem in (BOTH, PROBLEMS["left"]):
+            found = problem_mirror(problem)
+            np.testing.assert_array_equal(found.observations, mirror.observations)
         (bench, _) = Scene().obstacles
-        assert task_mirror(True, World(BOTH.replace(scene=Scene(obstacles=(bench,))))) is None
-
-    def test_of_a_lopsided_arm_there_is_none(self, lopsided):
-        problem = BOTH.replace(arm=lopsided)
-        assert task_mirror(True, World(problem)) is None
-        assert not has_mirror(problem)
-        assert has_mirror(BOTH)
-        assert not has_mirror(PROBLEMS["left"])
+        assert problem_mirror(BOTH.replace(scene=Scene(obstacles=(bench,)))) is None
+        assert problem_mirror(BOTH.replace(arm=lopsided)) is None
 
     def test_why_there_is_none(self, lopsided):
         one_bench = PROBLEMS["left"].replace(scene=Scene(obstacles=Scene().obstacles[:1]))
@@ -268,9 +260,6 @@ class TestFindings:
         assert self.faults(BOTH) == []
         assert self.faults(BOTH.replace(scene="table")) == []
         assert self.faults(BOTH.replace(scene="post")) == []
-
-    def test_a_task_on_one_side(self):
-        assert self.faults(PROBLEMS["left"]) == ["scene"]
 
     def test_uneven_limits(self):
         arm = Arm.load("paper", limits={"axis_1": (-3.0, 2.0)})

@@ -47,19 +47,6 @@ def test_before_the_first_observation_nothing_is_changed():
     assert normalizer.count == 0
 
 
-def test_nothing_added_changes_nothing():
-    normalizer = add(Normalizer.empty(1), [np.array([[1.0], [3.0]])])
-    same = normalizer.updated(np.zeros((0, 2, 1)), np.zeros(0, dtype=int))
-    assert (same.count, same.mean, same.std) == (2, 2, 1)
-
-
-def test_update_leaves_the_old_statistics_alone():
-    normalizer = Normalizer.empty(1)
-    add(normalizer, [np.ones((3, 1))])
-    assert normalizer.count == 0
-    np.testing.assert_array_equal(normalizer.mean, 0)
-
-
 @pytest.mark.parametrize("value", [0.325, 1e3, -1e6, 0.0])
 def test_constant_inputs_get_weight_zero(value):
     normalizer = Normalizer.empty(2)

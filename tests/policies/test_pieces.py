@@ -5,7 +5,7 @@ import pytest
 
 from kinarm.errors import InvalidInputError
 from kinarm.networks import ACTIVATIONS
-from kinarm.policies.conversion.pieces import Clip, chained
+from kinarm.policies.conversion.layers import Clip, chained
 from kinarm.policies.policy import Layer
 
 

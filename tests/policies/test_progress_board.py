@@ -2,11 +2,10 @@
 
 import pytest
 
-from kinarm._console import COMPILING, doing
-from kinarm.policies.curve import CurvePoint
-from kinarm.policies.learners import TrainingState
+from kinarm._console import COMPILING, doing, told_of_activities
+from kinarm.policies.learners import CurvePoint, TrainingState
 from kinarm.policies.progress_board import BoardWatcher, ProgressBoard
-from kinarm.policies.training_progress import STARTING, watched_preparation
+from kinarm.policies.training import STARTING
 
 FIRST = "learning from others first"
 
@@ -21,7 +20,9 @@ def board(tmp_path):
 
 def test_what_takes_long_before_the_first_iteration_is_said(board):
     assert board.words() == [STARTING]
-    with watched_preparation(BoardWatcher(board, 1)):
+    watcher = BoardWatcher(board, 1)
+    watcher.prepare("")
+    with told_of_activities(watcher.prepare):
         assert board.words() == [STARTING]
         with doing(FIRST):
             with doing(COMPILING):

@@ -79,12 +79,6 @@ class TestStepsBetween:
         through = steps_between(free, a, b) + steps_between(free, b, c)
         assert steps_between(free, a, c) <= through
 
-    def test_arrays(self, free):
-        many = drawn(free, 2, 5)
-        steps = steps_between(free, many, many[0])
-        assert steps.shape == (5,)
-        assert steps[3] == steps_between(free, many[3], many[0])
-
 
 class TestStraight:
     def test_arrives_on_a_straight_line(self, free):

@@ -11,12 +11,10 @@ from kinarm._console import told_of_activities
 from kinarm.errors import InvalidInputError
 from kinarm.policies import PPOConfig
 from kinarm.policies.normalizer import Normalizer
-from kinarm.policies.ppo.actor import actor_policy
 from kinarm.policies.ppo.imitation import BATCH_SIZE, Demonstrations, demonstrate, imitate
 from kinarm.policies.ppo.kernels.imitation import add_imitation_gradients
 from kinarm.policies.ppo.learner import IMITATING, PPOTraining
-from kinarm.policies.ppo.networks import ActorCritic
-from kinarm.policies.ppo.parameters import initial_parameters
+from kinarm.policies.ppo.networks import ActorCritic, actor_policy, initial_parameters
 from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
 

@@ -1,7 +1,6 @@
 """Checkpoint files of PPO, which need none of its packages; resuming is tested in test_ppo."""
 
 import gc
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -87,29 +86,6 @@ def test_round_trip(saved, state):
     assert loaded.simulator_time == 0.0625
 
 
-def test_before_the_first_iteration(saved, state):
-    save_checkpoint(saved, CONFIG, replace(state, curve=(), simulator_time=0.0))
-    loaded = load_checkpoint(saved)[1]
-    assert (loaded.iteration, loaded.environment_steps, loaded.wall_time) == (0, 0, 0.0)
-
-
-@pytest.mark.parametrize("share", [0, 0.05, 0.5, 0.99])
-def test_truncated(saved, share):
-    content = saved.read_bytes()
-    saved.write_bytes(content[: int(share * len(content))])
-    refused(saved)
-
-
-def test_missing_file(tmp_path):
-    refused(tmp_path / "gone.ckpt")
-
-
-@pytest.mark.parametrize("key", ["header", "state.first_moment", "state.episodes.q", "state.curve"])
-def test_missing_entry(saved, key):
-    spoil(saved, **{key: None})
-    refused(saved)
-
-
 @pytest.mark.parametrize(
     "entries",
     [
@@ -133,16 +109,3 @@ def test_bad_entry(saved, entries):
 def test_numbers_of_double_precision(state):
     with pytest.raises(InvalidInputError, match="must be finite, of single precision"):
         replace(state, parameters=state.parameters.astype(np.float64))
-
-
-def test_later_version(saved):
-    spoil(saved, version=np.array(99))
-    refused(saved, "version 99")
-
-
-def test_impossible_setting_is_named(saved):
-    with np.load(saved) as file:
-        header = json.loads(str(file["header"]))
-    header["config"]["batch_size"] = 7
-    spoil(saved, header=np.array(json.dumps(header)))
-    refused(saved, "batch_size")

@@ -18,8 +18,7 @@ from kinarm.policies.ppo.kernels.update import (
     fill_in_scales,
     standardisation,
 )
-from kinarm.policies.ppo.networks import ActorCritic
-from kinarm.policies.ppo.parameters import split_parameters
+from kinarm.policies.ppo.networks import ActorCritic, split_parameters
 
 N_OBSERVATIONS, N_ACTIONS = 19, 3
 ARCHES = [(7,), (12, 10), (16, 33, 64), (130,)]
@@ -181,7 +180,7 @@ class TestNetworks:
             nets = (networks.actor, networks.critic)
             descend(*nets, *moments, gradients, DESCENT, step + 1)
         for array in (networks.weights, *moments):
-            again = networks.spread(networks.gathered(array))
+            again = networks.scattered(networks.gathered(array))
             np.testing.assert_array_equal(again, array)
         assert (networks.weights != 0).sum() == reference.count
 
@@ -194,8 +193,10 @@ def test_steps_of_adam():
     moments = [np.zeros_like(networks.weights) for _ in range(2)]
     first, second = np.zeros_like(weights), np.zeros_like(weights)
     for step in range(1, 5):
-        gradients = networks.spread(numbers(rng, reference.count))[None] * np.float32(step == 1)
-        gradients = np.concatenate([gradients, gradients, networks.spread(reference.vector)[None]])
+        gradients = networks.scattered(numbers(rng, reference.count))[None] * np.float32(step == 1)
+        gradients = np.concatenate(
+            [gradients, gradients, networks.scattered(reference.vector)[None]]
+        )
         slope = gradients.astype(float).sum(axis=0)
         slope *= min(0.5 / np.linalg.norm(slope), 1)
         first = 0.9 * first + 0.1 * slope

@@ -16,7 +16,7 @@ from stable_baselines3.common.logger import Logger
 from kinarm.errors import InvalidInputError
 from kinarm.policies import PPOConfig, recipe, train_policy
 from kinarm.policies.ppo.learner import PPOTraining
-from kinarm.policies.ppo.parameters import initial_parameters, orthogonal, split_parameters
+from kinarm.policies.ppo.networks import initial_parameters, orthogonal, split_parameters
 from kinarm.problem import PROBLEMS
 from kinarm.task import RewardWeights
 

@@ -82,16 +82,6 @@ def test_equals_single_environments_of_theirs(env_id, horizon):
     assert ends["collision"] > 0
 
 
-def test_types_of_infos_are_plain():
-    env = sb3_vec_env(FLAT, NUMBER, horizon=2)
-    env.reset()
-    for _ in range(2):
-        infos = env.step(np.zeros((NUMBER, 5)))[3]
-    for info in infos:
-        kinds = {key: type(info[key]) for key, kind in FINAL_KEYS.items() if kind is not ...}
-        assert kinds == {key: kind for key, kind in FINAL_KEYS.items() if kind is not ...}
-
-
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
 @pytest.mark.parametrize("env_id", [FLAT, GOALS])
 def test_results_are_of_the_spaces(env_id, dtype):
@@ -102,14 +92,6 @@ def test_results_are_of_the_spaces(env_id, dtype):
         for row in range(NUMBER):
             one = {key: part[row] for key, part in parts.items()}
             assert env.observation_space.contains(one if env_id == GOALS else one[""])
-
-
-def test_observations_are_copies():
-    env = sb3_vec_env(FLAT, NUMBER)
-    before = env.reset()
-    kept = before.copy()
-    env.step(np.ones((NUMBER, 5)))
-    np.testing.assert_array_equal(before, kept)
 
 
 class TestSeeds:
@@ -134,9 +116,6 @@ class TestSeeds:
         env = sb3_vec_env("both", 3, seed=4)
         first, second = env.reset(), env.reset()
         assert len(np.unique(np.vstack([first, second]), axis=0)) == 6
-
-    def test_without_a_seed_environments_differ(self):
-        assert (sb3_vec_env("both", 2).reset() != sb3_vec_env("both", 2).reset()).any()
 
     def test_seed_of_a_learner(self):
         def trained():
@@ -218,11 +197,6 @@ class TestAttributes:
         assert env.get_attr("spec")[0].id == GOALS
         assert env.get_attr("metadata")[0]["render_fps"] == 50
 
-    def test_has_attr(self):
-        env = VecFrameStack(sb3_vec_env(FLAT, 2), 2)
-        assert env.has_attr("simulator")
-        assert not env.has_attr("action_masks")
-
     def test_set_attr_is_for_all_arms(self):
         env = sb3_vec_env(FLAT, 3)
         env.set_attr("note", "mine")
@@ -281,19 +255,6 @@ class TestPictures:
         assert [picture.shape for picture in env.render()] == [(48, 128, 3)] * 4
         assert env.render() == []
 
-    def test_no_mode_no_picture(self):
-        env = sb3_vec_env(FLAT, 2)
-        env.reset()
-        with pytest.warns(UserWarning, match="no `render_mode` was passed"):
-            assert env.render() is None
-        assert env.get_images() == [None, None]
-
-    def test_another_mode_than_the_one_chosen(self):
-        env = sb3_vec_env(FLAT, 2, render_mode="rgb_array_list", **SIZE)
-        env.reset()
-        with pytest.warns(UserWarning, match="has to be the same"):
-            assert env.render("rgb_array") is None
-
 
 class TestReplay:
     """Episodes that begin where earlier ones ended without success, if that is asked for."""
@@ -349,14 +310,6 @@ class TestReplay:
             assert [goal for goal, _ in self.play(other, 80)] == [goal for goal, _ in wanted]
             np.testing.assert_array_equal(other.failed.starts, env.failed.starts)
 
-    def test_given_back_while_episodes_run(self):
-        first, second = (sb3_vec_env(FLAT, 3, seed=4, replay_share=0.5) for _ in range(2))
-        assert_same(first.reset(), second.reset())
-        actions = np.full((3, 5), 0.2)
-        for _ in range(6):
-            assert_same(first.step(actions)[0], second.step(actions)[0])
-            second.restore_failed(*second.failed)
-
     def test_the_last_failures_are_given_back(self):
         env = sb3_vec_env(FLAT, 10, seed=4, replay_share=0.5, replay_size=5)
         self.play(env, 80)
@@ -375,6 +328,3 @@ class TestReplay:
             env.restore_failed(home + 9, np.ones((1, 3)))
         with pytest.raises(InvalidInputError, match="need an environment with a replay_share"):
             sb3_vec_env(FLAT, 2).restore_failed(home, np.ones((1, 3)))
-
-    def test_without_it_nothing_is_said(self):
-        assert "replayed" not in self.play(sb3_vec_env(FLAT, 10, seed=4), 40)[0][1]
