@@ -26,7 +26,7 @@ from kinarm.evaluation.experiments.runs import (
     save_checkpoint,
 )
 from kinarm.evaluation.trials import trial_set
-from kinarm.policies.curve import CurvePoint as IterationPoint
+from kinarm.policies.learners import CurvePoint as IterationPoint
 from kinarm.policies.learners import (
     TrainingState,
     begin_training,
