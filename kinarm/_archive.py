@@ -144,9 +144,9 @@ def load_archive(
         content = {} if is_other else _arrays(file, unless)
         if "format" not in content:
             raise error(f"{name} is not a kinarm {kind}")
-        held = str(content.pop("format"))
-        if held != wanted:
-            raise error(f"{name} holds {held[:40]!r}, not {wanted!r}")
+        given = str(content.pop("format"))
+        if given != wanted:
+            raise error(f"{name} holds {given[:40]!r}, not {wanted!r}")
         found = int(content.pop("version"))
         if found != version:
             age = "a later" if found > version else "an earlier"
