@@ -72,18 +72,14 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     InvalidInputError
         If the file, called ``what``, cannot be read or is no TOML; says where.
     """
-    name, text = str(path), ""
     try:
-        text = read_file(path, LARGEST).decode()
-        return tomllib.loads(text)
+        return tomllib.loads(read_file(path, LARGEST).decode())
     except OSError as error:
-        raise InvalidInputError(f"cannot read {what} {name!r}: {error.strerror}") from error
+        raise InvalidInputError(f"cannot read {what} {str(path)!r}: {error.strerror}") from error
     except (ValueError, RecursionError) as error:
-        *_, last = lines = text.split("\n")
-        end = f"at line {len(lines)}, column {len(last) + 1}"
-        reason = first_line(error).replace("at end of document", end)
         article = "an" if what[0] in "aeiou" else "a"
-        raise InvalidInputError(f"{name}: not {article} {what} file: {reason}") from error
+        reason = first_line(error)
+        raise InvalidInputError(f"{path}: not {article} {what} file: {reason}") from error
 
 
 def take_base(entries: dict[str, Any], where: str, bases: Collection[str], default: str) -> str:

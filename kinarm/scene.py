@@ -22,9 +22,7 @@ ROUNDING = 1e-12
 
 def _check_box(what: str, lower: Point, upper: Point, *, flat: bool) -> None:
     """Refuse a box whose corners are not finite or that is empty; a flat one has an area."""
-    if not all(math.isfinite(number) for number in (*lower, *upper)):
-        raise ProblemError(f"{what} has a corner that is not finite: {lower} to {upper}")
-    _check_finite(what, (*lower, *upper))
+    _check_finite(f"corners of {what}", (*lower, *upper))
     extents = [high - low for low, high in zip(lower, upper, strict=True)]
     if min(extents) < 0 or sum(extent > 0 for extent in extents) < (2 if flat else 3):
         wanted = "lower <= upper, and < along two axes at least" if flat else "lower < upper"

@@ -99,7 +99,7 @@ class TestArmFiles:
     @pytest.mark.parametrize(
         ("text", "message"),
         [
-            ("[arm", r"at line 1, column"),
+            ("[arm", r"at end of document"),
             ("title = 3", "title|arm"),
             ("[arm]\nsource = 'other.toml'", "'arm.source' must be a URDF or a known arm"),
             ("[arm]\nsources = 'paper'", "unknown key 'arm.sources'"),

@@ -132,10 +132,10 @@ class TestFile:
             ("task = 3", "task must be a table, got 3"),
             ('[arm]\nhome = "zero"', r"arm.home must be a list, each entry a number \[rad or m\]"),
             ('base = "up"', "base must be one of left, right, both, got 'up'"),
-            ("[task", r"not a problem file: .* \(at line 1, column 6\)"),
+            ("[task", r"not a problem file: .* \(at end of document\)"),
             (
                 "[task]\nhorizon = 3\nhorizon = 4",
-                r"not a problem file: .* \(at line 3, column 12\)",
+                "not a problem file: Cannot overwrite a value",
             ),
             ("a = " + "[" * 5000, "not a problem file: "),
             (
@@ -236,7 +236,7 @@ class TestScenesAndTasks:
         [
             ("ground = true", "'goal_regions' is missing"),
             ("[[goal_regions]]\nname = 3", "missing|must be a text"),
-            ("ground = ", r"not a scene file: .*\(at line 1, column"),
+            ("ground = ", r"not a scene file: .*\(at end of document"),
             (BOX + "[mount]\nrpy = [0, 0]", "mount.rpy must be a list of 3"),
             (BOX.replace("yaw = 0.5", "yaw = inf"), "yaw"),
         ],
