@@ -1,27 +1,20 @@
 """``kinarm-reproduce``: train what the paper trained, and see which of its claims hold."""
 
-import json
 from collections.abc import Sequence
-from contextlib import suppress
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from kinarm._command_line import run_request
-from kinarm._console import open_console
-from kinarm._files import check_folder, only_writer, write_text
+from kinarm._console import open_console, print_table
 from kinarm._interrupts import GOES_ON, telling
 from kinarm._parallel import available_threads
-from kinarm.errors import InvalidInputError
-from kinarm.evaluation.running.options import RunningOptions
+from kinarm.evaluation.experiments.options import RunningOptions
 
 if TYPE_CHECKING:
-    from kinarm.evaluation.reproduction.claims import Claim
-    from kinarm.evaluation.reproduction.results import Results
-    from kinarm.evaluation.reproduction.runs import RunStore
-    from kinarm.evaluation.reproduction.study import Study
-    from kinarm.evaluation.running.executor import Executor
+    from kinarm.evaluation.experiments.executors import Executor
+    from kinarm.evaluation.experiments.experiment import Experiment
+    from kinarm.evaluation.paper.claims import Claim
 
 EPILOG = """
 needs the extra ppo: pip install 'kinarm[ppo]' (or --no-ppo)
@@ -70,60 +63,51 @@ class ReproductionRequest(RunningOptions):
         return self.out or Path("reproduction-quick" if self.quick else "reproduction")
 
     @property
-    def study(self) -> "Study":
-        """What is trained."""
-        from kinarm.evaluation.reproduction.study import full_study, quick_study
+    def experiment(self) -> "Experiment":
+        """What is trained: the shipped experiment, or its part without PPO."""
+        from kinarm.evaluation.experiments.experiment import Experiment
 
-        return (quick_study if self.quick else full_study)(ppo=self.ppo)
+        shipped = Experiment.load("reproduction_quick" if self.quick else "reproduction")
+        wanted = (entry for entry in shipped.entries if self.ppo or entry.learner != "ppo")
+        return replace(shipped, entries=tuple(wanted))
 
     def run(
         self, executor: "Executor | None" = None, command: str | None = None
-    ) -> "tuple[Claim, ...]":
+    ) -> "Sequence[Claim]":
         """Run the missing trainings, and write the results.
 
         Parameters
         ----------
         executor : Executor, optional
-            Where trainings are carried out; the processors of this machine if it is left out.
+            Where trainings are carried out, instead of where the options say.
         command : str, optional
-            What to record as the command that made the files; this request if it is left out.
+            What to record as the command that made the files; this request by default.
 
         Returns
         -------
-        tuple of Claim
+        sequence of Claim
             The claims under the literal reading.
 
         Raises
         ------
         KinarmError
-            If the extra ``ppo`` is missing, the folder holds another study, cannot be written to or
-            is written to by another process, or a worker ends unexpectedly.
+            If the extra ``ppo`` is missing, the folder is another experiment's or cannot be written
+            to, or a training fails.
+        KeyboardInterrupt
+            If it is interrupted; what is finished is kept, and the message says so.
         """
-        from kinarm.policies.learners import find_learner
+        from kinarm.evaluation.experiments.study import Study
+        from kinarm.evaluation.paper.page import write_all
 
-        if self.ppo:
-            find_learner("ppo").check_installed()
-        check_folder(self.folder)
-        with only_writer(self.folder):
-            return self._carry_out(executor, command)
-
-    def _carry_out(self, executor: "Executor | None", command: str | None) -> "tuple[Claim, ...]":
-        """Train and write in a folder that no other process writes to."""
-        from kinarm.evaluation.reproduction.document import write_all
-        from kinarm.evaluation.reproduction.results import Results
-        from kinarm.evaluation.reproduction.runs import RunStore
-
-        study, folder = self.study, self.folder
-        _claim_folder(folder, study)
-        store = RunStore(folder, study.protocol)
-        results = Results.load(study, store)
+        study = Study(self.experiment, self.folder)
+        threads = max(1, available_threads() // (self.jobs or available_threads()))
         with telling(lambda: GOES_ON):
-            if results.missing:
-                results = _train(results, store, self.at_once, executor or self.elsewhere(folder))
+            chosen = executor or self.executor(self.folder, threads)
+            study.run(threads=threads, executor=chosen)
             with open_console(stderr=True).status(
                 "bounding what could be reached, drawing figures"
             ):
-                return write_all(results, store, command or repr(self))
+                return write_all(study, command or repr(self))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -133,70 +117,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _report(request: ReproductionRequest, command: str) -> None:
     """Run a request, and print its verdicts, if it has any."""
-    claims, study = request.run(command=command), request.study
-    if study.is_judged:
-        _print_verdicts(claims)
+    from kinarm.evaluation.paper.page import CLAIM_COLUMNS, SMOKE, claim_rows
+
+    claims = request.run(command=command)
+    if request.quick:
+        print(SMOKE.format(request.experiment.size))
     else:
-        print(study.warning)
+        print_table(CLAIM_COLUMNS, claim_rows(claims), expendable=CLAIM_COLUMNS[1:2])
     print(f"written: {request.folder / 'REPRODUCTION.md'}, with tables and figures beside it")
-    if not study.is_judged:
+    if request.quick:
         print("next: kinarm-reproduce trains everything to the end and judges the claims")
-
-
-def _print_verdicts(claims: "Sequence[Claim]") -> None:
-    """Print each claim, what was measured, and whether it holds."""
-    from rich.table import Table
-
-    from kinarm.evaluation.statistics import estimate_text
-
-    table = Table("claim", "measured (95 %)", "claimed", "verdict", header_style="bold")
-    for claim in claims:
-        measured = "\n".join(estimate_text(part.estimate) for part in claim.parts)
-        claimed = "\n".join(f"{part.claimed} {part.threshold:g}" for part in claim.parts)
-        table.add_row(claim.statement, measured, claimed, claim.verdict)
-    open_console().print(table)
-
-
-def _claim_folder(folder: Path, study: "Study") -> None:
-    """Mark the folder with its study; refuse a folder of another study."""
-    from kinarm._archive import load_json, reading
-
-    marker = folder / "study.json"
-    if marker.exists():
-        held = "foreign"
-        with suppress(InvalidInputError), reading(repr(str(marker)), "study", InvalidInputError):
-            held = str(load_json(marker, "study", InvalidInputError)["study"])
-        if held != study.name:
-            raise InvalidInputError(
-                f"{str(folder)!r} holds a {held} reproduction, not a {study.name} one: "
-                "name another folder with --out"
-            )
-    write_text(marker, json.dumps({"study": study.name}))
-
-
-def _train(
-    results: "Results", store: "RunStore", jobs: int, executor: "Executor | None"
-) -> "Results":
-    """Run the missing trainings, the longest first, and read all runs anew."""
-    from kinarm.evaluation.reproduction.results import Results
-    from kinarm.evaluation.reproduction.training import carry_out
-    from kinarm.evaluation.running.progress import TaskProgress
-    from kinarm.workers import LocalExecutor
-
-    study = results.study
-    missing = sorted(results.missing, key=lambda training: -training.cost)
-    console = open_console(stderr=True)
-    if results.runs:
-        console.print(f"{len(results.runs)} of {len(study.trainings)} trainings are finished")
-    jobs = min(jobs, len(missing))
-    threads = max(1, available_threads() // jobs)
-    work = partial(carry_out, protocol=study.protocol, threads=threads)
-    with TaskProgress(len(study.trainings), missing, jobs, console) as progress:
-        chosen = executor or LocalExecutor(jobs, threads)
-        for number, (policy, run) in chosen.carry_out(work, missing):
-            store.save(missing[number], policy, run)
-            progress.finished(missing[number])
-    return Results.load(study, store)
 
 
 if __name__ == "__main__":

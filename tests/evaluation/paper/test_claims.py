@@ -5,60 +5,62 @@ import math
 
 import numpy as np
 import pytest
-from made_up_runs import made_up
 
-from kinarm.evaluation.reproduction.claims import Claim, ClaimPart, assess, bench_shares
-from kinarm.evaluation.reproduction.study import LITERAL, Protocol, Reading
-from kinarm.evaluation.reproduction.training import final_trials
+from kinarm.evaluation.paper.claims import Claim, ClaimPart, assess, bench_shares
+from kinarm.evaluation.paper.results import PaperRun, Reading
 from kinarm.evaluation.statistics import Estimate
+from kinarm.evaluation.trials import trial_set
+from kinarm.problem import PROBLEMS
 
 TRIALS = 200
 
 
-def noise(training, scale=0.01):
+def noise(run, scale=0.01):
     """Differences between the seeds of a training, and between its trials."""
-    rng = np.random.default_rng([len(training.name), training.config.seed])
+    rng = np.random.default_rng([len(run.name), run.planned.config.seed])
     return scale * (rng.normal() + rng.normal(size=TRIALS))
 
 
-def learnt_at(snapshot):
-    """Distances at four snapshots of a policy that reaches everything from one of them on."""
-    return np.where(np.arange(4)[:, None] >= snapshot, 0.01, 1.0) * np.ones((4, 10))
+def learnt_at(point):
+    """Distances at four points of a policy that reaches everything from one of them on."""
+    return np.where(np.arange(4)[:, None] >= point, 0.01, 1.0) * np.ones((4, 10))
 
 
-def as_the_paper_says(training):
+@pytest.fixture(scope="module")
+def as_the_paper_says(made_up_run):
     """A world in which everything is as in the paper."""
-    config = training.config
-    if training.purpose == "sweep":
-        worse = 0.2 * (config.step_size == 0.005) + 0.2 * (config.directions == 32)
-        distance = 0.3 + worse + noise(training)
-        return made_up(distance, np.tile(distance[:10], (4, 1)))
-    base = 0.1 if training.purpose == "ars" else 0.05
-    distance = base + np.abs(noise(training))
-    if training.purpose == "ars" and config.problem.name == "both":
-        trials = final_trials(config.problem, Protocol())
-        poor = (trials.goals[:, 1] > 0) == bool(config.seed % 2)
-        distance = distance + 0.5 * poor
-    return made_up(distance, learnt_at(0 if training.purpose == "ars" else 2))
+
+    def run_of(run):
+        config = run.planned.config
+        if run.purpose == "sweep":
+            worse = 0.2 * (config.step_size == 0.005) + 0.2 * (config.directions == 32)
+            distance = 0.3 + worse + noise(run)
+            return made_up_run(distance, np.tile(distance[:10], (4, 1)))
+        base = 0.1 if run.purpose == "ars" else 0.05
+        distance = base + np.abs(noise(run))
+        if run.purpose == "ars" and run.task == "both":
+            poor = (trial_set(config.problem, TRIALS, 0).goals[:, 1] > 0) == bool(config.seed % 2)
+            distance = distance + 0.5 * poor
+        return made_up_run(distance, learnt_at(0 if run.purpose == "ars" else 2))
+
+    return run_of
 
 
-def the_other_way_round(training):
+@pytest.fixture(scope="module")
+def the_other_way_round(made_up_run):
     """A world in which nothing is."""
-    config = training.config
-    if training.purpose == "sweep":
-        better = 0.1 * (config.step_size == 0.005) + 0.1 * (config.directions == 32)
-        distance = 0.5 - better + noise(training)
-        return made_up(distance, np.tile(distance[:10], (4, 1)))
-    base = 0.5 if training.purpose == "ars" else 0.7
-    distance = base - 0.1 * (config.problem.name == "both") + noise(training)
-    return made_up(distance, learnt_at(2 if training.purpose == "ars" else 0))
 
+    def run_of(run):
+        config = run.planned.config
+        if run.purpose == "sweep":
+            better = 0.1 * (config.step_size == 0.005) + 0.1 * (config.directions == 32)
+            distance = 0.5 - better + noise(run)
+            return made_up_run(distance, np.tile(distance[:10], (4, 1)))
+        base = 0.5 if run.purpose == "ars" else 0.7
+        distance = base - 0.1 * (run.task == "both") + noise(run)
+        return made_up_run(distance, learnt_at(2 if run.purpose == "ars" else 0))
 
-def by_chance(training):
-    """A world in which seeds differ and nothing else does."""
-    rng = np.random.default_rng([*training.name.encode()])
-    distance = np.full(TRIALS, rng.uniform(0.1, 0.3))
-    return made_up(distance, np.full((4, 10), rng.uniform(0.1, 0.3)))
+    return run_of
 
 
 def verdicts(claims):
@@ -73,30 +75,43 @@ ALL = {
 
 
 class TestWorlds:
-    def test_as_the_paper_says(self, results_of):
+    def test_as_the_paper_says(self, results_of, as_the_paper_says):
         found = verdicts(assess(results_of(as_the_paper_says)))
         assert found == dict.fromkeys(ALL, "holds")
 
-    def test_the_other_way_round(self, results_of):
-        found = verdicts(assess(results_of(the_other_way_round)))
-        assert found == dict.fromkeys(ALL, "does not hold")
+    def test_the_other_way_round(self, results_of, the_other_way_round):
+        claims = assess(results_of(the_other_way_round))
+        assert verdicts(claims) == dict.fromkeys(ALL, "does not hold")
+        values = {claim.name: claim.parts[0].estimate.value for claim in claims}
+        assert values["ars-left"] == values["ars-samples"] == 0
+        assert values["ars-both"] == pytest.approx(-0.1, abs=0.02)
+        assert values["ppo-nearer"] == pytest.approx(-0.2, abs=0.02)
+        assert values["sweep-rate"] == pytest.approx(-0.1, abs=0.02)
+        assert values["sweep-perturbations"] == pytest.approx(-0.1, abs=0.02)
 
-    def test_by_chance(self, results_of):
-        found = verdicts(assess(results_of(by_chance)))
+    def test_by_chance(self, results_of, made_up_run):
+        """A world in which seeds differ and nothing else does."""
+
+        def run_of(run):
+            rng = np.random.default_rng([*run.name.encode()])
+            distance = np.full(TRIALS, rng.uniform(0.1, 0.3))
+            return made_up_run(distance, np.full((4, 10), rng.uniform(0.1, 0.3)))
+
+        found = verdicts(assess(results_of(run_of)))
         assert set(found) == ALL
         assert found["ppo-nearer"] == found["ppo-both"] == found["ars-samples"] == "undecided"
         assert found["sweep-rate"] == found["sweep-perturbations"] == "undecided"
 
-    def test_other_readings_are_judged_by_their_own_trainings(self, results_of):
-        near = Reading(start_spread=0.1, sharing="pair")
-
-        def run_of(training):
-            world = as_the_paper_says if training.reading.start_spread == 1 else the_other_way_round
-            return world(training)
+    def test_other_readings_are_judged_by_their_own_trainings(
+        self, results_of, as_the_paper_says, the_other_way_round
+    ):
+        def run_of(run):
+            literal = run.reading.start_spread == 1
+            return (as_the_paper_says if literal else the_other_way_round)(run)
 
         results = results_of(run_of)
         assert set(verdicts(assess(results)).values()) == {"holds"}
-        found = verdicts(assess(results, near))
+        found = verdicts(assess(results, Reading(start_spread=0.1, sharing="pair")))
         assert set(found) == {name for name in ALL if not name.startswith("sweep")}
         assert set(found.values()) == {"does not hold"}
 
@@ -104,9 +119,8 @@ class TestWorlds:
 @pytest.mark.parametrize("start_spread", [1.0, 0.1])
 def test_trials_of_all_tasks_are_crossed(start_spread):
     """What `contrast` is told of them: one start, and one place of the goal on its bench."""
-    reading = Reading(start_spread=start_spread)
     left, right, both = (
-        final_trials(reading.problem(task), Protocol(trials=50))
+        trial_set(PROBLEMS[task].replace(start_spread=start_spread), 50, 0)
         for task in ("left", "right", "both")
     )
     bench_to_bench = np.array([0.0, 1.3, 0.0])
@@ -117,37 +131,42 @@ def test_trials_of_all_tasks_are_crossed(start_spread):
         np.testing.assert_array_equal(trials.starts, left.starts)
 
 
-class TestStatistics:
-    def test_values_by_hand(self, results_of):
-        claims = {claim.name: claim for claim in assess(results_of(the_other_way_round))}
-        values = {name: claim.parts[0].estimate.value for name, claim in claims.items()}
-        assert values["ars-left"] == 0
-        assert values["ars-both"] == pytest.approx(-0.1, abs=0.02)
-        assert values["ppo-nearer"] == pytest.approx(-0.2, abs=0.02)
-        assert values["sweep-rate"] == pytest.approx(-0.1, abs=0.02)
-        assert values["sweep-perturbations"] == pytest.approx(-0.1, abs=0.02)
-        assert values["ars-samples"] == 0
-
-    def test_where_no_level_is_reached_speed_cannot_be_compared(self, results_of):
-        results = results_of(lambda training: made_up(np.ones(TRIALS)))
+class TestSpeed:
+    def test_where_no_level_is_reached_it_cannot_be_compared(self, results_of, made_up_run):
+        results = results_of(lambda _: made_up_run(np.ones(TRIALS)))
         claim = {claim.name: claim for claim in assess(results)}["ars-samples"]
         assert claim.verdict == "undecided"
         assert claim.parts[0].estimate.value is None
         json.dumps(claim.to_json(), allow_nan=False)
 
-    def test_equal_steps_are_those_of_the_shortest_training(self, results_of):
-        def run_of(training):
-            if training.purpose != "sweep":
-                return made_up(np.ones(TRIALS))
-            many = training.config.directions == 32
-            snapshots = np.array([[0.4], [0.3], [0.2], [0.1]]) * np.ones((4, 10))
-            return made_up(np.full(TRIALS, 0.1), snapshots, 2000 if many else 1000)
+    def test_equal_steps_are_those_of_the_shortest_training(self, results_of, made_up_run):
+        def run_of(run):
+            if run.purpose != "sweep":
+                return made_up_run(np.ones(TRIALS))
+            many = run.planned.config.directions == 32
+            curve = np.array([[0.4], [0.3], [0.2], [0.1]]) * np.ones((4, 10))
+            return made_up_run(np.full(TRIALS, 0.1), curve, 2000 if many else 1000)
 
         claims = {claim.name: claim for claim in assess(results_of(run_of))}
         part = claims["sweep-perturbations-steps"].parts[0]
         assert "after 4 thousand environment steps" in part.measure
         assert part.estimate.value == pytest.approx(0.2)
         assert claims["sweep-perturbations"].parts[0].estimate.value == pytest.approx(0)
+
+    @pytest.mark.parametrize(
+        ("distance", "share", "steps"),
+        [(0.5, 1.0, 1000), (0.2, 0.5, 2000), (0.2, 0.75, 3000), (0.05, 0.25, math.inf)],
+    )
+    def test_steps_to_level(self, made_up_run, distance, share, steps):
+        curve = np.array([[0.5, 0.5], [0.2, 0.5], [0.1, 0.1], [0.3, 0.3]])
+        run = PaperRun(planned=None, trained=made_up_run(np.ones(3), curve), clock=None)
+        assert run.steps_to_level(distance, share) == steps
+
+    @pytest.mark.parametrize(("steps", "distance"), [(4000, 0.3), (3999, 0.1), (10, 0.5)])
+    def test_distance_after(self, made_up_run, steps, distance):
+        curve = np.array([[0.5, 0.5], [0.2, 0.5], [0.1, 0.1], [0.3, 0.3]])
+        run = PaperRun(planned=None, trained=made_up_run(np.ones(3), curve), clock=None)
+        assert run.distance_after(steps)[1] == pytest.approx(distance)
 
 
 class TestBenchShares:
@@ -207,8 +226,8 @@ class TestVerdict:
         assert Claim("", "", (yes, perhaps)).verdict == "undecided"
         assert Claim("", "", (perhaps, no)).verdict == "does not hold"
 
-    def test_as_json(self, results_of):
-        for claim in assess(results_of(as_the_paper_says), LITERAL):
+    def test_as_json(self, results_of, as_the_paper_says):
+        for claim in assess(results_of(as_the_paper_says)):
             entries = json.loads(json.dumps(claim.to_json(), allow_nan=False))
             assert entries["verdict"] == "holds"
             assert len(entries["parts"]) == len(claim.parts)

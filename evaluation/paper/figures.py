@@ -1,6 +1,5 @@
 """The paper's figures 2 and 3, and learning curves."""
 
-from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -8,9 +7,7 @@ from numpy.typing import NDArray
 
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.figures import BIN_WIDTH, COLOURS
-from kinarm.evaluation.reproduction.results import Results
-from kinarm.evaluation.reproduction.runs import TrainedRun
-from kinarm.evaluation.reproduction.study import LEARNERS, NEAR, Purpose
+from kinarm.evaluation.paper.results import LEARNERS, NEAR, PaperResults, Purpose
 from kinarm.problem import PROBLEMS
 
 if TYPE_CHECKING:
@@ -30,42 +27,34 @@ NARROWEST = 0.005
 """Least bandwidth of a density [m]."""
 
 
-def figure_2(results: Results) -> "Figure":
-    """Training rewards and final distances of ARS, a row per task (paper, Figure 2)."""
+def figure_2(results: PaperResults) -> "Figure":
+    """Training rewards and final distances of ARS, a row per task (paper, Figure 2).
+
+    Seeds are in colour, and the mean of their returns in black.
+    """
     figure, panels = _panels((9.0, 8.4), len(PROBLEMS), 2, sharex="col", sharey="col")
-    for number, (task, row) in enumerate(zip(PROBLEMS, panels, strict=True), start=1):
+    edges = np.arange(0.0, SHOWN_DISTANCE + BIN_WIDTH, BIN_WIDTH)
+    for number, (task, (left, right)) in enumerate(zip(PROBLEMS, panels, strict=True), start=1):
         runs = results.select("ars", task)
-        _rewards(row[0], runs)
-        _histograms(row[1], runs)
-        row[0].set_ylabel(f"task {number}: {task}\nmean return of an iteration")
-        row[1].set_ylabel(f"share of trials per {BIN_WIDTH} m")
+        returns = np.array([run.trained.returns for run in runs])
+        iterations = np.arange(1, returns.shape[1] + 1)
+        for seed, run in enumerate(runs):
+            left.plot(iterations, returns[seed], color=COLOURS[seed], lw=0.6, label=f"seed {seed}")
+            shares = np.histogram(run.distance, edges)[0] / len(run.distance)
+            label = f"seed {seed}: {np.mean(run.distance <= NEAR):.0%} within {NEAR} m"
+            right.stairs(shares, edges, color=COLOURS[seed], lw=1.3, label=label)
+        left.plot(iterations, returns.mean(axis=0), color="black", lw=1.6, label="mean")
+        right.axvline(NEAR, color="#444444", linestyle=":", lw=1)
+        right.legend(frameon=False, fontsize=8)
+        left.set_ylabel(f"task {number}: {task}\nmean return of an iteration")
+        right.set_ylabel(f"share of trials per {BIN_WIDTH} m")
     panels[0, 0].legend(frameon=False, loc="lower right")
     panels[-1, 0].set_xlabel("iteration")
     panels[-1, 1].set(xlabel="final distance to the goal [m]", xlim=(0, SHOWN_DISTANCE))
     return figure
 
 
-def _rewards(axes: "Axes", runs: Sequence[TrainedRun]) -> None:
-    """Mean returns of the seeds in colour, and their mean in black."""
-    returns = np.array([run.returns for run in runs])
-    iterations = np.arange(1, returns.shape[1] + 1)
-    for number, seed in enumerate(returns):
-        axes.plot(iterations, seed, color=COLOURS[number], lw=0.6, label=f"seed {number}")
-    axes.plot(iterations, returns.mean(axis=0), color="black", lw=1.6, label="mean")
-
-
-def _histograms(axes: "Axes", runs: Sequence[TrainedRun]) -> None:
-    """Histograms of the seeds' final distances, with the share near the goal."""
-    edges = np.arange(0.0, SHOWN_DISTANCE + BIN_WIDTH, BIN_WIDTH)
-    for number, run in enumerate(runs):
-        shares = np.histogram(run.distance, edges)[0] / len(run.distance)
-        label = f"seed {number}: {np.mean(run.distance <= NEAR):.0%} within {NEAR} m"
-        axes.stairs(shares, edges, color=COLOURS[number], lw=1.3, label=label)
-    axes.axvline(NEAR, color="#444444", linestyle=":", lw=1)
-    axes.legend(frameon=False, fontsize=8)
-
-
-def figure_3(results: Results) -> "Figure":
+def figure_3(results: PaperResults) -> "Figure":
     """Densities of the final distances of ARS and PPO, a row per task (paper, Figure 3).
 
     The oracle's is drawn behind them: what could be reached. Heights are square roots, so that
@@ -110,33 +99,29 @@ def density(samples: NDArray[np.float64], positions: NDArray[np.float64]) -> NDA
     return values
 
 
-def learning_curves(results: Results, against: Literal["steps", "time"]) -> "Figure":
+def learning_curves(results: PaperResults, against: Literal["steps", "time"]) -> "Figure":
     """How well policies do in the course of their training, a column per task.
 
     Progress is shown against environment steps or against wall time.
     """
     figure, panels = _panels((10.5, 6.4), 2, len(PROBLEMS), sharex=True, sharey="row")
-    label, across = ACROSS[against]
+    in_time = against == "time"
     for task, (above, below) in zip(PROBLEMS, panels.T, strict=True):
         for learner, style in STYLES.items():
             if runs := results.select(learner, task):
-                x = np.array([across(run) for run in runs])
-                distance = np.array([run.snapshot_distance for run in runs])
+                x = np.array(
+                    [run.clock.points if in_time else run.curve_steps / 1e6 for run in runs]
+                )
+                distance = np.array([run.curve_distance for run in runs])
                 _seeds_and_mean(above, x, (distance <= NEAR).mean(axis=2), style)
                 _seeds_and_mean(below, x, np.median(distance, axis=2), style)
         above.set_title(f"task {task}")
-        below.set(xlabel=label, xscale="linear" if against == "steps" else "log")
+        below.set_xlabel("training time [s]" if in_time else "million environment steps")
+        below.set_xscale("log" if in_time else "linear")
     panels[0, 0].set(ylabel=f"share of trials within {NEAR} m", ylim=(0, 1))
     panels[1, 0].set(ylabel="median final distance [m]", ylim=(0, None))
     panels[0, 0].legend(frameon=False)
     return figure
-
-
-ACROSS: dict[str, tuple[str, Callable[[TrainedRun], NDArray[np.float64]]]] = {
-    "steps": ("million environment steps", lambda run: run.snapshot_steps / 1e6),
-    "time": ("training time [s]", lambda run: run.wall_time[run.snapshots]),
-}
-"""What learning curves can be drawn against: label, and values at the snapshots."""
 
 
 def _seeds_and_mean(

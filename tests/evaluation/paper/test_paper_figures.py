@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from made_up_runs import made_up
 
-from kinarm.evaluation.reproduction.figures import density, figure_2, figure_3, learning_curves
+from kinarm.evaluation.paper.figures import density, figure_2, figure_3, learning_curves
 
 
 class TestDensity:
@@ -28,10 +27,10 @@ class TestDensity:
 
 
 @pytest.fixture(scope="module")
-def results(results_of):
-    def run_of(training):
-        rng = np.random.default_rng([*training.name.encode()])
-        return made_up(rng.uniform(0, 1, 200), rng.uniform(0, 1, (4, 10)))
+def results(results_of, made_up_run):
+    def run_of(run):
+        rng = np.random.default_rng([*run.name.encode()])
+        return made_up_run(rng.uniform(0, 1, 200), rng.uniform(0, 1, (4, 10)))
 
     return results_of(run_of)
 

@@ -1,35 +1,30 @@
 """The paper's claims, and whether they hold here."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from operator import attrgetter
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.evaluation.reproduction.results import Results
-from kinarm.evaluation.reproduction.runs import TrainedRun
-from kinarm.evaluation.reproduction.study import (
+from kinarm.evaluation.paper.results import (
+    LEARNERS,
     LITERAL,
     NEAR,
-    SWEEP_PERTURBATIONS,
-    SWEEP_RATES,
-    Purpose,
+    PaperResults,
+    PaperRun,
     Reading,
+    final_distances,
 )
 from kinarm.evaluation.statistics import Estimate, Term, contrast, mean_share, superiority
+from kinarm.problem import PROBLEMS
 
 Verdict = Literal["holds", "does not hold", "undecided", "not judged"]
 
 LEARNING_LEVELS = (
-    (0.2, 0.25),
-    (0.2, 0.5),
-    (0.2, 0.75),
-    (0.1, 0.25),
-    (0.1, 0.5),
-    (0.05, 0.25),
-    (0.05, 0.5),
+    *((0.2, 0.25), (0.2, 0.5), (0.2, 0.75)),
+    *((0.1, 0.25), (0.1, 0.5)),
+    *((0.05, 0.25), (0.05, 0.5)),
 )
 """Distances [m] and shares of trials by which the speed of learning is measured."""
 
@@ -41,7 +36,7 @@ class ClaimPart:
     Attributes
     ----------
     measure : str
-        What the statistic is.
+        Name of the statistic, with its unit.
     estimate : Estimate
         The statistic and its interval.
     claimed : {"above", "below"}
@@ -79,7 +74,7 @@ class Claim:
     statement : str
         The finding.
     parts : tuple of ClaimPart
-        What it means in numbers; all have to be so.
+        Its meaning in numbers; all have to be so.
     judged : bool
         Whether the trainings are such that it can be judged.
     """
@@ -119,13 +114,13 @@ class Claim:
         }
 
 
-def assess(results: Results, reading: Reading = LITERAL) -> tuple[Claim, ...]:
+def assess(results: PaperResults, reading: Reading = LITERAL) -> tuple[Claim, ...]:
     """All claims that can be judged under a reading; the sweep follows the literal one."""
     claims = [
-        mostly_near(results, reading, "left"),
-        mostly_near(results, reading, "right"),
-        both_is_worse(results, reading),
-        one_bench_is_poor(results, reading),
+        _mostly_near(results, reading, "left"),
+        _mostly_near(results, reading, "right"),
+        _both_is_worse(results, reading),
+        _one_bench_is_poor(results, reading),
     ]
     if results.select("ppo", reading=reading):
         claims += [
@@ -133,42 +128,44 @@ def assess(results: Results, reading: Reading = LITERAL) -> tuple[Claim, ...]:
             Claim(
                 "ppo-nearer",
                 "PPO ends nearer than ARS on left and right",
-                (ars_less_ppo(results, reading, "left", "right"),),
+                (_ars_less_ppo(results, reading, "left", "right"),),
             ),
             # Section 4: PPO delivers more on task 3.
             Claim(
                 "ppo-both",
                 "PPO does better than ARS on both",
-                (ars_less_ppo(results, reading, "both"),),
+                (_ars_less_ppo(results, reading, "both"),),
             ),
-            ars_needs_fewer_steps(results, reading),
+            _ars_needs_fewer_steps(results, reading),
         ]
     if reading == LITERAL:
-        claims += [low_rate_is_worse(results), *many_perturbations_are_worse(results)]
-    return tuple(replace(claim, judged=results.study.is_judged) for claim in claims)
+        claims += [_low_rate_is_worse(results), *_many_perturbations_are_worse(results)]
+    return tuple(replace(claim, judged=results.is_judged) for claim in claims)
 
 
-def mostly_near(results: Results, reading: Reading, task: str) -> Claim:
+def _mostly_near(results: PaperResults, reading: Reading, task: str) -> Claim:
     """Section 4: on tasks 1 and 2, most trials end within 0.2."""
-    near = results.distances("ars", task, reading) <= NEAR
+    near = final_distances(results.select("ars", task, reading)) <= NEAR
     estimate = mean_share(near.mean(axis=1), near.shape[1])
     part = ClaimPart(f"share of trials within {NEAR} m", estimate, "above", 0.5)
     return Claim(f"ars-{task}", f"ARS mostly ends within {NEAR} m on {task}", (part,))
 
 
-def both_is_worse(results: Results, reading: Reading) -> Claim:
+def _both_is_worse(results: PaperResults, reading: Reading) -> Claim:
     """Section 4: task 3 is learnt less well than tasks 1 and 2."""
-    terms = [
-        Term(weight, results.distances("ars", task, reading))
-        for task, weight in (("both", 1.0), ("left", -0.5), ("right", -0.5))
-    ]
-    part = _difference("mean final distance on both, less that on left and right [m]", terms)
+    part = _difference(
+        "mean final distance on both, less that on left and right [m]",
+        [
+            (task == "both", final_distances(results.select("ars", task, reading)))
+            for task in ("both", "left", "right")
+        ],
+    )
     return Claim("ars-both", "ARS does worse on both benches than on one", (part,))
 
 
-def one_bench_is_poor(results: Results, reading: Reading) -> Claim:
+def _one_bench_is_poor(results: PaperResults, reading: Reading) -> Claim:
     """Section 4: on task 3, a policy does well on one bench and poorly on the other."""
-    near = results.distances("ars", "both", reading) <= NEAR
+    near = final_distances(results.select("ars", "both", reading)) <= NEAR
     better, worse = bench_shares(near, results.trial_set("both", reading).goals[:, 1] > 0)
     label = f"share of trials within {NEAR} m on a policy's {{}} bench"
     parts = (
@@ -204,21 +201,22 @@ def bench_shares(near: NDArray[np.bool_], left: NDArray[np.bool_]) -> tuple[Esti
     return mean_share(better, per_bench), mean_share(worse, per_bench)
 
 
-def ars_less_ppo(results: Results, reading: Reading, *tasks: str) -> ClaimPart:
+def _ars_less_ppo(results: PaperResults, reading: Reading, *tasks: str) -> ClaimPart:
     """Mean final distance of ARS, less that of PPO on the same trials."""
-    weights: dict[Purpose, float] = {"ars": 1.0 / len(tasks), "ppo": -1.0 / len(tasks)}
-    terms = [
-        Term(weight, results.distances(learner, task, reading))
-        for task in tasks
-        for learner, weight in weights.items()
-    ]
-    return _difference("mean final distance of ARS, less that of PPO [m]", terms)
+    return _difference(
+        "mean final distance of ARS, less that of PPO [m]",
+        [
+            (learner == "ars", final_distances(results.select(learner, task, reading)))
+            for task in tasks
+            for learner in LEARNERS
+        ],
+    )
 
 
-def ars_needs_fewer_steps(results: Results, reading: Reading) -> Claim:
+def _ars_needs_fewer_steps(results: PaperResults, reading: Reading) -> Claim:
     """Section 4: ARS is much more sample-efficient."""
     pairs = []
-    for task in ("left", "right", "both"):
+    for task in PROBLEMS:
         ars = steps_to_levels(results.select("ars", task, reading))
         ppo = steps_to_levels(results.select("ppo", task, reading))
         reached = np.isfinite(ars).any(axis=1) | np.isfinite(ppo).any(axis=1)
@@ -230,40 +228,48 @@ def ars_needs_fewer_steps(results: Results, reading: Reading) -> Claim:
     return Claim("ars-samples", "ARS needs fewer environment steps than PPO", (part,))
 
 
-def steps_to_levels(runs: Iterable[TrainedRun]) -> NDArray[np.float64]:
+def steps_to_levels(runs: Iterable[PaperRun]) -> NDArray[np.float64]:
     """Environment steps to `LEARNING_LEVELS`, shape (n_levels, n_runs); infinity for never."""
     return np.array([[run.steps_to_level(*level) for level in LEARNING_LEVELS] for run in runs]).T
 
 
-def low_rate_is_worse(results: Results) -> Claim:
+def _low_rate_is_worse(results: PaperResults) -> Claim:
     """Section 3.3: too low a learning rate may not be desirable."""
-    lowest, *higher = sorted(SWEEP_RATES)
+    sweep = results.sweep()
+    lowest, *higher = sorted({rate for rate, _ in sweep})
     parts = [
-        _sweep_difference(
+        _difference(
             f"mean final distance with rate {lowest}, less that with rate {other} [m]",
-            {key: runs for key, runs in results.sweep().items() if key[0] in (lowest, other)},
-            lambda rate, _: rate == lowest,
+            [
+                (rate == lowest, final_distances(runs))
+                for (rate, _), runs in sweep.items()
+                if rate in (lowest, other)
+            ],
         )
         for other in higher
     ]
     return Claim("sweep-rate", "Too low a learning rate is undesirable", tuple(parts))
 
 
-def many_perturbations_are_worse(results: Results) -> tuple[Claim, Claim]:
+def _many_perturbations_are_worse(results: PaperResults) -> tuple[Claim, Claim]:
     """Section 3.3: too many perturbations may not be desirable.
 
     Judged twice: after as many iterations, and after as many environment steps, of which more
     perturbations take more.
     """
-    most = max(SWEEP_PERTURBATIONS)
-    budget = min(run.environment_steps[-1] for run in results.select("sweep"))
+    sweep = results.sweep()
+    most = max(perturbations for _, perturbations in sweep)
+    budget = min(run.environment_steps for runs in sweep.values() for run in runs)
     measure = f"mean final distance with {most} perturbations, less that with fewer"
-    after_iterations = _sweep_difference(f"{measure} [m]", results.sweep(), lambda _, n: n == most)
-    after_steps = _sweep_difference(
+    after_iterations = _difference(
+        f"{measure} [m]", [(n == most, final_distances(runs)) for (_, n), runs in sweep.items()]
+    )
+    after_steps = _difference(
         f"{measure}, after {budget / 1e3:.0f} thousand environment steps [m]",
-        results.sweep(),
-        lambda _, n: n == most,
-        lambda run: run.distance_after(budget),
+        [
+            (n == most, np.array([run.distance_after(budget) for run in runs]))
+            for (_, n), runs in sweep.items()
+        ],
     )
     statement = "Too many perturbations are undesirable, after as many"
     return (
@@ -272,24 +278,10 @@ def many_perturbations_are_worse(results: Results) -> tuple[Claim, Claim]:
     )
 
 
-def _sweep_difference(
-    measure: str,
-    settings: Mapping[tuple[float, int], Sequence[TrainedRun]],
-    chosen: Callable[[float, int], bool],
-    distance: Callable[[TrainedRun], NDArray[Any]] = attrgetter("distance"),
-) -> ClaimPart:
-    """Mean of the chosen settings, less the mean of all others."""
-    n = sum(chosen(*setting) for setting in settings)
+def _difference(measure: str, groups: Sequence[tuple[bool, NDArray[Any]]]) -> ClaimPart:
+    """Mean of the chosen groups of trainings, less that of the others, claimed to be above zero."""
+    n = sum(chosen for chosen, _ in groups)
     terms = [
-        Term(
-            1.0 / n if chosen(*setting) else -1.0 / (len(settings) - n),
-            np.array([distance(run) for run in runs]),
-        )
-        for setting, runs in settings.items()
+        Term(1.0 / n if chosen else -1.0 / (len(groups) - n), values) for chosen, values in groups
     ]
-    return _difference(measure, terms)
-
-
-def _difference(measure: str, terms: Sequence[Term]) -> ClaimPart:
-    """A difference that the claim puts above zero."""
     return ClaimPart(measure, contrast(terms), "above", 0.0)

@@ -1,1 +1,0 @@
-"""The paper's experiments: trainings, stored runs, and verdicts on the claims."""
