@@ -94,7 +94,17 @@ def arrays_of(name: str, value: Any) -> dict[str, NDArray[Any]]:
 
 
 def rebuilt(kind: Any, name: str, arrays: Arrays) -> Any:
-    """Rebuild a value of a kind, a type or its annotation, from what `arrays_of` returned."""
+    """Rebuild a value of a kind, a type or its annotation, from what `arrays_of` returned.
+
+    Parameters
+    ----------
+    kind : type
+        What it is to be: a type, or the annotation of a field.
+    name : str
+        The name that it has in the file.
+    arrays : mapping of str to ndarray
+        All arrays of the file.
+    """
     if is_dataclass(kind) or hasattr(kind, "_fields"):
         hints = get_type_hints(kind)
         names = _field_names(kind)

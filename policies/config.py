@@ -19,7 +19,17 @@ Schedule = Literal["constant", "linear"]
 
 
 def scheduled(value: float, schedule: Schedule, done: float) -> float:
-    """Value of a setting after this share of the training."""
+    """Value of a setting after this share of the training.
+
+    Parameters
+    ----------
+    value : float
+        Value at the beginning.
+    schedule : {"constant", "linear"}
+        How it changes.
+    done : float
+        Share of the training, from 0 to 1.
+    """
     return value if schedule == "constant" else value * (1 - done)
 
 
@@ -53,6 +63,15 @@ def check_range(name: str, value: Any, demands: Mapping[str, Any]) -> None:
 
     Whole numbers, those of tuples, too, must be ``at_least`` so large, or 1 if it is not said, and
     ``at_most`` so large, if it is said.
+
+    Parameters
+    ----------
+    name : str
+        The setting, for messages.
+    value : object
+        Its value; other than numbers and tuples of them, anything is fine.
+    demands : mapping
+        Metadata of its field.
     """
     if isinstance(value, tuple):
         for each in value:

@@ -299,7 +299,17 @@ def run_training(
     state: TrainingState | None = None,
     on_iteration: Callable[[Any], object] | None = None,
 ) -> TrainingResult:
-    """Iterate until the training is complete; see `train_policy`."""
+    """Iterate until the training is complete; see `train_policy`.
+
+    Parameters
+    ----------
+    config : TrainingConfig
+        The settings.
+    training : Training
+        What `begin_training` prepared with them.
+    state, on_iteration
+        As for `train_policy`.
+    """
     if state is None:
         state = training.initial_state()
     while state.iteration < config.iterations:

@@ -151,7 +151,21 @@ def sample_seen(
     *,
     start_spread: float | None = None,
 ) -> StartsAndGoals:
-    """Draw scenarios as a training meets them: with a mirror, those on the left reflected."""
+    """Draw scenarios as a training meets them: with a mirror, those on the left reflected.
+
+    Parameters
+    ----------
+    mirror : Mirror or None
+        The reflection.
+    simulator : Simulator
+        Draws starts and goals.
+    rng : numpy.random.Generator
+        Random numbers.
+    count : int
+        Number of scenarios.
+    start_spread : float, optional
+        That of the starts; the task's by default.
+    """
     drawn = simulator.sample(rng, count, start_spread=start_spread)
     return drawn if mirror is None else mirror.scenarios_from_the_right(*drawn)
 

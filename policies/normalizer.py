@@ -27,6 +27,15 @@ def fold_normalizer(
 
     Weights have the shape (..., n_out, n_observations), biases (..., n_out). The sums are taken in
     a fixed order, not by BLAS, whose order depends on the processor.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (..., n_out, n_observations)
+        Of the layers.
+    bias : ndarray, shape (..., n_out)
+        Of the layers.
+    mean, std : ndarray, shape (n_observations,)
+        Statistics by which they take observations normalised.
     """
     scaled = weights * input_scale(std)
     return scaled, bias - (scaled * mean).sum(axis=-1)

@@ -60,7 +60,17 @@ class Provenance:
 
     @classmethod
     def of(cls, algorithm: str, config: TrainingConfig, environment_steps: int) -> "Provenance":
-        """Record a training that took place here and now, with these settings."""
+        """Record a training that took place here and now, with these settings.
+
+        Parameters
+        ----------
+        algorithm : str
+            Name of the learner.
+        config : TrainingConfig
+            Its settings.
+        environment_steps : int
+            Steps that the training took.
+        """
         return cls(
             algorithm=algorithm,
             recipe=config.recipe,

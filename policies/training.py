@@ -238,7 +238,17 @@ def shown_progress(config: TrainingConfig) -> Iterator[TrainingProgress]:
 
 
 class CheckpointKeeper:
-    """Saves the latest state every few seconds and on demand."""
+    """Saves the latest state every few seconds and on demand.
+
+    Parameters
+    ----------
+    config : TrainingConfig
+        Settings of the training.
+    path : Path
+        File of the checkpoint.
+    state : TrainingState or None
+        Where it goes on.
+    """
 
     def __init__(self, config: TrainingConfig, path: Path, state: TrainingState | None) -> None:
         self._config, self._path, self._state = config, path, state

@@ -87,6 +87,19 @@ def ars_iteration(
     With a mirror, scenarios with goals to the left are met reflected. The statistics are frozen
     within an iteration: they are updated at its end with all observations of its episodes. A
     generator can be lent.
+
+    Parameters
+    ----------
+    config : ARSConfig
+        The settings.
+    simulator : Simulator
+        Where policies are tried.
+    state : ARSState
+        State before the iteration; it is left as it is.
+    mirror : Mirror, optional
+        Reflects scenarios with goals to the left.
+    rng : numpy.random.Generator, optional
+        A generator to be reused; the state says in which state it begins.
     """
     began, rng = time.perf_counter(), state.random_generator(rng)
     N, theta, normalizer = config.directions, state.theta, state.normalizer
@@ -135,6 +148,15 @@ def perturbed_policies(
     """Policies (theta + step) diag(Sigma)^(-1/2) (x - mu), then those of theta - step.
 
     Steps have the shape (N, n_actions, n_observations). The normaliser is folded in.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (n_actions, n_observations)
+        Parameters.
+    step : ndarray, shape (N, n_actions, n_observations)
+        What is added to them, and subtracted.
+    normalizer : Normalizer
+        Statistics mu and Sigma, which are folded in.
     """
     n_actions, n_observations = theta.shape
     weights = np.empty((2, len(step), (n_observations + 1) * n_actions))
@@ -161,6 +183,17 @@ def ars_step(
     sigma_R is the population standard deviation of the returns of all perturbations, shape (2, N),
     as the paper defines it in section 2.1; the step is zero when all returns tie. Perturbations
     delta have the shape (N, n_actions, n_observations).
+
+    Parameters
+    ----------
+    config : ARSConfig
+        The settings.
+    delta : ndarray, shape (N, n_actions, n_observations)
+        Perturbations.
+    returns : ndarray, shape (2, N)
+        Mean returns r+ and r- of the perturbed policies.
+    step_size : float
+        Learning rate alpha.
     """
     b = config.top_directions
     top = top_directions(returns, b)

@@ -59,6 +59,15 @@ def initial_network(
     The other weights are normal numbers: those of the first layer with a standard deviation for
     each input, the others over the root of the layer's inputs. The widths are those of the layers
     after the observation. Parameters have the shape (1, n_parameters).
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Draws the weights.
+    deviations : ndarray, shape (n_observations,)
+        Standard deviations of the weights of each input.
+    widths : sequence of int
+        Of the layers after the observation.
     """
     parts = []
     for n_out in widths[:-1]:
@@ -74,6 +83,17 @@ def perturbed_networks(
     """Networks theta + step of normalised observations, then those of theta - step.
 
     Steps have the shape (n, 1, n_parameters). The normaliser is folded in.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (1, n_parameters)
+        Parameters.
+    step : ndarray, shape (n, 1, n_parameters)
+        What is added to them, and subtracted.
+    normalizer : Normalizer
+        Statistics, which are folded in.
+    widths : sequence of int
+        Of the layers, from the observation to the action.
     """
     parameters = np.concatenate([theta + step, theta - step])[:, 0]
     n_in, n_out = widths[:2]

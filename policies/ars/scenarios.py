@@ -69,6 +69,19 @@ def draw_shared(
     """Draw the scenarios of an iteration, shared and replayed as configured.
 
     With a mirror, new ones with goals to the left are reflected.
+
+    Parameters
+    ----------
+    config : ARSConfig
+        The settings.
+    simulator : Simulator
+        Draws starts and goals.
+    rng : numpy.random.Generator
+        Random numbers of the iteration.
+    failed : FailedScenarios
+        What may be replayed.
+    mirror : Mirror, optional
+        Reflects new scenarios with goals to the left.
     """
     copies = {"none": 1, "pair": 2, "iteration": 2 * config.directions}[config.sharing]
 
@@ -83,7 +96,19 @@ def draw_shared(
 def failed_after(
     config: ARSConfig, failed: FailedScenarios, scenarios: Scenarios, rollouts: Rollouts
 ) -> FailedScenarios:
-    """Add the scenarios that at least half of the policies that faced them failed."""
+    """Add the scenarios that at least half of the policies that faced them failed.
+
+    Parameters
+    ----------
+    config : ARSConfig
+        The settings.
+    failed : FailedScenarios
+        Those before the iteration.
+    scenarios : Scenarios
+        What its policies faced.
+    rollouts : Rollouts
+        How they did.
+    """
     if not config.replay_share:
         return failed
     reached = np.count_nonzero(rollouts.success.reshape(scenarios.copies, -1), axis=0)

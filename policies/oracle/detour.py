@@ -48,6 +48,17 @@ def find_detour(
 
     A tree grows from either side, in turns, until they meet. Start and ends are contact-free; the
     path, shape (m, n_joints), leads from the start to an end. None if none was found.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        Arm and scene.
+    start : ndarray, shape (n_joints,)
+        Where the path begins [rad or m].
+    ends : ndarray, shape (k, n_joints)
+        Where it may end [rad or m].
+    rng : numpy.random.Generator
+        Draws samples and shortcuts.
     """
     moved, n = slice(simulator.n_actions), simulator.n_actions
     lower, upper = simulator.arm.lower[moved], simulator.arm.upper[moved]

@@ -105,6 +105,21 @@ def solve_within(
     Row by row: the tool within ``tolerances`` of ``goals`` [m], and ``steps`` or fewer from
     ``starts``. The search begins at as many ``samples``: the start, the guess, and evenly spread
     configurations.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        Arm and scene.
+    starts, guesses : ndarray, shape (m, n_joints)
+        Where the arm is, and configurations that may be close to a solution [rad or m].
+    goals : ndarray, shape (m, 3)
+        Goal positions [m].
+    steps : ndarray of int, shape (m,)
+        Steps at most from the starts.
+    tolerances : ndarray, shape (m,)
+        Distances at most from the goals [m].
+    samples : int
+        Configurations from which each search begins.
     """
     m, n_joints = len(starts), simulator.arm.n_joints
     box = step_box(simulator, starts, steps)
@@ -142,6 +157,21 @@ def project(
     Returns where they ended [rad or m], and the distances from tool to goal [m]. ``owner`` says
     which row of the box's corners and of the goals belongs to each, and ``radius`` how far from
     the goal it may rest [m].
+
+    Parameters
+    ----------
+    simulator : Simulator
+        The arm.
+    configurations : ndarray, shape (k, n_joints)
+        Where they begin [rad or m].
+    owner : ndarray of int, shape (k,)
+        Rows of the box and of the goals that they belong to.
+    box : tuple of ndarray, shape (m, n_actions)
+        Lower and upper corners, which they do not leave [rad or m].
+    goals : ndarray, shape (m, 3)
+        Goal positions [m].
+    radius : ndarray, shape (k,)
+        How far from the goal they may rest [m].
     """
     ended, distances = configurations.copy(), np.empty(len(configurations))
     chain, _, _ = simulator.world.records
@@ -160,7 +190,17 @@ def _project_some(first: int, last: int, *arrays: Any) -> None:
 def step_box(
     simulator: Simulator, starts: NDArray[np.float64], steps: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Corners of what the actuated joints can reach in some steps, shapes (m, n_actions)."""
+    """Corners of what the actuated joints can reach in some steps, shapes (m, n_actions).
+
+    Parameters
+    ----------
+    simulator : Simulator
+        The arm and its step.
+    starts : ndarray, shape (m, n_joints)
+        Where it is [rad or m].
+    steps : ndarray of int, shape (m,)
+        How many.
+    """
     moved = slice(simulator.n_actions)
     extent = steps[:, None] * simulator.step_limit
     lower = np.maximum(simulator.arm.lower[moved], starts[:, moved] - extent)

@@ -12,6 +12,13 @@ def steps_between(
     """Steps that the straight motion between configurations takes, before rounding up.
 
     The slowest joint decides: the largest of |dq_i| / (rate_i dt) over the actuated joints.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        The arm and its step.
+    first, second : ndarray, shape (..., n_joints)
+        The configurations [rad or m].
     """
     moved = np.abs(second - first)[..., : simulator.n_actions] / simulator.step_limit
     steps: NDArray[np.float64] = moved.max(axis=-1)
@@ -30,6 +37,15 @@ def two_segments(
 
     ``vias`` are reached after ``turn`` steps, ``ends`` after ``steps``; where these are equal, the
     ends are not visited. Shape (m, horizon, n_actions).
+
+    Parameters
+    ----------
+    simulator : Simulator
+        The arm, its step and the horizon.
+    starts, vias, ends : ndarray, shape (m, n_joints)
+        Where the motions begin, turn and end [rad or m].
+    turn, steps : ndarray of int, shape (m,)
+        Steps to the turn, and to the end.
     """
     moved = slice(simulator.n_actions)
     after = np.maximum(steps - turn, 1)
@@ -49,7 +65,13 @@ def straight(
     ends: NDArray[np.float64],
     steps: NDArray[np.int64],
 ) -> NDArray[np.float64]:
-    """Actions that move straight to a configuration, then rest; see `two_segments`."""
+    """Actions that move straight to a configuration, then rest; see `two_segments`.
+
+    Parameters
+    ----------
+    simulator, starts, ends, steps
+        As for `two_segments`.
+    """
     return two_segments(simulator, starts, ends, ends, steps, steps)
 
 
@@ -60,6 +82,15 @@ def along_path(
 
     A step ends at every configuration if the path is followed ``through_corners``; else steps cut
     corners, and are fewer. Shape (horizon, n_actions); None if the horizon is too short.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        The arm, its step and the horizon.
+    path : ndarray, shape (m, n_joints)
+        Configurations, connected by straight segments [rad or m].
+    through_corners : bool
+        Whether every one of them is visited.
     """
     lengths = steps_between(simulator, path[:-1], path[1:])
     if through_corners:

@@ -50,6 +50,15 @@ def demonstrate(
 ) -> Demonstrations:
     """Let the oracle solve scenarios; those that it does not solve are left out.
 
+    Parameters
+    ----------
+    simulator : Simulator
+        What the oracle solves them in.
+    scenarios : tuple of ndarray, shapes (n, n_joints) and (n, 3)
+        Starts [rad or m] and goals [m].
+    threads : int, optional
+        As for `kinarm.policies.Oracle`.
+
     Raises
     ------
     InvalidInputError

@@ -44,6 +44,15 @@ class PPOTraining:
     The model is Stable-Baselines3's, its rollouts and updates compiled; see `CompiledPPO`. The
     result does not depend on the number of ``threads``. On demand, Stable-Baselines3 writes its
     logs to the folder ``tensorboard``.
+
+    Parameters
+    ----------
+    config : PPOConfig
+        The settings.
+    tensorboard : str or Path, optional
+        Folder of the logs.
+    threads : int, optional
+        Threads of an update; as many as there are processors by default.
     """
 
     @alone_in_torch()

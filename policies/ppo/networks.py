@@ -54,6 +54,15 @@ def split_parameters(
     The order is that of Stable-Baselines3: standard deviations, hidden layers of actor and critic,
     last layers of actor and critic; of every layer the weights come first.
 
+    Parameters
+    ----------
+    vector : ndarray, shape (n_parameters,)
+        All parameters.
+    n_observations, n_actions : int
+        Widths of the input and of the actor's output.
+    net_arch : sequence of int
+        Widths of the hidden layers.
+
     Raises
     ------
     InvalidInputError
@@ -80,7 +89,17 @@ def initial_parameters(
     n_actions: int,
     log_std: float,
 ) -> NDArray[np.float32]:
-    """Draw parameters as Stable-Baselines3 does: orthogonal weights, and biases of zero."""
+    """Draw parameters as Stable-Baselines3 does: orthogonal weights, and biases of zero.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Draws the weights.
+    n_observations, net_arch, n_actions
+        As for `split_parameters`.
+    log_std : float
+        Logarithm of the standard deviation of the actions.
+    """
     widths = [n_observations, *net_arch]
     inner = sum((n_in + 1) * n_out for n_in, n_out in pairwise(widths))
     vector = np.zeros(2 * inner + (n_actions + 1) * (net_arch[-1] + 1) + n_actions)

@@ -79,6 +79,21 @@ class TrainingVecEnv(SB3VecEnv):
     with goals to the left are reflected, so that a learner only ever meets goals to the right.
     What is recorded of episodes that ended leaves out those that replayed a failed scenario. To
     stop at the goal, a success takes two steps in a row within the tolerance.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        What is stepped.
+    num_envs : int
+        Number of arms.
+    rng : numpy.random.Generator
+        Draws scenarios.
+    mirror : Mirror, optional
+        Reflects those with goals to the left.
+    replay : Replay, optional
+        How failed scenarios are replayed; never, if it is not given.
+    stop_at_goal : bool
+        Whether a success takes two steps within the tolerance.
     """
 
     def __init__(

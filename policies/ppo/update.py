@@ -92,6 +92,17 @@ def run_parts(kernel: Callable[..., None], n_parts: int, threads: int, *arrays: 
     The calling thread works, too, and never waits for one that has not begun: where processors
     are busy with something else, it does all by itself. Kernels release the GIL and treat parts
     independently, so the result does not depend on who did what.
+
+    Parameters
+    ----------
+    kernel : callable
+        Called with the first part, the one after the last, and the arrays.
+    n_parts : int
+        Number of parts.
+    threads : int
+        Threads at most.
+    *arrays
+        What the kernel reads and writes.
     """
     parts = iter(range(n_parts))  # whose next number only one thread gets: it holds the GIL
 

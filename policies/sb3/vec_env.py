@@ -317,6 +317,15 @@ class SB3VecEnv(Lifecycle, VecEnv):
     def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
         """Set an attribute of the environment, which all arms share.
 
+        Parameters
+        ----------
+        attr_name : str
+            Its name.
+        value : object
+            Its value.
+        indices : int or iterable of int, optional
+            Which arms; there is no choice but all.
+
         Raises
         ------
         InvalidInputError
@@ -332,6 +341,15 @@ class SB3VecEnv(Lifecycle, VecEnv):
         self, method_name: str, *method_args: Any, indices: Indices = None, **method_kwargs: Any
     ) -> list[Any]:
         """What a method of the interface returns, repeated for every arm.
+
+        Parameters
+        ----------
+        method_name : str
+            Its name.
+        *method_args, **method_kwargs
+            What it is called with.
+        indices : int or iterable of int, optional
+            Arms for which the result is repeated; all by default.
 
         Raises
         ------
