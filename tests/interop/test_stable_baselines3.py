@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 
-from stable_baselines3 import A2C, DDPG, DQN, PPO, SAC, TD3, HerReplayBuffer
+from stable_baselines3 import A2C, DDPG, PPO, SAC, TD3, HerReplayBuffer
 from stable_baselines3.common.callbacks import EvalCallback, StopTrainingOnRewardThreshold
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.evaluation import evaluate_policy
@@ -56,14 +56,6 @@ class TestFirstLines:
         env = make_vec_env(f"kinarm:{FLAT}", n_envs=2, vec_env_cls=SubprocVecEnv)
         assert PPO("MlpPolicy", env, **rollouts(2)).learn(64).num_timesteps == 64
         env.close()
-
-    def test_goals_need_their_policy(self):
-        with pytest.raises(ValueError, match="MultiInputPolicy"):
-            PPO("MlpPolicy", GOALS)
-
-    def test_discrete_learners_refuse(self):
-        with pytest.raises(AssertionError, match="action spaces"):
-            DQN("MlpPolicy", sb3_vec_env(FLAT, 2))
 
 
 class TestLearners:

@@ -111,12 +111,6 @@ class TestTopDirections:
         np.testing.assert_array_equal(top_directions(returns, 3), [1, 3, 0])
         np.testing.assert_array_equal(top_directions(returns, 4), [1, 3, 0, 2])
 
-    def test_many_ties_keep_their_order(self):
-        returns = np.random.default_rng(15).integers(0, 3, (2, 500)).astype(float)
-        expected = sorted(range(500), key=lambda k: -returns[:, k].max())
-        for b in (1, 77, 500):
-            np.testing.assert_array_equal(top_directions(returns, b), expected[:b])
-
 
 class TestPerturbations:
     def test_are_those_of_box_and_muller(self):
@@ -226,12 +220,6 @@ class TestIteration:
         second = old.count * (old.std**2 + old.mean**2) + (seen**2).sum(axis=0)
         variance = np.maximum(second / count - combined**2, 0)
         np.testing.assert_allclose(after.normalizer.std**2, variance, atol=1e-10)
-
-    def test_first_state_is_zero(self):
-        state = ARSTraining(TINY, threads=1).initial_state()
-        np.testing.assert_array_equal(state.theta, np.zeros((5, 48)))
-        np.testing.assert_array_equal(state.normalizer.std, np.ones(48))
-        assert (state.iteration, state.environment_steps, state.wall_time) == (0, 0, 0.0)
 
     def test_statistics_are_frozen_within_an_iteration(self, tiny_simulator, monkeypatch):
         state = run(TINY, tiny_simulator, 1)[-1]
@@ -386,13 +374,6 @@ class TestTraining:
         config = ARSConfig(step_size=0.4, step_size_schedule="linear", iterations=4)
         assert [config.step_size_at(k) for k in range(5)] == pytest.approx([0.4, 0.3, 0.2, 0.1, 0])
         assert ARSConfig(step_size=0.4).step_size_at(700) == 0.4
-
-    def test_weights_reach_the_simulator(self):
-        weights = RewardWeights(collision=-3, success=2, step=-0.1)
-        config = replace(TINY, reward=weights, problem=SHORT.replace(start_spread=0.5))
-        task = config.simulator().task
-        assert task.reward == weights
-        assert (task.horizon, task.start_spread) == (8, 0.5)
 
     def test_without_weights_those_of_the_task_count(self):
         weights = RewardWeights(success=3)

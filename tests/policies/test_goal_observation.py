@@ -46,14 +46,6 @@ def test_others_are_refused(shown, change, message):
 
 
 class TestPredict:
-    def test_answers_as_a_call_and_gives_the_state_back(self, shown):
-        policy, (flat, parts) = load_policy("ppo-tuned-both"), shown
-        actions, state = policy.predict(flat, "mine", np.zeros(30, dtype=bool), False)
-        np.testing.assert_array_equal(actions, policy(flat))
-        assert state == "mine"
-        of_parts, _ = policy.predict(parts)
-        np.testing.assert_allclose(of_parts, actions, rtol=0, atol=1e-12)
-
     def test_drives_a_goal_conditioned_environment(self):
         env, policy = ReachGoalEnv("right"), load_policy("ppo-tuned-both")
         reached = []

@@ -36,12 +36,6 @@ def test_v1_and_brs_lack_the_augmentations():
         assert config.top_directions == config.directions
 
 
-def test_settings_replace_those_of_the_recipe():
-    config = recipe("ars", "tuned", problem="both", seed=4, iterations=None)
-    assert (config.problem, config.seed) == (PROBLEMS["both"], 4)
-    assert config.iterations == ARS_RECIPES["tuned"].iterations
-
-
 def test_unknown_setting_is_refused():
     words = "unknown setting of ars 'learning_rate'; available: problem, reward, seed"
     with pytest.raises(UnknownNameError, match=words):

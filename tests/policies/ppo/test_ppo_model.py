@@ -14,7 +14,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.logger import Logger
 
 from kinarm.errors import InvalidInputError
-from kinarm.policies import PPOConfig, recipe, train_policy
+from kinarm.policies import PPOConfig, recipe
 from kinarm.policies.ppo.learner import PPOTraining
 from kinarm.policies.ppo.networks import initial_parameters, orthogonal, split_parameters
 from kinarm.problem import PROBLEMS
@@ -183,18 +183,6 @@ def test_a_vector_of_another_network_is_refused():
         split_parameters(vector[:-1], 7, (3, 2), 1)
 
 
-def test_threads_are_an_option():
-    config = replace(AWKWARD, iterations=1)
-    first, second = (train_policy(config, threads=threads).state for threads in (1, 2))
-    assert first.parameters.tobytes() == second.parameters.tobytes()
-
-
-@pytest.mark.parametrize("threads", [0, 1.5])
-def test_threads_that_cannot_be(threads):
-    with pytest.raises(InvalidInputError, match="threads must be a whole number of at least 1"):
-        train_policy(AWKWARD, threads=threads)
-
-
 class TestModel:
     def test_is_one_of_stable_baselines3_in_file_and_out(self, tmp_path):
         training, state = begun(AWKWARD)
@@ -213,12 +201,6 @@ class TestModel:
         assert plain.num_timesteps == training.model.num_timesteps + AWKWARD.steps_per_iteration
         steps = {float(state["step"]) for state in plain.policy.optimizer.state.values()}
         assert steps == {3 * 3 * 3}
-
-    def test_a_callback_can_end_a_rollout(self):
-        training, state = begun(AWKWARD, 0)
-        training.model.learn(1000, callback=lambda *_: False, reset_num_timesteps=False)
-        assert training.model.num_timesteps == AWKWARD.n_envs
-        np.testing.assert_array_equal(training.model.parameters(), state.parameters)
 
 
 class TestParameters:

@@ -1,11 +1,9 @@
 """What `sb3_vec_env` makes of problems, ids and settings, and what it refuses."""
 
-import gymnasium
 import numpy as np
 import pytest
 
 from kinarm import PROBLEMS
-from kinarm.envs import ReachEnv
 from kinarm.errors import InvalidInputError, MissingExtraError, UnknownNameError
 from kinarm.policies import sb3_vec_env
 
@@ -41,15 +39,6 @@ class TestProblems:
             assert env.simulator.problem == PROBLEMS[problem]
             assert type(env.observation_space).__name__ == space
             assert (env.num_envs, env.spec.id) == (3, env_id)
-
-    def test_ids_of_their_own(self):
-        name = "Test/Wide-v0"
-        gymnasium.register(name, entry_point=ReachEnv, kwargs={"tolerance": 0.2, "horizon": 5})
-        try:
-            env = sb3_vec_env(name, horizon=7)
-        finally:
-            del gymnasium.registry[name]
-        assert env.simulator.problem == PROBLEMS["right"].replace(tolerance=0.2, horizon=7)
 
     def test_a_reward_type_makes_goals(self):
         env = sb3_vec_env("both", 2, reward_type="dense", horizon=4)

@@ -8,7 +8,6 @@ pytest.importorskip("stable_baselines3")
 
 from stable_baselines3 import PPO
 from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.utils import set_random_seed
 from stable_baselines3.common.vec_env import DummyVecEnv, VecFrameStack
 
 from kinarm.envs import ClosedEnvironmentError, ResetNeededError
@@ -127,14 +126,6 @@ class TestSeeds:
         first, second = trained(), trained()
         assert all((first[name] == second[name]).all() for name in first)
 
-    def test_no_seed_means_the_global_one_of_numpy(self):
-        """As their environments do it, so that `set_random_seed` is enough."""
-        env, other = sb3_vec_env("both", 2), sb3_vec_env("both", 2)
-        for each in (env, other):
-            set_random_seed(3)
-            each.seed()
-        assert_same(env.reset(), other.reset())
-
 
 class TestOptions:
     def test_starts_and_goals_can_be_set_once(self):
@@ -218,11 +209,6 @@ class TestAttributes:
             np.testing.assert_array_equal(found, wanted)
         assert len(env.env_method("compute_reward", achieved, desired, {})) == 4
 
-    def test_no_such_method(self):
-        env = sb3_vec_env(FLAT, 2)
-        with pytest.raises(AttributeError, match="compute_reward"):
-            env.env_method("compute_reward", np.zeros(3), np.zeros(3), {})
-
     def test_infos_are_as_if_monitored(self):
         env = sb3_vec_env(FLAT, 2)
         assert env.env_is_wrapped(Monitor) == [True, True]
@@ -246,14 +232,6 @@ class TestPictures:
         env.step(np.ones((1, 5)))
         single.step(np.ones(5))
         np.testing.assert_array_equal(env.render(), single.render())
-
-    def test_a_list_holds_every_step(self):
-        env = sb3_vec_env(FLAT, 2, render_mode="rgb_array_list", **SIZE)
-        env.reset()
-        for _ in range(3):
-            env.step(np.zeros((2, 5)))
-        assert [picture.shape for picture in env.render()] == [(48, 128, 3)] * 4
-        assert env.render() == []
 
 
 class TestReplay:
@@ -309,16 +287,6 @@ class TestReplay:
                 other.seed(7)
             assert [goal for goal, _ in self.play(other, 80)] == [goal for goal, _ in wanted]
             np.testing.assert_array_equal(other.failed.starts, env.failed.starts)
-
-    def test_the_last_failures_are_given_back(self):
-        env = sb3_vec_env(FLAT, 10, seed=4, replay_share=0.5, replay_size=5)
-        self.play(env, 80)
-        starts, goals = env.failed
-        assert len(goals) == 5
-        env.restore_failed(np.concatenate([starts[::-1], starts]), np.concatenate([goals] * 2))
-        np.testing.assert_array_equal(env.failed.starts, starts)
-        env.restore_failed(starts[:0], goals[:0])
-        assert len(env.failed.goals) == 0
 
     def test_failures_that_cannot_be_given_back(self):
         env, home = sb3_vec_env(FLAT, 2, replay_share=0.5), np.zeros((1, 6))
