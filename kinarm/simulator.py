@@ -53,8 +53,6 @@ class Simulator:
     ----------
     world : World
         Arm and scene, and what can be asked about configurations.
-    threads : int
-        Threads for large batches.
     checked_by_coal : int
         Configurations that rollouts and steps have asked Coal about so far.
     """
@@ -122,11 +120,6 @@ class Simulator:
         ----------
         rng, count, start_spread
             As for `kinarm.scenarios.draw_scenarios`.
-
-        Returns
-        -------
-        starts, goals : ndarray, shape (count, n_joints) and (count, 3)
-            Configurations [rad or m] and goal positions [m].
         """
         return draw_scenarios(self.world, rng, count, start_spread=start_spread)
 
@@ -292,14 +285,13 @@ class Simulator:
         """Allocate and start episodes for stepping."""
         at_rest = table_control(np.zeros((len(starts), 1, self.n_actions)))
         batch = Batch.bound(self.world, at_rest, starts, goals, record=record, shift=shift)
-        self._last = batch
         self._start(batch.episodes, np.arange(len(starts)), batch.session)
+        self._last = batch
         return batch.episodes
 
     def _run(self, batch: Batch) -> Episodes:
         """Start the episodes of a batch, and advance them to their end."""
-        episodes = batch.episodes
-        n = len(episodes.status)
+        episodes, n = batch.episodes, len(batch.episodes.status)
         self._start(episodes, np.arange(n), batch.session)
         self._advance(batch.session, episodes, n * self.task.horizon)
         return episodes
