@@ -2,10 +2,8 @@
 
 import numpy as np
 import pinocchio as pin
-import pytest
 from configurations import random_configurations
 
-from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.world import World
 
 
@@ -66,15 +64,3 @@ def test_threads_do_not_matter(simulator):
     first, second = (World(simulator.problem, threads=threads) for threads in (1, 3))
     np.testing.assert_array_equal(first.poses(q), second.poses(q))
     np.testing.assert_array_equal(first.jacobians(q), second.jacobians(q))
-
-
-def test_bad_input(simulator):
-    world = simulator.world
-    with pytest.raises(UnknownNameError, match="frame 'claw'; available: axis_1, axis_2"):
-        world.poses(np.zeros(6), "claw")
-    for ask in (world.poses, world.jacobians, world.in_contact, world.clearance):
-        for given in (np.zeros(5), np.zeros((2, 5)), 0.0, [[0] * 6, [0] * 5], "here"):
-            with pytest.raises(InvalidInputError, match="configurations must"):
-                ask(given)
-        with pytest.raises(InvalidInputError, match="configurations must be finite"):
-            ask(np.full(6, np.inf))

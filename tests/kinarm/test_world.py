@@ -56,23 +56,46 @@ def test_a_copy_can_take_other_rules(simulator, copied):
     np.testing.assert_array_equal(other.screen(q)[1], known[0][1])
 
 
+@pytest.mark.parametrize(
+    ("asked", "given", "message"),
+    [
+        *(
+            (asked, given, message)
+            for asked in ("observe", "distances")
+            for given, message in (
+                ((np.zeros((2, 5)), np.zeros((2, 3))), r"configurations must have shape \(n, 6\)"),
+                ((np.zeros((2, 6)), np.zeros((1, 3))), r"goals must have shape \(2, 3\)"),
+                ((np.full((1, 6), np.nan), np.zeros((1, 3))), "configurations must be finite"),
+            )
+        ),
+        ("screen", (np.zeros((2, 5)),), "configurations must"),
+        *(
+            (asked, given, message)
+            for asked in ("contact", "contact_pair")
+            for bad in (np.zeros(5), np.full(6, np.nan), 0.0)
+            for given, message in (
+                ((np.zeros(6), bad), "target must"),
+                ((bad, np.zeros(6)), "configuration must"),
+            )
+        ),
+        *(
+            (asked, (bad,), "configurations must")
+            for asked in ("poses", "jacobians", "in_contact", "clearance")
+            for bad in (np.zeros(5), np.zeros((2, 5)), 0.0, [[0] * 6, [0] * 5], "here")
+        ),
+        *(
+            (asked, (np.full(6, np.inf),), "configurations must be finite")
+            for asked in ("poses", "jacobians", "in_contact", "clearance")
+        ),
+        ("poses", (np.zeros(6), "claw"), "frame 'claw'; available: axis_1, axis_2"),
+    ],
+)
+def test_bad_input(simulator, asked, given, message):
+    with pytest.raises(InvalidInputError, match=message):
+        getattr(simulator.world, asked)(*given)
+
+
 class TestObserve:
-    @pytest.mark.parametrize(
-        ("configurations", "goals", "message"),
-        [
-            (np.zeros((2, 5)), np.zeros((2, 3)), r"configurations must have shape \(n, 6\)"),
-            (np.zeros((2, 6)), np.zeros((1, 3)), r"goals must have shape \(2, 3\)"),
-            (np.full((1, 6), np.nan), np.zeros((1, 3)), "configurations must be finite"),
-        ],
-    )
-    def test_bad_input(self, simulator, configurations, goals, message):
-        for ask in (simulator.world.observe, simulator.world.distances):
-            with pytest.raises(InvalidInputError, match=message):
-                ask(configurations, goals)
-
-        with pytest.raises(InvalidInputError, match="configurations must"):
-            simulator.world.screen(configurations[:, :5])
-
     def test_touching_configurations_are_observed_like_others(self, simulator):
         seen = simulator.world.observe(FALLING[None], np.ones((1, 3)))
         np.testing.assert_allclose(seen[0, 3:6], 1 - simulator.arm.tool_position(FALLING))
@@ -85,14 +108,6 @@ class TestObserve:
 
 
 class TestContact:
-    @pytest.mark.parametrize("end", [np.zeros(5), np.full(6, np.nan), 0.0])
-    def test_bad_ends(self, simulator, end):
-        for ask in (simulator.world.contact, simulator.world.contact_pair):
-            with pytest.raises(InvalidInputError, match="target must"):
-                ask(np.zeros(6), end)
-            with pytest.raises(InvalidInputError, match="configuration must"):
-                ask(end, np.zeros(6))
-
     def test_of_configurations(self, any_simulator):
         world, q = any_simulator.world, random_configurations(any_simulator, 6, 200)
         touching, pairs = world.in_contact(q), world.contact_pairs(q)
