@@ -18,10 +18,18 @@ FORBIDDEN = {
 SOURCES = [path for folder in PACKAGES for path in sorted((ROOT / folder).glob("**/*.py"))]
 
 
-def imported_modules(path):
+def nodes_of(tree, *, types):
+    """All nodes of a syntax tree, or those that do not stand there for types alone."""
+    for node in ast.iter_child_nodes(tree):
+        if types or not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
+            yield node
+            yield from nodes_of(node, types=types)
+
+
+def imported_modules(path, *, types=True):
     """Names of everything that a source file imports, at any depth."""
     names = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in nodes_of(ast.parse(path.read_text(encoding="utf-8")), types=types):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -51,14 +59,7 @@ def module_name(path):
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-KNOWN = (
-    "kinarm.problem",
-    "kinarm.policies.policy",
-    "kinarm.policies.conversion.",
-    "kinarm.evaluation.replay.",
-    "kinarm.evaluation.experiments.",
-    "kinarm.evaluation.studies.",
-)
+KNOWN = ("kinarm.policies.policy", "kinarm.policies.conversion.", "kinarm.evaluation.replay.")
 """Beginnings of the names of modules that need each other still, and are to be untangled."""
 
 
@@ -66,7 +67,7 @@ def modules_needed():
     """Modules that each module imports, at any depth; a package only for what it defines itself."""
     names, needed = {module_name(path): path for path in SOURCES}, {}
     for name, path in names.items():
-        found = imported_modules(path) & set(names)
+        found = imported_modules(path, types=False) & set(names)
         packages = {
             other for other in found if any(lies_in(each, other) for each in found - {other})
         }
