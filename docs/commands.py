@@ -21,9 +21,9 @@ EVERYWHERE = ("help", "version")
 
 
 def programs() -> dict[str, Callable[[Sequence[str]], None]]:
-    """The programs that an install of kinarm brings, by name."""
+    """The programs that an install of kinarm brings, by name; `kinarm` alone only lists them."""
     scripts = entry_points(group="console_scripts")
-    ours = (script for script in scripts if script.value.startswith("kinarm."))
+    ours = (script for script in scripts if script.name.startswith("kinarm-"))
     return {script.name: script.load() for script in sorted(ours, key=lambda each: each.name)}
 
 

@@ -108,7 +108,7 @@ def run_command(command: str) -> None:
     """Run a command line of kinarm in this process, another one in a shell."""
     command, _, file = command.partition(" > ")
     program, *arguments = shlex.split(command)
-    if program not in PROGRAMS:
+    if program not in PROGRAMS or program == "kinarm":  # which starts processes of its own
         path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
         subprocess.run(["sh", "-c", command], check=True, env={**os.environ, "PATH": path})
         return
