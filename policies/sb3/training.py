@@ -65,7 +65,7 @@ class SteppedLearning:
         self.model = model
         self.taken, self._steps = 0, steps
         self._may_go_on, self._has_stopped = threading.Semaphore(0), threading.Semaphore(0)
-        self._error: Exception | None = None
+        self._error: BaseException | None = None
         self._abandoned = False
         threading.Thread(target=self._learn, daemon=True).start()
 
@@ -79,8 +79,10 @@ class SteppedLearning:
         """
         self._may_go_on.release()
         self._has_stopped.acquire()
-        if self._error is not None:
+        if isinstance(self._error, REFUSALS):
             raise InvalidInputError(first_line(self._error)) from self._error
+        if self._error is not None:
+            raise self._error
 
     def abandon(self) -> None:
         """Let the thread end."""
@@ -94,7 +96,7 @@ class SteppedLearning:
         environment_steps = self._steps * self.model.n_envs
         try:
             self.model.learn(environment_steps, callback=self._after_step)
-        except REFUSALS as error:
+        except BaseException as error:  # which is raised where a step was asked for
             self._error = error
         self._has_stopped.release()
 

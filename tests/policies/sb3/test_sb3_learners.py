@@ -92,6 +92,19 @@ def test_it_resumes_exactly_and_leaves_the_global_generators_alone(tmp_path):
     assert np.random.get_state()[1].tobytes() == before  # noqa: NPY002
 
 
+@pytest.mark.parametrize(("error", "raised"), [(ValueError, InvalidInputError), (OSError, OSError)])
+def test_what_goes_wrong_in_a_step_is_raised_where_it_was_asked_for(monkeypatch, error, raised):
+    from kinarm.policies.sb3.vec_env import SB3VecEnv
+
+    def fail(env):
+        raise error("no more")
+
+    config = config_of("a2c")
+    monkeypatch.setattr(SB3VecEnv, "step_wait", fail)
+    with pytest.raises(raised, match="no more"):
+        train_policy(config)
+
+
 def test_the_command_takes_hyperparameters(tmp_path, capsys):
     pytest.importorskip("stable_baselines3")
     given = ("--iterations", "12", "--hyperparameters", "gamma = 0.9, n_steps = 3")
