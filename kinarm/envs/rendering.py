@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import webbrowser
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -157,7 +158,7 @@ class EnvPictures:
     def close(self) -> None:
         """End the live page, and forget all pictures."""
         if self._stage is not None:
-            self._stage.close()
+            self._stage.server.close()
         self._stage, self._renderer, self._frames = None, None, []
 
     def _take(self) -> Pictures:
@@ -181,9 +182,12 @@ class EnvPictures:
     def _live_stage(self) -> LiveStage:
         """The live page, opened with the first call."""
         if self._stage is None:
+            from kinarm.viewer.live_server import LiveServer
             from kinarm.viewer.live_stage import LiveStage
 
-            self._stage = LiveStage.opened(self._simulator.problem, self._simulator.arm)
+            server = LiveServer()
+            self._stage = LiveStage(server, self._simulator.problem, self._simulator.arm)
+            webbrowser.open(server.address)
         return self._stage
 
     def _way(self, row: int) -> tuple[NDArray[np.float64], str | None]:

@@ -1,9 +1,6 @@
 """A problem on a live page: an arm that moves on command."""
 
-from __future__ import annotations
-
 import time
-import webbrowser
 
 import numpy as np
 import pinocchio as pin
@@ -40,19 +37,6 @@ class LiveStage:
         draw_goal(window["goal"], problem)
         self._frames = draw_arm(window["arm"], arm)[1:]
 
-    @classmethod
-    def opened(cls, problem: ReachProblem, arm: Arm) -> LiveStage:
-        """Serve a stage on a free port, and show it in the browser.
-
-        Raises
-        ------
-        OutputError
-            If no port is free.
-        """
-        stage = cls(LiveServer(), problem, arm)
-        webbrowser.open(stage.server.address)
-        return stage
-
     def begin(self, configuration: NDArray[np.float64], goal: ArrayLike) -> None:
         """Show a start and a goal [rad or m, m], and no way yet."""
         place = np.eye(4)
@@ -75,7 +59,3 @@ class LiveStage:
         """Wait until some time has passed since the last call was over [s]."""
         time.sleep(max(self._due + seconds - time.monotonic(), 0.0))
         self._due = time.monotonic()
-
-    def close(self) -> None:
-        """Stop serving."""
-        self.server.close()
