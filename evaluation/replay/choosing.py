@@ -12,16 +12,13 @@ from kinarm.evaluation.contestants import (
     ORACLE,
     UNTRAINED,
     Contestant,
-    find_contestants,
     is_import_path,
 )
 from kinarm.evaluation.document import EvaluationDocument, check_same
 from kinarm.evaluation.replay.request import ReplayRequest
-from kinarm.evaluation.replay.runs import Run
+from kinarm.evaluation.replay.runs import Run, faced_problem, first_contestant, stated_problem
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.library import BEST, group_of, policy_names
-from kinarm.problem import ReachProblem
-from kinarm.problem_options import ProblemOptions
 from kinarm.recording import Recording, load_recordings
 
 PLAYED, SEARCHED, FAILING = 5, 200, 10_000
@@ -65,50 +62,6 @@ class Chosen:
     runs: list[list[Recording]]
     groups: list[str] = field(default_factory=list)
     heading: str = ""
-
-
-def first_contestant(name: str | None, problem: ReachProblem | None = None) -> Contestant:
-    """The contestant of a name; of a group, its first seed.
-
-    Where the contestant does not say which problem it is for, it is this one.
-
-    Raises
-    ------
-    InvalidInputError
-        If none is named, or it does not exist.
-    """
-    if name is None:
-        raise InvalidInputError("name a --policy, or a file of recordings or of an evaluation")
-    return find_contestants(name, problem)[0]
-
-
-def faced_problem(
-    contestants: Sequence[Contestant], options: ProblemOptions, stated: ReachProblem | None
-) -> ReachProblem:
-    """The problem that is stated, or what options make of that of the first trained contestant.
-
-    Raises
-    ------
-    InvalidInputError
-        If no contestant was trained and no option names a problem.
-    """
-    if stated is not None:
-        return stated
-    trained = [contestant.problem for contestant in contestants if contestant.problem is not None]
-    if not trained:
-        raise InvalidInputError(f"{contestants[0].name!r} was not trained: name a --problem")
-    return options.resolve(trained[0])
-
-
-def stated_problem(
-    options: ProblemOptions, names: Sequence[str | None] = ()
-) -> ReachProblem | None:
-    """The problem that options name, if they name one.
-
-    The best policy is for some problem: for the usual one if none is named.
-    """
-    named = options.problem is not None or options.task is not None
-    return options.resolve() if named or BEST in names else None
 
 
 def find_candidates(request: ReplayRequest) -> Candidates:

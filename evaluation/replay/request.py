@@ -223,12 +223,8 @@ class ReplayRequest(ProblemOptions):
 
     def _serve(self, report: Callable[[str], object]) -> None:
         """Serve fresh trials until this is interrupted."""
-        from kinarm.evaluation.replay.choosing import (
-            faced_problem,
-            first_contestant,
-            stated_problem,
-        )
         from kinarm.evaluation.replay.live import follow, fresh_recordings
+        from kinarm.evaluation.replay.runs import faced_problem, first_contestant, stated_problem
         from kinarm.simulator import Simulator
         from kinarm.viewer.live_server import PORT, LiveServer
 

@@ -5,11 +5,15 @@ from dataclasses import dataclass
 from functools import partial
 from typing import cast
 
-from kinarm.evaluation.contestants import Contestant
+from kinarm.errors import InvalidInputError
+from kinarm.evaluation.contestants import Contestant, find_contestants
 from kinarm.evaluation.outcomes import Cause, End, Outcome, Pair, ends_of, failure_causes
 from kinarm.evaluation.trials import TrialSet
+from kinarm.policies.library import BEST
 from kinarm.policies.oracle.solution import OracleSolutions
 from kinarm.policies.provenance import package_versions, source_commit
+from kinarm.problem import ReachProblem
+from kinarm.problem_options import ProblemOptions
 from kinarm.recording import Recording, record_rollouts
 from kinarm.rollouts import Rollouts
 
@@ -78,6 +82,50 @@ class Run:
     def causes(self) -> dict[int, Cause]:
         """Why trials failed, by the positions of those that did."""
         return failure_causes(self.ends, self.contacts)
+
+
+def first_contestant(name: str | None, problem: ReachProblem | None = None) -> Contestant:
+    """The contestant of a name; of a group, its first seed.
+
+    Where the contestant does not say which problem it is for, it is this one.
+
+    Raises
+    ------
+    InvalidInputError
+        If none is named, or it does not exist.
+    """
+    if name is None:
+        raise InvalidInputError("name a --policy, or a file of recordings or of an evaluation")
+    return find_contestants(name, problem)[0]
+
+
+def faced_problem(
+    contestants: Sequence[Contestant], options: ProblemOptions, stated: ReachProblem | None
+) -> ReachProblem:
+    """The problem that is stated, or what options make of that of the first trained contestant.
+
+    Raises
+    ------
+    InvalidInputError
+        If no contestant was trained and no option names a problem.
+    """
+    if stated is not None:
+        return stated
+    trained = [contestant.problem for contestant in contestants if contestant.problem is not None]
+    if not trained:
+        raise InvalidInputError(f"{contestants[0].name!r} was not trained: name a --problem")
+    return options.resolve(trained[0])
+
+
+def stated_problem(
+    options: ProblemOptions, names: Sequence[str | None] = ()
+) -> ReachProblem | None:
+    """The problem that options name, if they name one.
+
+    The best policy is for some problem: for the usual one if none is named.
+    """
+    named = options.problem is not None or options.task is not None
+    return options.resolve() if named or BEST in names else None
 
 
 def record(
