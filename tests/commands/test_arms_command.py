@@ -17,19 +17,6 @@ def rows(answer):
     return {line.split()[0]: line for line in lines}
 
 
-@pytest.mark.parametrize(
-    ("width", "left_out"), [(80, ("source", "licence")), (60, ("source", "licence", "title"))]
-)
-def test_a_narrow_table_has_fewer_columns_and_names_them(run, monkeypatch, width, left_out):
-    monkeypatch.setenv("COLUMNS", str(width))
-    lines = run("kinarm-arms").out.splitlines()
-    assert max(map(len, lines)) <= width
-    assert [line.split()[0] for line in lines[1 : 1 + len(arm_names())]] == list(arm_names())
-    told = " ".join(" ".join(lines).partition("columns that do not fit here: ")[2].split())
-    assert set(left_out) <= set(told.partition(";")[0].split(", "))
-    assert "…" not in told
-
-
 @INSTALLED
 def test_table(run):
     answer = run("kinarm-arms")

@@ -66,20 +66,6 @@ class TestModel:
         ]
         assert rows[0]["note"] == note
 
-    def test_is_replayed_alone_and_from_an_evaluation(self, run, saved):
-        evaluated = run(
-            *("kinarm-eval", "--policy", saved, "--problem", "right", "--trials", 4),
-            *("--no-oracle", "--out", "results"),
-        )
-        assert evaluated.status == 0, evaluated.err
-        alone = run("kinarm-replay", "--policy", saved, "--problem", "right", "--trials", 4)
-        assert alone.status == 0, alone.err
-        assert "normalised by" in alone.out
-        again = run(
-            *("kinarm-replay", "results/evaluation.json", "--policy", saved, "--out", "b.html")
-        )
-        assert again.status == 0, again.err
-
     @pytest.mark.parametrize("command", ["kinarm-eval", "kinarm-replay"])
     def test_needs_one_problem(self, run, saved, command):
         words = ("model.zip", "which problem it is for", "--problem")
@@ -99,13 +85,6 @@ class TestModule:
         answer = run(command, "--policy", module, "--problem", "left", "--trials", 3)
         assert answer.status == 0, answer.err
         assert module in answer.out
-
-    @pytest.mark.parametrize("command", ["kinarm-eval", "kinarm-replay"])
-    def test_what_is_not_there(self, run, module, command):
-        options = ("--problem", "left", "--trials", 2)
-        name = module.replace(":still", ":moving")
-        check_refused(run(command, "--policy", name, *options), "'moving'", "still")
-        check_refused(run(command, "--policy", "nowhere_at_all:f", *options), "nowhere_at_all")
 
     def test_actions_of_another_shape(self, run, here):
         (here / "wrong_for_tests.py").write_text("def wrong(seen):\n    return seen\n")

@@ -1,10 +1,8 @@
 """``kinarm-replay --live``: a page of its own server, and what is left when it ends."""
 
-import os
 import signal
 import socket
 import subprocess
-import time
 import urllib.request
 from pathlib import Path
 
@@ -74,21 +72,3 @@ def test_only_this_machine_is_served(live):
     live(port)
     assert listens(port)
     assert not listens(port, "127.0.0.2")
-
-
-def test_a_port_in_use(live):
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = taken.getsockname()[1]
-        process, line = live(port)
-        assert line == f"port {port} is in use: taking {port + 1}\n"
-        assert f":{port + 1}/ " in process.stdout.readline()
-
-
-def test_trials_are_reported_as_they_end(live):
-    process, _ = live(free_port())
-    os.set_blocking(process.stdout.fileno(), True)
-    began = time.monotonic()
-    assert "left 0, zero: truncated after 64 steps" in process.stdout.readline()
-    assert time.monotonic() - began < 30

@@ -1,7 +1,6 @@
 """``kinarm-problem``: list, show and check."""
 
 import json
-import re
 
 import pytest
 from matplotlib.image import imread
@@ -110,20 +109,6 @@ def test_check_says_what_is_out_of_reach(run, write, tmp_path):
     for missed in goals["not_reached"]:
         assert missed["goal"][0] >= 3
         assert "out of reach" in missed["reason"]
-
-
-def test_training_says_when_many_goals_are_out_of_reach(run, write):
-    path = write(f'arm = "paper"\nscene = "{write(FAR, "scene.toml")}"\n')
-    options = ("--recipe", "paper", "--iterations", 1, "--out", "far.npz")
-    answer = run("kinarm-train", "ars", "--problem", path, *options)
-    assert answer.status == 0
-    found = re.search(
-        r"problem mine: no contact-free configuration was found for (\d+) of 100 goals", answer.err
-    )
-    assert 30 < int(found[1]) < 70
-    fine = run("kinarm-train", "ars", "--problem", write(FREE), *options, "--overwrite")
-    assert fine.status == 0
-    assert "goals" not in fine.err
 
 
 @pytest.mark.parametrize(

@@ -44,32 +44,10 @@ def test_recordings_end_as_the_evaluation_says(run, tmp_path, evaluation, policy
     assert [each.contact for each in recorded] == contacts
 
 
-def test_what_was_recorded_plays_the_same(run, tmp_path, recordings):
-    assert run("kinarm-replay", recordings, "--out", tmp_path / "again.html").status == 0
-    again = (tmp_path / "again.html").read_bytes()
-    assert again == (recordings.parent / "page.html").read_bytes()
-
-
 def test_the_worst_of_an_evaluation(replay, evaluation):
     distances = np.array(outcomes_of(evaluation, "random")["final_distance"])
     answer = replay(evaluation, "--policy", "random", "--worst", 3, *QUICK)
     assert played(answer) == np.argsort(-distances, kind="stable")[:3].tolist()
-
-
-def test_the_worst_trials_of_several_policies_are_distinct(replay, policy_folder, tmp_path):
-    both = tmp_path / "both.npz"
-    names = (policy_folder / "mine-seed0.npz", policy_folder / "mine-seed1.npz")
-    made = [
-        recording
-        for name in names
-        for recording in ReplayRequest(policy=str(name), trials=6, oracle=False).recordings()[0]
-    ]
-    save_recordings(both, made)
-    numbers = played(replay(both, "--worst", 4))
-    farthest = {each.trial: 0.0 for each in made}
-    for each in made:
-        farthest[each.trial] = max(farthest[each.trial], each.final_distance)
-    assert numbers == sorted(farthest, key=lambda number: -farthest[number])[:4]
 
 
 @pytest.mark.parametrize(("options", "problem"), [((), "right"), (("--problem", "both"), "both")])

@@ -16,7 +16,6 @@ from kinarm.evaluation import bounds
 from kinarm.evaluation.bounds import bounds_document, oracle_bounds
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle import Oracle
-from kinarm.problem import PROBLEMS
 from kinarm.scene import PAPER_BENCHES, Obstacle, Scene
 from kinarm.task import RewardWeights
 
@@ -84,14 +83,6 @@ def test_bounds_are_those_of_the_oracle(folder, solutions):
     np.testing.assert_array_equal(found[1].path, single.path)
 
 
-def test_bounds_are_those_of_the_problem_of_the_trials(folder):
-    post = Obstacle(name="post", lower=(0.3, -0.8, 0.0), upper=(0.5, -0.6, 0.2))
-    settings = {"tolerance": 0.1, "horizon": 20, "arm": "lrmate200ic_5l"}
-    trials = draw(scene=Scene(obstacles=(post,)), **settings)
-    solver = Oracle(PROBLEMS["right"].replace(scene=Scene(obstacles=(post,)), **settings))
-    assert same(oracle_bounds(trials), solver.solve_batch(trials.starts, trials.goals))
-
-
 def test_bounds_are_known_as_long_as_the_trials_are(folder, monkeypatch):
     trials = draw()
     first = oracle_bounds(trials)
@@ -106,15 +97,6 @@ def test_equal_trials_are_looked_up(folder, solutions, monkeypatch):
     found = oracle_bounds(draw())
     assert same(found, solutions)
     assert not any(array.flags.writeable for array in found.arrays().values())
-
-
-def test_a_single_file_is_left_and_others_may_read_it(folder):
-    oracle_bounds(draw())
-    (path,) = folder.iterdir()
-    reference = folder / "reference"
-    reference.write_text("")
-    assert path.name == f"oracle-{draw().digest}-{bounds.oracle_version()}.npz"
-    assert path.stat().st_mode == reference.stat().st_mode
 
 
 def test_the_reward_does_not_matter(folder, monkeypatch):

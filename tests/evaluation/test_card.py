@@ -112,15 +112,6 @@ def test_without_the_oracle(faced, document):
     assert "| | this policy |\n| --- | --- |\n" in text
 
 
-def test_says_it_if_the_problem_is_another_one(skilled, trials):
-    harder = PROBLEMS["right"].replace(tolerance=0.03, name="harder")
-    other = trials.draw(harder, 4, 0)
-    evaluation = run_trials(Contestant.from_policy("mine", skilled), other)
-    text = policy_card("mine", evaluation_document([evaluation], "made"), evaluation)
-    assert "it was trained for another one, `right`" in text
-    assert "within 0.03 m" in text
-
-
 class TestCheck:
     @pytest.fixture
     def mine(self, skilled):

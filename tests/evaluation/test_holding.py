@@ -14,8 +14,6 @@ from kinarm.evaluation.evaluation import evaluate, pool, run_trials
 from kinarm.evaluation.holding import AIM, Holding, measure_holding
 from kinarm.evaluation.metrics import CLOSE, HOLDING_WITHIN
 from kinarm.evaluation.outcomes import HOLDING_STEPS, Outcomes
-from kinarm.evaluation.trials import TrialSet
-from kinarm.problem import PROBLEMS
 
 
 @pytest.fixture(scope="module")
@@ -91,12 +89,6 @@ def test_a_policy_that_does_not_move_stays_where_it_is(trials):
     assert (held.steps == trials.problem.task.horizon).all()
 
 
-def test_a_horizon_shorter_than_what_is_held():
-    trials = TrialSet.draw(PROBLEMS["right"].replace(horizon=3), 4, 0)
-    held = measure_holding(find_contestants("zero")[0], trials)
-    np.testing.assert_allclose(held.closest, held.farthest_at_end)
-
-
 def test_functions_and_random_actions_are_held_too(trials):
     moved = evaluate(lambda seen: np.zeros((len(seen), 5)), "right", trials=3, hold=True)
     assert moved.metrics["held"].value == 0
@@ -123,11 +115,3 @@ def test_seeds_are_pooled(skilled, trials):
 def test_without_it_there_is_nothing_to_tell(skilled_evaluation):
     figures = estimate_metrics(Outcomes((skilled_evaluation.rollouts,)))
     assert figures["held"].value is figures["median_approach"].value is None
-
-
-def test_what_is_shown_of_it():
-    touched = np.array([True, False, True])
-    held = Holding(
-        closest=np.zeros(3), farthest_at_end=np.ones(3), collision=touched, steps=np.full(3, 64)
-    )
-    assert repr(held) == "Holding(3 trials, 2 collisions)"

@@ -10,7 +10,6 @@ from kinarm.errors import InvalidInputError, ProblemError
 from kinarm.evaluation.trials import TrialSet, trial_generator
 from kinarm.problem import PROBLEMS
 from kinarm.scene import PAPER_BENCHES, Obstacle, Scene
-from kinarm.simulator import Simulator
 
 PRINT_DIGEST = """
 from kinarm.evaluation import TrialSet
@@ -30,23 +29,12 @@ def test_equal_arguments_give_equal_trials():
     assert same(draw(), draw())
 
 
-def test_other_randomness_does_not_matter():
-    expected = draw()
-    np.random.default_rng().random(10)
-    Simulator("both", threads=1).sample(np.random.default_rng(8), 5)
-    assert same(expected, draw())
-
-
 def test_a_problem_by_name_file_or_object(tmp_path):
     PROBLEMS["both"].save(tmp_path / "mine.toml")
     for problem in ("both", tmp_path / "mine.toml", PROBLEMS["both"]):
         trials = TrialSet.draw(problem, 7, seed=3)
         assert same(trials, draw())
         assert trials.digest == draw().digest
-
-
-def test_rewards_and_horizon_do_not_move_the_trials():
-    assert same(draw(), draw(horizon=9, reward={"success": 4}))
 
 
 @pytest.mark.parametrize("other", [{"seed": 4}, {"problem": "left"}])
@@ -58,11 +46,6 @@ def test_a_small_set_is_the_beginning_of_a_large_one():
     few, many = draw(trials=3), draw(trials=11)
     np.testing.assert_array_equal(many.starts[:3], few.starts)
     np.testing.assert_array_equal(many.goals[:3], few.goals)
-
-
-def test_trials_differ_from_each_other():
-    trials = draw(trials=50)
-    assert len(np.unique(trials.starts, axis=0)) == len(np.unique(trials.goals, axis=0)) == 50
 
 
 def test_streams_of_randomness_are_independent_of_each_other():

@@ -8,11 +8,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from drawings import PIXEL
-from matplotlib.figure import Figure
 from scipy import stats
 
 from kinarm.evaluation.evaluation import evaluate, evaluation_document
-from kinarm.evaluation.report import charts, maps, svg
+from kinarm.evaluation.report import charts, maps
 from kinarm.evaluation.report.groups import group_results
 from kinarm.evaluation.report.maps import fates, level
 from kinarm.evaluation.report.page import page_template, report_page
@@ -51,18 +50,6 @@ def places(limits):
     return charts.LEFT + (np.log(limits) - low) / (high - low) * inside
 
 
-def test_only_paths_and_texts_of_styled_artists_are_kept():
-    """A line has a path; its markers are uses of a definition, which a page cannot style."""
-    figure = Figure()
-    axes = figure.subplots()
-    (line,) = axes.plot([0, 1], [0, 1], marker="o")
-    svg.style(line, "curve", title="a line")
-    svg.style(axes.text(0.5, 0.5, "half"), "label")
-    drawing = svg.draw(figure, "a line and a word")
-    kept = [(shape.classes, shape.text, bool(shape.path)) for shape in drawing.shapes]
-    assert kept == [("curve", "", True), ("label", "half", False)]
-
-
 class TestProfile:
     BOTTOM = charts.PROFILE_HEIGHT - charts.BELOW
     SPAN = BOTTOM - 14
@@ -98,13 +85,6 @@ class TestProfile:
                 # Student's about the seeds alone would be too narrow: trials vary as well.
                 reach = abs(drawn[1] - drawn[0]) / 2
                 assert reach >= min(stats.sem(shares) * stats.norm.ppf(0.975), 0.5) - tolerance
-
-    def test_the_style_sheet_has_the_last_word(self, right):
-        """Charts bring no colours or fonts of their own."""
-        drawing = charts.profile_chart(right)
-        chart = page_template().environment.get_template("parts.html").module.chart(drawing)
-        assert not re.search(r"#[0-9a-f]{6}|font|style=", chart)
-        assert drawing.description in chart
 
 
 class TestHistogram:
@@ -167,13 +147,6 @@ class TestMap:
             assert marker.get("d").endswith(maps.SYMBOLS[fate.outcome])
             seen.add(fate.outcome)
         assert len(seen) > 1
-
-    def test_many_trials_leave_a_map_light(self, right, monkeypatch):
-        monkeypatch.setattr(maps, "MARKERS", 7)
-        markers = maps.markers(right, right.contenders[0])
-        assert sorted(marker.title.split(",")[0] for marker in markers) == [
-            f"trial {number}" for number in range(7)
-        ]
 
     def test_fate_is_the_worst_over_the_seeds(self, right):
         group = right.contenders[0]
