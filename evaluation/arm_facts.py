@@ -40,7 +40,7 @@ class ArmFacts:
 
     @cached_property
     def statistics(self) -> ContactStatistics:
-        """What touches at random configurations."""
+        """Contacts at random configurations."""
         return ContactStatistics.sample(self.contact)
 
     @property

@@ -122,7 +122,7 @@ class Unsolved(Document, frozen=True, kw_only=True):
 
 
 class TrialBounds(Document, frozen=True, kw_only=True):
-    """What the oracle knows about each of the bounded trials.
+    """Bounds of each of the first trials.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ class TrialBounds(Document, frozen=True, kw_only=True):
 
 
 class Bounds(Document, frozen=True, kw_only=True):
-    """What any policy could do in the trials of a problem.
+    """Bounds of what any policy could do in the trials of a problem.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ class Bounds(Document, frozen=True, kw_only=True):
 
 
 def bounds_document(solutions: OracleSolutions) -> Bounds:
-    """What the oracle knows about a set of trials, for a document."""
+    """Bounds of a set of trials, for a document."""
     missed = np.flatnonzero(~solutions.reachable)
     gap = (solutions.steps - solutions.steps_lower_bound)[solutions.reachable]
     trials = {name: getattr(solutions, name).tolist() for name in TrialBounds.__struct_fields__}

@@ -143,7 +143,17 @@ class Contestant:
 
     @classmethod
     def from_policy(cls, name: str, policy: Policy, source: Path | None = None) -> "Contestant":
-        """Enter a trained policy."""
+        """Enter a trained policy.
+
+        Parameters
+        ----------
+        name : str
+            Name in tables.
+        policy : Policy
+            The policy.
+        source : Path, optional
+            The file that it was read from.
+        """
         made = policy.provenance
         return cls(
             name=name,
@@ -298,7 +308,7 @@ def imported_policy(name: str) -> Policy | PolicyFunction:
 
 
 def policy_function(policy: Any, name: str) -> PolicyFunction:
-    """What chooses actions as a function of observations, shape (n, n_observations).
+    """A policy as a function of observations, shape (n, n_observations).
 
     Raises
     ------

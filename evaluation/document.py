@@ -122,7 +122,7 @@ class TrialEnds(Document, frozen=True, kw_only=True):
 
 
 class TrialHolding(Document, frozen=True, kw_only=True):
-    """What happened in each trial where success did not end it.
+    """Course of each trial where success did not end it.
 
     Parameters
     ----------
@@ -267,7 +267,7 @@ class EvaluationDocument(Document, frozen=True, kw_only=True):
         raise UnknownNameError("policy", policy, dict.fromkeys(row.policy for row in fitting))
 
     def faced(self, problem: str) -> FacedProblem:
-        """What the protocol says of a problem.
+        """Entry of the protocol about a problem.
 
         Raises
         ------

@@ -66,7 +66,7 @@ class Evaluation:
 
     @property
     def problem(self) -> ReachProblem:
-        """What was faced."""
+        """The problem that was faced."""
         return self.trials.problem
 
     @cached_property
@@ -134,7 +134,7 @@ class PooledEvaluation:
 
     @property
     def problem(self) -> ReachProblem:
-        """What was faced."""
+        """The problem that was faced."""
         return self.members[0].problem
 
     @cached_property
@@ -170,7 +170,7 @@ class PooledEvaluation:
 
 
 def _outcomes(members: Sequence[Evaluation]) -> Outcomes:
-    """What one or several training seeds did in the same trials."""
+    """Outcomes of one or several training seeds in the same trials."""
     return Outcomes(
         tuple(member.rollouts for member in members),
         members[0].bounds,
@@ -180,7 +180,7 @@ def _outcomes(members: Sequence[Evaluation]) -> Outcomes:
 
 
 def _summary(name: str, trials: TrialSet, success: Estimate) -> str:
-    """What faced which trials, and with what success."""
+    """Who faced which trials, and with what success."""
     return f"{name} on {len(trials)} trials of {trials.problem.name}, success {success}"
 
 

@@ -84,7 +84,17 @@ def draw_band(
     colour: str,
     dash: str,
 ) -> None:
-    """Draw the mean of curves, shape (n_curves, n_places), and a band from lowest to highest."""
+    """Draw the mean of curves, and a band from the lowest to the highest.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where to.
+    places, heights : ndarray, shape (n_places,) and (n_curves, n_places)
+        The curves.
+    label, colour, dash : str
+        Name and look of the mean.
+    """
     low, high = heights.min(axis=0), heights.max(axis=0)
     axes.fill_between(places, low, high, color=colour, alpha=0.15, lw=0)
     axes.plot(places, heights.mean(axis=0), color=colour, linestyle=dash, lw=2, label=label)
@@ -113,7 +123,17 @@ def _label(evaluation: Evaluation, group: str) -> str:
 
 
 def save_figure(figure: "Figure", folder: Path, name: str) -> tuple[Path, ...]:
-    """Write a figure as PNG and as SVG; equal figures give equal files."""
+    """Write a figure as PNG and as SVG; equal figures give equal files.
+
+    Parameters
+    ----------
+    figure : Figure
+        The figure.
+    folder : Path
+        Where to.
+    name : str
+        Name of the files, without the suffix.
+    """
     import matplotlib
 
     paths = (folder / f"{name}.png", folder / f"{name}.svg")

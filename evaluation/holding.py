@@ -25,7 +25,7 @@ LOT = 1000
 
 @dataclass(frozen=True, eq=False)
 class Holding:
-    """What a policy did in trials that only contact or the horizon end.
+    """How close a policy came, and whether it stayed, in trials that success does not end.
 
     Attributes
     ----------

@@ -95,7 +95,7 @@ class Metric:
         return f"{self.write(low)}..{self.write(high)}"
 
 
-def share_of(
+def _share_of(
     meaning: str, definition: str, hits: Callable[[Outcomes], NDArray[np.bool_]], **shown: Any
 ) -> Metric:
     """Share of trials that hit."""
@@ -110,9 +110,9 @@ def share_of(
     )
 
 
-def share_within(limit: float) -> Metric:
+def _share_within(limit: float) -> Metric:
     """Share of trials that end within a distance [m]."""
-    return share_of(
+    return _share_of(
         f"with a final distance of at most {limit:g} m, however they ended",
         f"|{{i : dᵢ ≤ {limit:g} m}}| / n",
         lambda trials: trials.distance <= limit,
@@ -121,9 +121,9 @@ def share_within(limit: float) -> Metric:
     )
 
 
-def share_closer(limit: float) -> Metric:
+def _share_closer(limit: float) -> Metric:
     """Share of trials whose closest approach is within a distance [m], if they go on."""
-    return share_of(
+    return _share_of(
         f"that come within {1000 * limit:g} mm of the goal, if success does not end them; "
         "without contact at any time",
         f"|{{i ∉ H : aᵢ ≤ {limit:g} m}}| / n",
@@ -134,7 +134,7 @@ def share_closer(limit: float) -> Metric:
     )
 
 
-def distance_metric(
+def _distance_metric(
     meaning: str, definition: str, formula: Callable[[Outcomes], Any], **shown: Any
 ) -> Metric:
     """A statistic of the final distance."""
@@ -148,7 +148,7 @@ def distance_metric(
     )
 
 
-def approach_metric(
+def _approach_metric(
     meaning: str, definition: str, formula: Callable[[Outcomes], Any], **shown: Any
 ) -> Metric:
     """A statistic of the closest approach."""
@@ -192,7 +192,7 @@ def median_or_none(values: NDArray[Any]) -> Any:
 
 
 METRICS: dict[str, Metric] = {
-    "success": share_of(
+    "success": _share_of(
         "that ended within the tolerance, without contact",
         "|S| / n",
         lambda trials: trials.success,
@@ -211,8 +211,8 @@ METRICS: dict[str, Metric] = {
         digits=1,
         priority=7,
     ),
-    **{f"within_{limit:g}": share_within(limit) for limit in LIMITS},
-    "median_distance": distance_metric(
+    **{f"within_{limit:g}": _share_within(limit) for limit in LIMITS},
+    "median_distance": _distance_metric(
         "median",
         "median of dᵢ",
         lambda trials: median(trials.ordered_distance),
@@ -220,19 +220,19 @@ METRICS: dict[str, Metric] = {
         shows_interval=True,
         priority=12,
     ),
-    "mean_distance": distance_metric(
+    "mean_distance": _distance_metric(
         "mean",
         "Σ dᵢ / n",
         lambda trials: trials.distance.mean(axis=-1),
         heading="mean distance m",
         priority=2,
     ),
-    "iqm_distance": distance_metric(
+    "iqm_distance": _distance_metric(
         "interquartile mean",
         "mean of dᵢ without the smallest and the largest quarter",
         lambda trials: middle_half(trials.ordered_distance).mean(axis=-1),
     ),
-    "p95_distance": distance_metric(
+    "p95_distance": _distance_metric(
         "95th percentile",
         "0.95 quantile of dᵢ, interpolated linearly",
         lambda trials: quantile(trials.ordered_distance, 0.95),
@@ -245,21 +245,21 @@ METRICS: dict[str, Metric] = {
         formula=lambda trials: trials.distance.max(),
         unit="m",
     ),
-    "collision": share_of(
+    "collision": _share_of(
         "that ended in contact with an obstacle, the ground or the arm itself",
         "|C| / n",
         lambda trials: trials.collision,
         heading="collision %",
         priority=6,
     ),
-    "early_collision": share_of(
+    "early_collision": _share_of(
         f"that ended in contact within the first {EARLY_STEPS} steps",
         f"|{{i ∈ C : kᵢ ≤ {EARLY_STEPS}}}| / n",
         lambda trials: trials.early_collision,
         heading="early collision %",
         priority=0.5,
     ),
-    "truncated": share_of(
+    "truncated": _share_of(
         "that took all steps without success or contact",
         "|T| / n",
         lambda trials: trials.truncated,
@@ -314,8 +314,8 @@ METRICS: dict[str, Metric] = {
         needs_bounds=True,
         digits=2,
     ),
-    **{f"closer_than_{1000 * limit:g}_mm": share_closer(limit) for limit in CLOSE},
-    "held": share_of(
+    **{f"closer_than_{1000 * limit:g}_mm": _share_closer(limit) for limit in CLOSE},
+    "held": _share_of(
         f"whose last {HOLDING_STEPS} steps stay within {1000 * HOLDING_WITHIN:g} mm of the goal, "
         "if success does not end them; without contact",
         f"|{{i ∉ H : eᵢ ≤ {HOLDING_WITHIN:g} m}}| / n",
@@ -325,7 +325,7 @@ METRICS: dict[str, Metric] = {
         shows_interval=True,
         priority=15,
     ),
-    "median_approach": approach_metric(
+    "median_approach": _approach_metric(
         "median",
         "median of aᵢ",
         lambda trials: median(trials.ordered_closest),
@@ -333,12 +333,12 @@ METRICS: dict[str, Metric] = {
         beside=("p95_approach", "p95 {}"),
         priority=13,
     ),
-    "p95_approach": approach_metric(
+    "p95_approach": _approach_metric(
         "95th percentile",
         "0.95 quantile of aᵢ, interpolated linearly",
         lambda trials: quantile(trials.ordered_closest, 0.95),
     ),
-    "held_collision": share_of(
+    "held_collision": _share_of(
         "that touch something if success does not end them",
         "|H| / n",
         lambda trials: trials.holding_collision,

@@ -70,7 +70,7 @@ class Bounded(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Outcomes:
-    """What one or several training seeds did in the same trials.
+    """Outcomes of one or several training seeds in the same trials.
 
     Their arrays are joined along the last axis, shape (..., n_seeds * n_trials).
 
@@ -102,7 +102,7 @@ class Outcomes:
         return replace(self, numbers=numbers, origin=self)
 
     def of_seed(self, seed: int) -> "Outcomes":
-        """What one of the training seeds did."""
+        """Outcomes of one of the training seeds."""
         one = slice(seed, seed + 1)
         return replace(self, rollouts=self.rollouts[one], holding=self.holding[one])
 

@@ -50,7 +50,7 @@ class Starts(Document, frozen=True, kw_only=True):
 
 
 class Contacts(Document, frozen=True, kw_only=True):
-    """What touches at random configurations.
+    """Pairs of bodies that touch at random configurations.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class Contacts(Document, frozen=True, kw_only=True):
 
 
 class ProblemCheck(Document, frozen=True, kw_only=True):
-    """What is known of a problem: what kinarm-problem check --json writes.
+    """Findings about a problem: the document of kinarm-problem check --json.
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def faced_problem_of(evaluation: "Evaluation") -> FacedProblem:
-    """What was faced, and what any policy could do there."""
+    """Entry about a problem, its trials, and what any policy could do there."""
     trials, bounds = evaluation.trials, evaluation.bounds
     return FacedProblem(
         arm=trials.simulator.arm.name,
@@ -107,7 +107,7 @@ def _failures(evaluations: "Sequence[Evaluation]") -> list[Failures]:
 
 
 def _holding(holding: Holding) -> TrialHolding:
-    """What happened in each trial where success did not end it."""
+    """Course of each trial where success did not end it."""
     at_end = holding.farthest_at_end.tolist()
     return TrialHolding(
         closest=holding.closest.tolist(),

@@ -65,7 +65,12 @@ class Estimate:
 def wilson_interval(hits: int, trials: int, seeds: int = 1) -> Interval:
     """95 % interval of a share of trials, from the hits of all seeds together.
 
-    Every seed faced the trials; see `Estimate.share`.
+    Parameters
+    ----------
+    hits, trials : int
+        How many hits there were, and how many trials every seed faced.
+    seeds : int
+        Number of training seeds; see `Estimate.share`.
     """
     few, many = hits // seeds, -(-hits // seeds)
     return _wilson_interval(few, trials)[0], _wilson_interval(many, trials)[1]
@@ -99,7 +104,7 @@ def resampled_figures(
 
 
 def percentile_interval(figures: NDArray[np.float64]) -> Interval:
-    """What encloses 95 % of the figures of all resamples, shape (n_resamples,)."""
+    """Ends of the middle 95 % of the figures of all resamples, shape (n_resamples,)."""
     ordered, tail = np.sort(figures), (1 - LEVEL) / 2
     return float(_quantile(ordered, tail)), float(_quantile(ordered, 1 - tail))
 

@@ -107,7 +107,14 @@ def print_table(
 ) -> None:
     """Print the figures of a document, without the less important columns if space is scarce.
 
-    Markdown is always printed with all columns that say something.
+    Parameters
+    ----------
+    document : EvaluationDocument
+        The document.
+    console : Console
+        Where to.
+    markdown : bool
+        As Markdown, with all columns that say something.
     """
     rows = [row for problem in document.protocol.problems for row in table_rows(document, problem)]
     figures = [c for c in metric_columns() if any(c.cell(row).value for row in rows)]
@@ -118,13 +125,13 @@ def print_table(
     ]
     if markdown:
         text = io.StringIO()
-        open_console(file=text).print(evaluation_table(document, columns, markdown=True))
+        open_console(file=text).print(_evaluation_table(document, columns, markdown=True))
         console.out(text.getvalue().strip(), highlight=False)
         return
     expendable = sorted((c for c in columns if c.priority < ALWAYS), key=lambda c: c.priority)
     print_fitting(
         console,
-        lambda left_out: evaluation_table(
+        lambda left_out: _evaluation_table(
             document, [column for column in columns if column.heading not in left_out]
         ),
         [column.heading for column in expendable],
@@ -132,7 +139,7 @@ def print_table(
     )
 
 
-def evaluation_table(
+def _evaluation_table(
     document: EvaluationDocument, columns: Sequence[Column], *, markdown: bool = False
 ) -> "Table":
     """The figures of a document as a table; several training seeds share a row."""

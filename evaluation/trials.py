@@ -80,7 +80,15 @@ class TrialSet:
 
     @classmethod
     def draw_in(cls, simulator: Simulator, trials: int, seed: int) -> "TrialSet":
-        """Draw trials of the problem of a simulator, to be faced in it; see `draw`."""
+        """Draw trials of the problem of a simulator, to be faced in it.
+
+        Parameters
+        ----------
+        simulator : Simulator
+            The simulator.
+        trials, seed : int
+            As of `draw`.
+        """
         trials, seed = whole_number("trials", trials, 1, MOST_TRIALS), whole_number("seed", seed, 0)
         lots = (range(first, min(first + LOT, trials)) for first in range(0, trials, LOT))
         drawn = [
@@ -112,7 +120,7 @@ class TrialSet:
 
     @property
     def problem(self) -> ReachProblem:
-        """What is faced."""
+        """The problem that is faced."""
         return self.simulator.problem
 
     @cached_property
@@ -126,5 +134,5 @@ class TrialSet:
 
 @cache
 def trial_set(problem: ReachProblem, trials: int, seed: int) -> TrialSet:
-    """Trials of a problem, drawn once in a process."""
+    """Trials of a problem, drawn once in a process; parameters as of `TrialSet.draw`."""
     return TrialSet.draw(problem, trials, seed)

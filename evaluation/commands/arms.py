@@ -40,7 +40,7 @@ class ListRequest:
 
 
 def _row(name: str) -> tuple[str, ...]:
-    """What is known of an arm; of one that is not installed, what its file says."""
+    """Cells of an arm; of one that is not installed, what its file says."""
     from kinarm.errors import ArmError
 
     file = ArmFile.of(name)

@@ -65,7 +65,7 @@ def _report(request: EvaluationRequest, command: str) -> None:
 
 
 def _footnote(document: "EvaluationDocument") -> str:
-    """What the figures in the table stand on."""
+    """Notes on what the figures in the table are of."""
     from kinarm.evaluation.table import REPLACED, has_star, table_rows
 
     protocol = document.protocol

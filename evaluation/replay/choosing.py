@@ -33,7 +33,7 @@ LowerBounds = Callable[[Sequence[int]], Sequence[int | None]]
 
 @dataclass(frozen=True)
 class Candidates:
-    """What one policy did, or two in the same trials, and how many are played by default.
+    """Runs of one policy, or of two in the same trials, and how many trials are played by default.
 
     Without `LowerBounds`, what the recordings say of them is kept. Without `TrialSet`, nothing
     else can face them.
@@ -47,7 +47,7 @@ class Candidates:
 
 @dataclass(frozen=True)
 class Chosen:
-    """What is played.
+    """Recordings that are played.
 
     Attributes
     ----------
@@ -123,7 +123,7 @@ def _known_contestant(name: str, path: Path) -> Contestant:
 
 
 def _name_in(document: EvaluationDocument, contestant: Contestant) -> str:
-    """What an evaluation calls a contestant: by its file alone, or by its folder, too."""
+    """Name of a contestant in an evaluation: that of its file alone, or with its folder."""
     names = {row.policy for row in document.results}
     whole = f"{contestant.source.parent.name}/{contestant.name}" if contestant.source else ""
     return whole if whole in names and contestant.name not in names else contestant.name
@@ -220,7 +220,7 @@ def _failures(candidates: Candidates, *, oracle: bool) -> Chosen:
 
 
 def _oracle_ghosts(trials: TrialSet, numbers: Sequence[int]) -> list[Recording]:
-    """What the oracle does in some trials, under their numbers."""
+    """Recordings of the oracle in some trials, under their numbers."""
     run = Run.faced(ORACLE, trials.chosen(numbers), allow_other_arm=True)
     recordings = run.recorded(range(len(numbers)))
     return [replace(each, trial=number) for each, number in zip(recordings, numbers, strict=True)]

@@ -26,7 +26,14 @@ def fresh_recordings(
 ) -> Iterator[Recording]:
     """Record one trial after the other, without end.
 
-    The seed is that of the first trial; the next ones count up.
+    Parameters
+    ----------
+    contestant : Contestant
+        Who faces them.
+    simulator : Simulator
+        Where.
+    seed : int
+        That of the first trial; the next ones count up.
     """
     oracle = Oracle(simulator.problem)
     for number in itertools.count():  # pragma: no branch - it counts without end
@@ -43,7 +50,17 @@ def fresh_recordings(
 def follow(
     server: LiveServer, simulator: Simulator, recordings: Iterable[Recording]
 ) -> Iterator[Recording]:
-    """Show one recording after the other, and hand it out when it is over."""
+    """Show one recording after the other, and hand it out when it is over.
+
+    Parameters
+    ----------
+    server : LiveServer
+        The live page.
+    simulator : Simulator
+        Where the recordings were made.
+    recordings : iterable of Recording
+        They may have no end.
+    """
     stage = LiveStage(server, simulator.problem, simulator.arm)
     for recording in recordings:
         stage.begin(recording.states[0], recording.goal)

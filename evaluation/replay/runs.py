@@ -20,7 +20,7 @@ from kinarm.rollouts import Rollouts
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What one policy did in trials, to choose from by their positions.
+    """Trials as one policy ended them, to choose from by their positions.
 
     Attributes
     ----------
@@ -103,6 +103,15 @@ def faced_problem(
     contestants: Sequence[Contestant], options: ProblemOptions, stated: ReachProblem | None
 ) -> ReachProblem:
     """The problem that is stated, or what options make of that of the first trained contestant.
+
+    Parameters
+    ----------
+    contestants : sequence of Contestant
+        Who faces it.
+    options : ProblemOptions
+        Changes to the problem.
+    stated : ReachProblem, optional
+        The problem, if one is named.
 
     Raises
     ------

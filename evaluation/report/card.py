@@ -35,6 +35,15 @@ def check_card(
 ) -> None:
     """Check that there is one policy for a card, and that its files can be written.
 
+    Parameters
+    ----------
+    path : Path
+        The card.
+    pairs : sequence of (Contestant, ReachProblem)
+        Who faces what.
+    overwrite : bool
+        Whether files may be replaced.
+
     Raises
     ------
     InvalidInputError
@@ -87,9 +96,16 @@ def write_card(path: Path, document: EvaluationDocument, evaluations: Sequence[E
 
 
 def policy_card(name: str, document: EvaluationDocument, evaluation: Evaluation) -> str:
-    """The card of a policy whose files are called ``name``, in Markdown.
+    """The card of a policy, in Markdown; equal input gives equal text.
 
-    Equal input gives equal text.
+    Parameters
+    ----------
+    name : str
+        Name of its files, without the suffix.
+    document : EvaluationDocument
+        The document of the evaluation.
+    evaluation : Evaluation
+        That of the policy.
 
     Raises
     ------

@@ -67,7 +67,7 @@ class ProblemResults:
 
     @property
     def trials(self) -> TrialSet:
-        """What was faced."""
+        """The trials that were faced."""
         return self.groups[0].members[0].trials
 
     @property

@@ -82,7 +82,7 @@ class View(NamedTuple):
 
 
 class Fate(NamedTuple):
-    """What became of one trial in the hands of one or several training seeds.
+    """End of one trial in the hands of one or several training seeds.
 
     How many reached the goal, the mean of their final distances [m], and the outcome:
     ``"collision"`` if any touched something, else ``"truncated"`` if any ran out of steps, else
@@ -95,7 +95,7 @@ class Fate(NamedTuple):
 
 
 def fates(group: Group) -> tuple[Fate, ...]:
-    """What became of each trial in the hands of a group."""
+    """Ends of all trials in the hands of a group."""
     success = np.array([member.rollouts.success for member in group.members])
     collision = np.array([member.rollouts.collision for member in group.members])
     outcomes = np.where(
@@ -155,7 +155,7 @@ def failure_shares(
 
 
 def description(results: ProblemResults, group: Group) -> str:
-    """What a map shows, for those who cannot see it."""
+    """Description of a map for those who cannot see it."""
     outcomes = [fate.outcome for fate in fates(group)]
     every = " by every training seed" if len(group.members) > 1 else ""
     reached = f"of {len(outcomes)} goals, {outcomes.count('success')} were reached{every}"

@@ -34,7 +34,7 @@ class Shape(NamedTuple):
 
 
 class Drawing(NamedTuple):
-    """What a page needs to show a figure: its size, its shapes from the lowest to the topmost.
+    """A figure as a page shows it: its size, its shapes from the lowest to the topmost.
 
     The description says what it shows, for those who cannot see it.
     """
@@ -46,7 +46,19 @@ class Drawing(NamedTuple):
 
 
 def style(artist: "Artist", classes: str, group: Group | None = None, title: str = "") -> None:
-    """Leave the looks of an artist to the style sheet; see `Shape`."""
+    """Leave the looks of an artist to the style sheet.
+
+    Parameters
+    ----------
+    artist : Artist
+        The artist.
+    classes : str
+        Of the style sheet.
+    group : Group, optional
+        The policy that it belongs to.
+    title : str
+        What is said where the pointer is.
+    """
     series, colour = (group.name, group.style) if group else ("", "")
     artist.set_gid(json.dumps((classes, series, colour, title)))
 

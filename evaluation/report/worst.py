@@ -58,7 +58,7 @@ def _ranked(group: Group) -> list[WorstTrial]:
 
 
 def worst_row(results: ProblemResults, worst: WorstTrial) -> dict[str, Any]:
-    """What the page says of a trial: its policy, and figures by their headings."""
+    """Row of the page about a trial: its policy, and figures by their headings."""
     rollouts, trial = worst.evaluation.rollouts, worst.trial
     figures = {
         "trial": f"{trial}",
