@@ -27,8 +27,6 @@ RECORDED = {
     "benchmark": "data/results/speed/speed.json",
     "claims": "data/results/claims.json",
     "comparison": "data/results/*/learners.json",
-    "compared-run": "data/results/*/runs/*.json",
-    "training-times": "data/results/timing.json",
 }
 
 
