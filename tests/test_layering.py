@@ -59,7 +59,7 @@ def module_name(path):
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-KNOWN = ("kinarm.policies.policy", "kinarm.policies.conversion.", "kinarm.evaluation.replay.")
+KNOWN = ("kinarm.policies.policy", "kinarm.policies.conversion.")
 """Beginnings of the names of modules that need each other still, and are to be untangled."""
 
 

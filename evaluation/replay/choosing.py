@@ -3,8 +3,8 @@
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import product
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.bounds import oracle_bounds
@@ -15,11 +15,13 @@ from kinarm.evaluation.contestants import (
     is_import_path,
 )
 from kinarm.evaluation.document import EvaluationDocument, check_same
-from kinarm.evaluation.replay.request import ReplayRequest
 from kinarm.evaluation.replay.runs import Run, faced_problem, first_contestant, stated_problem
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.library import BEST, group_of, policy_names
 from kinarm.recording import Recording, load_recordings
+
+if TYPE_CHECKING:
+    from kinarm.evaluation.replay.request import ReplayRequest
 
 PLAYED, SEARCHED, FAILING = 5, 200, 10_000
 """Trials that are played by default, among which some, and among which failures are looked for."""
@@ -64,7 +66,7 @@ class Chosen:
     heading: str = ""
 
 
-def find_candidates(request: ReplayRequest) -> Candidates:
+def find_candidates(request: "ReplayRequest") -> Candidates:
     """Make or read the recordings to choose from."""
     default = BEST if request.failures and request.source is None else None
     names = request.compare or (request.policy or default,)
@@ -75,7 +77,7 @@ def find_candidates(request: ReplayRequest) -> Candidates:
     return _recorded_candidates(request.source, names, request.problem, request.arm)
 
 
-def _fresh_candidates(request: ReplayRequest, names: Sequence[str | None]) -> Candidates:
+def _fresh_candidates(request: "ReplayRequest", names: Sequence[str | None]) -> Candidates:
     """Run policies on trials that are drawn now."""
     stated = stated_problem(request, names)
     contestants = [first_contestant(name, stated) for name in names]
@@ -158,7 +160,7 @@ def _recorded_candidates(
     return Candidates(runs, None, len(runs[0].numbers))
 
 
-def chosen_recordings(request: ReplayRequest) -> Chosen:
+def chosen_recordings(request: "ReplayRequest") -> Chosen:
     """The recordings that a request asks for, with their bounds; the first run decides.
 
     Raises
@@ -252,66 +254,3 @@ def _positions_of_worst(count: int, run: Run) -> list[int]:
             f"--worst {count} asks for more trials than there are: {len(positions)}"
         )
     return list(positions.values())[:count]
-
-
-def find_failures(
-    policies: Sequence[str],
-    problems: Sequence[str] = ("left", "right", "both"),
-    *,
-    trials: int = FAILING,
-    seed: int = 0,
-) -> Chosen:
-    """Record all failures of some policies, and what the oracle does in the same trials.
-
-    They are grouped by recipe and cause, the most frequent cause first. ``kinarm-replay
-    --failures`` shows those of one policy on one problem.
-
-    Parameters
-    ----------
-    policies : sequence of str
-        As `ReplayRequest` takes them, ``"best"`` included.
-    problems : sequence of str
-        Problems of one arm and scene.
-    trials, seed : int
-        Size and seed of the set of trials of each problem.
-
-    Returns
-    -------
-    Chosen
-        For `kinarm.viewer.replay_page`: ``runs``, the recordings of the policies and of the
-        oracle; ``groups`` and ``heading``.
-
-    Raises
-    ------
-    KinarmError
-        If a name or number cannot be used, none fails somewhere, or too many do.
-    """
-    played: list[Recording] = []
-    ghosts: list[Recording] = []
-    causes: list[str] = []
-    for policy, problem in product(policies, problems):
-        request = ReplayRequest(
-            policy=policy, problem=problem, failures=True, trials=trials, seed=seed
-        )
-        found = chosen_recordings(request)
-        played += found.runs[0]
-        ghosts += found.runs[1]
-        causes += found.groups
-    if len(played) > MOST_FAILURES:
-        raise InvalidInputError(
-            f"{len(played)} trials failed, a page holds {MOST_FAILURES} at most: ask for fewer "
-            "trials"
-        )
-    faced = trials * len(policies) * len(problems)
-    recipes = [group_of(each.policy) for each in played]
-    groups = [f"{recipe}: {cause}" for recipe, cause in zip(recipes, causes, strict=True)]
-    rank, frequency = list(dict.fromkeys(recipes)), Counter(groups)
-    order = sorted(
-        range(len(played)),
-        key=lambda k: (rank.index(recipes[k]), -frequency[groups[k]], groups[k]),
-    )
-    return Chosen(
-        [[run[k] for k in order] for run in (played, ghosts)],
-        [groups[k] for k in order],
-        f"{len(played)} of {faced} trials of {', '.join(problems)} failed",
-    )
