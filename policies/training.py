@@ -242,12 +242,8 @@ class CheckpointKeeper:
 
     Parameters
     ----------
-    config : TrainingConfig
-        Settings of the training.
-    path : Path
-        File of the checkpoint.
-    state : TrainingState or None
-        Where it goes on.
+    config, path, state
+        Settings of the training, file of the checkpoint, and where it goes on if not anew.
     """
 
     def __init__(self, config: TrainingConfig, path: Path, state: TrainingState | None) -> None:

@@ -56,8 +56,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
     where an earlier one had failed. That of a move that was refused holds ``collision``. All other
     infos are empty, which saves time.
 
-    The arms share this object and its interface: ``get_attr`` reads from them, ``env_method`` calls
-    methods of the interface such as ``compute_reward``, and ``set_attr`` sets for all arms.
+    The arms share this object and its interface, from which ``get_attr`` and ``env_method`` read.
     """
 
     def __init__(
@@ -319,12 +318,8 @@ class SB3VecEnv(Lifecycle, VecEnv):
 
         Parameters
         ----------
-        attr_name : str
-            Its name.
-        value : object
-            Its value.
-        indices : int or iterable of int, optional
-            Which arms; there is no choice but all.
+        attr_name, value, indices
+            As for ``VecEnv``; there is no choice of arms but all.
 
         Raises
         ------
@@ -344,17 +339,8 @@ class SB3VecEnv(Lifecycle, VecEnv):
 
         Parameters
         ----------
-        method_name : str
-            Its name.
-        *method_args, **method_kwargs
-            What it is called with.
-        indices : int or iterable of int, optional
-            Arms for which the result is repeated; all by default.
-
-        Raises
-        ------
-        AttributeError
-            If there is no such method.
+        method_name, *method_args, indices, **method_kwargs
+            As for ``VecEnv``.
         """
         result = getattr(self.interface, method_name)(*method_args, **method_kwargs)
         return [result for _ in self._get_indices(indices)]
