@@ -276,7 +276,7 @@ class Experiment:
         """
         file = Path(name_or_file)
         shipped = shipped_files("experiments")
-        if not file.suffix and not file.exists():
+        if not file.suffix and not file.is_file():
             if str(name_or_file) not in shipped:
                 available = (*shipped, "path/to/experiment.toml")
                 raise UnknownNameError("experiment", str(name_or_file), available)
