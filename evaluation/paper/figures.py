@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.figures import BIN_WIDTH, COLOURS
-from kinarm.evaluation.paper.results import LEARNERS, NEAR, PaperResults, Purpose
+from kinarm.evaluation.paper.results import LEARNERS, NEAR, PaperResults
 from kinarm.problem import PROBLEMS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-STYLES: dict[Purpose, dict[str, Any]] = {
+STYLES: dict[str, dict[str, Any]] = {
     "ars": {"label": LEARNERS["ars"], "color": COLOURS[0], "linestyle": "solid"},
     "ppo": {"label": LEARNERS["ppo"], "color": COLOURS[1], "linestyle": "dashed"},
 }

@@ -16,9 +16,10 @@ from kinarm.evaluation.trials import TrialSet, trial_set
 from kinarm.policies.ars.config import Sharing
 from kinarm.problem import PROBLEMS
 
-Purpose = Literal["sweep", "ars", "ppo"]
+PURPOSES = ("sweep", "ars", "ppo")
+"""Purposes of trainings: the sweep of ARS's settings, its models, and those of PPO."""
 
-LEARNERS: dict[Purpose, str] = {"ars": "ARS", "ppo": "PPO"}
+LEARNERS = {"ars": "ARS", "ppo": "PPO"}
 """Names of the learners that are compared, by the purpose of their trainings."""
 
 NEAR = 0.2
@@ -73,10 +74,9 @@ class PaperRun:
     clock: Clock
 
     @property
-    def purpose(self) -> Purpose:
-        """Part of the paper that it is for: the first word of its entry in the experiment."""
-        purpose: Purpose = self.planned.entry.name.partition("-")[0]  # type: ignore[assignment]
-        return purpose
+    def purpose(self) -> str:
+        """One of `PURPOSES`: the first word of its entry in the experiment."""
+        return self.planned.entry.name.partition("-")[0]
 
     @property
     def task(self) -> str:
@@ -111,7 +111,7 @@ class PaperRun:
         """Where it stands among all: by purpose, reading, task, setting and seed."""
         reading, (rate, perturbations) = self.reading, self.setting
         return (
-            get_args(Purpose).index(self.purpose),
+            PURPOSES.index(self.purpose),
             -reading.start_spread,
             reading.reward != "progress",
             get_args(Sharing).index(reading.sharing),
@@ -191,14 +191,14 @@ class PaperResults:
         return tuple(dict.fromkeys(run.reading for run in self.runs if run.purpose == "ars"))
 
     def select(
-        self, purpose: Purpose, task: str | None = None, reading: Reading = LITERAL
+        self, purpose: str, task: str | None = None, reading: Reading = LITERAL
     ) -> list[PaperRun]:
         """Choose some of the trainings.
 
         Parameters
         ----------
-        purpose : {"sweep", "ars", "ppo"}
-            Part of the paper that they are for.
+        purpose : str
+            One of `PURPOSES`.
         task : str, optional
             Name of the task; all tasks by default.
         reading : Reading
