@@ -42,6 +42,8 @@ extend an experiment: nothing is trained twice.
 
 examples:
   kinarm-study learners                    an experiment that ships with kinarm: learners compared
+  kinarm-study learners --only ars-tuned sac --problems right --seeds 1
+                                           a part of it
   kinarm-study steps.toml                  into the folder steps
   kinarm-study steps.toml --jobs 1         one training at a time
   kinarm-study steps.toml --ray auto       on the Ray cluster that this machine is part of
@@ -58,6 +60,12 @@ class StudyRequest(RunningOptions):
     ----------
     experiment : Path
         The file of the experiment, or the name of a shipped one.
+    only : tuple of str
+        Names of entries of the experiment that are trained.
+    problems : tuple of str
+        Names or files of problems instead of its own.
+    seeds : int
+        Trainings with each setting instead of its own.
     out : Path
         Output folder.
     threads : int
@@ -72,17 +80,23 @@ class StudyRequest(RunningOptions):
     """
 
     experiment: Path = field(metadata={"flag": "experiment", "metavar": "EXPERIMENT"})
+    only: tuple[str, ...] = ()
+    problems: tuple[str, ...] = ()
+    seeds: int | None = None
     out: Path | None = field(default=None, metadata={"metavar": "DIR"})
     threads: int = 1
     train: bool = True
 
     GROUPS: ClassVar = {
-        "experiment": ("experiment", "out", "train", "threads"),
+        "experiment": (*("experiment", "only", "problems", "seeds", "out", "train", "threads"),),
         **RunningOptions.GROUPS,
     }
     DEFAULTS: ClassVar = {
         **RunningOptions.DEFAULTS,
-        "out": "the name of the file without its ending",
+        "only": "all",
+        "problems": "its own",
+        "seeds": "its own",
+        "out": "the name of the experiment",
     }
 
     def __post_init__(self) -> None:
@@ -120,16 +134,18 @@ class StudyRequest(RunningOptions):
         KeyboardInterrupt
             If it is interrupted; what is finished is kept, and the message says so.
         """
+        from kinarm.evaluation.experiments.experiment import Experiment
         from kinarm.evaluation.experiments.page import write_all
         from kinarm.evaluation.experiments.study import Study
 
-        study = Study(self.experiment, self.folder)
+        chosen = {"entries": self.only, "problems": self.problems, "seeds": self.seeds}
+        study = Study(Experiment.load(self.experiment).only(**chosen), self.folder)
         with telling(lambda: GOES_ON):
             failed = None
             try:
                 if self.train:
-                    chosen = executor or self.executor(self.folder, self.threads)
-                    study.run(threads=self.threads, executor=chosen)
+                    where = executor or self.executor(self.folder, self.threads)
+                    study.run(threads=self.threads, executor=where)
             except TrainingFailedError as error:
                 failed = error
             if len(study):

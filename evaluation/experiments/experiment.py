@@ -1,7 +1,7 @@
 """What an experiment is: a file that names learners, problems, seeds and what varies."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
@@ -11,7 +11,13 @@ from kinarm._fields import OPTIONAL, check_fields, from_plain, read_toml, to_pla
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.experiments.curve import TrialSettings
-from kinarm.evaluation.experiments.ranges import RANGE, check_range, draw
+from kinarm.evaluation.experiments.variation import (
+    check_grid,
+    check_range,
+    combinations,
+    draw,
+    flattened,
+)
 from kinarm.problem_files import shipped_files
 from kinarm.randomness import Stream, stream_generator
 
@@ -40,7 +46,7 @@ class Entry:
     learner : str
         Name of the learner.
     recipe : str
-        Name or file of the recipe.
+        Name or file of the recipe; the first of the learner by default.
     problems : tuple of str
         Names or files of problems; those of the experiment by default.
     seeds : int
@@ -57,7 +63,7 @@ class Entry:
     title: str = field(default="", metadata=OPTIONAL)
     source: str = field(default="", metadata=OPTIONAL)
     learner: str = "ars"
-    recipe: str = "paper"
+    recipe: str = field(default="", metadata=OPTIONAL)
     problems: tuple[str, ...] = field(default=(), metadata=OPTIONAL)
     seeds: int = field(default=0, metadata=OPTIONAL)
     first_seed: int | None = None
@@ -68,10 +74,11 @@ class Entry:
         check_fields(self)
         if not self.name:
             recipe = Path(self.recipe).stem if self.recipe.endswith(".toml") else self.recipe
-            object.__setattr__(self, "name", f"{self.learner}-{recipe}")
+            name = f"{self.learner}-{recipe}" if recipe else self.learner
+            object.__setattr__(self, "name", name)
         whole_number("seeds", self.seeds, 0, MOST_TRAININGS)
         whole_number("first_seed", self.first_seed or 0, 0)
-        _check_grid(self.grid)
+        check_grid(self.grid)
         if twice := sorted(self.fixed.keys() & self.grid.keys()):
             raise InvalidInputError(f"{twice[0]!r} stands in fixed and in grid")
 
@@ -92,7 +99,7 @@ class Experiment:
     learners : tuple of str
         Names of learners.
     recipes : tuple of str
-        Names or files of recipes.
+        Names or files of recipes; the first of each learner by default.
     entries : tuple of Entry
         Learners with a recipe and settings of their own, instead of learners and recipes.
     problems : tuple of str
@@ -119,7 +126,7 @@ class Experiment:
 
     name: str
     learners: tuple[str, ...] = ("ars",)
-    recipes: tuple[str, ...] = ("paper",)
+    recipes: tuple[str, ...] = field(default=(), metadata=OPTIONAL)
     problems: tuple[str, ...] = ("right",)
     seeds: int = 1
     first_seed: int = 0
@@ -136,7 +143,7 @@ class Experiment:
         whole_number("seeds", self.seeds, 1, MOST_TRAININGS)
         whole_number("first_seed", self.first_seed, 0)
         for name in SEVERAL:
-            if not getattr(self, name):
+            if not getattr(self, name) and name != "recipes":
                 raise InvalidInputError(f"{name} must not be empty")
             _check_distinct(name, getattr(self, name))
         _check_distinct("entries", [entry.name for entry in self.entries])
@@ -161,7 +168,7 @@ class Experiment:
                 if key in given:
                     raise InvalidInputError(f"{key!r} stands in {given[key]} and in {table}")
                 given[key] = table
-        _check_grid(self.grid)
+        check_grid(self.grid)
         for table, entries in (("random", self.random), ("search", self.search)):
             if entries:
                 whole_number(f"{table}.count", entries.get("count", 0), 1, MOST_TRAININGS)
@@ -174,7 +181,7 @@ class Experiment:
         """The entries as given, or all learners with all recipes."""
         return self.entries or tuple(
             Entry(learner=learner, recipe=recipe)
-            for learner, recipe in product(self.learners, self.recipes)
+            for learner, recipe in product(self.learners, self.recipes or ("",))
         )
 
     @property
@@ -284,6 +291,43 @@ class Experiment:
         entries = {"name": file.stem, **read_toml(file, "experiment")}
         return cls.from_json(entries, str(file)).resolved(file.parent)
 
+    def only(
+        self,
+        *,
+        entries: Iterable[str] = (),
+        problems: Sequence[str] = (),
+        seeds: int | None = None,
+    ) -> "Experiment":
+        """A part of the experiment, or the same with other problems or seeds.
+
+        Parameters
+        ----------
+        entries : iterable of str
+            Names of entries; all by default.
+        problems : sequence of str
+            Names or files of problems instead of its own.
+        seeds : int, optional
+            Trainings with each setting.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such entry.
+        """
+        known = {entry.name: entry for entry in self.all_entries}
+        for name in entries:
+            if name not in known:
+                raise UnknownNameError("entry", name, known)
+        chosen = tuple(known[name] for name in dict.fromkeys(entries)) or self.entries
+        if problems:
+            chosen = tuple(replace(entry, problems=()) for entry in chosen)
+        return replace(
+            self,
+            entries=chosen,
+            problems=tuple(problems) or self.problems,
+            seeds=self.seeds if seeds is None else seeds,
+        )
+
     def resolved(self, folder: Path) -> "Experiment":
         """The same experiment, with its files found from wherever it is read."""
 
@@ -306,23 +350,9 @@ SEARCH_CHOICES = {"sampler": ("tpe", "random", "cmaes"), "pruner": ("median", "n
 """What can be said of a search beside count and seed; the first is the default."""
 
 
-def combinations(grid: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """Every combination of the values in lists, by field."""
-    for values in product(*grid.values()):
-        yield dict(zip(grid, values, strict=True))
-
-
 def _check_distinct(name: str, values: "tuple[str, ...] | list[str]") -> None:
     if len(set(values)) < len(values):
         raise InvalidInputError(f"{name} names the same twice: {', '.join(values)}")
-
-
-def _check_grid(grid: Mapping[str, Any]) -> None:
-    for key, values in grid.items():
-        if not isinstance(values, list | tuple) or not values:
-            raise InvalidInputError(
-                f"grid.{key} must be a list of at least one value, got {values!r}"
-            )
 
 
 def _ranges(entries: Mapping[str, Any]) -> dict[str, Any]:
@@ -342,15 +372,5 @@ def _prepared(entries: Mapping[str, Any], several: Iterable[str]) -> dict[str, A
             made[name] = [made[name]]
     for table in TABLES:
         if isinstance(made.get(table), Mapping):
-            made[table] = dict(_flat(made[table], ranges=table in ("random", "search")))
+            made[table] = dict(flattened(made[table], ranges=table in ("random", "search")))
     return made
-
-
-def _flat(entries: Mapping[str, Any], *, ranges: bool, path: str = "") -> Iterator[tuple[str, Any]]:
-    """Entries of tables within tables by their paths; tables that are ranges stay whole."""
-    for key, entry in entries.items():
-        is_range = ranges and isinstance(entry, Mapping) and set(entry) & set(RANGE)
-        if isinstance(entry, Mapping) and not is_range:
-            yield from _flat(entry, ranges=ranges, path=f"{path}{key}.")
-        else:
-            yield f"{path}{key}", entry

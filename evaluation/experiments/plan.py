@@ -15,7 +15,8 @@ from kinarm import SEMANTICS
 from kinarm._fields import alternatives, field_types, from_plain, init_fields, to_plain
 from kinarm.errors import InvalidInputError, KinarmError, UnknownNameError
 from kinarm.evaluation.experiments.curve import TrialSettings
-from kinarm.evaluation.experiments.experiment import Entry, Experiment, combinations
+from kinarm.evaluation.experiments.experiment import Entry, Experiment
+from kinarm.evaluation.experiments.variation import combinations
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import Learner, find_learner
 from kinarm.policies.recipes import recipe
@@ -228,17 +229,18 @@ def _concerning(
 def _config(entry: Entry, problem: ReachProblem, entries: Mapping[str, Any]) -> TrainingConfig:
     """A recipe for a problem, with some fields of both changed."""
     of_recipe: dict[str, Any] = {}
+    outer: dict[str, Any]
     for key, value in entries.items():
         if key.startswith(PROBLEM):
             with _naming(key):
                 problem = changed_problem(problem, key.removeprefix(PROBLEM), value)
-        elif "." in key:
-            outer, _, inner = key.partition(".")
-            of_recipe.setdefault(outer, {})[inner] = value
         else:
-            of_recipe[key] = value
+            outer, (*path, name) = of_recipe, key.split(".")
+            for part in path:
+                outer = outer.setdefault(part, {})
+            outer[name] = value
     config: TrainingConfig = recipe(
-        entry.learner, entry.recipe, problem=problem.pinned, **of_recipe
+        entry.learner, entry.recipe or None, problem=problem.pinned, **of_recipe
     )
     return config
 

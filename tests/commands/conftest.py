@@ -14,7 +14,6 @@ from oracle_calls import count_calls
 from kinarm.evaluation.commands import (
     arms,
     bench,
-    compare,
     evaluate,
     problem,
     replay,
@@ -31,7 +30,6 @@ MODULES = {
     "kinarm-train": "kinarm.policies.train",
     "kinarm-bench": "kinarm.evaluation.commands.bench",
     "kinarm-arms": "kinarm.evaluation.commands.arms",
-    "kinarm-compare": "kinarm.evaluation.commands.compare",
     "kinarm-problem": "kinarm.evaluation.commands.problem",
     "kinarm-reproduce": "kinarm.evaluation.commands.reproduce",
     "kinarm-study": "kinarm.evaluation.commands.study",
@@ -42,7 +40,6 @@ MAINS = {
     "kinarm-bench": bench.main,
     "kinarm-replay": replay.main,
     "kinarm-arms": arms.main,
-    "kinarm-compare": compare.main,
     "kinarm-problem": problem.main,
     "kinarm-reproduce": reproduce.main,
     "kinarm-study": study.main,

@@ -14,7 +14,6 @@ PROGRAMS = {
     "kinarm-train": "kinarm.policies.train",
     "kinarm-bench": "kinarm.evaluation.commands.bench",
     "kinarm-arms": "kinarm.evaluation.commands.arms",
-    "kinarm-compare": "kinarm.evaluation.commands.compare",
     "kinarm-problem": "kinarm.evaluation.commands.problem",
     "kinarm-reproduce": "kinarm.evaluation.commands.reproduce",
     "kinarm-study": "kinarm.evaluation.commands.study",

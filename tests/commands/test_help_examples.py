@@ -6,7 +6,6 @@ from importlib.util import find_spec
 import pytest
 
 from kinarm.evaluation.commands.bench import BenchmarkRequest
-from kinarm.evaluation.commands.compare import ComparisonRequest
 from kinarm.evaluation.commands.reproduce import ReproductionRequest
 from kinarm.evaluation.commands.study import StudyRequest
 from kinarm.policies import Policy, recipe, train_policy
@@ -22,7 +21,6 @@ SMALLER = {
 
 LONG = {
     "kinarm-bench": BenchmarkRequest,
-    "kinarm-compare": ComparisonRequest,
     "kinarm-reproduce": ReproductionRequest,
     "kinarm-study": StudyRequest,
 }

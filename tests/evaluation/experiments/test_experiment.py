@@ -8,7 +8,7 @@ import pytest
 from kinarm.errors import InvalidInputError, KinarmError
 from kinarm.evaluation.experiments.experiment import Experiment
 from kinarm.evaluation.experiments.plan import changed_problem, plan
-from kinarm.evaluation.experiments.ranges import LARGEST
+from kinarm.evaluation.experiments.variation import LARGEST
 from kinarm.policies.recipes import recipe
 from kinarm.problem import PROBLEMS, ReachProblem
 
@@ -52,7 +52,6 @@ class TestFile:
     def test_what_it_says(self, experiment, tmp_path):
         assert experiment.name == "steps"
         assert experiment.learners == ("ars",)
-        assert experiment.recipes == ("paper",)
         assert experiment.problems == ("right", str(tmp_path / "own.toml"))
         assert experiment.trials.count == 50
         assert experiment.fixed == {"iterations": 7, "reward.success": 2.0}

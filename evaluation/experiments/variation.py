@@ -1,6 +1,7 @@
-"""What values are drawn from: lists, and ranges of numbers."""
+"""What varies in an experiment: fields by their paths, with lists of values or ranges."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from itertools import product
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -57,3 +58,40 @@ def draw(entry: Any, uniform: float) -> Any:
     if whole:
         return min(int(value), high)
     return float(f"{value:.{DIGITS}g}")
+
+
+def combinations(grid: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """Every combination of the values in lists, by field."""
+    for values in product(*grid.values()):
+        yield dict(zip(grid, values, strict=True))
+
+
+def check_grid(grid: Mapping[str, Any]) -> None:
+    """Refuse lists of values that are none."""
+    for key, values in grid.items():
+        if not isinstance(values, list | tuple) or not values:
+            raise InvalidInputError(
+                f"grid.{key} must be a list of at least one value, got {values!r}"
+            )
+
+
+def flattened(
+    entries: Mapping[str, Any], *, ranges: bool, path: str = ""
+) -> Iterator[tuple[str, Any]]:
+    """Entries of tables within tables by their paths.
+
+    Parameters
+    ----------
+    entries : mapping
+        The tables.
+    ranges : bool
+        Whether tables that are ranges stay whole.
+    path : str
+        What all paths begin with.
+    """
+    for key, entry in entries.items():
+        is_range = ranges and isinstance(entry, Mapping) and set(entry) & set(RANGE)
+        if isinstance(entry, Mapping) and not is_range:
+            yield from flattened(entry, ranges=ranges, path=f"{path}{key}.")
+        else:
+            yield f"{path}{key}", entry

@@ -1,0 +1,69 @@
+"""Experiments come to the figures that version 1.0.0 recorded of them, to the last bit."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kinarm.evaluation import Study
+from kinarm.evaluation.experiments.experiment import Experiment
+from kinarm.evaluation.experiments.page import results_document
+from kinarm.evaluation.experiments.results import curve_rows, run_rows
+
+FROZEN = Path(__file__).parent
+
+
+def rows_of(name):
+    with (FROZEN / name).open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_the_runs_of_a_study(tmp_path):
+    """With the keys of its files, so that folders of version 1.0.0 go on."""
+    study = Study(FROZEN / "study.toml", tmp_path).run()
+    rows = run_rows(study)
+    expected = rows_of("runs.csv")
+    assert [{name: str(row[name]) for name in expected[0]} for row in rows] == expected
+
+
+@pytest.mark.parametrize(
+    "learners",
+    [
+        ("ars-tuned", "ppo-tuned"),
+        pytest.param(("sb3-sac", "sb3-tqc-her", "sb3-a2c"), marks=pytest.mark.slow),
+    ],
+)
+def test_learners_compared(learners, tmp_path):
+    if learners[0].startswith("sb3"):
+        pytest.importorskip("sb3_contrib")
+    experiment = Experiment.load(FROZEN / "learners.toml").only(entries=learners)
+    study = Study(experiment, tmp_path).run()
+    expected = json.loads((FROZEN / "learners.json").read_text())
+    document = results_document(study, "")
+    assert document["reachable"] == expected["reachable"]
+    results = [row for row in expected["results"] if row["learner"] in learners]
+    for group, now, before in zip(study.groups(), document["results"], results, strict=True):
+        assert now["entry"] == before.pop("learner")
+        for name in ("success", "collision"):
+            share = before.pop(name)
+            assert now[name]["value"] == share["value"]
+            assert now[name]["ci95_of_trials"] == share["ci95"]
+        rounded = [round(run.last.median_distance, 5) for run in group.runs]
+        assert np.mean(rounded) == before.pop("median_distance")
+        for now_until, before_until in zip(now["until"], before.pop("until"), strict=True):
+            assert now_until.items() >= before_until.items()
+        assert now.items() >= before.items()
+    found = [
+        {
+            "learner": row["entry"],
+            "seed": str(row["seed"]),
+            "environment_steps": str(row["environment_steps"]),
+            "successes": str(round(60 * row["success"])),
+            "collisions": str(round(60 * row["collision"])),
+            "median_distance": str(round(row["median_distance"], 5)),
+        }
+        for row in curve_rows(study)
+    ]
+    assert found == [row for row in rows_of("learners.csv") if row["learner"] in learners]
