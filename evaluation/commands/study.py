@@ -138,8 +138,10 @@ class StudyRequest(RunningOptions):
         from kinarm.evaluation.experiments.page import write_all
         from kinarm.evaluation.experiments.study import Study
 
-        chosen = {"entries": self.only, "problems": self.problems, "seeds": self.seeds}
-        study = Study(Experiment.load(self.experiment).only(**chosen), self.folder)
+        experiment = Experiment.load(self.experiment).only(
+            entries=self.only, problems=self.problems, seeds=self.seeds
+        )
+        study = Study(experiment, self.folder)
         with telling(lambda: GOES_ON):
             failed = None
             try:
