@@ -12,7 +12,7 @@ from kinarm._parser import SHELLS, CommandParser
 PROG = "kinarm"
 
 COMMANDS = {
-    "train": ("kinarm.policies.train", "train a policy"),
+    "train": ("kinarm.evaluation.commands.train", "train a policy"),
     "eval": ("kinarm.evaluation.commands.evaluate", "evaluate policies beside the oracle"),
     "replay": ("kinarm.evaluation.commands.replay", "watch what policies do, in a browser"),
     "study": ("kinarm.evaluation.commands.study", "study learners: many trainings, one file"),

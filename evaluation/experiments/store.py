@@ -124,11 +124,6 @@ class Store:
         if isinstance(task, RunTask):
             self.checkpoint_path(task.run).unlink(missing_ok=True)
 
-    def forget(self, run: Run) -> None:
-        """Remove a training and how far it is."""
-        for path in (self.run_path(run), self.checkpoint_path(run)):
-            path.unlink(missing_ok=True)
-
     def load(self, runs: Iterable[Run]) -> dict[Run, TrainedRun]:
         """Read those of the trainings that are finished and whose file is not damaged."""
         found = {}

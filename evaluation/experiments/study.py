@@ -39,6 +39,8 @@ class Study:
         a file.
     folder : str or Path
         Where the trainings lie, or will.
+    runs : tuple of Run, optional
+        The trainings, instead of those that the experiment plans.
 
     Raises
     ------
@@ -54,7 +56,10 @@ class Study:
     """
 
     def __init__(
-        self, experiment: Experiment | Mapping[str, Any] | str | Path, folder: str | Path
+        self,
+        experiment: Experiment | Mapping[str, Any] | str | Path,
+        folder: str | Path,
+        runs: tuple[Run, ...] | None = None,
     ) -> None:
         where = "experiment"
         if isinstance(experiment, str | Path):
@@ -63,7 +68,7 @@ class Study:
             experiment = Experiment.from_json(experiment, where)
         self.experiment, self.store = experiment, Store(Path(folder))
         try:
-            self.runs = self._planned()
+            self.runs = self._planned() if runs is None else runs
         except InvalidInputError as error:
             raise InvalidInputError(f"{where}: {error}") from error
 
@@ -151,7 +156,7 @@ class Study:
         logs : Path, optional
             Folder of the logs for TensorBoard.
         on_trained : callable
-            Is told of every training that is finished, before it counts as such.
+            Is told of every training that is finished.
 
         Returns
         -------
@@ -184,9 +189,9 @@ class Study:
                 for task, result in chosen.map(work, progress.tasks):
                     if isinstance(result, Failure):
                         failures[task.name] = result.error
-                    elif isinstance(task, RunTask):
-                        on_trained(task.run, result)
                     store.save(task, result)
+                    if isinstance(task, RunTask) and not isinstance(result, Failure):
+                        on_trained(task.run, result)
                     progress.finished(task)
         self.refresh()
         if failures:

@@ -188,14 +188,15 @@ def train(
     """
     run, config, start = task.run, task.run.config, task.start
     learner, earlier = find_learner(run.learner), start or Checkpoint(TrainingState())
-    curve = Curve(config, run.trials, earlier.curve, earlier.distances)
     stopwatch = Stopwatch(earlier.clock)
     options: dict[str, Any] = dict(thread_options(config, threads))
     if logs is not None and "tensorboard" in learner.options:
         options["tensorboard"] = logs / f"{learner.name}-seed{config.seed}"
-    with stopwatch, task.watcher.preparing() if task.watcher else nullcontext():
-        training = begin_training(config, **options)
-        state = training.initial_state() if start is None else start.state
+    with task.watcher.preparing() if task.watcher else nullcontext():
+        curve = Curve(config, run.trials, earlier.curve, earlier.distances)
+        with stopwatch:
+            training = begin_training(config, **options)
+            state = training.initial_state() if start is None else start.state
     if start is None and curve.update(state):
         stopwatch.note()
     saved = time.monotonic()

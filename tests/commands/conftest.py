@@ -19,15 +19,16 @@ from kinarm.evaluation.commands import (
     replay,
     reproduce,
     study,
+    train,
 )
-from kinarm.policies import Policy, recipe, train, train_policy
+from kinarm.policies import Policy, recipe, train_policy
 from kinarm.problem import PROBLEMS
 
 ROOT = Path(__file__).resolve().parents[2]
 MODULES = {
     "kinarm-eval": "kinarm.evaluation.commands.evaluate",
     "kinarm-replay": "kinarm.evaluation.commands.replay",
-    "kinarm-train": "kinarm.policies.train",
+    "kinarm-train": "kinarm.evaluation.commands.train",
     "kinarm-bench": "kinarm.evaluation.commands.bench",
     "kinarm-arms": "kinarm.evaluation.commands.arms",
     "kinarm-problem": "kinarm.evaluation.commands.problem",

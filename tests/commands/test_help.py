@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = {
     "kinarm-eval": "kinarm.evaluation.commands.evaluate",
     "kinarm-replay": "kinarm.evaluation.commands.replay",
-    "kinarm-train": "kinarm.policies.train",
+    "kinarm-train": "kinarm.evaluation.commands.train",
     "kinarm-bench": "kinarm.evaluation.commands.bench",
     "kinarm-arms": "kinarm.evaluation.commands.arms",
     "kinarm-problem": "kinarm.evaluation.commands.problem",

@@ -23,7 +23,8 @@ LONG = {"iterations": 2000, "directions": 2, "top_directions": 2}
 LONG_OPTIONS = ["--iterations", "2000", "--directions", "2", "--top-directions", "2"]
 TRAIN_WITH_FREQUENT_CHECKPOINTS = """
 import signal, sys
-from kinarm.policies import train, training
+from kinarm.evaluation.commands import train
+from kinarm.policies import training
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job may inherit "ignore"
 training.CHECKPOINT_SECONDS = 0.1
 train.main(sys.argv[1:])

@@ -91,7 +91,7 @@ def test_tensorboard(run, tmp_path):
 
 def test_without_its_packages_one_line_says_what_to_install(tmp_path):
     code = "import sys; sys.modules['stable_baselines3'] = None\n"
-    code += "from kinarm.policies.train import main; main(sys.argv[1:])"
+    code += "from kinarm.evaluation.commands.train import main; main(sys.argv[1:])"
     done = subprocess.run(
         [sys.executable, "-c", code, "ppo", "--out", tmp_path / "p.npz"],
         capture_output=True,

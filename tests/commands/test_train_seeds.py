@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 from kinarm.errors import InvalidInputError
-from kinarm.policies import Policy, policy_names, recipe, seeds, train_policy
-from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
-from kinarm.policies.progress_board import ProgressBoard
-from kinarm.policies.seeds import SeedsRequest, SeedTask, seeds_of
-from kinarm.policies.training import CheckpointKeeper, TrainRequest, checkpoint_path
+from kinarm.evaluation.commands.train import SeedsRequest, seeds_of
+from kinarm.evaluation.experiments import train as experiments
+from kinarm.evaluation.experiments.seeds import SeedTrainings
+from kinarm.policies import Policy, policy_names, recipe, train_policy
+from kinarm.policies.training import TrainRequest
 
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = ("--directions", 2, "--top-directions", 2)
@@ -33,14 +33,6 @@ def check_equal(one: Policy, other: Policy) -> None:
 def config(seed=0, **changes):
     settings = {"iterations": 9, "directions": 2, "top_directions": 2, **changes}
     return recipe("ars", "paper", problem="right", seed=seed, **settings)
-
-
-def leave_checkpoint(folder: Path, seed: int, after: int = 4) -> None:
-    """Leave the checkpoint of a seed that was stopped after some iterations."""
-    states = []
-    train_policy(config(seed), on_iteration=states.append)
-    folder.mkdir(exist_ok=True)
-    save_checkpoint(folder / f"{NAME.format(seed)}.checkpoint.npz", config(seed), states[after - 1])
 
 
 @pytest.mark.parametrize(
@@ -77,26 +69,48 @@ def test_each_policy_is_that_of_a_single_training(run, tmp_path, jobs):
 
 
 def test_names_are_those_of_shipped_policies(tmp_path):
-    request = SeedsRequest(
-        training=TrainRequest(learner="ars", recipe="tuned", problem="both", out=tmp_path),
-        seeds=(0, 1),
-    )
-    assert {task.out.stem for task in request._tasks()} < set(policy_names())
+    training = TrainRequest(learner="ars", recipe="tuned", problem="both", out=tmp_path)
+    seeds = SeedTrainings(training, (0, 1))
+    assert {seeds._out(run).stem for run in seeds._runs()} < set(policy_names())
 
 
-def test_resuming_finishes_each_seed_and_repeats_none(run, tmp_path):
-    leave_checkpoint(tmp_path, 1)
-    train_policy(config(0)).policy.save(tmp_path / f"{NAME.format(0)}.npz")
-    before = (tmp_path / f"{NAME.format(0)}.npz").read_bytes()
+def test_resuming_finishes_each_seed_and_repeats_none(run, tmp_path, monkeypatch):
+    """Seed 0 is finished, seed 1 was interrupted, seed 2 has not begun."""
+    monkeypatch.setattr(experiments, "CHECKPOINT_SECONDS", 0.0)
     arguments = ("ars", "--problem", "right", "--iterations", 9, *SMALL, "--seeds", 3)
-    answer = run("kinarm-train", *arguments, "--out", tmp_path, "--resume")
+    options = ("--jobs", 1, "--out", tmp_path)
+    save, resumed = experiments.save_checkpoint, []
+
+    def interrupt(path, run, checkpoint):
+        save(path, run, checkpoint)
+        resumed.append((run.config.seed, checkpoint.state.iteration))
+        if resumed[-1] == (1, 4):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(experiments, "save_checkpoint", interrupt)
+    answer = run("kinarm-train", *arguments, *options)
+    assert answer.status == 130
+    assert answer.err.splitlines()[-1] == (
+        "kinarm-train: interrupted: 1 of 3 seeds are finished; "
+        "the same command with --resume goes on"
+    )
+    before = (tmp_path / f"{NAME.format(0)}.npz").read_bytes()
+    answer = run("kinarm-train", *arguments, *options)
+    assert (answer.status, answer.err.count("\n")) == (2, 1)
+    assert "go on with --resume" in answer.err
+    answer = run("kinarm-train", *arguments, *options, "--noise", 0.5, "--resume")
+    assert (answer.status, answer.err.count("\n")) == (2, 1)
+    assert "noise" in answer.err
+    del resumed[:]
+    answer = run("kinarm-train", *arguments, *options, "--resume")
     assert answer.status == 0, answer.err
+    assert resumed[0] == (1, 5)
     assert (tmp_path / f"{NAME.format(0)}.npz").read_bytes() == before
     assert "seed 0: finished earlier" in answer.out
     for seed in range(3):
         made = Policy.load(tmp_path / f"{NAME.format(seed)}.npz")
         check_equal(made, train_policy(config(seed)).policy)
-    assert not list(tmp_path.glob("*.checkpoint.npz"))
+    assert len(list(tmp_path.iterdir())) == 6
 
 
 @pytest.mark.parametrize(
@@ -122,49 +136,40 @@ def test_out_is_a_folder(run, tmp_path):
     assert f"--out {tmp_path / 'right'}" in answer.err
 
 
-def leave(folder, what):
-    """Put what a training of seed 1 leaves at its end, or on the way, into a folder."""
-    if what == "policy":
-        train_policy(config(1)).policy.save(folder / f"{NAME.format(1)}.npz")
-    else:
-        leave_checkpoint(folder, 1)
-
-
-@pytest.mark.parametrize("left", ["policy", "checkpoint"])
-def test_files_in_the_way(run, tmp_path, left):
-    leave(tmp_path, left)
-    before = sorted(path.name for path in tmp_path.iterdir())
+def test_a_policy_in_the_way(run, tmp_path):
+    train_policy(config(1)).policy.save(tmp_path / f"{NAME.format(1)}.npz")
     arguments = ("ars", "--problem", "right", "--iterations", 9, *SMALL, "--seeds", 2)
     answer = run("kinarm-train", *arguments, "--out", tmp_path)
     assert (answer.status, answer.err.count("\n")) == (2, 1)
-    assert ("--overwrite" if left == "policy" else "--resume") in answer.err
-    assert sorted(path.name for path in tmp_path.iterdir()) == before
-
-
-@pytest.mark.parametrize("left", ["policy", "checkpoint"])
-def test_resuming_refuses_the_files_of_other_settings(run, tmp_path, left):
-    leave(tmp_path, left)
-    arguments = ("ars", "--problem", "right", "--iterations", 9, *SMALL, "--seeds", 2)
+    assert "--overwrite" in answer.err
     for change in (("--noise", 0.5), ("--tolerance", 0.1)):
         answer = run("kinarm-train", *arguments, *change, "--out", tmp_path, "--resume")
         assert (answer.status, answer.err.count("\n")) == (2, 1)
         assert change[0][2:] in answer.err
+    assert [path.name for path in tmp_path.iterdir()] == [f"{NAME.format(1)}.npz"]
 
 
-def test_a_seed_that_fails_says_why_in_one_line(run, tmp_path):
-    """The file of one seed is being written by another process."""
-    from kinarm._files import only_writer
+def test_a_seed_that_fails_is_named(run, tmp_path, monkeypatch):
+    train = experiments.train
 
-    with only_writer(tmp_path / f"{NAME.format(1)}.npz"):
-        arguments = ("ars", "--problem", "right", "--iterations", 9, *SMALL, "--seeds", 2)
-        answer = run("kinarm-train", *arguments, "--jobs", 1, "--out", tmp_path)
-    assert (answer.status, answer.out) == (2, "")
-    assert "another process is writing" in answer.err.splitlines()[-1]
+    def fail(task, *given, **options):
+        if task.run.config.seed == 1:
+            raise ValueError("of all things")
+        return train(task, *given, **options)
+
+    monkeypatch.setattr(experiments, "train", fail)
+    arguments = ("ars", "--problem", "right", "--iterations", 9, *SMALL, "--seeds", 2)
+    answer = run("kinarm-train", *arguments, "--jobs", 1, "--out", tmp_path)
+    assert answer.status == 1
+    assert answer.err.splitlines()[-1] == (
+        "kinarm-train: 1 of 2 trainings failed: ars paper* right seed 1: of all things"
+    )
+    assert (tmp_path / f"{NAME.format(0)}.npz").exists()
 
 
 def test_what_was_to_be_replaced_is_trained_anew(run, tmp_path):
     """A policy with the settings that are asked for is finished, one with others is not."""
-    leave(tmp_path, "policy")
+    train_policy(config(1)).policy.save(tmp_path / f"{NAME.format(1)}.npz")
     train_policy(config(0, noise=0.5)).policy.save(tmp_path / f"{NAME.format(0)}.npz")
     before = (tmp_path / f"{NAME.format(0)}.npz").read_bytes()
     arguments = ("ars", "--problem", "right", "--iterations", 9, *SMALL, "--noise", 0.5)
@@ -179,47 +184,6 @@ def test_what_was_to_be_replaced_is_trained_anew(run, tmp_path):
 def test_there_must_be_a_seed():
     with pytest.raises(InvalidInputError, match="there is no seed to train"):
         SeedsRequest(training=TrainRequest(learner="ars", out=Path("right")), seeds=())
-
-
-class TestAskedToStop:
-    """What a worker does, within this process."""
-
-    @pytest.fixture
-    def task(self, tmp_path):
-        return SeedTask(config(3), tmp_path / f"{NAME.format(3)}.npz")
-
-    @pytest.fixture
-    def board(self, tmp_path):
-        (tmp_path / "board").mkdir()
-        board = ProgressBoard(tmp_path / "board", 1)
-        board.clear()
-        return board
-
-    def test_before_it_begins_nothing_is_written(self, task, board, tmp_path):
-        board.ask_to_stop()
-        assert seeds._train((0, task), board, 1, None) is None
-        assert [path.name for path in tmp_path.iterdir()] == ["board"]
-        assert seeds._what_is_left([task], "interrupted").endswith("the same command begins again")
-
-    def test_in_between_it_keeps_a_checkpoint(self, task, board, monkeypatch):
-        asked = iter([False, False, False, True])
-        monkeypatch.setattr(ProgressBoard, "asked_to_stop", lambda _: next(asked))
-        assert seeds._train((0, task), board, 1, None) is None
-        state = load_checkpoint(checkpoint_path(task.out)).state
-        assert state.iteration == board.iterations == 3
-        assert "0 of 1 seeds are finished" in seeds._what_is_left([task], "interrupted")
-        monkeypatch.undo()
-        last = seeds._train((0, task), board, 1, None)
-        assert last.environment_steps == train_policy(task.config).curve[-1].environment_steps
-        check_equal(Policy.load(task.out), train_policy(task.config).policy)
-        assert "1 of 1 seeds are finished" in seeds._what_is_left([task], "interrupted")
-
-    def test_without_an_iteration_there_is_nothing_to_keep(self, task):
-        path = checkpoint_path(task.out)
-        keeper = CheckpointKeeper(task.config, path, None)
-        assert keeper.save_on_interrupt() == "interrupted before the first iteration"
-        keeper.save()
-        assert not path.exists()
 
 
 def start(command, folder: Path, shared: Path, *extra: object) -> subprocess.Popen:
@@ -237,16 +201,6 @@ def start(command, folder: Path, shared: Path, *extra: object) -> subprocess.Pop
     )
 
 
-def wait_for_iterations(process: subprocess.Popen, shared: Path, count: int) -> None:
-    """Wait until the trainings have come so far."""
-    while True:
-        assert process.poll() is None, process.stderr.read()
-        for rows in shared.glob("kinarm-*/rows"):
-            if ProgressBoard(rows.parent, 3).iterations >= count:
-                return
-        time.sleep(0.02)
-
-
 def workers(process: subprocess.Popen) -> list[int]:
     """Worker processes of a command, of those that it has started."""
     found = []
@@ -261,7 +215,9 @@ def workers(process: subprocess.Popen) -> list[int]:
 def test_ctrl_c_and_lost_workers_keep_every_seed_and_say_how_to_go_on(command, tmp_path):
     folder, shared = tmp_path / "right", tmp_path / "shared"
     process = start(command, folder, shared)
-    wait_for_iterations(process, shared, 200)
+    while not list(shared.glob("kinarm-*/rows")):
+        assert process.poll() is None, process.stderr.read()
+        time.sleep(0.02)
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=120)
     assert process.returncode == 130
@@ -269,8 +225,6 @@ def test_ctrl_c_and_lost_workers_keep_every_seed_and_say_how_to_go_on(command, t
     last = errors.splitlines()[-1]
     assert last.startswith("kinarm-train: interrupted: ")
     assert last.endswith("the same command with --resume goes on")
-    states = [load_checkpoint(path).state for path in folder.glob("*.checkpoint.npz")]
-    assert sum(state.iteration for state in states) >= 200 or list(folder.glob("*.curve.csv"))
     assert not list(shared.iterdir())
 
     process = start(command, folder, shared, "--resume")
@@ -283,7 +237,7 @@ def test_ctrl_c_and_lost_workers_keep_every_seed_and_say_how_to_go_on(command, t
     assert process.returncode == 1
     assert "Traceback" not in errors
     last = errors.splitlines()[-1]
-    assert last.startswith("kinarm-train: workers ended unexpectedly, perhaps for want of memory: ")
+    assert last.startswith("kinarm-train: workers ended unexpectedly: ")
     assert last.endswith("of 3 seeds are finished; the same command with --resume goes on")
 
     process = start(command, folder, shared, "--resume")

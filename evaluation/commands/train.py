@@ -1,19 +1,24 @@
 """``kinarm-train``: train a policy."""
 
 import argparse
+import re
 import shlex
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from kinarm._command_line import run_command
 from kinarm._options import add_options, given_options
 from kinarm._parser import CommandParser, Parser
+from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
 from kinarm.policies.learners import Learner, find_learner, learner_names
-from kinarm.policies.seeds import SeedsRequest
 from kinarm.policies.training import TrainRequest, curve_path
+
+if TYPE_CHECKING:
+    from kinarm.evaluation.experiments.seeds import TrainedSeed
 
 PROG = "kinarm-train"
 
@@ -46,6 +51,96 @@ examples:
 """
 
 SETTINGS = "settings of the learner (defaults of the recipe {})"
+
+
+MOST_SEEDS = 1000
+
+
+def seeds_of(text: str) -> tuple[int, ...]:
+    """Seeds of a text: ``"5"`` is 0 to 4, ``"5-9"`` is 5 to 9.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is neither a number nor a rising range, or there are too many.
+    """
+    found = re.fullmatch(r"(?:([0-9]{1,9})-)?([0-9]{1,9})", text)
+    if found is not None:
+        first, last = int(found[1] or 0), int(found[2]) - (found[1] is None)
+        if first <= last < first + MOST_SEEDS:
+            return tuple(range(first, last + 1))
+    raise InvalidInputError(
+        f"must be a number (5) or a rising range (5-9), 1 to {MOST_SEEDS} seeds, got {text!r}"
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeedsRequest:
+    """Train a policy with each of several seeds, as many at a time as there are processors.
+
+    Each policy equals that of a training with this seed alone, bit for bit.
+
+    Parameters
+    ----------
+    training : TrainRequest
+        What is trained; ``out`` is the folder of the policies, and there is no ``seed``.
+    seeds : tuple of int
+        Train several seeds in parallel: a number (5 is 0 to 4) or a range (5-9). One policy for
+        each goes into the folder --out.
+    jobs : int, optional
+        Seeds at a time.
+
+    Raises
+    ------
+    InvalidInputError
+        If two settings do not go together, or a number is out of range.
+    """
+
+    training: TrainRequest
+    seeds: tuple[int, ...] = field(metadata={"parse": seeds_of, "metavar": "N"})
+    jobs: int | None = None
+
+    GROUPS: ClassVar = {"training": ("seeds", "jobs")}
+    DEFAULTS: ClassVar = {"seeds": "one training", "jobs": "one a processor"}
+
+    def __post_init__(self) -> None:
+        if self.training.seed is not None:
+            raise InvalidInputError("--seed and --seeds exclude each other")
+        if not self.seeds:
+            raise InvalidInputError("there is no seed to train")
+        for seed in self.seeds:
+            whole_number("seed", seed, 0)
+        if self.jobs is not None:
+            whole_number("jobs", self.jobs, 1)
+        if Path(self.training.out).suffix == ".npz":
+            folder = Path(self.training.out).with_suffix("")
+            raise InvalidInputError(f"with --seeds, --out is a folder: --out {folder}")
+
+    def run(self) -> "tuple[TrainedSeed, ...]":
+        """Train, and write a policy and a learning curve for each seed.
+
+        Names are those of the shipped policies, such as ``ars-tuned-both-seed0.npz``. With
+        ``resume``, finished seeds are left as they are, and the others go on or begin. What is
+        under way lies in the folder ``.training`` meanwhile.
+
+        Returns
+        -------
+        tuple of TrainedSeed
+            In the order of the seeds.
+
+        Raises
+        ------
+        TrainingFailedError
+            If trainings failed; all others are finished then.
+        KinarmError
+            If settings cannot be used, a file cannot be written, or workers end unexpectedly again
+            and again.
+        KeyboardInterrupt
+            If it is interrupted; the message says how to go on.
+        """
+        from kinarm.evaluation.experiments.seeds import SeedTrainings
+
+        return SeedTrainings(self.training, self.seeds, self.jobs).run()
 
 
 def build_parser(named: str | None = None) -> Parser:
@@ -140,7 +235,7 @@ def _train_seeds(request: SeedsRequest) -> None:
         if last is not None:
             said = f"return {last.mean_return:+.3f}, success {100 * last.success:.0f} %"
         sys.stdout.write(f"seed {seed}: {said}; written: {out}\n")
-    _say_next(f"{request.folder}/")
+    _say_next(f"{request.training.out}/")
 
 
 def _say_next(out: Path | str) -> None:
