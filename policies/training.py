@@ -7,7 +7,7 @@ import csv
 import io
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -42,10 +42,6 @@ CHECKPOINT_SECONDS = 5.0
 
 STARTING = "starting"
 """Shown before the first iteration, unless the training says something else."""
-
-
-class TrainingStopped(Exception):  # noqa: N818 - it is no error
-    """A training was asked to stop; its checkpoint is saved."""
 
 
 def checkpoint_path(out: str | Path) -> Path:
@@ -278,7 +274,6 @@ def train_to_file(
     state: TrainingState | None,
     out: str | Path,
     watcher: Watcher,
-    asked_to_stop: Callable[[], bool] = lambda: False,
     **options: Any,
 ) -> TrainingResult:
     """Train, and write the policy and its learning curve.
@@ -293,15 +288,11 @@ def train_to_file(
         File of the policy.
     watcher : Watcher
         Is told how far the training is.
-    asked_to_stop : callable
-        Whether the training is to stop; asked after every iteration.
 
     Raises
     ------
     KinarmError
         If settings cannot be used, or a file cannot be written.
-    TrainingStopped
-        If the training was asked to stop; the checkpoint is complete.
     KeyboardInterrupt
         If it is interrupted; the checkpoint is complete, and the message says so.
     """
@@ -311,9 +302,6 @@ def train_to_file(
     def on_iteration(state: TrainingState) -> None:
         watcher.update(state)
         keeper.update(state)
-        if state.iteration < config.iterations and asked_to_stop():
-            keeper.save()
-            raise TrainingStopped
 
     with telling(keeper.save_on_interrupt):
         watcher.prepare("")
