@@ -93,7 +93,7 @@ class SeedTrainings:
                 self._train(study, leave)
             except WorkerError as error:
                 raise WorkerError(self._what_is_left("workers ended unexpectedly")) from error
-        shutil.rmtree(study.store.folder)
+        shutil.rmtree(study.store.folder, ignore_errors=True)
         return tuple(TrainedSeed(run.config.seed, self._out(run), last.get(run)) for run in runs)
 
     def _runs(self) -> tuple[Run, ...]:

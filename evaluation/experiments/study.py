@@ -66,6 +66,8 @@ class Study:
             where, experiment = str(experiment), Experiment.load(experiment)
         elif isinstance(experiment, Mapping):
             experiment = Experiment.from_json(experiment, where)
+        else:
+            where = experiment.name
         self.experiment, self.store = experiment, Store(Path(folder))
         try:
             self.runs = self._planned() if runs is None else runs

@@ -83,8 +83,8 @@ class TestBadInput:
             ("seeds = 'many'", "steps.toml: seeds must be a whole number, got 'many'"),
             ("[grid]\nstep_size = []", "grid.step_size must be a list of at least one value"),
             ("[grid]\nstep = [1]", "unknown field of a recipe or problem 'step'"),
-            ("[fixed]\nnoise = 'x'", "steps.toml: noise must be a number, got 'x'"),
-            ("problem = 'nowhere'", "steps.toml: unknown problem 'nowhere'"),
+            ("[fixed]\nnoise = 'x'", "steps: noise must be a number, got 'x'"),
+            ("problem = 'nowhere'", "steps: unknown problem 'nowhere'"),
             ("seeds = ", "steps.toml: not an experiment file: Invalid value"),
         ],
     )
