@@ -8,7 +8,7 @@ PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check 
 MODULES := $(shell find kinarm policies evaluation data -name __pycache__ -prune -o -type f -print | sort | cksum | cut -d' ' -f1)
 INSTALLED = $(VENV)/.installed-$(1)-$(MODULES)
 
-.PHONY: eval test test-slow campaign lint docs package clean
+.PHONY: eval test test-slow campaign mutants lint docs package clean
 
 eval: $(call INSTALLED,core) ## evaluate all shipped policies on 200 trials a task
 	$(BIN)/kinarm-eval --trials 200
@@ -23,14 +23,14 @@ test: $(call INSTALLED,test) ## run the tests, but for the slow ones
 test-slow: $(call INSTALLED,all) ## run the slow tests, and what make test skipped for want of a library
 	$(PYTEST) -n $(WORKERS) --rest --cov --cov-append --cov-report=term --cov-fail-under=95
 
-CAMPAIGN := loaders command_lines writes signals kills live_page
+CAMPAIGN := loaders disturbances
 
-test-slow: $(call INSTALLED,test) ## run the slow tests, those in a browser included
-	$(PYTEST) -n $(WORKERS) -m slow
-
-campaign: $(call INSTALLED,all) ## damaged files, odd arguments, failing writes, signals: hours
+campaign: $(call INSTALLED,all) ## damaged files, kills, signals, failing writes: hours
 	set -e; for module in $(CAMPAIGN); do \
 		$(BIN)/python -m tests.campaign.$$module --out data/results/campaign/$$module.json; done
+
+mutants: $(call INSTALLED,all) ## change the code in a copy, and see whether the tests notice: hours
+	$(BIN)/python tests/mutants.py --out mutants.json
 
 lint: $(call INSTALLED,dev) ## check style, format and types
 	$(BIN)/ruff check .
