@@ -3,11 +3,13 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from docs.transfer.reflection import reflection_of, with_mirror
+from docs.transfer.study import SOURCE, Training, TransferRun, TransferStudy, targets
 from kinarm._fields import to_plain
 from kinarm.evaluation.statistics import (
     Estimate,
@@ -17,9 +19,6 @@ from kinarm.evaluation.statistics import (
     student,
     superiority,
 )
-from kinarm.evaluation.studies.transfer.planning import SOURCE, PlannedTraining, Role, targets
-from kinarm.evaluation.studies.transfer.reflection import reflection_of, with_mirror
-from kinarm.evaluation.studies.transfer.runs import TransferRun
 from kinarm.evaluation.trials import TrialSet, trial_set
 from kinarm.policies.mirror import find_mirror, missing_mirror
 from kinarm.policies.policy import Policy
@@ -27,23 +26,20 @@ from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.problem import ReachProblem
 from kinarm.problem_files import problem_names
 
-if TYPE_CHECKING:
-    from kinarm.evaluation.studies.transfer.study import TransferStudy
-
 LEVELS = (0.5, 0.8, 0.9)
 """Shares of success by which the speed of learning is told."""
 
-Runs = Mapping[PlannedTraining, TransferRun]
+Runs = Mapping[Training, TransferRun]
 
 
-def transfer_document(study: "TransferStudy", runs: Runs, command: str) -> dict[str, Any]:
+def transfer_document(study: TransferStudy, runs: Runs, command: str) -> dict[str, Any]:
     """Settings and results, as a dictionary that JSON can hold.
 
     Parameters
     ----------
     study : TransferStudy
         What was planned.
-    runs : mapping of PlannedTraining to TransferRun
+    runs : mapping of Training to TransferRun
         What all of its trainings came to.
     command : str
         What made it, for the record.
@@ -82,15 +78,15 @@ class TransferResults:
     ----------
     study : TransferStudy
         What was planned.
-    runs : mapping of PlannedTraining to TransferRun
+    runs : mapping of Training to TransferRun
         What all of its trainings came to.
     """
 
-    def __init__(self, study: "TransferStudy", runs: Runs) -> None:
+    def __init__(self, study: TransferStudy, runs: Runs) -> None:
         self._study, self._runs, self._protocol = study, runs, study.protocol
 
     def group(
-        self, learner: str, role: Role, problem: ReachProblem, length: float
+        self, learner: str, role: str, problem: ReachProblem, length: float
     ) -> list[TransferRun]:
         """The training seeds of one kind."""
         return [
@@ -155,8 +151,7 @@ class TransferResults:
         self, level: float, warm: Sequence[TransferRun], scratch: Sequence[TransferRun]
     ) -> dict[str, Any]:
         """How long trainings take until a share of trials first succeeds."""
-        successes = level * self._protocol.look_trials
-        looks = [[run.first_look(successes) for run in runs] for runs in (warm, scratch)]
+        looks = [[run.first_look(level) for run in runs] for runs in (warm, scratch)]
         steps = [
             np.array([look.environment_steps if look else math.inf for look in each])
             for each in looks
@@ -205,10 +200,10 @@ class TransferResults:
                 "role": training.role,
                 "problem": training.problem.name,
                 "length": training.length,
-                "seed": training.config.seed,
+                "seed": training.seed,
                 "iteration": [look.iteration for look in run.looks],
                 "environment_steps": [look.environment_steps for look in run.looks],
-                "success": [look.successes / self._protocol.look_trials for look in run.looks],
+                "success": [look.success for look in run.looks],
             }
 
     def _trials(self, problem: ReachProblem) -> TrialSet:

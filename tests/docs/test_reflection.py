@@ -6,12 +6,12 @@ from itertools import product
 import numpy as np
 import pytest
 
-from kinarm.evaluation.studies.transfer import reflection
-from kinarm.evaluation.studies.transfer.planning import (
+from docs.transfer import reflection
+from docs.transfer.reflection import reflection_of, with_mirror
+from docs.transfer.study import (
     SOURCE,
     targets,
 )
-from kinarm.evaluation.studies.transfer.reflection import reflection_of, with_mirror
 from kinarm.evaluation.trials import trial_set
 from kinarm.policies import load_policy, recipe, train_policy
 from kinarm.policies.mirror import find_mirror, missing_mirror

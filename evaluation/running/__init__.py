@@ -1,1 +1,0 @@
-"""Carry out many tasks: in worker processes of this machine, or wherever an executor puts them."""

@@ -1,1 +1,0 @@
-"""Studies: many trainings from one file, each of them judged beside what could be reached."""

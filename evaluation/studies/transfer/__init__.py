@@ -1,1 +1,0 @@
-"""Transfer: what policies for one task are worth for other tasks and for another arm."""
