@@ -180,7 +180,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _carry_out(request: StudyRequest, command: str) -> None:
     """Run a request, and print the best settings."""
-    from kinarm.evaluation.experiments.page import group_row, headings
+    from kinarm.evaluation.experiments.table import group_row, headings
 
     study = request.run(command=command)
     if len(study):

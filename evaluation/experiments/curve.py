@@ -193,3 +193,13 @@ def _due_iterations(curve: CurveTrials | None, iterations: int) -> frozenset[int
 def face(policy: Policy, trials: TrialSet) -> Rollouts:
     """Put a policy to trials."""
     return trials.simulator.rollout(policy, trials.starts, trials.goals)
+
+
+def curve_array(points: Sequence[CurvePoint]) -> NDArray[np.float64]:
+    """Points as rows of numbers, shape (n_points, 5)."""
+    return np.array(points, dtype=np.float64).reshape(-1, len(CurvePoint._fields))
+
+
+def points_of(array: NDArray[np.float64]) -> tuple[CurvePoint, ...]:
+    """The points that `curve_array` made rows of."""
+    return tuple(CurvePoint(int(row[0]), int(row[1]), *row[2:]) for row in array.tolist())

@@ -12,11 +12,13 @@ from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.experiments.curve import TrialSettings
 from kinarm.evaluation.experiments.variation import (
+    SEARCH_CHOICES,
     check_grid,
     check_range,
     combinations,
     draw,
-    flattened,
+    prepared,
+    ranges_of,
 )
 from kinarm.problem_files import shipped_files
 from kinarm.randomness import Stream, stream_generator
@@ -26,9 +28,6 @@ MOST_TRAININGS = 100_000
 
 SEVERAL = ("learners", "recipes", "problems")
 """Entries of a file that are lists; a text stands for a list of one."""
-
-TABLES = ("fixed", "grid", "random", "search")
-"""Entries of a file that name fields of settings."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,7 +158,7 @@ class Experiment:
         tables = {
             "fixed": self.fixed,
             "grid": self.grid,
-            "random": _ranges(self.random),
+            "random": ranges_of(self.random),
             "search": self.searched,
         }
         given: dict[str, str] = {}
@@ -173,7 +172,7 @@ class Experiment:
             if entries:
                 whole_number(f"{table}.count", entries.get("count", 0), 1, MOST_TRAININGS)
                 whole_number(f"{table}.seed", entries.get("seed", 0), 0)
-                for key, entry in _ranges(entries).items():
+                for key, entry in ranges_of(entries).items():
                     check_range(f"{table}.{key}", entry)
 
     @property
@@ -222,7 +221,7 @@ class Experiment:
     @property
     def searched(self) -> dict[str, Any]:
         """What is searched, by field."""
-        return _ranges(self.search)
+        return ranges_of(self.search)
 
     def choices(self) -> Iterator[dict[str, Any]]:
         """Every combination of the values that vary, by field."""
@@ -237,7 +236,7 @@ class Experiment:
             return
         for number in range(self.random["count"]):
             rng = stream_generator(Stream.STUDY, self.random.get("seed", 0), number)
-            yield {key: draw(entry, rng.random()) for key, entry in _ranges(self.random).items()}
+            yield {key: draw(entry, rng.random()) for key, entry in ranges_of(self.random).items()}
 
     def to_json(self) -> dict[str, Any]:
         """As a dictionary that TOML and JSON can hold."""
@@ -261,10 +260,10 @@ class Experiment:
             If an entry is missing, unknown or wrong; in one line that names source, key and what
             is expected.
         """
-        made = _prepared(entries, SEVERAL)
+        made = prepared(entries, SEVERAL)
         if isinstance(made.get("entries"), list):
             made["entries"] = [
-                _prepared(each, ("problems",)) if isinstance(each, Mapping) else each
+                prepared(each, ("problems",)) if isinstance(each, Mapping) else each
                 for each in made["entries"]
             ]
         return from_plain(cls, made, where)
@@ -346,31 +345,6 @@ class Experiment:
         return replace(self, recipes=recipes, problems=problems, entries=entries)
 
 
-SEARCH_CHOICES = {"sampler": ("tpe", "random", "cmaes"), "pruner": ("median", "none", "hyperband")}
-"""What can be said of a search beside count and seed; the first is the default."""
-
-
 def _check_distinct(name: str, values: "tuple[str, ...] | list[str]") -> None:
     if len(set(values)) < len(values):
         raise InvalidInputError(f"{name} names the same twice: {', '.join(values)}")
-
-
-def _ranges(entries: Mapping[str, Any]) -> dict[str, Any]:
-    """What is drawn or searched, by field."""
-    said = ("count", "seed", *SEARCH_CHOICES)
-    return {key: entry for key, entry in entries.items() if key not in said}
-
-
-def _prepared(entries: Mapping[str, Any], several: Iterable[str]) -> dict[str, Any]:
-    """Entries of a file, with lists for texts, and with paths for tables within tables."""
-    made = dict(entries)
-    for name in several:
-        single = name.removesuffix("s")
-        if single in made and name not in made:
-            made[name] = made.pop(single)
-        if isinstance(made.get(name), str):
-            made[name] = [made[name]]
-    for table in TABLES:
-        if isinstance(made.get(table), Mapping):
-            made[table] = dict(flattened(made[table], ranges=table in ("random", "search")))
-    return made

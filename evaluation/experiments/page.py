@@ -12,16 +12,8 @@ import tomli_w
 from kinarm._files import write_atomically, write_text
 from kinarm.errors import MissingExtraError
 from kinarm.evaluation.experiments.figures import draw_all
-from kinarm.evaluation.experiments.results import (
-    COLUMNS,
-    FIGURES,
-    Group,
-    curve_rows,
-    group_entries,
-    run_rows,
-    run_table,
-    shown,
-)
+from kinarm.evaluation.experiments.results import FIGURES, Group, shown
+from kinarm.evaluation.experiments.table import curve_rows, group_entries, group_row, headings
 from kinarm.evaluation.figures import save_figure
 from kinarm.evaluation.markdown import markdown_table
 from kinarm.evaluation.metrics import METRICS
@@ -78,7 +70,7 @@ def write_all(study: "Study", command: str = "") -> Path:
         If a file cannot be written.
     """
     folder = study.store.folder
-    write_csv(folder / "runs.csv", run_rows(study))
+    write_csv(folder / "runs.csv", study.rows())
     write_csv(folder / "curves.csv", curve_rows(study))
     if find_spec("pyarrow") is not None:
         write_parquet(study, folder / "runs.parquet")
@@ -127,7 +119,7 @@ def write_parquet(study: "Study", path: Path) -> None:
         import pyarrow.parquet
     except ImportError as error:
         raise MissingExtraError("pyarrow", "study") from error
-    table = run_table(study)
+    table = study.table()
     arrow = pyarrow.table({name: table[name] for name in table.dtype.names or ()})
     write_atomically(path, lambda file: pyarrow.parquet.write_table(arrow, file))
 
@@ -218,16 +210,6 @@ def study_page(study: "Study", figures: dict[str, "Figure"], command: str = "") 
         meanings=[(heading or name, meaning) for name, heading, meaning in explained],
         versions=package_versions(),
     )
-
-
-def headings() -> tuple[str, ...]:
-    """Of the table of groups."""
-    return tuple(column.heading for column in COLUMNS)
-
-
-def group_row(group: Group) -> tuple[str, ...]:
-    """What the table says of a group."""
-    return tuple(column.text(group) for column in COLUMNS)
 
 
 def _subtitle(study: "Study") -> str:

@@ -1,33 +1,30 @@
 """What the trainings of an experiment came to: groups of seeds, and tables of them."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.evaluation.experiments.curve import CurvePoint
-from kinarm.evaluation.experiments.experiment import Entry
+from kinarm.evaluation.experiments.experiment import Entry, Experiment
 from kinarm.evaluation.experiments.plan import Run
-from kinarm.evaluation.experiments.runs import Clock, TrainedRun, TrialBounds
+from kinarm.evaluation.experiments.runs import Clock, TrainedRun, TrialBounds, load_run
+from kinarm.evaluation.experiments.store import Store
+from kinarm.evaluation.experiments.train import BoundTask
 from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.outcomes import Outcomes
-from kinarm.evaluation.statistics import Estimate, share_over_seeds, wilson_interval
+from kinarm.evaluation.statistics import Estimate, share_over_seeds
 from kinarm.policies.config import TrainingConfig
-
-if TYPE_CHECKING:
-    from kinarm.evaluation.experiments.study import Study
+from kinarm.policies.policy import Policy
 
 FIGURES = (
     *("success", "relative_success", "collision", "median_distance", "median_steps", "step_ratio"),
 )
 """Figures of merit that a row tells of a training, as in `kinarm.evaluation.METRICS`."""
-
-LEVELS = (0.5, 0.8)
-"""Shares of success by which the speed of learning is told."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -153,100 +150,6 @@ def figures_of(outcomes: Outcomes) -> dict[str, float]:
     return found
 
 
-class Column(NamedTuple):
-    """A column of the table of groups, on the page and wherever it is printed.
-
-    Attributes
-    ----------
-    heading : str
-        What it is called.
-    text : callable
-        What it says of a group.
-    """
-
-    heading: str
-    text: Callable[[Group], str]
-
-
-def _figure(name: str) -> Callable[[Group], str]:
-    """A figure of merit as text; nothing for an unknown one."""
-    return lambda group: (
-        "" if np.isnan(value := group.figures[name]) else METRICS[name].write(value)
-    )
-
-
-def _interval(group: Group) -> str:
-    low, high = group.success.ci95 or (np.nan, np.nan)
-    return METRICS["success"].write_range(low, high).replace("..", "\N{EN DASH}")
-
-
-def _until(level: float) -> Callable[[Group], str]:
-    """Environment steps [thousands] and processor time [min] until a share of trials succeeds."""
-
-    def text(group: Group) -> str:
-        steps, _, seconds = group.until(level)
-        if math.isinf(steps):
-            return "never"
-        time = "" if math.isnan(seconds) else f", {seconds / 60:.2f}"
-        return f"{steps / 1e3:,.0f}{time}"
-
-    return text
-
-
-COLUMNS = (
-    Column("trainings", lambda group: group.label),
-    Column("seeds", lambda group: str(len(group.runs))),
-    Column("success %", _figure("success")),
-    Column("95 %", _interval),
-    Column(
-        "worst seed %", lambda group: METRICS["success"].write(float(group.hits.mean(axis=1).min()))
-    ),
-    Column("relative success %", _figure("relative_success")),
-    Column("collision %", _figure("collision")),
-    Column("median distance m", _figure("median_distance")),
-    Column("median steps", _figure("median_steps")),
-    Column("step ratio", _figure("step_ratio")),
-    Column("million steps", lambda group: f"{group.environment_steps / 1e6:.2f}"),
-    Column("minutes", lambda group: f"{group.processor_seconds / 60:.2f}"),
-    *(Column(f"thousand steps, minutes to {level:.0%}", _until(level)) for level in LEVELS),
-)
-"""What tables say of a group; minutes are processor time without the trials of the policies."""
-
-
-def group_runs(study: "Study") -> tuple[Group, ...]:
-    """Finished trainings of a study, those with the same settings but for the seed together."""
-    shared: dict[tuple[str, str], list[Run]] = {}
-    for run in study.finished:
-        config = {k: v for k, v in run.settings["config"].items() if k != "seed"}
-        shared.setdefault((run.entry.name, repr((run.learner, config))), []).append(run)
-    return tuple(
-        Group(
-            label=_label(runs[0], study),
-            entry=runs[0].entry,
-            config=runs[0].config,
-            choices=runs[0].choices,
-            runs=tuple(study.finished[run] for run in runs),
-            clocks=tuple(study.store.clock(run) for run in runs),
-            bounds=study.bounds.get(runs[0].config.problem.digest),
-        )
-        for runs in shared.values()
-    )
-
-
-def _label(run: Run, study: "Study") -> str:
-    """What to call the trainings with the settings of a run."""
-    experiment, names = study.experiment, identity(run)
-    if experiment.entries:
-        parts = [run.entry.title or run.entry.name]
-    else:
-        several = {"learner": experiment.learners, "recipe": experiment.recipes}
-        parts = [str(names[name]) for name, values in several.items() if len(values) > 1]
-    if len({each.config.problem.name for each in study.runs}) > 1:
-        parts.append(names["problem"])
-    parts += [f"{shorter(field)}={shown(value)}" for field, value in run.choices.items()]
-    return " ".join(parts) or f"{names['learner']} {names['recipe']} {names['problem']}"
-
-
 def identity(run: Run) -> dict[str, Any]:
     """Who was trained on what."""
     config = run.config
@@ -272,102 +175,154 @@ def shown(value: Any) -> str:
     return str(value)
 
 
-def run_rows(study: "Study") -> list[dict[str, Any]]:
-    """One row per finished training: learner, varied fields, figures of merit, times."""
-    fields = _varied(study)
-    rows = []
-    for run, trained in study.finished.items():
-        clock = study.store.clock(run)
-        outcomes = Outcomes((trained.outcomes,), study.bounds.get(run.config.problem.digest))
-        rows.append(
-            {
-                **({"entry": run.entry.name} if study.experiment.entries else {}),
-                **identity(run),
-                **{field: run.choices.get(field) for field in fields},
-                "iterations": trained.last.iteration,
-                "environment_steps": trained.last.environment_steps,
-                "seconds": clock.seconds or math.nan,
-                "processor_seconds": clock.processor_seconds or math.nan,
-                **figures_of(outcomes),
-                "key": run.key,
-            }
-        )
-    return rows
-
-
-def curve_rows(study: "Study") -> list[dict[str, Any]]:
-    """One row per point of a learning curve, the ends included."""
-    fields = _varied(study)
-    return [
-        {
-            "entry": run.entry.name,
-            **identity(run),
-            **{field: run.choices.get(field) for field in fields},
-            **point._asdict(),
-            "seconds": seconds,
-            "processor_seconds": processor_seconds,
-        }
-        for run, trained in study.finished.items()
-        for point, seconds, processor_seconds in timed_curve(trained, study.store.clock(run))
-    ]
-
-
-def _varied(study: "Study") -> list[str]:
-    """Fields that vary between the finished trainings."""
-    return list(dict.fromkeys(field for run in study.finished for field in run.choices))
-
-
-def run_table(study: "Study") -> "np.ndarray[Any, np.dtype[Any]]":
-    """The `run_rows` as a structured array; fields that are no numbers are texts."""
-    rows = run_rows(study)
-    columns = {name: _column([row[name] for row in rows]) for name in (rows[0] if rows else ())}
-    table = np.empty(len(rows), dtype=[(name, column.dtype) for name, column in columns.items()])
-    for name, column in columns.items():
-        table[name] = column
-    return table
-
-
 def _column(values: Sequence[Any]) -> NDArray[Any]:
     """Values of one kind as an array: numbers if all of them are, else texts."""
     numbers = all(isinstance(each, bool | int | float) for each in values)
     return np.array(values if numbers else ["" if v is None else shown(v) for v in values])
 
 
-def group_entries(group: Group) -> dict[str, Any]:
-    """What is known of a group, as a dictionary that JSON can hold.
+class Results:
+    """What the finished trainings of an experiment came to.
 
-    ``ci95`` is over seeds and trials, ``ci95_of_trials`` over trials that the seeds share.
+    Parameters
+    ----------
+    experiment : Experiment
+        What is trained.
+    store : Store
+        The folder in which the trainings lie, or will.
+    runs : tuple of Run
+        The trainings, whether finished or not.
     """
-    n_trials = group.hits.shape[1]
-    touched = np.array([run.outcomes.collision for run in group.runs])
-    quantities = ("environment_steps", "seconds", "processor_seconds")
-    return {
-        "trainings": group.label,
-        "entry": group.entry.name,
-        "problem": group.config.problem.name,
-        "choices": dict(group.choices),
-        "seeds": len(group.runs),
-        **{
-            name: {
-                **share_over_seeds(hits).to_json(),
-                "ci95_of_trials": list(wilson_interval(int(hits.sum()), n_trials, len(hits))),
-            }
-            for name, hits in (("success", group.hits), ("collision", touched))
-        },
-        "success_each": group.hits.mean(axis=1).tolist(),
-        "median_distance": float(np.mean([run.last.median_distance for run in group.runs])),
-        "steps_to_success": group.steps_to_success,
-        "environment_steps": group.environment_steps,
-        "seconds": float(np.mean([clock.seconds for clock in group.clocks])),
-        "processor_seconds": group.processor_seconds,
-        "until": [
-            {
-                "success": level,
-                **{
-                    name: value if math.isfinite(value) else None
-                    for name, value in zip(quantities, group.until(level), strict=True)
-                },
-            }
-            for level in LEVELS
-        ],
-    }
+
+    def __init__(self, experiment: Experiment, store: Store, runs: tuple[Run, ...]) -> None:
+        self.experiment, self.store, self.runs = experiment, store, runs
+
+    def __len__(self) -> int:
+        return len(self.finished)
+
+    def __iter__(self) -> Iterator[TrainedRun]:
+        return iter(self.finished.values())
+
+    @cached_property
+    def finished(self) -> Mapping[Run, TrainedRun]:
+        """The trainings that are finished, in the order of the experiment."""
+        return self.store.load(self.runs)
+
+    @property
+    def missing(self) -> tuple[Run, ...]:
+        """The trainings that are not finished."""
+        return tuple(run for run in self.runs if run not in self.finished)
+
+    @cached_property
+    def bounds(self) -> Mapping[str, TrialBounds]:
+        """What the oracle knows about the trials, as far as it is known, by the problem's hash."""
+        found = {task.problem.digest: self.store.bounds(task) for task in self.bound_tasks}
+        return {digest: bounds for digest, bounds in found.items() if bounds is not None}
+
+    @property
+    def bound_tasks(self) -> tuple[BoundTask, ...]:
+        """The trials whose bounds belong to the experiment."""
+        if not self.experiment.bounds:
+            return ()
+        problems = {run.config.problem.digest: run.config.problem for run in self.runs}
+        return tuple(BoundTask(each, self.experiment.trials) for each in problems.values())
+
+    @property
+    def failures(self) -> Mapping[Run, str]:
+        """Why trainings failed that were not finished since."""
+        found = {run: self.store.failure(run) for run in self.missing}
+        return {run: error for run, error in found.items() if error is not None}
+
+    def policy(self, run: Run) -> Policy:
+        """The policy of a finished training, with versions and commit that made it.
+
+        Raises
+        ------
+        InvalidInputError
+            If the training is not finished, or its file is damaged.
+        """
+        trained = load_run(self.store.run_path(run), run, whole=True)
+        assert trained.policy is not None
+        made = self.store.made(run)
+        known = {name: made[name] for name in ("versions", "commit") if name in made}
+        provenance = replace(trained.policy.provenance, **known)
+        return replace(trained.policy, provenance=provenance)
+
+    def groups(self) -> tuple[Group, ...]:
+        """The finished trainings, those with the same settings but for the seed together."""
+        return self._groups
+
+    @cached_property
+    def _groups(self) -> tuple[Group, ...]:
+        shared: dict[tuple[str, str], list[Run]] = {}
+        for run in self.finished:
+            config = {k: v for k, v in run.settings["config"].items() if k != "seed"}
+            shared.setdefault((run.entry.name, repr((run.learner, config))), []).append(run)
+        return tuple(
+            Group(
+                label=self._label(runs[0]),
+                entry=runs[0].entry,
+                config=runs[0].config,
+                choices=runs[0].choices,
+                runs=tuple(self.finished[run] for run in runs),
+                clocks=tuple(self.store.clock(run) for run in runs),
+                bounds=self.bounds.get(runs[0].config.problem.digest),
+            )
+            for runs in shared.values()
+        )
+
+    def best(self, count: int = 1) -> tuple[Group, ...]:
+        """The settings with the largest success over what the oracle reaches, best first."""
+        ordered = sorted(self.groups(), key=lambda group: -group.relative_success)
+        return tuple(ordered[:count])
+
+    def _label(self, run: Run) -> str:
+        """What to call the trainings with the settings of a run."""
+        experiment, names = self.experiment, identity(run)
+        if experiment.entries:
+            parts = [run.entry.title or run.entry.name]
+        else:
+            several = {"learner": experiment.learners, "recipe": experiment.recipes}
+            parts = [str(names[name]) for name, values in several.items() if len(values) > 1]
+        if len({each.config.problem.name for each in self.runs}) > 1:
+            parts.append(names["problem"])
+        parts += [f"{shorter(field)}={shown(value)}" for field, value in run.choices.items()]
+        return " ".join(parts) or f"{names['learner']} {names['recipe']} {names['problem']}"
+
+    @property
+    def varied(self) -> list[str]:
+        """Fields that vary between the finished trainings."""
+        return list(dict.fromkeys(field for run in self.finished for field in run.choices))
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row per finished training: learner, varied fields, figures of merit, times."""
+        fields = self.varied
+        rows = []
+        for run, trained in self.finished.items():
+            clock = self.store.clock(run)
+            outcomes = Outcomes((trained.outcomes,), self.bounds.get(run.config.problem.digest))
+            rows.append(
+                {
+                    **({"entry": run.entry.name} if self.experiment.entries else {}),
+                    **identity(run),
+                    **{field: run.choices.get(field) for field in fields},
+                    "iterations": trained.last.iteration,
+                    "environment_steps": trained.last.environment_steps,
+                    "seconds": clock.seconds or math.nan,
+                    "processor_seconds": clock.processor_seconds or math.nan,
+                    **figures_of(outcomes),
+                    "key": run.key,
+                }
+            )
+        return rows
+
+    def table(self) -> "np.ndarray[Any, np.dtype[Any]]":
+        """The `rows` as a structured array; fields that are no numbers are texts."""
+        rows = self.rows()
+        columns = {name: _column([row[name] for row in rows]) for name in (rows[0] if rows else ())}
+        table = np.empty(
+            len(rows), dtype=[(name, column.dtype) for name, column in columns.items()]
+        )
+        for name, column in columns.items():
+            table[name] = column
+        return table

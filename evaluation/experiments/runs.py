@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kinarm._archive import Archive, load_archive, reading, save_archive, write_archive
 from kinarm.errors import InvalidInputError
-from kinarm.evaluation.experiments.curve import CurvePoint
+from kinarm.evaluation.experiments.curve import CurvePoint, curve_array, points_of
 from kinarm.evaluation.experiments.plan import Run
 from kinarm.policies.checkpoint import arrays_of, rebuilt
 from kinarm.policies.learners import TrainingState, find_learner
@@ -142,7 +142,7 @@ def run_content(run: TrainedRun, policy: Policy) -> bytes:
     """A run and its policy as their file holds them; equal runs give equal bytes."""
     content = policy_content(policy)
     arrays = {
-        "curve": _table(run.curve),
+        "curve": curve_array(run.curve),
         **{OUTCOMES + name: array for name, array in run.outcomes._asdict().items()},
         **{POLICY + name: array for name, array in content.arrays.items()},
     }
@@ -172,10 +172,6 @@ def _content(
     file = io.BytesIO()
     write_archive(file, *archive, arrays, header, compress=True)
     return file.getvalue()
-
-
-def _table(curve: tuple[CurvePoint, ...]) -> NDArray[np.float64]:
-    return np.array(curve, dtype=np.float64).reshape(-1, len(CurvePoint._fields))
 
 
 def load_bounds(path: Path, count: int) -> TrialBounds:
@@ -209,7 +205,7 @@ def save_checkpoint(path: Path, run: Run, checkpoint: Checkpoint) -> None:
         If the file cannot be written.
     """
     arrays: dict[str, NDArray[Any]] = {
-        "curve": _table(checkpoint.curve),
+        "curve": curve_array(checkpoint.curve),
         "distances": np.array(checkpoint.distances),
         **arrays_of(STATE, checkpoint.state),
     }
@@ -230,7 +226,7 @@ def load_checkpoint(path: Path, run: Run) -> Checkpoint:
         _check_settings(path, header, run)
         return Checkpoint(
             state=rebuilt(find_learner(run.learner).state, STATE, arrays),
-            curve=_points(arrays),
+            curve=points_of(arrays["curve"]),
             distances=tuple(arrays["distances"]),
             clock=clock_of(header["clock"]),
         )
@@ -299,7 +295,7 @@ def load_run(path: Path, run: Run, *, whole: bool = False) -> TrainedRun:
         outcomes = _each_trials(_parts(arrays, OUTCOMES), OUTCOME_TYPES, run.trials.count)
         return TrainedRun(
             settings=header["settings"],
-            curve=_points(arrays),
+            curve=points_of(arrays["curve"]),
             last=CurvePoint(**header["last"]),
             outcomes=TrialOutcomes(**outcomes),
             returns=arrays.get("returns"),
@@ -340,14 +336,6 @@ def _each_trials(
         if type_ == "f8" and not (np.abs(array) <= LARGEST).all():
             raise ValueError(f"{name} holds a number that no trial comes to")
     return {name: arrays[name] for name in types}
-
-
-def _points(arrays: Mapping[str, NDArray[Any]]) -> tuple[CurvePoint, ...]:
-    """The points of a curve from their table."""
-    return tuple(
-        CurvePoint(int(iteration), int(steps), *rest)
-        for iteration, steps, *rest in arrays["curve"].tolist()
-    )
 
 
 def _parts(arrays: Mapping[str, NDArray[Any]], begin: str) -> dict[str, NDArray[Any]]:

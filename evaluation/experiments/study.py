@@ -1,12 +1,12 @@
 """A study: an experiment in its folder, how to carry it out, and what it came to."""
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from datetime import datetime, timedelta
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from kinarm._files import is_being_written
 from kinarm._parallel import available_threads
@@ -16,20 +16,14 @@ from kinarm.evaluation.experiments.executors import Executor, Failure, LocalExec
 from kinarm.evaluation.experiments.experiment import Experiment
 from kinarm.evaluation.experiments.plan import Run, plan
 from kinarm.evaluation.experiments.progress import Progress
-from kinarm.evaluation.experiments.runs import TrainedRun, TrialBounds, load_run
+from kinarm.evaluation.experiments.results import Results
 from kinarm.evaluation.experiments.search import carry_out_search, searched_runs
 from kinarm.evaluation.experiments.store import SPECIFICATION, Store
 from kinarm.evaluation.experiments.train import BoundTask, RunTask, TaskResult, carry_out
 from kinarm.policies.learners import find_learner
-from kinarm.policies.policy import Policy
-
-if TYPE_CHECKING:
-    import numpy as np
-
-    from kinarm.evaluation.experiments.results import Group
 
 
-class Study:
+class Study(Results):
     """An experiment, kept in one folder.
 
     Parameters
@@ -68,7 +62,7 @@ class Study:
             experiment = Experiment.from_json(experiment, where)
         else:
             where = experiment.name
-        self.experiment, self.store = experiment, Store(Path(folder))
+        super().__init__(experiment, Store(Path(folder)), ())
         try:
             self.runs = self._planned() if runs is None else runs
         except InvalidInputError as error:
@@ -97,42 +91,6 @@ class Study:
     def __repr__(self) -> str:
         done = f"{len(self.finished)} of {len(self.runs)} trainings finished"
         return f"{type(self).__name__}({self.experiment.name!r}, {done})"
-
-    def __len__(self) -> int:
-        return len(self.finished)
-
-    def __iter__(self) -> Iterator[TrainedRun]:
-        return iter(self.finished.values())
-
-    @cached_property
-    def finished(self) -> Mapping[Run, TrainedRun]:
-        """The trainings that are finished, in the order of the experiment."""
-        return self.store.load(self.runs)
-
-    @property
-    def missing(self) -> tuple[Run, ...]:
-        """The trainings that are not finished."""
-        return tuple(run for run in self.runs if run not in self.finished)
-
-    @cached_property
-    def bounds(self) -> Mapping[str, TrialBounds]:
-        """What the oracle knows about the trials, as far as it is known, by the problem's hash."""
-        found = {task.problem.digest: self.store.bounds(task) for task in self.bound_tasks}
-        return {digest: bounds for digest, bounds in found.items() if bounds is not None}
-
-    @property
-    def bound_tasks(self) -> tuple[BoundTask, ...]:
-        """The trials whose bounds belong to the experiment."""
-        if not self.experiment.bounds:
-            return ()
-        problems = {run.config.problem.digest: run.config.problem for run in self.runs}
-        return tuple(BoundTask(each, self.experiment.trials) for each in problems.values())
-
-    @property
-    def failures(self) -> Mapping[Run, str]:
-        """Why trainings failed that were not finished since."""
-        found = {run: self.store.failure(run) for run in self.missing}
-        return {run: error for run, error in found.items() if error is not None}
 
     def run(
         self,
@@ -226,42 +184,6 @@ class Study:
                 for run in missing
             ),
         ]
-
-    def policy(self, run: Run) -> Policy:
-        """The policy of a finished training, with versions and commit that made it.
-
-        Raises
-        ------
-        InvalidInputError
-            If the training is not finished, or its file is damaged.
-        """
-        trained = load_run(self.store.run_path(run), run, whole=True)
-        assert trained.policy is not None
-        made = self.store.made(run)
-        known = {name: made[name] for name in ("versions", "commit") if name in made}
-        provenance = replace(trained.policy.provenance, **known)
-        return replace(trained.policy, provenance=provenance)
-
-    def groups(self) -> "tuple[Group, ...]":
-        """The finished trainings, those with the same settings but for the seed together."""
-        return self._groups
-
-    @cached_property
-    def _groups(self) -> "tuple[Group, ...]":
-        from kinarm.evaluation.experiments.results import group_runs
-
-        return group_runs(self)
-
-    def table(self) -> "np.ndarray[Any, np.dtype[Any]]":
-        """One row per finished training, as a structured array."""
-        from kinarm.evaluation.experiments.results import run_table
-
-        return run_table(self)
-
-    def best(self, count: int = 1) -> "tuple[Group, ...]":
-        """The settings with the largest success over what the oracle reaches, best first."""
-        ordered = sorted(self.groups(), key=lambda group: -group.relative_success)
-        return tuple(ordered[:count])
 
     def status(self) -> list[str]:
         """How far it is, in lines, while it runs or after it was stopped."""

@@ -1,6 +1,6 @@
 """What varies in an experiment: fields by their paths, with lists of values or ranges."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import product
 from typing import Any, TypeGuard
 
@@ -95,3 +95,32 @@ def flattened(
             yield from flattened(entry, ranges=ranges, path=f"{path}{key}.")
         else:
             yield f"{path}{key}", entry
+
+
+SEARCH_CHOICES = {"sampler": ("tpe", "random", "cmaes"), "pruner": ("median", "none", "hyperband")}
+"""What can be said of a search beside count and seed; the first is the default."""
+
+
+TABLES = ("fixed", "grid", "random", "search")
+"""Entries of a file that name fields of settings."""
+
+
+def ranges_of(entries: Mapping[str, Any]) -> dict[str, Any]:
+    """What is drawn or searched, by field."""
+    said = ("count", "seed", *SEARCH_CHOICES)
+    return {key: entry for key, entry in entries.items() if key not in said}
+
+
+def prepared(entries: Mapping[str, Any], several: Iterable[str]) -> dict[str, Any]:
+    """Entries of a file, with lists for texts, and with paths for tables within tables."""
+    made = dict(entries)
+    for name in several:
+        single = name.removesuffix("s")
+        if single in made and name not in made:
+            made[name] = made.pop(single)
+        if isinstance(made.get(name), str):
+            made[name] = [made[name]]
+    for table in TABLES:
+        if isinstance(made.get(table), Mapping):
+            made[table] = dict(flattened(made[table], ranges=table in ("random", "search")))
+    return made

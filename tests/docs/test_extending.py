@@ -14,8 +14,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinarm.evaluation.commands import evaluate, replay
-from kinarm.policies import learners, load_policy, train, training
+from kinarm.evaluation import Study
+from kinarm.evaluation.commands import evaluate, replay, train
+from kinarm.evaluation.experiments import table
+from kinarm.evaluation.experiments.clusters import RayExecutor
+from kinarm.evaluation.experiments.executors import LocalExecutor
+from kinarm.evaluation.experiments.page import write_all
+from kinarm.policies import learners, load_policy, training
 from kinarm.problem import ReachProblem
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -75,6 +80,57 @@ def test_a_learner_is_one_file(toy: None, folder: Path, capsys: pytest.CaptureFi
 def test_workers_train_the_learner_of_a_package(toy: None, folder: Path) -> None:
     run("kinarm-train toy --seeds 3 --jobs 2 --iterations 4 --out seeds")
     assert len(list((folder / "seeds").glob("toy-paper-right-seed?.npz"))) == 3
+
+
+TOYS = {
+    "name": "toys",
+    "entries": [
+        {"learner": "toy", "fixed": {"iterations": 4}},
+        {"learner": "toy_learner:LEARNER", "name": "by module", "fixed": {"iterations": 5}},
+    ],
+    "seeds": 2,
+    "trials": {"count": 10},
+    "bounds": False,
+}
+
+
+@pytest.mark.parametrize(
+    "executor",
+    [
+        LocalExecutor(2),
+        pytest.param(
+            RayExecutor("local", 2),
+            marks=[pytest.mark.slow, pytest.mark.filterwarnings("ignore")],  # Ray's own
+        ),
+    ],
+)
+def test_experiments_train_it_wherever_they_run(
+    executor: LocalExecutor | RayExecutor,
+    toy: None,
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    if isinstance(executor, RayExecutor):
+        pytest.importorskip("ray")
+        monkeypatch.setenv("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(folder), str(ROOT)]))
+    study = Study(TOYS, folder / "study").run(executor=executor)
+    assert [group.entry.name for group in study.groups()] == ["toy", "by module"]
+    assert len(study) == 4
+
+
+def test_a_column_of_the_page_stands_in_one_place(
+    toy: None, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(table, "COLUMNS", table.COLUMNS)
+    exec(BLOCKS["column"], {})
+    study = Study({**TOYS, "seeds": 1}, folder / "study").run(jobs=1)
+    write_all(study)
+    (shown, _) = (table.group_row(group)[-1] for group in study.groups())
+    for name in ("index.html", "RESULTS.md"):
+        text = (folder / "study" / name).read_text()
+        assert "best seed %" in text
+        assert shown in text
 
 
 def test_a_registered_learner_resumes_exactly(

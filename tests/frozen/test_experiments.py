@@ -10,7 +10,7 @@ import pytest
 from kinarm.evaluation import Study
 from kinarm.evaluation.experiments.experiment import Experiment
 from kinarm.evaluation.experiments.page import results_document
-from kinarm.evaluation.experiments.results import curve_rows, run_rows
+from kinarm.evaluation.experiments.table import curve_rows
 
 FROZEN = Path(__file__).parent
 
@@ -23,7 +23,7 @@ def rows_of(name):
 def test_the_runs_of_a_study(tmp_path):
     """With the keys of its files, so that folders of version 1.0.0 go on."""
     study = Study(FROZEN / "study.toml", tmp_path).run()
-    rows = run_rows(study)
+    rows = study.rows()
     expected = rows_of("runs.csv")
     assert [{name: str(row[name]) for name in expected[0]} for row in rows] == expected
 

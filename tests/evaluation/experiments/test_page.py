@@ -12,9 +12,10 @@ from small_studies import SMALL
 from kinarm.errors import MissingExtraError
 from kinarm.evaluation.experiments import page
 from kinarm.evaluation.experiments.figures import _band, beside_bound, draw_all, effects
-from kinarm.evaluation.experiments.page import group_row, write_all, write_parquet
+from kinarm.evaluation.experiments.page import write_all, write_parquet
 from kinarm.evaluation.experiments.results import shown
 from kinarm.evaluation.experiments.study import Study
+from kinarm.evaluation.experiments.table import group_row
 from kinarm.evaluation.statistics import share_over_seeds, wilson_interval
 
 
