@@ -29,11 +29,7 @@ GOES_ON = "interrupted; what is finished is kept, and the same command goes on"
 AGAIN = 0.5
 """After so long, an interruption that got lost is raised again [s]."""
 
-PATIENCE = 3.0
-"""So long may work that is asked to stop take to do so [s]."""
-
 _requested = False
-_stop: Callable[[], object] | None = None
 
 
 class Interruption(KeyboardInterrupt):
@@ -65,16 +61,13 @@ def _end_at_once(_: int, __: FrameType | None) -> None:
 
 
 def _interrupt(_: int, __: FrameType | None) -> None:
-    """Ask what can stop in order to do so; raise an interruption if nothing can, or it has not."""
+    """Raise an interruption, and again after a while if it got lost."""
     global _requested
     if _on_its_way():
         return
-    ask = None if _requested else _stop
     _requested = True
-    signal.setitimer(signal.ITIMER_REAL, PATIENCE if ask else AGAIN, AGAIN)
-    if ask is None:
-        raise Interruption
-    ask()
+    signal.setitimer(signal.ITIMER_REAL, AGAIN, AGAIN)
+    raise Interruption
 
 
 def _on_its_way() -> bool:
@@ -122,23 +115,6 @@ def telling(what_is_left: Callable[[], str]) -> Iterator[None]:
         if not was_interrupted(error):
             raise
         raise KeyboardInterrupt(what_is_left()) from None
-
-
-@contextmanager
-def asking(stop: Callable[[], object]) -> Iterator[None]:
-    """Do what stops in order once ``stop`` is called: a request to end calls it.
-
-    The request is raised afterwards, or when the work has not stopped after `PATIENCE`, or at the
-    second request.
-    """
-    global _stop
-    _stop = stop
-    try:
-        yield
-    finally:
-        _stop = None
-    if _requested:
-        raise Interruption
 
 
 @contextmanager

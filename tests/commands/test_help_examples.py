@@ -26,7 +26,7 @@ LONG = {
 }
 """Commands of which it is enough that they accept their examples."""
 
-ELSEWHERE = (" status ", "my_module", "model.zip", "--live", "my.urdf", "ur5", ">")
+ELSEWHERE = (" status ", "my_module:LEARNER", "model.zip", "--live", "my.urdf", "ur5", ">")
 """Parts of examples that need what is not there, or a shell, or never end."""
 
 

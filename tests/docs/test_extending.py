@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from joblib.externals.loky import get_reusable_executor
 
 from kinarm.evaluation import Study
 from kinarm.evaluation.commands import evaluate, replay, train
@@ -58,6 +59,7 @@ def toy(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     shutil.copy(ROOT / "docs" / "how-to" / "toy_learner.py", folder)
     monkeypatch.syspath_prepend(str(folder))
     learners._installed.cache_clear()
+    get_reusable_executor().shutdown()  # workers that are there already know no such package
     yield
     learners._installed.cache_clear()
     sys.modules.pop("toy_learner", None)

@@ -213,35 +213,6 @@ def test_children_that_are_kept_from_it(run):
     assert run(source) == INTERRUPTED
 
 
-def test_work_is_asked_to_stop_before_it_is_interrupted(run):
-    source = """
-    from kinarm._interrupts import asking
-    stopped = []
-    def command():
-        with asking(lambda: stopped.append(True)):
-            ask()
-            while not stopped:
-                pass
-            sys.stderr.write("in order\\n")
-        print("not reached")
-    run_command('bake', command)
-    """
-    assert run(source) == (130, "", "in order\nbake: interrupted\n")
-
-
-def test_work_that_does_not_stop_is_interrupted(run):
-    source = """
-    import kinarm._interrupts as interrupts
-    interrupts.PATIENCE = 0.1
-    def command():
-        with interrupts.asking(lambda: None):
-            ask()
-            wait()
-    run_command('bake', command)
-    """
-    assert run(source) == INTERRUPTED
-
-
 @pytest.mark.parametrize(
     ("program", "words", "expected"),
     [
