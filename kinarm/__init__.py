@@ -10,7 +10,7 @@ import lazy_loader
 __version__ = "1.0.0"
 
 SEMANTICS = "4"
-"""The version of what simulator and learners compute: every number that settings and seeds make.
+"""Version of all that simulator and learners compute, every number that settings and seeds make.
 
 Drawn starts, goals and trials, rollouts and iterations of the learners; what the oracle makes of
 them has a version of its own, `kinarm.policies.oracle.ORACLE_SEMANTICS`. Finished trainings are

@@ -18,6 +18,7 @@ from .errors import PolicyFileError as PolicyFileError
 from .errors import ProblemError as ProblemError
 from .errors import RecordingFileError as RecordingFileError
 from .errors import StartInContactError as StartInContactError
+from .errors import TrainingFailedError as TrainingFailedError
 from .errors import UnknownNameError as UnknownNameError
 from .errors import WorkerError as WorkerError
 from .kinematics import InverseSolutions as InverseSolutions

@@ -123,7 +123,7 @@ class TrainingConfig:
 
     @property
     def learner(self) -> str:
-        """Name by which the learner is found: ``LEARNER`` of their module, unless they say more."""
+        """Name by which the learner is found; ``LEARNER`` of its module if it says no more."""
         return f"{type(self).__module__}:LEARNER"
 
     @property

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from kinarm._console import told_of_activities
 from kinarm._files import check_output, only_writer, write_text
@@ -196,16 +196,6 @@ class TrainRequest(ProblemOptions):
         return checkpoint
 
 
-class Watcher(Protocol):
-    """Watches the progress of a training."""
-
-    def prepare(self, activity: str) -> None:
-        """It does something before it goes on, in words; empty if that is over."""
-
-    def update(self, state: TrainingState) -> None:
-        """Take note of the latest iteration."""
-
-
 class TrainingProgress:
     """A line on standard error: iterations, return, success, time left."""
 
@@ -273,7 +263,7 @@ def train_to_file(
     config: TrainingConfig,
     state: TrainingState | None,
     out: str | Path,
-    watcher: Watcher,
+    progress: TrainingProgress,
     **options: Any,
 ) -> TrainingResult:
     """Train, and write the policy and its learning curve.
@@ -286,7 +276,7 @@ def train_to_file(
         As for `kinarm.policies.train_policy`.
     out : str or Path
         File of the policy.
-    watcher : Watcher
+    progress : TrainingProgress
         Is told how far the training is.
 
     Raises
@@ -300,12 +290,12 @@ def train_to_file(
     keeper = CheckpointKeeper(config, path, state)
 
     def on_iteration(state: TrainingState) -> None:
-        watcher.update(state)
+        progress.update(state)
         keeper.update(state)
 
     with telling(keeper.save_on_interrupt):
-        watcher.prepare("")
-        with told_of_activities(watcher.prepare):
+        progress.prepare("")
+        with told_of_activities(progress.prepare):
             training = begin_training(config, **options)
             result = run_training(config, training, state=state, on_iteration=on_iteration)
         try:

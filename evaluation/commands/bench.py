@@ -71,7 +71,7 @@ class BenchmarkRequest:
         Returns
         -------
         dict
-            Figures that JSON can hold, of `kinarm.evaluation.bench.measure`.
+            Figures that JSON can hold.
 
         Raises
         ------

@@ -123,7 +123,8 @@ def source_digest() -> str:
     """Hash of the Python files of kinarm, wherever they lie."""
     content = hashlib.sha256()
     for folder in sorted({Path(folder).resolve() for folder in kinarm.__path__}):
-        parts = [folder] if folder.name == "kinarm" else [folder / name for name in BESIDE]
+        is_package = (folder / "__init__.py").is_file()
+        parts = [folder] if is_package else [folder / name for name in BESIDE]
         for path in sorted(path for part in parts for path in part.rglob("*.py")):
             content.update(path.read_bytes())
     return content.hexdigest()[:12]

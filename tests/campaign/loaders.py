@@ -99,7 +99,7 @@ def _checkpoint(path: Path) -> None:
 def _evaluation(path: Path) -> None:
     document = EvaluationDocument.load(path)
     row = document.result(None, None)
-    document.problem(row["problem"])
+    document.problem(row.problem)
 
 
 def _arm(path: Path) -> None:

@@ -22,6 +22,7 @@ def rows_of(name):
 
 def test_the_runs_of_a_study(tmp_path):
     """With the keys of its files, so that folders of version 1.0.0 go on."""
+    pytest.importorskip("stable_baselines3")
     study = Study(FROZEN / "study.toml", tmp_path).run()
     rows = study.rows()
     expected = rows_of("runs.csv")
@@ -36,8 +37,7 @@ def test_the_runs_of_a_study(tmp_path):
     ],
 )
 def test_learners_compared(learners, tmp_path):
-    if learners[0].startswith("sb3"):
-        pytest.importorskip("sb3_contrib")
+    pytest.importorskip("sb3_contrib" if learners[0].startswith("sb3") else "stable_baselines3")
     experiment = Experiment.load(FROZEN / "learners.toml").only(entries=learners)
     study = Study(experiment, tmp_path).run()
     expected = json.loads((FROZEN / "learners.json").read_text())

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from kinarm.errors import InvalidInputError
+from kinarm.evaluation.commands import train
 from kinarm.policies import (
     Policy,
     TrainingConfig,
@@ -15,7 +16,6 @@ from kinarm.policies import (
     load_checkpoint,
     recipe,
     save_checkpoint,
-    train,
     train_policy,
 )
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from kinarm.errors import InvalidInputError, MissingExtraError
+from kinarm.evaluation.commands import train
 from kinarm.policies import (
     Policy,
     find_learner,
@@ -11,7 +12,6 @@ from kinarm.policies import (
     recipe,
     save_checkpoint,
     sb3_vec_env,
-    train,
     train_policy,
 )
 
