@@ -94,6 +94,7 @@ def test_it_resumes_exactly_and_leaves_the_global_generators_alone(tmp_path):
 
 @pytest.mark.parametrize(("error", "raised"), [(ValueError, InvalidInputError), (OSError, OSError)])
 def test_what_goes_wrong_in_a_step_is_raised_where_it_was_asked_for(monkeypatch, error, raised):
+    pytest.importorskip("stable_baselines3")
     from kinarm.policies.sb3.vec_env import SB3VecEnv
 
     def fail(env):
