@@ -58,7 +58,7 @@ maximum_signature_line_length = 76
 
 # Types of other projects: their inventories would have to be fetched.
 nitpick_ignore_regex = [
-    (r"py:.*", r"(numpy|pinocchio|gymnasium|pathlib|collections|typing)\..*"),
+    (r"py:.*", r"(numpy|pinocchio|gymnasium|msgspec|pathlib|collections|typing)\..*"),
     (r"py:data", r"Ellipsis"),
     (r"py:class", r"Figure"),  # matplotlib, which is imported when first used
     (
