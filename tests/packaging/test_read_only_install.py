@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 SCREEN = """
 import numpy as np
-from kinarm.kernels.rollout import screen
+from kinarm.kernels.screening import screen
 from kinarm.world import World
 World("right").screen(np.zeros((1, 6)))
 print(screen.stats.cache_path, sum(screen.stats.cache_hits.values()))
