@@ -58,13 +58,11 @@ maximum_signature_line_length = 76
 
 # Types of other projects: their inventories would have to be fetched.
 nitpick_ignore_regex = [
-    (r"py:.*", r"(numpy|pinocchio|gymnasium|msgspec|pathlib|collections|typing)\..*"),
+    (r"py:.*", r"(numpy|pinocchio|coal|gymnasium|msgspec|pathlib|collections|typing)\..*"),
     (r"py:data", r"Ellipsis"),
     (r"py:class", r"Figure"),  # matplotlib, which is imported when first used
-    (
-        r"py:class",
-        r"NDArray|ndarray|np\.\w+",
-    ),  # NumPy's, where annotations are kept as they are written
+    # NumPy's, where annotations are kept as they are written.
+    (r"py:class", r"NDArray|ndarray|Array|np\.\w+"),
     (r"py:class", r".*\.[A-Z]\w*T"),  # type variables
     # What only kernels look into.
     (r"py:class", r"kinarm\.(kernels\.session\.Session|episodes\.Rules|task\.Goals)"),

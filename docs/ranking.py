@@ -23,11 +23,13 @@ from kinarm._files import write_text
 from kinarm.evaluation.bounds import MOST_BOUNDED, oracle_bounds
 from kinarm.evaluation.contestants import find_contestants
 from kinarm.evaluation.metrics import METRICS
-from kinarm.evaluation.outcomes import Bounded, Ends, Outcomes
+from kinarm.evaluation.outcomes import Outcomes
 from kinarm.evaluation.statistics import share_over_seeds
 from kinarm.evaluation.trials import trial_set
 from kinarm.policies.library import RANKING, group_of, policy_names
+from kinarm.policies.oracle import OracleSolutions
 from kinarm.problem import PROBLEMS
+from kinarm.rollouts import Rollouts
 
 TRIALS, SEED = 10_000, 20_161
 
@@ -54,7 +56,7 @@ def ranking(names: Iterable[str], trials: int = TRIALS) -> dict[str, Any]:
     return {"trials": trials, "seed": SEED, **made}
 
 
-def best_of(found: Mapping[str, Ends], bounds: Bounded) -> str:
+def best_of(found: Mapping[str, Rollouts], bounds: OracleSolutions) -> str:
     """Name of the best of some policies: of the best recipe, the best seed.
 
     Parameters
@@ -64,20 +66,20 @@ def best_of(found: Mapping[str, Ends], bounds: Bounded) -> str:
     bounds : OracleSolutions
         Of the first trials.
     """
-    recipes: dict[str, dict[str, Ends]] = {}
+    recipes: dict[str, dict[str, Rollouts]] = {}
     for name, did in found.items():
         recipes.setdefault(group_of(name), {})[name] = did
     recipe = _leader({name: list(seeds.values()) for name, seeds in recipes.items()}, bounds)
     return _leader({name: [did] for name, did in recipes[recipe].items()}, bounds)
 
 
-def step_ratio(seeds: list[Ends], bounds: Bounded) -> float | None:
+def step_ratio(seeds: list[Rollouts], bounds: OracleSolutions) -> float | None:
     """Median of steps divided by the bound, over the successes of all seeds; None without any."""
     ratio: float | None = METRICS["step_ratio"].formula(Outcomes(tuple(seeds), bounds))
     return ratio
 
 
-def _leader(candidates: Mapping[str, list[Ends]], bounds: Bounded) -> str:
+def _leader(candidates: Mapping[str, list[Rollouts]], bounds: OracleSolutions) -> str:
     """The best candidate, of each of which there are one or several training seeds."""
     names = sorted(candidates)
     hits = {name: np.array([did.success for did in candidates[name]]) for name in names}

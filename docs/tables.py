@@ -49,7 +49,7 @@ def capsule_table(name: str) -> str:
     """Collision shapes of an arm."""
     rows = []
     for shape in Arm.load(name).geometry.geometryObjects:
-        start, end, radius = enclosing_capsule(shape)
+        (start, end), radius = enclosing_capsule(shape)
         frame = f"joint {shape.parentJoint}" if shape.parentJoint else "world"
         link = shape.name.rsplit("_", 1)[0].replace("_", " ")
         rows.append([link, frame, numbers(start), numbers(end), f"{radius:.3f}"])

@@ -14,7 +14,7 @@ from .figures import save_figure as save_figure
 from .metrics import METRICS as METRICS
 from .metrics import Metric as Metric
 from .outcomes import Outcomes as Outcomes
-from .replay.failures import find_failures as find_failures
+from .replay.choosing import find_failures as find_failures
 from .replay.request import ReplayRequest as ReplayRequest
 from .replay.runs import record as record
 from .report.card import policy_card as policy_card
@@ -22,7 +22,5 @@ from .report.card import write_card as write_card
 from .report.page import report_page as report_page
 from .report.page import write_report as write_report
 from .request import EvaluationRequest as EvaluationRequest
-from .schemas import document_schema as document_schema
-from .schemas import schema_names as schema_names
 from .statistics import Estimate as Estimate
 from .trials import TrialSet as TrialSet

@@ -41,10 +41,9 @@ _known: WeakKeyDictionary[TrialSet, OracleSolutions] = WeakKeyDictionary()
 def oracle_bounds(trials: TrialSet, on_progress: Progress | None = None) -> OracleSolutions:
     """Find what the oracle knows about a set of trials: look it up, or solve and keep it.
 
-    Solutions are kept in the cache folder under a name made of the hash of the trials and of the
-    oracle's version, for other processes, and in memory as long as the trials are. A file that
-    cannot be read is replaced; where none can be written, nothing is kept. Beyond ``KEPT_BYTES``,
-    the files that were used least recently go.
+    Solutions are kept in the cache folder, under the hash of the trials and of the oracle's
+    version, and in memory as long as the trials are. A file that cannot be read is replaced; where
+    none can be written, nothing is kept. Beyond ``KEPT_BYTES``, what was used least recently goes.
 
     Parameters
     ----------
@@ -55,7 +54,7 @@ def oracle_bounds(trials: TrialSet, on_progress: Progress | None = None) -> Orac
     """
     if trials not in _known:
         path = cache_folder() / f"oracle-{trials.digest}-{oracle_version()}.npz"
-        solutions = _load(path, trials)
+        solutions = _load(path)
         if solutions is None:
             oracle = Oracle(trials.simulator.problem)
             solutions = oracle.solve_batch(trials.starts, trials.goals, on_progress=on_progress)
@@ -72,19 +71,11 @@ def oracle_version() -> str:
     return hashlib.sha256(" ".join(versions).encode()).hexdigest()[:12]
 
 
-def _load(path: Path, trials: TrialSet) -> OracleSolutions | None:
+def _load(path: Path) -> OracleSolutions | None:
     """Read solutions; None if there are none or they cannot be used."""
     try:
         solutions = OracleSolutions(**load_archive(path, *ARCHIVE, InvalidInputError).arrays)
     except (InvalidInputError, TypeError):
-        return None
-    simulator, n = trials.simulator, len(trials)
-    expected = {
-        "actions": (n, simulator.task.horizon, simulator.n_actions),
-        "paths": (n, simulator.task.horizon + 1, simulator.arm.n_joints),
-    }
-    fits = (array.shape == expected.get(name, (n,)) for name, array in solutions.arrays().items())
-    if not all(fits):
         return None
     with suppress(OSError):
         os.utime(path)
@@ -92,26 +83,16 @@ def _load(path: Path, trials: TrialSet) -> OracleSolutions | None:
 
 
 def _save(path: Path, solutions: OracleSolutions) -> None:
-    """Write solutions, if possible, and make room for them."""
-    with suppress(OutputError):
+    """Write solutions, if possible, and delete what was used least recently, also half-written."""
+    with suppress(OutputError, OSError):
         check_folder(path.parent)
-        save_archive(path, *ARCHIVE, solutions.arrays(), {}, compress=True)
-        _delete_least_recently_used(path.parent)
-
-
-def _delete_least_recently_used(folder: Path) -> None:
-    """Delete surplus files, half-written ones included; other processes may change them, too."""
-    used = []
-    for path in (*folder.glob("oracle-*.npz"), *folder.glob(".oracle-*.npz.*")):
-        with suppress(OSError):
-            status = path.stat()
-            used.append((status.st_mtime_ns, status.st_size, path))
-    total = 0
-    for rank, (_, size, path) in enumerate(sorted(used, reverse=True)):
-        total += size
-        if rank > 0 and total > KEPT_BYTES:
-            with suppress(OSError):
-                path.unlink()
+        save_archive(path, *ARCHIVE, vars(solutions), {}, compress=True)
+        files = (*path.parent.glob("oracle-*.npz"), *path.parent.glob(".oracle-*.npz.*"))
+        total = 0
+        for each in sorted(files, key=lambda file: -file.stat().st_mtime_ns):
+            total += each.stat().st_size
+            if total > KEPT_BYTES and each != path:
+                each.unlink()
 
 
 class Unsolved(Document, frozen=True, kw_only=True):

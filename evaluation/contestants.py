@@ -27,8 +27,6 @@ from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.rollouts import Rollouts
 from kinarm.simulator import PolicyFunction
 
-IMPORT_PATH = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
-
 
 class Predictor(Protocol):
     """Something that chooses actions as models of Stable-Baselines3 do."""
@@ -36,13 +34,6 @@ class Predictor(Protocol):
     @property
     def predict(self) -> Callable[..., Any]:
         """From observations, shape (n, n_observations), to actions, or to actions and a state."""
-
-
-class Run(Protocol):
-    """Runs all trials of a set, and keeps the configurations visited if that is asked for."""
-
-    def __call__(self, trials: TrialSet, *, record: bool = False) -> Rollouts:
-        """Return what happened."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,24 +45,23 @@ class Contestant:
     name : str
         Name in tables.
     run : callable
-        Runs all trials of a set.
-    algorithm, recipe : str
-        How it was made.
-    seed : int or None
-        Training seed.
-    policy : Policy or None
-        The trained policy, if it is one.
-    source : Path or None
-        The file that it was read from, if it was.
+        Runs all trials of a set; with ``record``, it keeps the configurations visited.
+    algorithm, recipe, seed : str, str, int or None
+        How it was made, and its training seed.
+    policy, source : Policy or None, Path or None
+        The trained policy, if it is one, and the file that it was read from.
+    best_for : tuple of ReachProblem
+        What it was chosen for as the best shipped policy, if it was.
     """
 
     name: str
-    run: Run
+    run: Callable[..., Rollouts]
     algorithm: str
     recipe: str
     seed: int | None = None
     policy: Policy | None = None
     source: Path | None = None
+    best_for: tuple[ReachProblem, ...] = ()
 
     @property
     def note(self) -> str:
@@ -92,14 +82,8 @@ class Contestant:
         """Whether it was made for a problem.
 
         What was not trained is for every problem. A policy with a mirror learnt the goals of one
-        side, so it is for each side alone, too.
-
-        Parameters
-        ----------
-        problem : ReachProblem
-            What it is to face.
-        change : callable
-            Makes the changes to the problem that it was trained for which make no difference.
+        side, so it is for each side alone, too. ``change`` makes the changes to the problem that a
+        policy was trained for which make no difference.
         """
         if self.policy is None:
             return True
@@ -109,20 +93,7 @@ class Contestant:
         return trained_for.digest == problem.digest
 
     def check(self, arm: Arm, *, allow_other_arm: bool = False) -> None:
-        """See that the policy, if there is one, can drive an arm.
-
-        Parameters
-        ----------
-        arm : Arm
-            The arm.
-        allow_other_arm : bool
-            Whether it may face an arm that it was not trained for.
-
-        Raises
-        ------
-        PolicyFileError
-            If it was trained for another one, or does not fit it.
-        """
+        """See that the policy, if there is one, fits an arm and was trained for it."""
         if self.policy is None:
             return
         if not allow_other_arm:
@@ -147,46 +118,30 @@ class Contestant:
 
         Parameters
         ----------
-        name : str
-            Name in tables.
-        policy : Policy
-            The policy.
+        name, policy : str, Policy
+            Name in tables, and the policy.
         source : Path, optional
             The file that it was read from.
         """
         made = policy.provenance
         return cls(
-            name=name,
-            run=_running(policy),
-            algorithm=made.algorithm,
-            recipe=made.recipe,
-            seed=made.seed,
-            policy=policy,
-            source=source,
+            name, partial(_run, policy), made.algorithm, made.recipe, made.seed, policy, source
         )
 
     @classmethod
     def from_function(cls, name: str, function: PolicyFunction) -> "Contestant":
         """Enter a function from observations (n, n_observations) to actions (n, n_actions)."""
-        return cls(name, _running(function), algorithm="function", recipe="")
+        return cls(name, partial(_run, function), algorithm="function", recipe="")
 
 
-def _running(policy: Policy | PolicyFunction) -> Run:
-    """Run something that chooses actions."""
-
-    def run(trials: TrialSet, *, record: bool = False) -> Rollouts:
-        return trials.simulator.rollout(policy, trials.starts, trials.goals, record=record)
-
-    return run
+def _run(actor: Policy | PolicyFunction, trials: TrialSet, *, record: bool = False) -> Rollouts:
+    return trials.simulator.rollout(actor, trials.starts, trials.goals, record=record)
 
 
 def _run_zero(trials: TrialSet, *, record: bool = False) -> Rollouts:
-    simulator = trials.simulator
-    still = Networks.linear(
-        np.zeros((1, simulator.n_actions, simulator.n_observations)),
-        np.zeros((1, simulator.n_actions)),
-    )
-    return simulator.rollout(still, trials.starts, trials.goals, record=record)
+    still = np.zeros((1, trials.simulator.n_actions, trials.simulator.n_observations))
+    network = Networks.linear(still, np.zeros(still.shape[:2]))
+    return trials.simulator.rollout(network, trials.starts, trials.goals, record=record)
 
 
 def _run_random(trials: TrialSet, *, record: bool = False) -> Rollouts:
@@ -228,16 +183,6 @@ def find_contestants(
     problem : ReachProblem, str or Path, optional
         What a model is for, as its file does not say, or the best shipped policy; others say it
         themselves.
-
-    Raises
-    ------
-    UnknownNameError
-        If it is none of these.
-    PolicyFileError
-        If a file cannot be used.
-    InvalidInputError
-        If a model cannot be converted or its problem is not given, a module cannot be imported,
-        or no policy ships for the problem.
     """
     text = str(name_or_file)
     if text in UNTRAINED:
@@ -265,31 +210,13 @@ def _model_contestant(path: Path, problem: ProblemLike | None) -> Contestant:
     return Contestant.from_policy(path.stem, policy, path.resolve())
 
 
-def _imported_contestant(name: str) -> Contestant:
-    """A policy, or a function, of a module."""
-    found = imported_policy(name)
-    if isinstance(found, Policy):
-        return Contestant.from_policy(name, found)
-    return Contestant.from_function(name, found)
-
-
 def is_import_path(text: str) -> bool:
     """Whether a text has the form ``module:function``."""
-    return IMPORT_PATH.fullmatch(text) is not None
+    return re.fullmatch(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*", text) is not None
 
 
-def imported_policy(name: str) -> Policy | PolicyFunction:
-    """Import a policy, a function, or something with a method ``predict``.
-
-    Modules in the current directory are found, too.
-
-    Raises
-    ------
-    InvalidInputError
-        If the module cannot be imported, or what it holds under this name is none of these.
-    UnknownNameError
-        If it holds nothing under this name.
-    """
+def _imported_contestant(name: str) -> Contestant:
+    """A policy, or what chooses actions, of a module, also of one in the current directory."""
     module_name, _, attribute = name.partition(":")
     if str(Path.cwd()) not in sys.path:
         sys.path.insert(0, str(Path.cwd()))
@@ -301,48 +228,35 @@ def imported_policy(name: str) -> Policy | PolicyFunction:
             f"cannot import {module_name!r} of policy {name!r}: {first_line(error)}"
         ) from error
     if not hasattr(module, attribute):
-        offered = (key for key, each in vars(module).items() if _chooses(each) and key[0] != "_")
+        offered = (
+            key
+            for key, each in vars(module).items()
+            if key[0] != "_" and (hasattr(each, "predict") or inspect.isfunction(each))
+        )
         raise UnknownNameError(f"name in module {module_name}:", attribute, offered)
     found = getattr(module, attribute)
-    return found if isinstance(found, Policy) else policy_function(found, name)
+    if isinstance(found, Policy):
+        return Contestant.from_policy(name, found)
+    return Contestant.from_function(name, policy_function(found, name))
 
 
 def policy_function(policy: Any, name: str) -> PolicyFunction:
-    """A policy as a function of observations, shape (n, n_observations).
-
-    Raises
-    ------
-    InvalidInputError
-        If it is neither a function nor has a method ``predict``.
-    """
-    predict = getattr(policy, "predict", None)
-    if callable(predict) and not inspect.isclass(policy):
-        settings = {"deterministic": True} if _takes(predict, "deterministic") else {}
-        return partial(_predicted_actions, partial(predict, **settings))
-    if not callable(policy) or inspect.isclass(policy):
+    """A function of observations, (n, n_observations), or what has a ``predict``, as the first."""
+    if inspect.isclass(policy) or not (callable(policy) or hasattr(policy, "predict")):
         raise InvalidInputError(
             f"{name!r} is neither a function of observations nor has a method predict: "
             f"it is {policy!r}"
         )
-    function: PolicyFunction = policy
-    return function
+    predict = getattr(policy, "predict", None)
+    if predict is None:
+        function: PolicyFunction = policy
+        return function
+    known = inspect.signature(predict).parameters
+    options = {"deterministic": True} if "deterministic" in known else {}
 
+    def actions(observations: NDArray[np.float64]) -> ArrayLike:
+        answer = predict(observations, **options)
+        chosen: ArrayLike = answer[0] if isinstance(answer, tuple) else answer
+        return chosen
 
-def _predicted_actions(predict: Callable[..., Any], observations: NDArray[np.float64]) -> ArrayLike:
-    """Actions alone, if there is a state beside them."""
-    answer = predict(observations)
-    actions: ArrayLike = answer[0] if isinstance(answer, tuple) else answer
     return actions
-
-
-def _takes(function: Callable[..., Any], option: str) -> bool:
-    """Whether a function has an option."""
-    try:
-        return option in inspect.signature(function).parameters
-    except (TypeError, ValueError):
-        return False
-
-
-def _chooses(value: object) -> bool:
-    """Whether something could be a policy."""
-    return callable(getattr(value, "predict", None)) or inspect.isfunction(value)

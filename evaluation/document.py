@@ -1,34 +1,32 @@
 """The document of an evaluation: everything about it, to keep and to face the same trials again."""
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
 import msgspec
 
+from kinarm._archive import load_json
 from kinarm._validation import finite_array
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.bounds import Bounds
-from kinarm.evaluation.outcomes import Cause, End, Outcome, Pair
-from kinarm.evaluation.schemas import Count, Digest, Document, Share, read_document
-from kinarm.evaluation.statistics import Estimate
+from kinarm.evaluation.outcomes import Cause, Pair
+from kinarm.evaluation.schemas import Count, Digest, Document, Share
+from kinarm.evaluation.statistics import BOOTSTRAP_SEED, LEVEL, RESAMPLES, Estimate
 from kinarm.evaluation.trials import TrialSet
 from kinarm.problem import ReachProblem
+from kinarm.rollouts import Outcome
 from kinarm.simulator import Simulator
-
-FORMAT_VERSION: Final = 4
-"""Version of the files, which is the only one that can be read."""
 
 
 class Intervals(Document, frozen=True, kw_only=True):
     """How the 95 % intervals are made."""
 
-    level: Share
-    shares: str
-    distances: str
-    pooled: str
-    resamples: Count
-    bootstrap_seed: Count
+    level: Share = LEVEL
+    shares: str = "Wilson"
+    distances: str = "percentile bootstrap over trials"
+    pooled: str = "Student, over training seeds and trials"
+    resamples: Count = RESAMPLES
+    bootstrap_seed: Count = BOOTSTRAP_SEED
 
 
 class FacedProblem(Document, frozen=True, kw_only=True):
@@ -72,7 +70,7 @@ class Protocol(Document, frozen=True, kw_only=True):
         Commit of kinarm, -dirty behind it if files were changed; null without Git.
     """
 
-    format_version: Literal[4] = FORMAT_VERSION
+    format_version: Literal[4] = 4
     command: str
     trials: Count
     seed: Count
@@ -83,26 +81,11 @@ class Protocol(Document, frozen=True, kw_only=True):
     commit: str | None
 
 
-class Failures(Document, frozen=True, kw_only=True):
-    """Trials that failed for one cause.
+class Failures(Cause, frozen=True, kw_only=True):
+    """Trials that failed for one cause."""
 
-    Parameters
-    ----------
-    contact : tuple of str, optional
-        The bodies that touched; null where the steps ran out.
-    early : bool
-        Whether they did within the first steps.
-    """
-
-    contact: Pair | None
-    early: bool
     trials: Count
     share_of_failures: Share
-
-    @property
-    def cause(self) -> Cause:
-        """Why they failed."""
-        return Cause(self.contact, self.early)
 
 
 class TrialEnds(Document, frozen=True, kw_only=True):
@@ -115,10 +98,6 @@ class TrialEnds(Document, frozen=True, kw_only=True):
     steps: list[Count]
     outcome: list[Outcome]
     contact: list[Pair | None]
-
-    def ends(self) -> list[End]:
-        """Outcome, steps and final distance of each trial."""
-        return list(zip(self.outcome, self.steps, self.final_distance, strict=False))
 
 
 class TrialHolding(Document, frozen=True, kw_only=True):
@@ -216,10 +195,6 @@ class EvaluationDocument(Document, frozen=True, kw_only=True):
 
     Parameters
     ----------
-    protocol : Protocol
-        Problems, trials, and how it was measured.
-    results : list of Result
-        Every policy on every problem.
     pooled : list of PooledResult
         Training seeds of a recipe together.
     """
@@ -233,23 +208,17 @@ class EvaluationDocument(Document, frozen=True, kw_only=True):
 
     @classmethod
     def load(cls, path: str | Path) -> "EvaluationDocument":
-        """Read a document.
-
-        Raises
-        ------
-        InvalidInputError
-            If the file is missing, damaged, something else, or of another version.
-        """
-        return read_document(path, cls, "evaluation")
+        """Read a document; one that is damaged or of another version is refused."""
+        content = load_json(path, "evaluation", InvalidInputError)
+        try:
+            return msgspec.convert(content, cls)
+        except (msgspec.ValidationError, RecursionError) as error:
+            raise InvalidInputError(
+                f"{str(path)!r} is not a complete kinarm evaluation of this version: {error}"
+            ) from error
 
     def result(self, policy: str | None, problem: str | None) -> Result:
-        """Find the result of a policy, or of a group's first seed, on a problem.
-
-        Raises
-        ------
-        InvalidInputError
-            If there is none, or several that fit.
-        """
+        """Find the result of a policy, or of a group's first seed, on a problem."""
         fitting = [row for row in self.results if problem in (None, row.problem)]
         if policy is None:
             named = [row for row in fitting if row.trained_on is not None] or fitting
@@ -267,37 +236,17 @@ class EvaluationDocument(Document, frozen=True, kw_only=True):
         raise UnknownNameError("policy", policy, dict.fromkeys(row.policy for row in fitting))
 
     def faced(self, problem: str) -> FacedProblem:
-        """Entry of the protocol about a problem.
-
-        Raises
-        ------
-        UnknownNameError
-            If none of this name was faced.
-        """
+        """Entry of the protocol about a problem."""
         if problem not in self.protocol.problems:
             raise UnknownNameError("problem", problem, self.protocol.problems)
         return self.protocol.problems[problem]
 
     def problem(self, name: str) -> ReachProblem:
-        """One of the problems that were faced.
-
-        Raises
-        ------
-        InvalidInputError
-            If there is none of this name, or it cannot be read.
-        """
+        """One of the problems that were faced."""
         return ReachProblem.from_json(self.faced(name).problem, f"problem {name}")
 
     def trials(self, problem: str) -> TrialSet:
-        """The trials of a problem, as they were faced.
-
-        Raises
-        ------
-        InvalidInputError
-            If problem, starts and goals do not match their hash.
-        KinarmError
-            If the arm is missing or another one by now.
-        """
+        """The trials of a problem as they were faced, if they and the arm are still the same."""
         faced, simulator = self.faced(problem), Simulator(self.problem(problem))
         starts = finite_array("starts", faced.starts, (None, simulator.arm.n_joints))
         goals = finite_array("goals", faced.goals, (len(starts), 3))
@@ -310,30 +259,3 @@ class EvaluationDocument(Document, frozen=True, kw_only=True):
         """Proven numbers of steps of a problem's first trials, if the evaluation had them."""
         oracle = self.faced(problem).oracle
         return oracle.trials.steps_lower_bound if oracle else None
-
-
-def check_same(row: Result, ends: Sequence[End]) -> None:
-    """See that trials end as an evaluation says.
-
-    Parameters
-    ----------
-    row : Result
-        What it says of a policy.
-    ends : sequence of End
-        How all its trials end now.
-
-    Raises
-    ------
-    InvalidInputError
-        If one ends otherwise: policy or simulator have changed since.
-    """
-    said = row.outcomes.ends()
-    if list(ends) != said:
-        trial = next(
-            (k for k, pair in enumerate(zip(ends, said, strict=False)) if pair[0] != pair[1]),
-            len(said),
-        )
-        raise InvalidInputError(
-            f"trial {trial} of {row.policy!r} ends otherwise than in the evaluation: the policy or "
-            "kinarm has changed, evaluate again"
-        )

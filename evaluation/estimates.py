@@ -11,7 +11,7 @@ from kinarm.evaluation.statistics import (
     Estimate,
     Interval,
     percentile_interval,
-    resampled_figures,
+    resamples,
     share_over_seeds,
     student,
 )
@@ -40,7 +40,7 @@ def estimate_metrics(outcomes: Outcomes) -> dict[str, Estimate]:
 
 def _of_shares(outcomes: Outcomes, known: Mapping[str, Metric]) -> dict[str, Interval | None]:
     """Intervals of the metrics that are shares of trials."""
-    each = np.arange(len(outcomes.rollouts[0]))[:, None]
+    each = np.arange(len(outcomes.rollouts[0].success))[:, None]
     seeds = [outcomes.of_seed(seed).resampled(each) for seed in range(len(outcomes.rollouts))]
     return {
         name: share_over_seeds(np.array([metric.formula(seed) for seed in seeds])).ci95
@@ -60,14 +60,15 @@ def _bootstrapped(outcomes: Outcomes, known: Mapping[str, Metric]) -> dict[str, 
     def figures(some: Outcomes) -> NDArray[np.float64]:
         return np.stack([formula(some) for formula in formulas.values()])
 
-    trials, seeds = len(outcomes.rollouts[0]), len(outcomes.rollouts)
+    trials, seeds = len(outcomes.rollouts[0].success), len(outcomes.rollouts)
     if trials == 1:
         return dict.fromkeys(formulas)
-    found = resampled_figures(trials, lambda numbers: figures(outcomes.resampled(numbers)))
+    pieces = [figures(outcomes.resampled(numbers)) for numbers in resamples(trials)]
+    found = np.concatenate(pieces, axis=-1)
     if seeds == 1:
         return dict(zip(formulas, map(percentile_interval, found), strict=True))
     each = np.stack([figures(outcomes.of_seed(seed)) for seed in range(seeds)], axis=-1)
-    intervals: dict[str, tuple[float, float] | None] = {}
+    intervals: dict[str, Interval | None] = {}
     for name, of_seeds, of_trials in zip(formulas, each, found, strict=True):
         value = float(formulas[name](outcomes))
         parts = [(of_seeds.var(ddof=1) / seeds, seeds - 1), (of_trials.var(ddof=1), trials - 1)]

@@ -11,51 +11,30 @@ from numpy.typing import NDArray
 
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.bounds import MOST_BOUNDED, oracle_bounds
-from kinarm.evaluation.contestants import (
-    Contestant,
-    Predictor,
-    find_contestants,
-    policy_function,
-)
-from kinarm.evaluation.document import EvaluationDocument, Intervals, Protocol
+from kinarm.evaluation.contestants import Contestant, Predictor, find_contestants, policy_function
+from kinarm.evaluation.document import EvaluationDocument, Intervals, Protocol, Spread
 from kinarm.evaluation.estimates import estimate_metrics
 from kinarm.evaluation.holding import Holding, measure_holding
-from kinarm.evaluation.outcomes import Outcome, Outcomes, ends_of
+from kinarm.evaluation.outcomes import Outcomes
 from kinarm.evaluation.rows import faced_problem_of, pooled_result_of, result_of
 from kinarm.evaluation.selection import check_names
-from kinarm.evaluation.statistics import (
-    BOOTSTRAP_SEED,
-    LEVEL,
-    RESAMPLES,
-    Estimate,
-    share_over_seeds,
-)
+from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.training_seeds import group_names
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle.solution import OracleSolutions
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.problem import ProblemLike, ReachProblem
-from kinarm.rollouts import Rollouts
+from kinarm.rollouts import Outcome, Rollouts
 from kinarm.simulator import PolicyFunction
 
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """How one policy did on one problem.
+    """How one policy did on one problem: ``rollouts`` of ``trials``.
 
-    Attributes
-    ----------
-    contestant : Contestant
-        The policy.
-    trials : TrialSet
-        What it faced.
-    rollouts : Rollouts
-        What it did.
-    bounds : OracleSolutions or None
-        What any policy could do in the trials, or in the first ones, if that was asked for.
-    holding : Holding or None
-        What it did where success did not end the trials, if that was asked for.
+    ``bounds`` are what any policy could do in the trials, or in the first ones, and ``holding`` is
+    what this one did where success did not end them, if that was asked for.
     """
 
     contestant: Contestant
@@ -95,39 +74,27 @@ class Evaluation:
 
     @property
     def step_ratio(self) -> NDArray[np.float64]:
-        """Steps taken over those proven to be necessary, of the trials that succeeded.
-
-        Raises
-        ------
-        InvalidInputError
-            If the evaluation was made without bounds.
-        """
+        """Steps taken over those proven to be necessary, of the trials that succeeded."""
         return _outcomes((self,)).step_ratio
 
     @property
     def outcomes(self) -> tuple[Outcome, ...]:
         """``"success"``, ``"collision"`` or ``"truncated"``, per trial."""
-        return tuple(outcome for outcome, *_ in ends_of(self.rollouts))
+        return self.rollouts.outcomes
 
     def to_json(self) -> dict[str, Any]:
         """Figures of merit and every trial, as a dictionary that JSON can hold."""
         return result_of(self).to_json()
 
     def __repr__(self) -> str:
-        return f"Evaluation({_summary(self.contestant.name, self.trials, self.success)})"
+        name, problem = self.contestant.name, self.problem.name
+        trials = f"{len(self.trials)} trials of {problem}"
+        return f"Evaluation({name} on {trials}, success {self.success})"
 
 
 @dataclass(frozen=True, eq=False)
 class PooledEvaluation:
-    """How several training seeds of one recipe did on the same trials.
-
-    Attributes
-    ----------
-    name : str
-        Name of the group.
-    members : tuple of Evaluation
-        One per training seed.
-    """
+    """How several training seeds of one recipe did on the same trials, one a member."""
 
     name: str
     members: tuple[Evaluation, ...]
@@ -148,7 +115,7 @@ class PooledEvaluation:
         return min(self.members, key=lambda member: int(member.rollouts.success.sum()))
 
     @property
-    def spread(self) -> dict[str, dict[str, Any]]:
+    def spread(self) -> dict[str, Spread]:
         """Extremes, standard deviation and values over the seeds, of the metrics that all have."""
         spread = {}
         for name in self.metrics:
@@ -156,7 +123,7 @@ class PooledEvaluation:
             each = [value for value in known if value is not None]
             if len(each) == len(known):
                 std = float(np.std(each, ddof=1))
-                spread[name] = {"min": min(each), "max": max(each), "std": std, "each": each}
+                spread[name] = Spread(min=min(each), max=max(each), std=std, each=each)
         return spread
 
     def to_json(self) -> dict[str, Any]:
@@ -164,9 +131,9 @@ class PooledEvaluation:
         return pooled_result_of(self).to_json()
 
     def __repr__(self) -> str:
-        success = share_over_seeds(np.array([each.rollouts.success for each in self.members]))
-        summary = _summary(self.name, self.members[0].trials, success)
-        return f"PooledEvaluation({len(self.members)} seeds of {summary})"
+        seeds, trials = len(self.members), self.members[0].trials
+        on = f"{self.name} on {len(trials)} trials of {self.problem.name}"
+        return f"PooledEvaluation({seeds} seeds of {on}, success {self.metrics['success']})"
 
 
 def _outcomes(members: Sequence[Evaluation]) -> Outcomes:
@@ -177,11 +144,6 @@ def _outcomes(members: Sequence[Evaluation]) -> Outcomes:
         tuple(member.holding for member in members if member.holding),
         members[0].problem.stepping.time_step,
     )
-
-
-def _summary(name: str, trials: TrialSet, success: Estimate) -> str:
-    """Who faced which trials, and with what success."""
-    return f"{name} on {len(trials)} trials of {trials.problem.name}, success {success}"
 
 
 def evaluate(
@@ -205,16 +167,14 @@ def evaluate(
         method ``predict`` as models of Stable-Baselines3 have it.
     problem : ReachProblem, str or Path, optional
         The problem that it faces; by default the one that the policy was trained for.
-    trials : int
-        Number of trials.
-    seed : int
-        Seed of the trials.
+    trials, seed : int
+        Number of trials, and their seed.
     allow_other_arm : bool
         Whether a policy may face an arm that it was not trained for.
     oracle : bool
         Whether to bound what any policy could do, in the first 2000 trials at most.
     hold : bool
-        Whether to run the trials once more without an end at success; see `Evaluation.holding`.
+        Whether to run the trials once more without an end at success; see `Evaluation`.
     **overrides
         Changes of the problem, such as ``tolerance``; see `kinarm.ReachProblem.replace`.
 
@@ -232,7 +192,7 @@ def evaluate(
     drawn = TrialSet.draw(ReachProblem.load(faced).replace(**overrides), trials, seed)
     contestant.check(drawn.simulator.arm, allow_other_arm=allow_other_arm)
     bounds = oracle_bounds(drawn.first(MOST_BOUNDED)) if oracle else None
-    return run_trials(contestant, drawn, bounds=bounds, hold=hold, allow_other_arm=allow_other_arm)
+    return run_trials(contestant, drawn, bounds=bounds, hold=hold)
 
 
 def _contestant_of(
@@ -258,30 +218,17 @@ def run_trials(
     *,
     bounds: OracleSolutions | None = None,
     hold: bool = False,
-    allow_other_arm: bool = False,
 ) -> Evaluation:
-    """Let a contestant face a set of trials; see `evaluate`.
+    """Let a contestant face a set of trials.
 
     Parameters
     ----------
-    contestant : Contestant
-        Who faces them.
-    trials : TrialSet
-        The trials.
-    bounds : OracleSolutions, optional
-        What any policy could do in them, or in the first ones.
-    hold : bool
-        Whether to run them once more without an end at success.
-    allow_other_arm : bool
-        Whether a policy may face an arm that it was not trained for.
-
-    Raises
-    ------
-    PolicyFileError
-        If it was trained for another arm and that is not allowed, or its inputs or actions are
-        not those of this arm.
+    contestant, trials : Contestant, TrialSet
+        Who faces what.
+    bounds, hold : OracleSolutions, bool
+        What any policy could do in the trials, or in the first ones, and whether to run them once
+        more without an end at success; see `Evaluation`.
     """
-    contestant.check(trials.simulator.arm, allow_other_arm=allow_other_arm)
     holding = measure_holding(contestant, trials) if hold else None
     return Evaluation(contestant, trials, contestant.run(trials), bounds, holding)
 
@@ -297,11 +244,8 @@ def pool(evaluations: Sequence[Evaluation]) -> tuple[PooledEvaluation, ...]:
     for evaluation in evaluations:
         key = (names[evaluation.contestant.name], evaluation.problem.digest)
         groups.setdefault(key, []).append(evaluation)
-    return tuple(
-        PooledEvaluation(name, tuple(members))
-        for (name, _), members in groups.items()
-        if len(members) > 1
-    )
+    several = ((name, members) for (name, _), members in groups.items() if len(members) > 1)
+    return tuple(PooledEvaluation(name, tuple(members)) for name, members in several)
 
 
 def evaluation_document(evaluations: Sequence[Evaluation], command: str) -> EvaluationDocument:
@@ -310,14 +254,9 @@ def evaluation_document(evaluations: Sequence[Evaluation], command: str) -> Eval
     Parameters
     ----------
     evaluations : sequence of Evaluation
-        Made with one trial set per problem.
+        Made with one trial set per problem; all policies, and all problems, have own names.
     command : str
         The command that made them.
-
-    Raises
-    ------
-    InvalidInputError
-        If two policies on a problem, or two problems, have the same name.
     """
     check_names((each.contestant, each.problem) for each in evaluations)
     any_set = evaluations[0].trials
@@ -327,14 +266,7 @@ def evaluation_document(evaluations: Sequence[Evaluation], command: str) -> Eval
         trials=len(any_set),
         seed=any_set.seed,
         hold=any(each.holding is not None for each in evaluations),
-        intervals=Intervals(
-            level=LEVEL,
-            shares="Wilson",
-            distances="percentile bootstrap over trials",
-            pooled="Student, over training seeds and trials",
-            resamples=RESAMPLES,
-            bootstrap_seed=BOOTSTRAP_SEED,
-        ),
+        intervals=Intervals(),
         problems={name: faced_problem_of(facing[name]) for name in reversed(facing)},
         versions=package_versions(),
         commit=source_commit(),

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,37 +28,47 @@ def distance_histograms(evaluations: Sequence[Evaluation]) -> "Figure":
     """Histograms of the final distance, a panel per problem (paper, Figure 2, right).
 
     Training seeds of one recipe share a colour: the line is their mean, thin lines are the seeds.
-
-    Parameters
-    ----------
-    evaluations : sequence of Evaluation
-        Any policies on any problems.
     """
-    from matplotlib.figure import Figure
-
     problems = {evaluation.problem.digest: evaluation.problem for evaluation in evaluations}
     labels = series_labels(evaluations)
     furthest = max(float(evaluation.rollouts.distance.max()) for evaluation in evaluations)
     edges = np.arange(0.0, furthest + BIN_WIDTH, BIN_WIDTH)
-    figure = Figure(figsize=(4.2 * len(problems), 3.6), layout="constrained")
-    panels = figure.subplots(1, len(problems), squeeze=False)[0]
-    for axes, (digest, problem) in zip(panels, problems.items(), strict=True):
-        facing = [
-            (label, evaluation.rollouts.distance)
-            for label, evaluation in zip(labels, evaluations, strict=True)
-            if evaluation.problem.digest == digest
-        ]
-        for number, label in enumerate(dict.fromkeys(labels)):
-            distances = [each for shown, each in facing if shown == label]
+    figure, panels = panels_figure((4.2 * len(problems), 3.6), 1, len(problems))
+    for axes, (digest, problem) in zip(panels[0], problems.items(), strict=True):
+        series: dict[str, list[NDArray[np.float64]]] = {label: [] for label in labels}
+        for label, evaluation in zip(labels, evaluations, strict=True):
+            if evaluation.problem.digest == digest:
+                series[label].append(evaluation.rollouts.distance)
+        for number, (label, distances) in enumerate(series.items()):
             if distances:
                 _stairs(axes, distances, edges, label, number)
         axes.axvline(problem.task.tolerance, color="#444444", linestyle=":", linewidth=1)
         axes.set(title=problem.name, xlabel="final distance to the goal [m]", xlim=(0, None))
         axes.set_ylim(0, None)
-        axes.spines[["top", "right"]].set_visible(False)
         axes.legend(frameon=False, fontsize=8)
     figure.axes[0].set_ylabel(f"share of trials per {BIN_WIDTH} m")
     return figure
+
+
+def panels_figure(
+    size: tuple[float, float], rows: int, columns: int, **options: Any
+) -> "tuple[Figure, NDArray[Any]]":
+    """A figure and its panels, shape (rows, columns), without top and right spines.
+
+    Parameters
+    ----------
+    size : tuple of float
+        Width and height [inches].
+    rows, columns, **options
+        As for ``subplots`` of Matplotlib.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, layout="constrained")
+    panels = figure.subplots(rows, columns, squeeze=False, **options)
+    for axes in panels.flat:
+        axes.spines[["top", "right"]].set_visible(False)
+    return figure, panels
 
 
 def _stairs(
@@ -74,30 +84,6 @@ def _stairs(
     for share in shares if len(shares) > 1 else ():
         axes.stairs(share, edges, color=colour, alpha=0.3, linewidth=0.8)
     axes.stairs(shares.mean(axis=0), edges, color=colour, linestyle=dash, linewidth=2, label=label)
-
-
-def draw_band(
-    axes: "Axes",
-    places: NDArray[np.float64],
-    heights: NDArray[np.float64],
-    label: str,
-    colour: str,
-    dash: str,
-) -> None:
-    """Draw the mean of curves, and a band from the lowest to the highest.
-
-    Parameters
-    ----------
-    axes : Axes
-        Where to.
-    places, heights : ndarray, shape (n_places,) and (n_curves, n_places)
-        The curves.
-    label, colour, dash : str
-        Name and look of the mean.
-    """
-    low, high = heights.min(axis=0), heights.max(axis=0)
-    axes.fill_between(places, low, high, color=colour, alpha=0.15, lw=0)
-    axes.plot(places, heights.mean(axis=0), color=colour, linestyle=dash, lw=2, label=label)
 
 
 def series_labels(evaluations: Sequence[Evaluation]) -> list[str]:
@@ -123,16 +109,14 @@ def _label(evaluation: Evaluation, group: str) -> str:
 
 
 def save_figure(figure: "Figure", folder: Path, name: str) -> tuple[Path, ...]:
-    """Write a figure as PNG and as SVG; equal figures give equal files.
+    """Write a figure as PNG and as SVG, with the same bytes at any time.
 
     Parameters
     ----------
-    figure : Figure
-        The figure.
-    folder : Path
-        Where to.
+    figure, folder : Figure, Path
+        What to write, and the folder, which exists.
     name : str
-        Name of the files, without the suffix.
+        Name of the two files, without what they end in.
     """
     import matplotlib
 

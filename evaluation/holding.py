@@ -11,16 +11,12 @@ from kinarm.evaluation.contestants import ORACLE, Contestant
 from kinarm.evaluation.outcomes import HOLDING_STEPS
 from kinarm.evaluation.trials import TrialSet
 from kinarm.rollouts import Rollouts
-from kinarm.world import World
 
 NEVER = sys.float_info.min
 """A tolerance that nothing meets [m]."""
 
 AIM = 0.005
 """How close the oracle's motions are to come where success does not end trials [m]."""
-
-LOT = 1000
-"""Trials whose distances are worked out together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +30,8 @@ class Holding:
     farthest_at_end : ndarray, shape (n,)
         Largest distance after the last `HOLDING_STEPS` steps, or all if there are fewer [m];
         infinite where contact ended the trial.
-    collision : ndarray of bool, shape (n,)
-        Whether contact ended the trial.
-    steps : ndarray of int, shape (n,)
-        Steps taken.
+    collision, steps : ndarray, shape (n,)
+        Whether contact ended the trial, and steps taken.
     """
 
     closest: NDArray[np.float64]
@@ -45,50 +39,32 @@ class Holding:
     collision: NDArray[np.bool_]
     steps: NDArray[np.int64]
 
-    def __repr__(self) -> str:
-        return f"Holding({len(self.steps)} trials, {int(self.collision.sum())} collisions)"
-
     @classmethod
     def of(cls, rollouts: Rollouts, trials: TrialSet) -> "Holding":
         """Measure rollouts that kept the configurations visited."""
-        lots = [slice(first, first + LOT) for first in range(0, len(rollouts), LOT)]
-        distances = [
-            _distances(trials.simulator.world, rollouts.paths[lot, 1:], rollouts.goals[lot])
-            for lot in lots
-        ]
-        at_end = np.concatenate([each[:, -HOLDING_STEPS:].max(axis=1) for each in distances])
+        paths = rollouts.paths[:, 1:]
+        visited = ~np.isnan(paths[..., 0])
+        tools = trials.simulator.world.poses(paths[visited])[:, :3, 3]
+        aims = np.broadcast_to(rollouts.goals[:, None], (*visited.shape, 3))[visited]
+        distances = np.full(visited.shape, np.nan)
+        distances[visited] = np.linalg.norm(tools - aims, axis=1)
+        at_end = distances[:, -HOLDING_STEPS:].max(axis=1)
         return cls(
-            closest=np.concatenate([np.nanmin(each, axis=1) for each in distances]),
+            closest=np.nanmin(distances, axis=1),
             farthest_at_end=np.where(rollouts.collision, np.inf, at_end),
             collision=rollouts.collision,
             steps=rollouts.steps,
         )
 
 
-def _distances(
-    world: World, paths: NDArray[np.float64], goals: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Distances from the tool to goals along paths [m], shape (n, n_steps); NaN after their end."""
-    visited = ~np.isnan(paths[..., 0])
-    distances = np.full(visited.shape, np.nan)
-    tools = world.poses(paths[visited])[:, :3, 3]
-    aims = np.broadcast_to(goals[:, None], (*visited.shape, 3))[visited]
-    distances[visited] = np.linalg.norm(tools - aims, axis=1)
-    return distances
-
-
 def measure_holding(contestant: Contestant, trials: TrialSet) -> Holding:
-    """Let a contestant face trials that success does not end.
-
-    Starts and goals are those of the trials. The oracle aims at `AIM` there, and stays where it
-    gets to.
-    """
+    """Let a contestant face trials that success does not end; the oracle aims at `AIM` there."""
     endless = trials.with_tolerance(NEVER)
     if contestant is ORACLE:
         aimed = trials.with_tolerance(min(AIM, trials.problem.task.tolerance))
         actions = oracle_bounds(aimed).actions
         scenarios = (endless.starts, endless.goals)
-        return Holding.of(
-            endless.simulator.rollout_actions(actions, *scenarios, record=True), trials
-        )
-    return Holding.of(contestant.run(endless, record=True), trials)
+        rollouts = endless.simulator.rollout_actions(actions, *scenarios, record=True)
+    else:
+        rollouts = contestant.run(endless, record=True)
+    return Holding.of(rollouts, trials)

@@ -1,6 +1,5 @@
 """The figures of merit in one table, which documents, tables, reports and the docs read."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -9,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.evaluation.outcomes import EARLY_STEPS, HOLDING_STEPS, Outcomes
+
+APPROACH = "closest approach over all trials, if success does not end them; contact does"
 
 LIMITS = (0.1, 0.2)
 """Distances whose shares are reported beside success [m]."""
@@ -29,7 +30,7 @@ SYMBOLS = {
     "eᵢ": f"largest distance after the last {HOLDING_STEPS} steps of that longer trial [m]",
     "H": "set of these longer trials that touch something",
 }
-"""What the letters in definitions of metrics stand for."""
+"""Meaning of the letters in definitions of metrics."""
 
 ALWAYS = float("inf")
 """Priority of columns that are never left out."""
@@ -41,10 +42,8 @@ class Metric:
 
     Attributes
     ----------
-    meaning : str
-        What it is, for documentation and reports.
-    definition : str
-        The formula in words of mathematics; ``SYMBOLS`` says what its letters stand for.
+    meaning, definition : str
+        What it is, and its formula in mathematics; ``SYMBOLS`` says what the letters stand for.
     formula : callable
         From `Outcomes` to the figure; None or NaN where there is nothing to tell. For an interval
         it is asked about many resamples at once and works along the last axis.
@@ -53,20 +52,15 @@ class Metric:
     interval : ``"Wilson"``, ``"bootstrap"`` or None
         How its 95 % interval is made. Wilson's is for shares of trials, whose formula is asked
         about each trial by itself as well.
-    needs_bounds : bool
-        Whether it compares with the oracle.
-    needs_holding : bool
-        Whether it is about trials that go on after success.
-    heading : str
-        Heading of its column, its name and unit; without one it is in documents alone.
-    digits : int
-        Decimals that are shown.
-    shows_interval : bool
-        Whether the interval is shown, too.
+    needs_bounds, needs_holding : bool
+        Whether it compares with the oracle, or is about trials that go on after success.
+    heading, spread_heading : str
+        Headings of its column, and of one for its range over training seeds; without the first it
+        is in documents alone.
+    digits, shows_interval : int, bool
+        Decimals that are shown, and whether the interval is.
     beside : tuple of str, optional
         Name of another metric that is shown in the same column, and how, such as ``"{} s"``.
-    spread_heading : str
-        Heading of a column for its range over training seeds, if there is to be one.
     priority : float
         Where space is scarce, columns of low priority are left out first, and those of infinite
         priority never.
@@ -110,17 +104,6 @@ def _share_of(
     )
 
 
-def _share_within(limit: float) -> Metric:
-    """Share of trials that end within a distance [m]."""
-    return _share_of(
-        f"with a final distance of at most {limit:g} m, however they ended",
-        f"|{{i : dᵢ ≤ {limit:g} m}}| / n",
-        lambda trials: trials.distance <= limit,
-        heading=f"within {limit:g} m %",
-        priority=1,
-    )
-
-
 def _share_closer(limit: float) -> Metric:
     """Share of trials whose closest approach is within a distance [m], if they go on."""
     return _share_of(
@@ -134,12 +117,28 @@ def _share_closer(limit: float) -> Metric:
     )
 
 
+def _share_within(limit: float) -> Metric:
+    """Share of trials that end within a distance [m]."""
+    return _share_of(
+        f"with a final distance of at most {limit:g} m, however they ended",
+        f"|{{i : dᵢ ≤ {limit:g} m}}| / n",
+        lambda trials: trials.distance <= limit,
+        heading=f"within {limit:g} m %",
+        priority=1,
+    )
+
+
 def _distance_metric(
-    meaning: str, definition: str, formula: Callable[[Outcomes], Any], **shown: Any
+    meaning: str,
+    definition: str,
+    formula: Callable[[Outcomes], Any],
+    of: str = "final distance over all trials, however they ended",
+    **shown: Any,
 ) -> Metric:
-    """A statistic of the final distance."""
+    """A statistic of the final distance, or of another one."""
+    text = f"{meaning} of the {of}"
     return Metric(
-        meaning=f"{meaning} of the final distance over all trials, however they ended",
+        meaning=text,
         definition=definition,
         formula=formula,
         unit="m",
@@ -148,46 +147,12 @@ def _distance_metric(
     )
 
 
-def _approach_metric(
-    meaning: str, definition: str, formula: Callable[[Outcomes], Any], **shown: Any
-) -> Metric:
-    """A statistic of the closest approach."""
-    return Metric(
-        meaning=f"{meaning} of the closest approach over all trials, if success does not end them; "
-        "contact does",
-        definition=definition,
-        formula=formula,
-        unit="m",
-        interval="bootstrap",
-        needs_holding=True,
-        **shown,
-    )
-
-
-def median(ordered: NDArray[np.float64]) -> Any:
-    """Median along the last axis of values that are ordered, whatever their size."""
-    n = ordered.shape[-1]
-    return ordered[..., (n - 1) // 2] / 2 + ordered[..., n // 2] / 2
-
-
-def quantile(ordered: NDArray[np.float64], share: float) -> Any:
-    """Quantile along the last axis, as NumPy interpolates it, of values that are ordered."""
-    position = share * (ordered.shape[-1] - 1)
-    low, beyond = ordered[..., math.floor(position)], position % 1
-    high = ordered[..., math.ceil(position)]
-    if beyond < 0.5:
-        return low + (high - low) * beyond
-    return high - (high - low) * (1 - beyond)
-
-
-def middle_half(ordered: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Ordered values without the smallest and the largest quarter, along the last axis."""
+def _middle_half(ordered: NDArray[np.float64]) -> NDArray[np.float64]:
     n = ordered.shape[-1]
     return ordered[..., n // 4 : n - n // 4]
 
 
-def median_or_none(values: NDArray[Any]) -> Any:
-    """Median of values; None if there are none."""
+def _median_or_none(values: NDArray[Any]) -> Any:
     return np.median(values) if values.size else None
 
 
@@ -215,7 +180,7 @@ METRICS: dict[str, Metric] = {
     "median_distance": _distance_metric(
         "median",
         "median of dᵢ",
-        lambda trials: median(trials.ordered_distance),
+        lambda trials: np.median(trials.ordered_distance, axis=-1),
         heading="median distance m",
         shows_interval=True,
         priority=12,
@@ -230,12 +195,12 @@ METRICS: dict[str, Metric] = {
     "iqm_distance": _distance_metric(
         "interquartile mean",
         "mean of dᵢ without the smallest and the largest quarter",
-        lambda trials: middle_half(trials.ordered_distance).mean(axis=-1),
+        lambda trials: _middle_half(trials.ordered_distance).mean(axis=-1),
     ),
     "p95_distance": _distance_metric(
         "95th percentile",
         "0.95 quantile of dᵢ, interpolated linearly",
-        lambda trials: quantile(trials.ordered_distance, 0.95),
+        lambda trials: np.quantile(trials.ordered_distance, 0.95, axis=-1),
         heading="p95 distance m",
         priority=2,
     ),
@@ -255,14 +220,14 @@ METRICS: dict[str, Metric] = {
     "early_collision": _share_of(
         f"that ended in contact within the first {EARLY_STEPS} steps",
         f"|{{i ∈ C : kᵢ ≤ {EARLY_STEPS}}}| / n",
-        lambda trials: trials.early_collision,
+        lambda trials: trials.collision & (trials.steps <= EARLY_STEPS),
         heading="early collision %",
         priority=0.5,
     ),
     "truncated": _share_of(
         "that took all steps without success or contact",
         "|T| / n",
-        lambda trials: trials.truncated,
+        lambda trials: ~(trials.success | trials.collision),
         heading="truncated %",
         priority=0.5,
     ),
@@ -282,7 +247,7 @@ METRICS: dict[str, Metric] = {
     "steps_to_success": Metric(
         meaning="median number of steps over the trials that succeeded, and the same as time",
         definition="median of kᵢ over i ∈ S",
-        formula=lambda trials: median_or_none(trials.steps_to_success),
+        formula=lambda trials: _median_or_none(trials.steps[trials.success]),
         heading="steps to success",
         digits=0,
         beside=("time_to_success", "{} s"),
@@ -291,14 +256,14 @@ METRICS: dict[str, Metric] = {
     "time_to_success": Metric(
         meaning="median duration of the trials that succeeded",
         definition="median of kᵢ times the duration of a step, over i ∈ S",
-        formula=lambda trials: median_or_none(trials.steps_to_success * trials.time_step),
+        formula=lambda trials: _median_or_none(trials.steps[trials.success] * trials.time_step),
         unit="s",
         digits=2,
     ),
     "step_ratio": Metric(
         meaning="median of steps divided by the bound, over the bounded trials that succeeded",
         definition="median of kᵢ / bᵢ over the bounded i ∈ S",
-        formula=lambda trials: median_or_none(trials.step_ratio),
+        formula=lambda trials: _median_or_none(trials.step_ratio),
         needs_bounds=True,
         heading="step ratio",
         digits=2,
@@ -325,18 +290,22 @@ METRICS: dict[str, Metric] = {
         shows_interval=True,
         priority=15,
     ),
-    "median_approach": _approach_metric(
+    "median_approach": _distance_metric(
         "median",
         "median of aᵢ",
-        lambda trials: median(trials.ordered_closest),
+        lambda trials: np.median(trials.ordered_closest, axis=-1),
+        of=APPROACH,
+        needs_holding=True,
         heading="median approach m",
         beside=("p95_approach", "p95 {}"),
         priority=13,
     ),
-    "p95_approach": _approach_metric(
+    "p95_approach": _distance_metric(
         "95th percentile",
         "0.95 quantile of aᵢ, interpolated linearly",
-        lambda trials: quantile(trials.ordered_closest, 0.95),
+        lambda trials: np.quantile(trials.ordered_closest, 0.95, axis=-1),
+        of=APPROACH,
+        needs_holding=True,
     ),
     "held_collision": _share_of(
         "that touch something if success does not end them",

@@ -39,7 +39,7 @@ class Goals(Document, frozen=True, kw_only=True):
 
 
 class Starts(Document, frozen=True, kw_only=True):
-    """Configurations that the task may start at: how many touch nothing, and what touches at home.
+    """How many configurations that the task may start at touch nothing, and what touches at home.
 
     They are random, unless the task lists its starts.
     """
@@ -87,23 +87,18 @@ class ProblemCheck(Document, frozen=True, kw_only=True):
     def lines(self) -> dict[str, str]:
         """The same in words, by what it is about."""
         goals, starts, contact = self.goals, self.starts, self.contact
-        shares = (
-            f"{name.replace('_', ' ')} {percent(getattr(goals, name))}"
-            for name in ("reached", "out_of_reach", "undecided")
-        )
-        always = [f"{one} and {other}" for one, other, share in contact.touching if share == 1]
-        never = sum(share == 0 for *_, share in contact.touching)
-        often = [
-            f"{one} and {other} {share:.1%}"
-            for one, other, share in contact.touching
-            if 0 < share < 1
-        ]
+        named = [(f"{one} and {other}", share) for one, other, share in contact.touching]
+        always = [pair for pair, share in named if share == 1]
+        never = sum(share == 0 for _, share in named)
+        often = [f"{pair} {share:.1%}" for pair, share in named if 0 < share < 1]
         faults = [f"{name} ({reason})" for name, reason in self.mirror.items() if reason]
         home = " touches ".join(starts.home_contact or ("nothing touches",))
         return {
-            "goals": f"{', '.join(shares)}; of {goals.trials} trials",
+            "goals": f"reached {percent(goals.reached)}, out of reach "
+            f"{percent(goals.out_of_reach)}, undecided {percent(goals.undecided)}; "
+            f"of {goals.trials} trials",
             "starts": f"free {percent(starts.free)} of {contact.configurations}; at home {home}",
-            "contact": f"{len(contact.touching)} pairs are tested; at {contact.configurations} "
+            "contact": f"{len(named)} pairs are tested; at {contact.configurations} "
             f"configurations {len(always)} always and {never} never touch",
             "always": "; ".join(always) or "none",
             "often": "; ".join(often[:OFTEN]) or "none",
@@ -114,7 +109,7 @@ class ProblemCheck(Document, frozen=True, kw_only=True):
 def check_problem(
     world: World, trials: int = 200, seed: int = 0, on_progress: Progress | None = None
 ) -> ProblemCheck:
-    """Check a problem.
+    """Check a problem; one whose arm cannot move or start is refused.
 
     Parameters
     ----------
@@ -124,14 +119,8 @@ def check_problem(
         How many trials the oracle faces, and their seed.
     on_progress : callable, optional
         Called with the number of trials solved so far and in all.
-
-    Raises
-    ------
-    ProblemError
-        If the arm touches something at all random configurations, or cannot start.
     """
-    model = world.contact_model
-    contact = ContactStatistics.sample(model)
+    contact = ContactStatistics.sample(world.contact_model)
     contact.check_movable(world.arm.name)
     free_starts = ~world.screen(random_starts(world))[1]
     return ProblemCheck(
@@ -141,13 +130,13 @@ def check_problem(
         starts=Starts(
             configurations=len(free_starts),
             free=Estimate.share(free_starts),
-            home_contact=model.contact_pair(world.arm.home),
+            home_contact=world.contact_model.contact_pair(world.arm.home),
         ),
         contact=Contacts(
             configurations=len(contact.free),
             free=Estimate.share(contact.free),
             touching=[(*pair, share) for pair, share in contact.shares.items()],
-            left_out=[(*pair, reason) for pair, reason in model.left_out.items()],
+            left_out=[(*pair, reason) for pair, reason in world.contact_model.left_out.items()],
         ),
         mirror=mirror_findings(world),
     )
@@ -158,6 +147,7 @@ def _goals(trials: TrialSet, on_progress: Progress | None) -> Goals:
     solutions = oracle_bounds(trials, on_progress)
     reached = solutions.reachable
     out_of_reach = solutions.steps_lower_bound > trials.problem.task.horizon
+    goals, reasons = trials.goals.tolist(), solutions.reasons.tolist()
     return Goals(
         trials=len(trials),
         seed=trials.seed,
@@ -165,22 +155,16 @@ def _goals(trials: TrialSet, on_progress: Progress | None) -> Goals:
         out_of_reach=Estimate.share(out_of_reach),
         undecided=Estimate.share(~(reached | out_of_reach)),
         not_reached=[
-            MissedGoal(
-                trial=trial,
-                goal=tuple(trials.goals[trial].tolist()),
-                reason=str(solutions.reasons[trial]),
-            )
+            MissedGoal(trial=trial, goal=tuple(goals[trial]), reason=reasons[trial])
             for trial in np.flatnonzero(~reached).tolist()
         ],
     )
 
 
-def percent(estimate: Estimate) -> str:
+def percent(share: Estimate) -> str:
     """A share and its interval, in per cent."""
-    if estimate.value is None or estimate.ci95 is None:
-        return "unknown"
-    low, high = estimate.ci95
-    return f"{100 * estimate.value:.1f} % ({100 * low:.1f}..{100 * high:.1f})"
+    ends = (share.value or 0.0, *(share.ci95 or (0.0, 1.0)))
+    return "{:.1f} % ({:.1f}..{:.1f})".format(*(100 * end for end in ends))
 
 
 def random_starts(world: World) -> NDArray[np.float64]:

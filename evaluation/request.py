@@ -1,9 +1,8 @@
 """An evaluation from what is asked for to what is written: the main path, on one screen."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
@@ -87,21 +86,11 @@ class EvaluationRequest(ProblemOptions):
 
     policies: tuple[str, ...] = field(
         default=(),
-        metadata={
-            "flag": "--policy",
-            "metavar": "NAME_OR_FILE",
-            "several": True,
-            "completes": policy_choices,
-        },
+        metadata={"flag": "--policy", "metavar": "NAME_OR_FILE", "completes": policy_choices},
     )
     problems: tuple[str, ...] = field(
         default=(),
-        metadata={
-            "flag": "--problem",
-            "metavar": "NAME_OR_FILE",
-            "several": True,
-            "names": problem_names,
-        },
+        metadata={"flag": "--problem", "metavar": "NAME_OR_FILE", "names": problem_names},
     )
     trials: int = 200
     seed: int = 0
@@ -137,17 +126,7 @@ class EvaluationRequest(ProblemOptions):
     def run(self, command: str | None = None, tell: Tell = lambda _: None) -> "EvaluationDocument":
         """Evaluate, and write the outputs.
 
-        Parameters
-        ----------
-        command : str, optional
-            What to record as the command that did it; this request if it is left out.
-        tell : callable
-            Called with what is being done.
-
-        Raises
-        ------
-        KinarmError
-            If a name, file or number cannot be used, or a file cannot be written.
+        ``command`` is recorded as what did it, or this request; ``tell`` hears what is being done.
         """
         from kinarm.evaluation.evaluation import evaluation_document
 
@@ -178,8 +157,12 @@ class EvaluationRequest(ProblemOptions):
         for name, problem in problems.items():
             trials = TrialSet.draw(problem, self.trials, self.seed)
             bounded = trials if named else trials.first(MOST_BOUNDED)
-            solving = partial(_tell_bounds, tell, name)
-            bounds = oracle_bounds(bounded, solving) if self.oracle or named else None
+            solving = f"what could any policy reach on {name}? {{}} of {{}} trials solved"
+            bounds = None
+            if self.oracle or named:
+                bounds = oracle_bounds(
+                    bounded, lambda *counts, text=solving: tell(text.format(*counts))
+                )
             tell(f"evaluating on {name}")
             evaluations += [
                 run_trials(
@@ -187,7 +170,6 @@ class EvaluationRequest(ProblemOptions):
                     bounded if contestant is ORACLE else trials,
                     bounds=bounds if self.oracle else None,
                     hold=self.hold,
-                    allow_other_arm=self.allow_other_arm,
                 )
                 for contestant, faced in pairs
                 if faced.name == name
@@ -216,41 +198,22 @@ class EvaluationRequest(ProblemOptions):
             shown = [e for e in evaluations if e.contestant.algorithm != "oracle"] or evaluations
             save_figure(distance_histograms(shown), self.out, HISTOGRAMS)
 
-    def pairs(self) -> "list[Pair]":
-        """Decide who faces which problem.
-
-        Raises
-        ------
-        KinarmError
-            If a name or file cannot be used, or two policies or problems have one name.
-        """
-        from kinarm.evaluation.selection import Selection
-
-        return Selection(self).pairs()
-
     def _checked_pairs(self) -> "list[Pair]":
         """Who faces which problem, if all of them can and the files can be written."""
-        pairs = self.pairs()
-        problems = {problem.name: problem for _, problem in pairs}
-        arms = {name: problem.load_arm() for name, problem in problems.items()}
+        from kinarm.evaluation.selection import select_pairs
+
+        pairs = select_pairs(self)
+        arms = {problem.name: problem.load_arm() for _, problem in pairs}
         for contestant, problem in pairs:
             contestant.check(arms[problem.name], allow_other_arm=self.allow_other_arm)
-        self._check_outputs(pairs)
-        return pairs
-
-    def _check_outputs(self, pairs: "Sequence[Pair]") -> None:
-        """Check that the files can be written, and that there is one policy for a card."""
         if self.card is not None:
             from kinarm.evaluation.report.card import check_card
 
             check_card(self.card, pairs, overwrite=self.overwrite)
-        if self.report is not None:
-            check_output(self.report / REPORT, overwrite=self.overwrite)
+        written = [self.report / REPORT] if self.report else []
         if self.out is not None:
-            for name in (DOCUMENT, f"{HISTOGRAMS}.png", f"{HISTOGRAMS}.svg"):
-                check_output(self.out / name, overwrite=self.overwrite)
-
-
-def _tell_bounds(tell: Tell, problem: str, done: int, total: int) -> None:
-    """Say how far the oracle is."""
-    tell(f"what could any policy reach on {problem}? {done} of {total} trials solved")
+            names = (DOCUMENT, f"{HISTOGRAMS}.png", f"{HISTOGRAMS}.svg")
+            written += [self.out / name for name in names]
+        for path in written:
+            check_output(path, overwrite=self.overwrite)
+        return pairs

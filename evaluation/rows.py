@@ -13,14 +13,11 @@ from kinarm.evaluation.document import (
     Failures,
     PooledResult,
     Result,
-    Spread,
     TrialEnds,
     TrialHolding,
     WorstSeed,
 )
-from kinarm.evaluation.holding import Holding
-from kinarm.evaluation.outcomes import ends_of, failure_causes
-from kinarm.evaluation.statistics import Estimate
+from kinarm.evaluation.outcomes import failure_causes
 
 if TYPE_CHECKING:
     from kinarm.evaluation.evaluation import Evaluation, PooledEvaluation
@@ -42,18 +39,28 @@ def faced_problem_of(evaluation: "Evaluation") -> FacedProblem:
 
 def result_of(evaluation: "Evaluation") -> Result:
     """Figures of merit of one policy, and every trial."""
-    rollouts, contestant = evaluation.rollouts, evaluation.contestant
+    rollouts, holding = evaluation.rollouts, evaluation.holding
+    ends = TrialEnds(
+        final_distance=rollouts.distance.tolist(),
+        steps=rollouts.steps.tolist(),
+        outcome=list(evaluation.outcomes),
+        contact=list(evaluation.contacts),
+    )
+    held = holding and TrialHolding(
+        closest=holding.closest.tolist(),
+        farthest_at_end=[
+            each if np.isfinite(each) else None for each in holding.farthest_at_end.tolist()
+        ],
+        contact=holding.collision.tolist(),
+        steps=holding.steps.tolist(),
+    )
     return Result(
-        **_row(contestant.name, [evaluation], evaluation.metrics),
-        training_seed=contestant.seed,
-        note=contestant.note,
-        outcomes=TrialEnds(
-            final_distance=rollouts.distance.tolist(),
-            steps=rollouts.steps.tolist(),
-            outcome=list(evaluation.outcomes),
-            contact=list(evaluation.contacts),
-        ),
-        held=_holding(evaluation.holding) if evaluation.holding else UNSET,
+        **_row(evaluation.contestant.name, [evaluation]),
+        metrics=evaluation.metrics,
+        training_seed=evaluation.contestant.seed,
+        note=evaluation.contestant.note,
+        outcomes=ends,
+        held=held or UNSET,
     )
 
 
@@ -61,10 +68,11 @@ def pooled_result_of(pooled: "PooledEvaluation") -> PooledResult:
     """Figures of merit of several training seeds."""
     worst = pooled.worst
     return PooledResult(
-        **_row(pooled.name, pooled.members, pooled.metrics),
+        **_row(pooled.name, pooled.members),
+        metrics=pooled.metrics,
         members=[member.contestant.name for member in pooled.members],
         training_seeds=[member.contestant.seed for member in pooled.members],
-        spread={name: Spread(**figures) for name, figures in pooled.spread.items()},
+        spread=pooled.spread,
         worst_seed=WorstSeed(
             policy=worst.contestant.name,
             training_seed=worst.contestant.seed,
@@ -73,11 +81,14 @@ def pooled_result_of(pooled: "PooledEvaluation") -> PooledResult:
     )
 
 
-def _row(
-    name: str, evaluations: "Sequence[Evaluation]", metrics: dict[str, Estimate]
-) -> dict[str, Any]:
-    """Fields of a row: what it is about, its figures, and why its trials failed."""
+def _row(name: str, evaluations: "Sequence[Evaluation]") -> dict[str, Any]:
+    """Fields of a row: what it is about, and why trials failed, the most frequent cause first."""
     contestant, trials = evaluations[0].contestant, evaluations[0].trials
+    causes = (
+        failure_causes(each.outcomes, each.rollouts.steps.tolist(), each.contacts)
+        for each in evaluations
+    )
+    counts = Counter(cause for each in causes for cause in each.values())
     return {
         "policy": name,
         "algorithm": contestant.algorithm,
@@ -85,33 +96,13 @@ def _row(
         "problem": trials.problem.name,
         "trained_on": contestant.problem.name if contestant.problem else None,
         "trials": len(trials),
-        "metrics": metrics,
-        "failures": _failures(evaluations),
+        "failures": [
+            Failures(
+                contact=cause.contact,
+                early=cause.early,
+                trials=count,
+                share_of_failures=count / counts.total(),
+            )
+            for cause, count in sorted(counts.items(), key=lambda item: (-item[1], str(item[0])))
+        ],
     }
-
-
-def _failures(evaluations: "Sequence[Evaluation]") -> list[Failures]:
-    """How many trials of all seeds failed for each cause, the most frequent first."""
-    causes = (failure_causes(ends_of(each.rollouts), each.contacts) for each in evaluations)
-    counts = Counter(cause for each in causes for cause in each.values())
-    ordered = sorted(counts.items(), key=lambda item: (-item[1], str(item[0])))
-    return [
-        Failures(
-            contact=cause.pair,
-            early=cause.early,
-            trials=count,
-            share_of_failures=count / counts.total(),
-        )
-        for cause, count in ordered
-    ]
-
-
-def _holding(holding: Holding) -> TrialHolding:
-    """Course of each trial where success did not end it."""
-    at_end = holding.farthest_at_end.tolist()
-    return TrialHolding(
-        closest=holding.closest.tolist(),
-        farthest_at_end=[each if np.isfinite(each) else None for each in at_end],
-        contact=holding.collision.tolist(),
-        steps=holding.steps.tolist(),
-    )

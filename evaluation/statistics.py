@@ -4,9 +4,8 @@ Written out here, because SciPy's statistics take longer to load than a policy t
 """
 
 import math
-from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -42,16 +41,8 @@ class Estimate:
 
     @classmethod
     def share(cls, hits: NDArray[np.bool_]) -> "Estimate":
-        """Share of hits, with its Wilson interval.
-
-        Parameters
-        ----------
-        hits : ndarray of bool, shape (n_trials,) or (n_seeds, n_trials)
-            Whether a trial hit. Several seeds face the same trials, so they are no independent
-            evidence about them: their interval is that of n_trials trials, widened to whole hits.
-        """
-        seeds = hits.size // hits.shape[-1]
-        return cls(float(hits.mean()), wilson_interval(int(hits.sum()), hits.shape[-1], seeds))
+        """Share of trials that hit, with its Wilson interval; shape (n_trials,)."""
+        return cls(float(hits.mean()), wilson_interval(int(hits.sum()), len(hits)))
 
     def __str__(self) -> str:
         interval = " ({:.3g}..{:.3g})".format(*self.ci95) if self.ci95 else ""
@@ -63,76 +54,49 @@ class Estimate:
 
 
 def wilson_interval(hits: int, trials: int, seeds: int = 1) -> Interval:
-    """95 % interval of a share of trials, from the hits of all seeds together.
+    """95 % interval of a share of trials (Wilson 1927); exact where none or all hit.
 
     Parameters
     ----------
     hits, trials : int
-        How many hits there were, and how many trials every seed faced.
+        Hits of all seeds together, and the trials that every seed faced.
     seeds : int
-        Number of training seeds; see `Estimate.share`.
+        Number of training seeds. They face the same trials, so they are no independent evidence
+        about them: the interval is that of the trials of one, widened to whole hits.
     """
+
+    def end(hits: int, side: int) -> float:
+        share, z = hits / trials, DEVIATIONS
+        spread = 2 * (trials + z**2)
+        centre = (2 * trials * share + z**2) / spread
+        return centre + side * (z / spread * math.sqrt(4 * trials * share * (1 - share) + z**2))
+
     few, many = hits // seeds, -(-hits // seeds)
-    return _wilson_interval(few, trials)[0], _wilson_interval(many, trials)[1]
-
-
-def _wilson_interval(hits: int, trials: int) -> Interval:
-    """Interval of whole hits (Wilson 1927); exact where none or all hit."""
-    share, z = hits / trials, DEVIATIONS
-    spread = 2 * (trials + z**2)
-    centre = (2 * trials * share + z**2) / spread
-    half = z / spread * math.sqrt(4 * trials * share * (1 - share) + z**2)
-    return centre - half if hits > 0 else 0.0, centre + half if hits < trials else 1.0
-
-
-def resampled_figures(
-    trials: int, figures: Callable[[NDArray[np.int64]], NDArray[np.float64]]
-) -> NDArray[np.float64]:
-    """Some figures of resamples of the trials, shape (n_figures, n_resamples); seeded.
-
-    Parameters
-    ----------
-    trials : int
-        Number of trials.
-    figures : callable
-        From numbers of trials, shape (n_resamples, trials), to the figures of each resample,
-        shape (n_figures, n_resamples).
-    """
-    few = RESAMPLES * trials <= NUMBERS_AT_ONCE
-    pieces = _few_resamples(trials) if few else _resamples(trials)
-    return np.concatenate([figures(piece) for piece in pieces], axis=-1)
+    return end(few, -1) if few > 0 else 0.0, end(many, 1) if many < trials else 1.0
 
 
 def percentile_interval(figures: NDArray[np.float64]) -> Interval:
     """Ends of the middle 95 % of the figures of all resamples, shape (n_resamples,)."""
     ordered, tail = np.sort(figures), (1 - LEVEL) / 2
-    return float(_quantile(ordered, tail)), float(_quantile(ordered, 1 - tail))
+    return _quantile(ordered, tail), _quantile(ordered, 1 - tail)
 
 
-def _resamples(trials: int) -> Iterator[NDArray[np.int64]]:
-    """Numbers of the trials of all resamples, a piece of shape (n, trials) at a time."""
+def resamples(trials: int) -> Iterator[NDArray[np.int64]]:
+    """Numbers of the trials of all resamples, a piece of shape (n, trials) at a time; seeded."""
     rng, at_once = np.random.default_rng(BOOTSTRAP_SEED), max(1, NUMBERS_AT_ONCE // trials)
     for done in range(0, RESAMPLES, at_once):
         yield rng.integers(trials, size=(min(at_once, RESAMPLES - done), trials))
 
 
-@lru_cache(maxsize=1)
-def _few_resamples(trials: int) -> tuple[NDArray[np.int64], ...]:
-    """The same, kept: policies face as many trials one after the other."""
-    return tuple(_resamples(trials))
-
-
-def _quantile(ordered: NDArray[np.float64], share: float) -> NDArray[np.float64]:
-    """Quantile along the last axis, interpolated linearly."""
-    rank = share * ordered.shape[-1] + (1 - share)
+def _quantile(ordered: NDArray[np.float64], share: float) -> float:
+    """Quantile, interpolated linearly."""
+    rank = share * len(ordered) + (1 - share)
     below, beyond = int(rank) - 1, rank % 1
-    quantile: NDArray[np.float64]
-    quantile = (1 - beyond) * ordered[..., below] + beyond * ordered[..., below + 1]
-    return quantile
+    return float((1 - beyond) * ordered[below] + beyond * ordered[below + 1])
 
 
 def estimate_text(estimate: Estimate) -> str:
-    """A statistic and its interval in words; a single seed has no interval."""
+    """A statistic and its interval in words."""
     if estimate.value is None:
         return "not measurable"
     interval = "{:.3f}..{:.3f}".format(*estimate.ci95) if estimate.ci95 else "no interval"
@@ -140,17 +104,10 @@ def estimate_text(estimate: Estimate) -> str:
 
 
 class Term(NamedTuple):
-    """One part of a contrast of means.
+    """One part of a contrast of means: values of shape (n_seeds, n_trials), and their weight.
 
-    Attributes
-    ----------
-    weight : float
-        By which its mean enters.
-    values : ndarray, shape (n_seeds, n_trials)
-        What every training seed got in every trial.
-    trials : hashable
-        Names the trials. Crossed ones have one name: terms were measured on the same trials, or
-        trial by trial on variants of them, such as the same places of another bench.
+    ``trials`` names the trials. Crossed ones have one name: terms were measured on the same trials,
+    or trial by trial on variants of them, such as the same places of another bench.
     """
 
     weight: float
@@ -168,7 +125,7 @@ def contrast(terms: Sequence[Term]) -> Estimate:
     rather too wide. It is Student's, with the degrees of freedom of Welch and Satterthwaite.
     """
     value = sum(term.weight * float(term.values.mean()) for term in terms)
-    parts = [(term.weight**2 * _mean_variance(term.values.mean(axis=1))) for term in terms]
+    parts = [term.weight**2 * _mean_variance(term.values.mean(axis=1)) for term in terms]
     freedom = [term.values.shape[0] - 1 for term in terms]
     for name in dict.fromkeys(term.trials for term in terms):
         shared = [term.weight * term.values.mean(axis=0) for term in terms if term.trials == name]
@@ -201,14 +158,8 @@ def mean_share(shares: NDArray[np.float64], n_trials: int) -> Estimate:
     """Mean of the seeds' shares of trials.
 
     The trials' part of the variance is that of a binomial share, with two hits and two misses
-    added (Agresti and Coull), so that it does not vanish where nothing or everything was hit.
-
-    Parameters
-    ----------
-    shares : ndarray, shape (n_seeds,)
-        Share of every seed.
-    n_trials : int
-        Trials of a seed; they count as if all seeds had met the same ones.
+    added (Agresti and Coull), so that it does not vanish where nothing or everything was hit. The
+    ``n_trials`` of a seed count as if all seeds had met the same ones.
     """
     value = float(shares.mean())
     moderate = (value * n_trials + 2) / (n_trials + 4)
@@ -222,12 +173,8 @@ def share_over_seeds(hits: NDArray[Any]) -> Estimate:
     """A share of trials and its 95 % interval.
 
     That of one seed is Wilson's, about other trials. That of several covers those over seeds and
-    trials (`contrast`), which knows nothing where all seeds agree, and over trials alone.
-
-    Parameters
-    ----------
-    hits : ndarray, shape (n_seeds, n_trials)
-        Whether a trial hit, or the share of several trainings in which it did.
+    trials (`contrast`), which knows nothing where all seeds agree, and over trials alone. Hits,
+    shape (n_seeds, n_trials), may be shares of several trainings as well.
     """
     share = float(hits.mean())
     low, high = wilson_interval(round(share * hits.shape[1]), hits.shape[1])
@@ -243,12 +190,8 @@ def superiority(pairs: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]
     Several comparisons of the same groups, such as with several measures, and then several pairs
     of groups are averaged. The interval is Wilson's, for as many independent comparisons as the
     smaller groups have members: the variance of the statistic is at most theirs (van Dantzig
-    1951), however few seeds there are.
-
-    Parameters
-    ----------
-    pairs : sequence of (ndarray, ndarray)
-        Groups of independent seeds, shape (n_measures, n_seeds) each; infinity stands for never.
+    1951), however few seeds there are. Groups have shape (n_measures, n_seeds); infinity stands
+    for never.
     """
     from scipy.stats import norm
 

@@ -4,7 +4,6 @@ import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from operator import attrgetter
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from kinarm._console import open_console, print_fitting
@@ -18,9 +17,8 @@ if TYPE_CHECKING:
 SPREAD_PRIORITY = 5
 """Priority of the columns with ranges over training seeds; see `Metric.priority`."""
 
-
 REPLACED = "* some settings of the recipe are replaced"
-"""What the star in a label means."""
+"""Meaning of the star in a label."""
 
 
 class Cell(NamedTuple):
@@ -60,6 +58,12 @@ def metric_columns() -> list[Column]:
     return columns
 
 
+def telling_columns(rows: Sequence[Row], priority: float = 0) -> list[Column]:
+    """Metric columns of at least some priority that have something to say of rows."""
+    columns = (column for column in metric_columns() if column.priority >= priority)
+    return [column for column in columns if any(column.cell(row).value for row in rows)]
+
+
 def metric_cell(name: str, row: Row) -> Cell:
     """A metric in a row of the document."""
     metric, estimate = METRICS[name], row.metrics[name]
@@ -82,19 +86,13 @@ def spread_cell(name: str, row: Row) -> Cell:
     return Cell(METRICS[name].write_range(spread.min, spread.max), f"{len(spread.each)} seeds")
 
 
-def text_column(heading: str, text: Callable[[Row], str]) -> Column:
-    """Column of a text in a row of the document."""
-    return Column(heading, "", ALWAYS, lambda row: Cell(text(row)))
-
-
 def policy_label(row: Row) -> str:
     """Name of a row's policy; where it names a recipe, with the star of replaced settings.
 
     Names of files lack the star: ``ars-tuned-right`` is ``ars-tuned*-right``.
     """
     plain = row.recipe.removesuffix("*")
-    made = row.algorithm
-    return row.policy.replace(f"{made}-{plain}-", f"{made}-{row.recipe}-", 1)
+    return row.policy.replace(f"{row.algorithm}-{plain}-", f"{row.algorithm}-{row.recipe}-", 1)
 
 
 def has_star(row: Row) -> bool:
@@ -105,23 +103,21 @@ def has_star(row: Row) -> bool:
 def print_table(
     document: EvaluationDocument, console: "Console", *, markdown: bool = False
 ) -> None:
-    """Print the figures of a document, without the less important columns if space is scarce.
+    """Print the figures of a document.
 
     Parameters
     ----------
-    document : EvaluationDocument
-        The document.
-    console : Console
-        Where to.
+    document, console : EvaluationDocument, Console
+        What to print, and where to.
     markdown : bool
-        As Markdown, with all columns that say something.
+        As Markdown with all columns that say something; else those of low priority are left out
+        where space is scarce.
     """
     rows = [row for problem in document.protocol.problems for row in table_rows(document, problem)]
-    figures = [c for c in metric_columns() if any(c.cell(row).value for row in rows)]
     columns = [
-        text_column("problem", attrgetter("problem")),
-        text_column("policy", policy_label),
-        *figures,
+        Column("problem", "", ALWAYS, lambda row: Cell(row.problem)),
+        Column("policy", "", ALWAYS, lambda row: Cell(policy_label(row))),
+        *telling_columns(rows),
     ]
     if markdown:
         text = io.StringIO()

@@ -4,6 +4,7 @@ import json
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import replace
+from operator import attrgetter
 from pathlib import Path
 
 from kinarm.evaluation.contestants import Contestant
@@ -30,11 +31,13 @@ def group_names(contestants: Iterable[Contestant]) -> dict[str, str]:
     groups = [group for members in alike.values() for group in _with_distinct_seeds(members)]
     names = [_shared_name(group) for group in groups]
     several = Counter(names)
-    return {
-        member.name: name if several[name] == 1 else _own_name(name, group)
-        for name, group in zip(names, groups, strict=True)
-        for member in group
-    }
+    found: dict[str, str] = {}
+    for name, group in zip(names, groups, strict=True):
+        if several[name] > 1:  # a name that no other group has
+            first = group[0].name
+            name = first if len(group) == 1 else f"{name} ({first}, ...)"
+        found |= {member.name: name for member in group}
+    return found
 
 
 def _training(contestant: Contestant) -> Hashable:
@@ -47,34 +50,26 @@ def _training(contestant: Contestant) -> Hashable:
     return made.algorithm, made.recipe, shared, made.problem.digest
 
 
-def _with_distinct_seeds(members: list[Contestant]) -> list[list[Contestant]]:
-    """Split what holds a seed twice: by being shipped, by folder, and one by one."""
-    groups = [members]
-    for key in SPLITS:
-        groups = [part for group in groups for part in _split(group, key)]
-    return groups
-
-
-def _split(
-    members: list[Contestant], key: Callable[[Contestant], Hashable]
-) -> list[list[Contestant]]:
-    if len({member.seed for member in members}) == len(members):
-        return [members]
-    parts: dict[Hashable, list[Contestant]] = {}
-    for member in members:
-        parts.setdefault(key(member), []).append(member)
-    return list(parts.values())
-
-
 def _is_shipped(contestant: Contestant) -> bool:
     return contestant.source is not None and is_shipped(contestant.source)
 
 
-SPLITS: tuple[Callable[[Contestant], Hashable], ...] = (
-    _is_shipped,
-    lambda contestant: contestant.source and contestant.source.parent,
-    lambda contestant: contestant.name,
-)
+def _folder(contestant: Contestant) -> Path | None:
+    """Folder of a policy's file."""
+    return contestant.source and contestant.source.parent
+
+
+SPLIT_BY: tuple[Callable[[Contestant], Hashable], ...] = (_is_shipped, _folder, attrgetter("name"))
+
+
+def _with_distinct_seeds(members: list[Contestant], depth: int = 0) -> list[list[Contestant]]:
+    """Split what holds a seed twice: by being shipped, by folder, and one by one."""
+    if len({member.seed for member in members}) == len(members):
+        return [members]
+    parts: dict[Hashable, list[Contestant]] = {}
+    for member in members:
+        parts.setdefault(SPLIT_BY[depth](member), []).append(member)
+    return [group for part in parts.values() for group in _with_distinct_seeds(part, depth + 1)]
 
 
 def _shared_name(group: Sequence[Contestant]) -> str:
@@ -86,25 +81,12 @@ def _shared_name(group: Sequence[Contestant]) -> str:
     return f"{first.algorithm}-{first.recipe}-{first.problem.name}"
 
 
-def _own_name(name: str, group: Sequence[Contestant]) -> str:
-    """A name that no other group has."""
-    first = group[0].name
-    return first if len(group) == 1 else f"{name} ({first}, ...)"
-
-
 def named_apart(contestants: Sequence[Contestant]) -> list[Contestant]:
     """Put the folder before the names of files that are called alike, but for shipped policies."""
     count = Counter(contestant.name for contestant in contestants)
-    return [
-        replace(contestant, name=f"{folder.name}/{contestant.name}")
-        if count[contestant.name] > 1 and (folder := _folder(contestant))
-        else contestant
-        for contestant in contestants
-    ]
-
-
-def _folder(contestant: Contestant) -> Path | None:
-    """Folder of a policy's file, if that is the user's."""
-    if contestant.source is None or is_shipped(contestant.source):
-        return None
-    return contestant.source.parent
+    named = []
+    for each in contestants:
+        if count[each.name] > 1 and not _is_shipped(each) and (folder := _folder(each)):
+            each = replace(each, name=f"{folder.name}/{each.name}")
+        named.append(each)
+    return named

@@ -19,14 +19,12 @@ LOT = 4096
 
 
 def trial_generator(seed: int, trial: int, stream: int = 0) -> np.random.Generator:
-    """Random generator of one trial, independent of all other trials.
+    """Random generator of one trial, independent of all others.
 
     Parameters
     ----------
-    seed : int
-        Seed of the trial set.
-    trial : int
-        Number of the trial.
+    seed, trial : int
+        Seed of the set, and number of the trial in it.
     stream : int
         0 draws the trial itself; others are for contestants that act at random.
     """
@@ -41,14 +39,10 @@ class TrialSet:
 
     Attributes
     ----------
-    simulator : Simulator
-        What they are faced in.
-    seed : int
-        Seed of the set.
-    starts : ndarray, shape (n, n_joints)
-        Start configurations [rad or m].
-    goals : ndarray, shape (n, 3)
-        Goal positions [m].
+    simulator, seed : Simulator, int
+        What they are faced in, and what they were drawn from.
+    starts, goals : ndarray, shape (n, n_joints) and (n, 3)
+        Start configurations [rad or m] and goal positions [m].
     """
 
     simulator: Simulator
@@ -57,38 +51,17 @@ class TrialSet:
     goals: NDArray[np.float64]
 
     @classmethod
-    def draw(cls, problem: ProblemLike, trials: int, seed: int) -> "TrialSet":
+    def draw(cls, problem: ProblemLike | Simulator, trials: int, seed: int) -> "TrialSet":
         """Draw a set of trials.
 
         Parameters
         ----------
-        problem : ReachProblem, str or Path
-            The problem, its name or its file.
-        trials : int
-            How many.
-        seed : int
-            Seed of the set.
-
-        Raises
-        ------
-        InvalidInputError
-            If there is no trial or the seed is negative.
-        ProblemError
-            If no contact-free start exists.
-        """
-        return cls.draw_in(Simulator(problem), trials, seed)
-
-    @classmethod
-    def draw_in(cls, simulator: Simulator, trials: int, seed: int) -> "TrialSet":
-        """Draw trials of the problem of a simulator, to be faced in it.
-
-        Parameters
-        ----------
-        simulator : Simulator
-            The simulator.
+        problem : ReachProblem, str, Path or Simulator
+            The problem, its name or its file; or a simulator of it, to face them in.
         trials, seed : int
-            As of `draw`.
+            How many, and the seed of the set.
         """
+        simulator = problem if isinstance(problem, Simulator) else Simulator(problem)
         trials, seed = whole_number("trials", trials, 1, MOST_TRIALS), whole_number("seed", seed, 0)
         lots = (range(first, min(first + LOT, trials)) for first in range(0, trials, LOT))
         drawn = [
@@ -134,5 +107,13 @@ class TrialSet:
 
 @cache
 def trial_set(problem: ReachProblem, trials: int, seed: int) -> TrialSet:
-    """Trials of a problem, drawn once in a process; parameters as of `TrialSet.draw`."""
+    """Trials of a problem, drawn once in a process.
+
+    Parameters
+    ----------
+    problem : ReachProblem
+        The problem.
+    trials, seed : int
+        How many, and the seed of the set; see `TrialSet.draw`.
+    """
     return TrialSet.draw(problem, trials, seed)

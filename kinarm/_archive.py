@@ -6,7 +6,6 @@ Results that are only computed to be used again lie in the user's cache folder.
 import hashlib
 import json
 import os
-import tempfile
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -16,14 +15,11 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm._files import check_folder, first_line, read_file, write_atomically
+from kinarm._files import check_folder, first_line, write_atomically
 from kinarm.errors import InvalidInputError, KinarmError, OutputError
 
 KINDS = "biufU"
 """Kinds of what an array may hold: truth values, whole numbers, numbers and texts."""
-
-GROWTH, SMALL = 4, 10**9
-"""A file may claim to hold so many times its size, or so many bytes."""
 
 CACHE_VARIABLE = "KINARM_CACHE"
 """Environment variable that names another cache folder."""
@@ -32,22 +28,14 @@ Arrays = Mapping[str, NDArray[Any]]
 
 
 class Archive(NamedTuple):
-    """Content of a file.
-
-    Attributes
-    ----------
-    header : dict
-        Everything but the arrays, as JSON holds it.
-    arrays : dict of str to ndarray
-        The arrays by name.
-    """
+    """Arrays of a file by name, and everything else, as JSON holds it."""
 
     header: dict[str, Any]
     arrays: dict[str, NDArray[Any]]
 
 
 def save_archive(
-    path: str | Path,
+    file: str | Path | IO[bytes],
     kind: str,
     version: int,
     arrays: Arrays,
@@ -55,50 +43,18 @@ def save_archive(
     *,
     compress: bool = False,
 ) -> None:
-    """Write arrays and a header; an existing file is replaced only when the new one is complete.
+    """Write a ``.npz`` file whose arrays and header are of some kind, in a version of its format.
 
     Parameters
     ----------
-    path : str or Path
+    file : str, Path or binary file
         The file.
-    kind : str
-        What it holds, such as ``"policy"``.
-    version : int
-        Version of the format.
-    arrays : mapping of str to ndarray
-        The arrays by name.
-    header : mapping
-        Everything else, in terms that JSON can hold.
+    kind, version
+        Name of the kind, such as ``"policy"``, and version of the format.
+    arrays, header : mapping
+        Arrays by name, and everything else, in terms that JSON can hold.
     compress : bool
         Whether arrays are compressed.
-
-    Raises
-    ------
-    OutputError
-        If the file cannot be written.
-    """
-    write_atomically(
-        path, lambda file: write_archive(file, kind, version, arrays, header, compress=compress)
-    )
-
-
-def write_archive(
-    file: IO[bytes],
-    kind: str,
-    version: int,
-    arrays: Arrays,
-    header: Mapping[str, Any],
-    *,
-    compress: bool = False,
-) -> None:
-    """Write arrays and a header to an open file.
-
-    Parameters
-    ----------
-    file : binary file
-        The file.
-    kind, version, arrays, header, compress
-        As for `save_archive`.
     """
     content: dict[str, Any] = {
         "format": np.array(f"kinarm-{kind.replace(' ', '-')}"),
@@ -106,7 +62,11 @@ def write_archive(
         "header": np.array(json.dumps(header, sort_keys=True)),
         **arrays,
     }
-    (np.savez_compressed if compress else np.savez)(file, **content)
+    save = np.savez_compressed if compress else np.savez
+    if isinstance(file, str | Path):
+        write_atomically(file, lambda opened: save(opened, **content))
+    else:
+        save(file, **content)
 
 
 def load_archive(
@@ -117,26 +77,16 @@ def load_archive(
     *,
     unless: tuple[str, ...] = (),
 ) -> Archive:
-    """Read what `save_archive` wrote.
+    """Read what `save_archive` wrote, or refuse the file in one line.
 
     Parameters
     ----------
-    path : str or Path
-        The file.
-    kind : str
-        What it has to hold.
-    version : int
-        Version of the format that it has to have.
+    path, kind, version
+        The file, what it has to hold, and the version that it has to have.
     error : type
         Type of the errors.
     unless : tuple of str
         How the names of arrays begin that are left out.
-
-    Raises
-    ------
-    KinarmError
-        Of the given type, in one line: if the file is missing, damaged, holds something else, or
-        was written by a version of kinarm whose format is another.
     """
     name, wanted = repr(str(path)), f"kinarm-{kind.replace(' ', '-')}"
     with reading(name, kind, error), Path(path).open("rb") as file:
@@ -160,16 +110,12 @@ def load_archive(
 
 
 def _arrays(file: IO[bytes], unless: tuple[str, ...]) -> dict[str, NDArray[Any]]:
-    """Arrays of a ``.npz`` file, but for those whose names begin as some."""
     file.seek(0)
     with warnings.catch_warnings(action="ignore"), np.load(file, allow_pickle=False) as content:
-        claimed = sum(member.file_size for member in content.zip.infolist())
-        if claimed > max(GROWTH * os.fstat(file.fileno()).st_size, SMALL):
-            raise ValueError(f"it claims to hold {claimed / 1e6:.0f} MB")
         arrays = {name: content[name] for name in content.files if not name.startswith(unless)}
     for name, array in arrays.items():
         if not isinstance(array, np.ndarray) or array.dtype.kind not in KINDS:
-            raise ValueError(f"{name} holds {getattr(array, 'dtype', 'no array')}")
+            raise ValueError(f"{name} is no array of numbers or texts")
     return arrays
 
 
@@ -178,20 +124,13 @@ def load_json(path: str | Path, kind: str, error: type[KinarmError]) -> Any:
 
     Parameters
     ----------
-    path : str or Path
-        The file.
-    kind : str
-        What it holds, for messages.
+    path, kind
+        The file, and what it holds, for messages.
     error : type
-        Type of the errors.
-
-    Raises
-    ------
-    KinarmError
-        Of the given type, in one line: if the file is missing or no JSON.
+        Type of the errors: that the file is missing, or no JSON.
     """
     with reading(repr(str(path)), kind, error):
-        return json.loads(read_file(path))
+        return json.loads(Path(path).read_bytes())
 
 
 @contextmanager
@@ -202,10 +141,8 @@ def reading(
 
     Parameters
     ----------
-    name : str
-        Name of the file, quoted.
-    kind : str
-        What it holds.
+    name, kind
+        Name of the file, quoted, and what it holds.
     error : type
         Type of the errors; those that have it already pass as they are.
     of : str
@@ -223,13 +160,8 @@ def reading(
 
 def cache_folder() -> Path:
     """Folder of the cache: ``$KINARM_CACHE``, or ``kinarm`` in the user's cache folder."""
-    chosen, users = os.environ.get(CACHE_VARIABLE), os.environ.get("XDG_CACHE_HOME")
-    if chosen:
-        return Path(chosen)
-    try:
-        return (Path(users) if users else Path.home() / ".cache") / "kinarm"
-    except RuntimeError:  # a user without a home
-        return Path(tempfile.gettempdir()) / "kinarm"
+    users = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(os.environ.get(CACHE_VARIABLE) or Path(users) / "kinarm")
 
 
 def cached_arrays(
@@ -241,10 +173,8 @@ def cached_arrays(
 
     Parameters
     ----------
-    kind : str
-        What they are, one word.
-    version : int
-        To be raised when the same content makes other arrays.
+    kind, version
+        What they are, one word; the version is raised when the same content makes other arrays.
     made_of : bytes
         Everything that they depend on.
     make : callable

@@ -6,14 +6,16 @@ import shlex
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
-from typing import Any, NamedTuple, NoReturn, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 from kinarm._interrupts import EXIT_STATUS, begin, end, was_interrupted
-from kinarm._options import add_options, request_of
+from kinarm._options import add_options, given_options
 from kinarm._parser import CommandParser, Parser
 from kinarm.errors import KinarmError, one_line
 
 Request = TypeVar("Request")
+Commands = Mapping[str, tuple[type, Callable[[Any], None]]]
+"""By name, the request of each command, and what runs it and prints what it came to."""
 
 
 def run_command(prog: str, command: Callable[[], None]) -> NoReturn:
@@ -22,7 +24,9 @@ def run_command(prog: str, command: Callable[[], None]) -> NoReturn:
     Status 0 is success, 1 a failure of the machine, 2 bad input, 130 an interruption; all but
     success come with one line on standard error. A reader that closes the pipe is no failure.
     """
-    _prepare_streams()
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # letters that an encoding lacks
     begin()
     try:
         status = _run(command)
@@ -31,16 +35,6 @@ def run_command(prog: str, command: Callable[[], None]) -> NoReturn:
         end()
         status = _status_of(prog, error)
     sys.exit(status)
-
-
-def _prepare_streams() -> None:
-    """Make printing safe: on closed streams, and for letters that an encoding lacks."""
-    for name in ("stdout", "stderr"):
-        stream = getattr(sys, name)
-        if stream is None:  # closed before this process began
-            setattr(sys, name, open(os.devnull, "w"))  # noqa: PTH123, SIM115
-        elif isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
 
 
 def _run(command: Callable[[], None]) -> int:
@@ -74,7 +68,6 @@ def _status_of(prog: str, error: BaseException) -> int:
 
 
 def _discard_output() -> None:
-    """Discard the buffer of standard output, so that exiting is quiet."""
     with suppress(io.UnsupportedOperation):  # a stream of this process alone
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
@@ -97,10 +90,8 @@ def run_request(
 
     Parameters
     ----------
-    prog : str
-        Name of the command; what it does is the first line of the request's docstring.
-    kind : type
-        The request, a dataclass.
+    prog, kind
+        Name of the command, and its request, a dataclass whose first line says what it does.
     report : callable
         Runs a request and prints what it came to; its second argument is the command as typed.
     arguments : sequence of str, optional
@@ -109,31 +100,18 @@ def run_request(
         What help ends with, and fields that are no options.
     """
     typed = sys.argv[1:] if arguments is None else arguments
-    parser = Parser(prog=prog, description=(kind.__doc__ or "").partition("\n")[0], epilog=epilog)
+    parser = Parser(prog=prog, description=_first_line(kind), epilog=epilog)
     add_options(parser, kind, skip=skip)
     command = " ".join([prog, *map(shlex.quote, typed)])
-    run_command(prog, lambda: report(request_of(parser.parse_args(typed), kind), command))
-
-
-class Command(NamedTuple):
-    """One of several commands of a program.
-
-    Attributes
-    ----------
-    kind : type
-        Its request, a dataclass; the first line of its docstring says what it does.
-    report : callable
-        Runs a request and prints what it came to.
-    """
-
-    kind: type
-    report: Callable[[Any], None]
+    run_command(
+        prog, lambda: report(kind(**given_options(parser.parse_args(typed), kind)), command)
+    )
 
 
 def run_commands(
     prog: str,
     description: str,
-    commands: Mapping[str, Command],
+    commands: Commands,
     arguments: Sequence[str] | None,
     *,
     epilog: str = "",
@@ -142,16 +120,10 @@ def run_commands(
 
     Parameters
     ----------
-    prog : str
-        Name of the program.
-    description : str
-        What it is for.
+    prog, description, arguments, epilog
+        As for `run_request`; the description says what the program is for.
     commands : mapping
-        The commands by name.
-    arguments : sequence of str, optional
-        What is typed after the name; by default that of this process.
-    epilog : str
-        What help ends with.
+        See `Commands`.
     """
     parser = Parser(prog=prog, description=description, epilog=epilog)
     parsers = parser.add_subparsers(
@@ -161,13 +133,17 @@ def run_commands(
         metavar="COMMAND",
         parser_class=CommandParser,
     )
-    for name, command in commands.items():
-        said = (command.kind.__doc__ or "").partition("\n")[0]
-        add_options(parsers.add_parser(name, help=said, description=said), command.kind)
+    for name, (kind, _) in commands.items():
+        said = _first_line(kind)
+        add_options(parsers.add_parser(name, help=said, description=said), kind)
 
     def run() -> None:
         options = parser.parse_args(arguments)
-        command = commands[options.command]
-        command.report(request_of(options, command.kind))
+        kind, report = commands[options.command]
+        report(kind(**given_options(options, kind)))
 
     run_command(prog, run)
+
+
+def _first_line(kind: type) -> str:
+    return (kind.__doc__ or "").partition("\n")[0]

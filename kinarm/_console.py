@@ -12,7 +12,6 @@ from typing import IO, TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.progress import Task
     from rich.table import Table
 
 UNBOUNDED = 1000
@@ -25,7 +24,7 @@ LINE_SECONDS = 30.0
 """How often a line of progress is printed where there is no terminal."""
 
 _listeners: list[Callable[[str], object]] = []
-_activities: list[str] = []
+_activities = [""]
 
 
 @contextmanager
@@ -41,24 +40,21 @@ def told_of_activities(listener: Callable[[str], object]) -> Iterator[None]:
 @contextmanager
 def doing(activity: str) -> Iterator[None]:
     """Tell all listeners of what takes long; the same activity within it belongs to it."""
-    before = _latest()
+    if activity == _activities[-1]:
+        yield
+        return
     _activities.append(activity)
-    _tell(before)
+    _tell()
     try:
         yield
     finally:
         _activities.remove(activity)
-        _tell(activity)
+        _tell()
 
 
-def _latest() -> str:
-    return _activities[-1] if _activities else ""
-
-
-def _tell(before: str) -> None:
-    if (now := _latest()) != before:
-        for listener in _listeners:
-            listener(now)
+def _tell() -> None:
+    for listener in _listeners:
+        listener(_activities[-1])
 
 
 def open_console(*, stderr: bool = False, file: IO[str] | None = None) -> "Console":
@@ -66,16 +62,6 @@ def open_console(*, stderr: bool = False, file: IO[str] | None = None) -> "Conso
 
     It is as wide as the terminal. Standard output that is no terminal, and a file, are unbounded;
     the environment variable ``COLUMNS`` sets another width of standard output.
-
-    In a notebook without ipywidgets, where rich cannot redraw and warns of it, a bar is a line
-    that is printed at the end.
-
-    Parameters
-    ----------
-    stderr : bool
-        Whether it is standard error.
-    file : text stream, optional
-        Where else to print to.
     """
     from rich.console import Console
 
@@ -87,7 +73,7 @@ def open_console(*, stderr: bool = False, file: IO[str] | None = None) -> "Conso
         markup=False,
         emoji=False,
         highlight=False,
-        force_jupyter=None if find_spec("ipywidgets") else False,
+        force_jupyter=None if find_spec("ipywidgets") else False,  # it cannot redraw without
     )
 
 
@@ -101,14 +87,12 @@ def print_fitting(
 
     Parameters
     ----------
-    console : rich.console.Console
-        Where to print it.
+    console, advice
+        Where to print it, and how to see all columns.
     table_without : callable
         The table without some columns, given their headings.
     expendable : sequence of str
         Headings of columns that can be left out, in that order.
-    advice : str
-        How to see them all.
     """
     unbounded = console.options.update(width=UNBOUNDED)
     for count in range(len(expendable) + 1):
@@ -129,10 +113,8 @@ def print_table(
 
     Parameters
     ----------
-    headings : sequence of str
-        Headings of the columns.
-    rows : sequence of sequence of str
-        A text for each column.
+    headings, rows
+        A text for each column, and those of each row.
     expendable : sequence of str
         Headings of columns that are left out, in that order, where the terminal is too narrow.
     """
@@ -174,12 +156,10 @@ class ProgressLine:
 
     Parameters
     ----------
-    title : str
-        What is under way.
+    title, unit : str
+        What is under way, and what is counted, for the lines where there is no terminal.
     total : float
         How much there is to do.
-    unit : str
-        What is counted, for the lines where there is no terminal.
     console : rich.console.Console, optional
         Where to show it; standard error by default.
     """
@@ -188,24 +168,17 @@ class ProgressLine:
         self, title: str, total: float, unit: str, console: "Console | None" = None
     ) -> None:
         from rich.progress import BarColumn, Progress, TextColumn
-        from rich.text import Text
 
-        class Words(TextColumn):
-            """All but the bar; what has no room is cut off."""
-
-            def render(self, task: "Task") -> Text:
-                return Text(_line_of(task, " "), no_wrap=True, overflow="ellipsis")
-
-        self._unit, self._printed = unit, time.monotonic()
+        self._title, self._unit, self._printed = title, unit, time.monotonic()
         self._console = console or open_console(stderr=True)
         self._progress = Progress(
             BarColumn(10),
-            Words(""),
+            TextColumn("{task.fields[text]}", markup=False),
             console=self._console,
             disable=not self._console.is_terminal,
             speed_estimate_period=math.inf,
         )
-        self._task = self._progress.add_task(title, total=total, words=(), count="", unit="")
+        self._task = self._progress.add_task(title, total=total, text="")
 
     def __enter__(self) -> "ProgressLine":
         self._progress.start()
@@ -215,7 +188,7 @@ class ProgressLine:
         if not self._progress.disable:  # before Rich 15, stopping would print an empty line
             self._progress.stop()
 
-    def update(self, done: float | None = None, words: Sequence[str] = (), count: str = "") -> None:
+    def update(self, done: float | None = None, words: Sequence[str] = ()) -> None:
         """Show how far it is.
 
         Parameters
@@ -223,21 +196,17 @@ class ProgressLine:
         done : float, optional
             How much is done; as before if it is left out.
         words : sequence of str
-            Texts at the end of the line.
-        count : str
-            How much that is; in numbers of what is done and of all if it is left out.
+            Texts at the end of the line, those first that matter most.
         """
-        self._progress.update(self._task, completed=done, words=tuple(words), count=count)
-        if self._progress.disable and time.monotonic() - self._printed > LINE_SECONDS:
+        self._progress.update(self._task, completed=done)
+        task = self._progress.tasks[0]
+        count = f"{int(task.completed)}/{task.total:.0f}"
+        seconds = task.time_remaining
+        left = "-:--:--" if seconds is None else timedelta(seconds=math.ceil(seconds))
+        if not self._progress.disable:
+            text = " ".join([f"{self._title}: {count}", f"{left} left", *words])
+            self._progress.update(self._task, text=text)
+        elif time.monotonic() - self._printed > LINE_SECONDS:
             self._printed = time.monotonic()
-            self._console.print(_line_of(self._progress.tasks[0], ", ", f" {self._unit}"))
-
-
-def _line_of(task: "Task", separator: str, unit: str = "") -> str:
-    """The texts of a line of progress, those first that matter most."""
-    count = task.fields["count"] or f"{task.completed:.0f}/{task.total:.0f}"
-    seconds = task.time_remaining
-    left = "-:--:--" if seconds is None else timedelta(seconds=math.ceil(seconds))
-    return separator.join(
-        [f"{task.description}: {count}{unit}", f"{left} left", *task.fields["words"]]
-    )
+            line = ", ".join([f"{self._title}: {count} {self._unit}", f"{left} left", *words])
+            self._console.print(line)

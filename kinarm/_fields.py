@@ -8,7 +8,6 @@ import re
 import tomllib
 import types
 from collections.abc import Callable, Collection, Mapping
-from contextlib import suppress
 from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import cache
 from pathlib import Path
@@ -16,7 +15,7 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 
 import numpy as np
 
-from kinarm._files import first_line, read_file
+from kinarm._files import first_line
 from kinarm.errors import InvalidInputError, KinarmError
 
 T = TypeVar("T")
@@ -26,11 +25,7 @@ UNIT = re.compile(r"\[([^\]]+)\]$")
 field_types: Callable[[type], dict[str, Any]] = cache(get_type_hints)
 """Types of the fields of a dataclass, by name."""
 
-LARGEST = 10**6
-"""Size of a TOML file at most [bytes]: people write them."""
-
 SCALARS = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
-
 
 OPTIONAL: Mapping[str, Any] = {"optional": True}
 """Metadata of a field that files and hashes hold only where it is not at its default."""
@@ -54,26 +49,15 @@ def to_plain(value: Any) -> Any:
 
 
 def _omitted(item: Field[Any], entry: Any) -> bool:
-    """Whether plain values leave a field out."""
-    return entry is None or ("optional" in item.metadata and bool(entry == default_of(item)))
-
-
-def default_of(item: Field[Any]) -> Any:
-    """Value of a field that is not given."""
     make = item.default_factory
-    return item.default if make is MISSING else make()
+    default = item.default if make is MISSING else make()
+    return entry is None or ("optional" in item.metadata and bool(entry == default))
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
-    """Read a TOML file.
-
-    Raises
-    ------
-    InvalidInputError
-        If the file, called ``what``, cannot be read or is no TOML; says where.
-    """
+    """Read a TOML file, which messages call ``what``."""
     try:
-        return tomllib.loads(read_file(path, LARGEST).decode())
+        return tomllib.loads(path.read_bytes().decode())
     except OSError as error:
         raise InvalidInputError(f"cannot read {what} {str(path)!r}: {error.strerror}") from error
     except (ValueError, RecursionError) as error:
@@ -87,19 +71,10 @@ def take_base(entries: dict[str, Any], where: str, bases: Collection[str], defau
 
     Parameters
     ----------
-    entries : dict
-        Entries of the file.
-    where : str
-        Name of the file.
-    bases : collection of str
-        Values that the entry may have.
-    default : str
-        One of them.
-
-    Raises
-    ------
-    InvalidInputError
-        If it is none of the bases.
+    entries, where
+        Entries of the file, and its name.
+    bases, default
+        Values that the entry may have, and one of them.
     """
     base = entries.pop("base", default)
     if not isinstance(base, str) or base not in bases:
@@ -110,22 +85,15 @@ def take_base(entries: dict[str, Any], where: str, bases: Collection[str], defau
 def from_plain(kind: type[T], entries: object, where: str, path: str = "") -> T:
     """Build a dataclass from plain values by the names of its fields.
 
+    What is unknown, missing, of the wrong type or refused by the dataclass is an
+    `InvalidInputError`, in one line that names source, key and what is expected.
+
     Parameters
     ----------
-    kind : type
-        The dataclass.
-    entries : mapping
-        Plain values.
-    where : str
-        Name of their source.
-    path : str
-        Names of the tables around them, such as ``"scene."``.
-
-    Raises
-    ------
-    InvalidInputError
-        If a key is unknown or missing, or a value has the wrong type or is refused by the
-        dataclass; in one line that names source, key and what is expected.
+    kind, entries
+        The dataclass, and plain values.
+    where, path : str
+        Name of their source, and those of the tables around them, such as ``"scene."``.
     """
     if not isinstance(entries, Mapping):
         table = path.removesuffix(".") or "it"
@@ -155,11 +123,6 @@ def check_fields(given: Any) -> None:
 
     To be called first in ``__post_init__``: lists and arrays become tuples, and numbers become
     Python's, whole where whole ones are asked for.
-
-    Raises
-    ------
-    InvalidInputError
-        If a value has the wrong type; names the field and what is expected.
     """
     kind = type(given)
     hints = field_types(kind)
@@ -200,14 +163,13 @@ def _value(hint: Any, entry: Any, where: str, path: str, kind: type) -> Any:
     elif origin is Literal:
         if entry in arguments:
             return entry
-    elif is_scalar(hint, entry):
-        with suppress(OverflowError):
-            return float(entry) + 0.0 if hint is float else hint(entry)  # without negative zeros
+    elif _is_scalar(hint, entry):
+        return float(entry) + 0.0 if hint is float else hint(entry)  # without negative zeros
     wanted = f"{path} must be {expected(hint)}{_unit(kind, path)}, got {entry!r}"
     raise InvalidInputError(f"{where}: {wanted}" if where else wanted)
 
 
-def is_scalar(hint: Any, entry: object) -> bool:
+def _is_scalar(hint: Any, entry: object) -> bool:
     """Whether a plain value is one of a type: a whole number is a number, a truth value is none."""
     if hint in (str, Path):
         return isinstance(entry, str | Path)

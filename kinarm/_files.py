@@ -1,4 +1,4 @@
-"""Writing files so that a reader never sees half of one, and reading those that end.
+"""Writing files so that a reader never sees half of one, and what can be said of paths.
 
 Each function that writes raises `OutputError`, in one line, where it cannot.
 """
@@ -6,17 +6,16 @@ Each function that writes raises `OutputError`, in one line, where it cannot.
 import fcntl
 import io
 import os
-import stat
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import cache
+from importlib import resources
 from pathlib import Path
+from types import MappingProxyType
 from typing import IO
 
-from kinarm.errors import OutputError
-
-ENDLESS = 10**7
-"""Bytes that are read at most of a pipe or a device."""
+from kinarm.errors import OutputError, UnknownNameError
 
 is_file, is_folder = os.path.isfile, os.path.isdir
 """Whether there is such a file or folder; not, if none can have this name."""
@@ -65,13 +64,7 @@ def write_text(path: str | Path, text: str) -> None:
 
 @contextmanager
 def only_writer(path: str | Path) -> Iterator[None]:
-    """Keep other processes from making the same output, a file or a folder, meanwhile.
-
-    Raises
-    ------
-    OutputError
-        If another process is making it.
-    """
+    """Keep other processes from making the same output, a file or a folder, meanwhile."""
     lock = _lock_of(path)
     with _reported(path):
         try:
@@ -120,32 +113,35 @@ def _locked(path: Path, *, wait: bool = False) -> IO[bytes]:
         file.close()
 
 
-def read_file(path: str | Path, most: int = 0) -> bytes:
-    """Read a file of at most so many bytes; of any size if it is a regular one and 0 is given.
+@cache
+def shipped_files(folder: str, suffix: str = ".toml") -> Mapping[str, Path]:
+    """Files of a folder of kinarm's data, such as ``"scenes"``, by name."""
+    with resources.as_file(resources.files("kinarm.data") / folder) as path:
+        return MappingProxyType({file.stem: file for file in sorted(path.glob(f"*{suffix}"))})
 
-    Raises
-    ------
-    OSError
-        If it cannot be read.
-    ValueError
-        If it is larger, as what never ends is.
+
+def named_file(what: str, name: str | Path, others: Iterable[str] = ()) -> Path:
+    """The file of what ships with kinarm, or a path that looks like one.
+
+    Parameters
+    ----------
+    what, name
+        What it holds, such as ``"scene"``, and its name or path.
+    others : iterable of str
+        Further names that exist, for the message of UnknownNameError.
     """
-    with Path(path).open("rb") as file:
-        status = os.fstat(file.fileno())
-        size = status.st_size if stat.S_ISREG(status.st_mode) else ENDLESS
-        limit = min(size, most or size)
-        content = file.read(limit + 1)
-    if len(content) > limit:
-        raise ValueError(f"it is larger than {limit / 1e6:.0f} MB")
-    return content
+    shipped, path = shipped_files(f"{what}s"), Path(name)
+    if str(name) in shipped:
+        return shipped[str(name)]
+    if path.suffix == ".toml" or is_file(path) or path.parent != Path():
+        return path
+    available = dict.fromkeys((*others, *shipped, f"path/to/{what}.toml"))
+    raise UnknownNameError(what, str(name), available)
 
 
 def absolute(path: str | Path) -> Path:
-    """The absolute path without links; as it stands if no file can have this name."""
-    try:
-        return Path(os.path.realpath(path))
-    except (OSError, ValueError):
-        return Path(path)
+    """The absolute path without links."""
+    return Path(os.path.realpath(path))
 
 
 def first_line(error: BaseException) -> str:
@@ -158,10 +154,8 @@ def check_output(path: str | Path, *, overwrite: bool = False, suffix: str = "")
 
     Parameters
     ----------
-    path : str or Path
-        The file.
-    overwrite : bool
-        Whether it may exist.
+    path, overwrite
+        The file, and whether it may exist.
     suffix : str
         What its name has to end in.
     """

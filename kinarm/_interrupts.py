@@ -1,10 +1,9 @@
 """Requests to end: Ctrl-C and its like end a command in order, in one line and with one status.
 
 While a command starts, which it does from its first line on, that of this module, there is nothing
-to lose, and it ends at once. While it runs, an `Interruption` is raised; some libraries drop it or
-make another error of it, so it is raised again after a while, and `was_interrupted` knows of it in
-any case. Once the command ends, requests are ignored. Processes that only import kinarm keep their
-own ways.
+to lose, and it ends at once. While it runs, an `Interruption` is raised; some libraries make
+another error of it, and `was_interrupted` knows of it in any case. Once the command ends, requests
+are ignored. Processes that only import kinarm keep their own ways.
 """
 
 from __future__ import annotations
@@ -18,17 +17,13 @@ from contextlib import contextmanager
 TYPE_CHECKING = False  # `typing` takes longer to load than all the rest
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-    from types import FrameType
-    from typing import Any
 
 REQUESTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 EXIT_STATUS = 130
 
 GOES_ON = "interrupted; what is finished is kept, and the same command goes on"
 
-AGAIN = 0.5
-"""After so long, an interruption that got lost is raised again [s]."""
-
+_phase = "starting"
 _requested = False
 
 
@@ -49,56 +44,29 @@ def is_command() -> bool:
     return name.partition("-")[0] == "kinarm" and program in sys.orig_argv
 
 
-def _answer_by(handler: Callable[[int, FrameType | None], object] | signal.Handlers) -> None:
-    """Answer requests, and the reminder that there was one, but for those that are ignored."""
-    for request in (*REQUESTS, signal.SIGALRM):
-        if signal.getsignal(request) is not signal.SIG_IGN:
-            signal.signal(request, handler)
-
-
-def _end_at_once(_: int, __: FrameType | None) -> None:
-    os._exit(EXIT_STATUS)
-
-
-def _interrupt(_: int, __: FrameType | None) -> None:
-    """Raise an interruption, and again after a while if it got lost."""
+def _answer(*_: object) -> None:
+    """Answer a request, by the phase in which the command is."""
     global _requested
-    if _on_its_way():
-        return
-    _requested = True
-    signal.setitimer(signal.ITIMER_REAL, AGAIN, AGAIN)
-    raise Interruption
-
-
-def _on_its_way() -> bool:
-    """Whether an interruption, or what was made of it, is being handled."""
+    if _phase == "starting":
+        os._exit(EXIT_STATUS)
     error = sys.exc_info()[1]
     while error is not None and not isinstance(error, Interruption):
         error = error.__context__
-    return error is not None
-
-
-def _unless_requested(report: Callable[..., object]) -> Callable[..., None]:
-    """Report errors that have no way to go, but for those that follow from a request to end."""
-
-    def told(*failure: Any) -> None:
-        if not _requested:
-            report(*failure)
-
-    return told
+    if _phase == "running" and error is None:  # else one, or what was made of it, is on its way
+        _requested = True
+        raise Interruption
 
 
 def begin() -> None:
     """From now on there is something to lose: requests are raised."""
-    if _COMMAND:
-        _answer_by(_interrupt)
+    global _phase
+    _phase = "running"
 
 
 def end() -> None:
     """From now on the process ends, and requests are ignored."""
-    if _COMMAND:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        _answer_by(signal.SIG_IGN)
+    global _phase
+    _phase = "ending"
 
 
 def was_interrupted(error: BaseException) -> bool:
@@ -127,8 +95,7 @@ def kept_from_children() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-_COMMAND = is_command()
-if _COMMAND:  # pragma: no cover - tests are no command; test_interrupts starts some
-    _answer_by(_end_at_once)
-    sys.unraisablehook = _unless_requested(sys.unraisablehook)
-    sys.excepthook = _unless_requested(sys.excepthook)
+if is_command():  # pragma: no cover - tests are no command; test_interrupts starts some
+    for _request in REQUESTS:
+        if signal.getsignal(_request) is not signal.SIG_IGN:
+            signal.signal(_request, _answer)

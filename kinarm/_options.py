@@ -6,14 +6,11 @@ import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import MISSING, Field, is_dataclass
 from pathlib import Path
-from typing import Any, Literal, TypeVar, get_args, get_origin
+from typing import Any, Literal, get_args, get_origin
 
 from kinarm._fields import alternatives, expected, field_types, init_fields, summary_of
 from kinarm._parser import group_of_options
-from kinarm.errors import InvalidInputError, KinarmError
-
-Request = TypeVar("Request")
-
+from kinarm.errors import KinarmError
 
 METAVARS = {int: "N", float: "X", Path: "FILE"}
 
@@ -35,21 +32,18 @@ def add_options(
 
     A field's metadata may hold ``flag`` (another name of the option, or one without dashes for a
     positional argument), ``metavar``, ``repeat`` (a tuple is collected from repetitions of the
-    option), ``several`` (and each takes one or more), ``parse`` (makes the value of the text),
+    option of one value each, else of several), ``parse`` (makes the value of the text),
     ``names`` (a function that lists the names that an option takes, for help and completion) and
     ``completes`` (the same, for completion alone).
 
     Parameters
     ----------
-    parser : argparse.ArgumentParser
-        Where to add them.
-    kind : type
-        The dataclass.
+    parser, kind
+        Where to add them, and the dataclass.
     skip : collection of str
         Fields that get no option.
     explicit : bool
-        Whether every default is said, none and no, too, and there is an option ``--no-x`` also for
-        what is false by default.
+        Whether every default is said, and what is false by default has an option ``--no-x``.
     names : mapping, optional
         Names that options take, by field, where the metadata do not list them.
     """
@@ -104,46 +98,42 @@ def _value_options(item: Field[Any], hint: Any, flag: str) -> dict[str, Any]:
     """How argparse takes the value of an option."""
     options: dict[str, Any] = {}
     if "parse" in item.metadata:
-        return {"type": _checked(item.metadata["parse"]), "metavar": item.metadata["metavar"]}
+        make = _argument_type(item.metadata["parse"], hint)
+        return {"type": make, "metavar": item.metadata["metavar"]}
     if get_origin(hint) is tuple:
         hint, *others = get_args(hint)
-        count = "+" if Ellipsis in others else 1 + len(others)
-        if item.metadata.get("several"):
+        if item.metadata.get("repeat"):
+            options = {"action": "append"}
+        elif Ellipsis in others:
             options = {"action": "extend", "nargs": "+"}
         else:
-            options = {"action": "append"} if item.metadata.get("repeat") else {"nargs": count}
+            options = {"nargs": 1 + len(others)}
     if get_origin(hint) is Literal:
         options["choices"] = get_args(hint)
     else:
         usual = METAVARS.get(hint, "NAME") if flag.startswith("--") else flag
         options["metavar"] = item.metadata.get("metavar", usual)
-    return {**options, "type": _checked(lambda text: _value(hint, text))}
+    return {**options, "type": _argument_type(hint if hint in METAVARS else str, hint)}
 
 
-def _checked(parse: Callable[[str], Any]) -> Callable[[str], Any]:
-    """Argument type: a value of a text, which may be refused."""
+def _argument_type(make: Callable[[str], Any], hint: Any) -> Callable[[str], Any]:
+    """Makes the value of a text, which may be refused."""
 
     def parsed(text: str) -> Any:
         if text is argparse.SUPPRESS:  # a positional argument that is not given
             return text
         try:
-            return parse(text)
+            value = make(text)
         except KinarmError as error:
             raise argparse.ArgumentTypeError(str(error)) from error
+        except ValueError:
+            value = math.nan
+        if isinstance(value, float) and not math.isfinite(value):
+            wanted = "a finite number" if hint is float else expected(hint)
+            raise argparse.ArgumentTypeError(f"must be {wanted}, got {text!r}")
+        return value
 
     return parsed
-
-
-def _value(hint: Any, text: str) -> Any:
-    """The value of a text, which has to be of a type."""
-    try:
-        value = hint(text) if hint in (int, float, Path) else text
-    except ValueError:
-        value = math.nan
-    if isinstance(value, float) and not math.isfinite(value):
-        wanted = "a finite number" if hint is float else expected(hint)
-        raise InvalidInputError(f"must be {wanted}, got {text!r}")
-    return value
 
 
 def _completes(item: Field[Any], hint: Any, known: Sequence[str]) -> Any:
@@ -200,8 +190,3 @@ def given_options(options: argparse.Namespace, kind: type) -> dict[str, Any]:
         else:
             given[name] = tuple(value) if isinstance(value, list) else value
     return given
-
-
-def request_of(options: argparse.Namespace, kind: type[Request]) -> Request:
-    """Build the dataclass of what the command line gives; the rest has its defaults."""
-    return kind(**given_options(options, kind))

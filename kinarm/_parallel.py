@@ -30,10 +30,8 @@ def run_rows(
 
     Parameters
     ----------
-    kernel : callable
-        Works on the rows of a range.
-    n : int
-        Number of rows.
+    kernel, n
+        Works on the rows of a range, of so many rows.
     work : int
         Estimated work [episode steps]; little is done by the calling thread.
     threads : int
@@ -45,7 +43,7 @@ def run_rows(
         return kernel(0, n, *arrays) or 0
     ranges_each = 1 if work < BALANCED_STEPS else 4
     size = -(-n // (ranges_each * threads))
-    pool = _thread_pool(os.getpid(), threads)
+    pool = thread_pool(os.getpid(), threads)
     ranges = [
         pool.submit(kernel, first, min(first + size, n), *arrays) for first in range(0, n, size)
     ]
@@ -53,9 +51,9 @@ def run_rows(
 
 
 def run_together(
-    kernel: Callable[..., int], work: int, threads: int, given: Callable[[int], Any]
+    kernel: Callable[..., int], work: int, threads: int, given: Callable[[int], Any], *arrays: Any
 ) -> int:
-    """Call ``kernel(counters, given(thread))`` on several threads; add up what it returns.
+    """Call ``kernel(counters, given(thread), *arrays)`` on several threads; add up what it returns.
 
     The kernels share out the rows among them by a counter, zero at first, so that none is left
     with more than the others. The calling thread is one of them, that of number 0. A thread that
@@ -65,23 +63,25 @@ def run_together(
     ----------
     kernel : callable
         Works on rows as long as there are any.
-    work : int
-        Estimated work [episode steps]; little is done by the calling thread alone.
-    threads : int
-        Threads at most.
+    work, threads
+        As for `run_rows`.
     given : callable
         Second argument of the kernel, by the number of the thread.
+    *arrays
+        Passed on to the kernel.
     """
     counters = np.zeros(1, dtype=np.int64)
     if threads == 1 or work < SHARED_STEPS:
-        return kernel(counters, given(0))
-    pool = _thread_pool(os.getpid(), threads)
-    helpers = [pool.submit(kernel, counters, given(thread)) for thread in range(1, threads)]
-    total = kernel(counters, given(0))
+        return kernel(counters, given(0), *arrays)
+    pool = thread_pool(os.getpid(), threads)
+    helpers = [
+        pool.submit(kernel, counters, given(thread), *arrays) for thread in range(1, threads)
+    ]
+    total = kernel(counters, given(0), *arrays)
     return total + sum(helper.result() for helper in helpers if not helper.cancel())
 
 
 @cache
-def _thread_pool(process: int, threads: int) -> ThreadPoolExecutor:
+def thread_pool(process: int, threads: int) -> ThreadPoolExecutor:
     """A pool per process, since threads do not survive a fork."""
     return ThreadPoolExecutor(threads, thread_name_prefix=f"kinarm-{process}")

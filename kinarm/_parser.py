@@ -18,9 +18,6 @@ EXAMPLE = re.compile(r"(?m)^  (\S.*?) {2,}(\S.*)$")
 
 SHELLS = ("bash", "zsh", "fish")
 
-DETAILS = re.compile(r" \(default: |\. Names: |[;:] ")
-"""Where the help of an option goes into details, which completion leaves out."""
-
 FUNCTIONS: dict[str, Callable[[Iterable[str], str], str]] = {
     "bash": lambda names, call: (
         f"{call}() {{ compgen -W {shlex.quote(' '.join(names))} -- $1; _shtab_compgen_files $1; }}"
@@ -35,13 +32,7 @@ FUNCTIONS: dict[str, Callable[[Iterable[str], str], str]] = {
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser that reports bad usage in one line and exits with status 2.
-
-    Attributes
-    ----------
-    completable : bool
-        Whether it prints the completion of a shell.
-    """
+    """An argument parser that reports bad usage in one line and exits with status 2."""
 
     completable: ClassVar[bool] = True
 
@@ -59,6 +50,7 @@ class Parser(argparse.ArgumentParser):
             self.add_argument(
                 "--print-completion",
                 action=_PrintCompletion,
+                default=argparse.SUPPRESS,
                 choices=SHELLS,
                 help="Print the completion script of a shell and exit",
             )
@@ -139,11 +131,6 @@ class HelpFormatter(argparse.HelpFormatter):
 
 
 class _PrintCompletion(argparse.Action):
-    """Print the script with which a shell completes a command, and exit."""
-
-    def __init__(self, **options: Any) -> None:
-        super().__init__(**{**options, "default": argparse.SUPPRESS})
-
     def __call__(self, parser: argparse.ArgumentParser, *given: Any) -> None:
         _, shell, *_ = given
         sys.stdout.write(completion_script(parser, shell))
@@ -151,16 +138,12 @@ class _PrintCompletion(argparse.Action):
 
 
 def completion_script(parser: argparse.ArgumentParser, shell: str) -> str:
-    """The script with which a shell completes the options of a parser.
-
-    Options that take files have ``file`` or ``folder`` as their ``completes``; those that take
-    names, too, have a function that lists these.
-    """
+    """The script with which a shell completes options that `kinarm._options` added to a parser."""
     import shtab
 
     for action in _actions(parser):
         if action.help:
-            action.help = textwrap.shorten(DETAILS.split(action.help)[0], 60, placeholder=" ...")
+            action.help = action.help.partition(" (default: ")[0]
         completes = getattr(action, "completes", None)
         if completes in ("file", "folder"):
             action.complete = shtab.FILE if completes == "file" else shtab.DIRECTORY  # type: ignore[attr-defined]

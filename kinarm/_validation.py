@@ -1,4 +1,4 @@
-"""Checks of arguments that come from users."""
+"""Checks of arguments that come from users: what is wrong is an `InvalidInputError`."""
 
 from __future__ import annotations
 
@@ -14,27 +14,23 @@ MOST_TRIALS = 10_000_000
 
 
 def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
-    """Copy an argument into a contiguous float64 array.
+    """Copy an argument into a contiguous float64 array, or refuse it.
 
     Parameters
     ----------
-    name : str
-        Name of the argument, for messages.
-    value : array_like
-        The argument.
+    name, value
+        Name of the argument, for messages, and the argument.
     shape : tuple
         Shape that it has to have, in which None stands for any length.
-
-    Raises
-    ------
-    InvalidInputError
-        If it is not numeric, has another shape, or holds an entry that is not finite.
     """
     try:
         array = np.array(value, dtype=np.float64, order="C")
     except (TypeError, ValueError, OverflowError) as error:
         raise InvalidInputError(f"{name} must be numbers: {error}") from error
-    if array.shape != shape and not _matches(array.shape, shape):
+    if array.shape != shape and (
+        array.ndim != len(shape)
+        or any(want not in (None, has) for want, has in zip(shape, array.shape, strict=True))
+    ):
         wanted = ", ".join("n" if length is None else str(length) for length in shape)
         raise InvalidInputError(f"{name} must have shape ({wanted}), got {array.shape}")
     if not np.isfinite(array).all():
@@ -50,17 +46,8 @@ def one_or_many(
 
     Parameters
     ----------
-    name : str
-        Name of the argument, for messages.
-    value : array_like, shape ``shape`` or (n, *shape)
-        The argument.
-    shape : tuple of int
-        Shape of an item.
-
-    Raises
-    ------
-    InvalidInputError
-        As `finite_array` does.
+    name, value, shape
+        As for `finite_array`; the shape is that of an item.
     """
     try:
         one = np.ndim(value) == len(shape)
@@ -71,29 +58,15 @@ def one_or_many(
     return finite_array(name, value, (None, *shape)), False
 
 
-def _matches(actual: tuple[int, ...], expected: tuple[int | None, ...]) -> bool:
-    """Whether a shape is the expected one, in which None stands for any length."""
-    return len(actual) == len(expected) and all(
-        wanted in (None, length) for length, wanted in zip(actual, expected, strict=True)
-    )
-
-
 def whole_number(name: str, value: object, at_least: int, at_most: float = math.inf) -> int:
-    """Return a whole number that is in range.
+    """Return a whole number that is in range, or refuse it.
 
     Parameters
     ----------
-    name : str
-        Name of the argument, for messages.
-    value : int
-        The argument.
+    name, value
+        Name of the argument, for messages, and the argument.
     at_least, at_most : int
         Its range.
-
-    Raises
-    ------
-    InvalidInputError
-        If it is no whole number, or out of range.
     """
     if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < at_least:
         raise InvalidInputError(

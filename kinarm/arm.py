@@ -14,12 +14,12 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._validation import finite_array
-from kinarm.arm_model import build_model, build_shapes, limit_velocities
+from kinarm.arm_model import build_model, build_shapes
 from kinarm.arm_specification import AllowedContact, ArmSpecification
 from kinarm.chain import Chain
-from kinarm.errors import ArmError, UnknownNameError
+from kinarm.errors import ArmError
 from kinarm.motion_bounds import link_lengths
-from kinarm.urdf import Description, find_urdf, read_urdf
+from kinarm.urdf import Description, read_urdf
 
 DEFAULT_ARM = "paper"
 
@@ -32,14 +32,10 @@ class Arm:
 
     Attributes
     ----------
-    specification : ArmSpecification
-        What it was made of.
-    description : Description
-        The URDF, reduced to the chain that carries the tool.
-    model : pinocchio.Model
-        Kinematics.
-    geometry : pinocchio.GeometryModel
-        Collision shapes: primitives, or convex hulls of meshes; no collision pairs.
+    specification, description : ArmSpecification and Description
+        What it was made of, and the URDF, reduced to the chain that carries the tool.
+    model, geometry : pinocchio.Model and pinocchio.GeometryModel
+        Kinematics, and collision shapes: primitives, or convex hulls of meshes; no pairs.
     n_actuated : int
         Joints that actions move: the first ``n_actuated`` ones; the others stay at `home`.
     home : ndarray, shape (n_joints,)
@@ -84,20 +80,16 @@ class Arm:
 
         Raises
         ------
-        UnknownNameError
-            If neither an arm nor a file of that name exists.
-        ArmError
-            If the file is malformed, the robot is not a tree on a fixed base, its tool is not
-            carried by limited revolute and prismatic joints with velocity limits, or it does not
-            fit the specification.
+        UnknownNameError, ArmError
+            If there is no such arm or file, the robot is not a tree on a fixed base whose tool is
+            carried by limited joints with velocity limits, or it does not fit the specification.
         """
         if not isinstance(arm, ArmSpecification):
             arm = ArmSpecification(source=str(arm))
         specification = replace(arm, **changes).resolved(Path())
         wanted = specification.completed()
-        description = read_urdf(find_urdf(wanted.source), wanted)
-        model = build_model(description)
-        limit_velocities(model, wanted.velocity_limits, description)
+        description = read_urdf(wanted)
+        model = build_model(description, wanted.velocity_limits)
         chain = Chain.from_model(model, description.tool_frame)
         loaded = cls(
             specification=specification,
@@ -106,7 +98,7 @@ class Arm:
             geometry=build_shapes(description, model),
             n_actuated=_n_actuated(wanted.actuated, model, chain, description),
             home=_home(wanted.home, chain),
-            allowed_contacts=_allowed_contacts(wanted.allowed_contacts, description),
+            allowed_contacts=wanted.allowed_contacts or (),
             chain=chain,
         )
         if specification.digest not in (None, loaded.digest):
@@ -198,36 +190,24 @@ class Arm:
             arrays += [shape.placement.homogeneous, np.array([box.min_, box.max_])]
             if isinstance(shape.geometry, coal.ConvexBase):
                 arrays.append(np.array(shape.geometry.points()))
-        names += [f"{first} may touch {second}" for first, second in self._allowed_links]
+        links = sorted(tuple(sorted(each.links)) for each in self.allowed_contacts)
+        names += [f"{first} may touch {second}" for first, second in links]
         content = hashlib.sha256("\n".join(names).encode())
         for array in arrays:
             # Adding zero removes the sign of zeros.
             content.update((np.round(np.asarray(array, dtype=float), 12) + 0.0).tobytes())
         return content.hexdigest()[:16]
 
-    @property
-    def _allowed_links(self) -> list[tuple[str, ...]]:
-        return sorted(tuple(sorted(each.links)) for each in self.allowed_contacts)
-
     def tool_position(self, configuration: ArrayLike) -> NDArray[np.float64]:
         """Forward kinematics of the tool point, through Pinocchio.
 
-        Parameters
-        ----------
-        configuration : array_like, shape (n_joints,)
-            Joint positions [rad or m].
-
-        Returns
-        -------
-        ndarray, shape (3,)
-            Tool point in the world frame [m].
+        Takes a configuration, shape (n_joints,) [rad or m], and returns the tool point in the
+        world frame, shape (3,) [m].
         """
         q = finite_array("configuration", configuration, (self.n_joints,))
-        data = self.model.createData()
+        data, frame = self.model.createData(), self.model.getFrameId(self.tool_frame, pin.BODY)
         pin.framesForwardKinematics(self.model, data, q)
-        return np.array(
-            data.oMf[self.model.getFrameId(self.tool_frame, pin.FrameType.BODY)].translation
-        )
+        return np.array(data.oMf[frame].translation)
 
     def __repr__(self) -> str:
         return f"Arm({self.name!r}, {self.n_joints} axes, {self.n_actuated} actuated)"
@@ -257,9 +237,6 @@ def _n_actuated(
                 f"{description.tool_frame!r}"
             )
         return n_actuated
-    for name in named:
-        if name not in names:
-            raise UnknownNameError(f"joint in actuated of {description.path.name}:", name, names)
     if not named or list(named) != names[: len(named)]:
         raise ArmError(
             f"actuated must name the first joints of {description.path.name} in their order, "
@@ -268,25 +245,11 @@ def _n_actuated(
     return len(named)
 
 
-def _allowed_contacts(
-    given: tuple[AllowedContact, ...] | None, description: Description
-) -> tuple[AllowedContact, ...]:
-    """Check that allowed contacts name links."""
-    for contact in given or ():
-        for link in contact.links:
-            if link not in description.links:
-                raise UnknownNameError(
-                    f"link in allowed_contacts of {description.path.name}:", link, description.links
-                )
-    return given or ()
-
-
 def _home(home: ArrayLike | None, chain: Chain) -> NDArray[np.float64]:
     """Check a home configuration, or take zero clipped to the limits."""
-    given = finite_array(
-        "home", np.zeros(chain.n_joints) if home is None else home, (chain.n_joints,)
-    )
-    clipped: NDArray[np.float64] = np.clip(given, chain.lower, chain.upper)
-    if home is not None and not np.array_equal(given, clipped):
+    if home is None:
+        return np.clip(np.zeros(chain.n_joints), chain.lower, chain.upper)
+    given = finite_array("home", home, (chain.n_joints,))
+    if ((given < chain.lower) | (given > chain.upper)).any():
         raise ArmError(f"home {given.tolist()} lies outside the limits")
-    return clipped
+    return given

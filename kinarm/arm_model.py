@@ -1,10 +1,9 @@
 """Pinocchio's model of an arm, and its collision shapes, from a URDF reduced to a chain."""
 
-from collections.abc import Collection
 from pathlib import Path
 from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
-import coal
 import numpy as np
 import pinocchio as pin
 
@@ -15,104 +14,55 @@ from kinarm.meshes import hull_of_mesh
 from kinarm.urdf import Description
 
 
-def build_model(description: Description) -> pin.Model:
-    """Build the kinematics.
+def build_model(description: Description, speeds: tuple[float, ...] | None) -> pin.Model:
+    """Build the kinematics, with these velocity limits or those of the URDF [rad/s or m/s].
 
-    Raises
-    ------
-    ArmError
-        If Pinocchio cannot read the description, or nothing moves.
+    Raises ArmError if Pinocchio cannot, nothing moves, or a joint has no velocity limit.
     """
     name = description.path.name
     try:
-        model = pin.buildModelFromXML(_kinematics(description, ()))
+        model = pin.buildModelFromXML(ElementTree.tostring(_robot(description), "unicode"))
     except (ValueError, RuntimeError) as error:
         raise ArmError(f"{name} is not a readable URDF: {first_line(error)}") from error
     if model.njoints < 2:
         raise ArmError(f"{name} has no moving joint")
+    if speeds is not None:
+        limits = finite_array("velocity_limits", speeds, (model.nv,))
+        if (limits <= 0).any():
+            raise ArmError(f"velocity_limits of {name} must be greater than 0, got {list(speeds)}")
+        model.velocityLimit = limits
+    for joint, speed in zip(list(model.names)[1:], model.velocityLimit, strict=True):
+        if not 0 < speed < 1e10:
+            raise ArmError(f"joint {joint!r} of {name} has no velocity limit: velocity={speed}")
     return model
 
 
-def _kinematics(description: Description, shapes: Collection[str]) -> str:
-    """Pinocchio's input: links with some of their shapes, and joints."""
+def _robot(description: Description) -> Element:
+    """Pinocchio's input: links with their collision shapes, and joints."""
     robot = ElementTree.fromstring(description.text)
     robot.attrib = {"name": "robot", "version": "1.2"}
-    for part in robot.findall("material"):
-        robot.remove(part)
-    for link in robot.findall("link"):
-        for shape in [shape for shape in link if shape.tag not in shapes]:
-            link.remove(shape)
-    return ElementTree.tostring(robot, encoding="unicode")
-
-
-def limit_velocities(
-    model: pin.Model, given: tuple[float, ...] | None, description: Description
-) -> None:
-    """Set the given velocity limits, or check those of the URDF.
-
-    Parameters
-    ----------
-    model : pinocchio.Model
-        The model whose limits are set.
-    given : tuple of float, optional
-        Velocity limits of all joints [rad/s or m/s].
-    description : Description
-        The URDF.
-
-    Raises
-    ------
-    ArmError
-        If one is missing or not above zero.
-    """
-    name = description.path.name
-    if given is not None:
-        limits = finite_array("velocity_limits", given, (model.nv,))
-        if (limits <= 0).any():
-            raise ArmError(f"velocity_limits of {name} must be greater than 0, got {list(given)}")
-        model.velocityLimit = limits
-    for joint, speed in zip(list(model.names)[1:], model.velocityLimit, strict=True):
-        if not (np.isfinite(speed) and 0 < speed < 1e10):
-            raise ArmError(f"joint {joint!r} of {name} has no velocity limit: velocity={speed}")
+    for parent in (robot, *robot):
+        for element in (*parent.findall("material"), *parent.findall("visual")):
+            parent.remove(element)
+    return robot
 
 
 def build_shapes(description: Description, model: pin.Model) -> pin.GeometryModel:
-    """Load the collision shapes; meshes become convex hulls.
-
-    Raises
-    ------
-    ArmError
-        If a shape cannot be loaded.
-    """
-    name = description.path.name
-    robot = ElementTree.fromstring(_kinematics(description, ("collision",)))
-    hulls, declared = {}, 0
+    """Load the collision shapes; meshes become convex hulls."""
+    robot, hulls = _robot(description), {}
     for link in robot.findall("link"):
         for number, shape in enumerate(link.findall("collision/geometry")):
-            declared += 1
             mesh = shape.find("mesh")
             if mesh is not None:
-                hulls[f"{link.get('name')}_{number}"] = _hull(mesh)
+                scale = np.array([float(factor) for factor in mesh.get("scale", "").split()])
+                hull = hull_of_mesh(Path(mesh.get("filename", "")), scale)
+                hulls[f"{link.get('name')}_{number}"] = hull
                 shape.remove(mesh)
                 ElementTree.SubElement(shape, "sphere", radius="1")
-    text = ElementTree.tostring(robot, encoding="unicode")
-    try:
-        geometry = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
-    except (ValueError, RuntimeError) as error:
-        raise ArmError(
-            f"collision shapes of {name} cannot be loaded: {first_line(error)}"
-        ) from error
-    if geometry.ngeoms != declared:
-        raise ArmError(
-            f"{name} declares {declared} collision shapes but {geometry.ngeoms} were read"
-        )
+    text = ElementTree.tostring(robot, "unicode")
+    geometry = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
     for shape in geometry.geometryObjects:
         if shape.name in hulls:
             shape.geometry = hulls[shape.name]
         shape.geometry.computeLocalAABB()
     return geometry
-
-
-def _hull(mesh: ElementTree.Element) -> coal.ConvexBase:
-    """Hull of a mesh of a description."""
-    scale = np.array([float(factor) for factor in mesh.get("scale", "1 1 1").split()])
-    return hull_of_mesh(Path(mesh.get("filename", "")), finite_array("scale", scale, (3,)))

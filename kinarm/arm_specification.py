@@ -1,23 +1,19 @@
 """Which arm: its name or file and what of it is used, without the libraries that read it."""
 
 from dataclasses import dataclass, field, replace
-from functools import cache
-from importlib import resources
 from pathlib import Path
 
 from kinarm._fields import check_fields, from_plain, init_fields, read_toml
-from kinarm._files import absolute, is_file
+from kinarm._files import absolute, is_file, shipped_files
 from kinarm.errors import ArmError
 
 PACKAGE = "example-robot-data:"
 """Prefix of sources that lie in the installed package of that name."""
 
 
-@cache
 def arm_names() -> tuple[str, ...]:
     """Names of the arms that ship with kinarm, or whose package it knows."""
-    folder = resources.files("kinarm.data") / "arms"
-    return tuple(sorted(Path(f.name).stem for f in folder.iterdir() if f.name.endswith(".toml")))
+    return tuple(shipped_files("arms"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,24 +97,17 @@ class ArmSpecification:
         return replace(self, source=source, package_dirs=folders)
 
     def completed(self) -> "ArmSpecification":
-        """The same arm with what its arm files say of it; its source is then a URDF.
-
-        Raises
-        ------
-        InvalidInputError
-            If an arm file cannot be used.
-        """
+        """The same arm with what its arm files say of it; its source is then a URDF."""
         file = ArmFile.of(self.source)
         if file is None:
             return self
         below = file.arm.completed()
         given = {name: getattr(self, name) for name in init_fields(type(self)) if name != "source"}
         given = {name: value for name, value in given.items() if value is not None}
-        if not given["package_dirs"]:
+        if not self.package_dirs:
             del given["package_dirs"]
-        for name in ("held", "limits"):
-            if name in given:
-                given[name] = {**(getattr(below, name) or {}), **given[name]}
+        for name in {"held", "limits"} & given.keys():
+            given[name] = {**(getattr(below, name) or {}), **given[name]}
         return replace(below, **given)
 
     @property
@@ -138,14 +127,10 @@ class ArmFile:
     ----------
     title : str
         The arm's full name.
-    licence : str
-        Licence of URDF and meshes.
-    origin : str
-        Where they come from.
-    velocities : str
-        Where the velocity limits come from.
-    notes : str
-        What else was chosen, and why.
+    licence, origin : str
+        Licence of URDF and meshes, and where they come from.
+    velocities, notes : str
+        Where the velocity limits come from, and what else was chosen, and why.
     arm : ArmSpecification
         The arm; its ``source`` is a URDF or a known arm.
     """
@@ -164,16 +149,10 @@ class ArmFile:
     def of(cls, source: str) -> "ArmFile | None":
         """The arm file of a known arm or of a path; None if the source is a URDF.
 
-        Raises
-        ------
-        InvalidInputError
-            If it cannot be used.
-        ArmError
-            If there is no such file.
+        Raises InvalidInputError if it cannot be used, and ArmError if there is none.
         """
         if source in arm_names():
-            with resources.as_file(resources.files("kinarm.data") / "arms") as folder:
-                return cls._read(folder / f"{source}.toml")
+            return cls._read(shipped_files("arms")[source])
         path = Path(source)
         if path.suffix != ".toml":
             return None

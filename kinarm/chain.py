@@ -44,15 +44,7 @@ class Chain(NamedTuple):
 
     @classmethod
     def from_model(cls, model: pin.Model, tool_frame: str) -> "Chain":
-        """Extract the arrays from a Pinocchio model of a serial chain.
-
-        Parameters
-        ----------
-        model : pinocchio.Model
-            Joints of one degree of freedom, each the child of the one before.
-        tool_frame : str
-            Link whose origin is the tool point; the last joint carries it.
-        """
+        """Extract the arrays from a Pinocchio model of a serial chain and its tool frame."""
         frame = model.frames[model.getFrameId(tool_frame, pin.FrameType.BODY)]
         placements = [model.jointPlacements[i] for i in range(1, model.njoints)]
         subspaces = np.array([_motion_subspace(model.joints[i]) for i in range(1, model.njoints)])
@@ -60,7 +52,10 @@ class Chain(NamedTuple):
         return cls(
             prismatic=prismatic,
             translation=np.array([placement.translation for placement in placements]),
-            rotation=np.array([_quaternion(placement.rotation) for placement in placements]),
+            # Pinocchio's order is x, y, z, w.
+            rotation=np.array(
+                [np.roll(pin.Quaternion(each.rotation).coeffs(), 1) for each in placements]
+            ),
             axis=np.where(prismatic[:, None], subspaces[:, :3], subspaces[:, 3:]),
             tool=np.array(frame.placement.translation),
             lower=np.array(model.lowerPositionLimit),
@@ -74,9 +69,3 @@ def _motion_subspace(joint: pin.JointModel) -> NDArray[np.float64]:
     data = joint.createData()
     joint.calc(data, np.zeros(1))
     return np.array(data.S).reshape(6)
-
-
-def _quaternion(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit quaternion (w, x, y, z) of a rotation matrix, shape (4,)."""
-    x, y, z, w = pin.Quaternion(rotation).coeffs()
-    return np.array([w, x, y, z])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import NamedTuple
 
 import coal
@@ -36,8 +35,10 @@ class Clearance(NamedTuple):
     points: NDArray[np.float64]
 
 
-class Closeness:
-    """Measures distances between the bodies of a contact model.
+def measure_clearance(
+    model: ContactModel, bodies: Bodies, configurations: NDArray[np.float64], threads: int
+) -> Clearance:
+    """Find the closest tested pair of each configuration.
 
     Compiled code measures capsules, spheres, boxes, convex hulls and the ground, to within 1e-10 m.
     Coal measures cylinders that may be closest, and shapes that overlap: capsules and spheres if
@@ -45,52 +46,38 @@ class Closeness:
 
     Parameters
     ----------
-    contact_model : ContactModel
-        An arm in a scene, and the pairs that are tested.
+    model, bodies : ContactModel and Bodies
+        An arm in a scene with the pairs that are tested, and its `flattened` geometry.
+    configurations : ndarray, shape (n, n_joints)
+        Joint positions [rad or m].
+    threads : int
+        Threads at most.
     """
-
-    def __init__(self, contact_model: ContactModel) -> None:
-        self._model = contact_model
-        self._bodies = _flattened(contact_model.geometry)
-
-    def __reduce__(self) -> tuple[type, tuple[ContactModel]]:
-        return type(self), (self._model,)
-
-    def measure(self, configurations: NDArray[np.float64], threads: int) -> Clearance:
-        """Find the closest pair of each configuration, shape (n, n_joints) [rad or m]."""
-        n, names = len(configurations), np.array(self._model.pair_names).reshape(-1, 2)
-        distances, points = np.full(n, np.inf), np.full((n, 2, 3), np.nan)
-        if not len(names):
-            return Clearance(distances, np.full((n, 2), ""), points)
-        bounds, nearest = np.empty((n, len(names))), np.empty(n, dtype=np.int64)
-        arrays = (self._model.arm.chain, self._bodies, configurations, bounds, nearest, points)
-        run_rows(closest_pairs, n, 8 * n, threads, *arrays)
-        known = np.flatnonzero(nearest >= 0)
-        distances[known] = bounds[known, nearest[known]]
-        for row in np.flatnonzero(nearest < 0):
-            self._place(configurations[row])
-            for pair in np.argsort(bounds[row], kind="stable"):
-                if bounds[row, pair] >= distances[row]:
-                    break
-                result = pin.computeDistance(self._model.geometry, self._workspace[1], int(pair))
-                if result.min_distance < distances[row]:
-                    nearest[row], distances[row] = pair, result.min_distance
-                    points[row] = result.getNearestPoint1(), result.getNearestPoint2()
-        return Clearance(distances, names[nearest], points)
-
-    @cached_property
-    def _workspace(self) -> tuple[pin.Data, pin.GeometryData]:
-        return self._model.arm.model.createData(), self._model.geometry.createData()
-
-    def _place(self, configuration: NDArray[np.float64]) -> None:
-        """Place the shapes that Coal looks at."""
-        data, geometry_data = self._workspace
+    n, names = len(configurations), np.array(model.pair_names).reshape(-1, 2)
+    distances, points = np.full(n, np.inf), np.full((n, 2, 3), np.nan)
+    if not len(names):
+        return Clearance(distances, np.full((n, 2), ""), points)
+    bounds, nearest = np.empty((n, len(names))), np.empty(n, dtype=np.int64)
+    arrays = (model.arm.chain, bodies, configurations, bounds, nearest, points)
+    run_rows(closest_pairs, n, 8 * n, threads, *arrays)
+    known = np.flatnonzero(nearest >= 0)
+    distances[known] = bounds[known, nearest[known]]
+    data, placed, _ = model.workspace
+    for row in np.flatnonzero(nearest < 0):
         pin.updateGeometryPlacements(
-            self._model.arm.model, data, self._model.geometry, geometry_data, configuration
+            model.arm.model, data, model.geometry, placed, configurations[row]
         )
+        for pair in np.argsort(bounds[row], kind="stable"):
+            if bounds[row, pair] >= distances[row]:
+                break
+            result = pin.computeDistance(model.geometry, placed, int(pair))
+            if result.min_distance < distances[row]:
+                nearest[row], distances[row] = pair, result.min_distance
+                points[row] = result.getNearestPoint1(), result.getNearestPoint2()
+    return Clearance(distances, names[nearest], points)
 
 
-def _flattened(geometry: pin.GeometryModel) -> Bodies:
+def flattened(geometry: pin.GeometryModel) -> Bodies:
     """Bodies and pairs of a geometry model, for the kernels."""
     shapes = list(geometry.geometryObjects)
     corners, rounding = [], []
@@ -113,7 +100,7 @@ def _flattened(geometry: pin.GeometryModel) -> Bodies:
         np.linalg.norm(each - centre, axis=1).max() * (1 + 1e-12) + radius
         for each, centre, radius in zip(corners, centres, rounding, strict=True)
     ]
-    bodies = Bodies(
+    return Bodies(
         link=np.array([shape.parentJoint for shape in shapes], dtype=np.int64),
         span=np.stack([ends[:-1], ends[1:]], axis=1),
         corners=np.ascontiguousarray(np.concatenate(corners)),
@@ -125,6 +112,3 @@ def _flattened(geometry: pin.GeometryModel) -> Bodies:
             [(pair.first, pair.second) for pair in geometry.collisionPairs], dtype=np.int64
         ).reshape(-1, 2),
     )
-    for array in bodies:
-        array.flags.writeable = False
-    return bodies

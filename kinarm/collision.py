@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from functools import cached_property
+from itertools import combinations, product
 from typing import NamedTuple
 
 import coal
@@ -17,7 +18,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from kinarm.arm import Arm
-from kinarm.contact_shapes import BETWEEN_CAPSULES, WITH_BOX, WITH_GROUND, ContactShapes
+from kinarm.contact_shapes import ContactShapes
 from kinarm.errors import ProblemError
 from kinarm.scene import Scene
 
@@ -55,16 +56,15 @@ class ContactModel:
 
     Pairs that can tell nothing are left out: neighbours in the chain, bodies that overlap at the
     home pose, those that the arm's file allows, and the mounting, that is the base and the first
-    link against a world that they never touch or always touch.
+    link against a world that they never touch or always touch. A configuration is an array of
+    shape (n_joints,) [rad or m].
 
     Attributes
     ----------
-    arm : Arm
-        The arm.
-    geometry : pinocchio.GeometryModel
-        Shapes of arm and scene, and the pairs.
+    arm, geometry : Arm and pinocchio.GeometryModel
+        The arm, and shapes of arm and scene with the pairs.
     body_names : tuple of str
-        Readable name of each shape in `geometry`.
+        Readable name of each of these shapes.
     shapes : ContactShapes
         The same pairs for the kernels.
     left_out : dict
@@ -85,32 +85,30 @@ class ContactModel:
     def build(cls, arm: Arm, scene: Scene) -> "ContactModel":
         """Place an arm in a scene and choose the pairs to test.
 
-        Raises
-        ------
-        ProblemError
-            If the first link touches an obstacle wherever its joint is.
+        Raises ProblemError if the first link touches an obstacle wherever its joint is.
         """
         geometry = arm.geometry.copy()
         n_shapes = geometry.ngeoms
         _add_scene(geometry, scene)
         surroundings = [shape.name for shape in geometry.geometryObjects][n_shapes:]
-        candidates = _candidate_pairs(arm, geometry, n_shapes, len(scene.obstacles))
-        for first, second, _ in candidates:
-            geometry.addCollisionPair(pin.CollisionPair(first, second))
+        candidates = _candidate_pairs(arm, geometry, n_shapes)
+        for pair in candidates:
+            geometry.addCollisionPair(pin.CollisionPair(*pair))
         names = (*body_names(arm), *surroundings)
         dropped = _uninformative_pairs(arm, geometry, n_shapes, names)
         kept = [pair for index, pair in enumerate(candidates) if index not in dropped]
         geometry.removeAllCollisionPairs()
-        for first, second, _ in kept:
-            geometry.addCollisionPair(pin.CollisionPair(first, second))
+        for pair in kept:
+            geometry.addCollisionPair(pin.CollisionPair(*pair))
         return cls(
             arm=arm,
             geometry=geometry,
             body_names=names,
             shapes=ContactShapes.build(arm, scene, kept, n_shapes, _close_pairs(arm, geometry)),
             left_out={
-                (names[candidates[index][0]], names[candidates[index][1]]): reason
-                for index, reason in sorted(dropped.items())
+                (names[first], names[second]): dropped[index]
+                for index, (first, second) in enumerate(candidates)
+                if index in dropped
             },
         )
 
@@ -123,7 +121,8 @@ class ContactModel:
         return pool
 
     @cached_property
-    def _workspace(self) -> tuple[pin.Data, pin.GeometryData, list[coal.CollisionResult]]:
+    def workspace(self) -> tuple[pin.Data, pin.GeometryData, list[coal.CollisionResult]]:
+        """Space for Pinocchio and Coal, and where the results of each pair lie."""
         data = make_verdicts_reliable(self.geometry.createData())
         # Results are looked at in a list, since wrapping them takes longer than the test itself.
         return self.arm.model.createData(), data, list(data.collisionResults)
@@ -137,17 +136,7 @@ class ContactModel:
         )
 
     def in_contact(self, configurations: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Ask Coal which configurations touch something, in one call.
-
-        Parameters
-        ----------
-        configurations : ndarray, shape (n, n_joints)
-            Joint positions [rad or m].
-
-        Returns
-        -------
-        ndarray of bool, shape (n,)
-        """
+        """Ask Coal which configurations, shape (n, n_joints), touch something, in one call."""
         if len(configurations) == 0:
             return np.zeros(0, dtype=bool)
         columns = np.asfortranarray(configurations.T)
@@ -155,41 +144,23 @@ class ContactModel:
         return np.array(verdicts, dtype=bool).reshape(-1)
 
     def contact_pair(self, configuration: NDArray[np.float64]) -> tuple[str, str] | None:
-        """Name the first tested pair that is in contact, or None.
-
-        Parameters
-        ----------
-        configuration : ndarray, shape (n_joints,)
-            Joint positions [rad or m].
-        """
+        """Name the first tested pair that is in contact, or None."""
         index = self.first_in_contact(configuration)
         return None if index is None else self.pair_names[index]
 
     def contact(self, configuration: NDArray[np.float64]) -> Contact | None:
-        """Describe the first tested pair that is in contact, or return None.
-
-        Parameters
-        ----------
-        configuration : ndarray, shape (n_joints,)
-            Joint positions [rad or m].
-        """
+        """Describe the first tested pair that is in contact, or return None."""
         index = self.first_in_contact(configuration)
         if index is None:
             return None
-        point = np.array(self._workspace[2][index].getContact(0).pos)
+        point = np.array(self.workspace[2][index].getContact(0).pos)
         return Contact(configuration, self.pair_names[index], point)
 
     def first_in_contact(self, configuration: NDArray[np.float64]) -> int | None:
-        """Index of the first tested pair that is in contact, or None.
-
-        Parameters
-        ----------
-        configuration : ndarray, shape (n_joints,)
-            Joint positions [rad or m].
-        """
+        """Index of the first tested pair that is in contact, or None."""
         if not self.in_contact(configuration[None])[0]:
             return None
-        data, geometry_data, results = self._workspace
+        data, geometry_data, results = self.workspace
         start_anew(geometry_data.collisionRequests)
         pin.computeCollisions(
             self.arm.model, data, self.geometry, geometry_data, configuration, True
@@ -250,26 +221,21 @@ def body_names(arm: Arm) -> tuple[str, ...]:
     )
 
 
-def _candidate_pairs(
-    arm: Arm, geometry: pin.GeometryModel, n_shapes: int, n_boxes: int
-) -> list[tuple[int, int, int]]:
-    """All pairs (first, second, kind) that move against each other, but those that are allowed."""
+def _candidate_pairs(arm: Arm, geometry: pin.GeometryModel, n_shapes: int) -> list[tuple[int, int]]:
+    """All pairs that move against each other, but those that are allowed."""
     parent = [shape.parentJoint for shape in geometry.geometryObjects]
     links = _links(arm)
     allowed = {frozenset(contact.links) for contact in arm.allowed_contacts}
     pairs = []
-    for first in range(n_shapes):
-        for second in range(first + 1, n_shapes):
-            apart = abs(parent[first] - parent[second]) > 1
-            if apart and frozenset((links[first], links[second])) not in allowed:
-                a, b = sorted((first, second), key=lambda shape: parent[shape])
-                pairs.append((a, b, BETWEEN_CAPSULES))
-        if parent[first] > 0:
-            for second in range(n_shapes, geometry.ngeoms):
-                kind = WITH_BOX if second < n_shapes + n_boxes else WITH_GROUND
-                pairs.append((first, second, kind))
-    # Sorted by kind, which the kernels find easier to predict.
-    return sorted(pairs, key=lambda pair: pair[2])
+    for first, second in combinations(range(n_shapes), 2):
+        apart = abs(parent[first] - parent[second]) > 1
+        if apart and frozenset((links[first], links[second])) not in allowed:
+            pairs.append((first, second) if parent[first] < parent[second] else (second, first))
+    moving = [shape for shape in range(n_shapes) if parent[shape] > 0]
+    flat = [isinstance(each.geometry, coal.Halfspace) for each in geometry.geometryObjects]
+    with_world = product(moving, range(n_shapes, geometry.ngeoms))
+    # Kind after kind, which the kernels find easier to predict.
+    return pairs + sorted(with_world, key=lambda pair: flat[pair[1]])
 
 
 def _touching(

@@ -4,20 +4,14 @@ from collections.abc import Collection
 from itertools import product
 from typing import NamedTuple
 
+import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from kinarm.arm import Arm
 from kinarm.chain import Chain
-from kinarm.enclosures import (
-    FEW,
-    MANY,
-    Enclosure,
-    enclosing_capsule,
-    enclosing_polytope,
-    is_capsule,
-)
+from kinarm.enclosures import FEW, MANY, Enclosure, enclosing_capsule, enclosing_polytope
 from kinarm.motion_bounds import point_speed
 from kinarm.scene import Obstacle, Scene
 
@@ -26,6 +20,9 @@ BETWEEN_CAPSULES, WITH_BOX, WITH_GROUND = range(3)
 
 GROUND = -1
 """Carrier, in `ContactShapes.planes`, of the plane that is the ground."""
+
+EXACT = coal.Capsule | coal.Sphere
+"""Shapes that equal the capsule that encloses them."""
 
 PLANE = 5
 """Entries of a separating plane; see `kinarm.kernels.planes`."""
@@ -39,8 +36,6 @@ class ContactShapes(NamedTuple):
 
     Attributes
     ----------
-    link : ndarray of int, shape (n_shapes,)
-        Joint frame that carries a shape of the arm: 0 is the world, k the k-th joint.
     capsules : ndarray, shape (n_shapes, 7)
         The capsule that is or encloses the shape: its end points (3 + 3) in the joint frame and
         its radius [m].
@@ -54,7 +49,8 @@ class ContactShapes(NamedTuple):
     exact : ndarray of bool, shape (n_shapes,)
         Whether the capsule is the shape, rather than encloses it.
     bodies : ndarray of int, shape (n_bodies, 3)
-        First corner of a body, the one after its last, and the joint frame that carries it.
+        First corner of a body, the one after its last, and the joint frame that carries it: 0 is
+        the world, k the k-th joint.
     corners : ndarray, shape (n_corners, 3)
         Corners in that frame [m].
     rounding : ndarray, shape (n_bodies,)
@@ -72,7 +68,6 @@ class ContactShapes(NamedTuple):
         Cosine and sine of the yaw of the obstacles.
     """
 
-    link: NDArray[np.int64]
     capsules: NDArray[np.float64]
     boxes: NDArray[np.float64]
     pairs: NDArray[np.int64]
@@ -92,7 +87,7 @@ class ContactShapes(NamedTuple):
         cls,
         arm: Arm,
         scene: Scene,
-        pairs: list[tuple[int, int, int]],
+        pairs: list[tuple[int, int]],
         n_shapes: int,
         close: Collection[int],
     ) -> "ContactShapes":
@@ -100,10 +95,10 @@ class ContactShapes(NamedTuple):
 
         Parameters
         ----------
-        arm, scene
+        arm, scene : Arm and Scene
             What may touch.
         pairs : list of tuple
-            First and second shape of the pairs and their kind; obstacles count from ``n_shapes``.
+            Shapes of each pair; obstacles count from ``n_shapes``, and the ground comes last.
         n_shapes : int
             Number of the arm's shapes.
         close : collection of int
@@ -114,28 +109,28 @@ class ContactShapes(NamedTuple):
         ends = np.cumsum([0, *(len(body.corners) for body in bodies)])
         rows, planes, proxies = [], [], []
         travel = np.zeros((arm.n_actuated, len(pairs)))
-        for column, (first, second, kind) in enumerate(pairs):
-            between = kind == BETWEEN_CAPSULES
+        for column, (first, second) in enumerate(pairs):
+            between, ground = second < n_shapes, second == n_shapes + len(scene.obstacles)
+            kind = BETWEEN_CAPSULES if between else WITH_GROUND if ground else WITH_BOX
             rows.append((kind, first, second if between else second - n_shapes))
             carrier, mover = (first, second) if between else (second, first)
-            base = links[carrier] if kind != WITH_GROUND else int(_keeps_height(arm.chain))
+            base = int(_keeps_height(arm.chain)) if ground else links[carrier]
             last = min(links[mover], arm.n_actuated)
-            fine = (carrier if kind == WITH_GROUND else finer[carrier], finer[mover])
+            fine = (carrier if ground else finer[carrier], finer[mover])
             proxies.append((fine if column in close else (carrier, mover), fine))
-            planes.append((GROUND if kind == WITH_GROUND else carrier, mover, base, last))
+            planes.append((GROUND if ground else carrier, mover, base, last))
             for axis in range(base, last):
                 # Corners of the coarse polytope are among those of the fine one.
                 corners = bodies[finer[mover]].corners
                 travel[axis, column] = point_speed(arm.chain, axis, links[mover], corners)
         return cls(
-            link=np.array([shape.parentJoint for shape in objects], dtype=np.int64),
-            capsules=np.array([np.hstack(enclosing_capsule(each)) for each in objects]).reshape(
+            capsules=np.array([np.append(*enclosing_capsule(each)) for each in objects]).reshape(
                 -1, 7
             ),
             boxes=np.array([_turned_back(each) for each in scene.obstacles]).reshape(-1, 2, 3),
             pairs=np.array(rows, dtype=np.int64).reshape(-1, 3),
             travel=travel,
-            exact=np.array([is_capsule(shape) for shape in objects], dtype=bool),
+            exact=np.array([isinstance(each.geometry, EXACT) for each in objects], dtype=bool),
             bodies=np.stack([ends[:-1], ends[1:], np.array(links, dtype=np.int64)], axis=1),
             corners=np.concatenate([body.corners for body in bodies] or [np.zeros((0, 3))]),
             rounding=np.array([body.rounding for body in bodies], dtype=np.float64),

@@ -29,15 +29,7 @@ class ContactStatistics:
 
     @classmethod
     def sample(cls, model: ContactModel, count: int = SAMPLES) -> "ContactStatistics":
-        """Ask Coal for every pair, at configurations whose actuated joints are uniform.
-
-        Parameters
-        ----------
-        model : ContactModel
-            An arm in a scene.
-        count : int
-            How many configurations.
-        """
+        """Ask Coal for every pair, at so many `random_configurations`."""
         q = random_configurations(model, count)
         data = model.arm.model.createData()
         geometry_data = make_verdicts_reliable(model.geometry.createData())
@@ -63,29 +55,13 @@ class ContactStatistics:
         return {self.pairs[index]: float(shares[index]) for index in order}
 
     def check_movable(self, arm: str) -> None:
-        """Refuse a world in which no configuration is free.
-
-        Raises
-        ------
-        ProblemError
-            Names the pair that touches most often.
-        """
+        """Refuse a world in which no configuration is free, by the pair that touches most often."""
         if not self.free.any():
             (pair, share), *_ = self.shares.items()
             raise ProblemError(
                 f"arm {arm!r} cannot move: it touches something at all of {len(self.free)} random "
                 f"configurations, {' and '.join(pair)} at {share:.0%} of them"
             )
-
-    @property
-    def always(self) -> tuple[tuple[str, str], ...]:
-        """Pairs that touch at every configuration."""
-        return tuple(pair for pair, share in self.shares.items() if share == 1)
-
-    @property
-    def never(self) -> tuple[tuple[str, str], ...]:
-        """Pairs that touch at none."""
-        return tuple(pair for pair, share in self.shares.items() if share == 0)
 
 
 def random_configurations(model: ContactModel, count: int, seed: int = 0) -> NDArray[np.float64]:
@@ -95,10 +71,8 @@ def random_configurations(model: ContactModel, count: int, seed: int = 0) -> NDA
 
     Parameters
     ----------
-    model : ContactModel
-        An arm in a scene.
-    count, seed : int
-        How many, and the seed that they are drawn from.
+    model, count, seed
+        An arm in a scene, how many, and the seed that they are drawn from.
     """
     arm, moved = model.arm, slice(model.arm.n_actuated)
     q = np.tile(arm.home, (count, 1))

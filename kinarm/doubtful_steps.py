@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.collision import ContactModel
-from kinarm.episodes import RUNNING, Episodes
+from kinarm.episodes import RUNNING
+from kinarm.kernels.compiling import Array
 from kinarm.kernels.rollout import refuse
 from kinarm.kernels.session import Session
 from kinarm.world import World
@@ -13,29 +14,19 @@ FEW = 4
 """Of up to so many episodes in doubt, Coal also tells what touches."""
 
 
-def decide_doubtful_steps(
-    world: World, session: Session, episodes: Episodes, paused: NDArray[np.int64]
-) -> int:
-    """Refuse steps that touch something, and clear the others.
+def decide_doubtful_steps(world: World, session: Session, paused: NDArray[np.int64]) -> int:
+    """Refuse steps that touch something, clear the others, and return how often Coal was asked.
 
     Coal is asked in the order of the motion, and not beyond the first contact.
 
     Parameters
     ----------
-    world : World
-        Where the arms are.
-    session : Session
-        The episodes, bound for the kernels.
-    episodes : Episodes
-        The same; changed in place.
-    paused : ndarray of int
-        Which of them are in doubt.
-
-    Returns
-    -------
-    int
-        Configurations that Coal was asked about.
+    world, session
+        Where the arms are, and the episodes, which are changed in place.
+    paused : ndarray of int, shape (n,)
+        Numbers of those that are in doubt.
     """
+    episodes = session.episodes
     ways = world.substeps(episodes.q[paused], episodes.target[paused])
     touched, asked = first_contacts(world.contact_model, ways, episodes.doubt[paused])
     refused = touched != 0
@@ -50,16 +41,15 @@ def decide_doubtful_steps(
 
 
 def first_contacts(
-    contacts: ContactModel, ways: NDArray[np.float64], doubt: NDArray[np.int64]
+    contacts: ContactModel, ways: Array, doubt: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], int]:
     """Find what the doubtful configurations of steps touch first.
 
     Parameters
     ----------
-    contacts : ContactModel
-        Who is asked.
-    ways : ndarray, shape (n, n_tested, n_joints)
-        Configurations of the steps, in the order of the motion [rad or m].
+    contacts, ways
+        Who is asked, and configurations in the order of the motion, shape
+        (n, n_tested, n_joints) [rad or m].
     doubt : ndarray of int, shape (n,)
         Bit k set: that of number k, from 0, is in doubt.
 

@@ -30,17 +30,18 @@ class Enclosure(NamedTuple):
     corners: NDArray[np.float64]
     rounding: float
 
+    def moved(self, placement: pin.SE3) -> "Enclosure":
+        """The same one elsewhere."""
+        corners = np.array([placement.act(each) for each in self.corners])
+        return Enclosure(corners, self.rounding)
+
 
 def enclosing_polytope(shape: pin.GeometryObject, most: int = MANY) -> Enclosure:
     """Rounded polytope of at most so many corners around a shape, in the frame of its joint.
 
     It equals a capsule, sphere or box. Of a mesh, it is the hull of a few of its vertices, each the
     farthest one from the hull of those before, widened by the distance of the farthest one left.
-
-    Raises
-    ------
-    ArmError
-        If the shape is no capsule, sphere, cylinder, box or convex hull.
+    Other shapes raise ArmError.
     """
     corners, radius = _core(shape)
     local = Enclosure(corners, radius)
@@ -48,9 +49,7 @@ def enclosing_polytope(shape: pin.GeometryObject, most: int = MANY) -> Enclosure
         local = _around(_prism(radius, float(corners[1, 2])), most)
     elif isinstance(shape.geometry, coal.ConvexBase):
         local = _around(corners, most)
-    return Enclosure(
-        np.array([shape.placement.act(each) for each in local.corners]), local.rounding
-    )
+    return local.moved(shape.placement)
 
 
 def _core(shape: pin.GeometryObject) -> tuple[NDArray[np.float64], float]:
@@ -78,8 +77,6 @@ def _prism(radius: float, half_length: float) -> NDArray[np.float64]:
 
 def _around(points: NDArray[np.float64], most: int) -> Enclosure:
     """Enclose the hull of points, shape (n, 3); what took long is kept in the cache folder."""
-    if len(points) <= FEW:
-        return Enclosure(**_fitted(points, most))
     made_of = np.int64(most).tobytes() + points.tobytes()
     fitted = cached_arrays("enclosure", VERSION, made_of, lambda: _fitted(points, most))
     return Enclosure(fitted["corners"], float(fitted["rounding"]))
@@ -99,30 +96,18 @@ def _fitted(points: NDArray[np.float64], most: int) -> dict[str, Any]:
         chosen.append(farthest)
 
 
-class Capsule(NamedTuple):
-    """A segment with a radius, in the frame of the joint that carries it."""
+def enclosing_capsule(shape: pin.GeometryObject) -> Enclosure:
+    """Capsule around a shape, of two corners, in the frame of its joint.
 
-    start: NDArray[np.float64]
-    end: NDArray[np.float64]
-    radius: float
-
-
-def enclosing_capsule(shape: pin.GeometryObject) -> Capsule:
-    """Capsule around a shape, in the frame of its joint; it equals a capsule or sphere.
-
-    Raises
-    ------
-    ArmError
-        If the shape is no capsule, sphere, cylinder, box or convex hull.
+    It equals a capsule or sphere.
     """
     corners, radius = _core(shape)
     few = len(corners) <= 2
-    local = Capsule(corners[0], corners[-1], radius) if few else _capsule_around(corners)
-    placement = shape.placement
-    return Capsule(placement.act(local.start), placement.act(local.end), local.radius)
+    local = Enclosure(corners[[0, -1]], radius) if few else _capsule_around(corners)
+    return local.moved(shape.placement)
 
 
-def _capsule_around(points: NDArray[np.float64]) -> Capsule:
+def _capsule_around(points: NDArray[np.float64]) -> Enclosure:
     """Capsule along the longest principal direction of a set of points, shape (n, 3)."""
     centre = (points.min(axis=0) + points.max(axis=0)) / 2
     _, _, directions = np.linalg.svd(points - centre, full_matrices=False)
@@ -134,9 +119,4 @@ def _capsule_around(points: NDArray[np.float64]) -> Capsule:
     low, high = float((along + cap).min()), float((along - cap).max())
     if low > high:
         low = high = (low + high) / 2
-    return Capsule(centre + low * direction, centre + high * direction, radius)
-
-
-def is_capsule(shape: pin.GeometryObject) -> bool:
-    """Whether a shape equals the capsule that encloses it."""
-    return isinstance(shape.geometry, coal.Capsule | coal.Sphere)
+    return Enclosure(np.array([centre + low * direction, centre + high * direction]), radius)

@@ -1,20 +1,17 @@
 """Arrays that the simulator hands to the compiled kernels: rules, actions and episodes."""
 
-from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
 from kinarm.contact_shapes import PLANE
-from kinarm.kernels.records import Layout
-from kinarm.observation import observation_size
+from kinarm.kernels.compiling import Array
+from kinarm.observation import GOAL_SIDE, observation_size
 from kinarm.task import REWARD_TERMS
 
 RUNNING, PAUSED, SUCCESS, COLLISION, TRUNCATED = range(5)
 """States of an episode."""
-
 
 LINEAR, TANH, RELU, HARDTANH, ELU, LEAKY_RELU, SILU = range(7)
 """Activation functions of networks."""
@@ -29,23 +26,21 @@ class Rules(NamedTuple):
         Largest move of each joint in a step [rad or m].
     tested : int
         Configurations at which the motion of a step is tested for contact.
-    tolerance : float
-        The goal counts as reached at this distance or less [m].
-    horizon : int
-        Steps after which an episode is truncated.
+    tolerance, horizon
+        Distance at which a goal counts as reached [m], and steps after which episodes end.
     reward : ndarray, shape (n_terms,)
         Weights of the reward terms.
     """
 
-    step_limit: NDArray[np.float64]
+    step_limit: Array
     tested: int
     tolerance: float
     horizon: int
-    reward: NDArray[np.float64]
+    reward: Array
 
 
 class Control(NamedTuple):
-    """Where actions come from: dense networks, or a table if ``layers`` is empty.
+    """Where actions come from: dense networks, or a table if ``layers`` is empty, as by default.
 
     Attributes
     ----------
@@ -65,14 +60,14 @@ class Control(NamedTuple):
         The table; a table of one step serves every step.
     """
 
-    layers: NDArray[np.int64]
-    weights: NDArray[np.float64]
-    policy: NDArray[np.int64]
-    activations: NDArray[np.int64]
-    observation_signs: NDArray[np.float64]
-    action_signs: NDArray[np.float64]
-    side: int
-    actions: NDArray[np.float64]
+    layers: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+    weights: Array = np.zeros((0, 0))
+    policy: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+    activations: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+    observation_signs: Array = np.zeros(0)
+    action_signs: Array = np.zeros(0)
+    side: int = GOAL_SIDE
+    actions: Array = np.zeros((0, 0, 0))
 
 
 class Episodes(NamedTuple):
@@ -80,16 +75,11 @@ class Episodes(NamedTuple):
 
     Attributes
     ----------
-    status : ndarray of int, shape (n,)
-        `RUNNING`, `PAUSED`, `SUCCESS`, `COLLISION` or `TRUNCATED`.
-    steps : ndarray of int, shape (n,)
-        Steps taken.
-    stop : ndarray of int, shape (n,)
-        Step count at which to hand an episode back.
-    q : ndarray, shape (n, n_joints)
-        Configuration [rad or m].
-    target : ndarray, shape (n, n_joints)
-        Where the step under way leads.
+    status, steps, stop : ndarray of int, shape (n,)
+        `RUNNING`, `PAUSED`, `SUCCESS`, `COLLISION` or `TRUNCATED`; steps taken; step count at which
+        to hand an episode back.
+    q, target : ndarray, shape (n, n_joints)
+        Configuration, and where the step under way leads [rad or m].
     doubt : ndarray of int, shape (n,)
         Bit k - 1 set: configuration k of the step under way is not proven free.
     touched : ndarray of int, shape (n,)
@@ -99,16 +89,12 @@ class Episodes(NamedTuple):
     planes : ndarray, shape (n, n_pairs, PLANE)
         Separating plane of each pair and the height above it at ``q``; see
         ``kinarm.kernels.planes``.
-    goal : ndarray, shape (n, 3)
-        Goal position [m].
+    goal, distance : ndarray, shape (n, 3) and (n,)
+        Goal position, and distance of the tool from it [m].
     observation : ndarray, shape (n, n_observations)
         Observation of the current state.
-    distance : ndarray, shape (n,)
-        From the tool to the goal [m].
-    terms : ndarray, shape (n, n_terms)
-        Weighted terms of the last reward.
-    total : ndarray, shape (n,)
-        Return: sum of rewards.
+    terms, total : ndarray, shape (n, n_terms) and (n,)
+        Weighted terms of the last reward, and return: sum of rewards.
     moments : ndarray, shape (n, 2, n_observations) or (0, 2, n_observations)
         Sums of the observations acted upon, less ``shift``, and of their squares.
     shift : ndarray, shape (n_observations,)
@@ -120,92 +106,66 @@ class Episodes(NamedTuple):
     status: NDArray[np.int64]
     steps: NDArray[np.int64]
     stop: NDArray[np.int64]
-    q: NDArray[np.float64]
-    target: NDArray[np.float64]
+    q: Array
+    target: Array
     doubt: NDArray[np.int64]
     touched: NDArray[np.int64]
     cleared: NDArray[np.bool_]
-    planes: NDArray[np.float64]
-    goal: NDArray[np.float64]
-    observation: NDArray[np.float64]
-    distance: NDArray[np.float64]
-    terms: NDArray[np.float64]
-    total: NDArray[np.float64]
-    moments: NDArray[np.float64]
-    shift: NDArray[np.float64]
-    path: NDArray[np.float64]
+    planes: Array
+    goal: Array
+    observation: Array
+    distance: Array
+    terms: Array
+    total: Array
+    moments: Array
+    shift: Array
+    path: Array
 
     @classmethod
     def allocate(
         cls,
-        starts: NDArray[np.float64],
-        goals: NDArray[np.float64],
+        starts: Array,
+        goals: Array,
         *,
         n_pairs: int,
         horizon: int,
         record: bool = False,
-        shift: NDArray[np.float64] | None = None,
-    ) -> "tuple[Episodes, Any]":
-        """Allocate episodes at their starts, and their record for the kernels, in one buffer.
-
-        The kernel ``begin`` fills in the rest.
+        shift: Array | None = None,
+    ) -> "Episodes":
+        """Allocate episodes at their starts; the kernel ``begin`` fills in the rest.
 
         Parameters
         ----------
         starts, goals : ndarray, shape (n, n_joints) and (n, 3)
             Configurations [rad or m] and goal positions [m].
-        n_pairs, horizon : int
-            Pairs that are tested for contact, and steps to go.
-        record : bool
-            Keep the configurations visited.
+        n_pairs, horizon, record
+            Pairs that are tested for contact, steps to go, and whether configurations are kept.
         shift : ndarray, shape (n_observations,), optional
             Collect sums of the observations about this point.
         """
         n, n_joints = starts.shape
-        layout = episodes_layout(n, n_joints, n_pairs, horizon if record else 0, shift is not None)
-        known = layout.record_of(cls)
-        episodes: Episodes = known.values
-        episodes.stop[:] = horizon
-        episodes.q[:], episodes.target[:], episodes.goal[:] = starts, starts, goals
-        episodes.path[:] = np.nan
-        if shift is not None:
-            episodes.shift[:] = shift
-        return episodes, known
+        n_observations = observation_size(n_joints)
+        return cls(
+            status=np.zeros(n, dtype=np.int64),
+            steps=np.zeros(n, dtype=np.int64),
+            stop=np.full(n, horizon),
+            q=starts.copy(),
+            target=starts.copy(),
+            doubt=np.zeros(n, dtype=np.int64),
+            touched=np.zeros(n, dtype=np.int64),
+            cleared=np.zeros(n, dtype=bool),
+            planes=np.zeros((n, n_pairs, PLANE)),
+            goal=goals.copy(),
+            observation=np.zeros((n, n_observations)),
+            distance=np.zeros(n),
+            terms=np.zeros((n, len(REWARD_TERMS))),
+            total=np.zeros(n),
+            moments=np.zeros((0 if shift is None else n, 2, n_observations)),
+            shift=np.zeros(n_observations) if shift is None else shift.copy(),
+            path=np.full((n, horizon + 1, n_joints) if record else (0, 0, n_joints), np.nan),
+        )
 
     def resume(self, rows: NDArray[np.int64], horizon: int) -> None:
         """Let episodes go on that success or contact ended; at the horizon they are truncated."""
         over = self.steps[rows] >= horizon
         self.status[rows] = np.where(over, TRUNCATED, RUNNING)
-
-
-@lru_cache(maxsize=64)
-def episodes_layout(n: int, n_joints: int, n_pairs: int, horizon: int, collects: bool) -> Layout:
-    """How `Episodes` lie in memory.
-
-    Parameters
-    ----------
-    n, n_joints, n_pairs : int
-        Numbers of episodes, joints and tested pairs.
-    horizon : int
-        Steps of which configurations are kept; 0 for none.
-    collects : bool
-        Whether moments of observations are collected.
-    """
-    n_observations = observation_size(n_joints)
-    path = (n, horizon + 1, n_joints) if horizon else (0, 0, n_joints)
-    shapes: dict[str, tuple[types.Type, tuple[int, ...]]] = {
-        **dict.fromkeys(("status", "steps", "stop"), (types.int64, (n,))),
-        **dict.fromkeys(("q", "target"), (types.float64, (n, n_joints))),
-        **dict.fromkeys(("doubt", "touched"), (types.int64, (n,))),
-        "cleared": (types.boolean, (n,)),
-        "planes": (types.float64, (n, n_pairs, PLANE)),
-        "goal": (types.float64, (n, 3)),
-        "observation": (types.float64, (n, n_observations)),
-        "distance": (types.float64, (n,)),
-        "terms": (types.float64, (n, len(REWARD_TERMS))),
-        "total": (types.float64, (n,)),
-        "moments": (types.float64, (n if collects else 0, 2, n_observations)),
-        "shift": (types.float64, (n_observations,)),
-        "path": (types.float64, path),
-    }
-    return Layout("Episodes", shapes)

@@ -3,23 +3,20 @@
 ::
 
     KinarmError
-    ├── ArmError            a robot description is missing, malformed or not supported
-    ├── ProblemError        a scene, task or problem that cannot be built, or is another one
-    ├── InvalidInputError   an argument with the wrong shape, range or a non-finite entry
-    │   └── UnknownNameError    a name that does not exist; lists the ones that do
-    ├── StartInContactError a start configuration that touches something
-    ├── PolicyFileError     a policy file or checkpoint that cannot be read or used here
-    ├── RecordingFileError  a file of recordings that cannot be read or used here
-    ├── OutputError         a file or folder that cannot be written
-    ├── MissingExtraError   an optional package that is not installed; says how to install it
-    ├── WorkerError         a worker process that ended unexpectedly
-    └── TrainingFailedError trainings that failed, with their names and reasons
+    ├── ArmError, ProblemError
+    ├── PolicyFileError, RecordingFileError, OutputError
+    ├── InvalidInputError, which is a ValueError
+    │   └── UnknownNameError
+    ├── StartInContactError, MissingExtraError
+    └── WorkerError, TrainingFailedError
 
 Command lines turn any of them into one line on standard error and exit status 2, or 1 for the last
 two, which are failures of a run.
 """
 
+import copyreg
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 LONGEST = 1500
 """Characters of a message; of a longer one, the middle is left out."""
@@ -34,18 +31,17 @@ def one_line(text: str) -> str:
 
 
 class KinarmError(Exception):
-    """Base of all errors that kinarm raises on purpose; what they say is one line.
-
-    Attributes
-    ----------
-    exit_status : int
-        What a command line exits with.
-    """
+    """Base of all errors that kinarm raises on purpose; what they say is one line."""
 
     exit_status = 2
+    """Exit status of a command."""
 
     def __str__(self) -> str:
         return one_line(super().__str__())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Made anew from its message and its attributes, whatever its constructor takes.
+        return copyreg.__newobj__, (type(self), *self.args), vars(self)  # type: ignore[attr-defined]
 
 
 class ArmError(KinarmError):
@@ -65,22 +61,15 @@ class UnknownNameError(InvalidInputError):
 
     Parameters
     ----------
-    kind : str
-        What was looked up, such as ``"task"``.
-    given : str
-        The name as given.
+    kind, given : str
+        What was looked up, such as ``"task"``, and the name as given.
     available : iterable of str
         The names that exist.
     """
 
     def __init__(self, kind: str, given: str, available: Iterable[str]) -> None:
-        self.kind = kind
-        self.given = given
-        self.available = tuple(available)
+        self.kind, self.given, self.available = kind, given, tuple(available)
         super().__init__(f"unknown {kind} {given!r}; available: {', '.join(self.available)}")
-
-    def __reduce__(self) -> tuple[type, tuple[str, str, tuple[str, ...]]]:
-        return type(self), (self.kind, self.given, self.available)
 
 
 class StartInContactError(KinarmError):
@@ -95,12 +84,8 @@ class StartInContactError(KinarmError):
     """
 
     def __init__(self, index: int, pair: tuple[str, str]) -> None:
-        self.index = index
-        self.pair = pair
+        self.index, self.pair = index, pair
         super().__init__(f"start {index} is in contact: {pair[0]} touches {pair[1]}")
-
-    def __reduce__(self) -> tuple[type, tuple[int, tuple[str, str]]]:
-        return type(self), (self.index, self.pair)
 
 
 class PolicyFileError(KinarmError):
@@ -139,25 +124,16 @@ class TrainingFailedError(KinarmError):
         told = "; ".join(f"{name}: {reason}" for name, reason in reasons.items())
         super().__init__(f"{len(reasons)} of {trainings} trainings failed: {told}")
 
-    def __reduce__(self) -> tuple[type, tuple[dict[str, str], int]]:
-        return type(self), (self.reasons, self.trainings)
-
 
 class MissingExtraError(KinarmError):
     """An optional package that is not installed.
 
     Parameters
     ----------
-    package : str
-        The package that is missing.
-    extra : str
-        The extra of kinarm that brings it.
+    package, extra : str
+        What is missing, and the extra of kinarm that brings it.
     """
 
     def __init__(self, package: str, extra: str) -> None:
-        self.package = package
-        self.extra = extra
+        self.package, self.extra = package, extra
         super().__init__(f"{package} is not installed: pip install 'kinarm[{extra}]'")
-
-    def __reduce__(self) -> tuple[type, tuple[str, str]]:
-        return type(self), (self.package, self.extra)

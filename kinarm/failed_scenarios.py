@@ -6,14 +6,11 @@ have another distribution than those of an evaluation, which never replays any.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm._fields import check_fields
-from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError
 
 StartsAndGoals = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -23,42 +20,14 @@ LARGEST_REPLAY = 1_000_000
 """Scenarios that can be kept."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Replay:
-    """How failed scenarios are replayed.
-
-    Parameters
-    ----------
-    share : float
-        Probability that an episode replays a failed scenario, once there is one; 0 replays none.
-    size : int
-        Number of the last failures that are kept; see `FailedScenarios`.
-
-    Raises
-    ------
-    InvalidInputError
-        If the share is no probability, or the size not positive.
-    """
-
-    share: float = 0.5
-    size: int = 8192
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-        if not 0 <= self.share <= 1:
-            raise InvalidInputError(f"share must lie in [0, 1], got {self.share}")
-        whole_number("size", self.size, 1, LARGEST_REPLAY)
-
-
 class FailedScenarios(NamedTuple):
     """Scenarios of the last episodes that failed, the oldest first.
 
     A failure is kept for each episode, not for each scenario: one that failed k times among the
     last ``size`` failures is held k times, and all held ones are replayed with equal chance. So
-    its chance is proportional to its recent failures, which needs no priorities that would have to
-    be estimated, tuned and stored. Newer failures displace the oldest: a mastered scenario adds
-    none, and is forgotten after ``size`` failures of others. Those that always fail are held more
-    and more often, and can displace all others.
+    its chance is proportional to its recent failures, without priorities to be estimated and tuned.
+    A mastered scenario adds none, and is forgotten after ``size`` failures of others. Those that
+    always fail are held more and more often, and can displace all others.
 
     Attributes
     ----------
@@ -72,13 +41,7 @@ class FailedScenarios(NamedTuple):
     goals: NDArray[np.float64]
 
     def check(self) -> None:
-        """Refuse starts and goals that are not as many.
-
-        Raises
-        ------
-        InvalidInputError
-            If they are not.
-        """
+        """Refuse starts and goals that are not as many."""
         shapes = self.starts.shape, self.goals.shape
         if [len(shape) for shape in shapes] != [2, 2] or len(self.starts) != len(self.goals):
             raise InvalidInputError(f"failed scenarios have the shapes {shapes[0]}, {shapes[1]}")
@@ -91,16 +54,12 @@ class FailedScenarios(NamedTuple):
     def followed_by(
         self, starts: NDArray[np.float64], goals: NDArray[np.float64], size: int
     ) -> "FailedScenarios":
-        """Add newer ones, and forget the oldest.
+        """Add newer ones, and forget the oldest but ``size``.
 
         Parameters
         ----------
-        starts : ndarray, shape (n, n_joints)
-            Configurations [rad or m].
-        goals : ndarray, shape (n, 3)
-            Goal positions [m].
-        size : int
-            How many remain, the last ones.
+        starts, goals, size
+            As in `FailedScenarios`, and how many remain.
         """
         parts = zip(self, (starts, goals), strict=True)
         return FailedScenarios(*(np.concatenate(pair)[-size:] for pair in parts))
@@ -116,21 +75,17 @@ class FailedScenarios(NamedTuple):
 
         Parameters
         ----------
-        share : float
-            Probability that a scenario is one of these.
+        share, count : float and int
+            Probability that a scenario is one of these, and how many to draw.
         rng : numpy.random.Generator
             Decides which of them. It is not asked if none can be.
-        count : int
-            How many.
         draw : callable
             Draws those that are new, given their places among all, in ascending order.
 
         Returns
         -------
-        scenarios : tuple of ndarray
-            Starts, shape (count, n_joints), and goals, shape (count, 3).
-        replayed : ndarray of bool, shape (count,)
-            Which are failed ones.
+        tuple
+            Starts and goals, and which are failed ones, an array of bool of shape (count,).
         """
         every = np.arange(count)
         if not share or not len(self.goals):

@@ -33,11 +33,6 @@ class Frame(NamedTuple):
 class Frames:
     """Frames of an arm: joints and links by their names, and the tool.
 
-    Parameters
-    ----------
-    arm : Arm
-        The arm.
-
     Attributes
     ----------
     tool : Frame
@@ -46,15 +41,10 @@ class Frames:
 
     def __init__(self, arm: Arm) -> None:
         self._named: dict[str, Frame] = {}
-        for kind in KINDS:
-            for frame in arm.model.frames:
-                if frame.type == kind:
-                    self._named.setdefault(frame.name, _frame(frame))
-        tool_id = arm.model.getFrameId(arm.tool_frame, pin.FrameType.BODY)
-        self.tool = _frame(arm.model.frames[tool_id])
+        for frame in [each for kind in KINDS for each in arm.model.frames if each.type == kind]:
+            self._named.setdefault(frame.name, _frame(frame))
+        self.tool = _frame(arm.model.frames[arm.model.getFrameId(arm.tool_frame, pin.BODY)])
         self.tool.placement[:3, 3] = arm.chain.tool
-        for frame in (self.tool, *self._named.values()):
-            frame.placement.flags.writeable = False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -63,11 +53,9 @@ class Frames:
 
     def __getitem__(self, name: str | None) -> Frame:
         """Frame of a name; None is the tool."""
-        if name is None:
-            return self.tool
-        if name not in self._named:
+        if name is not None and name not in self._named:
             raise UnknownNameError("frame", name, self.names)
-        return self._named[name]
+        return self.tool if name is None else self._named[name]
 
 
 def _frame(frame: pin.Frame) -> Frame:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -93,12 +95,7 @@ class Kinematics(ABC):
         ndarray, shape (4, 4) or (n, 4, 4)
             Homogeneous transforms from the frame to the world [m].
         """
-        q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
-        joint, placement = self.frames[frame]
-        transforms = np.empty((len(q), 4, 4))
-        arrays = (self.arm.chain, joint, placement, q, transforms)
-        run_rows(place_frame, len(q), len(q), self.threads, *arrays)
-        return transforms[0] if one else transforms
+        return self._of_frame(place_frame, configurations, frame, (4, 4))
 
     def jacobians(self, configurations: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
         """Jacobians of a frame: how it moves per unit speed of each joint, compiled.
@@ -114,12 +111,21 @@ class Kinematics(ABC):
             Velocity of the frame's origin, then angular velocity, along the world's axes
             [m/rad and rad/rad; m/m and 0 of a joint that slides].
         """
+        return self._of_frame(move_frame, configurations, frame, (6, self.arm.n_joints))
+
+    def _of_frame(
+        self,
+        kernel: Callable[..., Any],
+        configurations: ArrayLike,
+        frame: str | None,
+        shape: tuple[int, int],
+    ) -> NDArray[np.float64]:
+        """Fill in an array of a shape at each configuration."""
         q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
-        joint, placement = self.frames[frame]
-        jacobians = np.zeros((len(q), 6, self.arm.n_joints))
-        arrays = (self.arm.chain, joint, placement, q, jacobians)
-        run_rows(move_frame, len(q), len(q), self.threads, *arrays)
-        return jacobians[0] if one else jacobians
+        filled = np.zeros((len(q), *shape))
+        arrays = (self.arm.chain, *self.frames[frame], q, filled)
+        run_rows(kernel, len(q), len(q), self.threads, *arrays)
+        return filled[0] if one else filled
 
     def inverse_kinematics(
         self,
@@ -166,26 +172,21 @@ class Kinematics(ABC):
         separation : float, optional
             Least difference of two solutions in some joint; 0.001 if they are isolated, else 0.2
             by default [rad or m].
-
-        Raises
-        ------
-        InvalidInputError
-            If a shape is wrong, an entry is not finite, a matrix is no pose, a direction is zero,
-            ``near`` is beyond the limits or a number is out of range.
         """
         arm = self.arm
         positions, wanted, axes = _targets(arm, self.frames.tool, targets, directions, tool_axis)
-        start = _near(arm, near)
+        start = finite_array("near", arm.home if near is None else near, (arm.n_joints,))
+        if ((start < arm.lower) | (start > arm.upper)).any():
+            raise InvalidInputError(f"near lies outside the limits: {start.tolist()}")
         search = _search(arm, axes, start, joints, separation)
-        moved, isolated = search.seeds.shape[1], search.least > 0
         configurations, owner = self._solutions(search, positions, wanted, most)
         if free:
             kept = ~self.in_contact(configurations)
             configurations, owner = configurations[kept], owner[kept]
         if turns:
-            configurations, owner = _turned(arm, configurations, owner, moved)
+            configurations, owner = _turned(arm, configurations, owner, search.seeds.shape[1])
         order = np.lexsort((np.abs(configurations - start).max(axis=1, initial=0.0), owner))
-        return InverseSolutions(configurations[order], owner[order], isolated)
+        return InverseSolutions(configurations[order], owner[order], search.least > 0)
 
     def _solutions(
         self,
@@ -216,9 +217,8 @@ def _search(
     separation: float | None,
 ) -> Search:
     """Check what is looked for, and complete it; see `Kinematics.inverse_kinematics`."""
-    moved = _moved(arm, axes) if joints is None else whole_number("joints", joints, 1)
-    if moved > arm.n_joints:
-        raise InvalidInputError(f"joints must be at most {arm.n_joints}, got {moved}")
+    moved = _moved(arm, axes) if joints is None else joints
+    moved = whole_number("joints", moved, 1, arm.n_joints)
     isolated = moved <= {0: 3, 1: 5, 3: 6}[len(axes)]
     if separation is None:
         separation = ISOLATED_SEPARATION if isolated else CONTINUUM_SEPARATION
@@ -246,7 +246,7 @@ def _targets(
 
     The axes are those of the last joint frame.
     """
-    if _are_poses(targets):
+    if np.shape(targets)[-2:] == (4, 4):
         if directions is not None or tool_axis is not None:
             raise InvalidInputError("a pose is wanted: directions and tool_axis do not apply")
         poses, _ = one_or_many("targets", targets, (4, 4))
@@ -272,14 +272,6 @@ def _targets(
         axis = (tool.placement[:3, :3] * given).sum(axis=1)
     # Copied, they can be written to like the others: kernels are not compiled once more for them.
     return positions, np.array(along[:, None], order="C"), np.array(axis[None])
-
-
-def _are_poses(targets: ArrayLike) -> bool:
-    """Whether targets have the shape of a pose, or of many."""
-    try:
-        return np.shape(targets)[-2:] == (4, 4)
-    except ValueError:
-        return False
 
 
 def _check_poses(poses: NDArray[np.float64]) -> None:
@@ -321,26 +313,15 @@ def _moved(arm: Arm, axes: NDArray[np.float64]) -> int:
     return arm.n_joints - int(spins)
 
 
-def _near(arm: Arm, near: ArrayLike | None) -> NDArray[np.float64]:
-    """Check the configuration whose neighbours are preferred; home by default."""
-    q = finite_array("near", arm.home if near is None else near, (arm.n_joints,))
-    if ((q < arm.lower) | (q > arm.upper)).any():
-        raise InvalidInputError(f"near lies outside the limits: {q.tolist()}")
-    return q
-
-
 def _turned(
     arm: Arm, configurations: NDArray[np.float64], owner: NDArray[np.int64], moved: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Add what differs by whole turns and lies within the limits."""
     for joint in np.flatnonzero(~arm.chain.prismatic[:moved]):
         span = int((arm.upper[joint] - arm.lower[joint]) / TURN)
-        copies = []
-        for turn in range(-span, span + 1):
-            other = configurations.copy()
-            other[:, joint] += turn * TURN
-            within = (other[:, joint] >= arm.lower[joint]) & (other[:, joint] <= arm.upper[joint])
-            copies.append((other[within], owner[within]))
-        configurations = np.concatenate([each for each, _ in copies])
-        owner = np.concatenate([each for _, each in copies])
+        turns = np.arange(-span, span + 1)
+        others, owner = np.tile(configurations, (len(turns), 1)), np.tile(owner, len(turns))
+        others[:, joint] += np.repeat(turns, len(configurations)) * TURN
+        within = (others[:, joint] >= arm.lower[joint]) & (others[:, joint] <= arm.upper[joint])
+        configurations, owner = others[within], owner[within]
     return configurations, owner

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial import HalfspaceIntersection
 
 from kinarm._archive import Arrays, cached_arrays
-from kinarm._files import absolute, first_line, is_file, read_file
+from kinarm._files import absolute, first_line, is_file
 from kinarm.errors import ArmError
 from kinarm.urdf_tree import FARTHEST, parse_xml
 
@@ -34,10 +34,6 @@ NUMBERS = re.compile(r"\s*(?:[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?:\s+|$))
 
 FLAT = 1e-9
 """Thickness over width of what has no volume."""
-
-LARGEST = 200 * 10**6
-"""Size of a mesh file at most [bytes]."""
-
 
 VERSION = 1
 """To be raised when the same mesh gets another hull."""
@@ -60,10 +56,8 @@ def resolve_meshes(robot: ElementTree.Element, path: Path, folders: Collection[s
 
     Parameters
     ----------
-    robot : xml.etree.ElementTree.Element
-        Root of the URDF.
-    path : Path
-        Its file.
+    robot, path
+        Root of the URDF, and its file.
     folders : collection of str
         Folders of packages, besides those around the file.
 
@@ -90,15 +84,14 @@ def _mesh_path(name: str, path: Path, folders: Collection[str]) -> Path | None:
     scheme, separator, inside = name.partition("://")
     if scheme == "file":
         return Path(inside) if is_file(inside) else None
-    if not separator:
-        beside = path.parent / name
-        return absolute(beside) if is_file(beside) else None
-    around = (*map(Path, folders), *path.parents)
-    own = (folder.parent for folder in around if folder.name == inside.partition("/")[0])
-    for folder in (*around, *own):
-        if is_file(folder / inside):
-            return absolute(folder / inside)
-    return None
+    if separator:
+        around = (*map(Path, folders), *path.parents)
+        package = inside.partition("/")[0]
+        own = (folder.parent for folder in around if folder.name == package)
+        places = [folder / inside for folder in (*around, *own)]
+    else:
+        places = [path.parent / name]
+    return next((absolute(place) for place in places if is_file(place)), None)
 
 
 def mesh_content(path: Path) -> bytes:
@@ -107,12 +100,12 @@ def mesh_content(path: Path) -> bytes:
     Raises
     ------
     ArmError
-        If it cannot be read, is of another format, or claims more than it holds.
+        If it does, or cannot be read, or is of another format.
     """
     if path.suffix.lower() not in FORMATS:
         raise ArmError(f"mesh {path.name!r} must be a file of {', '.join(FORMATS)}")
     try:
-        content = read_file(path, LARGEST)
+        content = path.read_bytes()
         if path.suffix.lower() == ".dae":
             _check_collada(content)
     except OSError as error:
@@ -136,13 +129,7 @@ def _check_collada(content: bytes) -> None:
 
 
 def check_vertices(path: Path, vertices: NDArray[np.float64]) -> None:
-    """Refuse a mesh whose vertices, shape (n, 3), span no volume or are too far away [m].
-
-    Raises
-    ------
-    ArmError
-        If they do.
-    """
+    """Refuse a mesh whose vertices, shape (n, 3), span no volume or are too far away [m]."""
     farthest = np.abs(vertices).max(initial=0.0)
     if not farthest <= FARTHEST:
         raise ArmError(f"mesh {path.name!r} has a vertex {farthest:g} m away")
@@ -152,16 +139,9 @@ def check_vertices(path: Path, vertices: NDArray[np.float64]) -> None:
 
 
 def hull_of_mesh(path: Path, scale: NDArray[np.float64]) -> coal.ConvexBase:
-    """Convex hull of a mesh, or a simpler polytope around it where it has many vertices.
+    """Convex hull of the vertices of a mesh file, or a simpler polytope around many.
 
-    Its corners are kept in the cache folder.
-
-    Parameters
-    ----------
-    path : Path
-        File of the mesh; its vertices count, not its triangles.
-    scale : ndarray, shape (3,)
-        Factors along its axes.
+    Its corners are kept in the cache folder. ``scale``, shape (3,), holds factors along its axes.
 
     Raises
     ------
@@ -170,8 +150,9 @@ def hull_of_mesh(path: Path, scale: NDArray[np.float64]) -> coal.ConvexBase:
     """
     content = scale.tobytes() + mesh_content(path)
     corners = cached_arrays("hull", VERSION, content, lambda: _corners(path, scale))["corners"]
-    check_vertices(path, corners.reshape(-1, 3))
-    return _hull(corners)
+    points = coal.StdVec_Vec3s()
+    points.extend(corners)
+    return coal.Convex.convexHull(points, True, "Qt")
 
 
 def _corners(path: Path, scale: NDArray[np.float64]) -> Arrays:
@@ -186,28 +167,11 @@ def _corners(path: Path, scale: NDArray[np.float64]) -> Arrays:
         raise ArmError(f"mesh {path.name} cannot be loaded: {first_line(error)}") from error
 
 
-def _hull(points: NDArray[np.float64]) -> coal.ConvexBase:
-    """Convex hull of points, shape (n, 3)."""
-    corners = coal.StdVec_Vec3s()
-    corners.extend(points)
-    return coal.Convex.convexHull(corners, True, "Qt")
-
-
 def enclosing_corners(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Corners of a polytope of few faces around a set of points.
+    """Corners, at most ``2 * PLANES - 4``, of a polytope around points that span a volume [m].
 
     Faces touch the set. They start with a box and its bevelled corners; then the corner that
     stands out farthest is cut off, until none does by more than `EXCESS`.
-
-    Parameters
-    ----------
-    points : ndarray, shape (n, 3)
-        Points that span a volume [m].
-
-    Returns
-    -------
-    ndarray, shape (n_corners, 3)
-        At most ``2 * PLANES - 4`` [m].
     """
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     around = points - middle

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm._validation import finite_array
 from kinarm.episodes import Control
 from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.kernels.compiling import Array
 from kinarm.kernels.network import LEAK
 from kinarm.observation import GOAL_SIDE
 
@@ -25,7 +26,7 @@ class CompiledPolicy(Protocol):
         """The policy as a batch of one network, its normaliser included."""
 
 
-ACTIVATIONS: dict[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
+ACTIVATIONS: dict[str, Callable[[Array], Array]] = {
     "linear": lambda values: values,
     "tanh": np.tanh,
     "relu": lambda values: np.maximum(values, 0.0),
@@ -34,40 +35,41 @@ ACTIVATIONS: dict[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
     "leaky_relu": lambda values: np.where(values < 0, LEAK * values, values),
     "silu": lambda values: values * (0.5 + 0.5 * np.tanh(0.5 * values)),
 }
-"""Activation functions by name, as the kernels apply them."""
+"""Activation functions by name, as the kernels apply them, in the order of `kinarm.episodes`."""
 
 Activation = Literal["linear", "tanh", "relu", "hardtanh", "elu", "leaky_relu", "silu"]
-ACTIVATION_CODES = {name: code for code, name in enumerate(ACTIVATIONS)}
-"""Their numbers in the kernels, in the order of `kinarm.episodes`."""
 
 
-class Mirror(NamedTuple):
-    """Signs that the reflection y -> -y gives to each number.
+class Layer(NamedTuple):
+    """An affine map: ``weights @ x + bias``.
 
     Attributes
     ----------
-    observations : ndarray, shape (n_observations,)
-        Signs of the entries of an observation.
-    actions : ndarray, shape (n_actions,)
-        Signs of the entries of an action.
+    weights : ndarray, shape (n_out, n_in)
+    bias : ndarray, shape (n_out,)
     """
 
-    observations: NDArray[np.float64]
-    actions: NDArray[np.float64]
+    weights: Array
+    bias: Array
 
-    def on_the_left(self, observations: NDArray[np.float64]) -> NDArray[np.bool_]:
+
+class Mirror(NamedTuple):
+    """Signs that the reflection y -> -y gives to the entries of an observation and an action."""
+
+    observations: Array
+    actions: Array
+
+    def on_the_left(self, observations: Array) -> NDArray[np.bool_]:
         """Which observations, shape (n, n_observations), have a goal to the left of the arm."""
         left: NDArray[np.bool_] = observations[:, GOAL_SIDE] > 0
         return left
 
-    def from_the_right(self, observations: NDArray[np.float64]) -> NDArray[np.float64]:
+    def from_the_right(self, observations: Array) -> Array:
         """Reflect those observations, shape (n, n_observations), whose goal lies to the left."""
         left = self.on_the_left(observations)
         return np.where(left[:, None], observations * self.observations, observations)
 
-    def scenarios_from_the_right(
-        self, starts: NDArray[np.float64], goals: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def scenarios_from_the_right(self, starts: Array, goals: Array) -> tuple[Array, Array]:
         """Reflect those starts, shape (n, n_joints), and goals, shape (n, 3), that lie to the left.
 
         Joints that are not actuated stay as they are.
@@ -96,16 +98,10 @@ class Networks:
     mirror : Mirror or None
         Reflection in which the networks see goals on the left, and act; None if they see all
         goals as they are.
-
-    Raises
-    ------
-    InvalidInputError
-        If the number of parameters or of functions does not fit the widths, or a parameter is not
-        finite.
     """
 
     layers: NDArray[np.int64]
-    weights: NDArray[np.float64]
+    weights: Array
     activations: tuple[Activation, ...] = ()
     mirror: Mirror | None = None
 
@@ -125,29 +121,15 @@ class Networks:
         return f"Networks({len(self.weights)} of layers {widths})"
 
     @classmethod
-    def linear(cls, matrices: NDArray[np.float64], biases: NDArray[np.float64]) -> Networks:
-        """Linear policies.
-
-        Parameters
-        ----------
-        matrices : ndarray, shape (n, n_actions, n_observations)
-            Maps from observations to actions.
-        biases : ndarray, shape (n, n_actions)
-            Constant parts of the actions.
-        """
+    def linear(cls, matrices: Array, biases: Array) -> Networks:
+        """Linear policies, of maps, shape (n, n_actions, n_observations), and constant parts."""
         n, n_out, n_in = matrices.shape
         flat = matrices.transpose(0, 2, 1).reshape(n, -1)
         return cls(np.array([n_in, n_out]), np.concatenate([flat, biases], axis=1))
 
     @classmethod
     def collect(cls, policies: Networks | CompiledPolicy | Sequence[CompiledPolicy]) -> Networks:
-        """Gather policies into one batch.
-
-        Raises
-        ------
-        InvalidInputError
-            If there is none, one cannot run compiled, or their layers differ.
-        """
+        """Gather policies into one batch, if their layers, functions and mirror are the same."""
         if isinstance(policies, Networks):
             return policies
         if isinstance(policies, CompiledPolicy):
@@ -180,7 +162,7 @@ def network_control(
     n: int,
     widths: tuple[int, int],
 ) -> Control:
-    """Arrange the networks of n episodes for the kernels.
+    """Arrange the networks of n episodes for the kernels, if they fit.
 
     Parameters
     ----------
@@ -188,15 +170,8 @@ def network_control(
         One for all episodes, or one for each, or as many as ``policy_index`` chooses from.
     policy_index : array_like of int, shape (n,), or None
         Which policy drives which episode.
-    n : int
-        Number of episodes.
-    widths : tuple of int
-        Lengths of an observation and of an action.
-
-    Raises
-    ------
-    InvalidInputError
-        If the networks do not fit the widths, or the index does not fit the networks.
+    n, widths
+        Number of episodes, and lengths of an observation and of an action.
     """
     networks = Networks.collect(policies)
     given = (int(networks.layers[0]), int(networks.layers[-1]))
@@ -215,11 +190,11 @@ def network_control(
         whole = index.shape == (n,) and index.dtype.kind in "iu"
         if not whole or (n and not 0 <= index.min() <= index.max() < count):
             raise InvalidInputError(f"policy_index must hold {n} whole numbers in 0..{count - 1}")
-    control = table_control(np.zeros((0, 0, 0)))._replace(
+    control = Control(
         layers=networks.layers,
         weights=networks.weights,
         policy=index.astype(np.int64),
-        activations=np.array([ACTIVATION_CODES[name] for name in networks.activations]),
+        activations=np.array([[*ACTIVATIONS].index(name) for name in networks.activations]),
     )
     if networks.mirror is None:
         return control
@@ -228,32 +203,10 @@ def network_control(
     return control._replace(observation_signs=signs, action_signs=action_signs)
 
 
-def table_control(actions: NDArray[np.float64]) -> Control:
-    """Take actions from a table, shape (n, n_steps, n_actions); one step serves every step."""
-    return Control(
-        layers=np.zeros(0, dtype=np.int64),
-        weights=np.zeros((0, 0)),
-        policy=np.zeros(0, dtype=np.int64),
-        activations=np.zeros(0, dtype=np.int64),
-        observation_signs=np.zeros(0),
-        action_signs=np.zeros(0),
-        side=GOAL_SIDE,
-        actions=actions,
-    )
-
-
 def checked_activations(given: Sequence[Activation], n_layers: int) -> tuple[Activation, ...]:
-    """The functions after some layers: those given, or the usual ones if none are.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such function.
-    InvalidInputError
-        If there is not one for each layer.
-    """
+    """The functions after some layers: those given, or the usual ones if none are."""
     for name in given:
-        if name not in ACTIVATION_CODES:
+        if name not in ACTIVATIONS:
             raise UnknownNameError("activation function", str(name), get_args(Activation))
     if not given:
         between: tuple[Activation, ...] = ("tanh",)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from kinarm.kernels.compiling import Array, Vector, inlined
 
@@ -19,12 +20,8 @@ VERSION = 1
 class Ranges(NamedTuple):
     """Ranges of the entries of an observation, in the problem at hand.
 
-    Attributes
-    ----------
-    goal_lower, goal_upper : ndarray, shape (3,)
-        Corners of a box that holds all goals, and the tolerance about them [m].
-    reach : float
-        Bound on the distance from the world's origin to any point of the arm [m].
+    Corners of a box that holds all goals and the tolerance about them, and a bound on the distance
+    from the world's origin to any point of the arm [m].
     """
 
     goal_lower: Array
@@ -37,20 +34,16 @@ class Part(NamedTuple):
 
     Attributes
     ----------
-    name : str
-        Its name in layouts.
-    meaning, unit : str
-        What it is, for people.
+    name, meaning, unit : str
+        Its name in layouts, and what it is, for people.
     signs : tuple of int
         Per entry, the sign that the reflection y -> -y gives it; as many as it has entries.
     bounds : callable
         From `Ranges` to the lowest and the highest values of its entries.
     write : callable
         Formula; see `write_goal`.
-    per_joint : bool
-        Whether there is one for every joint.
-    of_goal : bool
-        Whether it depends on the goal.
+    per_joint, of_goal : bool
+        Whether there is one for every joint, and whether it depends on the goal.
     """
 
     name: str
@@ -66,6 +59,11 @@ class Part(NamedTuple):
         """Number of its entries in the observation of an arm."""
         return len(self.signs) * (n_joints if self.per_joint else 1)
 
+    def repeated(self, values: ArrayLike, n_joints: int) -> Array:
+        """Values of its entries, or one for all of them, for every joint that it is of."""
+        once = np.broadcast_to(np.asarray(values, dtype=np.float64), len(self.signs))
+        return np.tile(once, self.length(n_joints) // len(self.signs))
+
 
 @inlined
 def write_goal(
@@ -77,63 +75,41 @@ def write_goal(
     ----------
     poses : ndarray, shape (n_joints + 1, POSE)
         Forward kinematics; see `kinarm.kernels.kinematics.forward_kinematics`.
-    tool : tuple of float
-        The tool point in the world [m].
-    goals, observations : ndarray, shape (n_episodes, 3) and (n_episodes, n_observations)
-        Goal points [m], and where the part is written.
-    e : int
-        Episode.
-    k : int
-        Joint, from 1; 0 for a part that is not per joint.
-    start : int
-        First entry of the part.
+    tool, goals
+        The tool point, and goal points, shape (n_episodes, 3), in the world [m].
+    e, k : int
+        Episode, and joint from 1; 0 for a part that is not per joint.
+    observations, start
+        Table, shape (n_episodes, n_observations), and the first entry of the part.
     """
     for i in range(3):
         observations[e, start + i] = goals[e, i]
 
 
 @inlined
-def write_offset(
+def _write_offset(
     poses: Array, tool: Vector, goals: Array, e: int, k: int, observations: Array, start: int
 ) -> None:
-    """Goal minus tool point.
-
-    Parameters
-    ----------
-    poses, tool, goals, e, k, observations, start
-        As for `write_goal`.
-    """
+    """Goal minus tool point."""
     observations[e, start] = goals[e, 0] - tool[0]
     observations[e, start + 1] = goals[e, 1] - tool[1]
     observations[e, start + 2] = goals[e, 2] - tool[2]
 
 
 @inlined
-def write_orientation(
+def _write_orientation(
     poses: Array, tool: Vector, goals: Array, e: int, k: int, observations: Array, start: int
 ) -> None:
-    """Orientation of a joint frame.
-
-    Parameters
-    ----------
-    poses, tool, goals, e, k, observations, start
-        As for `write_goal`.
-    """
+    """Orientation of a joint frame."""
     for i in range(4):
         observations[e, start + i] = poses[k, i]
 
 
 @inlined
-def write_position(
+def _write_position(
     poses: Array, tool: Vector, goals: Array, e: int, k: int, observations: Array, start: int
 ) -> None:
-    """Position of a joint frame.
-
-    Parameters
-    ----------
-    poses, tool, goals, e, k, observations, start
-        As for `write_goal`.
-    """
+    """Position of a joint frame."""
     for i in range(3):
         observations[e, start + i] = poses[k, 13 + i]
 
@@ -157,7 +133,7 @@ OBSERVATION = (
         unit="m",
         signs=POLAR,
         bounds=lambda ranges: (ranges.goal_lower - ranges.reach, ranges.goal_upper + ranges.reach),
-        write=write_offset,
+        write=_write_offset,
         of_goal=True,
     ),
     Part(
@@ -166,7 +142,7 @@ OBSERVATION = (
         unit="1",
         signs=(1, -1, 1, -1),
         bounds=lambda _: (-1 - 1e-6, 1 + 1e-6),  # to within rounding
-        write=write_orientation,
+        write=_write_orientation,
         per_joint=True,
     ),
     Part(
@@ -175,7 +151,7 @@ OBSERVATION = (
         unit="m",
         signs=POLAR,
         bounds=lambda ranges: (-ranges.reach, ranges.reach),
-        write=write_position,
+        write=_write_position,
         per_joint=True,
     ),
 )
@@ -199,36 +175,34 @@ def observation_layout() -> str:
 
 def observation_signs(n_joints: int) -> Array:
     """Signs that the reflection y -> -y gives to the entries, shape (n_observations,)."""
-    parts = [np.tile(part.signs, part.length(n_joints) // len(part.signs)) for part in OBSERVATION]
-    return np.concatenate(parts).astype(np.float64)
+    return np.concatenate([part.repeated(part.signs, n_joints) for part in OBSERVATION])
 
 
 def observation_bounds(ranges: Ranges, n_joints: int) -> tuple[Array, Array]:
     """Lowest and highest values of the entries, shape (n_observations,) each."""
-    ends: list[list[Array]] = [[], []]
-    for part in OBSERVATION:
-        for end, bound in zip(ends, part.bounds(ranges), strict=True):
-            once = np.broadcast_to(bound, len(part.signs))
-            end.append(np.tile(once, part.length(n_joints) // len(part.signs)))
-    lower, upper = (np.concatenate(end) for end in ends)
+    bounds = [(part, part.bounds(ranges)) for part in OBSERVATION]
+    lower, upper = (
+        np.concatenate([part.repeated(each[end], n_joints) for part, each in bounds])
+        for end in (0, 1)
+    )
     return lower, upper
 
 
 def part_slices(n_joints: int) -> dict[str, slice]:
     """Where each part lies in the observation of an arm, by its name."""
-    slices, start = {}, 0
-    for part in OBSERVATION:
-        slices[part.name] = slice(start, start + part.length(n_joints))
-        start += part.length(n_joints)
-    return slices
+    ends = np.cumsum([part.length(n_joints) for part in OBSERVATION]).tolist()
+    return {
+        part.name: slice(end - part.length(n_joints), end)
+        for part, end in zip(OBSERVATION, ends, strict=True)
+    }
 
 
 def observation_table(n_joints: int) -> list[tuple[str, ...]]:
     """Indices, meaning and unit of each part in the observation of an arm, for people."""
-    places = part_slices(n_joints)
+    places = part_slices(n_joints).values()
     return [
-        (f"{places[part.name].start}-{places[part.name].stop - 1}", part.meaning, part.unit)
-        for part in OBSERVATION
+        (f"{place.start}-{place.stop - 1}", part.meaning, part.unit)
+        for part, place in zip(OBSERVATION, places, strict=True)
     ]
 
 

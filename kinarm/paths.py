@@ -32,7 +32,7 @@ def record_path(
     problem : World, ReachProblem, str or Path
         Arm, scene and time step; a horizon that is too short for the path is made longer.
     path : array_like, shape (n, n_joints)
-        Configurations within the limits [rad or m].
+        At least one configuration, all within the limits [rad or m].
     goal : array_like, shape (3,), optional
         Goal position, the tool point at the end of the path by default [m].
     name : str
@@ -40,9 +40,6 @@ def record_path(
 
     Raises
     ------
-    InvalidInputError
-        If the path is empty, a shape is wrong, an entry is not finite or a configuration is beyond
-        the limits.
     StartInContactError
         If the first configuration touches something.
     """

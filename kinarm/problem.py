@@ -1,13 +1,13 @@
 """The problem: an arm, a scene, a task and a stepping, as one value.
 
 Everything that simulates, trains, bounds, evaluates, records or stores takes a problem and names
-it.
+it. What cannot be used is refused by a `KinarmError`, in one line that names it.
 """
 
 import hashlib
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Any
 import tomli_w
 
 from kinarm._fields import check_fields, from_plain, init_fields, to_plain
-from kinarm._files import absolute, write_text
+from kinarm._files import absolute, named_file, write_text
 from kinarm._validation import whole_number
 from kinarm.arm_specification import ArmSpecification
 from kinarm.errors import ProblemError, UnknownNameError
-from kinarm.problem_files import PAPER_TASKS, find_scene, find_task, problem_file, read_problem
+from kinarm.problem_files import PAPER_TASKS, find_scene, find_task, read_problem
 from kinarm.scene import Scene
 from kinarm.task import ReachTask, RewardWeights
 
@@ -37,15 +37,8 @@ class Stepping:
     time_step : float
         Duration of a step [s].
     tested_configurations : int
-        Evenly spaced configurations at which the motion of a step is tested for contact, its
-        end included.
-
-    Raises
-    ------
-    ProblemError
-        If the time step is not a positive number.
-    InvalidInputError
-        If the number of configurations is none from 1 to 32.
+        Evenly spaced configurations, from 1 to 32, at which the motion of a step is tested for
+        contact, its end included.
     """
 
     time_step: float = 0.02
@@ -74,13 +67,6 @@ class ReachProblem:
         Goals, endings, starts and rewards.
     stepping : Stepping
         How time passes.
-
-    Raises
-    ------
-    UnknownNameError
-        If the scene has no goal region that the task names.
-    ProblemError
-        If such a region lies inside an obstacle.
     """
 
     name: str
@@ -117,13 +103,6 @@ class ReachProblem:
             ``"left"``, ``"right"`` or ``"both"``, the paper's tasks 1, 2 and 3, or another name of
             `problem_names`; the path of a TOML file; what `to_json` returned; or a problem, which
             is returned as it is.
-
-        Raises
-        ------
-        UnknownNameError
-            If there is no such problem.
-        InvalidInputError
-            If the file cannot be used; in one line that names file, key and what is expected.
         """
         if isinstance(problem, ReachProblem):
             return problem
@@ -131,7 +110,7 @@ class ReachProblem:
             return cls.from_json(problem)
         if str(problem) in PROBLEMS:
             return PROBLEMS[str(problem)]
-        path = problem_file(problem)
+        path = named_file("problem", problem, PAPER_TASKS)
         read = cls.from_json(read_problem(path), str(path))
         return replace(read, arm=read.arm.resolved(absolute(path).parent))
 
@@ -146,13 +125,6 @@ class ReachProblem:
             (weights, or a mapping of those that change); or any field of the task or of the
             stepping, such as ``tolerance``. None leaves what there is. In a scene, by name or
             file, that lacks a goal region of the task, all regions are to be reached.
-
-        Raises
-        ------
-        UnknownNameError
-            If there is no such part or field.
-        KinarmError
-            If a value cannot be used.
         """
         given = {name: value for name, value in overrides.items() if value is not None}
         if not given:
@@ -160,7 +132,7 @@ class ReachProblem:
         changes = _taken(given, ReachProblem)
         if "arm" in changes:
             changes["arm"] = _specification(changes["arm"])
-        for name, find in PARTS.items():
+        for name, find in (("scene", find_scene), ("task", find_task)):
             if isinstance(changes.get(name), str | Path):
                 changes[name] = find(changes[name])
         task, stepping = changes.get("task", self.task), changes.get("stepping", self.stepping)
@@ -208,19 +180,16 @@ class ReachProblem:
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     def first_difference(self, other: "ReachProblem") -> str | None:
-        """Say where another problem first differs in what behaviour depends on.
+        """Say where another problem first differs in what behaviour depends on; None if nowhere.
 
-        Returns
-        -------
-        str or None
-            Such as ``"task.tolerance is 0.03, not 0.05"``, with the own value last.
+        Such as ``"task.tolerance is 0.03, not 0.05"``, with the own value last.
         """
         if other is self:
             return None
         if self.arm_digest != other.arm_digest:
             version = "another version of " if self.arm.name == other.arm.name else ""
             return f"arm is {version}{other.arm.name!r}, not {self.arm.name!r}"
-        ours, theirs = (_flattened(to_plain(problem)) for problem in (self, other))
+        ours, theirs = (dict(_leaves(to_plain(problem))) for problem in (self, other))
         for key in dict.fromkeys((*ours, *theirs)):
             here, there = ours.get(key, "missing"), theirs.get(key, "missing")
             if here != there and key != "name" and not key.startswith("arm."):
@@ -241,20 +210,7 @@ class ReachProblem:
         return wider and self.replace(**goals).first_difference(other) is None
 
     def check_same(self, other: "ReachProblem", what: str) -> None:
-        """Refuse another problem.
-
-        Parameters
-        ----------
-        other : ReachProblem
-            The problem that ``what`` is of.
-        what : str
-            What it is that should be of this problem, for the message.
-
-        Raises
-        ------
-        ProblemError
-            If anything that behaviour depends on differs; names the first field that does.
-        """
+        """Refuse another problem, which is that of ``what``, by the first field that differs."""
         difference = self.first_difference(other)
         if difference is not None:
             raise ProblemError(f"{what} is of another problem: {difference}")
@@ -266,13 +222,7 @@ class ReachProblem:
 
     @classmethod
     def from_json(cls, entries: object, where: str = "problem") -> "ReachProblem":
-        """Rebuild what `to_json` returned.
-
-        Raises
-        ------
-        InvalidInputError
-            If an entry is missing, unknown or wrong; names it and where it comes from.
-        """
+        """Rebuild what `to_json` returned; errors name ``where`` it is from."""
         return from_plain(cls, entries, where)
 
     def to_toml(self) -> str:
@@ -280,13 +230,7 @@ class ReachProblem:
         return tomli_w.dumps(self.to_json())
 
     def save(self, path: str | Path) -> None:
-        """Write a problem file.
-
-        Raises
-        ------
-        OutputError
-            If it cannot be written.
-        """
+        """Write a problem file."""
         write_text(path, self.to_toml())
 
 
@@ -300,10 +244,6 @@ PROBLEMS = {
 """The paper's tasks 1, 2 and 3 by name."""
 
 
-PARTS: dict[str, Callable[[Any], Any]] = {"scene": find_scene, "task": find_task}
-"""Parts of a problem that can be named, and how they are found."""
-
-
 def _specification(arm: "Arm | ArmSpecification | str | Path") -> ArmSpecification:
     from kinarm.arm import Arm
 
@@ -313,28 +253,23 @@ def _specification(arm: "Arm | ArmSpecification | str | Path") -> ArmSpecificati
 
 
 def _taken(given: dict[str, Any], kind: type) -> dict[str, Any]:
-    """Take the fields of a dataclass out of the given values."""
     return {name: given.pop(name) for name in init_fields(kind) if name in given}
 
 
 def _check_names(what: str, given: Mapping[str, Any], *kinds: type) -> None:
-    """Refuse names that are fields of none of the dataclasses."""
     available = [item.name for kind in kinds for item in fields(kind)]
     for name in given:
         if name not in available:
             raise UnknownNameError(what, name, available)
 
 
-def _flattened(value: Any, path: str = "") -> dict[str, Any]:
-    """Values of nested tables and lists by their paths, such as ``scene.obstacles[0].name``."""
+def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Values of nested tables and lists with their paths, such as ``scene.obstacles[0].name``."""
     if isinstance(value, Mapping):
-        parts = {f"{path}.{key}" if path else key: entry for key, entry in value.items()}
+        for key, entry in value.items():
+            yield from _leaves(entry, f"{path}.{key}" if path else key)
     elif isinstance(value, list):
-        parts = {f"{path}[{number}]": entry for number, entry in enumerate(value)}
+        for number, entry in enumerate(value):
+            yield from _leaves(entry, f"{path}[{number}]")
     else:
-        return {path: value}
-    return {
-        leaf: entry
-        for name, part in parts.items()
-        for leaf, entry in _flattened(part, name).items()
-    }
+        yield path, value

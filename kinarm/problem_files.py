@@ -1,16 +1,17 @@
-"""Files of problems, scenes and tasks: those that ship with kinarm, and the user's own."""
+"""Files of problems, scenes and tasks: those that ship with kinarm, and the user's own.
+
+Names that do not exist are an `UnknownNameError`, and files that cannot be used an
+`InvalidInputError`.
+"""
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cache
-from importlib import resources
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, TypeVar
 
-from kinarm._fields import from_plain, read_toml, summary_of, take_base, to_plain
-from kinarm._files import is_file
-from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm._fields import from_plain, read_toml, take_base, to_plain
+from kinarm._files import is_file, named_file, shipped_files
+from kinarm.errors import InvalidInputError
 from kinarm.scene import Scene
 from kinarm.task import ReachTask
 
@@ -23,13 +24,6 @@ KEYS = {"base", "name", "arm", "scene", "task", "stepping"}
 """Keys of a problem file."""
 
 
-@cache
-def shipped_files(folder: str) -> Mapping[str, Path]:
-    """Files of a folder of kinarm's data, such as ``"scenes"``, by name."""
-    with resources.as_file(resources.files("kinarm.data") / folder) as path:
-        return MappingProxyType({file.stem: file for file in sorted(path.glob("*.toml"))})
-
-
 def problem_names() -> tuple[str, ...]:
     """Names of the problems that ship with kinarm."""
     return (*PAPER_TASKS, *shipped_files("problems"))
@@ -40,28 +34,12 @@ def scene_names() -> tuple[str, ...]:
     return tuple(shipped_files("scenes"))
 
 
-def problem_file(name: str | Path) -> Path:
-    """The file of a problem, by its name or path.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such problem.
-    """
-    return _file("problem", name, "problems", tuple(PAPER_TASKS))
-
-
 def read_problem(path: Path) -> dict[str, Any]:
     """Read a problem file, as a table of what differs from the defaults of a problem.
 
     Its parts are tables; ``arm``, ``scene`` and ``task`` may also be names or files. What is left
     out is that of the problem ``base``. Without a word on goal regions, another scene's are all
     to be reached.
-
-    Raises
-    ------
-    InvalidInputError
-        If the file, or that of a part, cannot be used.
     """
     entries = read_toml(path, "problem")
     regions = PAPER_TASKS[take_base(entries, str(path), PAPER_TASKS, "right")]
@@ -79,40 +57,23 @@ def read_problem(path: Path) -> dict[str, Any]:
 
 
 def find_scene(name: str | Path) -> Scene:
-    """Find a scene by its name, by the name of a problem, or in a file of either.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such scene.
-    InvalidInputError
-        If the file cannot be used.
-    """
+    """Find a scene by its name, by the name of a problem, or in a file of either."""
     return _find_part(Scene, "scene", name)
 
 
 def find_task(name: str | Path) -> ReachTask:
-    """Find a task: by the name of a problem that has it, or in a file of task or problem.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such task.
-    InvalidInputError
-        If the file cannot be used.
-    """
+    """Find a task: by the name of a problem that has it, or in a file of task or problem."""
     if str(name) in PAPER_TASKS:
         return ReachTask(goal_regions=PAPER_TASKS[str(name)])
     return _find_part(ReachTask, "task", name)
 
 
 def _find_part(kind: type[Part], what: str, name: str | Path) -> Part:
-    """Find a scene or a task."""
     if str(name) in PAPER_TASKS:
         return kind()
     available = shipped_files(f"{what}s")
     of_problem = str(name) in shipped_files("problems") and str(name) not in available
-    path = problem_file(name) if of_problem else _file(what, name, f"{what}s", problem_names())
+    path = named_file("problem" if of_problem else what, name, problem_names())
     entries = read_toml(path, what)
     if entries.keys() & KEYS:
         entries = read_problem(path)
@@ -123,22 +84,9 @@ def _find_part(kind: type[Part], what: str, name: str | Path) -> Part:
         return part
     if kind is Scene:
         if "goal_regions" not in entries:
-            wanted = summary_of(Scene, "goal_regions").lower()
-            raise InvalidInputError(f"{path}: 'goal_regions' is missing: {wanted}")
+            raise InvalidInputError(f"{path}: 'goal_regions' is missing: where goals may lie")
         entries = {"obstacles": [], **entries}
     return from_plain(kind, entries, str(path))
-
-
-def _file(what: str, name: str | Path, folder: str, others: tuple[str, ...]) -> Path:
-    """The file of a name, or a path that looks like one."""
-    shipped = shipped_files(folder)
-    path = Path(name)
-    if str(name) in shipped:
-        return shipped[str(name)]
-    if path.suffix == ".toml" or is_file(path) or path.parent != Path():
-        return path
-    available = dict.fromkeys((*others, *shipped, f"path/to/{what}.toml"))
-    raise UnknownNameError(what, str(name), available)
 
 
 def _beside(path: Path, name: str) -> str | Path:

@@ -69,13 +69,7 @@ class ProblemOptions:
     """Values without an option, in words."""
 
     def resolve(self, default: "ProblemLike" = "right") -> "ReachProblem":
-        """The problem that the options make of a default one.
-
-        Raises
-        ------
-        KinarmError
-            If a name or file cannot be used, or a number is out of range.
-        """
+        """The problem that the options make of a default one."""
         from kinarm.problem import ReachProblem
 
         changed = {name: getattr(self, name) for name in init_fields(ProblemOptions)}

@@ -28,10 +28,8 @@ def stream_generator(stream: Stream, seed: int, *numbers: int) -> np.random.Gene
 
     Parameters
     ----------
-    stream : Stream
-        The purpose.
-    seed : int
-        Seed of the whole, from 0.
+    stream, seed
+        The purpose, and the seed of the whole, from 0.
     *numbers : int
         Which of the generators of this purpose, such as the iteration; from 0.
     """

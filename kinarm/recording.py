@@ -1,9 +1,9 @@
 """Recordings: what an arm did in one trial, state by state, in files without pickle."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +12,11 @@ from kinarm._archive import load_archive, reading, save_archive
 from kinarm._validation import finite_array, whole_number
 from kinarm.errors import InvalidInputError, RecordingFileError
 from kinarm.problem import ReachProblem
-from kinarm.rollouts import Rollouts
+from kinarm.rollouts import Outcome, Rollouts
 from kinarm.simulator import Simulator
 
 KIND, FORMAT_VERSION = "recording", 2
-OUTCOMES = ("success", "collision", "truncated")
+OUTCOMES = get_args(Outcome)
 ARRAYS = ("states", "distances", "goal", "refused", "contact_point")
 """Fields of a `Recording` that are stored as arrays."""
 
@@ -27,10 +27,8 @@ class Recording:
 
     Parameters
     ----------
-    policy : str
-        Name of what drove the arm.
-    problem : ReachProblem
-        What was faced, with the hash of its arm.
+    policy, problem
+        Name of what drove the arm, and what was faced, with the hash of its arm.
     trial : int
         Number of the trial in its set.
     states : ndarray, shape (steps + 1, n_joints)
@@ -41,10 +39,8 @@ class Recording:
         Goal position [m].
     outcome : str
         ``"success"``, ``"collision"`` or ``"truncated"``.
-    contact : tuple of str, optional
-        The two bodies that would have touched, if the last move was refused.
-    contact_point : ndarray, shape (3,), optional
-        Where they would have touched [m].
+    contact, contact_point : tuple of str and ndarray, shape (3,), optional
+        The two bodies that would have touched, and where [m], if the last move was refused.
     refused : ndarray, shape (n_joints,), optional
         The first configuration of the refused move at which they touch [rad or m].
     steps_lower_bound : int, optional
@@ -81,14 +77,8 @@ class Recording:
             raise InvalidInputError(
                 f"states must be 1 to {horizon + 1} for a horizon of {horizon}, got {len(states)}"
             )
-        shapes = {
-            "states": states.shape,
-            "distances": (len(states),),
-            "goal": (3,),
-            "refused": states.shape[1:],
-            "contact_point": (3,),
-        }
-        for name, shape in shapes.items():
+        shapes = states.shape, states.shape[:1], (3,), states.shape[1:], (3,)
+        for name, shape in zip(ARRAYS, shapes, strict=True):
             value = getattr(self, name)
             if value is not None:
                 value = finite_array(name, value, shape)
@@ -113,29 +103,16 @@ class Recording:
 
     def same_trial(self, other: "Recording") -> bool:
         """Whether another recording has the same start and goal."""
-        return np.array_equal(self.goal, other.goal) and np.array_equal(
-            self.states[0], other.states[0]
-        )
+        same_goal = np.array_equal(self.goal, other.goal)
+        return same_goal and np.array_equal(self.states[0], other.states[0])
 
     def save(self, path: str | Path) -> None:
-        """Write this recording alone to an ``.npz`` file; see `save_recordings`.
-
-        Raises
-        ------
-        OutputError
-            If the file cannot be written.
-        """
+        """Write this recording alone to an ``.npz`` file; see `save_recordings`."""
         save_recordings(path, [self])
 
     @classmethod
     def load(cls, path: str | Path) -> "Recording":
-        """Read the recording of a file that holds one.
-
-        Raises
-        ------
-        RecordingFileError
-            If the file cannot be used, or holds several.
-        """
+        """Read the recording of a file that holds one; see `load_recordings`."""
         recordings = load_recordings(path)
         if len(recordings) != 1:
             raise RecordingFileError(
@@ -153,21 +130,14 @@ def save_recordings(path: str | Path, recordings: Sequence[Recording]) -> None:
         If the file cannot be written; an existing file is then left as it was.
     """
     problems = list(dict.fromkeys(each.problem for each in recordings))
-    names = [item.name for item in fields(Recording) if item.name not in (*ARRAYS, "problem")]
-    header = {
-        "problems": [problem.to_json() for problem in problems],
-        "recordings": [
-            {name: getattr(each, name) for name in names}
-            | {"problem": problems.index(each.problem)}
-            for each in recordings
-        ],
-    }
-    values = {
-        f"{name}_{number}": getattr(each, name)
-        for number, each in enumerate(recordings)
-        for name in ARRAYS
-    }
-    arrays = {name: value for name, value in values.items() if value is not None}
+    entries, arrays = [], {}
+    for number, each in enumerate(recordings):
+        values = {**vars(each), "problem": problems.index(each.problem)}
+        for name in ARRAYS:
+            if (array := values.pop(name)) is not None:
+                arrays[f"{name}_{number}"] = array
+        entries.append(values)
+    header = {"problems": [problem.to_json() for problem in problems], "recordings": entries}
     save_archive(path, KIND, FORMAT_VERSION, arrays, header, compress=True)
 
 
@@ -205,10 +175,8 @@ def record_rollouts(
 
     Parameters
     ----------
-    simulator : Simulator
-        Where the rollouts took place.
-    rollouts : Rollouts
-        Made with ``record=True``.
+    simulator, rollouts
+        Where the rollouts took place, and these, made with ``record=True``.
     policy : str
         Name of what drove the arm.
     numbers : sequence of int, optional
@@ -226,7 +194,7 @@ def record_rollouts(
     if rollouts.paths.size == 0:
         raise InvalidInputError("these rollouts kept no configurations: make them with record=True")
     world, problem = simulator.world, simulator.problem.pinned
-    recordings = []
+    recordings, outcomes = [], rollouts.outcomes
     for number in range(len(rollouts)) if numbers is None else numbers:
         if number not in range(len(rollouts)):
             raise InvalidInputError(f"no trial {number}: there are 0 to {len(rollouts) - 1}")
@@ -243,7 +211,7 @@ def record_rollouts(
                 states=states,
                 distances=world.distances(states, np.tile(goal, (len(states), 1))),
                 goal=goal,
-                outcome=outcome_of(rollouts, number),
+                outcome=outcomes[number],
                 contact=touch.pair if touch else None,
                 contact_point=touch.point if touch else None,
                 refused=touch.configuration if touch else None,
@@ -252,10 +220,3 @@ def record_rollouts(
             )
         )
     return recordings
-
-
-def outcome_of(rollouts: Rollouts, number: int) -> str:
-    """How one of the rollouts ended: one of `OUTCOMES`."""
-    if rollouts.success[number]:
-        return "success"
-    return "collision" if rollouts.collision[number] else "truncated"

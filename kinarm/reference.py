@@ -11,10 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from kinarm.arm import Arm
 from kinarm.collision import make_verdicts_reliable, start_anew
+from kinarm.kernels.compiling import Array
 from kinarm.simulator import Simulator
 
 
@@ -23,23 +24,19 @@ class ReferenceEpisode(NamedTuple):
 
     Attributes
     ----------
-    path : ndarray, shape (steps + 1, n_joints)
-        Configurations visited [rad or m].
-    observations : ndarray, shape (steps + 1, n_observations)
-        Observations of them.
+    path, observations : ndarray, shape (steps + 1, n_joints) and (steps + 1, n_observations)
+        Configurations visited [rad or m], and observations of them.
     rewards : ndarray, shape (steps,)
         Rewards.
     success, collision : bool
         How it ended; neither means that the horizon was reached.
-    distance : float
-        Final distance from the tool to the goal [m].
-    contact : tuple of str or None
-        The first pair in contact, if the episode ended in one.
+    distance, contact
+        Final distance from the tool to the goal [m], and the first pair in contact, if any.
     """
 
-    path: NDArray[np.float64]
-    observations: NDArray[np.float64]
-    rewards: NDArray[np.float64]
+    path: Array
+    observations: Array
+    rewards: Array
     success: bool
     collision: bool
     distance: float
@@ -47,13 +44,7 @@ class ReferenceEpisode(NamedTuple):
 
 
 class ReferenceSimulator:
-    """Steps one episode at a time with Pinocchio's kinematics and Coal's verdict.
-
-    Parameters
-    ----------
-    simulator : Simulator
-        Whose problem to use.
-    """
+    """Steps one episode at a time with Pinocchio's kinematics and Coal's verdict."""
 
     def __init__(self, simulator: Simulator) -> None:
         self.arm: Arm = simulator.arm
@@ -65,10 +56,7 @@ class ReferenceSimulator:
         self._geometry_data = make_verdicts_reliable(self.contact_model.geometry.createData())
 
     def rollout(
-        self,
-        policy: Callable[[NDArray[np.float64]], ArrayLike],
-        start: NDArray[np.float64],
-        goal: NDArray[np.float64],
+        self, policy: Callable[[Array], ArrayLike], start: Array, goal: Array
     ) -> ReferenceEpisode:
         """Run one episode.
 
@@ -76,10 +64,8 @@ class ReferenceSimulator:
         ----------
         policy : callable
             Maps an observation, shape (n_observations,), to an action, shape (n_actions,).
-        start : ndarray, shape (n_joints,)
-            Start configuration [rad or m].
-        goal : ndarray, shape (3,)
-            Goal position [m].
+        start, goal : ndarray, shape (n_joints,) and (3,)
+            Start configuration [rad or m] and goal position [m].
         """
         q, reward = np.array(start), self.task.reward
         observation, distance = self.observe(q, goal)
@@ -116,9 +102,7 @@ class ReferenceSimulator:
             contact=contact,
         )
 
-    def observe(
-        self, q: NDArray[np.float64], goal: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], float]:
+    def observe(self, q: Array, goal: Array) -> tuple[Array, float]:
         """Observation of a configuration and its distance to the goal [m]."""
         model, data = self.arm.model, self._data
         pin.framesForwardKinematics(model, data, q)
@@ -128,7 +112,7 @@ class ReferenceSimulator:
         parts = [goal, offset, *self._quaternions(q), *positions]
         return np.concatenate(parts), float(np.linalg.norm(offset))
 
-    def _quaternions(self, q: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    def _quaternions(self, q: Array) -> list[Array]:
         """World orientations of the joint frames as quaternions composed along the chain."""
         world = pin.Quaternion.Identity()
         quaternions = []
@@ -141,9 +125,7 @@ class ReferenceSimulator:
             quaternions.append(np.array([w, x, y, z]))
         return quaternions
 
-    def first_contact(
-        self, q: NDArray[np.float64], target: NDArray[np.float64]
-    ) -> tuple[str, str] | None:
+    def first_contact(self, q: Array, target: Array) -> tuple[str, str] | None:
         """First pair that touches at the tested configurations of a step, or None."""
         model, geometry = self.arm.model, self.contact_model.geometry
         for k in range(1, self.tested + 1):

@@ -1,13 +1,17 @@
 """The outcome of a step, and of finished episodes."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.episodes import COLLISION, SUCCESS, Episodes
+from kinarm.kernels.compiling import Array
 from kinarm.task import REWARD_TERMS
+
+Outcome = Literal["success", "collision", "truncated"]
+"""How an episode ends: at the goal, in contact, or at the horizon."""
 
 
 class StepResult(NamedTuple):
@@ -25,7 +29,7 @@ class StepResult(NamedTuple):
         Number, from 1, of the pair that refused the step; 0 if none did, or nobody looked.
     """
 
-    numbers: NDArray[np.float64]
+    numbers: Array
     flags: NDArray[np.bool_]
     contact: NDArray[np.int64]
 
@@ -36,45 +40,39 @@ class StepResult(NamedTuple):
         return cls(np.empty((rows, n)), np.empty((3, n), bool), np.empty(n, np.int64))
 
     @property
-    def reward(self) -> NDArray[np.float64]:
+    def reward(self) -> Array:
         """Sums of the terms, shape (n,)."""
-        reward: NDArray[np.float64] = self.numbers[0]
-        return reward
+        return self.numbers[0, :]
 
     @property
-    def distance(self) -> NDArray[np.float64]:
+    def distance(self) -> Array:
         """From the tool to the goal [m], shape (n,)."""
-        distance: NDArray[np.float64] = self.numbers[1]
-        return distance
+        return self.numbers[1, :]
 
     @property
-    def terms(self) -> NDArray[np.float64]:
+    def terms(self) -> Array:
         """The weighted terms, shape (n, n_terms)."""
         return self.numbers[2:].T
 
     @property
     def truncated(self) -> NDArray[np.bool_]:
         """Whether the step ended an episode at the horizon, shape (n,)."""
-        truncated: NDArray[np.bool_] = self.flags[0]
-        return truncated
+        return self.flags[0, :]
 
     @property
     def success(self) -> NDArray[np.bool_]:
         """Whether it reached the goal, shape (n,)."""
-        success: NDArray[np.bool_] = self.flags[1]
-        return success
+        return self.flags[1, :]
 
     @property
     def collision(self) -> NDArray[np.bool_]:
         """Whether it was refused, shape (n,)."""
-        collision: NDArray[np.bool_] = self.flags[2]
-        return collision
+        return self.flags[2, :]
 
     @property
     def terminated(self) -> NDArray[np.bool_]:
         """Success or collision, shape (n,)."""
-        terminated: NDArray[np.bool_] = self.flags[1] | self.flags[2]
-        return terminated
+        return self.flags[1, :] | self.flags[2, :]
 
 
 KEPT = {
@@ -96,52 +94,40 @@ class Rollouts:
 
     Attributes
     ----------
-    starts : ndarray, shape (n, n_joints)
-        Start configurations [rad or m].
-    goals : ndarray, shape (n, 3)
-        Goal positions [m].
+    starts, goals : ndarray, shape (n, n_joints) and (n, 3)
+        Start configurations [rad or m] and goal positions [m].
     success, collision : ndarray of bool, shape (n,)
         How the episodes ended; neither means that the horizon was reached.
-    steps : ndarray of int, shape (n,)
-        Steps taken.
-    distance : ndarray, shape (n,)
-        Final distance from the tool to the goal [m].
-    returns : ndarray, shape (n,)
-        Sums of rewards.
-    configurations : ndarray, shape (n, n_joints)
-        Final configurations [rad or m].
-    targets : ndarray, shape (n, n_joints)
-        Where the last step led; it differs from the final configuration if it was refused.
+    steps, distance, returns : ndarray, shape (n,)
+        Steps taken, final distances from the tool to the goal [m], and sums of rewards.
+    configurations, targets : ndarray, shape (n, n_joints)
+        Final configurations, and where the last step led, which differs if it was refused.
     moments : ndarray, shape (n, 2, n_observations), or empty
         Sums of the observations acted upon, less the given shift, and of their squares.
     paths : ndarray, shape (n, horizon + 1, n_joints), or empty
         Configurations visited, NaN after the end.
     """
 
-    starts: NDArray[np.float64]
-    goals: NDArray[np.float64]
+    starts: Array
+    goals: Array
     success: NDArray[np.bool_]
     collision: NDArray[np.bool_]
     steps: NDArray[np.int64]
-    distance: NDArray[np.float64]
-    returns: NDArray[np.float64]
-    configurations: NDArray[np.float64]
-    targets: NDArray[np.float64]
-    moments: NDArray[np.float64]
-    paths: NDArray[np.float64]
+    distance: Array
+    returns: Array
+    configurations: Array
+    targets: Array
+    moments: Array
+    paths: Array
 
     @classmethod
-    def from_episodes(
-        cls, starts: NDArray[np.float64], episodes: Episodes, *, copy: bool = False
-    ) -> "Rollouts":
+    def from_episodes(cls, starts: Array, episodes: Episodes, *, copy: bool = False) -> "Rollouts":
         """Collect the outcome of episodes that have ended; its arrays are read-only.
 
         Parameters
         ----------
-        starts : ndarray, shape (n, n_joints)
-            Where they started [rad or m].
-        episodes : Episodes
-            The episodes.
+        starts, episodes
+            Where they started, shape (n, n_joints) [rad or m], and the episodes.
         copy : bool
             Copy their arrays, which may then serve others.
         """
@@ -157,6 +143,12 @@ class Rollouts:
         for array in vars(rollouts).values():
             array.flags.writeable = False
         return rollouts
+
+    @property
+    def outcomes(self) -> tuple[Outcome, ...]:
+        """How each episode ended."""
+        ends = np.select([self.success, self.collision], ["success", "collision"], "truncated")
+        return tuple(ends.tolist())
 
     def __len__(self) -> int:
         return len(self.steps)

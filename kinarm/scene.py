@@ -1,4 +1,7 @@
-"""The world around the arm: the ground, solid boxes, and where goals may lie."""
+"""The world around the arm: the ground, solid boxes, and where goals may lie.
+
+What is empty, not finite, or named twice is a `ProblemError`.
+"""
 
 import math
 from collections.abc import Iterable
@@ -21,7 +24,6 @@ ROUNDING = 1e-12
 
 
 def _check_box(what: str, lower: Point, upper: Point, *, flat: bool) -> None:
-    """Refuse a box whose corners are not finite or that is empty; a flat one has an area."""
     _check_finite(f"corners of {what}", (*lower, *upper))
     extents = [high - low for low, high in zip(lower, upper, strict=True)]
     if min(extents) < 0 or sum(extent > 0 for extent in extents) < (2 if flat else 3):
@@ -30,7 +32,6 @@ def _check_box(what: str, lower: Point, upper: Point, *, flat: bool) -> None:
 
 
 def _check_finite(what: str, numbers: Iterable[float]) -> None:
-    """Refuse numbers that are not finite, or so large that sums of them are not."""
     given = list(numbers)
     if not all(math.isfinite(number) for number in given):
         raise ProblemError(f"{what} must be finite, got {given}")
@@ -65,11 +66,6 @@ class Mount:
         Origin of the arm's base in the world [m].
     rpy : tuple of float
         Its orientation: roll, pitch and yaw about the axes of the world [rad].
-
-    Raises
-    ------
-    ProblemError
-        If a number is not finite.
     """
 
     position: Point = (0.0, 0.0, 0.0)
@@ -97,11 +93,6 @@ class Obstacle:
         Opposite corners, before it is turned, in the world frame [m].
     yaw : float
         Angle by which it is turned about the vertical through its centre [rad].
-
-    Raises
-    ------
-    ProblemError
-        If it is empty or a number is not finite.
     """
 
     name: str
@@ -142,11 +133,6 @@ class GoalRegion:
         How tasks call it.
     lower, upper : tuple of float
         Opposite corners in the world frame [m].
-
-    Raises
-    ------
-    ProblemError
-        If it has neither volume nor area, or a corner is not finite.
     """
 
     name: str
@@ -191,11 +177,6 @@ class Scene:
         Where goals may lie.
     mount : Mount
         Where the arm stands.
-
-    Raises
-    ------
-    ProblemError
-        If two obstacles or two goal regions have the same name, or a number is out of range.
     """
 
     ground: bool = True
@@ -215,13 +196,7 @@ class Scene:
             raise ProblemError(f"cube_edge must be at least 0 m, got {self.cube_edge}")
 
     def goal_region(self, name: str) -> GoalRegion:
-        """Look a goal region up by name.
-
-        Raises
-        ------
-        UnknownNameError
-            If the scene has no such region.
-        """
+        """Look a goal region up by name; UnknownNameError if the scene has none such."""
         for region in self.goal_regions:
             if region.name == name:
                 return region

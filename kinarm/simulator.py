@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from copy import copy
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm._parallel import run_rows, run_together
+from kinarm._parallel import run_together
 from kinarm._validation import finite_array
 from kinarm.arm import Arm
-from kinarm.batches import Batch, IdleBatch, begin_some
 from kinarm.doubtful_steps import decide_doubtful_steps
-from kinarm.episodes import PAUSED, RUNNING, Episodes
+from kinarm.episodes import PAUSED, RUNNING, Control, Episodes
 from kinarm.errors import InvalidInputError, StartInContactError
-from kinarm.kernels.rollout import advance, allow_one_step, results_of_step
+from kinarm.kernels.compiling import Array
+from kinarm.kernels.rollout import advance, allow_one_step, begin, results_of_step
 from kinarm.kernels.session import Session
-from kinarm.networks import CompiledPolicy, Networks, network_control, table_control
+from kinarm.networks import CompiledPolicy, Networks, network_control
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.rollouts import Rollouts, StepResult
 from kinarm.scenarios import draw_scenarios
@@ -26,7 +27,7 @@ from kinarm.scene import Scene
 from kinarm.task import ReachTask
 from kinarm.world import World
 
-PolicyFunction = Callable[[NDArray[np.float64]], ArrayLike]
+PolicyFunction = Callable[[Array], ArrayLike]
 """Maps observations, shape (n, n_observations), to actions, shape (n, n_actuated)."""
 
 
@@ -40,7 +41,8 @@ class Simulator:
     truncated at the horizon.
 
     Results depend on nothing but the inputs: not on the number of threads, nor on how episodes
-    are batched.
+    are batched. Arrays of a wrong shape, entries that are not finite and starts beyond the limits
+    are a `kinarm.InvalidInputError`, starts that touch something a `kinarm.StartInContactError`.
 
     Parameters
     ----------
@@ -61,11 +63,11 @@ class Simulator:
         self.world = World(problem, threads=threads)
         self.threads = self.world.threads
         self.checked_by_coal = 0
-        self._last: Batch | None = None
-        self._idle = IdleBatch()
+        self._last: Session | None = None
+        self._idle: list[Session] = []
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_last": None, "_idle": IdleBatch()}
+        return self.__dict__ | {"_last": None, "_idle": []}
 
     def __repr__(self) -> str:
         return f"Simulator({self.problem!r})"
@@ -101,7 +103,7 @@ class Simulator:
         return self.arm.n_actuated
 
     @property
-    def step_limit(self) -> NDArray[np.float64]:
+    def step_limit(self) -> Array:
         """Largest move of each actuated joint in a step, shape (n_actions,) [rad or m]."""
         return self.world.rules.step_limit.copy()
 
@@ -113,7 +115,7 @@ class Simulator:
 
     def sample(
         self, rng: np.random.Generator, count: int, *, start_spread: float | None = None
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    ) -> tuple[Array, Array]:
         """Draw starts and goals.
 
         Parameters
@@ -128,19 +130,10 @@ class Simulator:
 
         Parameters
         ----------
-        starts : array_like, shape (n, n_joints)
-            Start configurations within the limits [rad or m].
-        goals : array_like, shape (n, 3)
-            Goal positions [m].
+        starts, goals : array_like, shape (n, n_joints) and (n, 3)
+            Start configurations within the limits [rad or m], and goal positions [m].
         record : bool
             Keep the configurations visited.
-
-        Raises
-        ------
-        InvalidInputError
-            If a shape is wrong, an entry is not finite or a start is beyond the limits.
-        StartInContactError
-            If a start touches something.
         """
         return self._begin(*self.check_scenarios(starts, goals), record=record)
 
@@ -153,11 +146,6 @@ class Simulator:
             What `reset` returned.
         actions : array_like, shape (n, n_actions)
             Fractions of the velocity limits, clipped to [-1, 1].
-
-        Raises
-        ------
-        InvalidInputError
-            If the shape is wrong or an entry is NaN.
         """
         session = self._step(episodes, actions)
         result = StepResult.empty(len(episodes.status))
@@ -172,7 +160,7 @@ class Simulator:
         *,
         policy_index: ArrayLike | None = None,
         record: bool = False,
-        shift: NDArray[np.float64] | None = None,
+        shift: Array | None = None,
     ) -> Rollouts:
         """Run whole episodes.
 
@@ -182,23 +170,12 @@ class Simulator:
             One policy for all episodes, or one for each. Policies that offer ``networks()`` run
             compiled; a function from observations (n, n_observations) to actions (n, n_actions)
             is called once a step for all running episodes.
-        starts : array_like, shape (n, n_joints)
-            Start configurations [rad or m].
-        goals : array_like, shape (n, 3)
-            Goal positions [m].
+        starts, goals, record
+            As for `reset`.
         policy_index : array_like of int, shape (n,), optional
             Which compiled policy drives which episode, where there are several.
-        record : bool
-            Keep the configurations visited.
         shift : ndarray, shape (n_observations,), optional
             Collect moments of the observations about this point.
-
-        Raises
-        ------
-        InvalidInputError
-            If a shape is wrong or an entry is not finite.
-        StartInContactError
-            If a start touches something.
         """
         q, goal = self.check_scenarios(starts, goals)
         if shift is not None:
@@ -212,11 +189,11 @@ class Simulator:
         widths = (self.n_observations, self.n_actions)
         control = network_control(policies, policy_index, len(q), widths)
         if record:
-            batch = Batch.bound(self.world, control, q, goal, record=True, shift=shift)
-            return Rollouts.from_episodes(q, self._run(batch))
-        batch = self._idle.taken(self.world, control, q, goal, shift)
-        rollouts = Rollouts.from_episodes(q, self._run(batch), copy=True)
-        self._idle.keep(batch)
+            episodes = self.world.episodes(q, goal, record=True, shift=shift)
+            return Rollouts.from_episodes(q, self._run(self.world.session(control, episodes)))
+        session = self._refilled(control, q, goal, shift)
+        rollouts = Rollouts.from_episodes(q, self._run(session), copy=True)
+        self._idle[:] = [session]
         return rollouts
 
     def rollout_actions(
@@ -229,12 +206,13 @@ class Simulator:
         actions : array_like, shape (n, horizon, n_actions)
             Fractions of the velocity limits, clipped to [-1, 1].
         starts, goals, record
-            As for `rollout`.
+            As for `reset`.
         """
         q, goal = self.check_scenarios(starts, goals)
         table = finite_array("actions", actions, (len(q), self.task.horizon, self.n_actions))
-        batch = Batch.bound(self.world, table_control(table), q, goal, record=record)
-        return Rollouts.from_episodes(q, self._run(batch))
+        episodes = self.world.episodes(q, goal, record=record)
+        session = self.world.session(Control(actions=table), episodes)
+        return Rollouts.from_episodes(q, self._run(session))
 
     def contact_pairs(self, rollouts: Rollouts) -> tuple[tuple[str, str] | None, ...]:
         """Name the bodies that touched, per episode; None where nothing did."""
@@ -246,26 +224,11 @@ class Simulator:
         )
 
     def begin(self, episodes: Episodes, rows: NDArray[np.int64]) -> None:
-        """Start some episodes at their ``q`` and ``goal``; Coal decides about doubtful starts.
+        """Start those episodes that rows number, in place, at their ``q`` and ``goal``."""
+        self._start(rows, self._stepped(episodes))
 
-        Parameters
-        ----------
-        episodes : Episodes
-            What `reset` returned; changed in place.
-        rows : ndarray of int
-            Which episodes.
-
-        Raises
-        ------
-        StartInContactError
-            If a start touches something.
-        """
-        self._start(episodes, rows, self._stepped(episodes).session)
-
-    def check_scenarios(
-        self, starts: ArrayLike, goals: ArrayLike
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Copy starts and goals, or refuse them as `reset` does."""
+    def check_scenarios(self, starts: ArrayLike, goals: ArrayLike) -> tuple[Array, Array]:
+        """Copy starts and goals, or refuse them."""
         q = finite_array("starts", starts, (None, self.arm.n_joints))
         goal = finite_array("goals", goals, (len(q), 3))
         outside = (q < self.arm.lower) | (q > self.arm.upper)
@@ -275,32 +238,38 @@ class Simulator:
         return q, goal
 
     def _begin(
-        self,
-        starts: NDArray[np.float64],
-        goals: NDArray[np.float64],
-        *,
-        record: bool,
-        shift: NDArray[np.float64] | None = None,
+        self, starts: Array, goals: Array, *, record: bool, shift: Array | None = None
     ) -> Episodes:
-        """Allocate and start episodes for stepping."""
-        at_rest = table_control(np.zeros((len(starts), 1, self.n_actions)))
-        batch = Batch.bound(self.world, at_rest, starts, goals, record=record, shift=shift)
-        self._start(batch.episodes, np.arange(len(starts)), batch.session)
-        self._last = batch
-        return batch.episodes
-
-    def _run(self, batch: Batch) -> Episodes:
-        """Start the episodes of a batch, and advance them to their end."""
-        episodes, n = batch.episodes, len(batch.episodes.status)
-        self._start(episodes, np.arange(n), batch.session)
-        self._advance(batch.session, episodes, n * self.task.horizon)
+        episodes = self.world.episodes(starts, goals, record=record, shift=shift)
+        self._start(np.arange(len(starts)), self._stepped(episodes))
         return episodes
 
-    def _start(self, episodes: Episodes, rows: NDArray[np.int64], session: Session) -> None:
-        """Start some episodes; see `begin`."""
-        if not run_rows(begin_some, len(rows), len(rows), self.threads, rows, session):
+    def _refilled(
+        self, control: Control, starts: Array, goals: Array, shift: Array | None
+    ) -> Session:
+        """The last rollout's session, since binding takes longer than a rollout, or another.
+
+        No other thread gets it meanwhile.
+        """
+        with suppress(IndexError):
+            session = self._idle.pop()
+            if session.refill(control, starts, goals, shift):
+                return session
+        own = control._replace(layers=control.layers.copy(), weights=control.weights.copy())
+        return self.world.session(own, self.world.episodes(starts, goals, shift=shift))
+
+    def _run(self, session: Session) -> Episodes:
+        """Start the episodes of a session, and advance them to their end."""
+        n = len(session.episodes.status)
+        self._start(np.arange(n), session)
+        self._advance(session, n * self.task.horizon)
+        return session.episodes
+
+    def _start(self, rows: NDArray[np.int64], session: Session) -> None:
+        """Start some episodes; Coal decides about doubtful starts."""
+        if not run_together(begin, len(rows), self.threads, session.of_thread, rows):
             return
-        contacts = self.world.contact_model
+        episodes, contacts = session.episodes, self.world.contact_model
         paused = rows[episodes.status[rows] == PAUSED]
         touching = contacts.in_contact(episodes.q[paused])
         if touching.any():
@@ -309,31 +278,31 @@ class Simulator:
             raise StartInContactError(index, pair or ("arm", "scene"))
         episodes.status[paused] = RUNNING
 
-    def _stepped(self, episodes: Episodes) -> Batch:
-        """The batch by which episodes are stepped, kept until other episodes come."""
+    def _stepped(self, episodes: Episodes) -> Session:
+        """The session by which episodes are stepped, kept until other episodes come."""
         if self._last is None or self._last.episodes is not episodes:
-            control = table_control(np.zeros((len(episodes.status), 1, self.n_actions)))
-            self._last = Batch(control, episodes, self.world.session(control, episodes))
+            control = Control(actions=np.zeros((len(episodes.status), 1, self.n_actions)))
+            self._last = self.world.session(control, episodes)
         return self._last
 
     def _step(self, episodes: Episodes, actions: ArrayLike) -> Session:
-        """Advance running episodes by one step."""
-        control, _, session = self._stepped(episodes)
-        table = control.actions[:, 0]
+        session = self._stepped(episodes)
+        table = session.control.actions[:, 0]
         plain = isinstance(actions, np.ndarray) and actions.dtype.kind == "f"
         if not plain or np.shape(actions) != table.shape:
             actions = finite_array("actions", actions, table.shape)
         table[...] = actions
         if not allow_one_step(session):
             finite_array("actions", actions, table.shape)  # which says what is wrong
-        self._advance(session, episodes, len(table))
+        self._advance(session, len(table))
         return session
 
-    def _advance(self, session: Session, episodes: Episodes, work: int) -> None:
+    def _advance(self, session: Session, work: int) -> None:
         """Advance episodes to their stop, asking Coal about every step that is in doubt."""
+        episodes = session.episodes
         while run_together(advance, work, self.threads, session.of_thread):
             paused = np.flatnonzero(episodes.status == PAUSED)
-            self.checked_by_coal += decide_doubtful_steps(self.world, session, episodes, paused)
+            self.checked_by_coal += decide_doubtful_steps(self.world, session, paused)
             resumed = paused[episodes.cleared[paused]]
             if resumed.size == 0:
                 return

@@ -1,4 +1,7 @@
-"""Reaching tasks: goals, tolerance, horizon, starts and reward."""
+"""Reaching tasks: goals, tolerance, horizon, starts and reward.
+
+Numbers that are out of range, and what does not fit together, are a `ProblemError`.
+"""
 
 import math
 from dataclasses import dataclass, field, fields
@@ -34,11 +37,6 @@ class RewardWeights:
         Added once when the tool comes within the tolerance.
     allow_perverse : bool
         Accept weights that reward contact or punish success.
-
-    Raises
-    ------
-    ProblemError
-        If a weight is not finite, rewards contact or punishes success.
     """
 
     progress: float = 1.0
@@ -54,15 +52,14 @@ class RewardWeights:
             value = getattr(self, name)
             if not math.isfinite(value):
                 raise ProblemError(f"reward weight {name} must be finite, got {value}")
-        for name, sign, deed in (
-            ("collision", -1, "rewards contact"),
-            ("success", 1, "punishes it"),
+        for name, perverse, deed in (
+            ("collision", self.collision > 0, "rewards contact"),
+            ("success", self.success < 0, "punishes it"),
         ):
-            value = getattr(self, name)
-            if sign * value < 0 and not self.allow_perverse:
+            if perverse and not self.allow_perverse:
                 raise ProblemError(
-                    f"reward weight {name} = {value:g} {deed}: give it the other sign, or set "
-                    "allow_perverse"
+                    f"reward weight {name} = {getattr(self, name):g} {deed}: give it the other "
+                    "sign, or set allow_perverse"
                 )
 
     @property
@@ -96,8 +93,14 @@ class Goals(NamedTuple):
     ends: NDArray[np.float64]
 
     def draw(self, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
-        """Draw goals; see `ReachTask.draw_goals`."""
-        uniforms = rng.random((count, 1 + len(self.moving)))
+        """Draw goals, uniform over each region, shape (count, 3) [m]."""
+        return self.at(rng.random((count, 1 + len(self.moving))))
+
+    def at(self, uniforms: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Goals, shape (n, 3) [m], of numbers in [0, 1), shape (n, 1 + n_moving).
+
+        The first number of a row chooses the region, and the others where in it the goal lies.
+        """
         chosen = self.ends.searchsorted(uniforms[:, 0], side="right")
         goals: NDArray[np.float64] = self.lower[chosen]
         goals[:, self.moving] += uniforms[:, 1:] * self.extent[chosen]
@@ -125,11 +128,6 @@ class ReachTask:
         Start configurations, each as likely, instead of that range [rad or m].
     reward : RewardWeights
         What is rewarded.
-
-    Raises
-    ------
-    ProblemError
-        If a number is out of range, or regions and weights do not fit together.
     """
 
     goal_regions: tuple[str, ...] = ()
@@ -157,26 +155,7 @@ class ReachTask:
             raise ProblemError(f"start_spread must lie in [0, 1], got {self.start_spread}")
         whole_number("horizon", self.horizon, 1, LONGEST_HORIZON)
 
-    def draw_goals(self, scene: Scene, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
-        """Draw goals, uniform over each region.
-
-        Parameters
-        ----------
-        scene : Scene
-            The scene that holds the regions.
-        rng : numpy.random.Generator
-            Source of randomness.
-        count : int
-            How many.
-
-        Returns
-        -------
-        ndarray, shape (count, 3)
-            Goal points in the world [m].
-        """
-        return self.goals_in(scene).draw(rng, count)
-
-    def goals_in(self, scene: Scene) -> "Goals":
+    def goals_in(self, scene: Scene) -> Goals:
         """Where in a scene goals lie."""
         regions = [scene.goal_region(name) for name in self.goal_regions]
         lower, upper = np.array([(r.lower, r.upper) for r in regions]).transpose(1, 0, 2)

@@ -16,25 +16,17 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from kinarm._files import absolute, first_line, is_file, is_folder
+from kinarm._files import absolute, is_file, is_folder
 from kinarm.arm_specification import PACKAGE, ArmSpecification, arm_names
-from kinarm.errors import ArmError, InvalidInputError, UnknownNameError
+from kinarm.errors import ArmError, UnknownNameError
 from kinarm.meshes import resolve_meshes
-from kinarm.urdf_tree import (
-    FARTHEST,
-    FARTHEST_POSITION,
-    MOVING,
-    TreeJoint,
-    chain_to,
-    read_joints,
-    read_robot,
-)
+from kinarm.urdf_tree import MOVING, TreeJoint, chain_to, read_joints, read_robot
 
 USUAL_TOOL = "tool0"
 """Name of the tool frame by ROS's convention."""
 
-FOLLOWING = (("multiplier", "1"), ("offset", "0"))
-"""Attributes of a mimicking joint, and what they are where they are left out."""
+FARTHEST_POSITION = 1e6
+"""Positions of joints at most [rad or m]: up to there, the kernels' sines are exact."""
 
 
 class Description(NamedTuple):
@@ -46,8 +38,6 @@ class Description(NamedTuple):
         The file.
     text : str
         Its text, in which all moving joints are in series, from the base to the tool.
-    links : tuple of str
-        Names of all links.
     tool_frame : str
         Link whose origin is the tool point.
     held : dict
@@ -58,22 +48,13 @@ class Description(NamedTuple):
 
     path: Path
     text: str
-    links: tuple[str, ...]
     tool_frame: str
     held: dict[str, float]
     notes: tuple[str, ...]
 
 
-def find_urdf(source: str) -> Path:
-    """Resolve the source of a completed specification to a file.
-
-    Raises
-    ------
-    ArmError
-        If there is no such file.
-    UnknownNameError
-        If it is no path but a name.
-    """
+def _find_urdf(source: str) -> Path:
+    """Resolve the source of a completed specification to a file."""
     if source.startswith(PACKAGE):
         return _installed(source)
     path = Path(source)
@@ -101,68 +82,47 @@ def _installed(source: str) -> Path:
     return (share / inside).resolve()
 
 
-def read_urdf(path: Path, specification: ArmSpecification) -> Description:
-    """Read a URDF and reduce it to a chain.
+def read_urdf(specification: ArmSpecification) -> Description:
+    """Read the URDF of a completed specification, reduced to the chain that carries the tool.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    specification : ArmSpecification
-        What of it is to be used; a completed one.
-
-    Raises
-    ------
-    ArmError
-        If the file is malformed, or the robot cannot be reduced to a chain.
-    UnknownNameError
-        If the specification names a joint that there is none of.
+    Raises ArmError if there is no such file, it is malformed or the robot cannot be reduced to a
+    chain, and UnknownNameError if a name stands for no arm, joint or link.
     """
+    path = _find_urdf(specification.source)
     robot = read_robot(path)
-    try:
-        return _reduced(robot, path, specification)
-    except InvalidInputError:
-        raise
-    except (ValueError, RecursionError) as error:
-        raise ArmError(f"{path.name} is not a readable URDF: {first_line(error)}") from error
-
-
-def _reduced(
-    robot: ElementTree.Element, path: Path, specification: ArmSpecification
-) -> Description:
-    """Keep the chain that carries the tool."""
     joints = read_joints(robot, path)
     links = [link.get("name", "") for link in robot.findall("link")]
     tool, notes = _tool_frame(specification.tool_frame, joints, links, path)
-    chain = chain_to(tool, joints)
-    for what in ("held", "limits"):
-        _check_joints(what, getattr(specification, what) or {}, joints, path)
-    asked = specification.held or {}
-    kept = [joint.name for joint in chain if joint.name not in asked]
-    for joint in joints.values():
-        if joint.name in kept:
-            notes += _bounded(joint, specification.limits or {}, path)
-    held = _held_positions(joints, kept, asked, path)
+    asked, limits = specification.held or {}, specification.limits or {}
+    moving = [joint.name for joint in joints.values() if joint.kind in MOVING]
+    kept = [joint.name for joint in chain_to(tool, joints) if joint.name not in asked]
+    contacts = [link for each in specification.allowed_contacts or () for link in each.links]
+    for what, named, known in (
+        ("joint in held", asked, moving),
+        ("joint in limits", limits, moving),
+        ("joint in actuated", specification.actuated or (), kept),
+        ("link in allowed_contacts", contacts, links),
+    ):
+        for name in named:
+            if name not in known:
+                raise UnknownNameError(f"{what} of {path.name}:", name, known)
+    for name in moving:
+        if name in kept:
+            notes += _bounded(joints[name], limits, path)
+    held = _held_positions(joints, moving, kept, asked, path)
     for name, position in held.items():
-        _fix(joints[name].element, position)
+        _fix(joints[name], position)
     free = [name for name in held if name not in asked]
     if free:
         notes += (f"joints that do not carry the tool are held: {', '.join(free)}",)
     resolve_meshes(robot, path, specification.package_dirs)
     if specification.tool_offset is not None:
-        if not max(map(abs, specification.tool_offset)) <= FARTHEST:
-            raise ArmError(
-                f"tool_offset must be at most {FARTHEST:g} m, got {specification.tool_offset}"
-            )
         tool = _add_tool_point(robot, tool, specification.tool_offset)
-    return Description(
-        path=path,
-        text=ElementTree.tostring(robot, encoding="unicode"),
-        links=tuple(links),
-        tool_frame=tool,
-        held=held,
-        notes=notes,
-    )
+    try:
+        text = ElementTree.tostring(robot, "unicode")
+    except RecursionError:
+        raise ArmError(f"{path.name} is not a readable URDF: it is nested too deeply") from None
+    return Description(path, text, tool, held, notes)
 
 
 def _tool_frame(
@@ -184,16 +144,6 @@ def _tool_frame(
     parents = {joint.parent for joint in joints.values() if joint.child in longest}
     last = next(link for link in reversed(longest) if link not in parents)
     return last, (f"tool frame: {last!r}, the last link of the longest chain",)
-
-
-def _check_joints(
-    what: str, named: Collection[str], joints: Mapping[str, TreeJoint], path: Path
-) -> None:
-    """Refuse names that no moving joint has."""
-    moving = [joint.name for joint in joints.values() if joint.kind in MOVING]
-    for name in named:
-        if name not in moving:
-            raise UnknownNameError(f"joint in {what} of {path.name}:", name, moving)
 
 
 def _bounded(
@@ -228,39 +178,33 @@ def _bounded(
 
 
 def _held_positions(
-    joints: Mapping[str, TreeJoint], kept: Collection[str], asked: Mapping[str, float], path: Path
+    joints: Mapping[str, TreeJoint],
+    moving: Collection[str],
+    kept: Collection[str],
+    asked: Mapping[str, float],
+    path: Path,
 ) -> dict[str, float]:
-    """Where the joints stay that are not kept."""
-    positions = {}
-    for joint in joints.values():
-        if joint.kind not in MOVING or joint.name in kept:
+    """Where the moving joints stay that are not kept."""
+    fixed = [joints[name] for name in moving if name not in kept]
+    leaders = [joint for joint in fixed if joint.mimics is None or joint.name in asked]
+    positions = {joint.name: asked.get(joint.name, _near_zero(joint)) for joint in leaders}
+    for joint in fixed:
+        leader, mimic = joint.mimics, joint.element.find("mimic")
+        if joint.name in positions or mimic is None:
             continue
-        if joint.mimics in kept and joint.name not in asked:
+        if leader in kept:
             raise ArmError(
-                f"joint {joint.name!r} of {path.name} mimics {joint.mimics!r}, which moves: hold "
-                "it (held)"
+                f"joint {joint.name!r} of {path.name} mimics {leader!r}, which moves: hold it "
+                "(held)"
             )
-        if joint.mimics is None or joint.name in asked:
-            positions[joint.name] = asked.get(joint.name, _near_zero(joint))
-    for joint in joints.values():
-        leader = joint.mimics
-        if joint.kind in MOVING and joint.name not in kept and joint.name not in positions:
-            if leader not in positions:
-                raise ArmError(
-                    f"joint {joint.name!r} of {path.name} mimics {leader!r}, which is no joint "
-                    "that is held"
-                )
-            mimic = joint.element.find("mimic")
-            assert mimic is not None
-            factor, offset = (float(mimic.get(name, d)) for name, d in FOLLOWING)
-            positions[joint.name] = factor * positions[leader] + offset
-    for name, position in positions.items():
-        if not abs(position) <= FARTHEST_POSITION:
+        if leader not in positions:
             raise ArmError(
-                f"joint {name!r} of {path.name} cannot be held at {position}: positions are at "
-                f"most {FARTHEST_POSITION:g}"
+                f"joint {joint.name!r} of {path.name} mimics {leader!r}, which is no joint that is "
+                "held"
             )
-    return {name: positions[name] for name in joints if name in positions}
+        factor, offset = (float(mimic.attrib[name]) for name in ("multiplier", "offset"))
+        positions[joint.name] = factor * positions[leader] + offset
+    return {joint.name: positions[joint.name] for joint in fixed}
 
 
 def _near_zero(joint: TreeJoint) -> float:
@@ -268,32 +212,28 @@ def _near_zero(joint: TreeJoint) -> float:
     limit = joint.element.find("limit")
     if limit is None or joint.kind == "continuous":
         return 0.0
-    lower, upper = (float(limit.get(end, "0")) for end in ("lower", "upper"))
-    return min(max(0.0, lower), upper)
+    return min(max(0.0, float(limit.attrib["lower"])), float(limit.attrib["upper"]))
 
 
-def _fix(element: ElementTree.Element, position: float) -> None:
+def _fix(joint: TreeJoint, position: float) -> None:
     """Make a joint a fixed one at a position."""
-    kind = element.get("type")
+    element = joint.element
     element.set("type", "fixed")
-    mimic = element.find("mimic")
-    if mimic is not None:
+    for mimic in element.findall("mimic"):
         element.remove(mimic)
     if position == 0:
         return
-    origin, axis = element.find("origin"), element.find("axis")
-    if origin is None:
-        origin = ElementTree.SubElement(element, "origin")
-    along = _numbers("1 0 0" if axis is None else axis.get("xyz", "1 0 0"))
+    attributes = {part.tag: part.attrib for part in element}
+    origin, along = attributes["origin"], _numbers(attributes["axis"]["xyz"])
     along = along / np.linalg.norm(along)
-    turned = pin.rpy.rpyToMatrix(_numbers(origin.get("rpy", "0 0 0")))
-    moved = _numbers(origin.get("xyz", "0 0 0"))
-    if kind == "prismatic":
+    turned = pin.rpy.rpyToMatrix(_numbers(origin["rpy"]))
+    moved = _numbers(origin["xyz"])
+    if joint.kind == "prismatic":
         moved = moved + turned @ along * position
     else:
         turned = turned @ pin.AngleAxis(position, along).toRotationMatrix()
-    origin.set("xyz", " ".join(map(repr, moved.tolist())))
-    origin.set("rpy", " ".join(map(repr, pin.rpy.matrixToRpy(turned).tolist())))
+    origin["xyz"] = " ".join(map(repr, moved.tolist()))
+    origin["rpy"] = " ".join(map(repr, pin.rpy.matrixToRpy(turned).tolist()))
 
 
 def _numbers(text: str) -> NDArray[np.float64]:

@@ -1,74 +1,41 @@
 """Robot descriptions as their files have them: a tree of links and joints, checked."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Mapping
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from kinarm._files import first_line, read_file
+from kinarm._files import first_line
 from kinarm.errors import ArmError
-
-LARGEST = 5 * 10**6
-"""Size of a URDF at most [bytes]."""
-
-MOST_LINKS = 500
-"""Links of a robot at most."""
 
 FARTHEST = 1e4
 """Lengths at most [m]."""
-
-FARTHEST_POSITION = 1e6
-"""Positions of joints at most [rad or m]: up to there, the kernels' sines are exact."""
-
-ANY = 1e308
-"""Limits of joints at most, which need not be used."""
 
 MOVING = ("revolute", "prismatic", "continuous")
 """Kinds of joints that move."""
 
 SHAPES = ("box", "sphere", "cylinder", "capsule", "mesh")
 
-
-class Rule(NamedTuple):
-    """An attribute that holds numbers.
-
-    Attributes
-    ----------
-    n : int
-        How many.
-    default : str or None
-        What it is where it is left out; None if it must be there.
-    least, most : float
-        Range of each.
-    """
-
-    n: int
-    default: str | None
-    least: float = -FARTHEST
-    most: float = FARTHEST
-
-
-SIZE = Rule(1, None, least=1e-9)
-
-RULES: dict[str, dict[str, Rule]] = {
-    "origin": {"xyz": Rule(3, "0 0 0"), "rpy": Rule(3, "0 0 0")},
-    "axis": {"xyz": Rule(3, "1 0 0")},
-    "limit": {
-        "lower": Rule(1, "0", least=-ANY, most=ANY),
-        "upper": Rule(1, "0", least=-ANY, most=ANY),
-        "velocity": Rule(1, "0", least=0.0, most=ANY),
-    },
-    "mimic": {"multiplier": Rule(1, "1"), "offset": Rule(1, "0")},
-    "box": {"size": SIZE._replace(n=3)},
-    "sphere": {"radius": SIZE},
-    "cylinder": {"radius": SIZE, "length": SIZE},
-    "capsule": {"radius": SIZE, "length": SIZE},
-    "mesh": {"scale": Rule(3, "1 1 1")},
-    "color": {"rgba": Rule(4, "0 0 0 1")},
+NUMBERS: dict[str, dict[str, tuple[int, str]]] = {
+    "origin": {"xyz": (3, "0 0 0"), "rpy": (3, "0 0 0")},
+    "axis": {"xyz": (3, "1 0 0")},
+    "limit": {"lower": (1, "0"), "upper": (1, "0"), "velocity": (1, "0")},
+    "mimic": {"multiplier": (1, "1"), "offset": (1, "0")},
+    "box": {"size": (3, "")},
+    "sphere": {"radius": (1, "")},
+    "cylinder": {"radius": (1, ""), "length": (1, "")},
+    "capsule": {"radius": (1, ""), "length": (1, "")},
+    "mesh": {"scale": (3, "1 1 1")},
+    "color": {"rgba": (4, "0 0 0 1")},
 }
-"""Attributes of elements that hold numbers."""
+"""Attributes that hold numbers: how many, and which they are where they are left out."""
+
+RANGES = {"limit": (-1e308, 1e308)} | dict.fromkeys(SHAPES[:4], (1e-9, FARTHEST))
+"""Range of these numbers, where it is not that of lengths; limits need not be used."""
 
 NEEDED = {
     "robot": ("link", "joint", "material"),
@@ -95,13 +62,7 @@ class TreeJoint(NamedTuple):
 
 
 def parse_xml(content: bytes) -> Element:
-    """The root of an XML document.
-
-    Raises
-    ------
-    ValueError
-        If it is damaged.
-    """
+    """The root of an XML document; raises ValueError if it is damaged."""
     try:
         return ElementTree.fromstring(content)
     except (ElementTree.ParseError, LookupError) as error:  # the latter of an unknown encoding
@@ -111,109 +72,75 @@ def parse_xml(content: bytes) -> Element:
 def read_robot(path: Path) -> Element:
     """The root of a URDF, without what nobody needs; its numbers are written as Python does.
 
-    Visual shapes stay as they are: who draws them checks them.
-
-    Raises
-    ------
-    ArmError
-        If the file is none, a name or a shape is missing, or a number is none, too many or out of
-        range.
+    Joints have an origin and an axis. Visual shapes stay as they are: who draws them checks them.
+    Raises ArmError if the file is none, a name or shape is missing, or a number is out of range.
     """
     try:
-        robot = parse_xml(read_file(path, LARGEST))
+        robot = parse_xml(path.read_bytes())
     except (OSError, ValueError) as error:
         raise ArmError(f"{path.name} is not a readable URDF: {first_line(error)}") from error
     if robot.tag != "robot":
-        raise ArmError(
-            f"{path.name} is not a readable URDF: its root is <{robot.tag}>, not <robot>"
-        )
-    capsules = robot.find("link/collision/geometry/capsule") is not None
-    if capsules and robot.get("version", "1.0") not in ("1.1", "1.2"):
-        raise ArmError(f'{path.name} has capsules, which need <robot version="1.2">')
+        raise ArmError(f"{path.name} is not a readable URDF: its root is <{robot.tag}>")
     for part in (robot, *robot):
         for element in [each for each in part if each.tag not in NEEDED.get(part.tag, (each.tag,))]:
             part.remove(element)
     for joint in robot.findall("joint"):
-        _check_joint(joint, path.name)
-    _check_links(robot.findall("link"), path.name)
+        _check_joint(joint, f"joint {joint.get('name')!r} of {path.name}")
+    for link in robot.findall("link"):
+        for collision in link.findall("collision"):
+            _check_shape(collision, f"link {link.get('name')!r} of {path.name}")
     return robot
 
 
-def _check_joint(joint: Element, file: str) -> None:
-    """Check name and numbers of a joint."""
-    name = joint.get("name")
-    if not name:
-        raise ArmError(f"{file} is not a readable URDF: a joint has no name")
-    if (limit := joint.find("limit")) is not None:
-        limit.set("effort", "0")
+def _check_joint(joint: Element, where: str) -> None:
+    """Complete a joint, and check its numbers."""
+    for name in ("origin", "axis"):
+        if joint.find(name) is None:
+            ElementTree.SubElement(joint, name)
     for element in joint:
-        check_numbers(element, f"joint {name!r} of {file}")
-    axis = None if joint.get("type") == "fixed" else joint.find("axis")
-    if axis is not None and math.hypot(*map(float, axis.attrib["xyz"].split())) < 1e-6:
-        raise ArmError(f"joint {name!r} of {file} has no axis: {axis.attrib}")
+        check_numbers(element, where)
+        if element.tag == "limit":
+            element.set("effort", "0")
+        along = element.get("xyz", "") if element.tag == "axis" else "1"
+        if joint.get("type") in MOVING and math.hypot(*map(float, along.split())) < 1e-6:
+            raise ArmError(f"{where} has no axis: {element.attrib}")
 
 
-def _check_links(links: list[Element], file: str) -> None:
-    """Check names and collision shapes of all links."""
-    names = [link.get("name", "") for link in links]
-    if len(links) > MOST_LINKS:
-        raise ArmError(f"{file} has {len(links)} links: more than {MOST_LINKS}")
-    for name, link in zip(names, links, strict=True):
-        if not name or names.count(name) > 1:
-            what = f"two links are called {name!r}" if name else "a link has no name"
-            raise ArmError(f"{file} is not a readable URDF: {what}")
-        for collision in link.findall("collision"):
-            for element in _shape_and_origin(collision, f"link {name!r} of {file}"):
-                check_numbers(element, f"a shape of link {name!r} of {file}")
-
-
-def _shape_and_origin(collision: Element, where: str) -> Iterator[Element]:
-    """The shape of a collision element, the first if it has several, and its origin."""
+def _check_shape(collision: Element, where: str) -> None:
+    """Check numbers of a collision element, and drop all but the first of its shapes."""
     geometry = collision.find("geometry")
-    shape = None if geometry is None else next(iter(geometry), None)
-    if geometry is None or shape is None or shape.tag not in SHAPES:
-        found = "none" if shape is None else f"<{shape.tag[:40]}>"
-        raise ArmError(f"{where} needs a shape of {', '.join(SHAPES)}, got {found}")
+    if geometry is None or not len(geometry) or geometry[0].tag not in SHAPES:
+        raise ArmError(f"{where} needs a shape of {', '.join(SHAPES)} in each collision element")
     geometry[1:] = []
-    yield shape
-    yield from collision.findall("origin")
+    for element in (geometry[0], *collision.findall("origin")):
+        check_numbers(element, f"a shape of {where}")
 
 
 def check_numbers(element: Element, where: str) -> None:
     """Check the numbers of an element, called ``where``, and rewrite them.
 
-    Raises
-    ------
-    ArmError
-        If one is missing, none, too many or out of range.
+    Raises ArmError if one is missing, none, too many or out of range.
     """
-    for name, rule in RULES.get(element.tag, {}).items():
-        given = element.get(name, rule.default)
-        if given is None:
-            raise ArmError(f"{where}: <{element.tag}> lacks {name}")
+    least, most = RANGES.get(element.tag, (-FARTHEST, FARTHEST))
+    for name, (count, default) in NUMBERS.get(element.tag, {}).items():
+        given = element.get(name, default)
         try:
             numbers = [float(word) for word in given.split()]
         except ValueError:
             numbers = []
-        if len(numbers) != rule.n or not all(rule.least <= x <= rule.most for x in numbers):
-            wanted = f"{rule.n} from {rule.least:g} to {rule.most:g}"
+        if len(numbers) != count or not all(least <= x <= most for x in numbers):
             raise ArmError(
-                f"{where}: numbers of {name} of <{element.tag}> must be {wanted}, got {given!r}"
+                f"{where}: numbers of {name} of <{element.tag}> must be {count} from {least:g} to "
+                f"{most:g}, got {given!r}"
             )
         # Pinocchio's reader refuses numbers that are almost zero.
         element.set(name, " ".join(repr(x if abs(x) > 1e-300 else 0.0) for x in numbers))
 
 
 def read_joints(robot: Element, path: Path) -> dict[str, TreeJoint]:
-    """Joints by name.
-
-    Raises
-    ------
-    ArmError
-        If they and the links are no tree on a fixed base.
-    """
+    """Joints by name; raises ArmError if they and the links are no tree on a fixed base."""
     found: dict[str, TreeJoint] = {}
-    links = {link.get("name", "") for link in robot.findall("link")}
+    links = [link.get("name", "") for link in robot.findall("link")]
     carried: dict[str, str] = {}
     for element in robot.findall("joint"):
         name, kind = element.get("name", ""), element.get("type", "")
@@ -221,39 +148,40 @@ def read_joints(robot: Element, path: Path) -> dict[str, TreeJoint]:
         parent, child = ("" if end is None else end.get("link", "") for end in ends)
         for link in (parent, child):
             if link not in links:
-                raise ArmError(
-                    f"{path.name} is not a readable URDF: joint {name!r} joins {link!r}, which is "
-                    "no link"
-                )
-        if name in found:
-            raise ArmError(f"{path.name} is not a readable URDF: two joints are called {name!r}")
+                raise ArmError(f"joint {name!r} of {path.name} joins {link!r}, which is no link")
         if child in carried:
             raise ArmError(
                 f"link {child!r} of {path.name} hangs on two joints, {carried[child]!r} and "
                 f"{name!r}: closed loops are not supported"
             )
-        if kind in ("floating", "planar"):
-            raise ArmError(f"joint {name!r} of {path.name} is {kind}: the base must be fixed")
         if kind not in (*MOVING, "fixed"):
-            raise ArmError(f"joint {name!r} of {path.name} is {kind!r}: not supported")
+            raise ArmError(
+                f"joint {name!r} of {path.name} is {kind}: the base must be fixed, and joints "
+                f"{', '.join(MOVING)} or fixed"
+            )
         carried[child] = name
         found[name] = TreeJoint(element, name, kind, parent, child)
-    _check_tree(found, links, path)
+    _check_tree(found, links, carried, path)
     return found
 
 
-def _check_tree(joints: Mapping[str, TreeJoint], links: set[str], path: Path) -> None:
-    """Refuse links that do not hang on one link, the base."""
-    carried = {joint.child for joint in joints.values()}
+def _check_tree(
+    joints: Mapping[str, TreeJoint], links: list[str], carried: Mapping[str, str], path: Path
+) -> None:
+    """Refuse names that are missing or not unique, and links that do not hang on the base."""
+    for what, names in (("joint", list(carried.values())), ("link", links)):
+        for name, count in Counter(names).items():
+            if not name or count > 1:
+                raise ArmError(f"each {what} of {path.name} needs a name of its own, not {name!r}")
     roots = [link for link in links if link not in carried]
     if len(roots) > 1:
-        names = ", ".join(sorted(map(repr, roots)))
-        raise ArmError(f"{path.name} has links that no joint joins: {names}")
-    below, reached = {joint.child: joint.parent for joint in joints.values()}, set(roots)
-    for _ in joints:
-        reached |= {child for child, parent in below.items() if parent in reached}
-    if reached != links:
-        raise ArmError(f"the links of {path.name} form a loop: closed loops are not supported")
+        raise ArmError(f"{path.name} has links that no joint joins: {', '.join(map(repr, roots))}")
+    try:
+        TopologicalSorter({joint.child: [joint.parent] for joint in joints.values()}).prepare()
+    except CycleError:
+        raise ArmError(
+            f"the links of {path.name} form a loop: closed loops are not supported"
+        ) from None
 
 
 def chain_to(link: str, joints: Mapping[str, TreeJoint]) -> list[TreeJoint]:

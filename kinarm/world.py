@@ -12,18 +12,18 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm._parallel import available_threads, run_rows
 from kinarm._validation import finite_array, one_or_many, whole_number
 from kinarm.chain import Chain
-from kinarm.clearance import Clearance, Closeness
+from kinarm.clearance import Clearance, flattened, measure_clearance
 from kinarm.collision import Contact, ContactModel
 from kinarm.contact_shapes import ContactShapes
 from kinarm.episodes import Control, Episodes, Rules
 from kinarm.errors import ProblemError
 from kinarm.kernels.block import Alone, Block, work_space
+from kinarm.kernels.closest import Bodies
 from kinarm.kernels.records import recorded
 from kinarm.kernels.rollout import begin
 from kinarm.kernels.screening import screen
 from kinarm.kernels.session import Session
 from kinarm.kinematics import Kinematics
-from kinarm.networks import table_control
 from kinarm.observation import observation_size
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.task import Goals
@@ -41,10 +41,8 @@ class World(Kinematics):
 
     Attributes
     ----------
-    problem : ReachProblem
+    problem, arm : ReachProblem and Arm
         What it was built from.
-    arm : Arm
-        The arm.
     contact_model : ContactModel
         Shapes that may touch.
     rules : Rules
@@ -120,44 +118,20 @@ class World(Kinematics):
         return self.arm.n_actuated
 
     def observe(self, configurations: ArrayLike, goals: ArrayLike) -> NDArray[np.float64]:
-        """Observations of configurations, whether or not they touch something.
+        """Observations of configurations, shape (n, n_observations), whether or not they touch.
 
-        Parameters
-        ----------
-        configurations : array_like, shape (n, n_joints)
-            Joint positions [rad or m].
-        goals : array_like, shape (n, 3)
-            Goal positions [m].
-
-        Returns
-        -------
-        ndarray, shape (n, n_observations)
+        Takes joint positions, shape (n, n_joints) [rad or m], and goals, shape (n, 3) [m].
         """
         return self._begun_at(configurations, goals).observation
 
     def distances(self, configurations: ArrayLike, goals: ArrayLike) -> NDArray[np.float64]:
-        """Distances from the tool to goals [m], shape (n,).
-
-        Parameters
-        ----------
-        configurations, goals : array_like
-            As for `observe`.
-        """
+        """Distances from the tool to goals, shape (n,) [m]; takes what `observe` does."""
         return self._begun_at(configurations, goals).distance
 
     def screen(self, configurations: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Find tool points, and which configurations touch something.
+        """Tool points, shape (n, 3) [m], and which configurations touch something, shape (n,).
 
-        Parameters
-        ----------
-        configurations : array_like, shape (n, n_joints)
-            Joint positions [rad or m].
-
-        Returns
-        -------
-        tools : ndarray, shape (n, 3)
-            Tool points [m].
-        touching : ndarray of bool, shape (n,)
+        Takes joint positions, shape (n, n_joints) [rad or m].
         """
         q = finite_array("configurations", configurations, (None, self.arm.n_joints))
         return self.screened(q)
@@ -173,10 +147,10 @@ class World(Kinematics):
     def proven(
         self, q: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], int]:
-        """Tool points [m] of finite configurations, and what kernels prove of these.
+        """Tool points of finite configurations [m], and what kernels prove of these.
 
-        Which surely are free, which surely touch, and how many these are together: about the others
-        Coal has to decide.
+        That is: which surely are free, which surely touch, and how many these are together; about
+        the others Coal has to decide.
         """
         n = len(q)
         tools, free, touching = np.empty((n, 3)), np.empty(n, dtype=bool), np.empty(n, dtype=bool)
@@ -188,27 +162,17 @@ class World(Kinematics):
     def clearance(self, configurations: ArrayLike) -> Clearance:
         """Measure how far the closest of the tested pairs is apart, and where.
 
-        Distances of capsules, spheres, boxes, convex hulls and the ground are compiled, to within
-        1e-10 m. Coal measures where a cylinder may be closest, and where shapes overlap: capsules
-        and spheres deeper than their radii, others at all.
-
-        Parameters
-        ----------
-        configurations : array_like
-            As for `poses`.
+        Takes configurations as `poses` does. Distances of capsules, spheres, boxes, convex hulls
+        and the ground are compiled, to within 1e-10 m. Coal measures where a cylinder may be
+        closest, and where shapes overlap: capsules and spheres deeper than their radii, others at
+        all.
         """
         q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
-        found = self._closeness.measure(q, self.threads)
+        found = measure_clearance(self.contact_model, self._bodies, q, self.threads)
         return Clearance(*(each[0] for each in found)) if one else found
 
     def in_contact(self, configurations: ArrayLike) -> NDArray[np.bool_]:
-        """Tell which configurations touch something, shape () or (n,); Coal decides.
-
-        Parameters
-        ----------
-        configurations : array_like
-            As for `poses`.
-        """
+        """Tell which configurations touch something, shape () or (n,), given as for `poses`."""
         q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
         touching = self.screen(q)[1]
         return touching[0] if one else touching
@@ -216,17 +180,13 @@ class World(Kinematics):
     def contact_pairs(self, configurations: ArrayLike) -> tuple[tuple[str, str] | None, ...]:
         """Name the first tested pair that touches, per configuration; None where nothing does.
 
-        Parameters
-        ----------
-        configurations : array_like, shape (n, n_joints)
-            Joint positions [rad or m].
+        Takes joint positions, shape (n, n_joints) [rad or m].
         """
         q = finite_array("configurations", configurations, (None, self.arm.n_joints))
-        touching = self.in_contact(q)
-        return tuple(
-            self.contact_model.contact_pair(each) if touches else None
-            for each, touches in zip(q, touching, strict=True)
-        )
+        pairs: list[tuple[str, str] | None] = [None] * len(q)
+        for row in np.flatnonzero(self.in_contact(q)):
+            pairs[row] = self.contact_model.contact_pair(q[row])
+        return tuple(pairs)
 
     def contact(self, configuration: ArrayLike, target: ArrayLike | None = None) -> Contact | None:
         """Describe the contact of a configuration, or the first on a step's way; None without one.
@@ -249,13 +209,7 @@ class World(Kinematics):
     def contact_pair(
         self, configuration: ArrayLike, target: ArrayLike | None = None
     ) -> tuple[str, str] | None:
-        """Name the two bodies of what `contact` describes, or None.
-
-        Parameters
-        ----------
-        configuration, target : array_like
-            As for `contact`.
-        """
+        """Name the two bodies of what `contact` describes, or None."""
         contact = self.contact(configuration, target)
         return contact.pair if contact else None
 
@@ -264,19 +218,19 @@ class World(Kinematics):
     ) -> NDArray[np.float64]:
         """Configurations at which the motion of a step is tested for contact.
 
-        Parameters
-        ----------
-        configurations, targets : ndarray, shape (n, n_joints)
-            Ends of the steps [rad or m].
-
-        Returns
-        -------
-        ndarray, shape (n, n_tested, n_joints)
-            Evenly spaced; the last one is the target.
+        Takes the ends of steps, shape (n, n_joints), and returns evenly spaced configurations,
+        shape (n, n_tested, n_joints), of which the last one is the target [rad or m].
         """
         ways = configurations[:, None] + self._shares * (targets - configurations)[:, None]
         ways[:, -1] = targets
         return ways
+
+    def episodes(
+        self, starts: NDArray[np.float64], goals: NDArray[np.float64], **options: Any
+    ) -> Episodes:
+        """Episodes at their starts, yet to be begun; options are those of ``Episodes.allocate``."""
+        n_pairs, horizon = len(self.contact_model.shapes.pairs), self.problem.task.horizon
+        return Episodes.allocate(starts, goals, n_pairs=n_pairs, horizon=horizon, **options)
 
     def session(self, control: Control, episodes: Episodes) -> Session:
         """Bind episodes, and where their actions come from, for the kernels."""
@@ -285,24 +239,22 @@ class World(Kinematics):
     def _screen_some(self, first: int, last: int, *arrays: Any) -> int:
         """Screen some rows, with work space that no other thread uses."""
         try:
-            block, alone = self._idle.pop()
+            space = self._idle.pop()
         except IndexError:
             n_pairs = len(self.contact_model.shapes.pairs)
-            block, alone = work_space(n_joints=self.arm.n_joints, n_pairs=n_pairs)
-        proven = screen(first, last, block, alone, *arrays)
-        self._idle.append((block, alone))
-        return proven
+            space = work_space(n_joints=self.arm.n_joints, n_pairs=n_pairs)
+        n_proven = screen(first, last, *space, *arrays)
+        self._idle.append(space)
+        return n_proven
 
     @cached_property
-    def _closeness(self) -> Closeness:
-        return Closeness(self.contact_model)
+    def _bodies(self) -> Bodies:
+        return flattened(self.contact_model.geometry)
 
     def _begun_at(self, configurations: ArrayLike, goals: ArrayLike) -> Episodes:
         """Episodes that begin at configurations, whether or not those touch something."""
         q = finite_array("configurations", configurations, (None, self.arm.n_joints))
         goal = finite_array("goals", goals, (len(q), 3))
-        n_pairs = len(self.contact_model.shapes.pairs)
-        episodes, known = Episodes.allocate(q, goal, n_pairs=n_pairs, horizon=1)
-        at_rest = table_control(np.zeros((len(q), 1, self.n_actions)))
-        begin(0, len(q), np.arange(len(q)), self.session(at_rest, known))
-        return episodes
+        session = self.session(Control(), self.episodes(q, goal))
+        begin(np.zeros(1, dtype=np.int64), session, np.arange(len(q)))
+        return session.episodes

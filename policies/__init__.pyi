@@ -1,5 +1,5 @@
 from .ars.config import ARSConfig as ARSConfig
-from .ars.state import ARSState as ARSState
+from .ars.config import ARSState as ARSState
 from .checkpoint import Checkpoint as Checkpoint
 from .checkpoint import load_checkpoint as load_checkpoint
 from .checkpoint import save_checkpoint as save_checkpoint
@@ -26,4 +26,4 @@ from .ppo.state import PPOState as PPOState
 from .provenance import Provenance as Provenance
 from .recipes import recipe as recipe
 from .sb3.environment import sb3_vec_env as sb3_vec_env
-from .sb3.zoo import zoo_hyperparameters as zoo_hyperparameters
+from .sb3.environment import zoo_hyperparameters as zoo_hyperparameters

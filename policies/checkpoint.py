@@ -19,15 +19,7 @@ FORMAT_VERSION = 2
 
 
 class Checkpoint(NamedTuple):
-    """A training that was stopped.
-
-    Attributes
-    ----------
-    config : ARSConfig, PPOConfig or settings of another learner
-        The settings.
-    state : TrainingState
-        Where to go on.
-    """
+    """A training that was stopped: its settings, and the state from which it goes on."""
 
     config: Any
     state: Any
@@ -40,15 +32,8 @@ def save_checkpoint(path: str | Path, config: TrainingConfig, state: TrainingSta
     ----------
     path : str or Path
         The file, ``.npz`` without pickle.
-    config : ARSConfig, PPOConfig or settings of another learner
-        The settings of the training.
-    state : TrainingState
-        Its state.
-
-    Raises
-    ------
-    OutputError
-        If the file cannot be written.
+    config, state : TrainingConfig and TrainingState
+        Settings and state of the training.
     """
     header = {
         "learner": config.learner,
@@ -94,16 +79,21 @@ def arrays_of(name: str, value: Any) -> dict[str, NDArray[Any]]:
 
 
 def rebuilt(kind: Any, name: str, arrays: Arrays) -> Any:
-    """Rebuild a value of a kind, a type or its annotation, from what `arrays_of` returned.
+    """Rebuild what `arrays_of` flattened.
 
     Parameters
     ----------
     kind : type
-        What it is to be: a type, or the annotation of a field.
+        Type of the value, or the annotation of a field.
     name : str
-        The name that it has in the file.
+        Name that its arrays have, or begin with.
     arrays : mapping of str to ndarray
-        All arrays of the file.
+        All arrays, of whatever shapes the value has.
+
+    Raises
+    ------
+    InvalidInputError
+        If an array has another type of numbers, or one that is not finite.
     """
     if is_dataclass(kind) or hasattr(kind, "_fields"):
         hints = get_type_hints(kind)

@@ -19,16 +19,16 @@ Schedule = Literal["constant", "linear"]
 
 
 def scheduled(value: float, schedule: Schedule, done: float) -> float:
-    """Value of a setting after this share of the training.
+    """Value of a setting in the course of a training.
 
     Parameters
     ----------
     value : float
-        Value at the beginning.
+        Value at the beginning, in the unit of the setting.
     schedule : {"constant", "linear"}
-        How it changes.
+        Whether it stays or falls linearly to zero.
     done : float
-        Share of the training, from 0 to 1.
+        Share of the training that is done, in [0, 1].
     """
     return value if schedule == "constant" else value * (1 - done)
 
@@ -36,42 +36,31 @@ def scheduled(value: float, schedule: Schedule, done: float) -> float:
 RECIPE_REACH = 1.264
 """Reach of the arm ``paper``, in which the lengths of recipes were found [m]."""
 
-
-def relative_reach(problem: ReachProblem) -> float:
-    """Reach of a problem's arm divided by the reach of the arm ``paper``, to two digits."""
-    return round(problem.load_arm().reach / RECIPE_REACH, 2)
-
-
 POSITIVE = {"must": "be greater than 0", "holds": lambda value: value > 0}
 NOT_NEGATIVE = {"must": "not be negative", "holds": lambda value: value >= 0}
 SHARE = {"must": "lie in [0, 1]", "holds": lambda value: 0 <= value <= 1}
-"""What a number must be: metadata of a field."""
-
+"""Range of a number: metadata of a field."""
 
 LARGEST = 1e6
 """Numbers of settings at most; parameters would overflow with larger ones."""
 
-MANY = {"at_most": 100_000}
-"""Metadata of a whole number that memory grows with."""
-
-WIDTHS = {"at_most": 4096}
-"""Metadata of the widths of hidden layers."""
+MANY, WIDTHS = {"at_most": 100_000}, {"at_most": 4096}
+"""Metadata of whole numbers that memory grows with, and of the widths of hidden layers."""
 
 
 def check_range(name: str, value: Any, demands: Mapping[str, Any]) -> None:
-    """Refuse a number that is not finite or breaks what its field's metadata demand.
-
-    Whole numbers, those of tuples, too, must be ``at_least`` so large, or 1 if it is not said, and
-    ``at_most`` so large, if it is said.
+    """Refuse numbers that are not finite or break what the metadata of their field demand.
 
     Parameters
     ----------
     name : str
-        The setting, for messages.
+        Name of the field, for messages.
     value : object
-        Its value; other than numbers and tuples of them, anything is fine.
+        Its value, in its unit; entries of tuples are looked at one by one, and what is no number
+        passes.
     demands : mapping
-        Metadata of its field.
+        Metadata of the field. For whole numbers: ``at_least``, 1 if it is not said, and
+        ``at_most``. For other numbers: a condition that ``holds``, and what they ``must`` in words.
     """
     if isinstance(value, tuple):
         for each in value:
@@ -131,11 +120,6 @@ class TrainingConfig:
         """Whether a training with more iterations begins just as this one goes."""
         return False
 
-    @property
-    def cost(self) -> float:
-        """Rough duration of the training, to compare it with others [s of a core]."""
-        return float(self.iterations)
-
     def simulator(self, threads: int | None = None) -> "Simulator":
         """Build the simulator to train in."""
         from kinarm.simulator import Simulator
@@ -157,5 +141,5 @@ ConfigT = TypeVar("ConfigT", bound=TrainingConfig)
 def rewarded_per_reach(config: ConfigT) -> ConfigT:
     """Let progress count per reach of the problem's arm instead of per reach of ``paper``."""
     weights = config.training_problem.task.reward
-    progress = weights.progress / relative_reach(config.problem)
-    return replace(config, reward=replace(weights, progress=progress))
+    relative = round(config.problem.load_arm().reach / RECIPE_REACH, 2)
+    return replace(config, reward=replace(weights, progress=weights.progress / relative))

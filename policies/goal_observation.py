@@ -11,35 +11,21 @@ from kinarm.errors import InvalidInputError
 from kinarm.observation import OBSERVATION, observation_size, part_slices
 
 GOAL_KEYS = ("observation", "achieved_goal", "desired_goal")
-"""What a dictionary observation holds; the achieved goal is the tool point."""
+"""Entries of a dictionary observation; the achieved goal is the tool point."""
 
 
 def flat_observation(given: Mapping[str, ArrayLike], n_observations: int) -> NDArray[np.float64]:
     """Put a dictionary observation, of one arm or of several, together as policies take it.
 
-    Parameters
-    ----------
-    given : mapping
-        ``observation`` of shape (..., n_own), ``achieved_goal`` and ``desired_goal`` of shape
-        (..., 3) [m].
-    n_observations : int
-        Length of the flat observation.
-
-    Returns
-    -------
-    ndarray, shape (..., n_observations)
-
-    Raises
-    ------
-    InvalidInputError
-        If the keys or the shapes are others, or an entry is not finite.
+    It has an ``observation`` of shape (..., n_own), ``achieved_goal`` and ``desired_goal`` of shape
+    (..., 3) [m]; anything else is refused. The flat one has the shape (..., n_observations).
     """
     if set(given) != set(GOAL_KEYS):
         raise InvalidInputError(
             f"a dictionary observation has the keys {', '.join(GOAL_KEYS)}, got "
             f"{', '.join(map(str, given))}"
         )
-    places = part_slices(_n_joints(n_observations))
+    places = part_slices(next(n for n in count(1) if observation_size(n) >= n_observations))
     own = [places[part.name] for part in OBSERVATION if not part.of_goal]
     entries = np.concatenate([np.arange(place.start, place.stop) for place in own])
     batch = np.shape(given["desired_goal"])[:-1]
@@ -53,8 +39,3 @@ def flat_observation(given: Mapping[str, ArrayLike], n_observations: int) -> NDA
     flat[..., places["goal_minus_tool"]] = goal - tool
     flat[..., entries] = rest
     return flat
-
-
-def _n_joints(n_observations: int) -> int:
-    """Joints of the arms whose observation has a length."""
-    return next(n for n in count(1) if observation_size(n) >= n_observations)

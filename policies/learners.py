@@ -1,9 +1,8 @@
 """The contract of a learner, the one way to find learners, and the loop that they all train in.
 
-A learner is an attribute ``LEARNER`` of a module; it needs no base class. The module of ARS, for
-example, is ``kinarm.policies.ars``. Learners of other packages are found by a name that the package
-gives them in the entry-point group ``kinarm.learners``, or as ``module:LEARNER``. Either name works
-wherever a learner is named, in every process.
+A learner is an attribute ``LEARNER`` of a module, such as `kinarm.policies.ars`; it needs no base
+class. Those of other packages are found by the name that the package gives them in the entry-point
+group ``kinarm.learners``, or as ``module:LEARNER``, wherever a learner is named, in every process.
 """
 
 import sys
@@ -18,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 
 from kinarm._files import first_line
 from kinarm.errors import InvalidInputError, MissingExtraError, UnknownNameError
-from kinarm.policies.config import TrainingConfig
+from kinarm.policies.config import ConfigT, TrainingConfig
 
 if TYPE_CHECKING:
     from kinarm.policies.policy import Policy
@@ -29,16 +28,13 @@ class CurvePoint(NamedTuple):
 
     Attributes
     ----------
-    mean_return, std_return : float
-        Mean and standard deviation of the returns of the iteration's episodes; for PPO, of those
-        that ended in it, and for algorithms of Stable-Baselines3, of the last hundred that ended.
-        Episodes that replayed a failed scenario do not count; NaN if none does.
-    success : float
-        Share of these episodes that reached the goal.
-    environment_steps : int
-        Steps taken since the training began.
-    wall_time : float
-        Time that iterations took since the training began [s].
+    mean_return, std_return, success : float
+        Mean and standard deviation of the returns of the iteration's episodes, and the share that
+        reached the goal; for PPO, of those that ended in it, and for algorithms of
+        Stable-Baselines3, of the last hundred that ended. Episodes that replayed a failed scenario
+        do not count; NaN if none does.
+    environment_steps, wall_time : int and float
+        Steps taken, and time that iterations took [s], since the training began.
     """
 
     mean_return: float
@@ -53,12 +49,7 @@ class TrainingState:
     """Everything that the next iteration depends on; learners add fields of their own.
 
     A checkpoint holds all fields: numbers, arrays, dictionaries that JSON can hold, and
-    dataclasses or named tuples of these.
-
-    Attributes
-    ----------
-    curve : tuple of CurvePoint
-        One point per finished iteration.
+    dataclasses or named tuples of these. The curve has one point per finished iteration.
     """
 
     curve: tuple[CurvePoint, ...] = ()
@@ -79,7 +70,6 @@ class TrainingState:
         return self.curve[-1].wall_time if self.curve else 0.0
 
 
-ConfigT = TypeVar("ConfigT", bound=TrainingConfig)
 StateT = TypeVar("StateT", bound=TrainingState)
 
 
@@ -95,14 +85,12 @@ class Training(Protocol[StateT]):
 
 @dataclass(frozen=True, kw_only=True)
 class Learner(Generic[ConfigT, StateT]):
-    """What a learner offers.
+    """A learner: its settings, recipes and training.
 
     Parameters
     ----------
-    name : str
-        Its name on the command line and in files.
-    title : str
-        Its name in words.
+    name, title : str
+        Its name on the command line and in files, and in words.
     config, state : type
         Settings, and state of a training.
     recipes : mapping of str to config
@@ -117,10 +105,8 @@ class Learner(Generic[ConfigT, StateT]):
         Adapts a recipe to the problem that it is for.
     options : tuple of str
         Names of the options that ``begin`` takes.
-    packages : tuple of str
-        Modules that it needs beyond what kinarm requires.
-    extra : str
-        The extra of kinarm that brings them.
+    packages, extra : tuple of str, and str
+        Modules that it needs beyond what kinarm requires, and the extra that brings them.
     """
 
     name: str
@@ -141,15 +127,9 @@ class Learner(Generic[ConfigT, StateT]):
         """Name of the recipe that is taken where none is named."""
         return next(iter(self.recipes))
 
-    def check_installed(self, *others: str) -> None:
-        """Refuse to go on without the packages that the learner needs, and others.
-
-        Raises
-        ------
-        MissingExtraError
-            If one is missing; it says how to install it.
-        """
-        for package in (*self.packages, *others):
+    def check_installed(self) -> None:
+        """Refuse to go on without the packages that the learner needs."""
+        for package in self.packages:
             if find_spec(package) is None:
                 raise MissingExtraError(package, self.extra)
 
@@ -160,17 +140,7 @@ def imported(module: str, name: str) -> Callable[..., Any]:
 
 
 class TrainingResult(NamedTuple):
-    """A trained policy and how it came about.
-
-    Attributes
-    ----------
-    policy : Policy
-        The trained policy.
-    curve : tuple of CurvePoint
-        One point per iteration.
-    state : TrainingState
-        The state that the policy was made of.
-    """
+    """A trained policy, its learning curve, and the `TrainingState` that it was made of."""
 
     policy: "Policy"
     curve: tuple[CurvePoint, ...]
@@ -214,10 +184,8 @@ def find_learner(name: str) -> Learner[Any, Any]:
 
     Raises
     ------
-    UnknownNameError
-        If there is no such learner.
     InvalidInputError
-        If it cannot be imported, or is something else.
+        If there is no such learner, it cannot be imported, or is something else.
     """
     place = name if ":" in name else _SHIPPED.get(name) or _installed().get(name)
     if place is None:
@@ -232,17 +200,6 @@ def find_learner(name: str) -> Learner[Any, Any]:
     if not isinstance(found, Learner):
         raise InvalidInputError(f"learner {name!r} is no kinarm.policies.Learner: it is {found!r}")
     return found
-
-
-def learner_of(config: TrainingConfig) -> Learner[Any, Any]:
-    """Look up the learner that settings are for.
-
-    Raises
-    ------
-    InvalidInputError
-        If they are no learner's.
-    """
-    return find_learner(config.learner)
 
 
 def train_policy(
@@ -265,51 +222,8 @@ def train_policy(
     **options
         What does not change the result: ``threads``, and the folder of the ``tensorboard`` logs
         for PPO.
-
-    Raises
-    ------
-    MissingExtraError
-        If a package that the learner needs is not installed.
-    InvalidInputError
-        If the state is not one of such a training.
     """
     training = begin_training(config, **options)
-    return run_training(config, training, state=state, on_iteration=on_iteration)
-
-
-def thread_options(config: TrainingConfig, threads: int) -> dict[str, int]:
-    """Options of a training on so many threads; none if its learner does not ask for them."""
-    return {"threads": threads} if "threads" in learner_of(config).options else {}
-
-
-def begin_training(config: TrainingConfig, **options: Any) -> Training[Any]:
-    """Prepare a training, and refuse what cannot be trained; see `train_policy`."""
-    learner = learner_of(config)
-    learner.check_installed()
-    for option in options:
-        if option not in learner.options:
-            raise InvalidInputError(f"{learner.name} has no option {option!r}")
-    return learner.begin(config, **options)
-
-
-def run_training(
-    config: TrainingConfig,
-    training: Training[Any],
-    *,
-    state: TrainingState | None = None,
-    on_iteration: Callable[[Any], object] | None = None,
-) -> TrainingResult:
-    """Iterate until the training is complete; see `train_policy`.
-
-    Parameters
-    ----------
-    config : TrainingConfig
-        The settings.
-    training : Training
-        What `begin_training` prepared with them.
-    state, on_iteration
-        As for `train_policy`.
-    """
     if state is None:
         state = training.initial_state()
     while state.iteration < config.iterations:
@@ -319,6 +233,16 @@ def run_training(
     return TrainingResult(state_policy(config, state), state.curve, state)
 
 
+def begin_training(config: TrainingConfig, **options: Any) -> Training[Any]:
+    """Prepare a training, and refuse what cannot be trained; see `train_policy`."""
+    learner = find_learner(config.learner)
+    learner.check_installed()
+    for option in options:
+        if option not in learner.options:
+            raise InvalidInputError(f"{learner.name} has no option {option!r}")
+    return learner.begin(config, **options)
+
+
 def state_policy(config: TrainingConfig, state: TrainingState) -> "Policy":
     """Freeze a state of a training into a policy, with all that belongs to it."""
-    return learner_of(config).policy(config, state)
+    return find_learner(config.learner).policy(config, state)

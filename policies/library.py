@@ -1,13 +1,16 @@
-"""The policies that ship with kinarm, and loading by name, group or file."""
+"""The policies that ship with kinarm; loading by name, group or file, also to train on from."""
 
 import json
 import re
-from functools import cache
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 
-from kinarm._files import absolute, is_file, is_folder
+import numpy as np
+
+from kinarm._files import absolute, is_file, is_folder, shipped_files
 from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.policy import Policy
 from kinarm.policies.training import CHECKPOINT
 from kinarm.problem import ProblemLike, ReachProblem
@@ -18,22 +21,20 @@ BEST = "best"
 RANKING = "ranking.json"
 """Which shipped policies are best, beside them: see docs/ranking.py."""
 
+SEEN = 10_000
+"""Observations that the statistics of an initial policy count for: new ones soon outweigh them."""
+
 _SEED_SUFFIX = re.compile(r"-seed\d+$")
 
 
-@cache
 def policy_names() -> tuple[str, ...]:
     """Names of the shipped policies, such as ``ars-tuned-both-seed0``."""
-    folder = resources.files("kinarm.data") / "policies"
-    return tuple(
-        sorted(Path(file.name).stem for file in folder.iterdir() if file.name.endswith(".npz"))
-    )
+    return tuple(shipped_files("policies", ".npz"))
 
 
 def is_shipped(path: Path) -> bool:
     """Whether a file holds a shipped policy."""
-    with resources.as_file(resources.files("kinarm.data") / "policies") as folder:
-        return absolute(path).parent == absolute(folder)
+    return absolute(path) in map(absolute, shipped_files("policies", ".npz").values())
 
 
 def group_of(name: str) -> str:
@@ -42,45 +43,25 @@ def group_of(name: str) -> str:
 
 
 def best_policy(problem: ProblemLike | None) -> str:
-    """Name of the best shipped policy for a problem.
+    """Name of the best shipped policy for a problem, its name or its file.
 
     It was chosen when they were shipped, from what they reach of the problem as it ships; another
     tolerance, horizon, reward or spread of the starts does not change the choice.
-
-    Parameters
-    ----------
-    problem : ReachProblem, str or Path
-        The problem, its name or its file.
-
-    Raises
-    ------
-    InvalidInputError
-        If no problem is given, or no policy ships for its arm, scene and goals.
     """
     if problem is None:
         raise InvalidInputError(f"{BEST!r} is the best policy for a problem: name a --problem")
-    wanted, best = ReachProblem.load(problem), _best_policies()
+    wanted = ReachProblem.load(problem)
+    ranking = resources.files("kinarm.data") / "policies" / RANKING
+    best: dict[str, str] = json.loads(ranking.read_text(encoding="utf-8"))["best"]
     for trained_for, name in best.items():
-        if _differ_in_nothing_else(ReachProblem.load(trained_for), wanted):
+        other = ReachProblem.load(trained_for)
+        same_goals = set(other.task.goal_regions) == set(wanted.task.goal_regions)
+        if same_goals and other.same_place(wanted):
             return name
     raise InvalidInputError(
         f"no shipped policy is for the arm, scene and goals of problem {wanted.name!r}: "
         f"they are for {', '.join(best)}"
     )
-
-
-def _differ_in_nothing_else(one: ReachProblem, other: ReachProblem) -> bool:
-    """Whether two problems have the same arm, scene and goals."""
-    same_goals = set(one.task.goal_regions) == set(other.task.goal_regions)
-    return same_goals and one.same_place(other)
-
-
-@cache
-def _best_policies() -> dict[str, str]:
-    """Names of the best shipped policies, by problem."""
-    text = (resources.files("kinarm.data") / "policies" / RANKING).read_text(encoding="utf-8")
-    best: dict[str, str] = json.loads(text)["best"]
-    return best
 
 
 def load_policy(name_or_file: str | Path, problem: ProblemLike | None = None) -> Policy:
@@ -96,12 +77,9 @@ def load_policy(name_or_file: str | Path, problem: ProblemLike | None = None) ->
 
     Raises
     ------
-    UnknownNameError
-        If it is neither a name nor a file.
-    InvalidInputError
-        If it is ``"best"`` and no policy ships for the problem.
-    PolicyFileError
-        If the file cannot be used.
+    KinarmError
+        If it is neither a name nor a file, no policy ships for the problem, or the file cannot be
+        used.
     """
     return Policy.load(policy_files(name_or_file, problem)[0])
 
@@ -110,21 +88,14 @@ def policy_files(name_or_file: str | Path, problem: ProblemLike | None = None) -
     """Files behind a policy's name, a group's name, ``"best"`` or a path; see `load_policy`.
 
     Those of a folder are in the order of the numbers in their names.
-
-    Raises
-    ------
-    UnknownNameError
-        If it is none of these.
-    InvalidInputError
-        If it is ``"best"`` and no policy ships for the problem, or a folder without policies.
     """
     text, path = str(name_or_file), Path(name_or_file)
     if text == BEST:
         text = best_policy(problem)
-    names = [name for name in policy_names() if text in (name, group_of(name))]
-    if names:
-        with resources.as_file(resources.files("kinarm.data") / "policies") as folder:
-            return tuple(folder / f"{name}.npz" for name in names)
+    shipped = shipped_files("policies", ".npz").items()
+    files = tuple(file for name, file in shipped if text in (name, group_of(name)))
+    if files:
+        return files
     if is_folder(path):
         return _files_in(path)
     if is_file(path) or path.suffix == ".npz" or path.parent != Path():
@@ -138,8 +109,33 @@ def _files_in(folder: Path) -> tuple[Path, ...]:
     found = [path for path in folder.glob("*.npz") if not path.name.endswith(CHECKPOINT)]
     if not found:
         raise InvalidInputError(f"there is no policy (.npz) in the folder {str(folder)!r}")
-    return tuple(sorted(found, key=lambda path: re.sub(r"\d+", _padded, path.name)))
+    return tuple(
+        sorted(found, key=lambda path: re.sub(r"\d+", lambda n: n[0].rjust(20, "0"), path.name))
+    )
 
 
-def _padded(number: re.Match[str]) -> str:
-    return number[0].rjust(20, "0")
+def starting_policy(name_or_file: str, widths: Sequence[int]) -> Policy:
+    """Load a policy with which a training can begin, of any arm and problem.
+
+    Its layers must have the widths of the training's, from the observation to the action, and the
+    same functions.
+    """
+    policy = load_policy(name_or_file)
+    found = (policy.n_observations, *(len(layer.bias) for layer in policy.layers))
+    if found != tuple(widths):
+        layers, wanted = ("-".join(map(str, each)) for each in (found, widths))
+        raise InvalidInputError(
+            f"initial_policy {name_or_file!r} has layers {layers}, the training {wanted}"
+        )
+    usual = (*("tanh",) * (len(policy.layers) - 1), "linear")
+    if policy.activations != usual:
+        raise InvalidInputError(
+            f"initial_policy {name_or_file!r} has the functions {', '.join(policy.activations)}; "
+            f"those of the training are {', '.join(usual)}"
+        )
+    return policy
+
+
+def statistics(policy: Policy) -> Normalizer:
+    """Statistics of observations that a policy was trained with, as those of a few of them."""
+    return Normalizer(SEEN, np.array(policy.mean), SEEN * policy.std**2)

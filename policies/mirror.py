@@ -1,10 +1,9 @@
 """Reflection about the x-z plane, and its effect on observations and actions.
 
 The reflection y -> -y maps the right bench to the left one and an arm that is symmetric about its
-x-z plane to itself, with joints that turn about x or z reversed. In kinarm's observations and
-actions it only changes signs. A policy with a mirror sees goals on the left reflected, and its
-actions are reflected in turn. It does on one bench exactly what it does on the other; see
-`kinarm.Networks`.
+x-z plane to itself, with joints that turn about x or z reversed. In observations and actions it
+only changes signs. A policy with a mirror sees goals on the left reflected, and its actions are
+reflected in turn: it does on one bench exactly what it does on the other.
 """
 
 import math
@@ -16,72 +15,58 @@ from numpy.typing import NDArray
 
 from kinarm.contact_statistics import random_configurations
 from kinarm.errors import InvalidInputError
-from kinarm.failed_scenarios import StartsAndGoals
 from kinarm.networks import Mirror
 from kinarm.observation import observation_signs
 from kinarm.problem import ReachProblem
 from kinarm.scene import Obstacle, Point
-from kinarm.simulator import Simulator
 from kinarm.world import World
 
-TESTED_CONFIGURATIONS = 16
+TESTED_CONFIGURATIONS, MIRRORED_CONFIGURATIONS = 16, 2000
+"""At which observations are compared, and contact."""
+
 ACCURACY = 1e-9
-MIRRORED_CONFIGURATIONS = 2000
-"""Configurations at which `mirror_findings` compares contact."""
 
 REFLECTION = (1.0, -1.0, 1.0)
 
 
 def find_mirror(world: World) -> Mirror:
-    """Find the signs for an arm, and check them with forward kinematics.
-
-    Raises
-    ------
-    InvalidInputError
-        If the reflection does not map the arm's motions to themselves.
-    """
+    """Find the signs for an arm, and check them with its limits and forward kinematics."""
     arm = world.arm
     along_y = np.abs(arm.chain.axis[:, 1]) > 0.5
     axes = np.where(along_y ^ arm.chain.prismatic, 1.0, -1.0)
     mirror = Mirror(observation_signs(arm.n_joints), axes[: arm.n_actuated])
-    if not _is_mirror(mirror, axes, world):
+    rng = np.random.default_rng(0)
+    q = rng.uniform(arm.lower, arm.upper, (TESTED_CONFIGURATIONS, arm.n_joints))
+    goals = rng.normal(size=(TESTED_CONFIGURATIONS, 3))
+    reflected = world.observe(axes * q, goals * REFLECTION)
+    apart = np.abs(reflected - world.observe(q, goals) * mirror.observations).max()
+    if _beyond_limits(axes, arm.lower, arm.upper).any() or apart > ACCURACY:
         raise InvalidInputError(f"arm {arm.name!r} is not its own mirror image")
     return mirror
 
 
-def _is_mirror(mirror: Mirror, axes: NDArray[np.float64], world: World) -> bool:
-    """Whether mirrored configurations lead to mirrored observations, limits included."""
-    arm = world.arm
-    limits = np.sort(np.array([axes * arm.lower, axes * arm.upper]), axis=0)
-    if not np.allclose(limits, [arm.lower, arm.upper], rtol=0, atol=ACCURACY):
-        return False
-    rng = np.random.default_rng(0)
-    q = rng.uniform(arm.lower, arm.upper, (TESTED_CONFIGURATIONS, arm.n_joints))
-    goals = rng.normal(size=(TESTED_CONFIGURATIONS, 3))
-    seen = world.observe(q, goals)
-    reflected = world.observe(axes * q, goals * REFLECTION)
-    return np.allclose(reflected, seen * mirror.observations, rtol=0, atol=ACCURACY)
+def _beyond_limits(
+    axes: NDArray[np.float64], lower: NDArray[np.float64], upper: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Joints whose limits are not their own mirror image, given the signs of the reflection."""
+    apart = np.abs(np.sort([axes * lower, axes * upper], axis=0) - [lower, upper])
+    uneven: NDArray[np.bool_] = apart.max(axis=0) > ACCURACY
+    return uneven
 
 
 def mirror_findings(world: World) -> dict[str, str]:
-    """What stands against reflecting arm, scene and task about the x-z plane.
+    """Reasons against reflecting arm, scene and task about the x-z plane.
 
     Joints that turn about y, or slide across it, keep their sign; that is looked at where all
-    joints are at zero. Joints that are not actuated stay at home.
-
-    Returns
-    -------
-    dict
-        ``kinematics``, ``limits``, ``contact``, ``scene`` and ``observations`` (whether the mirror
-        image of an observation differs from it by signs alone, which symmetric policies build on):
-        a reason, or an empty text where it holds.
+    joints are at zero. Joints that are not actuated stay at home. For ``kinematics``, ``limits``,
+    ``contact``, ``scene`` and ``observations`` (whether the mirror image of an observation differs
+    from it by signs alone), there is a reason, or an empty text where it holds.
     """
     arm = world.arm
     axes, moved = _axis_signs(world)[: arm.n_actuated], slice(arm.n_actuated)
     q = random_configurations(world.contact_model, MIRRORED_CONFIGURATIONS)
-    lower, upper = arm.lower[moved], arm.upper[moved]
-    beyond = np.abs(np.sort([axes * lower, axes * upper], axis=0) - [lower, upper]).max(axis=0)
-    uneven = [arm.joint_names[joint] for joint in np.flatnonzero(beyond > ACCURACY)]
+    beyond = _beyond_limits(axes, arm.lower[moved], arm.upper[moved])
+    uneven = [arm.joint_names[joint] for joint in np.flatnonzero(beyond)]
     mirrored = q.copy()
     mirrored[:, moved] *= axes
     tools, touching = world.screen(q)
@@ -109,70 +94,36 @@ def _axis_signs(world: World) -> NDArray[np.float64]:
     pin.forwardKinematics(model, data, np.zeros(model.nq))
     turned = zip(list(data.oMi)[1:], chain.axis, strict=True)
     across = np.array([abs((pose.rotation @ axis)[1]) > 0.5 for pose, axis in turned])
-    signs: NDArray[np.float64] = np.where(across ^ chain.prismatic, 1.0, -1.0)
-    return signs
+    return np.where(across ^ chain.prismatic, 1.0, -1.0)
 
 
 @lru_cache(maxsize=8)
-def _mirror_or_reason(problem: ReachProblem) -> Mirror | str:
-    """Reflection of arm and obstacles, or why there is none.
+def _mirror_and_reason(problem: ReachProblem) -> tuple[Mirror | None, str]:
+    """Reflection of arm and obstacles, and why there is none; the arm is pinned.
 
-    A training asks for it with its recipe, before it, and for its policy, and each time a world
-    would be built, which takes longer than an iteration. The arm of the problem is pinned.
+    A training asks several times, and a world takes longer to build than an iteration.
     """
     if not obstacles_are_symmetric(problem):
-        return "obstacles are not their own mirror image"
+        return None, "obstacles are not their own mirror image"
     try:
-        return find_mirror(World(problem, threads=1))
+        return find_mirror(World(problem, threads=1)), ""
     except InvalidInputError as error:
-        return str(error)
+        return None, str(error)
 
 
 def problem_mirror(problem: ReachProblem) -> Mirror | None:
-    """Reflection that a policy can commute with, if arm and obstacles have one.
-
-    Where the goals lie does not matter: those on the left are seen in the mirror.
-    """
-    found = _mirror_or_reason(problem.pinned)
-    return None if isinstance(found, str) else found
+    """Reflection that a policy can commute with, if arm and obstacles have one; goals need not."""
+    return _mirror_and_reason(problem.pinned)[0]
 
 
 def missing_mirror(problem: ReachProblem) -> str:
     """Why arm and obstacles are not their own mirror image; an empty text if they are."""
-    found = _mirror_or_reason(problem.pinned)
-    return found if isinstance(found, str) else ""
-
-
-def sample_seen(
-    mirror: Mirror | None,
-    simulator: Simulator,
-    rng: np.random.Generator,
-    count: int,
-    *,
-    start_spread: float | None = None,
-) -> StartsAndGoals:
-    """Draw scenarios as a training meets them: with a mirror, those on the left reflected.
-
-    Parameters
-    ----------
-    mirror : Mirror or None
-        The reflection.
-    simulator : Simulator
-        Draws starts and goals.
-    rng : numpy.random.Generator
-        Random numbers.
-    count : int
-        Number of scenarios.
-    start_spread : float, optional
-        That of the starts; the task's by default.
-    """
-    drawn = simulator.sample(rng, count, start_spread=start_spread)
-    return drawn if mirror is None else mirror.scenarios_from_the_right(*drawn)
+    return _mirror_and_reason(problem.pinned)[1]
 
 
 def different_regions(problem: ReachProblem, symmetric: bool) -> int:
     """How many goal regions a policy meets, which sees those on the left in the mirror or not."""
-    regions = [problem.scene.goal_region(name) for name in problem.task.goal_regions]
+    regions = (problem.scene.goal_region(name) for name in problem.task.goal_regions)
     boxes = [(region.lower, region.upper) for region in regions]
     if symmetric:
         boxes = [_reflected(*box) if box[0][1] >= 0 else box for box in boxes]
@@ -181,9 +132,9 @@ def different_regions(problem: ReachProblem, symmetric: bool) -> int:
 
 def obstacles_are_symmetric(problem: ReachProblem) -> bool:
     """Whether the reflection maps the obstacles to themselves."""
-    boxes = [(each, (each.lower, each.upper)) for each in problem.scene.obstacles]
-    obstacles = {(*ends, _turned(box, box.yaw)) for box, ends in boxes}
-    return obstacles == {(*_reflected(*ends), _turned(box, -box.yaw)) for box, ends in boxes}
+    boxes = problem.scene.obstacles
+    images = {(*_reflected(box.lower, box.upper), _turned(box, -box.yaw)) for box in boxes}
+    return images == {(box.lower, box.upper, _turned(box, box.yaw)) for box in boxes}
 
 
 def is_symmetric(problem: ReachProblem) -> bool:

@@ -25,17 +25,14 @@ def fold_normalizer(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Make affine layers that take observations as they are of ones that take normalised ones.
 
-    Weights have the shape (..., n_out, n_observations), biases (..., n_out). The sums are taken in
-    a fixed order, not by BLAS, whose order depends on the processor.
+    The sums are taken in a fixed order, not by BLAS, whose order depends on the processor.
 
     Parameters
     ----------
-    weights : ndarray, shape (..., n_out, n_observations)
-        Of the layers.
-    bias : ndarray, shape (..., n_out)
-        Of the layers.
+    weights, bias : ndarray, shape (..., n_out, n_observations) and (..., n_out)
+        Of layers that take observations normalised.
     mean, std : ndarray, shape (n_observations,)
-        Statistics by which they take observations normalised.
+        Statistics by which they are normalised.
     """
     scaled = weights * input_scale(std)
     return scaled, bias - (scaled * mean).sum(axis=-1)
@@ -53,11 +50,6 @@ class Normalizer:
         Their mean; zero before the first one.
     squares : ndarray, shape (n_observations,)
         Sum of their squared deviations from the mean.
-
-    Raises
-    ------
-    InvalidInputError
-        If the number or a sum is negative.
     """
 
     count: int
@@ -91,10 +83,9 @@ class Normalizer:
 
         Parameters
         ----------
-        moments : ndarray, shape (n, 2, n_observations)
-            Per episode, the sums of the observations less `mean` and of the squares of these.
-        counts : ndarray of int, shape (n,)
-            Observations per episode.
+        moments, counts : ndarray, shape (n, 2, n_observations) and (n,)
+            Per episode, the sums of the observations less `mean` and of the squares of these, and
+            the number of observations.
         """
         added = int(counts.sum())
         if added == 0:

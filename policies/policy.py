@@ -1,40 +1,33 @@
-"""One class for every trained policy: a normaliser, dense layers and a clip."""
+"""One class for every trained policy: a normaliser, dense layers and a clip; and its file."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kinarm._archive import Archive, load_archive, reading, save_archive
 from kinarm._validation import finite_array
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.networks import ACTIVATIONS, Activation, Mirror, Networks, checked_activations
+from kinarm.networks import Layer as Layer
+from kinarm.observation import observation_layout
 from kinarm.policies.goal_observation import flat_observation
 from kinarm.policies.normalizer import fold_normalizer, input_scale
 from kinarm.policies.provenance import Provenance
 from kinarm.problem import ProblemLike, ReachProblem
 
+FORMAT_VERSION = 3
+
 LARGEST = 1e30
 """Magnitude of statistics and weights at most: with larger ones, actions overflow."""
-
-
-class Layer(NamedTuple):
-    """An affine map: ``weights @ x + bias``.
-
-    Attributes
-    ----------
-    weights : ndarray, shape (n_out, n_in)
-    bias : ndarray, shape (n_out,)
-    """
-
-    weights: NDArray[np.float64]
-    bias: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,11 +50,6 @@ class Policy:
         between the layers and none after the last.
     mirror : Mirror, optional
         Reflection in which it sees goals on the left, and acts.
-
-    Raises
-    ------
-    InvalidInputError
-        If shapes do not fit together or an entry is not finite.
     """
 
     mean: NDArray[np.float64]
@@ -83,32 +71,28 @@ class Policy:
         for number, layer in enumerate(self.layers):
             weights = finite_array(f"weights of layer {number}", layer.weights, (None, width))
             width = len(weights)
-            layers.append(
-                Layer(weights, finite_array(f"bias of layer {number}", layer.bias, (width,)))
-            )
-        mirror = None
-        if self.mirror is not None:
+            bias = finite_array(f"bias of layer {number}", layer.bias, (width,))
+            layers.append(Layer(weights, bias))
+        mirror = self.mirror
+        if mirror is not None:
             mirror = Mirror(
-                finite_array("mirror of observations", self.mirror.observations, mean.shape),
-                finite_array("mirror of actions", self.mirror.actions, (width,)),
+                finite_array("mirror of observations", mirror.observations, mean.shape),
+                finite_array("mirror of actions", mirror.actions, (width,)),
             )
-        for array in (mean, std, *(array for layer in layers for array in layer), *(mirror or ())):
+        for array in (mean, std, *chain(*layers), *(mirror or ())):
             if np.abs(array).max(initial=0.0) > LARGEST:
                 raise InvalidInputError(f"statistics and weights must be at most {LARGEST:g}")
             array.flags.writeable = False
-        object.__setattr__(self, "mean", mean)
-        object.__setattr__(self, "std", std)
-        object.__setattr__(self, "layers", tuple(layers))
-        object.__setattr__(self, "activations", activations)
-        object.__setattr__(self, "mirror", mirror)
+        checked = {"mean": mean, "std": std, "layers": tuple(layers), "mirror": mirror}
+        for name, part in {**checked, "activations": activations}.items():
+            object.__setattr__(self, name, part)
 
     def __repr__(self) -> str:
-        made, widths = self.provenance, "-".join(str(len(layer.bias)) for layer in self.layers)
+        made = self.provenance
+        widths = "-".join(map(str, [self.n_observations, *(len(b) for _, b in self.layers)]))
         seed = "" if made.seed is None else f"seed {made.seed}, "
-        return (
-            f"Policy({made.algorithm} {made.recipe}, problem {self.problem.name!r}, {seed}layers "
-            f"{self.n_observations}-{widths})"
-        )
+        name = f"{made.algorithm} {made.recipe}, problem {self.problem.name!r}"
+        return f"Policy({name}, {seed}layers {widths})"
 
     @property
     def problem(self) -> ReachProblem:
@@ -126,17 +110,9 @@ class Policy:
         return len(self.layers[-1].bias)
 
     def __call__(self, observations: ArrayLike) -> NDArray[np.float64]:
-        """Choose actions.
+        """Choose actions: fractions of the velocity limits in [-1, 1], shape ([n,] n_actions).
 
-        Parameters
-        ----------
-        observations : array_like, shape (n_observations,) or (n, n_observations)
-            One observation, or several.
-
-        Returns
-        -------
-        ndarray, shape (n_actions,) or (n, n_actions)
-            Fractions of the velocity limits in [-1, 1].
+        One observation, or several, of the shape ([n,] n_observations).
         """
         given = np.asarray(observations, dtype=float)
         shape = (self.n_observations,) if given.ndim == 1 else (None, self.n_observations)
@@ -166,46 +142,29 @@ class Policy:
         observation : array_like or mapping
             One observation or several, as for a call; or, of the goal-conditioned environments,
             a dictionary of ``observation``, ``achieved_goal`` and ``desired_goal``.
-        state : object
-            Given back as it is: policies have no memory.
-        episode_start, deterministic
-            Of no effect: policies neither remember nor draw.
-
-        Returns
-        -------
-        actions : ndarray, shape (n_actions,) or (n, n_actions)
-            Fractions of the velocity limits in [-1, 1].
-        state : object
-            The state that was given.
-
-        Raises
-        ------
-        InvalidInputError
-            If the observation has another shape or other keys, or an entry is not finite.
+        state, episode_start, deterministic
+            Of no effect: policies neither remember nor draw. The state is given back as it is.
         """
         if isinstance(observation, Mapping):
             observation = flat_observation(observation, self.n_observations)
         return self(observation), state
 
-    @cached_property
-    def _networks(self) -> Networks:
-        first = Layer(*fold_normalizer(*self.layers[0], self.mean, self.std))
-        layers = (first, *self.layers[1:])
-        flat = [part for weights, bias in layers for part in (weights.T.reshape(-1), bias)]
-        widths = [self.n_observations, *(len(layer.bias) for layer in layers)]
-        weights = np.concatenate(flat)[None]
-        return Networks(np.array(widths), weights, self.activations, self.mirror)
-
     def networks(self) -> Networks:
         """The policy in the form that the compiled simulator runs, normaliser folded in."""
         return self._networks
 
+    @cached_property
+    def _networks(self) -> Networks:
+        first = Layer(*fold_normalizer(*self.layers[0], self.mean, self.std))
+        layers = (first, *self.layers[1:])
+        widths = [self.n_observations, *(len(layer.bias) for layer in layers)]
+        parts = chain(*((weights.T.reshape(-1), bias) for weights, bias in layers))
+        weights = np.concatenate([*parts])[None]
+        return Networks(np.array(widths), weights, self.activations, self.mirror)
+
     @classmethod
     def from_sb3(
-        cls,
-        model: Any,
-        problem: ProblemLike | None = None,
-        vec_normalize: Any = None,
+        cls, model: Any, problem: ProblemLike | None = None, vec_normalize: Any = None
     ) -> Policy:
         """Convert a model of Stable-Baselines3 or sb3-contrib: its deterministic actions.
 
@@ -226,18 +185,14 @@ class Policy:
 
         Raises
         ------
-        InvalidInputError
+        KinarmError
             If it cannot be converted, with the reason: it is recurrent, computes features, has
-            other activation functions, or other observations or actions than the arm; or if
-            the problem is unknown.
-        PolicyFileError
-            If a file cannot be read, or is something else.
-        MissingExtraError
-            If Stable-Baselines3 is not installed.
+            other activation functions, or other observations or actions than the arm; the problem
+            is unknown; a file cannot be read; or Stable-Baselines3 is not installed.
         """
         from kinarm.policies.conversion.sb3 import policy_from_sb3
 
-        return policy_from_sb3(model, problem, vec_normalize)
+        return policy_from_sb3(cls, model, problem, vec_normalize)
 
     @classmethod
     def from_torch(
@@ -265,27 +220,15 @@ class Policy:
             Name of the algorithm that trained it, for tables.
         environment_steps, seed
             Steps and seed of the training, for the record.
-
-        Raises
-        ------
-        InvalidInputError
-            If it holds a module that cannot be converted, or does not fit the problem's arm.
-        MissingExtraError
-            If PyTorch is not installed.
         """
-        from kinarm.policies.conversion.layers import policy_from_torch
+        from kinarm.policies.conversion.layers import module_pieces, policy_of_pieces
 
         origin = {"algorithm": name, "environment_steps": environment_steps, "seed": seed}
-        return policy_from_torch(module, ReachProblem.load(problem), (mean, std), **origin)
+        pieces, own = module_pieces(module), ReachProblem.load(problem)
+        return policy_of_pieces(cls, pieces, own, mean, std, recipe="torch", **origin)
 
     def check_arm(self, arm: Arm) -> None:
-        """Refuse an arm other than the one that the policy was trained for.
-
-        Raises
-        ------
-        PolicyFileError
-            If the arm differs in anything that the simulator uses.
-        """
+        """Refuse an arm that differs from its own in anything that the simulator uses."""
         trained = self.problem.arm
         if self.problem.arm_digest != arm.digest:
             other = "another version of arm" if trained.name == arm.name else "arm"
@@ -294,16 +237,10 @@ class Policy:
             )
 
     def save(self, path: str | Path) -> None:
-        """Write the policy to an ``.npz`` file, without pickle.
-
-        Raises
-        ------
-        OutputError
-            If the file cannot be written; an existing file is then left as it was.
-        """
-        from kinarm.policies.policy_files import save_policy
-
-        save_policy(path, self)
+        """Write the policy to an ``.npz`` file, without pickle; all of it or nothing."""
+        content = policy_content(self)
+        # Weights of networks have the digits of single precision: compressed, they take half.
+        save_archive(path, "policy", FORMAT_VERSION, content.arrays, content.header, compress=True)
 
     @classmethod
     def load(cls, path: str | Path) -> Policy:
@@ -315,6 +252,45 @@ class Policy:
             If the file is missing, truncated, not a policy, written by another version, or made
             for observations of another layout.
         """
-        from kinarm.policies.policy_files import read_policy
+        content = load_archive(path, "policy", FORMAT_VERSION, PolicyFileError)
+        with reading(repr(str(path)), "policy", PolicyFileError):
+            return policy_of_content(content, repr(str(path)))
 
-        return read_policy(path)
+
+def policy_content(policy: Policy) -> Archive:
+    """A policy as files hold it: `policy_of_content` makes it again."""
+    header = {
+        "provenance": policy.provenance.to_json(),
+        "observation": observation_layout(),
+        "activations": list(policy.activations),
+    }
+    arrays = {"mean": policy.mean, "std": policy.std}
+    for number, layer in enumerate(policy.layers):
+        arrays |= {f"weights_{number}": layer.weights, f"bias_{number}": layer.bias}
+    if policy.mirror is not None:
+        arrays |= {f"mirror_{name}": part for name, part in policy.mirror._asdict().items()}
+    return Archive(header, arrays)
+
+
+def policy_of_content(content: Archive, where: str) -> Policy:
+    """Rebuild what `policy_content` returned and the file ``where`` holds.
+
+    Errors are those of what is missing, or cannot be used: for `kinarm._archive.reading`.
+    """
+    header, arrays = content
+    if header["observation"] != observation_layout():
+        raise PolicyFileError(
+            f"{where} understands observations of layout "
+            f"{header['observation']!r}, not {observation_layout()!r}"
+        )
+    n_layers = sum(name.startswith("weights_") for name in arrays)
+    signs = [f"mirror_{name}" for name in Mirror._fields]
+    mirrored = any(name in arrays for name in signs)
+    return Policy(
+        mean=arrays["mean"],
+        std=arrays["std"],
+        layers=tuple(Layer(arrays[f"weights_{k}"], arrays[f"bias_{k}"]) for k in range(n_layers)),
+        provenance=Provenance.from_json(header["provenance"]),
+        activations=tuple(header["activations"]),
+        mirror=Mirror(*(arrays[name] for name in signs)) if mirrored else None,
+    )

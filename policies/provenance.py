@@ -1,11 +1,11 @@
 """Where a policy comes from."""
 
-import json
 import platform
 import subprocess
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import cache, lru_cache
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -27,10 +27,8 @@ class Provenance:
 
     Parameters
     ----------
-    algorithm : str
-        Such as ``"ars"``.
-    recipe : str
-        Name of the settings that it was trained with.
+    algorithm, recipe : str
+        Such as ``"ars"``, and the name of the settings that it was trained with.
     problem : ReachProblem
         The problem that it is for, with the hash of its arm.
     seed : int, optional
@@ -60,16 +58,12 @@ class Provenance:
 
     @classmethod
     def of(cls, algorithm: str, config: TrainingConfig, environment_steps: int) -> "Provenance":
-        """Record a training that took place here and now, with these settings.
+        """Record a training that took place here and now.
 
         Parameters
         ----------
-        algorithm : str
-            Name of the learner.
-        config : TrainingConfig
-            Its settings.
-        environment_steps : int
-            Steps that the training took.
+        algorithm, config, environment_steps
+            Name of the learner, its settings, and the steps that it took.
         """
         return cls(
             algorithm=algorithm,
@@ -90,16 +84,7 @@ class Provenance:
 
     @classmethod
     def from_json(cls, entries: Mapping[str, Any]) -> "Provenance":
-        """Rebuild what `to_json` returned.
-
-        Raises
-        ------
-        InvalidInputError
-            If an entry is missing, unknown or wrong.
-        """
-        if isinstance(entries, Mapping) and isinstance(entries.get("problem"), Mapping):
-            problem = _problem(json.dumps(entries["problem"], sort_keys=True))
-            entries = {**entries, "problem": problem}
+        """Rebuild what `to_json` returned; entries that are missing or unknown are refused."""
         return from_plain(cls, entries, "provenance")
 
 
@@ -108,27 +93,14 @@ def plain_settings(config: TrainingConfig) -> dict[str, Any]:
     return {name: value for name, value in to_plain(config).items() if name != "problem"}
 
 
-@lru_cache
-def _problem(text: str) -> ReachProblem:
-    """Rebuild a problem once for all policies that are for it."""
-    return from_plain(ReachProblem, json.loads(text), "provenance", "problem.")
-
-
-def package_versions() -> dict[str, str]:
-    """Versions of Python and of the packages that results depend on."""
-    return dict(_package_versions())
-
-
 @cache
-def _package_versions() -> tuple[tuple[str, str], ...]:
-    """Look them up once in a process: they are asked for with every policy that is made."""
+def package_versions() -> dict[str, str]:
+    """Versions of Python and of the packages that results depend on, looked up once."""
     versions = {"python": platform.python_version()}
     for package in RECORDED_PACKAGES:
-        try:
+        with suppress(metadata.PackageNotFoundError):
             versions[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:
-            continue
-    return tuple(versions.items())
+    return versions
 
 
 @cache
@@ -136,10 +108,8 @@ def source_commit() -> str:
     """Commit of the clone that this runs from, or an empty string outside of a clone."""
     root = Path(__file__).resolve().parent.parent
     command = ["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=12"]
-    if not (root / ".git").exists():
-        return ""
-    try:
-        answer = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)
-    except (OSError, subprocess.SubprocessError):
-        return ""
-    return answer.stdout.strip()
+    with suppress(OSError, subprocess.SubprocessError):
+        if (root / ".git").exists():
+            done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)
+            return done.stdout.strip()
+    return ""

@@ -1,7 +1,6 @@
-"""Check before a training, within a second, which goals an arm can reach at all.
+"""Check before a training, within a second, for which goals there is a contact-free configuration.
 
-The oracle proves what no policy can reach, and finds motions. Here configurations at a goal are
-looked for, without contact; that none is found proves nothing.
+That none is found proves nothing; the oracle does.
 """
 
 import numpy as np
@@ -10,41 +9,28 @@ from numpy.typing import NDArray
 from kinarm.contact_statistics import ContactStatistics, random_configurations
 from kinarm.world import World
 
-GOALS = 100
-"""Goals that are looked at."""
-
-MANY = 0.1
-"""More than this share of them without a configuration is worth a line."""
-
-CONFIGURATIONS = 50_000
-"""Random configurations that are tried for all goals."""
+GOALS, MANY = 100, 0.1
+"""Goals that are looked at, and the share of them that may lack a configuration without a line."""
 
 
 def find_reachable(
-    world: World, goals: NDArray[np.float64], configurations: int = CONFIGURATIONS
+    world: World, goals: NDArray[np.float64], configurations: int = 50_000
 ) -> NDArray[np.bool_]:
     """Find out for which goals there is a configuration that touches nothing.
 
     One of many random configurations may bring the tool within the tolerance; for the goals that
-    are left, inverse kinematics is asked.
+    are left, inverse kinematics is asked. An arm that always touches something is refused.
 
     Parameters
     ----------
-    world : World
-        Arm and scene.
+    world, configurations
+        Arm and scene, and how many random configurations are tried.
     goals : ndarray, shape (n, 3)
         Goal points [m].
-    configurations : int
-        How many random ones.
 
     Returns
     -------
     ndarray of bool, shape (n,)
-
-    Raises
-    ------
-    ProblemError
-        If all random configurations touch something.
     """
     q = random_configurations(world.contact_model, configurations)
     tools, touching = world.screen(q)
@@ -59,15 +45,8 @@ def find_reachable(
 
 
 def reach_warning(world: World) -> str | None:
-    """Say in a line that many of a problem's goals seem out of reach, if they do.
-
-    Raises
-    ------
-    ProblemError
-        If the arm cannot move.
-    """
-    task, scene = world.problem.task, world.problem.scene
-    found = find_reachable(world, task.draw_goals(scene, np.random.default_rng(0), GOALS))
+    """Say in a line that many of a problem's goals seem out of reach, if they do."""
+    found = find_reachable(world, world.goals.draw(np.random.default_rng(0), GOALS))
     missed = int((~found).sum())
     if missed <= MANY * GOALS:
         return None

@@ -34,13 +34,6 @@ def recipe(learner: str, name_or_file: str | Path | None = None, **changes: Any)
     Returns
     -------
     ARSConfig, PPOConfig or settings of another learner
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such learner, recipe or setting.
-    InvalidInputError
-        If the file cannot be used; in one line that names file, key and what is expected.
     """
     found = find_learner(learner)
     available = init_fields(found.config)
@@ -71,27 +64,21 @@ def _read_recipe(learner: Learner[Any, Any], path: Path, circumstances: Mapping[
     """Settings of a file for a problem and a seed, which may be in the file."""
     entries = read_toml(path, "recipe")
     base = take_base(entries, str(path), learner.recipes, learner.first_recipe)
-    known = {**circumstances}
-    problem = entries.pop("problem", None)
+    known, problem = {**circumstances}, entries.pop("problem", None)
     if problem is not None and "problem" not in known:
-        known["problem"] = _problem_of_file(problem, path)
+        if not isinstance(problem, str):
+            raise InvalidInputError(
+                f"{path}: problem must be the name or file of a problem, got {problem!r}"
+            )
+        beside = path.parent / problem
+        known["problem"] = ReachProblem.load(beside if is_file(beside) else problem)
     standard = _named_recipe(learner, base, known)
     given = {"recipe": path.stem, **{key: v for key, v in entries.items() if key not in known}}
-    plain = {**to_plain(standard), "reward": to_plain(standard.training_problem.task.reward)}
-    if "reward" not in given and standard.reward is None:
-        del plain["reward"]
+    plain = to_plain(standard)
+    if "reward" in given:
+        plain["reward"] = to_plain(standard.training_problem.task.reward)
     for name, entry in given.items():
         if isinstance(entry, Mapping) and isinstance(plain.get(name), Mapping):
             given[name] = {**plain[name], **entry}
     made = from_plain(learner.config, {**plain, **given}, str(path))
     return replace(made, problem=standard.problem)
-
-
-def _problem_of_file(problem: object, path: Path) -> ReachProblem:
-    """The problem that a recipe file names; a file's path is relative to it."""
-    if not isinstance(problem, str):
-        raise InvalidInputError(
-            f"{path}: problem must be the name or file of a problem, got {problem!r}"
-        )
-    beside = path.parent / problem
-    return ReachProblem.load(beside if is_file(beside) else problem)

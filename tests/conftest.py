@@ -128,8 +128,9 @@ class Skipped:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Note what is skipped, once for all workers."""
-    if not config.getoption("rest") and not hasattr(config, "workerinput"):
+    """Note what is skipped, once for all workers, if the run keeps anything."""
+    keeps = config.pluginmanager.hasplugin("cacheprovider")
+    if keeps and not config.getoption("rest") and not hasattr(config, "workerinput"):
         config.pluginmanager.register(Skipped(config))
 
 
@@ -270,6 +271,7 @@ def simulator(simulators: dict[str, Simulator]) -> Simulator:
     return simulators["paper"]
 
 
-@pytest.fixture(params=[*SHIPPED_ARMS, "sliding", "mesh"])
+@pytest.fixture(params=["paper", "sliding", "mesh"])
 def any_simulator(request: pytest.FixtureRequest, simulators: dict[str, Simulator]) -> Simulator:
+    """Of the default arm's capsules, of slides and primitives of every kind, and of meshes."""
     return simulators[request.param]

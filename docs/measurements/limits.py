@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from docs.measurements.counting import KINDS, OperationCounter
+from docs.measurements.turns import alternated
 from kinarm.errors import MissingExtraError
-from kinarm.evaluation.bench import alternated
 from kinarm.evaluation.markdown import markdown_table
 from kinarm.kernels.compiling import Array, kernel
 from kinarm.kernels.lanes import LANES, as_lanes

@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from docs.measurements.mjcf import mjcf
+from docs.measurements.turns import alternated
 from kinarm.envs import ReachVectorEnv
-from kinarm.evaluation.bench import ROBOT_ITERATIONS, VECTOR_ENVS, alternated
+from kinarm.evaluation.bench import VECTOR_ENVS
 from kinarm.evaluation.markdown import markdown_table
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies import Policy, load_policy, recipe, train_policy
@@ -29,6 +30,8 @@ from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
 
 EPISODES = 512
+ROBOT_ITERATIONS = 20
+"""Iterations of ARS after which a policy no longer acts at random."""
 SINGLE_STEPS, VECTOR_STEPS = 500, 100
 LEVEL, TRIALS, BUDGET, BETWEEN = 0.5, 200, 60.0, 0.25
 """Share of trials at which a training is over, how many trials there are, the time after which

@@ -46,7 +46,7 @@ def main() -> None:
         folder = Path(name)
         timed(SHORT, folder, 2, jobs=2)  # loads and compiles
         one, study = timed(TABLE_1, folder, few, jobs=1)
-        spent = sum(study.store.clock(run).processor_seconds for run in study.runs)
+        spent = sum(trained.clock.processor_seconds for trained in study)
         print(f"share of a study that is no training: {1 - spent / one:.1%}")
         two, _ = timed(TABLE_1, folder, few, jobs=2)
         print(f"two processes over one, Table 1: {one / two:.2f} x")
@@ -62,7 +62,7 @@ def main() -> None:
         print(f"trainings planned: {len(planned) / seconds:,.0f} a second")
         began = time.perf_counter()
         loaded = len(Study.load(short.store.folder).table())
-        size = sum(short.store.run_path(run).stat().st_size for run in short.runs) / most
+        size = sum(short.store.path("runs", run).stat().st_size for run in short.runs) / most
         seconds = time.perf_counter() - began
         print(f"reading {loaded} trainings of {size / 1e3:.0f} kB each: {seconds:.2f} s")
 

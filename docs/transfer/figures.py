@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinarm.evaluation.figures import COLOURS, DASHES, draw_band
+from kinarm.evaluation.figures import COLOURS, DASHES, panels_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,20 +24,18 @@ def learning_curves(document: Mapping[str, Any]) -> "Figure":
     Lines are means over the training seeds, bands reach from the worst of them to the best.
     Dotted is what the policies of the first task do as they are.
     """
-    from matplotlib.figure import Figure
     from matplotlib.ticker import NullFormatter
 
     learners: list[str] = document["learners"]
     problems = list(dict.fromkeys(row["problem"] for row in document["warm_start"]))
     size = (1.0 + 3.2 * len(problems), 1.0 + 2.8 * len(learners))
-    figure = Figure(figsize=size, layout="constrained")
-    panels = figure.subplots(len(learners), len(problems), squeeze=False, sharex="row", sharey=True)
+    shape = len(learners), len(problems)
+    figure, panels = panels_figure(size, *shape, sharex="row", sharey=True)
     for learner, row in zip(learners, panels, strict=True):
         for problem, axes in zip(problems, row, strict=True):
             _draw_panel(axes, document, learner, problem)
             axes.set(xscale="log", ylim=(0, 1.02), title=f"{learner.upper()}, {problem}")
             axes.xaxis.set_minor_formatter(NullFormatter())
-            axes.spines[["top", "right"]].set_visible(False)
         row[0].set_ylabel("share of trials with success")
     for axes in panels[-1]:
         axes.set_xlabel("environment steps")
@@ -77,4 +75,6 @@ def _draw_curve(
             for each, curve in zip(steps, curves, strict=True)
         ]
     )
-    draw_band(axes, places, success, label, colour, dash)
+    low, high = success.min(axis=0), success.max(axis=0)
+    axes.fill_between(places, low, high, color=colour, alpha=0.15, lw=0)
+    axes.plot(places, success.mean(axis=0), color=colour, linestyle=dash, lw=2, label=label)

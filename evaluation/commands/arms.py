@@ -2,17 +2,15 @@
 
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import cast
 
-from kinarm._command_line import Command, run_commands
+from kinarm._command_line import Commands, run_commands
 from kinarm._console import print_table
 from kinarm._files import check_output
 from kinarm.arm_specification import PACKAGE, ArmFile, arm_names
-
-if TYPE_CHECKING:
-    from kinarm.arm import Arm
 
 EPILOG = """
 examples:
@@ -35,28 +33,23 @@ class ListRequest:
     """List the arms that kinarm knows."""
 
     def rows(self) -> list[tuple[str, ...]]:
-        """A row for each arm, under `HEADINGS`."""
-        return [_row(name) for name in arm_names()]
-
-
-def _row(name: str) -> tuple[str, ...]:
-    """Cells of an arm; of one that is not installed, what its file says."""
-    from kinarm.errors import ArmError
-
-    file = ArmFile.of(name)
-    assert file is not None
-    try:
+        """A row for each arm, under `HEADINGS`; of those not installed, what their file says."""
         from kinarm.arm import Arm
-        from kinarm.evaluation.arm_facts import ArmFacts
+        from kinarm.errors import ArmError
+        from kinarm.evaluation.arm_facts import contact_on_bare_ground, joint_speeds
 
-        facts = ArmFacts.of(Arm.load(name))
-    except ArmError:
-        return (name, file.title, "", "", "", "", "", file.licence, file.origin, "no")
-    arm = facts.arm
-    return (
-        *(name, file.title, str(arm.n_joints), str(arm.n_actuated), f"{arm.reach:.2f}"),
-        *(facts.speeds, str(len(facts.contact.pair_names)), file.licence, file.origin, "yes"),
-    )
+        rows = []
+        for name in arm_names():
+            known, installed = [""] * 5, "no"
+            with suppress(ArmError):
+                arm = Arm.load(name)
+                known = [str(arm.n_joints), str(arm.n_actuated), f"{arm.reach:.2f}"]
+                pairs = contact_on_bare_ground(arm).pair_names
+                known += [joint_speeds(arm), str(len(pairs))]
+                installed = "yes"
+            file = cast("ArmFile", ArmFile.of(name))
+            rows.append((name, file.title, *known, file.licence, file.origin, installed))
+        return rows
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,18 +78,6 @@ class ShowRequest:
     out: Path | None = field(default=None, metadata={"metavar": "FILE.html"})
     overwrite: bool = False
 
-    def load(self) -> "Arm":
-        """The arm.
-
-        Raises
-        ------
-        KinarmError
-            If it cannot be used.
-        """
-        from kinarm.arm import Arm
-
-        return Arm.load(self.arm, tool_frame=self.tool_frame, package_dirs=self.package_dirs)
-
 
 def _list(request: ListRequest) -> None:
     rows = request.rows()
@@ -107,34 +88,30 @@ def _list(request: ListRequest) -> None:
 
 
 def _show(request: ShowRequest) -> None:
-    from kinarm.evaluation.arm_facts import ArmFacts
+    from kinarm.arm import Arm
+    from kinarm.evaluation.arm_facts import arm_facts
 
     if request.out is not None:
         check_output(request.out, overwrite=request.overwrite, suffix=".html")
-    facts = ArmFacts.of(request.load())
-    for heading, lines in facts.sections().items():
+    arm = Arm.load(request.arm, tool_frame=request.tool_frame, package_dirs=request.package_dirs)
+    for heading, lines in arm_facts(arm).items():
         if lines:
             print(heading, *(f"  {line}" for line in lines), sep="\n")
     if request.out is not None:
         from kinarm.viewer import arm_page
 
-        page = arm_page(facts.arm, request.out)
+        page = arm_page(arm, request.out)
         print(f"written: {request.out}, {len(page.html) / 1e6:.1f} MB, opens in any browser")
 
 
-COMMANDS = {"list": Command(ListRequest, _list), "show": Command(ShowRequest, _show)}
+COMMANDS: Commands = {"list": (ListRequest, _list), "show": (ShowRequest, _show)}
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line."""
     typed = sys.argv[1:] if arguments is None else arguments
-    run_commands(
-        "kinarm-arms",
-        "List arms, and describe one.",
-        COMMANDS,
-        typed or ["list"],
-        epilog=EPILOG,
-    )
+    summary = "List arms, and describe one."
+    run_commands("kinarm-arms", summary, COMMANDS, typed or ["list"], epilog=EPILOG)
 
 
 if __name__ == "__main__":

@@ -13,9 +13,6 @@ from kinarm._validation import whole_number
 from kinarm.evaluation.markdown import markdown_table
 
 EPILOG = """
-What is not installed is named and left out: Stable-Baselines3, and arms with meshes without the
-extra robots.
-
 examples:
   kinarm-bench                              a table, in a minute or two
   kinarm-bench --ppo --out speed            with a training by PPO, and files
@@ -38,11 +35,6 @@ class BenchmarkRequest:
         Output folder, for a document and a page.
     json : bool
         Print JSON on standard output.
-
-    Raises
-    ------
-    InvalidInputError
-        If there are no repetitions.
     """
 
     repetitions: int = 7
@@ -63,34 +55,19 @@ class BenchmarkRequest:
     def run(self, command: str | None = None) -> dict[str, Any]:
         """Measure everything, and write ``speed.json`` and ``SPEED.md`` if there is a folder.
 
-        Parameters
-        ----------
-        command : str, optional
-            What to record as the command that made the files; this request if it is left out.
-
-        Returns
-        -------
-        dict
-            Figures that JSON can hold.
-
-        Raises
-        ------
-        KinarmError
-            If the policy cannot be used, or the folder cannot be written to.
+        ``command`` is recorded as what made the files; else it is this request.
         """
+        from kinarm.evaluation.bench import measure
+
         if self.out is None:
-            return self._measure()
+            return measure(self.policy, self.repetitions, ppo=self.ppo)
         check_folder(self.out)
         with only_writer(self.out):
-            document = {"command": command or repr(self), **self._measure()}
+            measured = measure(self.policy, self.repetitions, ppo=self.ppo)
+            document = {"command": command or repr(self), **measured}
             write_text(self.out / "speed.json", json.dumps(document, indent=1) + "\n")
             write_text(self.out / "SPEED.md", speed_page(document))
         return document
-
-    def _measure(self) -> dict[str, Any]:
-        from kinarm.evaluation import bench
-
-        return bench.measure(self.policy, self.repetitions, ppo=self.ppo)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -133,74 +110,41 @@ def speed_page(document: dict[str, Any]) -> str:
 
 
 def rows(document: dict[str, Any]) -> Iterator[Row]:
-    """What was measured, as rows of text; an empty row ends a section."""
+    """Measurements, as rows of text; an empty row ends a section."""
     for row in document["rollouts"]:
-        yield _rollout_row("rollouts", row)
-    yield ()
-    for row in document["robots"]:
-        yield from _skipped(row, "arms with meshes") or [_rollout_row(row["arm"], row)]
+        plural = "s" if row["threads"] > 1 else ""
+        what = f"{row['batch']} {row['actions']} episodes, {row['threads']} thread{plural}"
+        judged = f"{100 * row['judged_share']:.3f} %"
+        yield f"rollouts, {what}", *_rates(row["steps_per_second"]), judged
     yield ()
     yield "batch environment, 64 arms", *_rates(document["vector_environment"])
     yield "single environment", *_rates(document["single_environment"])
-    sb3 = document["stable_baselines3"]
-    yield from _skipped(sb3, "for Stable-Baselines3") or [
-        ("for Stable-Baselines3, 64 arms", *_rates(sb3["native"])),
-        ("its DummyVecEnv, 64 single environments", *_rates(sb3["dummy"])),
-        ("speed-up over its DummyVecEnv", f"{sb3['speed_up']:.0f} x"),
-    ]
     yield "reference path (Pinocchio + Coal)", *_rates(document["reference"])
-    yield "pictures, 480 x 360, one thread", *_rates(document["pictures"], "pictures")
-    yield (
-        "speed-up over the reference (512 trained)",
-        f"{document['speed_up_over_reference']:.0f} x",
-    )
+    speed_up = f"{document['speed_up_over_reference']:.0f} x"
+    yield "speed-up over the reference (512 trained)", speed_up
     yield ()
-    yield from _training_rows(document)
-    yield from _evaluation_rows(document["evaluation"])
-
-
-def _training_rows(document: dict[str, Any]) -> Iterator[Row]:
-    """Rows of trainings and of the oracle."""
     ars, oracle = document["table_1_training"], document["oracle"]
     seconds = (f"{ars['seconds'][name]:.2f} s" for name in ("median", "best"))
     yield f"training of Table 1 ({_millions(ars)})", *seconds
     if ppo := document.get("ppo_training"):
-        yield from _skipped(ppo, "training with PPO") or [
-            (f"training with PPO ({_millions(ppo)})", f"{ppo['seconds']:.1f} s"),
-            ("share of it in the simulator", f"{ppo['simulator_share']:.1%}"),
-        ]
+        yield f"training with PPO ({_millions(ppo)})", f"{ppo['seconds']:.1f} s"
+        yield "share of it in the simulator", f"{ppo['simulator_share']:.1%}"
     rates = oracle["trials_per_second"]
     seconds = (f"{oracle['trials'] / rates[name]:.1f} s" for name in ("median", "best"))
     yield f"oracle, {oracle['trials']} trials", *seconds
-
-
-def _evaluation_rows(evaluation: dict[str, float]) -> Iterator[Row]:
-    """Rows of ``kinarm-eval``, a process of its own."""
+    evaluation, what = document["evaluation"], "kinarm-eval --trials 200"
     memory = f"{evaluation['peak_memory_mb']:.0f} MB"
-    yield "kinarm-eval --trials 200, nothing compiled", f"{evaluation['seconds_first']:.1f} s"
-    for known, name in (("unknown", "seconds_without_bounds"), ("known", "seconds")):
-        what = f"kinarm-eval --trials 200, bounds {known}"
-        yield what, f"{evaluation[name]:.1f} s", memory
-
-
-def _rollout_row(what: str, row: dict[str, Any]) -> Row:
-    plural = "s" if row["threads"] > 1 else ""
-    episodes = f"{row['batch']} {row['actions']} episodes, {row['threads']} thread{plural}"
-    judged = f"{100 * row['judged_share']:.3f} %"
-    return f"{what}, {episodes}", *_rates(row["steps_per_second"]), judged
-
-
-def _skipped(measured: dict[str, Any], what: str) -> list[Row]:
-    """Rows that say why something was not measured; none if it was."""
-    return [(what, "skipped"), (measured["skipped"],)] if "skipped" in measured else []
+    yield f"{what}, nothing compiled", f"{evaluation['seconds_first']:.1f} s"
+    yield f"{what}, bounds unknown", f"{evaluation['seconds_without_bounds']:.1f} s", memory
+    yield f"{what}, bounds known", f"{evaluation['seconds']:.1f} s", memory
 
 
 def _millions(training: dict[str, Any]) -> str:
     return f"{training['environment_steps'] / 1e6:.1f} million steps"
 
 
-def _rates(timing: dict[str, float], unit: str = "steps") -> list[str]:
-    return [f"{timing[name]:,.0f} {unit}/s" for name in ("median", "best")]
+def _rates(timing: dict[str, float]) -> list[str]:
+    return [f"{timing[name]:,.0f} steps/s" for name in ("median", "best")]
 
 
 if __name__ == "__main__":

@@ -4,11 +4,10 @@ import json
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, BinaryIO, ClassVar, cast
 
-from kinarm._command_line import Command, run_commands
+from kinarm._command_line import Commands, run_commands
 from kinarm._console import print_table
 from kinarm._files import check_output, write_atomically, write_text
 from kinarm._validation import MOST_TRIALS, whole_number
@@ -73,11 +72,6 @@ class CheckRequest(ShowRequest):
         All findings, as JSON.
     overwrite : bool
         Replace earlier files.
-
-    Raises
-    ------
-    InvalidInputError
-        If there is no trial or the seed is negative.
     """
 
     trials: int = 200
@@ -97,14 +91,7 @@ class CheckRequest(ShowRequest):
         whole_number("seed", self.seed, 0)
 
     def run(self) -> "ProblemCheck":
-        """Check the problem, and write the outputs.
-
-        Raises
-        ------
-        KinarmError
-            If a name, file or number cannot be used, the arm cannot move, or a file cannot be
-            written.
-        """
+        """Check the problem, and write the outputs."""
         from kinarm._console import working
         from kinarm.evaluation.problem_check import check_problem
         from kinarm.world import World
@@ -114,10 +101,9 @@ class CheckRequest(ShowRequest):
             if path is not None:
                 check_output(path, overwrite=self.overwrite, suffix=suffix)
         say_choices([problem])
-        world = World(problem)
         with working("checking") as say:
             check = check_problem(
-                world,
+                World(problem),
                 self.trials,
                 self.seed,
                 lambda done, total: say(f"{done} of {total} trials solved"),
@@ -125,24 +111,21 @@ class CheckRequest(ShowRequest):
         if self.json is not None:
             write_text(self.json, json.dumps(check.to_json(), indent=1))
         if self.picture is not None:
-            write_picture(self.picture, world.problem)
+            write_picture(self.picture, problem)
         return check
 
 
 def write_picture(path: Path, problem: "ReachProblem") -> None:
     """Write a picture of the arm at home, and a goal in the middle of a region."""
-    import numpy as np
     from matplotlib.image import imsave
 
     from kinarm.viewer import Renderer
 
     region = problem.scene.goal_region(problem.task.goal_regions[0])
-    goal = (np.array(region.lower) + np.array(region.upper)) / 2
+    goal = [(low + high) / 2 for low, high in zip(region.lower, region.upper, strict=True)]
     width, height = PICTURE_SIZE
     taken = Renderer(problem, width=width, height=height).render(problem.load_arm().home, goal)
-    png = BytesIO()
-    imsave(png, taken, format="png")
-    write_atomically(path, lambda file: file.write(png.getvalue()))
+    write_atomically(path, lambda file: imsave(cast("BinaryIO", file), taken, format="png"))
 
 
 def rows() -> list[tuple[str, ...]]:
@@ -151,7 +134,8 @@ def rows() -> list[tuple[str, ...]]:
 
     return [
         (
-            *(problem.name, problem.arm.name),
+            problem.name,
+            problem.arm.name,
             ", ".join(each.name for each in problem.scene.obstacles) or "none",
             ", ".join(problem.task.goal_regions),
             f"{problem.stepping.time_step:g}",
@@ -161,20 +145,10 @@ def rows() -> list[tuple[str, ...]]:
     ]
 
 
-def _list(_: ListRequest) -> None:
-    print_table(HEADINGS, rows(), EXPENDABLE)
-
-
-def _show(request: ShowRequest) -> None:
-    print(request.resolve().to_toml(), end="")
-
-
 def _check(request: CheckRequest) -> None:
-    check = request.run()
-    problem = request.resolve()
-    print(
-        f"{problem.name}: arm {problem.arm.name}, goals {' and '.join(problem.task.goal_regions)}"
-    )
+    check, problem = request.run(), request.resolve()
+    goals = " and ".join(problem.task.goal_regions)
+    print(f"{problem.name}: arm {problem.arm.name}, goals {goals}")
     for about, line in check.lines().items():
         print(f"  {about:8} {line}")
     for path in (request.json, request.picture):
@@ -182,23 +156,18 @@ def _check(request: CheckRequest) -> None:
             print(f"  written  {path}")
 
 
-COMMANDS = {
-    "list": Command(ListRequest, _list),
-    "show": Command(ShowRequest, _show),
-    "check": Command(CheckRequest, _check),
+COMMANDS: Commands = {
+    "list": (ListRequest, lambda _: print_table(HEADINGS, rows(), EXPENDABLE)),
+    "show": (ShowRequest, lambda request: print(request.resolve().to_toml(), end="")),
+    "check": (CheckRequest, _check),
 }
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line."""
     typed = sys.argv[1:] if arguments is None else arguments
-    run_commands(
-        "kinarm-problem",
-        "List, show and check problems.",
-        COMMANDS,
-        typed or ["list"],
-        epilog=EPILOG,
-    )
+    summary = "List, show and check problems."
+    run_commands("kinarm-problem", summary, COMMANDS, typed or ["list"], epilog=EPILOG)
 
 
 if __name__ == "__main__":

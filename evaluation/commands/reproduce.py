@@ -9,7 +9,7 @@ from kinarm._command_line import run_request
 from kinarm._console import open_console, print_table
 from kinarm._interrupts import GOES_ON, telling
 from kinarm._parallel import available_threads
-from kinarm.evaluation.experiments.options import RunningOptions
+from kinarm.evaluation.commands.study import RunningOptions
 
 if TYPE_CHECKING:
     from kinarm.evaluation.experiments.executors import Executor
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from kinarm.evaluation.paper.claims import Claim
 
 EPILOG = """
-needs the extra ppo: pip install 'kinarm[ppo]' (or --no-ppo)
-
 An interrupted reproduction goes on where it stopped, by the same command.
 
 examples:
@@ -40,11 +38,6 @@ class ReproductionRequest(RunningOptions):
         Make a smoke run: every step with trainings of a few iterations, and no verdicts.
     ppo : bool
         Train with PPO as well, and judge the claims that compare it with ARS.
-
-    Raises
-    ------
-    InvalidInputError
-        If there are no jobs.
     """
 
     out: Path | None = field(default=None, metadata={"metavar": "DIR"})
@@ -64,7 +57,7 @@ class ReproductionRequest(RunningOptions):
 
     @property
     def experiment(self) -> "Experiment":
-        """What is trained: the shipped experiment, or its part without PPO."""
+        """The trainings: the shipped experiment, or its part without PPO."""
         from kinarm.evaluation.experiments.experiment import Experiment
 
         shipped = Experiment.load("reproduction_quick" if self.quick else "reproduction")
@@ -74,25 +67,13 @@ class ReproductionRequest(RunningOptions):
     def run(
         self, executor: "Executor | None" = None, command: str | None = None
     ) -> "Sequence[Claim]":
-        """Run the missing trainings, and write the results.
+        """Run the missing trainings, write the results, and return the claims, read literally.
 
-        Parameters
-        ----------
-        executor : Executor, optional
-            Where trainings are carried out, instead of where the options say.
-        command : str, optional
-            What to record as the command that made the files; this request by default.
-
-        Returns
-        -------
-        sequence of Claim
-            The claims under the literal reading.
+        ``executor`` says where trainings are carried out, instead of the options, and ``command``
+        what is recorded as having made the files, instead of this request.
 
         Raises
         ------
-        KinarmError
-            If the extra ``ppo`` is missing, the folder is another experiment's or cannot be written
-            to, or a training fails.
         KeyboardInterrupt
             If it is interrupted; what is finished is kept, and the message says so.
         """
@@ -117,11 +98,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _report(request: ReproductionRequest, command: str) -> None:
     """Run a request, and print its verdicts, if it has any."""
+    from kinarm.evaluation.experiments.plan import plan
     from kinarm.evaluation.paper.page import CLAIM_COLUMNS, SMOKE, claim_rows
 
     claims = request.run(command=command)
     if request.quick:
-        print(SMOKE.format(request.experiment.size))
+        print(SMOKE.format(len(plan(request.experiment))))
     else:
         print_table(CLAIM_COLUMNS, claim_rows(claims), expendable=CLAIM_COLUMNS[1:2])
     print(f"written: {request.folder / 'REPRODUCTION.md'}, with tables and figures beside it")

@@ -1,7 +1,7 @@
 """``kinarm-study``: the trainings of an experiment."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, ClassVar
 from kinarm._command_line import run_request
 from kinarm._console import print_table
 from kinarm._interrupts import GOES_ON, telling
+from kinarm._parallel import available_threads
 from kinarm._validation import whole_number
-from kinarm.errors import TrainingFailedError
-from kinarm.evaluation.experiments.options import RunningOptions
+from kinarm.errors import InvalidInputError, TrainingFailedError
 
 if TYPE_CHECKING:
     from kinarm.evaluation.experiments.executors import Executor
@@ -53,6 +53,69 @@ examples:
 
 
 @dataclass(frozen=True, kw_only=True)
+class RunningOptions:
+    """Where trainings run.
+
+    Parameters
+    ----------
+    jobs : int
+        Trainings at a time on this machine.
+    ray : str
+        Run on Ray: auto, the address of a cluster, or local.
+    slurm : bool
+        Run as array jobs of Slurm.
+    bundle : int
+        Trainings of one element of a Slurm array.
+    minutes : int
+        Time limit of an element of a Slurm array [min].
+    partition : str
+        Partition of Slurm.
+    """
+
+    jobs: int | None = None
+    ray: str | None = field(default=None, metadata={"metavar": "ADDRESS"})
+    slurm: bool = False
+    bundle: int | None = None
+    minutes: int | None = None
+    partition: str | None = None
+
+    GROUPS: ClassVar[Mapping[str, Sequence[str]]] = {
+        "where trainings run": ("jobs", "ray", "slurm", "bundle", "minutes", "partition")
+    }
+    DEFAULTS: ClassVar[Mapping[str, str]] = {
+        "jobs": "one a processor",
+        "ray": "this machine without Ray",
+        "bundle": "1",
+        "minutes": "240",
+        "partition": "the cluster's",
+    }
+
+    def __post_init__(self) -> None:
+        for name in ("jobs", "bundle", "minutes"):
+            if getattr(self, name) is not None:
+                whole_number(name, getattr(self, name), 1)
+        if self.slurm and self.ray is not None:
+            raise InvalidInputError("--ray and --slurm exclude each other")
+        if self.slurm and self.jobs is not None:
+            raise InvalidInputError("--jobs is for this machine: it does not go with --slurm")
+        for name in ("bundle", "minutes", "partition"):
+            if getattr(self, name) is not None and not self.slurm:
+                raise InvalidInputError(f"--{name} goes with --slurm")
+
+    def executor(self, folder: Path, threads: int = 1) -> "Executor":
+        """Where trainings run: on so many threads each, with Slurm's jobs in the output folder."""
+        from kinarm.evaluation.experiments.clusters import RayExecutor, SlurmExecutor
+        from kinarm.evaluation.experiments.executors import LocalExecutor
+
+        if self.ray is not None:
+            return RayExecutor(self.ray, self.jobs, threads)
+        if self.slurm:
+            place, minutes = folder / "slurm", self.minutes or 240
+            return SlurmExecutor(place, self.bundle or 1, minutes, threads, self.partition)
+        return LocalExecutor(self.jobs or available_threads(), threads)
+
+
+@dataclass(frozen=True, kw_only=True)
 class StudyRequest(RunningOptions):
     """Run the trainings of an experiment, and write their results.
 
@@ -72,11 +135,6 @@ class StudyRequest(RunningOptions):
         Threads of a training.
     train : bool
         Train what is missing; else write the results of the finished trainings.
-
-    Raises
-    ------
-    InvalidInputError
-        If a number is out of range.
     """
 
     experiment: Path = field(metadata={"flag": "experiment", "metavar": "EXPERIMENT"})
@@ -101,9 +159,9 @@ class StudyRequest(RunningOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.train:
-            self.refuse_without_training()
-        whole_number("threads", self.threads, 1)
+        for name in () if self.train else RunningOptions.GROUPS["where trainings run"]:
+            if getattr(self, name):
+                raise InvalidInputError(f"--{name} does not go with --no-train")
 
     @property
     def folder(self) -> Path:
@@ -113,22 +171,11 @@ class StudyRequest(RunningOptions):
     def run(self, executor: "Executor | None" = None, command: str | None = None) -> "Study":
         """Run the missing trainings, and write the results.
 
-        Parameters
-        ----------
-        executor : Executor, optional
-            Where trainings are carried out, instead of where the options say.
-        command : str, optional
-            What to record as the command that made the files; this request by default.
-
-        Returns
-        -------
-        Study
-            The study with what is finished.
+        ``executor`` says where trainings are carried out, instead of the options, and ``command``
+        what is recorded as having made the files, instead of this request.
 
         Raises
         ------
-        KinarmError
-            If the file cannot be used, the folder is another experiment's, or a package is missing.
         TrainingFailedError
             If trainings failed; what the others came to is written.
         KeyboardInterrupt
@@ -152,7 +199,7 @@ class StudyRequest(RunningOptions):
                 failed = error
             if len(study):
                 write_all(study, command or repr(self))
-            if failed is not None:
+            if failed:
                 raise failed
         return study
 

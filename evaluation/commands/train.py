@@ -31,7 +31,7 @@ kinarm-train LEARNER --help lists recipes and options.
 examples:
   kinarm-train ars --recipe tuned --out right.npz           one policy
   kinarm-train ars --recipe tuned --seeds 5 --out right     five, in the folder right
-  kinarm-train ppo --recipe tuned --problem both --out both.npz   both benches, with PPO (extra ppo)
+  kinarm-train ppo --recipe tuned --problem both --out both.npz   both benches, with PPO
   kinarm-train my_module:LEARNER --out mine.npz             a learner of your own
 """
 
@@ -57,13 +57,7 @@ MOST_SEEDS = 1000
 
 
 def seeds_of(text: str) -> tuple[int, ...]:
-    """Seeds of a text: ``"5"`` is 0 to 4, ``"5-9"`` is 5 to 9.
-
-    Raises
-    ------
-    InvalidInputError
-        If it is neither a number nor a rising range, or there are too many.
-    """
+    """Seeds of a text: ``"5"`` is 0 to 4, ``"5-9"`` is 5 to 9."""
     found = re.fullmatch(r"(?:([0-9]{1,9})-)?([0-9]{1,9})", text)
     if found is not None:
         first, last = int(found[1] or 0), int(found[2]) - (found[1] is None)
@@ -89,11 +83,6 @@ class SeedsRequest:
         each goes into the folder --out.
     jobs : int, optional
         Seeds at a time.
-
-    Raises
-    ------
-    InvalidInputError
-        If two settings do not go together, or a number is out of range.
     """
 
     training: TrainRequest
@@ -108,8 +97,6 @@ class SeedsRequest:
             raise InvalidInputError("--seed and --seeds exclude each other")
         if not self.seeds:
             raise InvalidInputError("there is no seed to train")
-        for seed in self.seeds:
-            whole_number("seed", seed, 0)
         if self.jobs is not None:
             whole_number("jobs", self.jobs, 1)
         if Path(self.training.out).suffix == ".npz":
@@ -123,11 +110,6 @@ class SeedsRequest:
         ``resume``, finished seeds are left as they are, and the others go on or begin. What is
         under way lies in the folder ``.training`` meanwhile.
 
-        Returns
-        -------
-        tuple of TrainedSeed
-            In the order of the seeds.
-
         Raises
         ------
         TrainingFailedError
@@ -138,9 +120,9 @@ class SeedsRequest:
         KeyboardInterrupt
             If it is interrupted; the message says how to go on.
         """
-        from kinarm.evaluation.experiments.seeds import SeedTrainings
+        from kinarm.evaluation.experiments.seeds import train_seeds
 
-        return SeedTrainings(self.training, self.seeds, self.jobs).run()
+        return train_seeds(self.training, self.seeds, self.jobs)
 
 
 def build_parser(named: str | None = None) -> Parser:
@@ -178,7 +160,7 @@ def _add_learner(
 
 
 def _epilog(name: str, learner: Learner[Any, Any]) -> str:
-    """What the recipes of a learner are, and examples with the one to try first."""
+    """Recipes of a learner, and examples with the one to try first."""
     recipe = "tuned" if "tuned" in learner.recipes else learner.first_recipe
     lines = (f"  {each:<8} {summary}\n" for each, summary in learner.summaries.items())
     return EPILOG.format(
@@ -192,30 +174,30 @@ def _epilog(name: str, learner: Learner[Any, Any]) -> str:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line."""
     given = sys.argv[1:] if arguments is None else list(arguments)
-    run_command(PROG, lambda: _train(build_parser(_named(given)).parse_args(given)))
-
-
-def _named(arguments: Sequence[str]) -> str | None:
-    """The learner that a command line names; None if it names none."""
-    return arguments[0] if arguments and not arguments[0].startswith("-") else None
+    named = given[0] if given and not given[0].startswith("-") else None
+    run_command(PROG, lambda: _train(build_parser(named).parse_args(given)))
 
 
 def _train(options: argparse.Namespace) -> None:
-    """Train as the options say, write the policy files, and print how good they are."""
+    """Train as the options say, and say how good the policies are and what to type next."""
     given = given_options(options, find_learner(options.learner).config)
     settings = {name: value for name, value in given.items() if name not in CIRCUMSTANCES}
     request = TrainRequest(**given_options(options, TrainRequest), settings=settings)
     seeds = given_options(options, SeedsRequest)
     if "seeds" in seeds:
         _train_seeds(SeedsRequest(training=request, **seeds))
+        trained = f"{request.out}/"
     elif "jobs" in seeds:
         raise InvalidInputError("--jobs goes with --seeds")
     else:
         _train_one(request)
+        trained = str(request.out)
+    name = shlex.quote(trained)
+    sys.stdout.write(f"next: kinarm-eval --policy {name}, kinarm-replay --policy {name}\n")
 
 
 def _train_one(request: TrainRequest) -> None:
-    """Train a policy, and say how good it is and what to type next."""
+    """Train a policy, and say how good it is."""
     curve = request.run().curve
     last = curve[-1]
     sys.stdout.write(
@@ -225,23 +207,15 @@ def _train_one(request: TrainRequest) -> None:
         f"success {100 * last.success:.0f} %\n"
         f"written: {request.out}, {curve_path(request.out)}\n"
     )
-    _say_next(request.out)
 
 
 def _train_seeds(request: SeedsRequest) -> None:
-    """Train several seeds, and say how good they are and what to type next."""
+    """Train several seeds, and say how good they are."""
     for seed, out, last in request.run():
         said = "finished earlier"
         if last is not None:
             said = f"return {last.mean_return:+.3f}, success {100 * last.success:.0f} %"
         sys.stdout.write(f"seed {seed}: {said}; written: {out}\n")
-    _say_next(f"{request.training.out}/")
-
-
-def _say_next(out: Path | str) -> None:
-    """Say how to evaluate and to watch what was trained."""
-    name = shlex.quote(str(out))
-    sys.stdout.write(f"next: kinarm-eval --policy {name}, kinarm-replay --policy {name}\n")
 
 
 if __name__ == "__main__":

@@ -1,23 +1,67 @@
 """Executors that carry tasks out on a cluster: Ray, and array jobs of Slurm."""
 
-import math
+import hashlib
 import os
 import pickle
-import time
+import socket
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cache, partial
+from importlib import import_module
 from itertools import islice
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
+from kinarm import SEMANTICS
 from kinarm._interrupts import kept_from_children
 from kinarm.errors import InvalidInputError, MissingExtraError, WorkerError
-from kinarm.evaluation.experiments.executors import Failure, Work
+from kinarm.evaluation.experiments.executors import Failure, attempt
+from kinarm.policies.oracle import ORACLE_SEMANTICS
+from kinarm.policies.provenance import package_versions
 
-TaskT = TypeVar("TaskT")
-ResultT = TypeVar("ResultT")
+PACKAGES = ("kinarm", "kinarm.policies", "kinarm.evaluation", "kinarm.data")
+"""All of kinarm; in a clone they lie beside each other, else the others lie in the first."""
+
+
+@cache
+def identity() -> dict[str, str]:
+    """Versions of packages and of results, and the hash of kinarm's source, by name."""
+    files = {
+        f"{package}.{'.'.join(path.relative_to(folder).parts)}": path
+        for package in PACKAGES
+        for folder in import_module(package).__path__[:1]
+        for path in Path(folder).rglob("*.py")
+    }
+    source = hashlib.sha256(b"".join(files[name].read_bytes() for name in sorted(files)))
+    results = {"semantics": SEMANTICS, "oracle semantics": ORACLE_SEMANTICS}
+    return {**package_versions(), **results, "source of kinarm": source.hexdigest()[:12]}
+
+
+def do_alike(work: Callable[[Any], Any], expected: Mapping[str, str], task: Any) -> Any:
+    """Do the work for a task where kinarm and its packages are those of the driver.
+
+    Parameters
+    ----------
+    work, expected : callable and mapping
+        The work, and the driver's `identity`.
+    task : object
+        What the work is done for.
+
+    Raises
+    ------
+    WorkerError
+        Names the first difference.
+    """
+    here = identity()
+    for name, wanted in expected.items():
+        if (found := here.get(name, "not installed")) != wanted:
+            raise WorkerError(
+                f"a worker differs from this process: {name} is {found} there, {wanted} here"
+            )
+    return work(task)
+
 
 ANSWER_SECONDS = 10.0
 """How long a cluster may take to answer."""
@@ -25,9 +69,8 @@ ANSWER_SECONDS = 10.0
 RETRIES = 20
 """How often a task is begun anew whose worker or node was lost."""
 
-WAITING = 4
-"""How many tasks wait at the cluster for each processor that it has: more are handed over as
-others finish, so that neither the driver nor the cluster holds all of a large study."""
+AT_ONCE = 10_000
+"""Tasks that wait at a Ray cluster at most."""
 
 
 @dataclass(frozen=True)
@@ -52,29 +95,30 @@ class RayExecutor:
     shares_files = False
 
     def map(
-        self, work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT]
-    ) -> Iterator[tuple[TaskT, ResultT | Failure]]:
-        """Do the work for every task; see `Executor.map`.
-
-        What was lost with a worker or a node is done again, elsewhere.
-
-        Raises
-        ------
-        MissingExtraError
-            If Ray is not installed.
-        InvalidInputError
-            If no cluster answers at the address within ten seconds.
-        WorkerError
-            If a worker has other versions than this process, or is lost again and again.
-        """
+        self, work: Callable[[Any], Any], tasks: Sequence[Any]
+    ) -> Iterator[tuple[Any, Any | Failure]]:
+        """Do the work for every task; see `Executor.map`."""
         try:
             import ray
         except ImportError as error:
             raise MissingExtraError("ray", "ray") from error
         with kept_from_children():
             self._connect(ray)
+        waiting, under_way = iter(tasks), dict[Any, Any]()
         try:
-            yield from self._map(ray, work, tasks)
+            remote: Any = ray.remote(num_cpus=self.threads, max_retries=RETRIES)(attempt)
+            shared = ray.put(partial(do_alike, work, identity()))
+            while True:
+                for task in islice(waiting, AT_ONCE - len(under_way)):
+                    under_way[remote.remote(shared, pickle.dumps(task))] = task
+                if not under_way:
+                    return
+                (done,), _ = ray.wait([*under_way])
+                yield under_way.pop(done), ray.get(done)
+        except ray.exceptions.RayError as error:
+            raise WorkerError(
+                f"Ray gave a task up: {error}; the same command goes on with what is missing"
+            ) from error
         finally:
             ray.shutdown()
 
@@ -88,72 +132,16 @@ class RayExecutor:
         if address == "auto":  # as Ray reads it
             address = os.environ.get("RAY_ADDRESS") or address
         try:
-            if address != "auto":
-                _knock(address.removeprefix("ray://"))
+            if address != "auto":  # Ray itself waits for minutes
+                host, _, port = address.removeprefix("ray://").rpartition(":")
+                socket.create_connection((host, int(port)), ANSWER_SECONDS).close()
             with warnings.catch_warnings(action="ignore"):  # one line says it
                 ray.init(address=address, **quiet)
-        except (ConnectionError, OSError, RuntimeError, TimeoutError, ValueError) as error:
+        except (OSError, RuntimeError, ValueError) as error:
             raise InvalidInputError(
                 f"no Ray cluster answers at {address!r}: give the address of one, auto "
                 "where one runs, or local"
             ) from error
-
-    def _map(
-        self, ray: Any, work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT]
-    ) -> Iterator[tuple[TaskT, ResultT | Failure]]:
-        """Hand tasks over, a few at a time, and take results back."""
-        remote = ray.remote(num_cpus=self.threads, max_retries=RETRIES)(_call)
-        packed = ray.put(Work.of(work))
-        waiting = iter(enumerate(tasks))
-        under_way: dict[Any, int] = {}
-        try:
-            while True:
-                room = self._room(ray) - len(under_way)
-                for number, task in islice(waiting, max(room, 0)):
-                    under_way[remote.remote(packed, pickle.dumps(task))] = number
-                if not under_way:
-                    return
-                done, _ = ray.wait(list(under_way), num_returns=1, timeout=1.0)
-                for reference in done:
-                    number = under_way.pop(reference)
-                    yield tasks[number], self._result(ray, reference)
-        finally:
-            for reference in under_way:
-                with suppress(Exception):
-                    ray.cancel(reference, force=True)
-
-    def _room(self, ray: Any) -> int:
-        """How many tasks the cluster is given at a time, as large as it is now."""
-        processors = math.floor(ray.cluster_resources().get("CPU", 1.0) / self.threads)
-        return int(WAITING * max(1, processors))
-
-    def _result(self, ray: Any, reference: Any) -> Any:
-        """What a task returned, or what went wrong."""
-        try:
-            return ray.get(reference)
-        except ray.exceptions.RayTaskError as error:
-            raise error.cause if isinstance(error.cause, Exception) else error from error
-        except ray.exceptions.RayError as error:
-            raise WorkerError(
-                "workers of the cluster are lost again and again, perhaps for want of memory; the "
-                "same command goes on with what is missing"
-            ) from error
-
-
-def _call(work: Work, task: bytes) -> Any:
-    """Do the work for a task, in a worker."""
-    return work(task)
-
-
-def _knock(address: str) -> None:
-    """See that something listens at an address."""
-    import socket
-
-    host, _, port = address.rpartition(":")
-    if not host or not port.isdigit():
-        raise ValueError(address)
-    with socket.create_connection((host, int(port)), timeout=ANSWER_SECONDS):
-        pass
 
 
 LOOK_SECONDS = 0.5
@@ -192,109 +180,43 @@ class SlurmExecutor:
     shares_files = True
 
     def map(
-        self, work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT]
-    ) -> Iterator[tuple[TaskT, ResultT | Failure]]:
-        """Do the work for every task, bundle by bundle; see `Executor.map`.
-
-        Raises
-        ------
-        MissingExtraError
-            If submitit is not installed.
-        InvalidInputError
-            If there is no Slurm on this machine, or it refuses the jobs.
-        WorkerError
-            If a job ends without a result, or a worker has other versions than this process.
-        """
+        self, work: Callable[[Any], Any], tasks: Sequence[Any]
+    ) -> Iterator[tuple[Any, Any | Failure]]:
+        """Do the work for every task, bundle by bundle; see `Executor.map`."""
         try:
             import submitit
         except ImportError as error:
             raise MissingExtraError("submitit", "slurm") from error
-        packed = Work.of(work)
-        numbered = [(number, pickle.dumps(task)) for number, task in enumerate(tasks)]
-        bundles = [
-            Bundle(packed, numbered[first : first + self.bundle])
-            for first in range(0, len(numbered), self.bundle)
-        ]
-        if not bundles:
+        parts = [tasks[k : k + self.bundle] for k in range(0, len(tasks), self.bundle)]
+        alike, jobs = partial(do_alike, work, identity()), list[Any]()
+        if not parts:
             return
-        jobs = self._submit(submitit, bundles)
-        try:
-            while jobs:
-                ended = [job for job in jobs if job.done()]
-                for job in ended:
-                    jobs.remove(job)
-                    for number, result in self._results(submitit, job):
-                        yield tasks[number], result
-                if jobs and not ended:
-                    time.sleep(LOOK_SECONDS)
-        finally:
-            for job in jobs:
-                with suppress(Exception):
-                    job.cancel(check=False)
-                    if self.cluster == "local":
-                        job.wait()
-
-    def _submit(self, submitit: Any, bundles: "Sequence[Bundle]") -> list[Any]:
-        """Hand an array of bundles to the cluster."""
         try:
             executor = submitit.AutoExecutor(folder=self.folder, cluster=self.cluster)
-            settings = {"slurm_partition": self.partition} if self.partition else {}
             executor.update_parameters(
                 name="kinarm",
                 timeout_min=self.minutes,
                 cpus_per_task=self.threads,
                 slurm_array_parallelism=self.at_once,
-                **settings,
+                **({"slurm_partition": self.partition} if self.partition else {}),
             )
             with executor.batch():
-                return [executor.submit(bundle) for bundle in bundles]
+                for part in parts:
+                    bundle = submitit.helpers.FunctionSequence()  # goes on where it was interrupted
+                    for task in part:
+                        bundle.add(attempt, alike, pickle.dumps(task))
+                    jobs.append(executor.submit(bundle))
         except (OSError, RuntimeError, submitit.core.utils.FailedJobError) as error:
             raise InvalidInputError(f"Slurm takes no jobs: {error}") from error
-
-    def _results(self, submitit: Any, job: Any) -> list[tuple[int, Any]]:
-        """What a bundle came to, or what went wrong."""
         try:
-            return list(job.result())
+            for job in submitit.helpers.as_completed(jobs, poll_frequency=LOOK_SECONDS):
+                yield from zip(parts[jobs.index(job)], job.result(), strict=True)
         except submitit.core.utils.FailedJobError as error:
             raise WorkerError(
-                f"job {job.job_id} failed: {_reason(str(error))}; its log is "
-                f"{str(job.paths.stderr)!r}, and the same command goes on with what is missing"
+                f"a job failed; the same command goes on with what is missing: {error}"
             ) from error
-
-
-def _reason(said: str) -> str:
-    """What submitit says of a failed job, in a line: the last one of the traceback, if any."""
-    _, _, traced = said.partition("Traceback (most recent call last):\n")
-    lines = [line for line in (traced or said).splitlines() if line and not line.startswith(" ")]
-    return next((line for line in lines if not line.startswith("-")), "no result")
-
-
-@dataclass
-class Bundle:
-    """Tasks of one element of an array, and their results so far.
-
-    Attributes
-    ----------
-    work : Work
-        What to do.
-    tasks : list of (int, bytes)
-        Pickled tasks with their numbers.
-    results : list of (int, object)
-        What those that are finished came to, with their numbers.
-    """
-
-    work: Work
-    tasks: list[tuple[int, bytes]]
-    results: list[tuple[int, Any]] = field(default_factory=list)
-
-    def __call__(self) -> list[tuple[int, Any]]:
-        """Run the unfinished tasks."""
-        for number, task in self.tasks[len(self.results) :]:
-            self.results.append((number, self.work(task)))
-        return self.results
-
-    def checkpoint(self) -> Any:
-        """What Slurm is to run when it takes the machine away: the rest."""
-        import submitit
-
-        return submitit.helpers.DelayedSubmission(self)
+        finally:
+            for job in jobs:
+                with suppress(Exception):
+                    if not job.done():
+                        job.cancel(check=False)

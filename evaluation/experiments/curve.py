@@ -1,18 +1,13 @@
 """Learning curves: which trials policies face in the course of a training, when, and how."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kinarm._fields import check_fields
 from kinarm._validation import MOST_TRIALS, whole_number
-from kinarm.evaluation.trials import TrialSet, trial_set
-from kinarm.policies.config import TrainingConfig
-from kinarm.policies.learners import TrainingState, state_policy
-from kinarm.policies.policy import Policy
+from kinarm.policies.learners import TrainingState
 from kinarm.rollouts import Rollouts
 
 MOST_POINTS = 1000
@@ -47,6 +42,14 @@ class CurveTrials:
         whole_number("points", self.points, 1, MOST_POINTS)
         whole_number("count", self.count, 1, MOST_TRIALS)
         whole_number("seed", self.seed, 0)
+
+    def iterations(self, last: int) -> frozenset[int]:
+        """After which iterations there is a point; the last is always among them."""
+        if self.spacing == "even":
+            ends = np.linspace(0, last, self.points + 1)[1:].clip(1)
+        else:
+            ends = np.append(0, np.geomspace(1, last, self.points))
+        return frozenset(ends.round().astype(np.int64).tolist())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +106,7 @@ class CurvePoint(NamedTuple):
 
     @classmethod
     def of(cls, state: TrainingState, rollouts: Rollouts) -> "CurvePoint":
-        """What rollouts of the policy of a state came to."""
+        """The point of the curve that rollouts of a policy make."""
         return cls(
             iteration=state.iteration,
             environment_steps=state.environment_steps,
@@ -111,95 +114,3 @@ class CurvePoint(NamedTuple):
             collision=float(rollouts.collision.mean()),
             median_distance=float(np.median(rollouts.distance)),
         )
-
-
-class Curve:
-    """The learning curve of a training, as far as it is.
-
-    Parameters
-    ----------
-    config : TrainingConfig
-        The settings of the training.
-    settings : TrialSettings
-        Which trials its policies face, and when.
-    points : sequence of CurvePoint
-        The points so far.
-    distances : sequence of ndarray
-        Final distances of the trials at these points, if they are kept [m].
-
-    Attributes
-    ----------
-    points : list of CurvePoint
-        How the policy did.
-    distances : list of ndarray of float32, shape (n_trials,)
-        Final distances at the points [m]; none unless the settings have trials for the curve.
-    """
-
-    def __init__(
-        self,
-        config: TrainingConfig,
-        settings: TrialSettings,
-        points: Sequence[CurvePoint] = (),
-        distances: Sequence[NDArray[np.float32]] = (),
-    ) -> None:
-        self.points, self.distances = [*points], [*distances]
-        self._config, self._settings = config, settings
-        own = settings.curve or settings
-        self._trials = trial_set(config.problem, own.count, own.seed)
-        self._iterations = _due_iterations(settings.curve, config.iterations)
-        first = self._trials.chosen([0])
-        simulator = first.simulator
-        actions = np.zeros((1, simulator.task.horizon, simulator.n_actions))
-        simulator.rollout_actions(actions, first.starts, first.goals)  # before any clock runs
-
-    def update(self, state: TrainingState) -> bool:
-        """Add a point if it is time for one; whether it was."""
-        if not self._is_due(state):
-            return False
-        rollouts = face(state_policy(self._config, state), self._trials)
-        self.points.append(CurvePoint.of(state, rollouts))
-        if self._settings.curve is not None:
-            self.distances.append(rollouts.distance.astype(np.float32))
-        return True
-
-    def _is_due(self, state: TrainingState) -> bool:
-        """Whether a point of the curve is reached that was not reached before."""
-        if self._settings.curve is not None:
-            return state.iteration in self._iterations
-        if self._settings.per_decade == 0:
-            return False
-        last = self.points[-1].environment_steps if self.points else 0
-        return self._reached(state.environment_steps) > self._reached(last)
-
-    def _reached(self, environment_steps: int) -> int:
-        """How many points there are up to a number of steps."""
-        settings, number = self._settings, 0
-        while environment_steps >= settings.first * 10.0 ** (number / settings.per_decade):
-            number += 1
-        return number
-
-
-def _due_iterations(curve: CurveTrials | None, iterations: int) -> frozenset[int]:
-    """After which iterations there is a point; the last is always among them."""
-    if curve is None:
-        return frozenset()
-    if curve.spacing == "even":
-        ends = np.linspace(0, iterations, curve.points + 1)[1:].clip(1)
-    else:
-        ends = np.append(0, np.geomspace(1, iterations, curve.points))
-    return frozenset(ends.round().astype(np.int64).tolist())
-
-
-def face(policy: Policy, trials: TrialSet) -> Rollouts:
-    """Put a policy to trials."""
-    return trials.simulator.rollout(policy, trials.starts, trials.goals)
-
-
-def curve_array(points: Sequence[CurvePoint]) -> NDArray[np.float64]:
-    """Points as rows of numbers, shape (n_points, 5)."""
-    return np.array(points, dtype=np.float64).reshape(-1, len(CurvePoint._fields))
-
-
-def points_of(array: NDArray[np.float64]) -> tuple[CurvePoint, ...]:
-    """The points that `curve_array` made rows of."""
-    return tuple(CurvePoint(int(row[0]), int(row[1]), *row[2:]) for row in array.tolist())

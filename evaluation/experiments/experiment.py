@@ -1,6 +1,5 @@
-"""What an experiment is: a file that names learners, problems, seeds and what varies."""
+"""An experiment: a file that names learners, problems, seeds and what varies."""
 
-import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
@@ -8,19 +7,18 @@ from pathlib import Path
 from typing import Any
 
 from kinarm._fields import OPTIONAL, check_fields, from_plain, read_toml, to_plain
+from kinarm._files import named_file
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.experiments.curve import TrialSettings
 from kinarm.evaluation.experiments.variation import (
     SEARCH_CHOICES,
-    check_grid,
-    check_range,
+    check_tables,
     combinations,
     draw,
     prepared,
     ranges_of,
 )
-from kinarm.problem_files import shipped_files
 from kinarm.randomness import Stream, stream_generator
 
 MOST_TRAININGS = 100_000
@@ -48,14 +46,11 @@ class Entry:
         Name or file of the recipe; the first of the learner by default.
     problems : tuple of str
         Names or files of problems; those of the experiment by default.
-    seeds : int
-        Trainings with each setting; as many as the experiment says by default (0).
-    first_seed : int, optional
-        Seed of the first of them; that of the experiment by default.
-    fixed : dict
-        Values of fields that stay, beside those of the experiment.
-    grid : dict
-        Lists of values of fields, beside those of the experiment.
+    seeds, first_seed : int, optional
+        Trainings with each setting, and seed of the first of them, as the experiment says by
+        default.
+    fixed, grid : dict
+        Values of fields that stay, and lists of values, beside those of the experiment.
     """
 
     name: str = field(default="", metadata=OPTIONAL)
@@ -77,9 +72,7 @@ class Entry:
             object.__setattr__(self, "name", name)
         whole_number("seeds", self.seeds, 0, MOST_TRAININGS)
         whole_number("first_seed", self.first_seed or 0, 0)
-        check_grid(self.grid)
-        if twice := sorted(self.fixed.keys() & self.grid.keys()):
-            raise InvalidInputError(f"{twice[0]!r} stands in fixed and in grid")
+        check_tables(fixed=self.fixed, grid=self.grid)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,26 +88,20 @@ class Experiment:
     ----------
     name : str
         How page and folder call it.
-    learners : tuple of str
-        Names of learners.
-    recipes : tuple of str
-        Names or files of recipes; the first of each learner by default.
+    learners, recipes : tuple of str
+        Names of learners; names or files of recipes, the first of each learner by default.
     entries : tuple of Entry
         Learners with a recipe and settings of their own, instead of learners and recipes.
     problems : tuple of str
         Names or files of problems.
-    seeds : int
-        Trainings with each setting.
-    first_seed : int
-        Seed of the first of them; the others follow.
+    seeds, first_seed : int
+        Trainings with each setting, and seed of the first of them.
     trials : TrialSettings
         Which trials the policies face.
     bounds : bool
         Find what any policy could reach in the trials.
-    fixed : dict
-        Values of fields that stay.
-    grid : dict
-        Lists of values of fields; all combinations are trained.
+    fixed, grid : dict
+        Values of fields that stay, and lists of values, of which all combinations are trained.
     random : dict
         ``count`` combinations, drawn by ``seed`` (0), of fields with a list of values, or a table
         of ``low``, ``high`` and, to draw the logarithm evenly, ``log = true``.
@@ -146,60 +133,17 @@ class Experiment:
                 raise InvalidInputError(f"{name} must not be empty")
             _check_distinct(name, getattr(self, name))
         _check_distinct("entries", [entry.name for entry in self.entries])
-        self._check_tables()
-        if self.size > MOST_TRAININGS:
-            raise InvalidInputError(
-                f"an experiment has at most {MOST_TRAININGS:,} trainings, this one {self.size:,}"
-            )
-        self._check_search()
-
-    def _check_tables(self) -> None:
-        """Refuse fields that stand in two tables, and values that nothing can be made of."""
-        tables = {
-            "fixed": self.fixed,
-            "grid": self.grid,
-            "random": ranges_of(self.random),
-            "search": self.searched,
-        }
-        given: dict[str, str] = {}
-        for table, entries in tables.items():
-            for key in entries:
-                if key in given:
-                    raise InvalidInputError(f"{key!r} stands in {given[key]} and in {table}")
-                given[key] = table
-        check_grid(self.grid)
-        for table, entries in (("random", self.random), ("search", self.search)):
-            if entries:
+        random, search = ranges_of(self.random), self.searched
+        check_tables(fixed=self.fixed, grid=self.grid, random=random, search=search)
+        for table in ("random", "search"):
+            if entries := getattr(self, table):
                 whole_number(f"{table}.count", entries.get("count", 0), 1, MOST_TRAININGS)
                 whole_number(f"{table}.seed", entries.get("seed", 0), 0)
-                for key, entry in ranges_of(entries).items():
-                    check_range(f"{table}.{key}", entry)
-
-    @property
-    def all_entries(self) -> tuple[Entry, ...]:
-        """The entries as given, or all learners with all recipes."""
-        return self.entries or tuple(
-            Entry(learner=learner, recipe=recipe)
-            for learner, recipe in product(self.learners, self.recipes or ("",))
-        )
-
-    @property
-    def size(self) -> int:
-        """Trainings that it asks for, those that turn out to be the same included."""
-        drawn = self.random.get("count", 1) * self.search.get("count", 1)
-        choices = math.prod(map(len, self.grid.values())) * drawn
-        return sum(
-            len(entry.problems or self.problems)
-            * math.prod(map(len, entry.grid.values()))
-            * (entry.seeds or self.seeds)
-            * choices
-            for entry in self.all_entries
-        )
+        if self.search:
+            self._check_search()
 
     def _check_search(self) -> None:
         """Refuse what cannot be searched."""
-        if not self.search:
-            return
         for table in ("grid", "random"):
             if getattr(self, table):
                 raise InvalidInputError(f"search and {table} exclude each other")
@@ -208,7 +152,7 @@ class Experiment:
                 f"a search has one learner and one recipe, got {len(self.all_entries)} of both"
             )
         for name, known in SEARCH_CHOICES.items():
-            if self.search.get(name, known[0]) not in known:
+            if name in self.search and self.search[name] not in known:
                 raise InvalidInputError(
                     f"search.{name} must be one of {', '.join(known)}, got {self.search[name]!r}"
                 )
@@ -219,24 +163,26 @@ class Experiment:
                 raise InvalidInputError(f"a search is for settings of a learner, not for {key!r}")
 
     @property
+    def all_entries(self) -> tuple[Entry, ...]:
+        """The entries as given, or all learners with all recipes."""
+        return self.entries or tuple(
+            Entry(learner=learner, recipe=recipe)
+            for learner, recipe in product(self.learners, self.recipes or ("",))
+        )
+
+    @property
     def searched(self) -> dict[str, Any]:
-        """What is searched, by field."""
+        """Lists and ranges that are searched, by field."""
         return ranges_of(self.search)
 
     def choices(self) -> Iterator[dict[str, Any]]:
         """Every combination of the values that vary, by field."""
         for of_grid in combinations(self.grid):
-            for drawn in self._drawn():
-                yield {**of_grid, **drawn}
-
-    def _drawn(self) -> Iterator[dict[str, Any]]:
-        """Random combinations; a larger number keeps the first ones."""
-        if not self.random:
-            yield {}
-            return
-        for number in range(self.random["count"]):
-            rng = stream_generator(Stream.STUDY, self.random.get("seed", 0), number)
-            yield {key: draw(entry, rng.random()) for key, entry in ranges_of(self.random).items()}
+            for number in range(self.random.get("count", 1)):
+                # A larger number of draws keeps the first ones.
+                rng = stream_generator(Stream.STUDY, self.random.get("seed", 0), number)
+                ranges = ranges_of(self.random).items()
+                yield {**of_grid, **{key: draw(entry, rng.random()) for key, entry in ranges}}
 
     def to_json(self) -> dict[str, Any]:
         """As a dictionary that TOML and JSON can hold."""
@@ -245,14 +191,7 @@ class Experiment:
 
     @classmethod
     def from_json(cls, entries: Mapping[str, Any], where: str) -> "Experiment":
-        """Rebuild what `to_json` returned, or what a file holds.
-
-        Parameters
-        ----------
-        entries : mapping
-            The entries of the file.
-        where : str
-            Name of the file, for messages.
+        """Rebuild what `to_json` returned, or what the file ``where`` holds.
 
         Raises
         ------
@@ -280,13 +219,7 @@ class Experiment:
         InvalidInputError
             If it cannot be used; in one line that names file, key and what is expected.
         """
-        file = Path(name_or_file)
-        shipped = shipped_files("experiments")
-        if not file.suffix and not file.is_file():
-            if str(name_or_file) not in shipped:
-                available = (*shipped, "path/to/experiment.toml")
-                raise UnknownNameError("experiment", str(name_or_file), available)
-            file = shipped[str(name_or_file)]
+        file = named_file("experiment", name_or_file)
         entries = {"name": file.stem, **read_toml(file, "experiment")}
         return cls.from_json(entries, str(file)).resolved(file.parent)
 
@@ -301,17 +234,10 @@ class Experiment:
 
         Parameters
         ----------
-        entries : iterable of str
-            Names of entries; all by default.
-        problems : sequence of str
-            Names or files of problems instead of its own.
+        entries, problems : iterable of str
+            Names of entries, all by default; names or files of problems instead of its own.
         seeds : int, optional
             Trainings with each setting.
-
-        Raises
-        ------
-        UnknownNameError
-            If there is no such entry.
         """
         known = {entry.name: entry for entry in self.all_entries}
         for name in entries:
@@ -334,17 +260,14 @@ class Experiment:
             beside = folder / name
             return str(beside.resolve()) if name.endswith(".toml") and beside.is_file() else name
 
-        def each(names: tuple[str, ...]) -> tuple[str, ...]:
-            return tuple(map(found, names))
-
         entries = tuple(
-            replace(entry, recipe=found(entry.recipe), problems=each(entry.problems))
-            for entry in self.entries
+            replace(each, recipe=found(each.recipe), problems=tuple(map(found, each.problems)))
+            for each in self.entries
         )
-        recipes, problems = each(self.recipes), each(self.problems)
+        recipes, problems = tuple(map(found, self.recipes)), tuple(map(found, self.problems))
         return replace(self, recipes=recipes, problems=problems, entries=entries)
 
 
-def _check_distinct(name: str, values: "tuple[str, ...] | list[str]") -> None:
+def _check_distinct(name: str, values: Sequence[str]) -> None:
     if len(set(values)) < len(values):
         raise InvalidInputError(f"{name} names the same twice: {', '.join(values)}")

@@ -3,27 +3,31 @@
 import hashlib
 import json
 import pickle
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field, is_dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from dataclasses import fields as dataclass_fields
 from functools import cached_property
 from itertools import product
 from typing import Any
 
 from kinarm import SEMANTICS
-from kinarm._fields import alternatives, field_types, from_plain, init_fields, to_plain
+from kinarm._fields import from_plain, init_fields, to_plain
 from kinarm.errors import InvalidInputError, KinarmError, UnknownNameError
 from kinarm.evaluation.experiments.curve import TrialSettings
-from kinarm.evaluation.experiments.experiment import Entry, Experiment
+from kinarm.evaluation.experiments.experiment import MOST_TRAININGS, Entry, Experiment
 from kinarm.evaluation.experiments.variation import combinations
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import Learner, find_learner
 from kinarm.policies.recipes import recipe
 from kinarm.problem import ReachProblem
 
+Learners = Mapping[str, Learner[Any, Any]]
+
+CHOSEN = {"seed", "recipe"}
+"""Settings that the experiment chooses."""
+
 PROBLEM = "problem."
-"""What the path of a field of the problem begins with."""
+"""Beginning of the path of a field of the problem."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -34,16 +38,12 @@ class Run:
     ----------
     learner : str
         Name of the learner.
-    config : TrainingConfig
-        All of its settings; the arm of the problem is pinned.
+    config, plain : TrainingConfig and mapping
+        All of its settings, the arm of the problem pinned; the same as JSON holds them.
     trials : TrialSettings
         Which trials its policies face.
-    choices : mapping
-        What of it varies in the experiment, by field.
-    entry : Entry
-        What it belongs to.
-    plain : mapping, optional
-        The settings as JSON holds them, where they are known already.
+    choices, entry : mapping and Entry
+        What of it varies in the experiment, by field; what it belongs to.
     """
 
     learner: str
@@ -67,56 +67,22 @@ class Run:
             "semantics": SEMANTICS,
         }
 
-    @classmethod
-    def of_settings(cls, settings: Mapping[str, Any], where: str) -> "Run":
-        """The training with these settings; its place in an experiment is not known.
-
-        Parameters
-        ----------
-        settings : mapping
-            What `settings` told.
-        where : str
-            Name of the file that holds them, for messages.
-
-        Raises
-        ------
-        KinarmError
-            If they cannot be used.
-        """
-        learner = find_learner(settings["learner"])
-        return cls(
-            learner=settings["learner"],
-            config=from_plain(learner.config, settings["config"], where),
-            trials=from_plain(TrialSettings, settings["trials"], where),
-        )
-
     @cached_property
     def key(self) -> str:
         """Hash of the settings; the name of its files."""
         return hash_of(self.settings)
 
-    @cached_property
-    def base_key(self) -> str:
-        """Hash of the settings but for the number of iterations."""
-        config = {k: v for k, v in self.settings["config"].items() if k != "iterations"}
-        return hash_of({**self.settings, "config": config})
-
     @property
     def name(self) -> str:
-        """What to call it in a line."""
+        """Its name in a line."""
         config = self.config
         made = f"{self.learner} {config.recipe} {config.problem.name} seed {config.seed}"
         chosen = ", ".join(f"{key} {value}" for key, value in self.choices.items())
         return f"{made}, {chosen}" if chosen else made
 
-    @property
-    def cost(self) -> float:
-        """Rough duration relative to other trainings [s of a core]."""
-        return self.config.cost
-
 
 def _unpacked(learner: str, fields: bytes) -> Run:
-    """A run in another process, which first finds its learner, wherever that is."""
+    """A run in another process, which first finds its learner."""
     find_learner(learner)
     return Run(**pickle.loads(fields))
 
@@ -124,6 +90,12 @@ def _unpacked(learner: str, fields: bytes) -> Run:
 def hash_of(entries: Any) -> str:
     """Hash of what JSON can hold."""
     return hashlib.sha256(json.dumps(entries, sort_keys=True).encode()).hexdigest()[:20]
+
+
+def base_key(settings: Mapping[str, Any]) -> str:
+    """Hash of the settings of a run but for the number of iterations."""
+    config = {name: value for name, value in settings["config"].items() if name != "iterations"}
+    return hash_of({**settings, "config": config})
 
 
 def plan(
@@ -144,20 +116,24 @@ def plan(
         If a name is unknown, a value has the wrong type or is refused; in one line that names the
         field.
     """
-    _check_fields_known(experiment)
+    names = [entry.learner for entry in experiment.all_entries]
+    learners = {each.name: each for each in map(find_learner, names)}
+    for key in experiment.searched:
+        _concerned(key, learners)
     varied = list(experiment.choices()) if choices is None else choices
     each = [
-        setting
+        (entry, config, to_plain(config), chosen, entry.seeds or experiment.seeds)
         for entry in experiment.all_entries
-        for problem in entry.problems or experiment.problems
-        for setting in _settings(experiment, entry, ReachProblem.load(problem), varied)
+        for config, chosen in _settings(experiment, entry, learners, varied)
     ]
-    plain = [to_plain(config) for _, config, _ in each]
-    most = max((entry.seeds or experiment.seeds for entry in experiment.all_entries), default=0)
+    if (total := sum(seeds for *_, seeds in each)) > MOST_TRAININGS:
+        raise InvalidInputError(
+            f"an experiment has at most {MOST_TRAININGS:,} trainings, this one {total:,}"
+        )
     found: dict[tuple[str, str], Run] = {}
-    for number in range(most):
-        for (entry, config, chosen), entries in zip(each, plain, strict=True):
-            if number < (entry.seeds or experiment.seeds):
+    for number in range(max((seeds for *_, seeds in each), default=0)):
+        for entry, config, plain, chosen, seeds in each:
+            if number < seeds:
                 first = experiment.first_seed if entry.first_seed is None else entry.first_seed
                 run = Run(
                     learner=entry.learner,
@@ -165,93 +141,79 @@ def plan(
                     trials=experiment.trials,
                     choices=chosen,
                     entry=entry,
-                    plain={**entries, "seed": first + number},
+                    plain={**plain, "seed": first + number},
                 )
                 found.setdefault((entry.name, run.key), run)
     return tuple(found.values())
 
 
-def _check_fields_known(experiment: Experiment) -> None:
-    """Refuse a field that none of the learners has."""
-    shared = {**experiment.fixed, **next(experiment.choices()), **experiment.searched}
-    every = [entry.learner for entry in experiment.all_entries]
-    own = [({**each.fixed, **each.grid}, [each.learner]) for each in experiment.entries]
-    for keys, names in [(shared, every), *own]:
-        learners = {learner.name: learner for learner in map(find_learner, names)}
-        fields_of = {name: init_fields(learner.config) for name, learner in learners.items()}
-        available = dict.fromkeys(name for each in fields_of.values() for name in each)
-        for key in keys:
-            owner, _, rest = key.partition(".")
-            fields, name = tuple(available), owner
-            if owner in learners:
-                fields, name = tuple(fields_of[owner]), rest.partition(".")[0]
-            if name not in fields or name in CHOSEN:
-                known = [each for each in fields if each not in CHOSEN]
-                raise UnknownNameError("field of a recipe or problem", key, known)
-
-
-CHOSEN = ("seed", "recipe")
-"""Settings that the experiment chooses."""
-
-
 def _settings(
-    experiment: Experiment,
-    entry: Entry,
-    problem: ReachProblem,
-    varied: Sequence[Mapping[str, Any]],
-) -> Iterator[tuple[Entry, TrainingConfig, dict[str, Any]]]:
-    """Settings of an entry on a problem, and what of them varies."""
+    experiment: Experiment, entry: Entry, learners: Learners, varied: Sequence[Mapping[str, Any]]
+) -> Iterator[tuple[TrainingConfig, dict[str, Any]]]:
+    """Settings of an entry on all of its problems, and what of them varies."""
     learner = find_learner(entry.learner)
-    others = {find_learner(each.learner).name for each in experiment.all_entries} - {learner.name}
-    fixed = {**_concerning(experiment.fixed, learner, others), **entry.fixed}
-    seen = set()
-    for choice, own in product(varied, combinations(entry.grid)):
-        choices = {**_concerning(choice, learner, others), **own}
-        if (key := repr(sorted(choices.items()))) not in seen:
-            seen.add(key)
-            yield entry, _config(entry, problem, {**fixed, **choices}), choices
+    alone = {learner.name: learner}
+    fixed = {
+        **_concerning(experiment.fixed, learner.name, learners),
+        **_concerning(entry.fixed, learner.name, alone),
+    }
+    distinct = {}
+    for shared, own in product(varied, combinations(entry.grid)):
+        choices = _concerning(shared, learner.name, learners)
+        choices |= _concerning(own, learner.name, alone)
+        distinct[repr(sorted(choices.items()))] = choices
+    for problem in map(ReachProblem.load, entry.problems or experiment.problems):
+        for choices in distinct.values():
+            yield _config(entry, problem, {**fixed, **choices}), choices
 
 
-def _concerning(
-    entries: Mapping[str, Any], learner: Learner[Any, Any], others: Collection[str]
-) -> dict[str, Any]:
-    """Entries that concern a learner, without its name; not those that only others have."""
-    owned, known = {}, init_fields(learner.config)
-    for key, value in entries.items():
-        owner, _, rest = key.partition(".")
-        if owner == learner.name:
-            owned[rest] = value
-        elif owner not in others and owner in known:
-            owned[key] = value
-    return owned
+def _concerning(entries: Mapping[str, Any], learner: str, learners: Learners) -> dict[str, Any]:
+    """Entries that concern a learner, without its name before them."""
+    found = ((_concerned(key, learners), value) for key, value in entries.items())
+    return {paths[learner]: value for paths, value in found if learner in paths}
+
+
+def _concerned(key: str, learners: Learners) -> dict[str, str]:
+    """Names of the learners that a field concerns, and what it is called without them."""
+    owner, _, rest = key.partition(".")
+    asked = {owner: rest} if owner in learners else dict.fromkeys(learners, key)
+    known = {name: init_fields(learners[name].config) for name in asked}
+    found = {
+        name: path
+        for name, path in asked.items()
+        if path.partition(".")[0] in known[name].keys() - CHOSEN
+    }
+    if not found:
+        names = [each for fields in known.values() for each in fields if each not in CHOSEN]
+        raise UnknownNameError("field of a recipe or problem", key, dict.fromkeys(names))
+    return found
 
 
 def _config(entry: Entry, problem: ReachProblem, entries: Mapping[str, Any]) -> TrainingConfig:
     """A recipe for a problem, with some fields of both changed."""
     of_recipe: dict[str, Any] = {}
-    outer: dict[str, Any]
     for key, value in entries.items():
         if key.startswith(PROBLEM):
-            with _naming(key):
+            try:
                 problem = changed_problem(problem, key.removeprefix(PROBLEM), value)
+            except KinarmError as error:
+                raise InvalidInputError(f"{key}: {error}") from error
         else:
-            outer, (*path, name) = of_recipe, key.split(".")
-            for part in path:
-                outer = outer.setdefault(part, {})
-            outer[name] = value
+            _put(of_recipe, key, value)
     config: TrainingConfig = recipe(
         entry.learner, entry.recipe or None, problem=problem.pinned, **of_recipe
     )
     return config
 
 
-@contextmanager
-def _naming(key: str) -> Iterator[None]:
-    """Say in an error which field of the experiment it is about."""
-    try:
-        yield
-    except KinarmError as error:
-        raise InvalidInputError(f"{key}: {error}") from error
+def _put(table: dict[str, Any], path: str, value: Any) -> None:
+    """Put a value into tables within tables."""
+    *outer, name = path.split(".")
+    for part in outer:
+        table = table.setdefault(part, {})
+        if not isinstance(table, dict):
+            raise InvalidInputError(f"{part!r} of {path!r} is no table")
+    table[name] = value
 
 
 def changed_problem(problem: ReachProblem, path: str, value: Any) -> ReachProblem:
@@ -271,22 +233,10 @@ def changed_problem(problem: ReachProblem, path: str, value: Any) -> ReachProble
     KinarmError
         If there is no such field, or it cannot have the value.
     """
-    names = path.split(".")
-    if len(names) == 1:
+    if "." not in path:
         return problem.replace(**{path: value})
     entries = problem.to_json()
-    kind: Any = ReachProblem
-    table = entries
-    for depth, name in enumerate(names):
-        known = init_fields(kind) if isinstance(kind, type) and is_dataclass(kind) else {}
-        if name not in known:
-            where = PROBLEM + ".".join(names[:depth])
-            raise UnknownNameError(f"field of {where.removesuffix('.')}", name, known)
-        if depth == len(names) - 1:
-            table[name] = value
-        else:
-            kind = alternatives(field_types(kind)[name])[0]
-            table = table.setdefault(name, {})
-    if names[0] == "arm":
+    _put(entries, path, value)
+    if path.startswith("arm."):
         entries["arm"].pop("digest", None)
     return from_plain(ReachProblem, entries, "problem")

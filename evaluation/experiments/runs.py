@@ -1,7 +1,13 @@
-"""What a training came to, or has come to so far, and the files in which it is kept."""
+"""Results of a training, finished or so far, and the files in which they are kept.
+
+Each function that reads a file raises `InvalidInputError` where it is missing or damaged, or of
+another training.
+"""
 
 import io
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -9,21 +15,26 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm._archive import Archive, load_archive, reading, save_archive, write_archive
+from kinarm._archive import Archive, load_archive, reading, save_archive
+from kinarm._fields import from_plain, to_plain
 from kinarm.errors import InvalidInputError
-from kinarm.evaluation.experiments.curve import CurvePoint, curve_array, points_of
+from kinarm.evaluation.experiments.curve import CurvePoint
 from kinarm.evaluation.experiments.plan import Run
 from kinarm.policies.checkpoint import arrays_of, rebuilt
 from kinarm.policies.learners import TrainingState, find_learner
-from kinarm.policies.policy import Policy
-from kinarm.policies.policy_files import policy_content, policy_of_content
+from kinarm.policies.policy import Policy, policy_content, policy_of_content
+from kinarm.rollouts import Rollouts
 
 RUN_ARCHIVE, BOUNDS_ARCHIVE = ("study run", 1), ("study bounds", 1)
 CHECKPOINT_ARCHIVE = ("study checkpoint", 1)
 """Kinds and versions of the files."""
 
 STATE, POLICY, OUTCOMES = "state", "policy.", "outcomes."
-"""What names of arrays begin with."""
+"""Beginnings of the names of arrays."""
+
+
+TimedPoint = tuple[CurvePoint, float, float]
+"""A point of a learning curve with wall time and processor time [s]; NaN if unknown."""
 
 
 class TrialOutcomes(NamedTuple):
@@ -47,12 +58,9 @@ class TrialOutcomes(NamedTuple):
     success: NDArray[np.bool_]
     collision: NDArray[np.bool_]
 
-    def __len__(self) -> int:
-        return len(self.distance)
-
 
 class TrialBounds(NamedTuple):
-    """What any policy could do in every trial; arrays of shape (n_trials,).
+    """Bounds on any policy in every trial; arrays of shape (n_trials,).
 
     Attributes
     ----------
@@ -66,7 +74,8 @@ class TrialBounds(NamedTuple):
     steps_lower_bound: NDArray[np.int64]
 
 
-class Clock(NamedTuple):
+@dataclass(frozen=True)
+class Clock:
     """How long a training took, without the trials that its policies faced.
 
     Attributes
@@ -85,12 +94,10 @@ class Clock(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TrainedRun:
-    """What a training came to.
+    """A finished training.
 
     Attributes
     ----------
-    settings : mapping
-        What was trained, as the planned run tells.
     curve : tuple of CurvePoint
         The policy in the course of the training, as often as the settings of the trials say.
     last : CurvePoint
@@ -101,20 +108,30 @@ class TrainedRun:
         Mean returns of the episodes of each iteration; kept with trials for the curve.
     curve_distance : ndarray of float32, shape (n_points, n_curve_trials), optional
         Final distances at the points of the curve [m]; kept with trials for the curve.
-    policy : Policy, optional
-        The trained policy, where it was read as well.
-    state : TrainingState, optional
-        Where a longer training can go on; kept if its iterations are those of this one.
+    clock : Clock
+        How long it took; nothing if unknown.
     """
 
-    settings: Mapping[str, Any]
     curve: tuple[CurvePoint, ...]
     last: CurvePoint
     outcomes: TrialOutcomes
     returns: NDArray[np.float64] | None = None
     curve_distance: NDArray[np.float32] | None = None
-    policy: Policy | None = None
-    state: TrainingState | None = None
+    clock: Clock = Clock()
+
+    @property
+    def timed_curve(self) -> list[TimedPoint]:
+        """Points of the learning curve, the end included, with wall and processor times [s]."""
+        clock, unknown = self.clock, (math.nan,) * len(self.curve)
+        columns = [
+            times if len(times) == len(self.curve) else unknown
+            for times in (clock.points, clock.processor_points)
+        ]
+        timed = list(zip(self.curve, *columns, strict=True))
+        if not self.curve or self.curve[-1].iteration < self.last.iteration:
+            known = clock.seconds or math.nan, clock.processor_seconds or math.nan
+            timed.append((self.last, *known))
+        return timed
 
 
 class Checkpoint(NamedTuple):
@@ -122,14 +139,10 @@ class Checkpoint(NamedTuple):
 
     Attributes
     ----------
-    state : TrainingState
-        The state that it is in.
-    curve : tuple of CurvePoint
-        Its learning curve.
-    distances : tuple of ndarray
-        Final distances at the points of the curve, if they are kept [m].
-    clock : Clock
-        What it took.
+    state, clock : TrainingState and Clock
+        The state that it is in, and what it took.
+    curve, distances : tuple of CurvePoint and of ndarray
+        Its learning curve, and final distances at the points of it, if they are kept [m].
     """
 
     state: TrainingState
@@ -138,24 +151,32 @@ class Checkpoint(NamedTuple):
     clock: Clock = Clock()
 
 
-def run_content(run: TrainedRun, policy: Policy) -> bytes:
-    """A run and its policy as their file holds them; equal runs give equal bytes."""
+def run_content(run: Run, end: Checkpoint, policy: Policy, rollouts: Rollouts) -> bytes:
+    """A finished training as its file holds it; equal ones give equal bytes.
+
+    Parameters
+    ----------
+    run, end : Run and Checkpoint
+        The training, and how it ended.
+    policy, rollouts : Policy and Rollouts
+        The trained policy, and what it did in the trials.
+    """
     content = policy_content(policy)
     arrays = {
-        "curve": curve_array(run.curve),
-        **{OUTCOMES + name: array for name, array in run.outcomes._asdict().items()},
+        "curve": np.array(end.curve, dtype=float).reshape(-1, len(CurvePoint._fields)),
+        **{OUTCOMES + name: getattr(rollouts, name) for name in TrialOutcomes._fields},
         **{POLICY + name: array for name, array in content.arrays.items()},
     }
-    for name in ("returns", "curve_distance"):
-        if getattr(run, name) is not None:
-            arrays[name] = getattr(run, name)
-    if run.state is not None:
-        arrays |= arrays_of(STATE, timeless(run.state))
+    if run.trials.curve is not None:
+        arrays["returns"] = np.array([point.mean_return for point in end.state.curve])
+        arrays["curve_distance"] = np.array(end.distances)
+    if run.config.can_extend:
+        arrays |= arrays_of(STATE, _timeless(end.state))
     # Where a file was made must not tell in its bytes.
     made = {**content.header["provenance"], "versions": {}, "commit": ""}
     header = {
         "settings": run.settings,
-        "last": run.last._asdict(),
+        "last": CurvePoint.of(end.state, rollouts)._asdict(),
         "policy": {**content.header, "provenance": made},
     }
     return _content(RUN_ARCHIVE, arrays, header)
@@ -170,79 +191,11 @@ def _content(
     archive: tuple[str, int], arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]
 ) -> bytes:
     file = io.BytesIO()
-    write_archive(file, *archive, arrays, header, compress=True)
+    save_archive(file, *archive, arrays, header, compress=True)
     return file.getvalue()
 
 
-def load_bounds(path: Path, count: int) -> TrialBounds:
-    """Read the file of bounds of so many trials.
-
-    Raises
-    ------
-    InvalidInputError
-        If it is missing or damaged.
-    """
-    arrays = load_archive(path, *BOUNDS_ARCHIVE, InvalidInputError).arrays
-    with reading(repr(str(path)), BOUNDS_ARCHIVE[0], InvalidInputError):
-        return TrialBounds(**_each_trials(arrays, BOUND_TYPES, count))
-
-
-def save_checkpoint(path: Path, run: Run, checkpoint: Checkpoint) -> None:
-    """Write how far a training is.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    run : Run
-        The training.
-    checkpoint : Checkpoint
-        How far it is.
-
-    Raises
-    ------
-    OutputError
-        If the file cannot be written.
-    """
-    arrays: dict[str, NDArray[Any]] = {
-        "curve": curve_array(checkpoint.curve),
-        "distances": np.array(checkpoint.distances),
-        **arrays_of(STATE, checkpoint.state),
-    }
-    header = {"settings": run.settings, "clock": checkpoint.clock._asdict()}
-    save_archive(path, *CHECKPOINT_ARCHIVE, arrays, header)
-
-
-def load_checkpoint(path: Path, run: Run) -> Checkpoint:
-    """Read how far a training is.
-
-    Raises
-    ------
-    InvalidInputError
-        If the file is missing, damaged or of another training.
-    """
-    header, arrays = load_archive(path, *CHECKPOINT_ARCHIVE, InvalidInputError)
-    with reading(repr(str(path)), CHECKPOINT_ARCHIVE[0], InvalidInputError):
-        _check_settings(path, header, run)
-        return Checkpoint(
-            state=rebuilt(find_learner(run.learner).state, STATE, arrays),
-            curve=points_of(arrays["curve"]),
-            distances=tuple(arrays["distances"]),
-            clock=clock_of(header["clock"]),
-        )
-
-
-def clock_of(entries: Mapping[str, Any]) -> Clock:
-    """Times from what JSON holds."""
-    return Clock(
-        float(entries.get("seconds", 0.0)),
-        float(entries.get("processor_seconds", 0.0)),
-        tuple(map(float, entries.get("points", ()))),
-        tuple(map(float, entries.get("processor_points", ()))),
-    )
-
-
-def timeless(state: TrainingState) -> TrainingState:
+def _timeless(state: TrainingState) -> TrainingState:
     """A state without the times that its iterations took."""
     changes: dict[str, Any] = {"curve": tuple(p._replace(wall_time=0.0) for p in state.curve)}
     if hasattr(state, "simulator_time"):
@@ -250,92 +203,116 @@ def timeless(state: TrainingState) -> TrainingState:
     return replace(state, **changes)
 
 
-def run_of_file(path: Path) -> Run:
-    """The training that a file is of; its place in an experiment is not known.
-
-    Raises
-    ------
-    KinarmError
-        If the file is missing or damaged, or its settings cannot be used.
-    """
-    every = (f"{STATE}.", POLICY, OUTCOMES, "curve", "returns")
-    header, _ = load_archive(path, *RUN_ARCHIVE, InvalidInputError, unless=every)
-    with reading(repr(str(path)), RUN_ARCHIVE[0], InvalidInputError):
-        return Run.of_settings(header["settings"], str(path))
+@contextmanager
+def _content_of(
+    path: Path, archive: tuple[str, int], run: Run | None = None, *, unless: tuple[str, ...] = ()
+) -> Iterator[Archive]:
+    """Header and arrays of a file, which may have to be that of a training."""
+    content = load_archive(path, *archive, InvalidInputError, unless=unless)
+    with reading(repr(str(path)), archive[0], InvalidInputError):
+        if run is not None and content.header["settings"] != run.settings:
+            raise InvalidInputError(f"{str(path)!r} is of another training")
+        yield content
 
 
-def load_run(path: Path, run: Run, *, whole: bool = False) -> TrainedRun:
-    """Read the file of a run.
+def load_bounds(path: Path) -> TrialBounds:
+    """Read the file of bounds."""
+    with _content_of(path, BOUNDS_ARCHIVE) as (_, arrays):
+        return TrialBounds(**arrays)
+
+
+def save_checkpoint(path: Path, run: Run, checkpoint: Checkpoint) -> None:
+    """Write how far a training is.
 
     Parameters
     ----------
-    path : Path
-        The file.
-    run : Run
-        The training that it is of.
-    whole : bool
-        Read policy and state as well.
-
-    Raises
-    ------
-    InvalidInputError
-        If it is missing, damaged or of another training.
+    path, run, checkpoint : Path, Run and Checkpoint
+        The file, the training, and how far it is.
     """
-    unless = () if whole else (f"{STATE}.", POLICY)
-    content = load_archive(path, *RUN_ARCHIVE, InvalidInputError, unless=unless)
-    with reading(repr(str(path)), RUN_ARCHIVE[0], InvalidInputError):
-        header, arrays = content
-        _check_settings(path, header, run)
-        policy, state = None, None
-        if whole:
-            archive = Archive(header["policy"], _parts(arrays, POLICY))
-            policy = policy_of_content(archive, repr(str(path)))
-        if any(name.startswith(f"{STATE}.") for name in arrays):
-            state = rebuilt(find_learner(run.learner).state, STATE, arrays)
-        outcomes = _each_trials(_parts(arrays, OUTCOMES), OUTCOME_TYPES, run.trials.count)
-        return TrainedRun(
-            settings=header["settings"],
-            curve=points_of(arrays["curve"]),
-            last=CurvePoint(**header["last"]),
-            outcomes=TrialOutcomes(**outcomes),
-            returns=arrays.get("returns"),
-            curve_distance=arrays.get("curve_distance"),
-            policy=policy,
-            state=state,
+    arrays: dict[str, NDArray[Any]] = {
+        **arrays_of("curve", checkpoint.curve),
+        "distances": np.array(checkpoint.distances),
+        **arrays_of(STATE, checkpoint.state),
+    }
+    header = {"settings": run.settings, "clock": to_plain(checkpoint.clock)}
+    header["iteration"] = checkpoint.state.iteration
+    save_archive(path, *CHECKPOINT_ARCHIVE, arrays, header)
+
+
+def load_checkpoint(path: Path, run: Run) -> Checkpoint:
+    """Read how far a training is."""
+    with _content_of(path, CHECKPOINT_ARCHIVE, run) as (header, arrays):
+        return Checkpoint(
+            state=rebuilt(find_learner(run.learner).state, STATE, arrays),
+            curve=_points(arrays),
+            distances=tuple(arrays["distances"]),
+            clock=from_plain(Clock, header["clock"], "record"),
         )
 
 
-def _check_settings(path: Path, header: Mapping[str, Any], run: Run) -> None:
-    if header["settings"] != run.settings:
-        raise InvalidInputError(f"{str(path)!r} is of another training")
+def load_share(path: Path) -> float:
+    """Read from a checkpoint which share of the iterations is done."""
+    every = (STATE, "curve", "distances")
+    with _content_of(path, CHECKPOINT_ARCHIVE, unless=every) as (header, _):
+        return float(header["iteration"] / header["settings"]["config"]["iterations"])
 
 
-OUTCOME_TYPES = {"distance": "f8", "steps": "i8", "returns": "f8", "success": "?", "collision": "?"}
-BOUND_TYPES = {"reachable": "?", "steps_lower_bound": "i8"}
-"""Types of arrays with an entry for each trial: numbers, whole numbers and truth values."""
+def load_settings(path: Path) -> dict[str, Any]:
+    """Read the settings of the training that a file is of."""
+    every = (STATE, POLICY, OUTCOMES, "curve", "returns")
+    with _content_of(path, RUN_ARCHIVE, unless=every) as (header, _):
+        settings: dict[str, Any] = header["settings"]
+        return settings
 
-LARGEST = 1e12
-"""Numbers of trials at most: sums and squares of them stay finite."""
 
+def load_end(path: Path, learner: str, clock: Clock) -> Checkpoint:
+    """Read the end of a training from which a longer one can go on.
 
-def _each_trials(
-    arrays: Mapping[str, NDArray[Any]], types: Mapping[str, str], count: int
-) -> dict[str, NDArray[Any]]:
-    """Arrays that are to have an entry for each of so many trials.
-
-    Raises
-    ------
-    ValueError
-        If one is missing, of another type or shape, or holds a number that is not finite or
-        beyond what a trial comes to.
+    Parameters
+    ----------
+    path, learner : Path and str
+        The file, and the name of the learner.
+    clock : Clock
+        How long the training took.
     """
-    for name, type_ in types.items():
-        array = arrays[name]
-        if array.dtype != type_ or array.shape != (count,):
-            raise ValueError(f"{name} is not of {count} trials")
-        if type_ == "f8" and not (np.abs(array) <= LARGEST).all():
-            raise ValueError(f"{name} holds a number that no trial comes to")
-    return {name: arrays[name] for name in types}
+    with _content_of(path, RUN_ARCHIVE, unless=(POLICY, OUTCOMES)) as (_, arrays):
+        state = rebuilt(find_learner(learner).state, STATE, arrays)
+        distances = tuple(arrays.get("curve_distance", ()))
+        return Checkpoint(state, _points(arrays), distances, clock)
+
+
+def load_policy(path: Path, run: Run) -> Policy:
+    """Read the policy of a finished training."""
+    with _content_of(path, RUN_ARCHIVE, run, unless=(STATE, OUTCOMES)) as (header, arrays):
+        archive = Archive(header["policy"], _parts(arrays, POLICY))
+        return policy_of_content(archive, repr(str(path)))
+
+
+def load_run(path: Path, run: Run, clock: Clock) -> TrainedRun:
+    """Read what a training came to.
+
+    Parameters
+    ----------
+    path, run : Path and Run
+        The file, and the training.
+    clock : Clock
+        How long the training took.
+    """
+    with _content_of(path, RUN_ARCHIVE, run, unless=(STATE, POLICY)) as (header, arrays):
+        return TrainedRun(
+            curve=_points(arrays),
+            last=CurvePoint(**header["last"]),
+            outcomes=TrialOutcomes(**_parts(arrays, OUTCOMES)),
+            returns=arrays.get("returns"),
+            curve_distance=arrays.get("curve_distance"),
+            clock=clock,
+        )
+
+
+def _points(arrays: Mapping[str, NDArray[Any]]) -> tuple[CurvePoint, ...]:
+    """Points of the learning curve."""
+    points: tuple[CurvePoint, ...] = rebuilt(tuple[CurvePoint, ...], "curve", arrays)
+    return points
 
 
 def _parts(arrays: Mapping[str, NDArray[Any]], begin: str) -> dict[str, NDArray[Any]]:

@@ -1,6 +1,5 @@
 """Search for the best settings of a learner, by Optuna, in the folder of an experiment."""
 
-import math
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
@@ -17,7 +16,8 @@ from kinarm.evaluation.experiments.executors import LocalExecutor
 from kinarm.evaluation.experiments.experiment import Experiment
 from kinarm.evaluation.experiments.plan import Run, plan
 from kinarm.evaluation.experiments.store import Store
-from kinarm.evaluation.experiments.train import RunTask, train
+from kinarm.evaluation.experiments.train import train
+from kinarm.evaluation.experiments.variation import SEARCH_CHOICES
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.recipes import PER_TRAINING
 
@@ -32,21 +32,14 @@ STUDY = "kinarm"
 
 
 def open_search(experiment: Experiment, folder: Path, draws: int = 0) -> "optuna.study.Study":
-    """Open the search of a study, or begin it.
+    """Open the search of the experiment in a folder, or begin it.
 
     Parameters
     ----------
-    experiment : Experiment
-        The experiment.
-    folder : Path
-        Its folder.
+    experiment, folder : Experiment and Path
+        The experiment and its folder.
     draws : int
         What tells the random numbers of this process from those of others.
-
-    Raises
-    ------
-    MissingExtraError
-        If Optuna is not installed.
     """
     try:
         import optuna
@@ -57,21 +50,17 @@ def open_search(experiment: Experiment, folder: Path, draws: int = 0) -> "optuna
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     said = experiment.search
     seed = int(np.random.SeedSequence([said.get("seed", 0), draws]).generate_state(1)[0])
-    samplers: dict[str, Any] = {
-        "tpe": partial(optuna.samplers.TPESampler, constant_liar=True),
-        "random": optuna.samplers.RandomSampler,
-        "cmaes": optuna.samplers.CmaEsSampler,
-    }
-    pruners: dict[str, Any] = {
-        "median": optuna.pruners.MedianPruner,
-        "none": optuna.pruners.NopPruner,
-        "hyperband": optuna.pruners.HyperbandPruner,
-    }
+    names = {kind: said.get(kind, next(iter(known))) for kind, known in SEARCH_CHOICES.items()}
+    liar = {"constant_liar": True} if names["sampler"] == "tpe" else {}
+    sampler, pruner = (
+        getattr(module, SEARCH_CHOICES[kind][names[kind]])
+        for kind, module in (("sampler", optuna.samplers), ("pruner", optuna.pruners))
+    )
     return optuna.create_study(
         study_name=STUDY,
         storage=JournalStorage(JournalFileBackend(str(folder / JOURNAL))),
-        sampler=samplers[said.get("sampler", "tpe")](seed=seed),
-        pruner=pruners[said.get("pruner", "median")](),
+        sampler=sampler(seed=seed, **liar),
+        pruner=pruner(),
         direction="maximize",
         load_if_exists=True,
     )
@@ -82,39 +71,34 @@ def carry_out_search(experiment: Experiment, folder: Path, jobs: int, threads: i
 
     Parameters
     ----------
-    experiment : Experiment
-        The experiment.
-    folder : Path
-        Its folder, to which no other process may write.
-    jobs : int
-        Settings that are tried at a time.
-    threads : int
-        Threads of a training.
+    experiment, folder : Experiment and Path
+        The experiment and its folder, to which no other process may write.
+    jobs, threads : int
+        Settings that are tried at a time, and threads of a training.
     """
-    import optuna
-
     # A process that was killed may have left its lock.
     for left in folder.glob(f"{JOURNAL}.lock*"):
         left.unlink(missing_ok=True)
     search = open_search(experiment, folder)
-    for trial in search.get_trials(deepcopy=False, states=(optuna.trial.TrialState.RUNNING,)):
-        search.tell(trial.number, state=optuna.trial.TrialState.FAIL)
-        search.enqueue_trial(trial.params)
-    missing = experiment.search["count"] - len(_counted(search))
+    for trial in search.trials:
+        if trial.state.name == "RUNNING":
+            search.tell(trial.number, state=type(trial.state).FAIL)
+            search.enqueue_trial(trial.params)
+    done = [trial for trial in search.trials if trial.state.name in ("COMPLETE", "PRUNED")]
+    missing = experiment.search["count"] - len(done)
     if missing > 0:
         jobs = min(jobs, missing)
         shares = [len(range(number, missing, jobs)) for number in range(jobs)]
         work = partial(_try_settings, experiment, folder, threads)
         tasks = [(share, len(search.trials) + number) for number, share in enumerate(shares)]
         list(LocalExecutor(jobs, threads).map(work, tasks))
-    write_recipe(experiment, folder)
+    if any(trial.state.name == "COMPLETE" for trial in search.trials):
+        best = plan(experiment, [_choices(experiment, search.best_trial)])[0]
+        write_text(folder / RECIPE, tomli_w.dumps(recipe_entries(best.config)))
 
 
-def _counted(search: "optuna.study.Study") -> list[Any]:
-    """What was tried to an end, or broken off."""
-    from optuna.trial import TrialState
-
-    return search.get_trials(deepcopy=False, states=(TrialState.COMPLETE, TrialState.PRUNED))
+FAILURES = 20
+"""Proposals of a worker that may be impossible before they count."""
 
 
 def _try_settings(
@@ -122,28 +106,23 @@ def _try_settings(
 ) -> None:
     """Try a share of the settings, one after the other."""
     import optuna
+    from optuna.trial import TrialState
 
     share, draws = task
-    search, store = open_search(experiment, folder, draws), Store(folder)
-    failed = 0
+    search, store, failed = open_search(experiment, folder, draws), Store(folder), 0
     while share > 0:
         trial = search.ask()
         try:
-            success = _mean_success(experiment, store, trial, threads)
+            search.tell(trial, _mean_success(experiment, store, trial, threads))
         except optuna.TrialPruned:
-            search.tell(trial, state=optuna.trial.TrialState.PRUNED)
+            search.tell(trial, state=TrialState.PRUNED)
         except Exception as error:  # settings can be impossible: another proposal takes their place
             trial.set_user_attr("error", first_line(error))
-            search.tell(trial, state=optuna.trial.TrialState.FAIL)
+            search.tell(trial, state=TrialState.FAIL)
             failed += 1
-            share += 1 if failed < FAILURES else 0
-        else:
-            search.tell(trial, success)
+            if failed < FAILURES:
+                continue
         share -= 1
-
-
-FAILURES = 20
-"""Proposals of a worker that may be impossible before they count."""
 
 
 def _mean_success(experiment: Experiment, store: Store, trial: Any, threads: int) -> float:
@@ -161,9 +140,8 @@ def _mean_success(experiment: Experiment, store: Store, trial: Any, threads: int
             raise optuna.TrialPruned
 
     for number, run in enumerate(plan(experiment, [choices])):
-        if run not in store.load([run]):
-            task = RunTask(run)
-            store.save(task, train(task, threads, on_point=on_point if number == 0 else None))
+        if not store.load([run]):
+            store.save(run, train(run, threads, on_point=on_point if number == 0 else None))
         shares.append(float(store.load([run])[run].outcomes.success.mean()))
     return float(np.mean(shares))
 
@@ -181,41 +159,18 @@ def _suggest(trial: Any, key: str, entry: Any) -> Any:
 
 def searched_runs(experiment: Experiment, folder: Path) -> tuple[Run, ...]:
     """The trainings of the settings that were tried to the end, in their order."""
-    if not (folder / JOURNAL).exists():
-        return plan(experiment, [])
-    found = [tried_choices(experiment, trial.params) for trial in _complete(experiment, folder)]
-    return plan(experiment, found)
+    trials = open_search(experiment, folder).trials if (folder / JOURNAL).exists() else []
+    complete = [trial for trial in trials if trial.state.name == "COMPLETE"]
+    return plan(experiment, [_choices(experiment, trial) for trial in complete])
 
 
-def _complete(experiment: Experiment, folder: Path) -> list[Any]:
-    """Trials that were carried out to the end."""
-    search = open_search(experiment, folder)
-    return [trial for trial in search.trials if trial.state.name == "COMPLETE"]
-
-
-def tried_choices(experiment: Experiment, tried: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of fields that Optuna's values stand for."""
+def _choices(experiment: Experiment, trial: Any) -> dict[str, Any]:
+    """Values of fields that were tried."""
     return {
-        key: tried[key] if isinstance(entry, Mapping) else entry[tried[key]]
+        key: trial.params[key] if isinstance(entry, Mapping) else entry[trial.params[key]]
         for key, entry in experiment.searched.items()
-        if key in tried
+        if key in trial.params
     }
-
-
-def write_recipe(experiment: Experiment, folder: Path) -> None:
-    """Write the best settings as a recipe file, for ``kinarm-train --recipe``.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written.
-    """
-    complete = _complete(experiment, folder)
-    if not complete:
-        return
-    best = max(complete, key=lambda trial: trial.value if trial.value is not None else -math.inf)
-    run = plan(experiment, [tried_choices(experiment, best.params)])[0]
-    write_text(folder / RECIPE, tomli_w.dumps(recipe_entries(run.config)))
 
 
 def recipe_entries(config: TrainingConfig) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """The folder of an experiment."""
 
 import json
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,24 +9,26 @@ from typing import Any
 
 import tomli_w
 
-from kinarm._archive import load_json, reading
+from kinarm._archive import load_json
+from kinarm._fields import from_plain, init_fields, to_plain
 from kinarm._files import check_folder, only_writer, write_atomically, write_text
-from kinarm.errors import InvalidInputError, KinarmError
+from kinarm.errors import InvalidInputError
 from kinarm.evaluation.experiments.executors import Failure
 from kinarm.evaluation.experiments.experiment import Experiment
-from kinarm.evaluation.experiments.plan import Run
+from kinarm.evaluation.experiments.plan import Run, base_key
 from kinarm.evaluation.experiments.runs import (
     Checkpoint,
     Clock,
     TrainedRun,
     TrialBounds,
-    clock_of,
     load_bounds,
     load_checkpoint,
+    load_end,
     load_run,
-    run_of_file,
+    load_settings,
+    load_share,
 )
-from kinarm.evaluation.experiments.train import BoundTask, RunTask, TaskResult
+from kinarm.evaluation.experiments.train import BoundTask, TaskResult
 from kinarm.policies.provenance import package_versions, source_commit
 
 SPECIFICATION = "study.toml"
@@ -43,30 +45,15 @@ class Store:
     is no other state: what has no such file is still to be done. How long it took, which no two
     machines agree on, lies apart in ``made/KEY.json``; why a training failed, until it succeeds, in
     ``failed/KEY.json``; how far it is in ``checkpoints/KEY.npz``; and what the oracle knows about
-    trials in ``bounds/KEY.npz``.
+    trials in ``bounds/KEY.npz``. A file that is damaged counts as missing.
     """
 
     folder: Path
 
-    def run_path(self, run: Run) -> Path:
-        """Where a training is kept."""
-        return self.folder / "runs" / f"{run.key}.npz"
-
-    def made_path(self, run: Run) -> Path:
-        """Where it is kept how a training was made."""
-        return self.folder / "made" / f"{run.key}.json"
-
-    def checkpoint_path(self, run: Run) -> Path:
-        """Where a training that is not finished saves how far it is."""
-        return self.folder / "checkpoints" / f"{run.key}.npz"
-
-    def failure_path(self, task: Run | RunTask | BoundTask) -> Path:
-        """Where it is kept why a training, or the search for bounds, failed."""
-        return self.folder / "failed" / f"{task.key}.json"
-
-    def bounds_path(self, task: BoundTask) -> Path:
-        """Where bounds are kept."""
-        return self.folder / "bounds" / f"{task.key}.npz"
+    def path(self, kind: str, task: Run | BoundTask) -> Path:
+        """Where something is kept of a training or of bounds, in one of the five folders."""
+        suffix = ".json" if kind in ("made", "failed") else ".npz"
+        return self.folder / kind / f"{task.key}{suffix}"
 
     @contextmanager
     def writing(self, experiment: Experiment) -> Iterator["Store"]:
@@ -82,120 +69,103 @@ class Store:
         check_folder(self.folder)
         marker = self.folder / SPECIFICATION
         with only_writer(self.folder):
-            if marker.exists():
-                there = Experiment.load(marker).name
-                if there != experiment.name:
-                    raise InvalidInputError(
-                        f"{str(self.folder)!r} is of the experiment {there!r}, not of "
-                        f"{experiment.name!r}: name another folder with --out"
-                    )
-            for name in FOLDERS:
-                check_folder(self.folder / name)
+            if marker.exists() and (there := Experiment.load(marker).name) != experiment.name:
+                raise InvalidInputError(
+                    f"{str(self.folder)!r} is of the experiment {there!r}, not of "
+                    f"{experiment.name!r}: name another folder with --out"
+                )
+            for kind in FOLDERS:
+                check_folder(self.folder / kind)
             write_text(marker, tomli_w.dumps(experiment.to_json()))
             yield self
 
-    def save(self, task: RunTask | BoundTask, result: TaskResult | Failure) -> None:
-        """Keep what came of a task.
-
-        Parameters
-        ----------
-        task : RunTask or BoundTask
-            The task.
-        result : TaskResult or Failure
-            What it came to, or why it failed.
-
-        Raises
-        ------
-        OutputError
-            If a file cannot be written.
-        """
-        failure = self.failure_path(task)
+    def save(self, task: Run | BoundTask, result: TaskResult | Failure) -> None:
+        """Keep what a training or bounds came to, or why they failed."""
+        failure, kind = self.path("failed", task), "bounds"
         if isinstance(result, Failure):
-            entries = {"name": task.name, **result._asdict()}
+            entries: dict[str, Any] = {"name": task.name, **result._asdict()}
             write_text(failure, json.dumps(entries, indent=1) + "\n")
             return
-        path = self.bounds_path(task) if isinstance(task, BoundTask) else self.run_path(task.run)
-        if isinstance(task, RunTask):
-            made = {"versions": package_versions(), "commit": source_commit()}
-            entries = {**result.clock._asdict(), **made}
-            write_text(self.made_path(task.run), json.dumps(entries) + "\n")
-        write_atomically(path, lambda file: file.write(result.content))
+        if isinstance(task, Run):
+            kind, made = "runs", {"versions": package_versions(), "commit": source_commit()}
+            entries = {**to_plain(result.clock), **made}
+            write_text(self.path("made", task), json.dumps(entries) + "\n")
+        write_atomically(self.path(kind, task), lambda file: file.write(result.content))
         failure.unlink(missing_ok=True)
-        if isinstance(task, RunTask):
-            self.checkpoint_path(task.run).unlink(missing_ok=True)
+        self.path("checkpoints", task).unlink(missing_ok=True)
 
     def load(self, runs: Iterable[Run]) -> dict[Run, TrainedRun]:
-        """Read those of the trainings that are finished and whose file is not damaged."""
+        """Read those of the trainings that are finished."""
         found = {}
         for run in runs:
-            path = self.run_path(run)
             with suppress(InvalidInputError):
-                if path.exists():
-                    found[run] = load_run(path, run)
+                found[run] = load_run(self.path("runs", run), run, self._clock(run.key))
         return found
 
     def starts(self, runs: Iterable[Run]) -> dict[Run, Checkpoint]:
         """Where trainings can go on that were interrupted, or that shorter ones began."""
-        runs = list(runs)
-        found = self._shorter_runs([run for run in runs if run.config.can_extend])
+        runs, found = list(runs), {}
+        shorter = self._lengths() if any(run.config.can_extend for run in runs) else {}
         for run in runs:
-            path = self.checkpoint_path(run)
+            lengths = shorter.get(base_key(run.settings), {}) if run.config.can_extend else {}
+            if longest := max((n for n in lengths if n < run.config.iterations), default=0):
+                with suppress(InvalidInputError):
+                    path = lengths[longest]
+                    found[run] = load_end(path, run.learner, self._clock(path.stem))
             with suppress(InvalidInputError):
-                if path.exists():
-                    saved = load_checkpoint(path, run)
-                    if run not in found or saved.state.iteration > found[run].state.iteration:
-                        found[run] = saved
+                saved = load_checkpoint(self.path("checkpoints", run), run)
+                if run not in found or saved.state.iteration > found[run].state.iteration:
+                    found[run] = saved
         return found
 
-    def _shorter_runs(self, runs: Collection[Run]) -> dict[Run, Checkpoint]:
-        """The longest of the shorter trainings, whichever experiment they were for."""
-        wanted: dict[str, list[Run]] = {}
-        for run in runs:
-            wanted.setdefault(run.base_key, []).append(run)
-        found: dict[Run, Checkpoint] = {}
-        for path in sorted((self.folder / "runs").glob("*.npz")) if wanted else ():
-            with suppress(KinarmError):
-                shorter = run_of_file(path)
-                longer = wanted.get(shorter.base_key, ())
-                if not longer or shorter.key != path.stem:
-                    continue
-                end = self._end_of(shorter)
-                for run in longer:
-                    before = found[run].state.iteration if run in found else 0
-                    if end is not None and before < end.state.iteration < run.config.iterations:
-                        found[run] = end
+    def _lengths(self) -> dict[str, dict[int, Path]]:
+        """Files of finished trainings that differ in their iterations alone, by these.
+
+        They may have been for other experiments.
+        """
+        found: dict[str, dict[int, Path]] = {}
+        for path in self.folder.glob("runs/*.npz"):
+            with suppress(InvalidInputError):
+                settings = load_settings(path)
+                iterations = settings["config"]["iterations"]
+                found.setdefault(base_key(settings), {})[iterations] = path
         return found
 
-    def _end_of(self, run: Run) -> Checkpoint | None:
-        """The state that a finished training ended in, if that is kept."""
-        trained = load_run(self.run_path(run), run, whole=True)
-        if trained.state is None:
-            return None
-        distances = () if trained.curve_distance is None else tuple(trained.curve_distance)
-        return Checkpoint(trained.state, trained.curve, distances, self.clock(run))
+    def shares(self, runs: Iterable[Run]) -> list[float]:
+        """Shares that are done of trainings under way, by their latest checkpoints."""
+        keys, found = {run.key for run in runs}, []
+        for path in self.folder.glob("checkpoints/*.npz"):
+            if path.stem in keys:
+                with suppress(InvalidInputError):
+                    found.append(load_share(path))
+        return found
 
     def made(self, run: Run) -> Mapping[str, Any]:
         """How a training was made: times [s], versions and commit; empty if unknown."""
-        path = self.made_path(run)
-        with suppress(KinarmError), reading(repr(str(path)), "record", KinarmError):
-            entries = load_json(path, "record", KinarmError)
-            clock_of(entries)
-            return dict(entries)
-        return {}
+        return self._record("made", run.key)
 
-    def clock(self, run: Run) -> Clock:
+    def _clock(self, key: str) -> Clock:
         """How long a training took; nothing if unknown."""
-        return clock_of(self.made(run))
+        made = self._record("made", key)
+        with suppress(InvalidInputError):
+            return from_plain(
+                Clock, {k: made[k] for k in init_fields(Clock) if k in made}, "record"
+            )
+        return Clock()
 
     def failure(self, task: Run | BoundTask) -> str | None:
         """Why a training failed, in a line; None if it did not."""
-        path = self.failure_path(task)
-        with suppress(KinarmError), reading(repr(str(path)), "record", KinarmError):
-            return str(load_json(path, "record", KinarmError)["error"])
-        return None
+        return self._record("failed", task.key).get("error")
+
+    def _record(self, kind: str, key: str) -> dict[str, Any]:
+        path = self.folder / kind / f"{key}.json"
+        with suppress(InvalidInputError):
+            record = load_json(path, "record", InvalidInputError)
+            return record if isinstance(record, dict) else {}
+        return {}
 
     def bounds(self, task: BoundTask) -> TrialBounds | None:
-        """Read bounds; None if they are not known, or their file is damaged."""
+        """Read bounds; None if they are not known."""
         with suppress(InvalidInputError):
-            return load_bounds(self.bounds_path(task), task.trials.count)
+            return load_bounds(self.path("bounds", task))
         return None

@@ -1,29 +1,38 @@
 """A study: an experiment in its folder, how to carry it out, and what it came to."""
 
-import time
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
-from datetime import datetime, timedelta
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
+from threading import Event, Thread
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm._console import ProgressLine
 from kinarm._files import is_being_written
+from kinarm._interrupts import kept_from_children
 from kinarm._parallel import available_threads
 from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError, TrainingFailedError
 from kinarm.evaluation.experiments.executors import Executor, Failure, LocalExecutor
 from kinarm.evaluation.experiments.experiment import Experiment
 from kinarm.evaluation.experiments.plan import Run, plan
-from kinarm.evaluation.experiments.progress import Progress
-from kinarm.evaluation.experiments.results import Results
+from kinarm.evaluation.experiments.runs import TrainedRun, TrialBounds, load_policy
 from kinarm.evaluation.experiments.search import carry_out_search, searched_runs
 from kinarm.evaluation.experiments.store import SPECIFICATION, Store
-from kinarm.evaluation.experiments.train import BoundTask, RunTask, TaskResult, carry_out
+from kinarm.evaluation.experiments.table import Group, figures_of, identity, shorter, shown
+from kinarm.evaluation.experiments.train import BoundTask, Task, TaskResult, carry_out
+from kinarm.evaluation.outcomes import Outcomes
 from kinarm.policies.learners import find_learner
+from kinarm.policies.policy import Policy
+from kinarm.policies.training import CHECKPOINT_SECONDS
 
 
-class Study(Results):
+class Study:
     """An experiment, kept in one folder.
 
     Parameters
@@ -40,13 +49,6 @@ class Study(Results):
     ------
     KinarmError
         If the experiment cannot be used; in one line that names file and field.
-
-    Attributes
-    ----------
-    experiment : Experiment
-        What is trained.
-    runs : tuple of Run
-        The trainings, whether finished or not.
     """
 
     def __init__(
@@ -55,18 +57,15 @@ class Study(Results):
         folder: str | Path,
         runs: tuple[Run, ...] | None = None,
     ) -> None:
-        where = "experiment"
         if isinstance(experiment, str | Path):
-            where, experiment = str(experiment), Experiment.load(experiment)
+            experiment = Experiment.load(experiment)
         elif isinstance(experiment, Mapping):
-            experiment = Experiment.from_json(experiment, where)
-        else:
-            where = experiment.name
-        super().__init__(experiment, Store(Path(folder)), ())
+            experiment = Experiment.from_json(experiment, "experiment")
+        self.experiment, self.store = experiment, Store(Path(folder))
         try:
             self.runs = self._planned() if runs is None else runs
         except InvalidInputError as error:
-            raise InvalidInputError(f"{where}: {error}") from error
+            raise InvalidInputError(f"{experiment.name}: {error}") from error
 
     def _planned(self) -> tuple[Run, ...]:
         """The trainings of the experiment, or those that a search chose."""
@@ -89,8 +88,14 @@ class Study(Results):
         return cls(marker, folder)
 
     def __repr__(self) -> str:
-        done = f"{len(self.finished)} of {len(self.runs)} trainings finished"
+        done = f"{len(self)} of {len(self.runs)} trainings finished"
         return f"{type(self).__name__}({self.experiment.name!r}, {done})"
+
+    def __len__(self) -> int:
+        return len(self.finished)
+
+    def __iter__(self) -> Iterator[TrainedRun]:
+        return iter(self.finished.values())
 
     def run(
         self,
@@ -107,21 +112,15 @@ class Study(Results):
 
         Parameters
         ----------
-        jobs : int, optional
-            Trainings at a time; one a processor by default.
-        threads : int
-            Threads of a training; they do not change what it comes to.
+        jobs, threads : int
+            Trainings at a time, one a processor by default, and threads of each; they do not change
+            what it comes to.
         executor : Executor, optional
             Where trainings are carried out; worker processes of this machine by default.
         logs : Path, optional
             Folder of the logs for TensorBoard.
         on_trained : callable
             Is told of every training that is finished.
-
-        Returns
-        -------
-        Study
-            The study with what is finished.
 
         Raises
         ------
@@ -135,33 +134,64 @@ class Study(Results):
         jobs = available_threads() if jobs is None else whole_number("jobs", jobs, 1)
         for entry in self.experiment.all_entries:
             find_learner(entry.learner).check_installed()
+        failures = {}
         with self.store.writing(self.experiment) as store:
             if self.experiment.search:
-                carry_out_search(self.experiment, self.store.folder, jobs, threads)
+                carry_out_search(self.experiment, store.folder, jobs, threads)
             self.refresh()
-            chosen = executor or LocalExecutor(jobs, threads)
-            tasks = self._tasks(checkpoints=chosen.shares_files)
-            if isinstance(chosen, LocalExecutor):
-                chosen = replace(chosen, jobs=max(1, min(chosen.jobs, len(tasks))))
+            where = executor or LocalExecutor(jobs, threads)
+            tasks = self._tasks(where.shares_files)
             work = partial(carry_out, threads=threads, logs=logs)
-            failures = {}
-            with Progress(self._total, tasks, jobs) as progress:
-                for task, result in chosen.map(work, progress.tasks):
+            with self._progress(len(tasks)) as show:
+                for number, ((done, *_), result) in enumerate(where.map(work, tasks), start=1):
+                    store.save(done, result)
                     if isinstance(result, Failure):
-                        failures[task.name] = result.error
-                    store.save(task, result)
-                    if isinstance(task, RunTask) and not isinstance(result, Failure):
-                        on_trained(task.run, result)
-                    progress.finished(task)
+                        failures[done.name] = result.error
+                    elif isinstance(done, Run):
+                        on_trained(done, result)
+                    show(number, done.name)
         self.refresh()
         if failures:
             raise TrainingFailedError(failures, len(self.runs))
         return self
 
-    @property
-    def _total(self) -> int:
-        """Number of all tasks; trainings that several entries share count once."""
-        return len({run.key for run in self.runs}) + len(self.bound_tasks)
+    @contextmanager
+    def _progress(self, total: int) -> Iterator[Callable[..., None]]:
+        """Show how many tasks are finished, what was last, and meanwhile how far others are."""
+        finished: tuple[int, tuple[str, ...]] = (0, ())
+        over = Event()
+
+        def show(number: int, *names: str) -> None:
+            nonlocal finished
+            finished = number, names
+            shares = self.store.shares(self.runs)
+            under_way = [f"{len(shares)} under way {100 * np.mean(shares):.0f} %"] if shares else []
+            line.update(number + sum(shares), [*under_way, *names])
+
+        def show_again() -> None:
+            while not over.wait(CHECKPOINT_SECONDS):
+                show(finished[0], *finished[1])
+
+        with ProgressLine("trainings", total, "finished") as line:
+            show(0)
+            with kept_from_children():  # such a thread gets no request to end, either
+                (thread := Thread(target=show_again, daemon=True)).start()
+            try:
+                yield show
+            finally:
+                over.set()
+                thread.join()
+
+    def _tasks(self, with_checkpoints: bool) -> list[Task]:
+        """The missing tasks: first the bounds, then the trainings seed by seed.
+
+        Trainings that several entries share are trained once.
+        """
+        bounds = [Task(each) for each in self.bound_tasks if each.problem.digest not in self.bounds]
+        missing = {run.key: run for run in self.missing}.values()
+        starts = self.store.starts(missing)
+        paths = {run: self.store.path("checkpoints", run) for run in missing if with_checkpoints}
+        return [*bounds, *(Task(run, starts.get(run), paths.get(run)) for run in missing)]
 
     def refresh(self) -> None:
         """Read the folder again."""
@@ -170,38 +200,141 @@ class Study(Results):
         for name in ("finished", "bounds", "_groups"):
             self.__dict__.pop(name, None)
 
-    def _tasks(self, *, checkpoints: bool) -> list[RunTask | BoundTask]:
-        """The missing tasks: first the bounds, then the trainings seed by seed."""
-        bounds = [task for task in self.bound_tasks if task.problem.digest not in self.bounds]
-        missing = {run.key: run for run in self.missing}.values()
-        starts = self.store.starts(missing)
-        return [
-            *bounds,
-            *(
-                RunTask(run, starts.get(run), self.store.checkpoint_path(run))
-                if checkpoints
-                else RunTask(run, starts.get(run))
-                for run in missing
-            ),
-        ]
-
     def status(self) -> list[str]:
         """How far it is, in lines, while it runs or after it was stopped."""
-        finished = [path for run in self.runs if (path := self.store.run_path(run)).exists()]
-        remain = len(self.runs) - len(finished)
-        told = [f"{self.experiment.name}: {len(finished)} of {len(self.runs)} trainings finished"]
+        remain = [run for run in self.runs if not self.store.path("runs", run).exists()]
+        finished = len(self.runs) - len(remain)
+        told = [f"{self.experiment.name}: {finished} of {len(self.runs)} trainings finished"]
+        if shares := self.store.shares(remain):
+            told[0] += f", {len(shares)} under way {100 * np.mean(shares):.0f} %"
         if remain and is_being_written(self.store.folder):
             told[0] += ", running"
-            times = sorted(path.stat().st_mtime for path in finished)[-RECENT:]
-            if passed := times[-1] - times[0] if times else 0.0:
-                rate = 60 * (len(times) - 1) / passed
-                end = datetime.fromtimestamp(time.time()).astimezone()
-                end += timedelta(minutes=remain / rate)
-                told.append(f"{rate:.1f} a minute; {remain} remain, until about {end:%H:%M}")
         elif remain:
             told[0] += ", stopped; the command that made it goes on"
         return told + [f"failed: {run.name}: {error}" for run, error in self.failures.items()]
 
+    @cached_property
+    def finished(self) -> Mapping[Run, TrainedRun]:
+        """The trainings that are finished, in the order of the experiment."""
+        return self.store.load(self.runs)
 
-RECENT = 50
-"""How many of the latest trainings tell the rate."""
+    @property
+    def missing(self) -> tuple[Run, ...]:
+        """The trainings that are not finished."""
+        return tuple(run for run in self.runs if run not in self.finished)
+
+    @cached_property
+    def bounds(self) -> Mapping[str, TrialBounds]:
+        """Bounds of the trials, as far as they are known, by the problem's hash."""
+        found = {task.problem.digest: self.store.bounds(task) for task in self.bound_tasks}
+        return {digest: bounds for digest, bounds in found.items() if bounds is not None}
+
+    @property
+    def bound_tasks(self) -> tuple[BoundTask, ...]:
+        """The trials whose bounds belong to the experiment."""
+        if not self.experiment.bounds:
+            return ()
+        problems = {run.config.problem.digest: run.config.problem for run in self.runs}
+        return tuple(BoundTask(each, self.experiment.trials) for each in problems.values())
+
+    @property
+    def failures(self) -> Mapping[Run, str]:
+        """Why trainings failed that were not finished since."""
+        found = {run: self.store.failure(run) for run in self.missing}
+        return {run: error for run, error in found.items() if error is not None}
+
+    def policy(self, run: Run) -> Policy:
+        """The policy of a finished training, with versions and commit that made it.
+
+        Raises
+        ------
+        InvalidInputError
+            If the training is not finished, or its file is damaged.
+        """
+        policy = load_policy(self.store.path("runs", run), run)
+        made = self.store.made(run)
+        known = {name: made[name] for name in ("versions", "commit") if name in made}
+        return replace(policy, provenance=replace(policy.provenance, **known))
+
+    def groups(self) -> tuple[Group, ...]:
+        """The finished trainings, those with the same settings but for the seed together."""
+        return self._groups
+
+    @cached_property
+    def _groups(self) -> tuple[Group, ...]:
+        shared: dict[tuple[str, str], list[Run]] = {}
+        for run in self.finished:
+            config = {k: v for k, v in run.settings["config"].items() if k != "seed"}
+            shared.setdefault((run.entry.name, repr((run.learner, config))), []).append(run)
+        return tuple(
+            Group(
+                label=self._label(runs[0]),
+                entry=runs[0].entry,
+                config=runs[0].config,
+                choices=runs[0].choices,
+                runs=tuple(self.finished[run] for run in runs),
+                bounds=self.bounds.get(runs[0].config.problem.digest),
+            )
+            for runs in shared.values()
+        )
+
+    def best(self, count: int = 1) -> tuple[Group, ...]:
+        """The settings with the largest success over what the oracle reaches, best first."""
+        ordered = sorted(self.groups(), key=lambda group: -group.relative_success)
+        return tuple(ordered[:count])
+
+    def _label(self, run: Run) -> str:
+        """Name of the trainings with the settings of a run."""
+        experiment, names = self.experiment, identity(run)
+        if experiment.entries:
+            parts = [run.entry.title or run.entry.name]
+        else:
+            several = {"learner": experiment.learners, "recipe": experiment.recipes}
+            parts = [str(names[name]) for name, values in several.items() if len(values) > 1]
+        if len({each.config.problem.name for each in self.runs}) > 1:
+            parts.append(names["problem"])
+        parts += [f"{shorter(field)}={shown(value)}" for field, value in run.choices.items()]
+        return " ".join(parts) or f"{names['learner']} {names['recipe']} {names['problem']}"
+
+    @property
+    def varied(self) -> list[str]:
+        """Fields that vary between the finished trainings."""
+        return list(dict.fromkeys(field for run in self.finished for field in run.choices))
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row per finished training: learner, varied fields, figures of merit, times."""
+        fields = self.varied
+        rows = []
+        for run, trained in self.finished.items():
+            clock = trained.clock
+            outcomes = Outcomes((trained.outcomes,), self.bounds.get(run.config.problem.digest))
+            rows.append(
+                {
+                    **({"entry": run.entry.name} if self.experiment.entries else {}),
+                    **identity(run),
+                    **{field: run.choices.get(field) for field in fields},
+                    "iterations": trained.last.iteration,
+                    "environment_steps": trained.last.environment_steps,
+                    "seconds": clock.seconds or math.nan,
+                    "processor_seconds": clock.processor_seconds or math.nan,
+                    **figures_of(outcomes),
+                    "key": run.key,
+                }
+            )
+        return rows
+
+    def table(self) -> NDArray[Any]:
+        """The `rows` as a structured array; fields that are no numbers are texts."""
+        rows = self.rows()
+        columns = {name: _column([row[name] for row in rows]) for name in (rows[0] if rows else ())}
+        kinds = [(name, column.dtype) for name, column in columns.items()]
+        table = np.empty(len(rows), dtype=kinds)
+        for name, column in columns.items():
+            table[name] = column
+        return table
+
+
+def _column(values: Sequence[Any]) -> NDArray[Any]:
+    """Values of one kind as an array: numbers if all of them are, else texts."""
+    numbers = all(isinstance(each, bool | int | float) for each in values)
+    return np.array(values if numbers else ["" if v is None else shown(v) for v in values])

@@ -1,29 +1,156 @@
-"""The tables of what an experiment came to: a row for each group of seeds, or point of a curve."""
+"""Groups of finished trainings, seeds of the same settings together, and tables of them."""
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from kinarm.evaluation.experiments.results import Group, Results, identity, timed_curve
+from kinarm.evaluation.experiments.experiment import Entry
+from kinarm.evaluation.experiments.plan import Run
+from kinarm.evaluation.experiments.runs import TrainedRun, TrialBounds
 from kinarm.evaluation.metrics import METRICS
-from kinarm.evaluation.statistics import share_over_seeds, wilson_interval
+from kinarm.evaluation.outcomes import Outcomes
+from kinarm.evaluation.statistics import Estimate, share_over_seeds, wilson_interval
+from kinarm.policies.config import TrainingConfig
+
+if TYPE_CHECKING:
+    from kinarm.evaluation.experiments.study import Study
+
+FIGURES = (
+    *("success", "relative_success", "collision", "median_distance", "median_steps", "step_ratio"),
+)
+"""Figures of merit that a row tells of a training, as in `kinarm.evaluation.METRICS`."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Group:
+    """Finished trainings with the same settings but for the seed, at least one.
+
+    Attributes
+    ----------
+    label : str
+        What sets them apart from the other groups of the experiment.
+    entry, config, choices : Entry, TrainingConfig and mapping
+        What they belong to, settings of the first of them, and what of these varies, by field.
+    runs : tuple of TrainedRun
+        The trainings by seed.
+    bounds : TrialBounds or None
+        What the oracle knows about their trials.
+    """
+
+    label: str
+    entry: Entry
+    config: TrainingConfig
+    choices: Mapping[str, Any]
+    runs: tuple[TrainedRun, ...]
+    bounds: TrialBounds | None
+
+    @cached_property
+    def hits(self) -> NDArray[np.bool_]:
+        """Which trials succeeded, shape (n_seeds, n_trials)."""
+        return np.array([run.outcomes.success for run in self.runs])
+
+    @cached_property
+    def success(self) -> Estimate:
+        """Share of trials with success, and its 95 % interval over seeds and trials."""
+        return share_over_seeds(self.hits)
+
+    @cached_property
+    def reachable(self) -> float:
+        """Share of the trials in which the oracle reaches; 1 if that is not known."""
+        return 1.0 if self.bounds is None else float(self.bounds.reachable.mean())
+
+    @property
+    def relative_success(self) -> float:
+        """Success over what the oracle reaches."""
+        return float(self.success.value or 0.0) / max(self.reachable, 1e-9)
+
+    @cached_property
+    def figures(self) -> dict[str, float]:
+        """The figures of merit over all seeds; NaN for unknown ones."""
+        return figures_of(Outcomes(tuple(run.outcomes for run in self.runs), self.bounds))
+
+    @property
+    def environment_steps(self) -> float:
+        """Steps of a training, mean over the seeds."""
+        return float(np.mean([run.last.environment_steps for run in self.runs]))
+
+    @property
+    def processor_seconds(self) -> float:
+        """Time of all processors that a training took, mean over the seeds [s]."""
+        return float(np.mean([run.clock.processor_seconds for run in self.runs]))
+
+    @property
+    def steps_to_success(self) -> float | None:
+        """Median steps of trials with success, mean over the seeds; None if a seed has none."""
+        if not self.hits.any(axis=1).all():
+            return None
+        each = [np.median(run.outcomes.steps[run.outcomes.success]) for run in self.runs]
+        return float(np.mean(each))
+
+    def until(self, level: float) -> tuple[float, float, float]:
+        """Effort until policies first succeed in a share of trials; medians over seeds.
+
+        Returns
+        -------
+        tuple of float
+            Environment steps, wall time and processor time [s]; infinity for never, NaN where the
+            times are not known.
+        """
+        needed = []
+        for run in self.runs:
+            reached = [each for each in run.timed_curve if each[0].success >= level]
+            there = [(point.environment_steps, *times) for point, *times in reached]
+            needed.append(there[0] if there else (math.inf,) * 3)
+        steps, seconds, processor = np.median(np.array(needed, dtype=float), axis=0).tolist()
+        return steps, seconds, processor
+
+
+def figures_of(outcomes: Outcomes) -> dict[str, float]:
+    """Figures of merit of some trainings; NaN for unknown ones."""
+    found = {}
+    for name in FIGURES:
+        known = outcomes.bounds is not None or not METRICS[name].needs_bounds
+        value = METRICS[name].formula(outcomes) if known else None
+        found[name] = math.nan if value is None else float(value)
+    return found
+
+
+def identity(run: Run) -> dict[str, Any]:
+    """Who was trained on what."""
+    config = run.config
+    return {
+        "learner": run.learner,
+        "recipe": config.recipe.removesuffix("*"),
+        "problem": config.problem.name,
+        "seed": config.seed,
+    }
+
+
+def shorter(field: str) -> str:
+    """The last name of a path."""
+    return field.rpartition(".")[2]
+
+
+def shown(value: Any) -> str:
+    """A value in a label or a table."""
+    if isinstance(value, float):
+        return f"{value:g}"
+    if isinstance(value, list | tuple):
+        return "-".join(map(shown, value))
+    return str(value)
+
 
 LEVELS = (0.5, 0.8)
 """Shares of success by which the speed of learning is told."""
 
 
 class Column(NamedTuple):
-    """A column of the table of groups, on the page and wherever it is printed.
-
-    Attributes
-    ----------
-    heading : str
-        What it is called.
-    text : callable
-        What it says of a group.
-    """
+    """A column of the table of groups, wherever it is shown: heading, and what it says of one."""
 
     heading: str
     text: Callable[[Group], str]
@@ -71,7 +198,7 @@ COLUMNS = (
     Column("minutes", lambda group: f"{group.processor_seconds / 60:.2f}"),
     *(Column(f"thousand steps, minutes to {level:.0%}", _until(level)) for level in LEVELS),
 )
-"""What tables say of a group; minutes are processor time without the trials of the policies."""
+"""Columns of a group; minutes are processor time without the trials of the policies."""
 
 
 def headings() -> tuple[str, ...]:
@@ -80,13 +207,13 @@ def headings() -> tuple[str, ...]:
 
 
 def group_row(group: Group) -> tuple[str, ...]:
-    """What the table says of a group."""
+    """The row of a group."""
     return tuple(column.text(group) for column in COLUMNS)
 
 
-def curve_rows(results: Results) -> list[dict[str, Any]]:
+def curve_rows(study: "Study") -> list[dict[str, Any]]:
     """One row per point of a learning curve, the ends included."""
-    fields = results.varied
+    fields = study.varied
     return [
         {
             "entry": run.entry.name,
@@ -96,46 +223,41 @@ def curve_rows(results: Results) -> list[dict[str, Any]]:
             "seconds": seconds,
             "processor_seconds": processor_seconds,
         }
-        for run, trained in results.finished.items()
-        for point, seconds, processor_seconds in timed_curve(trained, results.store.clock(run))
+        for run, trained in study.finished.items()
+        for point, seconds, processor_seconds in trained.timed_curve
     ]
 
 
 def group_entries(group: Group) -> dict[str, Any]:
-    """What is known of a group, as a dictionary that JSON can hold.
+    """A group, as a dictionary that JSON can hold.
 
     ``ci95`` is over seeds and trials, ``ci95_of_trials`` over trials that the seeds share.
     """
-    n_trials = group.hits.shape[1]
     touched = np.array([run.outcomes.collision for run in group.runs])
-    quantities = ("environment_steps", "seconds", "processor_seconds")
     return {
         "trainings": group.label,
         "entry": group.entry.name,
         "problem": group.config.problem.name,
         "choices": dict(group.choices),
         "seeds": len(group.runs),
-        **{
-            name: {
-                **share_over_seeds(hits).to_json(),
-                "ci95_of_trials": list(wilson_interval(int(hits.sum()), n_trials, len(hits))),
-            }
-            for name, hits in (("success", group.hits), ("collision", touched))
-        },
+        "success": _share(group.hits),
+        "collision": _share(touched),
         "success_each": group.hits.mean(axis=1).tolist(),
         "median_distance": float(np.mean([run.last.median_distance for run in group.runs])),
         "steps_to_success": group.steps_to_success,
         "environment_steps": group.environment_steps,
-        "seconds": float(np.mean([clock.seconds for clock in group.clocks])),
+        "seconds": float(np.mean([run.clock.seconds for run in group.runs])),
         "processor_seconds": group.processor_seconds,
-        "until": [
-            {
-                "success": level,
-                **{
-                    name: value if math.isfinite(value) else None
-                    for name, value in zip(quantities, group.until(level), strict=True)
-                },
-            }
-            for level in LEVELS
-        ],
+        "until": [_until_entries(group, level) for level in LEVELS],
     }
+
+
+def _share(hits: NDArray[np.bool_]) -> dict[str, Any]:
+    interval = wilson_interval(int(hits.sum()), hits.shape[1], len(hits))
+    return {**share_over_seeds(hits).to_json(), "ci95_of_trials": list(interval)}
+
+
+def _until_entries(group: Group, level: float) -> dict[str, Any]:
+    names = ("environment_steps", "seconds", "processor_seconds")
+    known = [value if math.isfinite(value) else None for value in group.until(level)]
+    return {"success": level, **dict(zip(names, known, strict=True))}

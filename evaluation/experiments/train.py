@@ -2,9 +2,9 @@
 
 import hashlib
 import time
-from collections.abc import Callable
-from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,102 +12,37 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kinarm import SEMANTICS
-from kinarm.evaluation.experiments.curve import Curve, CurvePoint, TrialSettings, face
+from kinarm.evaluation.experiments.curve import CurvePoint, TrialSettings
 from kinarm.evaluation.experiments.plan import Run
-from kinarm.evaluation.experiments.progress import Watcher
 from kinarm.evaluation.experiments.runs import (
     Checkpoint,
     Clock,
-    TrainedRun,
     TrialBounds,
-    TrialOutcomes,
     bounds_content,
     run_content,
     save_checkpoint,
 )
-from kinarm.evaluation.trials import trial_set
+from kinarm.evaluation.trials import TrialSet, trial_set
 from kinarm.policies.learners import CurvePoint as IterationPoint
-from kinarm.policies.learners import (
-    TrainingState,
-    begin_training,
-    find_learner,
-    state_policy,
-    thread_options,
-)
+from kinarm.policies.learners import TrainingState, begin_training, find_learner, state_policy
 from kinarm.policies.oracle import ORACLE_SEMANTICS, Oracle
 from kinarm.policies.policy import Policy
+from kinarm.policies.training import CHECKPOINT_SECONDS
 from kinarm.problem import ReachProblem
-
-CHECKPOINT_SECONDS = 5.0
-"""How often a training saves how far it is [s]."""
-
-
-@dataclass(frozen=True, eq=False)
-class RunTask:
-    """A training to be carried out.
-
-    Attributes
-    ----------
-    run : Run
-        The training.
-    start : Checkpoint or None
-        Where it goes on; None for its beginning.
-    checkpoint : Path or None
-        Where it saves how far it is; None if it cannot.
-    watcher : Watcher or None
-        Who is told how far it is.
-    """
-
-    run: Run
-    start: Checkpoint | None = None
-    checkpoint: Path | None = None
-    watcher: Watcher | None = None
-
-    @property
-    def name(self) -> str:
-        """What to call it."""
-        return self.run.name
-
-    @property
-    def cost(self) -> float:
-        """Rough duration, relative to other trainings."""
-        done = 0 if self.start is None else self.start.state.iteration
-        return self.run.cost * (1 - done / self.run.config.iterations)
-
-    @property
-    def key(self) -> str:
-        """Name of its files."""
-        return self.run.key
-
-    def watched(self, watcher: Watcher) -> "RunTask":
-        """The training, which tells a watcher how far it is."""
-        return replace(self, watcher=watcher)
+from kinarm.rollouts import Rollouts
 
 
 @dataclass(frozen=True)
 class BoundTask:
-    """Trials whose bounds are to be found.
-
-    Attributes
-    ----------
-    problem : ReachProblem
-        The problem, its arm pinned.
-    trials : TrialSettings
-        The trials.
-    """
+    """Trials of a problem, its arm pinned, whose bounds are to be found."""
 
     problem: ReachProblem
     trials: TrialSettings
 
     @property
     def name(self) -> str:
-        """What to call it."""
+        """Its name in a line."""
         return f"oracle {self.problem.name}"
-
-    @property
-    def cost(self) -> float:
-        """Rough duration [s of a core]."""
-        return 3e-3 * self.trials.count
 
     @cached_property
     def key(self) -> str:
@@ -116,22 +51,34 @@ class BoundTask:
         described = f"{self.problem.digest} {protocol} {SEMANTICS} {ORACLE_SEMANTICS}"
         return hashlib.sha256(described.encode()).hexdigest()[:20]
 
-    def watched(self, _: Watcher) -> "BoundTask":
-        """The same: it takes too little time to tell how far it is."""
-        return self
+
+class Task(NamedTuple):
+    """What an executor is given to do.
+
+    Attributes
+    ----------
+    work : Run or BoundTask
+        A training, or trials whose bounds are to be found.
+    start : Checkpoint or None
+        Where the training goes on; None for its beginning.
+    checkpoint : Path or None
+        Where it saves how far it is; None if its files are not those of the driver.
+    """
+
+    work: Run | BoundTask
+    start: Checkpoint | None = None
+    checkpoint: Path | None = None
 
 
 class TaskResult(NamedTuple):
-    """What comes back from a worker.
+    """Result of a task, as it comes back from a worker.
 
     Attributes
     ----------
     content : bytes
         What the file of the run or of the bounds holds.
-    clock : Clock
-        How long a training took.
-    iterations : tuple
-        The iterations of a training, as its learner tells of them.
+    clock, iterations : Clock and tuple
+        How long a training took, and its iterations as its learner tells of them.
     """
 
     content: bytes
@@ -139,27 +86,15 @@ class TaskResult(NamedTuple):
     iterations: tuple[IterationPoint, ...] = ()
 
 
-def carry_out(task: RunTask | BoundTask, threads: int = 1, **options: Any) -> TaskResult:
-    """Train and evaluate, or find bounds.
-
-    The result does not depend on the number of threads, or on where a training goes on.
-
-    Parameters
-    ----------
-    task : RunTask or BoundTask
-        What to do.
-    threads : int
-        On so many threads.
-    **options
-        As of `train`.
-    """
-    if isinstance(task, BoundTask):
-        return TaskResult(bounds_content(find_bounds(task, threads)))
-    return train(task, threads, **options)
+def carry_out(task: Task, threads: int = 1, logs: Path | None = None) -> TaskResult:
+    """Train and evaluate, or find bounds; threads and logs are as for `train`."""
+    if isinstance(task.work, BoundTask):
+        return TaskResult(bounds_content(find_bounds(task.work, threads)))
+    return train(task.work, threads, start=task.start, checkpoint=task.checkpoint, logs=logs)
 
 
 def find_bounds(task: BoundTask, threads: int) -> TrialBounds:
-    """What the oracle knows about some trials."""
+    """The bounds of some trials."""
     trials = trial_set(task.problem, task.trials.count, task.trials.seed)
     oracle = Oracle(trials.simulator.problem, threads=threads)
     solutions = oracle.solve_batch(trials.starts, trials.goals)
@@ -167,98 +102,110 @@ def find_bounds(task: BoundTask, threads: int) -> TrialBounds:
 
 
 def train(
-    task: RunTask,
+    run: Run,
     threads: int = 1,
     *,
+    start: Checkpoint | None = None,
+    checkpoint: Path | None = None,
     on_point: Callable[[CurvePoint], object] | None = None,
     logs: Path | None = None,
 ) -> TaskResult:
-    """Train and evaluate.
+    """Train and evaluate; the result depends neither on threads nor on where a training goes on.
 
     Parameters
     ----------
-    task : RunTask
-        The training.
-    threads : int
-        On so many threads.
+    run, threads : Run and int
+        The training, and on how many threads.
+    start, checkpoint
+        As of a `Task`.
     on_point : callable, optional
         Is told every point of the learning curve.
     logs : Path, optional
         Folder of the logs for TensorBoard, a folder in it for each seed.
     """
-    run, config, start = task.run, task.run.config, task.start
-    learner, earlier = find_learner(run.learner), start or Checkpoint(TrainingState())
-    stopwatch = Stopwatch(earlier.clock)
-    options: dict[str, Any] = dict(thread_options(config, threads))
+    config, learner = run.config, find_learner(run.learner)
+    options: dict[str, Any] = {"threads": threads} if "threads" in learner.options else {}
     if logs is not None and "tensorboard" in learner.options:
         options["tensorboard"] = logs / f"{learner.name}-seed{config.seed}"
-    with task.watcher.preparing() if task.watcher else nullcontext():
-        curve = Curve(config, run.trials, earlier.curve, earlier.distances)
-        with stopwatch:
-            training = begin_training(config, **options)
-            state = training.initial_state() if start is None else start.state
-    if start is None and curve.update(state):
-        stopwatch.note()
+    curve = Curve(run, start or Checkpoint(TrainingState()))
+    with curve.timed():
+        training = begin_training(config, **options)
+        state = training.initial_state() if start is None else start.state
+    if start is None:
+        curve.update(state)
     saved = time.monotonic()
     while state.iteration < config.iterations:
-        with stopwatch:
+        with curve.timed():
             state = training.iterate(state)
-        if curve.update(state):
-            stopwatch.note()
-            if on_point is not None:
-                on_point(curve.points[-1])
-        if task.watcher is not None:
-            task.watcher.update(state, config.iterations)
-        if task.checkpoint is not None and time.monotonic() - saved > CHECKPOINT_SECONDS:
-            done = tuple(curve.points), tuple(curve.distances), stopwatch.clock
-            save_checkpoint(task.checkpoint, run, Checkpoint(state, *done))
+        if curve.update(state) and on_point is not None:
+            on_point(curve.points[-1])
+        if checkpoint is not None and time.monotonic() - saved > CHECKPOINT_SECONDS:
+            save_checkpoint(checkpoint, run, curve.checkpoint(state))
             saved = time.monotonic()
-    policy = state_policy(config, state)
-    trained = _trained(run, curve, state, policy)
-    return TaskResult(run_content(trained, policy), stopwatch.clock, state.curve)
+    end, policy = curve.checkpoint(state), state_policy(config, state)
+    rollouts = _face(policy, trial_set(config.problem, run.trials.count, run.trials.seed))
+    return TaskResult(run_content(run, end, policy, rollouts), end.clock, state.curve)
 
 
-def _trained(run: Run, curve: Curve, state: TrainingState, policy: Policy) -> TrainedRun:
-    """What a training came to, whose policy now faces the trials."""
-    trials, detailed = run.trials, run.trials.curve is not None
-    rollouts = face(policy, trial_set(run.config.problem, trials.count, trials.seed))
-    names = TrialOutcomes._fields
-    return TrainedRun(
-        settings=run.settings,
-        curve=tuple(curve.points),
-        last=CurvePoint.of(state, rollouts),
-        outcomes=TrialOutcomes(*(np.array(getattr(rollouts, name)) for name in names)),
-        returns=np.array([point.mean_return for point in state.curve]) if detailed else None,
-        curve_distance=np.array(curve.distances) if detailed else None,
-        state=state if run.config.can_extend else None,
-    )
+def _face(policy: Policy, trials: TrialSet) -> Rollouts:
+    """Put a policy to trials."""
+    return trials.simulator.rollout(policy, trials.starts, trials.goals)
 
 
-class Stopwatch:
-    """Adds up how long the parts of a training take that run within it.
+class Curve:
+    """The learning curve of a training, as far as it is, and the time that it took.
 
     Parameters
     ----------
-    earlier : Clock
-        What went before.
+    run, start : Run and Checkpoint
+        The training, and what there is of it.
     """
 
-    def __init__(self, earlier: Clock) -> None:
-        self._spent = np.array([earlier.seconds, earlier.processor_seconds])
-        self._points = [*zip(earlier.points, earlier.processor_points, strict=False)]
+    def __init__(self, run: Run, start: Checkpoint) -> None:
+        self.points, self._distances = [*start.curve], [*start.distances]
+        self._run, clock = run, start.clock
+        self._spent = np.array([clock.seconds, clock.processor_seconds])
+        self._times = [*zip(clock.points, clock.processor_points, strict=False)]
+        own = run.trials.curve or run.trials
+        self._trials = trial_set(run.config.problem, own.count, own.seed)
+        first = self._trials.chosen([0])
+        simulator = first.simulator
+        actions = np.zeros((1, simulator.task.horizon, simulator.n_actions))
+        simulator.rollout_actions(actions, first.starts, first.goals)  # before any clock runs
 
-    def __enter__(self) -> None:
+    @contextmanager
+    def timed(self) -> Iterator[None]:
+        """Add the time of a part of the training that runs within it."""
         self._spent -= time.perf_counter(), time.process_time()
-
-    def __exit__(self, *_: object) -> None:
+        yield
         self._spent += time.perf_counter(), time.process_time()
 
-    def note(self) -> None:
-        """Note the time of a point of the learning curve."""
-        self._points.append(tuple(self._spent.round(3).tolist()))
+    def update(self, state: TrainingState) -> bool:
+        """Add a point, and its time, if it is time for one; whether it was."""
+        if not self._is_due(state):
+            return False
+        rollouts = _face(state_policy(self._run.config, state), self._trials)
+        self.points.append(CurvePoint.of(state, rollouts))
+        self._times.append(tuple(self._spent.round(3).tolist()))
+        if self._run.trials.curve is not None:
+            self._distances.append(rollouts.distance.astype(np.float32))
+        return True
 
-    @property
-    def clock(self) -> Clock:
-        """The times so far."""
-        points = tuple(zip(*self._points, strict=True)) or ((), ())
-        return Clock(*self._spent.round(3).tolist(), *points)
+    def _is_due(self, state: TrainingState) -> bool:
+        """Whether a point of the curve is reached that was not reached before."""
+        settings = self._run.trials
+        if settings.curve is not None:
+            return state.iteration in settings.curve.iterations(self._run.config.iterations)
+        if settings.per_decade == 0:
+            return False
+        last = self.points[-1].environment_steps if self.points else 0
+        number = 0  # of the first point beyond the last one
+        while last >= (due := settings.first * 10.0 ** (number / settings.per_decade)):
+            number += 1
+        return bool(state.environment_steps >= due)
+
+    def checkpoint(self, state: TrainingState) -> Checkpoint:
+        """How far the training is that is in a state."""
+        times = tuple(zip(*self._times, strict=True)) or ((), ())
+        clock = Clock(*self._spent.round(3).tolist(), *times)
+        return Checkpoint(state, tuple(self.points), tuple(self._distances), clock)

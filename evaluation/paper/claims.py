@@ -31,19 +31,7 @@ LEARNING_LEVELS = (
 
 @dataclass(frozen=True)
 class ClaimPart:
-    """A statistic that a claim puts on one side of a threshold.
-
-    Attributes
-    ----------
-    measure : str
-        Name of the statistic, with its unit.
-    estimate : Estimate
-        The statistic and its interval.
-    claimed : {"above", "below"}
-        On which side of the threshold the claim puts it.
-    threshold : float
-        The threshold.
-    """
+    """A statistic, named with its unit, that a claim puts on one side of a threshold."""
 
     measure: str
     estimate: Estimate
@@ -53,14 +41,11 @@ class ClaimPart:
     @property
     def verdict(self) -> Verdict:
         """Where the interval lies: on the claimed side, on the other one, or on both."""
-        if self.estimate.ci95 is None:
+        low, high = self.estimate.ci95 or (self.threshold, self.threshold)
+        if low <= self.threshold <= high:
             return "undecided"
-        low, high = self.estimate.ci95
-        if low > self.threshold:
-            return "holds" if self.claimed == "above" else "does not hold"
-        if high < self.threshold:
-            return "holds" if self.claimed == "below" else "does not hold"
-        return "undecided"
+        side = "above" if low > self.threshold else "below"
+        return "holds" if side == self.claimed else "does not hold"
 
 
 @dataclass(frozen=True)
@@ -117,25 +102,18 @@ class Claim:
 def assess(results: PaperResults, reading: Reading = LITERAL) -> tuple[Claim, ...]:
     """All claims that can be judged under a reading; the sweep follows the literal one."""
     claims = [
-        _mostly_near(results, reading, "left"),
-        _mostly_near(results, reading, "right"),
+        *(_mostly_near(results, reading, task) for task in ("left", "right")),
         _both_is_worse(results, reading),
         _one_bench_is_poor(results, reading),
     ]
     if results.select("ppo", reading=reading):
+        # Section 4: densities of PPO's final distances are shifted to the left of ARS's, and PPO
+        # delivers more on task 3.
+        nearer = _ars_less_ppo(results, reading, "left", "right")
+        better = _ars_less_ppo(results, reading, "both")
         claims += [
-            # Section 4: densities of PPO's final distances are shifted to the left of ARS's.
-            Claim(
-                "ppo-nearer",
-                "PPO ends nearer than ARS on left and right",
-                (_ars_less_ppo(results, reading, "left", "right"),),
-            ),
-            # Section 4: PPO delivers more on task 3.
-            Claim(
-                "ppo-both",
-                "PPO does better than ARS on both",
-                (_ars_less_ppo(results, reading, "both"),),
-            ),
+            Claim("ppo-nearer", "PPO ends nearer than ARS on left and right", (nearer,)),
+            Claim("ppo-both", "PPO does better than ARS on both", (better,)),
             _ars_needs_fewer_steps(results, reading),
         ]
     if reading == LITERAL:
@@ -179,16 +157,10 @@ def _one_bench_is_poor(results: PaperResults, reading: Reading) -> Claim:
 def bench_shares(near: NDArray[np.bool_], left: NDArray[np.bool_]) -> tuple[Estimate, Estimate]:
     """Share of hits on the better and on the worse bench of every seed's policy.
 
+    Whether a trial hit, shape (n_seeds, n_trials), and its goal lies on the left, (n_trials,).
     Which bench is the better one is told by one half of the trials and measured on the other, and
     the other way round: picking the larger of two noisy shares would flatter it. Where a bench has
     no trials in one of the halves, there is nothing to tell.
-
-    Parameters
-    ----------
-    near : ndarray of bool, shape (n_seeds, n_trials)
-        Whether a trial hit.
-    left : ndarray of bool, shape (n_trials,)
-        Whether its goal lies on the left bench.
     """
     half = np.arange(near.shape[1]) % 2 == 0
     groups = [[part & bench for bench in (left, ~left)] for part in (half, ~half)]
@@ -202,7 +174,6 @@ def bench_shares(near: NDArray[np.bool_], left: NDArray[np.bool_]) -> tuple[Esti
 
 
 def _ars_less_ppo(results: PaperResults, reading: Reading, *tasks: str) -> ClaimPart:
-    """Mean final distance of ARS, less that of PPO on the same trials."""
     return _difference(
         "mean final distance of ARS, less that of PPO [m]",
         [
@@ -236,19 +207,16 @@ def steps_to_levels(runs: Iterable[PaperRun]) -> NDArray[np.float64]:
 def _low_rate_is_worse(results: PaperResults) -> Claim:
     """Section 3.3: too low a learning rate may not be desirable."""
     sweep = results.sweep()
+    distances = [(rate, final_distances(runs)) for (rate, _), runs in sweep.items()]
     lowest, *higher = sorted({rate for rate, _ in sweep})
-    parts = [
+    parts = tuple(
         _difference(
             f"mean final distance with rate {lowest}, less that with rate {other} [m]",
-            [
-                (rate == lowest, final_distances(runs))
-                for (rate, _), runs in sweep.items()
-                if rate in (lowest, other)
-            ],
+            [(rate == lowest, d) for rate, d in distances if rate in (lowest, other)],
         )
         for other in higher
-    ]
-    return Claim("sweep-rate", "Too low a learning rate is undesirable", tuple(parts))
+    )
+    return Claim("sweep-rate", "Too low a learning rate is undesirable", parts)
 
 
 def _many_perturbations_are_worse(results: PaperResults) -> tuple[Claim, Claim]:
@@ -260,17 +228,15 @@ def _many_perturbations_are_worse(results: PaperResults) -> tuple[Claim, Claim]:
     sweep = results.sweep()
     most = max(perturbations for _, perturbations in sweep)
     budget = min(run.environment_steps for runs in sweep.values() for run in runs)
+    within = f", after {budget / 1e3:.0f} thousand environment steps"
+    ends = [(n == most, final_distances(runs)) for (_, n), runs in sweep.items()]
+    stops = [
+        (n == most, np.array([run.distance_after(budget) for run in runs]))
+        for (_, n), runs in sweep.items()
+    ]
     measure = f"mean final distance with {most} perturbations, less that with fewer"
-    after_iterations = _difference(
-        f"{measure} [m]", [(n == most, final_distances(runs)) for (_, n), runs in sweep.items()]
-    )
-    after_steps = _difference(
-        f"{measure}, after {budget / 1e3:.0f} thousand environment steps [m]",
-        [
-            (n == most, np.array([run.distance_after(budget) for run in runs]))
-            for (_, n), runs in sweep.items()
-        ],
-    )
+    after_iterations = _difference(f"{measure} [m]", ends)
+    after_steps = _difference(f"{measure}{within} [m]", stops)
     statement = "Too many perturbations are undesirable, after as many"
     return (
         Claim("sweep-perturbations", f"{statement} iterations", (after_iterations,)),

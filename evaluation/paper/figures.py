@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.evaluation.bounds import oracle_bounds
-from kinarm.evaluation.figures import BIN_WIDTH, COLOURS
+from kinarm.evaluation.figures import BIN_WIDTH, COLOURS, panels_figure
 from kinarm.evaluation.paper.results import LEARNERS, NEAR, PaperResults
 from kinarm.problem import PROBLEMS
 
@@ -20,11 +20,8 @@ STYLES: dict[str, dict[str, Any]] = {
 }
 """How lines of a learner look; its seeds are drawn thin and faint in the same colour."""
 
-SHOWN_DISTANCE = 1.2
-"""Where the axes of final distances end [m]."""
-
-NARROWEST = 0.005
-"""Least bandwidth of a density [m]."""
+SHOWN_DISTANCE, NARROWEST = 1.2, 0.005
+"""Where the axes of final distances end, and the least bandwidth of a density [m]."""
 
 
 def figure_2(results: PaperResults) -> "Figure":
@@ -32,7 +29,7 @@ def figure_2(results: PaperResults) -> "Figure":
 
     Seeds are in colour, and the mean of their returns in black.
     """
-    figure, panels = _panels((9.0, 8.4), len(PROBLEMS), 2, sharex="col", sharey="col")
+    figure, panels = panels_figure((9.0, 8.4), len(PROBLEMS), 2, sharex="col", sharey="col")
     edges = np.arange(0.0, SHOWN_DISTANCE + BIN_WIDTH, BIN_WIDTH)
     for number, (task, (left, right)) in enumerate(zip(PROBLEMS, panels, strict=True), start=1):
         runs = results.select("ars", task)
@@ -60,7 +57,7 @@ def figure_3(results: PaperResults) -> "Figure":
     The oracle's is drawn behind them: what could be reached. Heights are square roots, so that
     broad and narrow densities can be told apart beside each other.
     """
-    figure, panels = _panels((7.5, 8.4), len(PROBLEMS), 1, sharex=True)
+    figure, panels = panels_figure((7.5, 8.4), len(PROBLEMS), 1, sharex=True)
     for number, (task, axes) in enumerate(zip(PROBLEMS, panels[:, 0], strict=True), start=1):
         distance = np.linspace(0.0, SHOWN_DISTANCE, 481)
         highest = 0.0
@@ -100,21 +97,19 @@ def density(samples: NDArray[np.float64], positions: NDArray[np.float64]) -> NDA
 
 
 def learning_curves(results: PaperResults, against: Literal["steps", "time"]) -> "Figure":
-    """How well policies do in the course of their training, a column per task.
-
-    Progress is shown against environment steps or against wall time.
-    """
-    figure, panels = _panels((10.5, 6.4), 2, len(PROBLEMS), sharex=True, sharey="row")
+    """How well policies do in the course of their training, by steps or time, a column per task."""
+    figure, panels = panels_figure((10.5, 6.4), 2, len(PROBLEMS), sharex=True, sharey="row")
     in_time = against == "time"
     for task, (above, below) in zip(PROBLEMS, panels.T, strict=True):
         for learner, style in STYLES.items():
             if runs := results.select(learner, task):
-                x = np.array(
-                    [run.clock.points if in_time else run.curve_steps / 1e6 for run in runs]
-                )
+                times = [
+                    run.trained.clock.points if in_time else run.curve_steps / 1e6 for run in runs
+                ]
+                x = np.array(times)
                 distance = np.array([run.curve_distance for run in runs])
-                _seeds_and_mean(above, x, (distance <= NEAR).mean(axis=2), style)
-                _seeds_and_mean(below, x, np.median(distance, axis=2), style)
+                _seeds_and_mean(above, x, (distance <= NEAR).mean(axis=2), style, lw=2)
+                _seeds_and_mean(below, x, np.median(distance, axis=2), style, lw=2)
         above.set_title(f"task {task}")
         below.set_xlabel("training time [s]" if in_time else "million environment steps")
         below.set_xscale("log" if in_time else "linear")
@@ -125,25 +120,8 @@ def learning_curves(results: PaperResults, against: Literal["steps", "time"]) ->
 
 
 def _seeds_and_mean(
-    axes: "Axes",
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
-    style: dict[str, Any],
-    lw: float = 2,
+    axes: "Axes", x: NDArray[np.float64], y: NDArray[np.float64], style: dict[str, Any], lw: float
 ) -> None:
     """Curves of the seeds faintly, and the mean of what they do at the same place boldly."""
     axes.plot(x.T, y.T, color=style["color"], lw=0.6, alpha=0.5)
     axes.plot(x.mean(axis=0), y.mean(axis=0), lw=lw, **style)
-
-
-def _panels(
-    size: tuple[float, float], rows: int, columns: int, **shared: Any
-) -> "tuple[Figure, NDArray[np.object_]]":
-    """A figure and its panels, shape (rows, columns), without top and right spines."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=size, layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False, **shared)
-    for axes in panels.flat:
-        axes.spines[["top", "right"]].set_visible(False)
-    return figure, panels

@@ -4,8 +4,6 @@ import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
-from importlib.resources import files
-from string import Template
 from typing import Any
 
 import numpy as np
@@ -24,10 +22,10 @@ from kinarm.evaluation.paper.results import (
     LITERAL,
     NEAR,
     PaperResults,
-    PaperRun,
     Reading,
     final_distances,
 )
+from kinarm.evaluation.report.templating import template_environment
 from kinarm.evaluation.statistics import estimate_text
 from kinarm.policies.provenance import package_versions
 from kinarm.problem import PROBLEMS
@@ -55,41 +53,20 @@ RUN_COLUMNS = (
 
 CLAIM_COLUMNS = ("claim", "measure", "measured (95 %)", "claimed", "verdict")
 
-LEARNER_COLUMNS = (
-    *("task", "learner", "success %", "relative success %", f"within {NEAR} m % (seeds)"),
-    *("median distance m", "mean distance m", "collision %", "million steps"),
-)
-
 MARKS = {"holds": "holds", "does not hold": "no", "undecided": "?", "not judged": ""}
-"""How verdicts are told in the table of readings."""
+"""Verdicts in the table of readings."""
 
 
 def write_all(study: Study, command: str) -> Sequence[Claim]:
-    """Write all files of the finished reproduction beside its trainings.
+    """Write all files of the finished reproduction, and return the claims read literally.
 
-    Parameters
-    ----------
-    study : Study
-        The reproduction, of which nothing is missing.
-    command : str
-        The command that made it, for the record.
-
-    Returns
-    -------
-    sequence of Claim
-        The claims under the literal reading.
-
-    Raises
-    ------
-    OutputError
-        If a file cannot be written.
+    The command that made it is recorded.
     """
     results, folder = PaperResults.of(study), study.store.folder
     claims = {reading: assess(results, reading) for reading in results.readings}
     document = _claims_document(results, claims, command, _save_policies(study, results))
     write_text(folder / "claims.json", json.dumps(document, indent=1) + "\n")
     write_text(folder / "runs.csv", runs_csv(results))
-    write_text(folder / "timing.json", json.dumps(timing(results), indent=1) + "\n")
     for name, draw in FIGURES.items():
         save_figure(draw(results), folder, name)
     write_text(folder / "REPRODUCTION.md", _page(results, claims, document))
@@ -110,7 +87,7 @@ def _save_policies(study: Study, results: PaperResults) -> list[str]:
 def _claims_document(
     results: PaperResults, claims: Claims, command: str, commits: list[str]
 ) -> dict[str, Any]:
-    """All verdicts and what they stand on, as a dictionary that JSON can hold."""
+    """All verdicts and what they stand on, as ``claims.json`` holds them."""
     trials = to_plain(results.experiment.trials)
     curve = trials["curve"]
     return {
@@ -136,24 +113,31 @@ def _claims_document(
 
 def _page(results: PaperResults, claims: Claims, document: Mapping[str, Any]) -> str:
     """``REPRODUCTION.md``."""
-    rows = [
-        (*row, f"**{verdict}**" if verdict else "") for *row, verdict in claim_rows(claims[LITERAL])
-    ]
-    page = files(__package__).joinpath("page.md").read_text(encoding="utf-8")
-    return Template(page).substitute(
-        warning="" if results.is_judged else f"**{SMOKE.format(len(results.runs))}**\n\n",
-        command=document["command"],
-        commits=", ".join(document["commits"]) or "unknown",
-        trainings=document["trainings"],
-        steps=f"{document['environment_steps']:,}",
-        **document["protocol"],
-        claims=markdown_table(CLAIM_COLUMNS, rows),
-        learners=markdown_table(LEARNER_COLUMNS, _learner_rows(results)),
-        sweep=_sweep_table(results),
-        speed=_speed_table(results),
+    environment = template_environment(keep_trailing_newline=True)
+    environment.filters.update(
+        percent=lambda share, of=1.0: f"{100 * share / of:.1f}" if of else "",
+        within=lambda distance: _mean_and_range(100 * (distance <= NEAR).mean(axis=1), 1),
+        mean_and_range=_mean_and_range,
+        million_steps=lambda runs: f"{np.mean([r.environment_steps for r in runs]) / 1e6:.2f}",
+        median_cell=median_cell,
+    )
+    return environment.get_template("reproduction.md").render(
+        results=results,
+        document=document,
+        smoke=SMOKE.format(len(results.runs)),
+        claim_columns=CLAIM_COLUMNS,
+        claims=claim_rows(claims[LITERAL]),
+        tasks=PROBLEMS,
+        learners=LEARNERS,
+        shown=[purpose for purpose in LEARNERS if results.select(purpose)],
+        levels=LEARNING_LEVELS,
+        near=NEAR,
         readings=readings_table(results, claims),
-        best_readings=_best_readings(claims),
-        versions=", ".join(f"{name} {version}" for name, version in document["versions"].items()),
+        oracle_bounds=oracle_bounds,
+        final_distances=final_distances,
+        steps_to_levels=steps_to_levels,
+        contact=lambda runs: np.mean([run.trained.outcomes.collision.mean() for run in runs]),
+        median=np.median,
     )
 
 
@@ -167,15 +151,6 @@ def runs_csv(results: PaperResults) -> str:
         row = (run.name, *made, run.environment_steps, *within, *distances)
         lines.append((*map(str, row), str(float(run.trained.outcomes.collision.mean()))))
     return "".join(",".join(line) + "\n" for line in lines)
-
-
-def timing(results: PaperResults) -> dict[str, Any]:
-    """Time that the trainings took [s], by purpose."""
-    seconds: dict[str, float] = {}
-    for run in results.runs:
-        spent = seconds.get(run.purpose, 0.0) + run.clock.seconds
-        seconds[run.purpose] = round(spent, 1)
-    return {"training_seconds": seconds}
 
 
 def claim_rows(claims: Iterable[Claim]) -> list[tuple[str, ...]]:
@@ -193,69 +168,10 @@ def claim_rows(claims: Iterable[Claim]) -> list[tuple[str, ...]]:
     ]
 
 
-def _learner_rows(results: PaperResults) -> list[list[str]]:
-    """Final policies of every learner next to what could be reached; means over seeds."""
-    rows = []
-    for number, task in enumerate(PROBLEMS, start=1):
-        trials, name = results.trial_set(task), f"{number}: {task}"
-        bounds = oracle_bounds(trials)
-        final, possible = bounds.final_distance, float(bounds.reachable.mean())
-        for purpose, label in LEARNERS.items():
-            if runs := results.select(purpose, task):
-                cells = _learner_cells(runs, trials.problem.task.tolerance, possible)
-                rows.append([name, f"{label}, {len(runs)} seeds", *cells])
-        oracle = (f"{100 * possible:.1f}", "100.0", f"{100 * np.mean(final <= NEAR):.1f}")
-        distances = (f"{np.median(final):.3f}", f"{final.mean():.3f}")
-        rows.append([name, "oracle", *oracle, *distances, "0.0", ""])
-    return rows
-
-
-def _learner_cells(runs: Sequence[PaperRun], tolerance: float, possible: float) -> list[str]:
-    """How well the policies of a learner do."""
-    distance = final_distances(runs)
-    success = float((distance <= tolerance).mean())
-    contact = np.mean([run.trained.outcomes.collision.mean() for run in runs])
-    of_oracle = f"{100 * success / possible:.1f}" if possible else ""
-    distances = (f"{np.median(distance):.3f}", f"{distance.mean():.3f}")
-    shares = (f"{100 * success:.1f}", of_oracle, _near_cell(distance))
-    return [*shares, *distances, f"{100 * contact:.1f}", _steps_cell(runs)]
-
-
-def _near_cell(distance: NDArray[np.float64]) -> str:
-    """Share of trials that ended near the goal, and its range over seeds [%]."""
-    near = 100 * (distance <= NEAR).mean(axis=1)
-    return f"{near.mean():.1f} ({near.min():.1f}..{near.max():.1f})"
-
-
-def _steps_cell(runs: Sequence[PaperRun]) -> str:
-    """Mean number of environment steps of a training [millions]."""
-    return f"{np.mean([run.environment_steps for run in runs]) / 1e6:.2f}"
-
-
-def _sweep_table(results: PaperResults) -> str:
-    """The nine settings that the paper tried first."""
-    rows = []
-    for (rate, perturbations), runs in results.sweep().items():
-        distance = final_distances(runs)
-        means = distance.mean(axis=1)
-        mean = f"{means.mean():.3f} ({means.min():.3f}..{means.max():.3f})"
-        near, steps = _near_cell(distance), _steps_cell(runs)
-        rows.append((f"{rate:g}", str(perturbations), mean, near, steps))
-    header = ("learning rate", "perturbations", "mean final distance m (seeds)")
-    return markdown_table((*header, f"<= {NEAR} m % (seeds)", "million steps"), rows)
-
-
-def _speed_table(results: PaperResults) -> str:
-    """Environment steps after which levels of success were first seen; medians over seeds."""
-    shown = [purpose for purpose in LEARNERS if results.select(purpose)]
-    rows = []
-    for task in PROBLEMS:
-        steps = [steps_to_levels(results.select(purpose, task)) for purpose in shown]
-        for number, (distance, share) in enumerate(LEARNING_LEVELS):
-            cells = (median_cell(learner[number]) for learner in steps)
-            rows.append((task, f"{share:.0%} within {distance:g} m", *cells))
-    header = ("task", "level", *(f"{LEARNERS[purpose]}, steps" for purpose in shown))
-    return markdown_table(header, rows)
+def _mean_and_range(values: NDArray[np.float64], digits: int) -> str:
+    """Mean over seeds, and the range."""
+    mean, low, high = (f"{each:.{digits}f}" for each in (values.mean(), values.min(), values.max()))
+    return f"{mean} ({low}..{high})"
 
 
 def median_cell(steps: NDArray[np.float64]) -> str:
@@ -281,23 +197,3 @@ def readings_table(results: PaperResults, claims: Claims) -> str:
         rows.append((f"{reading.start_spread:g}", reading.reward, reading.sharing, shares, *found))
     header = ("starts", "reward", "shared by", f"ARS <= {NEAR} m %, left / right / both")
     return markdown_table((*header, *(f"`{name}`" for name in names), "hold"), rows)
-
-
-def _best_readings(claims: Claims) -> str:
-    """Say under which readings most claims about policies hold."""
-    if any(claim.verdict == "not judged" for claim in claims[LITERAL]):
-        return "No claim is judged."
-    holding = {
-        reading: [c.name for c in judged if c.verdict == "holds" and not c.name.startswith("sweep")]
-        for reading, judged in claims.items()
-    }
-    most = max(map(len, holding.values()))
-    if not most:
-        return "Under no reading does any of these claims hold."
-    best = [
-        f"starts {reading.start_spread:g}, reward {reading.reward}, shared by {reading.sharing} "
-        f"({', '.join(f'`{name}`' for name in names)})"
-        for reading, names in holding.items()
-        if len(names) == most
-    ]
-    return f"Most of these claims hold, {most}, under: {'; '.join(best)}."

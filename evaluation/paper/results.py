@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kinarm.evaluation.experiments.experiment import Experiment
 from kinarm.evaluation.experiments.plan import Run
-from kinarm.evaluation.experiments.runs import Clock, TrainedRun
+from kinarm.evaluation.experiments.runs import TrainedRun
 from kinarm.evaluation.experiments.study import Study
 from kinarm.evaluation.trials import TrialSet, trial_set
 from kinarm.policies.ars.config import Sharing
@@ -20,7 +20,6 @@ PURPOSES = ("sweep", "ars", "ppo")
 """Purposes of trainings: the sweep of ARS's settings, its models, and those of PPO."""
 
 LEARNERS = {"ars": "ARS", "ppo": "PPO"}
-"""Names of the learners that are compared, by the purpose of their trainings."""
 
 NEAR = 0.2
 """Distance within which the paper calls a trial near its goal (section 4) [m]."""
@@ -57,21 +56,10 @@ LITERAL = Reading()
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PaperRun:
-    """A finished training of the reproduction.
-
-    Attributes
-    ----------
-    planned : Run
-        The training.
-    trained : TrainedRun
-        What it came to.
-    clock : Clock
-        How long it took.
-    """
+    """A finished training of the reproduction, and what it came to."""
 
     planned: Run
     trained: TrainedRun
-    clock: Clock
 
     @property
     def purpose(self) -> str:
@@ -80,7 +68,7 @@ class PaperRun:
 
     @property
     def task(self) -> str:
-        """Name of the task."""
+        """One of the names in `PROBLEMS`."""
         return self.planned.config.problem.name
 
     @property
@@ -128,7 +116,7 @@ class PaperRun:
 
     @property
     def environment_steps(self) -> int:
-        """Steps of the whole training."""
+        """All that the training took."""
         return self.trained.last.environment_steps
 
     @property
@@ -158,15 +146,7 @@ class PaperRun:
 
 @dataclass(frozen=True, eq=False)
 class PaperResults:
-    """The finished trainings of the reproduction.
-
-    Attributes
-    ----------
-    experiment : Experiment
-        What is trained, and how it is judged.
-    runs : tuple of PaperRun
-        The trainings in the order of the paper.
-    """
+    """The experiment, and its finished trainings in the order of the paper."""
 
     experiment: Experiment
     runs: tuple[PaperRun, ...]
@@ -175,7 +155,7 @@ class PaperResults:
     def of(cls, study: Study) -> "PaperResults":
         """Take what is finished of the experiment."""
         runs = [
-            PaperRun(planned=planned, trained=trained, clock=study.store.clock(planned))
+            PaperRun(planned=planned, trained=trained)
             for planned, trained in study.finished.items()
         ]
         return cls(study.experiment, tuple(sorted(runs, key=lambda run: run.place)))
@@ -197,10 +177,8 @@ class PaperResults:
 
         Parameters
         ----------
-        purpose : str
-            One of `PURPOSES`.
-        task : str, optional
-            Name of the task; all tasks by default.
+        purpose, task : str
+            One of `PURPOSES`, and the name of a task; all tasks by default.
         reading : Reading
             How they read the paper; what does not concern PPO does not count there.
         """

@@ -1,1 +1,1 @@
-"""What is replayed: finding and choosing trials, recording contestants, following them live."""
+"""Replays: finding and choosing trials, recording contestants, following them live."""

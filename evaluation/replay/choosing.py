@@ -1,10 +1,11 @@
 """Trials to replay: new ones, those of an evaluation, or the recordings of a file."""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain, product
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.bounds import oracle_bounds
@@ -12,12 +13,16 @@ from kinarm.evaluation.contestants import (
     ORACLE,
     UNTRAINED,
     Contestant,
+    find_contestants,
     is_import_path,
 )
-from kinarm.evaluation.document import EvaluationDocument, check_same
-from kinarm.evaluation.replay.runs import Run, faced_problem, first_contestant, stated_problem
+from kinarm.evaluation.document import EvaluationDocument, Result
+from kinarm.evaluation.outcomes import failure_causes
+from kinarm.evaluation.replay.runs import record
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.library import BEST, group_of, policy_names
+from kinarm.problem import ReachProblem
+from kinarm.problem_options import ProblemOptions
 from kinarm.recording import Recording, load_recordings
 
 if TYPE_CHECKING:
@@ -29,44 +34,113 @@ PLAYED, SEARCHED, FAILING = 5, 200, 10_000
 MOST_FAILURES = 500
 """Failures that a page holds at most."""
 
-LowerBounds = Callable[[Sequence[int]], Sequence[int | None]]
-"""Gives the numbers of steps proven necessary in some trials, by their positions."""
+
+Trial = tuple[Recording, ...]
+"""A trial in the hands of one policy, or of two."""
 
 
 @dataclass(frozen=True)
 class Candidates:
-    """Runs of one policy, or of two in the same trials, and how many trials are played by default.
+    """Trials to choose from, and how many of them are played by default.
 
-    Without `LowerBounds`, what the recordings say of them is kept. Without `TrialSet`, nothing
-    else can face them.
+    Without the set that they are of, nothing else can face them. The bounds are the numbers of
+    steps proven necessary in the first trials, as far as they are known.
     """
 
-    runs: Sequence[Run]
-    lower_bounds: LowerBounds | None
+    trials: list[Trial]
     played: int
-    trials: TrialSet | None = None
+    faced: TrialSet | None = None
+    known_bounds: Sequence[int] | None = None
 
 
-@dataclass(frozen=True)
-class Chosen:
+class Chosen(NamedTuple):
     """Recordings that are played.
 
     Attributes
     ----------
     runs : list
         Recordings of one policy, or of two in the same trials.
-    groups : list of str
+    groups : sequence of str
         What each trial is listed under, if they are in groups.
     heading : str
         What the list is of.
     """
 
     runs: list[list[Recording]]
-    groups: list[str] = field(default_factory=list)
+    groups: Sequence[str] = ()
     heading: str = ""
 
 
-def find_candidates(request: "ReplayRequest") -> Candidates:
+def chosen_recordings(request: "ReplayRequest") -> Chosen:
+    """The recordings that a request asks for, with their bounds; the first policy decides."""
+    candidates = _find_candidates(request)
+    trials = candidates.trials
+    if request.failures:
+        return _failures(candidates, oracle=request.oracle)
+    if request.trial:
+        chosen = _numbered(trials, request.trial)
+    elif request.collisions:
+        chosen = [trial for trial in trials if trial[0].outcome == "collision"]
+        if not chosen:
+            raise InvalidInputError(f"none of the {len(trials)} trials ended in contact")
+    elif request.worst is not None:
+        chosen = _worst(trials, request.worst)
+    else:
+        chosen = trials[: candidates.played]
+    return Chosen(_with_bounds(candidates, chosen, oracle=request.oracle))
+
+
+def find_failures(
+    policies: Sequence[str],
+    problems: Sequence[str] = ("left", "right", "both"),
+    *,
+    trials: int = FAILING,
+    seed: int = 0,
+) -> Chosen:
+    """Record all failures of some policies, and what the oracle does in the same trials.
+
+    They are grouped by recipe and cause, the most frequent cause first. ``kinarm-replay
+    --failures`` shows those of one policy on one problem.
+
+    Parameters
+    ----------
+    policies : sequence of str
+        As `ReplayRequest` takes them, ``"best"`` included.
+    problems : sequence of str
+        Problems of one arm and scene.
+    trials, seed : int
+        Size and seed of the set of trials of each problem.
+
+    Returns
+    -------
+    Chosen
+        For `kinarm.viewer.replay_page`: ``runs``, the recordings of the policies and of the
+        oracle; ``groups`` and ``heading``.
+
+    Raises
+    ------
+    KinarmError
+        If a name or number cannot be used, none fails somewhere, or too many do.
+    """
+    found = []
+    for policy, problem in product(policies, problems):
+        drawn = TrialSet.draw(problem, trials, seed)
+        faced = record(_first_contestant(policy, drawn.problem), drawn)
+        found.append(_failures(Candidates([(each,) for each in faced], trials, drawn), oracle=True))
+    played, ghosts = (list(chain(*(each.runs[run] for each in found))) for run in (0, 1))
+    _check_room(len(played), trials * len(found), "trials")
+    recipes = [group_of(recording.policy) for recording in played]
+    causes = chain(*(each.groups for each in found))
+    groups = [f"{recipe}: {cause}" for recipe, cause in zip(recipes, causes, strict=True)]
+    order = sorted(_most_frequent_first(groups), key=lambda k: recipes.index(recipes[k]))
+    return Chosen(
+        [[run[k] for k in order] for run in (played, ghosts)],
+        [groups[k] for k in order],
+        f"{len(played)} of {trials * len(found)} trials of {', '.join(problems)} failed",
+    )
+
+
+def _find_candidates(request: "ReplayRequest") -> Candidates:
     """Make or read the recordings to choose from."""
     default = BEST if request.failures and request.source is None else None
     names = request.compare or (request.policy or default,)
@@ -79,14 +153,39 @@ def find_candidates(request: "ReplayRequest") -> Candidates:
 
 def _fresh_candidates(request: "ReplayRequest", names: Sequence[str | None]) -> Candidates:
     """Run policies on trials that are drawn now."""
-    stated = stated_problem(request, names)
-    contestants = [first_contestant(name, stated) for name in names]
+    contestants, problem = named_contestants(request, names)
     searched = request.trial or request.worst or request.collisions
     count = request.trials or (FAILING if request.failures else SEARCHED if searched else PLAYED)
-    trials = TrialSet.draw(faced_problem(contestants, request, stated), count, request.seed or 0)
-    options = {"allow_other_arm": request.allow_other_arm}
-    runs = [Run.faced(contestant, trials, **options) for contestant in contestants]
-    return Candidates(runs, _solved_bounds(trials), count, trials)
+    trials = TrialSet.draw(problem, count, request.seed or 0)
+    other = request.allow_other_arm
+    runs = [record(contestant, trials, allow_other_arm=other) for contestant in contestants]
+    return Candidates(list(zip(*runs, strict=True)), count, trials)
+
+
+def named_contestants(
+    options: ProblemOptions, names: Sequence[str | None]
+) -> tuple[list[Contestant], ReachProblem]:
+    """The contestants of names, and the problem that they face.
+
+    That is the one that options name, for the best policy by default the usual one; or what they
+    make of that of the first trained contestant.
+    """
+    named = options.problem is not None or options.task is not None
+    stated = options.resolve() if named or BEST in names else None
+    contestants = [_first_contestant(name, stated) for name in names]
+    if stated is not None:
+        return contestants, stated
+    trained = [contestant.problem for contestant in contestants if contestant.problem is not None]
+    if not trained:
+        raise InvalidInputError(f"{contestants[0].name!r} was not trained: name a --problem")
+    return contestants, options.resolve(trained[0])
+
+
+def _first_contestant(name: str | None, problem: ReachProblem | None = None) -> Contestant:
+    """The contestant of a name, of a group its first seed; for a problem, if it does not say."""
+    if name is None:
+        raise InvalidInputError("name a --policy, or a file of recordings or of an evaluation")
+    return find_contestants(name, problem)[0]
 
 
 def _evaluated_candidates(
@@ -99,7 +198,7 @@ def _evaluated_candidates(
         contestant = None
         if name is not None and (Path(name).suffix in (".npz", ".zip") or is_import_path(name)):
             faced = problem or next(iter(document.protocol.problems))
-            contestant = first_contestant(name, document.problem(faced))
+            contestant = _first_contestant(name, document.problem(faced))
         row = document.result(_name_in(document, contestant) if contestant else name, problem)
         problem = row.problem
         chosen.append((row, contestant or _known_contestant(row.policy, path)))
@@ -107,20 +206,27 @@ def _evaluated_candidates(
     trials = document.trials(str(problem)).first(count)
     runs = []
     for row, contestant in chosen:
-        run = Run.faced(contestant, trials, allow_other_arm=True)
-        check_same(row, run.ends)
-        runs.append(run)
-    bounds = document.lower_bounds(trials.problem.name)
-    if bounds is None:
-        return Candidates(runs, _solved_bounds(trials), PLAYED, trials)
-    known = dict(enumerate(bounds))
-    return Candidates(runs, lambda numbers: list(map(known.get, numbers)), PLAYED, trials)
+        runs.append(record(contestant, trials, allow_other_arm=True))
+        _check_same(row, runs[-1])
+    known = document.lower_bounds(trials.problem.name)
+    return Candidates(list(zip(*runs, strict=True)), PLAYED, trials, known)
+
+
+def _check_same(row: Result, recordings: Sequence[Recording]) -> None:
+    """Refuse trials that end otherwise than an evaluation says of a policy."""
+    said = zip(row.outcomes.outcome, row.outcomes.steps, row.outcomes.final_distance, strict=True)
+    for each, end in zip(recordings, said, strict=False):
+        if (each.outcome, each.steps, each.final_distance) != end:
+            raise InvalidInputError(
+                f"trial {each.trial} of {row.policy!r} ends otherwise than in the evaluation: the "
+                "policy or kinarm has changed, evaluate again"
+            )
 
 
 def _known_contestant(name: str, path: Path) -> Contestant:
     """The contestant of a name, as long as that does not stand for a file of the user's."""
     if name in (*UNTRAINED, *policy_names()) or is_import_path(name):
-        return first_contestant(name)
+        return _first_contestant(name)
     raise InvalidInputError(f"policy {name!r} of {str(path)!r} is a file: name it with --policy")
 
 
@@ -129,16 +235,6 @@ def _name_in(document: EvaluationDocument, contestant: Contestant) -> str:
     names = {row.policy for row in document.results}
     whole = f"{contestant.source.parent.name}/{contestant.name}" if contestant.source else ""
     return whole if whole in names and contestant.name not in names else contestant.name
-
-
-def _solved_bounds(trials: TrialSet) -> LowerBounds:
-    """Let the oracle solve no more trials than are played."""
-
-    def lower_bounds(numbers: Sequence[int]) -> Sequence[int]:
-        bounds: list[int] = oracle_bounds(trials.chosen(numbers)).steps_lower_bound.tolist()
-        return bounds
-
-    return lower_bounds
 
 
 def _recorded_candidates(
@@ -154,103 +250,84 @@ def _recorded_candidates(
         run = [each for each in found if name in (None, each.policy, group_of(each.policy))]
         if name is not None and not run:
             raise UnknownNameError("policy", name, dict.fromkeys(each.policy for each in found))
-        runs.append(Run.of(run))
-    if not runs[0].numbers:
+        runs.append(run)
+    trials = list(zip(*runs, strict=False))
+    if not trials:
         raise InvalidInputError(f"{str(path)!r} holds no recording that fits")
-    return Candidates(runs, None, len(runs[0].numbers))
+    return Candidates(trials, len(trials))
 
 
-def chosen_recordings(request: "ReplayRequest") -> Chosen:
-    """The recordings that a request asks for, with their bounds; the first run decides.
-
-    Raises
-    ------
-    KinarmError
-        If a file, name or number cannot be used, or there are too few trials.
-    """
-    candidates = find_candidates(request)
-    first = candidates.runs[0]
-    if request.failures:
-        return _failures(candidates, oracle=request.oracle)
-    if request.trial:
-        positions = _positions_of(request.trial, first)
-    elif request.collisions:
-        positions = _positions_of_collisions(first)
-    elif request.worst is not None:
-        positions = _positions_of_worst(request.worst, first)
-    else:
-        positions = list(range(len(first.numbers)))[: candidates.played]
-    return Chosen(_recorded(candidates, positions, oracle=request.oracle))
-
-
-def _recorded(
-    candidates: Candidates, positions: Sequence[int], *, oracle: bool
+def _with_bounds(
+    candidates: Candidates, chosen: Sequence[Trial], *, oracle: bool
 ) -> list[list[Recording]]:
-    """Recordings of some trials, with their lower bounds if the oracle is asked."""
-    runs = [run.recorded(positions) for run in candidates.runs]
-    if candidates.lower_bounds is None or not oracle:
+    """Recordings of some trials by policy, with their lower bounds if the oracle is asked."""
+    runs = [list(run) for run in zip(*chosen, strict=True)]
+    if candidates.faced is None or not oracle:
         return runs
-    bounds = candidates.lower_bounds(positions)
+    numbers = [recording.trial for recording in runs[0]]
+    if candidates.known_bounds is None:  # the oracle solves no more trials than are played
+        solved = oracle_bounds(candidates.faced.chosen(numbers))
+        bounds = dict(zip(numbers, solved.steps_lower_bound.tolist(), strict=True))
+    else:
+        bounds = dict(enumerate(candidates.known_bounds))
     return [
-        [replace(each, steps_lower_bound=bound) for each, bound in zip(run, bounds, strict=True)]
-        for run in runs
+        [replace(each, steps_lower_bound=bounds.get(each.trial)) for each in run] for run in runs
     ]
 
 
 def _failures(candidates: Candidates, *, oracle: bool) -> Chosen:
     """All trials that failed, in groups by their cause, beside what the oracle does in them."""
-    first = candidates.runs[0]
-    causes, total = first.causes, len(first.numbers)
-    if not causes:
+    first, total = [trial[0] for trial in candidates.trials], len(candidates.trials)
+    ends = zip(*((each.outcome, each.steps, each.contact) for each in first), strict=True)
+    found = failure_causes(*ends)
+    if not found:
         raise InvalidInputError(f"none of the {total} trials failed")
-    if len(causes) > MOST_FAILURES:
+    _check_room(len(found), total, "--trials")
+    failed, causes = list(found), list(map(str, found.values()))
+    order = _most_frequent_first(causes)
+    trials = [candidates.trials[failed[k]] for k in order]
+    runs = _with_bounds(candidates, trials, oracle=oracle)
+    if oracle and len(runs) == 1 and candidates.faced is not None:
+        numbers = [recording.trial for recording in runs[0]]
+        ghosts = record(ORACLE, candidates.faced.chosen(numbers), allow_other_arm=True)
+        runs.append([replace(each, trial=numbers[each.trial]) for each in ghosts])
+    policy, problem = first[0].policy, first[0].problem.name
+    heading = f"{policy}: {len(causes)} of {total} trials of {problem} failed"
+    return Chosen(runs, [causes[k] for k in order], heading)
+
+
+def _check_room(failed: int, total: int, option: str) -> None:
+    if failed > MOST_FAILURES:
         raise InvalidInputError(
-            f"{len(causes)} of {total} trials failed, a page holds {MOST_FAILURES} at most: ask "
-            "for fewer --trials"
+            f"{failed} of {total} trials failed, a page holds {MOST_FAILURES} at most: ask for "
+            f"fewer {option}"
         )
-    frequency = Counter(causes.values())
-    rank = sorted(frequency, key=lambda cause: (-frequency[cause], str(cause)))
-    positions = sorted(causes, key=lambda position: (rank.index(causes[position]), position))
-    runs = _recorded(candidates, positions, oracle=oracle)
-    if oracle and len(runs) == 1 and candidates.trials is not None:
-        runs.append(_oracle_ghosts(candidates.trials, positions))
-    recording = runs[0][0]
-    heading = (
-        f"{recording.policy}: {len(causes)} of {total} trials of {recording.problem.name} failed"
-    )
-    return Chosen(runs, [str(causes[position]) for position in positions], heading)
 
 
-def _oracle_ghosts(trials: TrialSet, numbers: Sequence[int]) -> list[Recording]:
-    """Recordings of the oracle in some trials, under their numbers."""
-    run = Run.faced(ORACLE, trials.chosen(numbers), allow_other_arm=True)
-    recordings = run.recorded(range(len(numbers)))
-    return [replace(each, trial=number) for each, number in zip(recordings, numbers, strict=True)]
+def _most_frequent_first(groups: Sequence[str]) -> list[int]:
+    """Order of things by their groups."""
+    frequency = Counter(groups)
+    return sorted(range(len(groups)), key=lambda k: (-frequency[groups[k]], groups[k]))
 
 
-def _positions_of(trials: Sequence[int], run: Run) -> list[int]:
-    numbers = list(run.numbers)
-    for trial in trials:
-        if trial not in numbers:
+def _numbered(trials: Sequence[Trial], wanted: Collection[int]) -> list[Trial]:
+    """Trials of some numbers, in that order."""
+    numbers = [first.trial for first, *_ in trials]
+    for number in wanted:
+        if number not in numbers:
             raise InvalidInputError(
-                f"there is no trial {trial}: they go from {min(numbers)} to {max(numbers)}"
+                f"there is no trial {number}: they go from {min(numbers)} to {max(numbers)}"
             )
-    return [k for trial in trials for k, number in enumerate(numbers) if number == trial]
+    return [trial for number in wanted for trial in trials if trial[0].trial == number]
 
 
-def _positions_of_collisions(run: Run) -> list[int]:
-    collided = [k for k, (outcome, *_) in enumerate(run.ends) if outcome == "collision"]
-    if not collided:
-        raise InvalidInputError(f"none of the {len(run.numbers)} trials ended in contact")
-    return collided
-
-
-def _positions_of_worst(count: int, run: Run) -> list[int]:
-    ends, positions = run.ends, dict[int, int]()
-    for position in sorted(range(len(ends)), key=lambda k: -ends[k][2]):
-        positions.setdefault(run.numbers[position], position)
-    if count > len(positions):
+def _worst(trials: Sequence[Trial], count: int) -> list[Trial]:
+    """So many trials that ended farthest from their goals, each number once."""
+    found: dict[int, Trial] = {}
+    for trial in sorted(trials, key=lambda trial: -trial[0].final_distance):
+        found.setdefault(trial[0].trial, trial)
+    if count > len(found):
         raise InvalidInputError(
-            f"--worst {count} asks for more trials than there are: {len(positions)}"
+            f"--worst {count} asks for more trials than there are: {len(found)}"
         )
-    return list(positions.values())[:count]
+    return list(found.values())[:count]

@@ -5,20 +5,16 @@ import time
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from kinarm.evaluation.contestants import ORACLE, Contestant
+from kinarm.evaluation.contestants import Contestant
 from kinarm.evaluation.replay.runs import record
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.oracle import Oracle
-from kinarm.recording import Recording, record_rollouts
+from kinarm.recording import Recording
 from kinarm.simulator import Simulator
 from kinarm.viewer.live_server import LiveServer
 from kinarm.viewer.live_stage import LiveStage
 
-SLOWDOWN = 2.5
-"""How much slower than the arm the page shows its motion."""
-
-REST = 1.2
-"""Pause between trials [s]."""
+SLOWDOWN, REST = 2.5, 1.2
+"""How much slower than the arm the page shows its motion, and the pause between trials [s]."""
 
 
 def fresh_recordings(
@@ -28,22 +24,14 @@ def fresh_recordings(
 
     Parameters
     ----------
-    contestant : Contestant
-        Who faces them.
-    simulator : Simulator
-        Where.
+    contestant, simulator
+        Who faces them, and where.
     seed : int
         That of the first trial; the next ones count up.
     """
-    oracle = Oracle(simulator.problem)
     for number in itertools.count():  # pragma: no branch - it counts without end
-        trials = TrialSet.draw_in(simulator, 1, seed + number)
-        if contestant is ORACLE:  # solved here, so that no bounds are kept of every trial
-            actions = oracle.solve_batch(trials.starts, trials.goals).actions
-            rollouts = simulator.rollout_actions(actions, trials.starts, trials.goals, record=True)
-            (recording,) = record_rollouts(simulator, rollouts, contestant.name)
-        else:
-            (recording,) = record(contestant, trials, allow_other_arm=True)
+        trials = TrialSet.draw(simulator, 1, seed + number)
+        (recording,) = record(contestant, trials, allow_other_arm=True)
         yield replace(recording, trial=number)
 
 
@@ -56,10 +44,8 @@ def follow(
     ----------
     server : LiveServer
         The live page.
-    simulator : Simulator
-        Where the recordings were made.
-    recordings : iterable of Recording
-        They may have no end.
+    simulator, recordings
+        Where and what was recorded; there may be no end of it.
     """
     stage = LiveStage(server, simulator.problem, simulator.arm)
     for recording in recordings:

@@ -1,4 +1,4 @@
-"""What a replay is asked for."""
+"""The request for a replay."""
 
 import webbrowser
 from collections import Counter
@@ -20,10 +20,7 @@ if TYPE_CHECKING:
     from kinarm.recording import Recording
     from kinarm.viewer import ReplayPage
 
-PAGE = Path("replay.html")
-LAST_PORT = 65535
-
-SMALLEST = {"trials": 1, "worst": 1, "seed": 0, "port": 1}
+RANGES = {"trials": (1,), "worst": (1,), "seed": (0,), "port": (1, 65535)}
 ALTERNATIVES = (("policy", "compare"), ("trial", "worst", "collisions", "failures"))
 """Fields of which one at most can be given."""
 
@@ -125,9 +122,9 @@ class ReplayRequest(ProblemOptions):
     }
 
     def __post_init__(self) -> None:
-        for name, smallest in SMALLEST.items():
+        for name, limits in RANGES.items():
             if getattr(self, name) is not None:
-                whole_number(name, getattr(self, name), smallest)
+                whole_number(name, getattr(self, name), *limits)
         for trial in self.trial:
             whole_number("trial", trial, 0)
         for names in ALTERNATIVES:
@@ -136,15 +133,12 @@ class ReplayRequest(ProblemOptions):
                 raise InvalidInputError(f"{given[0]} and {given[1]} exclude each other")
         if self.port is not None and not self.live:
             raise InvalidInputError("--port goes with --live")
-        if self.port is not None and self.port > LAST_PORT:
-            raise InvalidInputError(f"port must be at most {LAST_PORT}, got {self.port}")
         self._refuse("--live", NOT_LIVE if self.live else ())
         self._refuse("trials from a file", NOT_FROM_FILE if self.source else ())
         if self.source is not None and self.source.suffix == ".json":
             self._refuse("trials of an evaluation", ("arm",))
 
     def _refuse(self, mode: str, names: Sequence[str]) -> None:
-        """Refuse fields that mean nothing in a mode."""
         for option in self._given(names):
             raise InvalidInputError(f"{option} does not go with {mode}")
 
@@ -155,17 +149,14 @@ class ReplayRequest(ProblemOptions):
         return ["a file" if item.name == "source" else option_name(item) for item in given]
 
     def run(self, report: Callable[[str], object] = lambda _: None) -> "ReplayPage | None":
-        """Write the page, and the recordings if that is asked for; or serve the live page.
+        """Write the page, and the recordings if that is asked for, and return it.
+
+        Or serve the live page until this is interrupted.
 
         Parameters
         ----------
         report : callable
             Called with lines about what is shown.
-
-        Returns
-        -------
-        ReplayPage or None
-            The page; the live one is served until this is interrupted.
 
         Raises
         ------
@@ -194,17 +185,16 @@ class ReplayRequest(ProblemOptions):
         from kinarm.recording import save_recordings
         from kinarm.viewer import replay_page
 
-        out = self.out or PAGE
+        out = self.out or Path("replay.html")
         check_output(out, overwrite=self.overwrite)
         if self.record is not None:
             check_output(self.record, overwrite=self.overwrite, suffix=".npz")
         with working("recording"):
-            chosen = chosen_recordings(self)
-            runs, groups = chosen.runs, chosen.groups
+            runs, groups, heading = chosen_recordings(self)
             if self.source is None:
                 say_choices([runs[0][0].problem])
             ghosts = runs[1] if len(runs) > 1 else ()
-            page = replay_page(runs[0], ghosts=ghosts, groups=groups, heading=chosen.heading)
+            page = replay_page(runs[0], ghosts=ghosts, groups=groups, heading=heading)
         if self.record is not None:
             save_recordings(self.record, [recording for run in runs for recording in run])
         page.save(out)
@@ -212,7 +202,7 @@ class ReplayRequest(ProblemOptions):
             if note:
                 report(note)
         if groups:
-            report(chosen.heading)
+            report(heading)
             for group, count in Counter(groups).items():
                 report(f"{count:5d}  {group}")
         for trial in zip(*runs, strict=True) if not groups else ():
@@ -222,15 +212,13 @@ class ReplayRequest(ProblemOptions):
         return page
 
     def _serve(self, report: Callable[[str], object]) -> None:
-        """Serve fresh trials until this is interrupted."""
+        from kinarm.evaluation.replay.choosing import named_contestants
         from kinarm.evaluation.replay.live import follow, fresh_recordings
-        from kinarm.evaluation.replay.runs import faced_problem, first_contestant, stated_problem
         from kinarm.simulator import Simulator
         from kinarm.viewer.live_server import PORT, LiveServer
 
-        stated = stated_problem(self, [self.policy])
-        contestant = first_contestant(self.policy, stated)
-        simulator = Simulator(faced_problem([contestant], self, stated))
+        (contestant,), problem = named_contestants(self, [self.policy])
+        simulator = Simulator(problem)
         say_choices([simulator.problem])
         contestant.check(simulator.arm, allow_other_arm=self.allow_other_arm)
         fresh = fresh_recordings(contestant, simulator, self.seed or 0)

@@ -1,4 +1,4 @@
-"""What the page shows as one: a policy, or all training seeds of a recipe."""
+"""Groups that the page shows as one: a policy, or all training seeds of a recipe."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -14,12 +14,9 @@ from kinarm.evaluation.figures import series_labels
 from kinarm.evaluation.table import policy_label, table_rows
 from kinarm.evaluation.trials import TrialSet
 from kinarm.scene import GoalRegion
-from kinarm.task import ReachTask
 
-PAGE_COLOURS = 6
+PAGE_COLOURS, PAGE_DASHES = 6, 4
 """Colours of the style sheet for policies; beyond them, lines are dashed."""
-
-PAGE_DASHES = 4
 
 UNTRAINED_ALGORITHMS = ("baseline", "oracle")
 """Algorithms of the contestants that policies are compared with."""
@@ -46,15 +43,15 @@ class Group:
         """Whether it is neither a baseline nor the oracle."""
         return self.row.algorithm not in UNTRAINED_ALGORITHMS
 
-    @property
-    def is_pooled(self) -> bool:
-        """Whether several training seeds share the row."""
-        return len(self.members) > 1
-
     @cached_property
     def distances(self) -> NDArray[np.float64]:
         """Final distances [m], shape (n_seeds, n_trials)."""
         return np.stack([member.rollouts.distance for member in self.members])
+
+    @cached_property
+    def success(self) -> NDArray[np.bool_]:
+        """Whether trials succeeded, shape (n_seeds, n_trials)."""
+        return np.stack([member.rollouts.success for member in self.members])
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,14 +68,9 @@ class ProblemResults:
         return self.groups[0].members[0].trials
 
     @property
-    def task(self) -> ReachTask:
-        """Its goals and endings."""
-        return self.trials.problem.task
-
-    @property
     def tolerance(self) -> float:
         """Distance within which a goal is reached [m]."""
-        return self.task.tolerance
+        return self.trials.problem.task.tolerance
 
     @property
     def oracle_rate(self) -> float | None:
@@ -88,37 +80,27 @@ class ProblemResults:
     @property
     def goal_regions(self) -> tuple[GoalRegion, ...]:
         """Where goals lie."""
-        scene = self.trials.problem.scene
-        return tuple(scene.goal_region(name) for name in self.task.goal_regions)
-
-    @property
-    def policies(self) -> tuple[Group, ...]:
-        """Those that were trained or written, best first."""
-        return tuple(group for group in self.groups if group.is_policy)
+        problem = self.trials.problem
+        return tuple(problem.scene.goal_region(name) for name in problem.task.goal_regions)
 
     @property
     def contenders(self) -> tuple[Group, ...]:
-        """The policies; where there are none, the baselines; else the oracle."""
+        """The policies, best first; where there are none, the baselines; else the oracle."""
+        policies = tuple(group for group in self.groups if group.is_policy)
         others = tuple(group for group in self.groups if group.row.algorithm != "oracle")
-        return self.policies or others or self.groups
+        return policies or others or self.groups
 
 
 def count_policies(groups: Iterable[Group]) -> str:
     """How many policies there are, as rows of the tables: training seeds of a recipe are one."""
-    count = len({group.name for group in groups})
+    count = len({group.name for group in groups if group.is_policy})
     return f"{count} polic{'y' if count == 1 else 'ies'}"
 
 
 def group_results(
     document: EvaluationDocument, evaluations: Sequence[Evaluation]
 ) -> tuple[ProblemResults, ...]:
-    """Bring the rows of the table together with the evaluations behind them.
-
-    Raises
-    ------
-    InvalidInputError
-        If the document was made of others.
-    """
+    """Bring the rows of the table together with the evaluations behind them."""
     known = {(each.contestant.name, each.problem.name): each for each in evaluations}
     if list(known) != [(row.policy, row.problem) for row in document.results]:
         raise InvalidInputError("a report needs the document of the very evaluations that it shows")
@@ -143,8 +125,7 @@ def _styles(labels: Sequence[str], evaluations: Sequence[Evaluation]) -> dict[st
         if contestant.algorithm in UNTRAINED_ALGORITHMS:
             styles[label] = f"reference {contestant.name}"
         else:
-            styles[label] = (
-                f"colour{policies % PAGE_COLOURS} dash{policies // PAGE_COLOURS % PAGE_DASHES}"
-            )
+            dash, colour = divmod(policies, PAGE_COLOURS)
+            styles[label] = f"colour{colour} dash{dash % PAGE_DASHES}"
             policies += 1
     return styles

@@ -1,10 +1,6 @@
-"""Maps of the goal regions from above, which tell where policies fail.
+"""Maps of the goal regions from above, to scale, which tell where policies fail."""
 
-They are a template of the page: every marker carries its own words, colour and shape, and they
-are to scale, which leaves nothing for a plotting library to work out.
-"""
-
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -16,11 +12,8 @@ from kinarm.scene import GoalRegion, Obstacle
 SCALE = 200
 """Units of the SVG to a metre."""
 
-MAP_MARGIN = 0.07
-"""Beside the outermost region and the arm's base [m]."""
-
-BASE_RADIUS = 0.1
-"""Of the circle that stands for the arm [m]."""
+MAP_MARGIN, BASE_RADIUS, AXIS_LENGTH = 0.07, 0.1, 0.2
+"""Beside what a map has to show, of the circle for the arm's base, and of the world axes [m]."""
 
 MARKERS = 1000
 """Trials of which a map shows markers, the first ones; the figures beside them count all."""
@@ -30,9 +23,6 @@ SLICES = 10
 
 BAR_OFFSET, BAR_LENGTH = 0.02, 0.25
 """Where the bars of failures begin beside the region, and the length of 100 % [m]."""
-
-AXIS_LENGTH = 0.2
-"""Of the world axes [m]."""
 
 DISTANCE_COLOURS = 6
 """Colours of distances: within the tolerance, and twice the distance from one to the next."""
@@ -81,28 +71,12 @@ class View(NamedTuple):
         return self.across(inner - inward * BAR_OFFSET), inward * BAR_LENGTH * SCALE
 
 
-class Fate(NamedTuple):
-    """End of one trial in the hands of one or several training seeds.
-
-    How many reached the goal, the mean of their final distances [m], and the outcome:
-    ``"collision"`` if any touched something, else ``"truncated"`` if any ran out of steps, else
-    ``"success"``.
-    """
-
-    reached: int
-    distance: float
-    outcome: str
-
-
-def fates(group: Group) -> tuple[Fate, ...]:
-    """Ends of all trials in the hands of a group."""
-    success = np.array([member.rollouts.success for member in group.members])
-    collision = np.array([member.rollouts.collision for member in group.members])
-    outcomes = np.where(
-        collision.any(axis=0), "collision", np.where(success.all(axis=0), "success", "truncated")
-    )
-    columns = (success.sum(axis=0), group.distances.mean(axis=0), outcomes)
-    return tuple(map(Fate._make, zip(*(column.tolist() for column in columns), strict=True)))
+def worst_outcomes(group: Group) -> list[str]:
+    """Outcome of each trial: contact if any training seed had it, success if all had."""
+    collision = np.any([member.rollouts.collision for member in group.members], axis=0)
+    success = np.where(group.success.all(axis=0), "success", "truncated")
+    outcomes: list[str] = np.where(collision, "collision", success).tolist()
+    return outcomes
 
 
 def level(distance: float, tolerance: float) -> int:
@@ -112,29 +86,20 @@ def level(distance: float, tolerance: float) -> int:
     return min(int(np.ceil(np.log2(distance / tolerance) - 1e-12)), DISTANCE_COLOURS - 1)
 
 
-class Marker(NamedTuple):
-    """A goal on a map: its place, shape and colour, and the text at the pointer."""
-
-    path: str
-    level: int
-    title: str
-
-
-def markers(results: ProblemResults, group: Group) -> list[Marker]:
-    """Goals of a problem by how a group did, the worst last, on top."""
-    view, shown = View.of(results.goal_regions), fates(group)[:MARKERS]
-    goals, seeds = group.members[0].trials.goals, len(group.members)
-    order = np.argsort([fate.distance for fate in shown], kind="stable").tolist()
-    found = []
-    for trial in order:
-        (x, y, _), fate = goals[trial], shown[trial]
-        path = f"M{view.across(y):.1f},{view.down(x):.1f}{SYMBOLS[fate.outcome]}"
-        ending = f"{fate.distance:.3f} m, {OUTCOME_WORDS[fate.outcome]}"
-        if seeds > 1:
-            ending = f"{fate.reached} of {seeds} seeds reached it, mean {fate.distance:.3f} m"
+def markers(results: ProblemResults, group: Group) -> Iterator[tuple[str, int, str]]:
+    """Path, level of colour and words of the goals of a problem, the worst last, on top."""
+    view, outcomes = View.of(results.goal_regions), worst_outcomes(group)
+    means, reached = group.distances.mean(axis=0), group.success.sum(axis=0)
+    goals = group.members[0].trials.goals
+    for trial in np.argsort(means[:MARKERS], kind="stable").tolist():
+        (x, y, _), distance = goals[trial], means[trial]
+        path = f"M{view.across(y):.1f},{view.down(x):.1f}{SYMBOLS[outcomes[trial]]}"
+        ending = f"{distance:.3f} m, {OUTCOME_WORDS[outcomes[trial]]}"
+        if len(group.members) > 1:
+            seeds = f"{reached[trial]} of {len(group.members)} seeds reached it"
+            ending = f"{seeds}, mean {distance:.3f} m"
         title = f"trial {trial}, goal ({x:.2f}, {y:.2f}): {ending}"
-        found.append(Marker(path, level(fate.distance, results.tolerance), title))
-    return found
+        yield path, level(distance, results.tolerance), title
 
 
 def failure_shares(
@@ -144,22 +109,13 @@ def failure_shares(
 
     Each with the ends of its slice [m], ascending; None where no goal lies.
     """
-    goals = group.members[0].trials.goals
-    failed = 1 - np.mean([member.rollouts.success for member in group.members], axis=0)
+    goals, failed = group.members[0].trials.goals, 1 - group.success.mean(axis=0)
     inside = ((region.lower <= goals) & (goals <= region.upper)).all(axis=1)
     slices = np.linspace(region.lower[0], region.upper[0], SLICES + 1)
     places = np.clip(np.searchsorted(slices, goals[:, 0], side="right") - 1, 0, SLICES - 1)
     rows = [inside & (places == place) for place in range(SLICES)]
     shares = [float(failed[row].mean()) if row.any() else None for row in rows]
     return list(zip(pairwise(slices.tolist()), shares, strict=True))
-
-
-def description(results: ProblemResults, group: Group) -> str:
-    """Description of a map for those who cannot see it."""
-    outcomes = [fate.outcome for fate in fates(group)]
-    every = " by every training seed" if len(group.members) > 1 else ""
-    reached = f"of {len(outcomes)} goals, {outcomes.count('success')} were reached{every}"
-    return f"{group.name} on {results.name}: {reached}"
 
 
 def level_ranges(results: ProblemResults) -> list[str]:

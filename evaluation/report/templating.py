@@ -1,4 +1,4 @@
-"""Templates of the report, the card and other pages."""
+"""Templates of all pages and cards."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -6,17 +6,12 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 
-def template_environment(*packages: str, **settings: Any) -> "Environment":
-    """Where templates are found: in some packages, and here.
-
-    Settings are those of Jinja's ``Environment``.
-
-    A name that a template uses and nobody gives is an error.
-    """
-    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+def template_environment(**settings: Any) -> "Environment":
+    """Jinja's ``Environment`` with these settings, for the templates of all pages."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
 
     return Environment(
-        loader=ChoiceLoader([PackageLoader(name) for name in (*packages, __package__)]),
+        loader=PackageLoader(__package__),
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=StrictUndefined,

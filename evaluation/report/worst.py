@@ -2,22 +2,18 @@
 
 from collections.abc import Sequence
 from itertools import islice
-from typing import Any, NamedTuple
+from typing import NamedTuple
+
+import numpy as np
 
 from kinarm.evaluation.bounds import TrialBounds
 from kinarm.evaluation.evaluation import Evaluation
 from kinarm.evaluation.replay.runs import record
 from kinarm.evaluation.report.groups import Group, ProblemResults
-from kinarm.evaluation.report.maps import OUTCOME_WORDS
 from kinarm.recording import Recording
 
-BEST_GROUPS = 4
-"""Groups of a problem whose worst trials are shown."""
-
-TRIALS = 9
-"""Trials that the groups of a problem share, but at least `AT_LEAST` each."""
-
-AT_LEAST = 3
+BEST_GROUPS, TRIALS, AT_LEAST = 4, 9, 3
+"""Groups of a problem whose worst trials are shown, trials that they share, and the least each."""
 
 
 class WorstTrial(NamedTuple):
@@ -44,47 +40,12 @@ def worst_trials(results: ProblemResults) -> tuple[WorstTrial, ...]:
 
 def _ranked(group: Group) -> list[WorstTrial]:
     """Each trial of a group by the training seed that does worst in it, the worst first."""
-    ranked = sorted(
-        (bool(success), -float(distance), seed, trial)
-        for seed, member in enumerate(group.members)
-        for trial, (success, distance) in enumerate(
-            zip(member.rollouts.success, member.rollouts.distance, strict=True)
-        )
-    )
+    order = np.lexsort((-group.distances.ravel(), group.success.ravel())).tolist()
     found: dict[int, WorstTrial] = {}
-    for *_, seed, trial in ranked:
+    for place in order:
+        seed, trial = divmod(place, group.success.shape[1])
         found.setdefault(trial, WorstTrial(group, group.members[seed], trial))
     return list(found.values())
-
-
-def worst_row(results: ProblemResults, worst: WorstTrial) -> dict[str, Any]:
-    """Row of the page about a trial: its policy, and figures by their headings."""
-    rollouts, trial = worst.evaluation.rollouts, worst.trial
-    figures = {
-        "trial": f"{trial}",
-        "distance m": f"{rollouts.distance[trial]:.3f}",
-        "outcome": describe_outcome(worst),
-        "steps": f"{rollouts.steps[trial]}",
-    }
-    if results.entry.oracle:
-        figures["oracle steps"] = oracle_steps(results.entry.oracle.trials, trial)
-    return {
-        "policy": worst.evaluation.contestant.name,
-        "style": worst.group.style,
-        "trial": trial,
-        "figures": figures,
-    }
-
-
-def describe_outcome(worst: WorstTrial) -> str:
-    """How a trial ended, and what touched what."""
-    outcome = worst.evaluation.outcomes[worst.trial]
-    pair = worst.evaluation.contacts[worst.trial]
-    return (
-        f"{OUTCOME_WORDS[outcome]}: {pair[0]} \N{EN DASH} {pair[1]}"
-        if pair
-        else OUTCOME_WORDS[outcome]
-    )
 
 
 def oracle_steps(bounds: TrialBounds, trial: int) -> str:
@@ -99,13 +60,11 @@ def oracle_steps(bounds: TrialBounds, trial: int) -> str:
 
 def record_worst(chosen: Sequence[WorstTrial]) -> list[Recording]:
     """Run policies on the trials again: one recording for each."""
-    numbers: dict[Evaluation, list[int]] = {}
-    for worst in chosen:
-        numbers.setdefault(worst.evaluation, []).append(worst.trial)
     recordings = {}
-    for each, trials in numbers.items():
+    for each in dict.fromkeys(worst.evaluation for worst in chosen):
+        trials = [worst.trial for worst in chosen if worst.evaluation is each]
         # Whether a policy may face another arm was checked when the evaluation was made.
-        options: dict[str, Any] = {"bounds": each.bounds, "allow_other_arm": True}
-        for recording in record(each.contestant, each.trials, trials, **options):
-            recordings[each, recording.trial] = recording
+        contestant, known = each.contestant, each.bounds
+        made = record(contestant, each.trials, trials, bounds=known, allow_other_arm=True)
+        recordings.update({(each, recording.trial): recording for recording in made})
     return [recordings[worst.evaluation, worst.trial] for worst in chosen]

@@ -1,7 +1,7 @@
 """Environments for Gymnasium: one arm, and a native batch of many; importing it registers them."""
 
 import lazy_loader
-from gymnasium.envs.registration import register, registry
+from gymnasium.envs.registration import register
 
 KINDS = {
     "Reach": ("kinarm.envs.reach:ReachEnv", "kinarm.envs.vector:ReachVectorEnv"),
@@ -12,26 +12,18 @@ KINDS = {
 TASKS = {"Left": "left", "Right": "right", "Both": "both", "": "right"}
 """Problems as they are called in ids; the last id is for those that ``problem`` names."""
 
-ENVIRONMENTS = {
-    f"kinarm/{kind}{task}-v0": problem for kind in KINDS for task, problem in TASKS.items()
-}
+ENVIRONMENTS: dict[str, str] = {}
 """Ids of the environments and their problems."""
 
-
-def register_environments() -> None:
-    """Register the environments that are not registered yet."""
-    for kind, (entry_point, vector_entry_point) in KINDS.items():
-        for task, problem in TASKS.items():
-            name = f"kinarm/{kind}{task}-v0"
-            if name not in registry:
-                register(
-                    id=name,
-                    entry_point=entry_point,
-                    vector_entry_point=vector_entry_point,
-                    kwargs={"problem": problem},
-                )
-
-
-register_environments()
+for kind, (entry_point, vector_entry_point) in KINDS.items():
+    for task, problem in TASKS.items():
+        name = f"kinarm/{kind}{task}-v0"
+        ENVIRONMENTS[name] = problem
+        register(
+            id=name,
+            entry_point=entry_point,
+            vector_entry_point=vector_entry_point,
+            kwargs={"problem": problem},
+        )
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -7,5 +7,3 @@ from .reach import ReachEnv as ReachEnv
 from .vector import ReachVectorEnv as ReachVectorEnv
 
 ENVIRONMENTS: dict[str, str]
-
-def register_environments() -> None: ...

@@ -1,27 +1,31 @@
-"""The frame of every environment: its errors, its life, its specification, and how it is made."""
+"""The frame of every environment: how it is made and ends, its specification, what touched."""
 
 import json
 from collections.abc import Mapping
 from dataclasses import replace
 from enum import Enum
-from typing import Any, cast
+from functools import cached_property
+from typing import Any
 
 import gymnasium.error
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
-from gymnasium.spaces import Box, Space
 from numpy.typing import DTypeLike, NDArray
 
 from kinarm._validation import finite_array
-from kinarm.envs.infos import Contacts
 from kinarm.envs.interface import Interface
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
+from kinarm.envs.scenario_queues import ScenarioQueues
 from kinarm.episodes import Episodes
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.problem import ProblemLike, ReachProblem
+from kinarm.rollouts import StepResult
 from kinarm.simulator import Simulator
+from kinarm.task import REWARD_TERMS
 
 Array = NDArray[np.float64]
+
+TERM_KEYS = tuple(f"reward_{name}" for name in REWARD_TERMS)
 
 SETTINGS = (
     *("render_mode", "width", "height", "camera", "observation_dtype", "reward_type"),
@@ -53,15 +57,7 @@ class Lifecycle:
 
     @property
     def episodes(self) -> Episodes:
-        """The episodes under way, one row per arm.
-
-        Raises
-        ------
-        ClosedEnvironmentError
-            If the environment is closed.
-        ResetNeededError
-            If it was never reset.
-        """
+        """The episodes under way, one row per arm; refused after the end, and before a reset."""
         self._check_open()
         if self._episodes is None:
             raise ResetNeededError("the environment was never begun: call reset()")
@@ -85,14 +81,47 @@ class ArmEnvironment(Lifecycle):
 
     simulator: Simulator
     interface: Interface
-    _pictures: EnvPictures
-    _contacts: Contacts
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 50}  # noqa: RUF012  (as Gymnasium declares it)
     _spec: EnvSpec | None = None
 
-    @property
+    def _set_up(
+        self,
+        simulator: Simulator,
+        num_envs: int,
+        dtype: DTypeLike,
+        render_mode: str | None,
+        **picture: Any,
+    ) -> None:
+        """Take a simulator, and say how its arms are shown."""
+        self.simulator, self.render_mode = simulator, render_mode
+        self.interface = self._make_interface(simulator, dtype)
+        self.metadata = self.interface.metadata
+        self._told = ("distance", *(TERM_KEYS if self.interface.tells_terms else ()))
+        self._queues = ScenarioQueues(simulator.world, num_envs)
+        self._pictures = EnvPictures(simulator, render_mode, num_envs, **picture)
+
+    def _find_contacts(self, episodes: Episodes, result: StepResult) -> None:
+        """Fill in the numbers of the first contacts of a step that are not known yet.
+
+        Only configurations of the step whose bit of ``doubt`` is set can touch.
+        """
+        contact, refused, world = result.contact, result.collision, self.simulator.world
+        if np.count_nonzero(refused) == np.count_nonzero(contact):
+            return
+        rows = (refused & (contact == 0)).nonzero()[0]
+        ways = world.substeps(episodes.q[rows], episodes.target[rows])
+        for row, way, doubt in zip(rows.tolist(), ways, episodes.doubt[rows].tolist(), strict=True):
+            tested = (q for k, q in enumerate(way) if doubt >> k & 1)
+            found = map(world.contact_model.first_in_contact, tested)
+            contact[row] = next((index + 1 for index in found if index is not None), 0)
+
+    def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> Interface:
+        return Interface(simulator, dtype)
+
+    @cached_property
     def contact_names(self) -> tuple[tuple[str, str] | None, ...]:
-        """Names of the two bodies of a contact, by its number in the info."""
-        return self._contacts.names
+        """Names of the two bodies of a contact, by its number in the info; 0 is none."""
+        return (None, *self.simulator.world.contact_model.pair_names)
 
     @property
     def spec(self) -> EnvSpec | None:
@@ -103,29 +132,18 @@ class ArmEnvironment(Lifecycle):
     def spec(self, spec: EnvSpec | None) -> None:
         self._spec = None if spec is None else portable_spec(spec, self.simulator)
 
-    def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> Interface:
-        """Choose how the simulator is shown."""
-        return Interface(simulator, dtype)
-
 
 def make_simulator(
     problem: ProblemLike, threads: int | None, overrides: Mapping[str, Any]
 ) -> Simulator:
-    """Build the simulator of an environment from the environment's arguments.
+    """Build the simulator of an environment.
 
     Parameters
     ----------
-    problem : ReachProblem, str or Path
-        The problem.
-    threads : int, optional
+    problem, threads
         As for `kinarm.Simulator`.
     overrides : mapping
-        Changes to the problem, for `kinarm.ReachProblem.replace`.
-
-    Raises
-    ------
-    UnexpectedArgumentError
-        If a problem has nothing of the name of a change.
+        Changes to the problem, for `kinarm.ReachProblem.replace`; others are unexpected arguments.
     """
     try:
         return Simulator(ReachProblem.load(problem).replace(**overrides), threads=threads)
@@ -137,17 +155,6 @@ def make_simulator(
         ) from error
 
 
-def action_space(simulator: Simulator) -> Space[Any]:
-    """Fractions of the velocity limits."""
-    return cast("Space[Any]", Box(-1.0, 1.0, (simulator.n_actions,), dtype=np.float32))
-
-
-def environment_metadata(simulator: Simulator, **others: Any) -> dict[str, Any]:
-    """Tell Gymnasium how an environment can be rendered, and how many steps make a second."""
-    rate = round(1 / simulator.problem.stepping.time_step)
-    return {"render_modes": list(RENDER_MODES), "render_fps": max(rate, 1), **others}
-
-
 def pick_scenario(
     options: Mapping[str, Any] | None, start: Array, goal: Array
 ) -> tuple[Array, Array]:
@@ -157,15 +164,8 @@ def pick_scenario(
     ----------
     options : mapping, optional
         May hold ``start`` and ``goal``.
-    start : ndarray, shape (n_joints,)
-        Configuration that was drawn [rad or m].
-    goal : ndarray, shape (3,)
-        Position that was drawn [m].
-
-    Raises
-    ------
-    InvalidInputError
-        If an option is unknown, or has the wrong shape or an entry that is not finite.
+    start, goal : ndarray, shape (n_joints,) and (3,)
+        Configuration [rad or m] and position [m] that were drawn.
     """
     given = dict(options or {})
     unknown = set(given) - {"start", "goal"}

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any, Literal, get_args
 
 import numpy as np
-from gymnasium.spaces import Dict
+from gymnasium.spaces import Dict, Space
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from kinarm.envs.environment import ArmEnvironment
@@ -14,7 +14,6 @@ from kinarm.envs.interface import (
     Observations,
     StepOutcome,
     bounded_space,
-    checked_dtype,
     state_bounds,
 )
 from kinarm.envs.reach import ReachEnv
@@ -22,10 +21,8 @@ from kinarm.envs.vector import ReachVectorEnv
 from kinarm.episodes import TRUNCATED, Episodes
 from kinarm.errors import InvalidInputError
 from kinarm.observation import OBSERVATION, part_slices
-from kinarm.problem import ProblemLike
 from kinarm.rollouts import StepResult
 from kinarm.simulator import Simulator
-from kinarm.task import ReachTask
 
 RewardType = Literal["sparse", "dense"]
 
@@ -33,18 +30,8 @@ RewardType = Literal["sparse", "dense"]
 class GoalRewards:
     """Rewards and endings that follow from goals, as hindsight replay needs them."""
 
-    _sparse: bool
-    _tolerance: float
-    _collision: float
-
-    def _reward_by(self, task: ReachTask, reward_type: RewardType) -> None:
-        """Reward as a type says, and as the task says of collisions."""
-        if reward_type not in get_args(RewardType):
-            raise InvalidInputError(
-                f"reward_type must be one of {list(get_args(RewardType))}, got {reward_type!r}"
-            )
-        self._sparse = reward_type == "sparse"
-        self._tolerance, self._collision = task.tolerance, task.reward.collision
+    simulator: Simulator
+    reward_type: RewardType
 
     def compute_reward(
         self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
@@ -62,9 +49,10 @@ class GoalRewards:
         -------
         float or ndarray, shape (...)
         """
-        distance = _distance(achieved_goal, desired_goal)
-        reached = np.where(distance <= self._tolerance, 0.0, -1.0) if self._sparse else -distance
-        return (reached + self._collision * _collided(info))[()]
+        task, distance = self.simulator.task, _distance(achieved_goal, desired_goal)
+        sparse = self.reward_type == "sparse"
+        reached = np.where(distance <= task.tolerance, 0.0, -1.0) if sparse else -distance
+        return (reached + task.reward.collision * _collided(info))[()]
 
     def compute_terminated(
         self,
@@ -79,7 +67,7 @@ class GoalRewards:
         achieved_goal, desired_goal, info
             As for `compute_reward`; infos have no effect.
         """
-        return _distance(achieved_goal, desired_goal) <= self._tolerance
+        return _distance(achieved_goal, desired_goal) <= self.simulator.task.tolerance
 
     def compute_truncated(
         self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
@@ -98,22 +86,7 @@ class GoalInterface(GoalRewards, Interface):
     """Goals as a dictionary, and rewards that can be computed for any goals.
 
     A move that would touch something is refused and costs the problem's reward for a collision.
-    The episode goes on, so giving up never pays.
-
-    Parameters
-    ----------
-    simulator : Simulator
-        The simulator that the environment shows.
-    dtype : dtype_like
-        Type of observations and goals: float64 or float32.
-    reward_type : {"sparse", "dense"}
-        -1 for every step that does not reach the goal and 0 for the one that does, or minus the
-        distance [m].
-
-    Raises
-    ------
-    InvalidInputError
-        If there is no such type.
+    The episode goes on, so giving up never pays. Arguments are as for `ReachGoalEnv`.
     """
 
     tells_terms = False
@@ -124,21 +97,24 @@ class GoalInterface(GoalRewards, Interface):
         dtype: DTypeLike = np.float64,
         reward_type: RewardType = "sparse",
     ) -> None:
-        self._dtype = checked_dtype(dtype)
-        self._reward_by(simulator.task, reward_type)
-        self._horizon = simulator.task.horizon
-        n_joints = simulator.arm.n_joints
-        self._places = part_slices(n_joints)
+        if reward_type not in get_args(RewardType):
+            raise InvalidInputError(
+                f"reward_type must be one of {list(get_args(RewardType))}, got {reward_type!r}"
+            )
+        self.reward_type = reward_type
+        self._places = part_slices(simulator.arm.n_joints)
         self._own = [self._places[part.name] for part in OBSERVATION if not part.of_goal]
-        lower, upper = state_bounds(simulator)
-        goals, reach = self._places["goal"], np.full(3, simulator.arm.reach)
+        super().__init__(simulator, dtype)
+
+    def _space(self) -> Space[Any]:
+        lower, upper = state_bounds(self.simulator)
+        goals, reach = self._places["goal"], np.full(3, self.simulator.arm.reach)
         bounds = {
             "observation": (self._own_parts(lower), self._own_parts(upper)),
             "achieved_goal": (-reach, reach),
             "desired_goal": (lower[goals], upper[goals]),
         }
-        spaces = {name: bounded_space(pair, self._dtype) for name, pair in bounds.items()}
-        self.observation_space = Dict(spaces)
+        return Dict({name: bounded_space(pair, self._dtype) for name, pair in bounds.items()})
 
     def observe(self, observations: Array) -> Observations:
         """Split observations into ``observation``, ``achieved_goal`` and ``desired_goal``."""
@@ -147,11 +123,11 @@ class GoalInterface(GoalRewards, Interface):
         return {"observation": own, "achieved_goal": achieved, "desired_goal": desired}
 
     def _own_parts(self, observations: Array) -> Array:
-        """Copy what does not depend on the goal, shape (..., n)."""
+        """The parts of observations that do not depend on the goal, shape (..., n)."""
         return np.concatenate([observations[..., place] for place in self._own], axis=-1)
 
     def _goals(self, observations: Array) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Copy tool points and goals, shape (n, 3) each [m]."""
+        """Tool points and goals, shape (n, 3) each [m]."""
         goals = observations[:, self._places["goal"]]
         tools = goals - observations[:, self._places["goal_minus_tool"]]
         return tools.astype(self._dtype, copy=False), goals.astype(self._dtype)
@@ -160,7 +136,7 @@ class GoalInterface(GoalRewards, Interface):
         """Reward by the goals, and let episodes go on whose move was refused."""
         truncated = result.truncated
         if np.count_nonzero(result.collision):
-            episodes.resume(result.collision.nonzero()[0], self._horizon)
+            episodes.resume(result.collision.nonzero()[0], self.simulator.task.horizon)
             truncated = truncated | (episodes.status == TRUNCATED) & result.collision
         info = {"collision": result.collision}
         reward = self.compute_reward(*self._goals(episodes.observation), info)
@@ -170,10 +146,13 @@ class GoalInterface(GoalRewards, Interface):
 class GoalEnvironment(GoalRewards, ArmEnvironment):
     """An environment that shows its simulator by a `GoalInterface`."""
 
-    reward_type: RewardType
+    def __init__(
+        self, *arguments: Any, reward_type: RewardType = "sparse", **settings: Any
+    ) -> None:
+        self.reward_type = reward_type
+        super().__init__(*arguments, **settings)
 
     def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> GoalInterface:
-        self._reward_by(simulator.task, self.reward_type)
         return GoalInterface(simulator, dtype, self.reward_type)
 
 
@@ -213,16 +192,6 @@ class ReachGoalEnv(GoalEnvironment, ReachEnv):
     **Versions**: v0, the first.
     """
 
-    def __init__(
-        self,
-        problem: ProblemLike = "right",
-        *,
-        reward_type: RewardType = "sparse",
-        **settings: Any,
-    ) -> None:
-        self.reward_type = reward_type
-        super().__init__(problem, **settings)
-
 
 class ReachGoalVectorEnv(GoalEnvironment, ReachVectorEnv):
     """A native batch of `ReachGoalEnv`.
@@ -234,17 +203,6 @@ class ReachGoalVectorEnv(GoalEnvironment, ReachVectorEnv):
     reward_type : {"sparse", "dense"}
         As for `ReachGoalEnv`.
     """
-
-    def __init__(
-        self,
-        num_envs: int = 1,
-        problem: ProblemLike = "right",
-        *,
-        reward_type: RewardType = "sparse",
-        **settings: Any,
-    ) -> None:
-        self.reward_type = reward_type
-        super().__init__(num_envs, problem, **settings)
 
 
 def _collided(info: Any) -> NDArray[np.bool_]:

@@ -1,14 +1,12 @@
-"""The interface of an environment: observations, rewards and how episodes end.
+"""The interface of every environment: observations, rewards and how episodes end."""
 
-The single environment, the native batch and the one for Stable-Baselines3 share it.
-"""
-
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium.spaces import Box, Space
 from numpy.typing import DTypeLike, NDArray
 
+from kinarm.envs.rendering import RENDER_MODES
 from kinarm.episodes import Episodes
 from kinarm.errors import InvalidInputError
 from kinarm.observation import Ranges, observation_bounds
@@ -25,12 +23,7 @@ DTYPES = ("float64", "float32")
 class StepOutcome(NamedTuple):
     """The outcome of a step, as a learner sees it; arrays of shape (n,).
 
-    Attributes
-    ----------
-    reward : ndarray
-        The reward.
-    terminated, truncated : ndarray of bool
-        Whether the episode ended by itself, or at the horizon.
+    The reward, and whether the episode ended by itself or at the horizon.
     """
 
     reward: Array
@@ -41,27 +34,25 @@ class StepOutcome(NamedTuple):
 class Interface:
     """The way in which an environment shows its simulator: with its own observation and reward.
 
-    Parameters
-    ----------
-    simulator : Simulator
-        What is shown.
-    dtype : dtype_like
-        Of observations: float64 or float32.
-
-    Attributes
-    ----------
-    observation_space : Space
-        Bounds of the observation of one arm.
-    tells_terms : bool
-        Whether the reward is the sum of the problem's reward terms, which infos then tell.
+    Spaces are those of one arm; observations are float64 or float32, actions fractions of the
+    velocity limits. ``tells_terms`` says whether the reward is the sum of the problem's reward
+    terms, which infos then tell.
     """
 
     observation_space: Space[Any]
+    action_space: Space[Any]
     tells_terms = True
 
     def __init__(self, simulator: Simulator, dtype: DTypeLike = np.float64) -> None:
-        self._dtype = checked_dtype(dtype)
-        self.observation_space = bounded_space(state_bounds(simulator), self._dtype)
+        self.simulator, self._dtype = simulator, checked_dtype(dtype)
+        self.action_space = Box(-1.0, 1.0, (simulator.n_actions,), dtype=np.float32)
+        rate = round(1 / simulator.problem.stepping.time_step)
+        self.metadata = {"render_modes": list(RENDER_MODES), "render_fps": max(rate, 1)}
+        self.observation_space = self._space()
+
+    def _space(self) -> Space[Any]:
+        """Space of what `observe` returns for one arm."""
+        return bounded_space(state_bounds(self.simulator), self._dtype)
 
     def observe(self, observations: Array) -> Observations:
         """Copy the simulator's observations, shape (n, n_observations), as they are shown."""
@@ -80,13 +71,7 @@ def one_by_one(observations: Observations, count: int) -> list[Any]:
 
 
 def checked_dtype(dtype: DTypeLike) -> np.dtype[Any]:
-    """Return a type that observations can have.
-
-    Raises
-    ------
-    InvalidInputError
-        If they cannot have it.
-    """
+    """A type that observations can have, or an error."""
     try:
         name = np.dtype(dtype).name
     except TypeError:
@@ -111,4 +96,4 @@ def state_bounds(simulator: Simulator) -> tuple[Array, Array]:
 def bounded_space(bounds: tuple[Array, Array], dtype: np.dtype[Any]) -> Space[Any]:
     """Space of vectors of a type between a lower and an upper bound, shape (n,) each."""
     lower, upper = (bound.astype(dtype) for bound in bounds)
-    return cast("Space[Any]", Box(lower, upper, dtype=dtype.type))
+    return Box(lower, upper, dtype=dtype.type)

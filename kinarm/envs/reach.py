@@ -7,21 +7,11 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from kinarm._validation import finite_array
-from kinarm.envs.environment import (
-    ArmEnvironment,
-    action_space,
-    environment_metadata,
-    make_simulator,
-    pick_scenario,
-)
-from kinarm.envs.infos import TERM_KEYS, Contacts
-from kinarm.envs.interface import Array, Observations
-from kinarm.envs.rendering import RENDER_MODES, EnvPictures
+from kinarm.envs.environment import ArmEnvironment, make_simulator, pick_scenario
+from kinarm.envs.interface import Array, Observations, one_by_one
 from kinarm.episodes import COLLISION, RUNNING, SUCCESS, TRUNCATED, Episodes
-from kinarm.observation import observation_table
 from kinarm.problem import ProblemLike
 from kinarm.rollouts import StepResult
-from kinarm.scenarios import ScenarioStream
 
 FIRST_ROW = np.zeros(1, dtype=np.int64)
 """The only row of a batch of one."""
@@ -34,10 +24,9 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
     ----------
     problem : ReachProblem, str or Path
         ``"left"``, ``"right"``, ``"both"``, a problem file, or a problem.
-    render_mode : {"rgb_array", "rgb_array_list", "human"}, optional
-        What `render` returns: a picture, all pictures since it was last called, or nothing, while
-        a page in the browser follows the arm. Only films, by Gymnasium's ``RecordVideo``, need the
-        extra ``render``.
+    render_mode : {"rgb_array", "human"}, optional
+        What `render` returns: a picture, or nothing, while a page in the browser follows the arm.
+        Only films, by Gymnasium's ``RecordVideo``, need the extra ``render``.
     width, height : int
         Size of pictures [pixels].
     camera : kinarm.viewer.Camera, optional
@@ -57,7 +46,14 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
 
     **Observation** (6 + 7 joints, 48 for the shipped arms), world frame with z up:
 
-    OBSERVATION_TABLE
+    ===== ====================================================== ====
+    Index Meaning                                                Unit
+    ===== ====================================================== ====
+    0-2   position of the goal x, y, z                           m
+    3-5   goal minus tool point x, y, z                          m
+    6-29  orientation of each joint frame, quaternion w, x, y, z 1
+    30-47 position of each joint frame x, y, z                   m
+    ===== ====================================================== ====
 
     Quaternions are composed along the chain, so they have no sign flips over the joint range.
 
@@ -81,8 +77,6 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
     **Versions**: v0, the first.
     """
 
-    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 50}  # noqa: RUF012  (as Gymnasium declares it)
-
     def __init__(
         self,
         problem: ProblemLike = "right",
@@ -94,17 +88,11 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
         observation_dtype: DTypeLike = np.float64,
         **overrides: Any,
     ) -> None:
-        self.simulator = make_simulator(problem, 1, overrides)
-        self.interface = self._make_interface(self.simulator, observation_dtype)
-        self.observation_space = self.interface.observation_space
-        self.action_space = action_space(self.simulator)
-        self.metadata = environment_metadata(self.simulator)
-        self.render_mode = render_mode
         picture = {"width": width, "height": height, "camera": camera}
-        self._pictures = EnvPictures(self.simulator, render_mode, 1, **picture)
-        self._contacts = Contacts(self.simulator.world)
-        self._told = ("distance", *(TERM_KEYS if self.interface.tells_terms else ()))
-        self._stream: ScenarioStream | None = None
+        simulator = make_simulator(problem, 1, overrides)
+        self._set_up(simulator, 1, observation_dtype, render_mode, **picture)
+        self.observation_space = self.interface.observation_space
+        self.action_space = self.interface.action_space
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -112,14 +100,15 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
         """Begin an episode; ``options`` may set ``start`` and ``goal``."""
         self._check_open()
         super().reset(seed=seed)
-        if self._stream is None or seed is not None:
-            self._stream = ScenarioStream(self.simulator.world, self.np_random)
-        start, goal = self._stream.next()
+        if self._episodes is None or seed is not None:
+            self._queues.seed(0, self.np_random)
         if self._episodes is None or options:
-            start, goal = pick_scenario(options, start, goal)
+            drawn = np.empty((1, self.simulator.arm.n_joints)), np.empty((1, 3))
+            self._queues.put(FIRST_ROW, *drawn)
+            start, goal = pick_scenario(options, drawn[0][0], drawn[1][0])
             self._episodes = self.simulator.reset([start], [goal])
         else:
-            self._episodes.q[0], self._episodes.goal[0] = start, goal
+            self._queues.put(FIRST_ROW, self._episodes.q, self._episodes.goal)
             self.simulator.begin(self._episodes, FIRST_ROW)
         self._pictures.begin(FIRST_ROW, self._episodes)
         distance = self._episodes.distance.item()
@@ -128,82 +117,47 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
     def step(self, action: Array) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
         """Move for one time step."""
         episode = self.episodes
-        if episode.status.item() != RUNNING:
-            self._check_action(action)
-            return self._rest(episode)
+        over = episode.status.item() != RUNNING
         try:
             result = self.simulator.step(episode, np.asarray(action)[None])
         except ValueError:  # of the simulator, or of NumPy
-            self._check_action(action)
+            finite_array("action", action, (self.simulator.n_actions,))
             raise
+        if over:
+            self._rest(episode, result)
         reward, terminated, truncated = self.interface.step_outcome(episode, result)
-        self._contacts.find(episode, result)
+        self._find_contacts(episode, result)
         self._pictures.step(episode)
-        return (
-            self._observation(episode),
-            reward.item(),
-            terminated.item(),
-            truncated.item(),
-            self._info(result),
-        )
+        answer = 0.0 if over else reward.item(), terminated.item(), truncated.item()
+        return self._observation(episode), *answer, self._info(result)
 
     def render(self) -> Any:
         """Take a picture of the arm; see ``render_mode``."""
         _ = self.episodes  # refuses if there are none
         pictures = self._pictures.render()
-        if self.render_mode == "rgb_array_list":
-            return [picture for (picture,) in pictures]
         return pictures and pictures[0]
 
     def close(self) -> None:
-        """Close the live page, if there is one; the environment cannot be used any more."""
+        """Close the live page, if there is one; nothing can be done afterwards."""
         self.closed = True
         self._pictures.close()
 
-    def _rest(self, episode: Episodes) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
-        """Answer a step after the end: nothing moves."""
+    def _rest(self, episode: Episodes, result: StepResult) -> None:
+        """Let the result of a step after the end, in which nothing moved, tell of that again."""
         gymnasium.logger.warn(
             "step() was called although the episode is over: call reset() first. "
             "Nothing moves until then, and rewards are 0."
         )
-        result, status = StepResult.empty(1), episode.status
-        result.numbers[:], result.contact[:] = 0.0, episode.touched * (status == COLLISION)
-        result.numbers[1] = episode.distance
+        status = episode.status
         result.flags[:] = np.equal.outer((TRUNCATED, SUCCESS, COLLISION), status)
-        self._contacts.find(episode, result)
-        ended = bool(result.terminated[0]), bool(result.truncated[0])
-        return self._observation(episode), 0.0, *ended, self._info(result)
+        result.contact[:] = episode.touched * (status == COLLISION)
 
     def _observation(self, episode: Episodes) -> Observations:
-        shown = self.interface.observe(episode.observation)
-        if isinstance(shown, dict):
-            return {name: part[0] for name, part in shown.items()}
-        return shown[0]
+        return one_by_one(self.interface.observe(episode.observation), 1)[0]
 
     def _info(self, result: StepResult) -> dict[str, Any]:
-        """Tell about a step."""
         told = dict(zip(self._told, result.numbers[1:, 0].tolist(), strict=False))
         _, success, collision = result.flags[:, 0].tolist()
         told["success"] = told["is_success"] = success
         told["collision"], told["contact"] = collision, result.contact.item()
         return told
-
-    def _check_action(self, action: Array) -> None:
-        """Refuse an action that is not one number for each actuated joint."""
-        finite_array("action", action, (self.simulator.n_actions,))
-
-
-def _rst_table(rows: "list[tuple[str, ...]]") -> str:
-    """Lay out rows, the first of which are headings, as a table in a docstring."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = [
-        " ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    ]
-    rule = " ".join("=" * width for width in widths)
-    return "\n    ".join([rule, lines[0], rule, *lines[1:], rule])
-
-
-ReachEnv.__doc__ = (ReachEnv.__doc__ or "").replace(
-    "OBSERVATION_TABLE", _rst_table([("Index", "Meaning", "Unit"), *observation_table(6)])
-)

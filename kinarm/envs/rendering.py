@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm._validation import whole_number
 from kinarm.episodes import COLLISION, SUCCESS, TRUNCATED, Episodes
 from kinarm.errors import InvalidInputError
 from kinarm.observation import part_slices
 from kinarm.simulator import Simulator
-from kinarm.viewer.camera import Camera, CameraLike, picture_size
+from kinarm.viewer.camera import Camera, CameraLike
 
 if TYPE_CHECKING:
     from kinarm.collision import Contact
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 Picture = NDArray[np.uint8]
 
-RENDER_MODES = ("rgb_array", "rgb_array_list", "human")
+RENDER_MODES = ("rgb_array", "human")
 
 OUTCOMES = {SUCCESS: "success", COLLISION: "collision", TRUNCATED: "truncated"}
 
@@ -37,7 +38,7 @@ class Pictures(tuple[Picture, ...]):
     def tiled(self) -> Picture:
         """All in one picture, row by row from the upper left; empty tiles are white."""
         height, width = self[0].shape[:2]
-        columns = _columns(len(self))
+        columns = math.ceil(math.sqrt(len(self)))
         rows = math.ceil(len(self) / columns)
         sheet = np.full((rows, height, columns, width, 3), 255, dtype=np.uint8)
         for number, picture in enumerate(self):
@@ -63,16 +64,6 @@ class EnvPictures:
         of a quarter of the width and height.
     camera : Camera, optional
         Where pictures are taken from; as the replay page does by default.
-
-    Attributes
-    ----------
-    mode : str or None
-        As given.
-
-    Raises
-    ------
-    InvalidInputError
-        If there is no such mode, or the size or the camera cannot be used.
     """
 
     def __init__(
@@ -89,31 +80,29 @@ class EnvPictures:
             raise InvalidInputError(
                 f"render_mode must be one of {list(RENDER_MODES)} or None, got {mode!r}"
             )
-        self._size = _tile_size(num_envs, *picture_size(width, height))
+        columns = math.ceil(math.sqrt(num_envs))
+        share = math.sqrt(FULL_SIZE) / max(columns, math.sqrt(FULL_SIZE))
+        sides = {"width": width, "height": height}.items()
+        wanted = [whole_number(name, pixels, 1) for name, pixels in sides]
+        self._size = [max(round(pixels * share), 1) for pixels in wanted]
         self._camera = None if camera is None else Camera.checked(camera)
         self.mode = mode
         self._simulator, self._num_envs = simulator, num_envs
-        horizon = 0 if mode is None else simulator.task.horizon
-        self._traces = np.empty((num_envs, horizon + 1, 3) if mode else (0, 0, 3))
+        self._traces = np.empty((num_envs if mode else 0, simulator.task.horizon + 1, 3))
         self._contacts: dict[int, Contact | None] = {}
-        self._frames: list[Pictures] = []
         self._renderer: Renderer | None = None
         self._stage: LiveStage | None = None
         self._begun: Episodes
 
     def begin(self, rows: NDArray[np.int64], episodes: Episodes) -> None:
-        """Take note that the episodes of some arms were begun."""
+        """Take note of the episodes that some arms begin."""
         if self.mode is None:
             return
         self._begun = episodes
         self._traces[rows, 0] = self._tools(episodes)[rows]
         for row in rows.tolist():
             self._contacts.pop(row, None)
-        if self.mode == "rgb_array_list":
-            anew = len(rows) == self._num_envs
-            del self._frames[0 if anew else -1 :]
-            self._frames.append(self._take())
-        elif self.mode == "human" and 0 in rows:
+        if self.mode == "human" and 0 in rows:
             self._live_stage().begin(episodes.q[0], episodes.goal[0])
 
     def step(self, episodes: Episodes) -> None:
@@ -127,42 +116,26 @@ class EnvPictures:
                 self._contacts[row] = self._simulator.world.contact(
                     episodes.q[row], episodes.target[row]
                 )
-        if self.mode == "rgb_array_list":
-            self._frames.append(self._take())
-        elif self.mode == "human":
+        if self.mode == "human":
             stage = self._live_stage()
             stage.show(episodes.q[0])
             stage.draw_trace(*self._way(0))
             stage.pace(self._simulator.problem.stepping.time_step)
-
-    def render(self) -> Any:
-        """Show the arms.
-
-        Returns
-        -------
-        Pictures, list of Pictures or None
-            ``"rgb_array"``: a picture of each arm. ``"rgb_array_list"``: such pictures of all
-            steps since the last call, or since all arms began anew. ``"human"`` or no mode: None.
-        """
-        if self.mode == "rgb_array":
-            return self._take()
-        if self.mode == "rgb_array_list":
-            frames, self._frames = self._frames, []
-            return frames
-        return None
 
     def __getstate__(self) -> dict[str, Any]:
         """Copies draw with a renderer, and on a page, of their own."""
         return {**self.__dict__, "_renderer": None, "_stage": None}
 
     def close(self) -> None:
-        """End the live page, and forget all pictures."""
+        """End the live page."""
         if self._stage is not None:
             self._stage.server.close()
-        self._stage, self._renderer, self._frames = None, None, []
+        self._stage = self._renderer = None
 
-    def _take(self) -> Pictures:
-        """A picture of each arm."""
+    def render(self) -> Pictures | None:
+        """A picture of each arm, if the mode says so."""
+        if self.mode != "rgb_array":
+            return None
         if self._renderer is None:
             from kinarm.viewer.renderer import Renderer
 
@@ -170,17 +143,14 @@ class EnvPictures:
             self._renderer = Renderer(
                 self._simulator.problem, width=width, height=height, camera=self._camera
             )
-        return Pictures(self._picture(self._renderer, row) for row in range(self._num_envs))
-
-    def _picture(self, renderer: Renderer, row: int) -> Picture:
-        """Picture of one arm."""
-        q, goal = self._begun.q[row], self._begun.goal[row]
-        trace, outcome = self._way(row)
-        contact = self._contacts.get(row)
-        return renderer.render(q, goal, trace=trace, outcome=outcome, contact=contact)
+        pictures = []
+        for row, (q, goal) in enumerate(zip(self._begun.q, self._begun.goal, strict=True)):
+            trace, outcome = self._way(row)
+            contact, render = self._contacts.get(row), self._renderer.render
+            pictures.append(render(q, goal, trace=trace, outcome=outcome, contact=contact))
+        return Pictures(pictures)
 
     def _live_stage(self) -> LiveStage:
-        """The live page, opened with the first call."""
         if self._stage is None:
             from kinarm.viewer.live_server import LiveServer
             from kinarm.viewer.live_stage import LiveStage
@@ -199,14 +169,3 @@ class EnvPictures:
         """Tool points, shape (num_envs, 3) [m]."""
         offset = part_slices(self._simulator.arm.n_joints)["goal_minus_tool"]
         return episodes.goal - episodes.observation[:, offset]
-
-
-def _columns(count: int) -> int:
-    """How many pictures stand side by side."""
-    return math.ceil(math.sqrt(count))
-
-
-def _tile_size(count: int, width: int, height: int) -> tuple[int, int]:
-    """Size of each of some pictures [pixels], so that they take the area of four at most."""
-    share = math.sqrt(FULL_SIZE) / max(_columns(count), math.sqrt(FULL_SIZE))
-    return max(round(width * share), 1), max(round(height * share), 1)

@@ -17,6 +17,8 @@ def deal(
 ) -> bool:
     """Copy the next scenario of each of some arms to its row of ``q`` and ``goal``.
 
+    Nothing is dealt, and the answer is no, where one of them has none left.
+
     Parameters
     ----------
     rows : ndarray of int, shape (n,)
@@ -27,11 +29,6 @@ def deal(
         Scenarios; the one of number k has the place k modulo n_kept.
     q, goal : ndarray, shape (n_arms, n_joints) and (n_arms, 3)
         Where to.
-
-    Returns
-    -------
-    bool
-        Whether there was one for each; if not, nothing is dealt.
     """
     for row in rows:
         if taken[row] == drawn[row]:
@@ -49,22 +46,16 @@ def deal(
 class ScenarioQueues:
     """Starts and goals of the successive episodes of many arms, drawn for all of them at a time.
 
-    Those of an arm are what `kinarm.scenarios.ScenarioStream` gives with its generator. There is
-    room for twice as many as are drawn: once an arm has none left, all that have room get some.
-
-    Parameters
-    ----------
-    world : World
-        The world of the problem.
-    rngs : list of numpy.random.Generator
-        Source of randomness of each arm.
+    Those of an arm are what `kinarm.scenarios.draw_scenarios` draws with its generator, a few at a
+    time. There is room for twice as many as are drawn: once an arm has none left, all that have
+    room get some.
     """
 
-    def __init__(self, world: World, rngs: list[np.random.Generator]) -> None:
-        self._world, self._rngs = world, rngs
-        self._starts = np.empty((len(rngs), 2 * PREFETCHED, world.arm.n_joints))
-        self._goals = np.empty((len(rngs), 2 * PREFETCHED, 3))
-        self._taken, self._drawn = np.zeros((2, len(rngs)), dtype=np.int64)
+    def __init__(self, world: World, n_arms: int) -> None:
+        self._world, self._rngs = world, [np.random.default_rng() for _ in range(n_arms)]
+        self._starts = np.empty((n_arms, 2 * PREFETCHED, world.arm.n_joints))
+        self._goals = np.empty((n_arms, 2 * PREFETCHED, 3))
+        self._taken, self._drawn = np.zeros((2, n_arms), dtype=np.int64)
 
     def seed(self, row: int, rng: np.random.Generator) -> None:
         """Give an arm another generator, and forget what was drawn for it."""
@@ -72,14 +63,12 @@ class ScenarioQueues:
         self._taken[row] = self._drawn[row] = 0
 
     def put(self, rows: Rows, q: Array, goal: Array) -> None:
-        """Put the next scenarios of some arms into their rows.
+        """Put the next scenarios of some arms into their rows of configurations and goals.
 
         Parameters
         ----------
-        rows : ndarray of int, shape (n,)
-            The arms.
-        q, goal : ndarray, shape (n_arms, n_joints) and (n_arms, 3)
-            Where to [rad or m].
+        rows, q, goal
+            As for `deal`.
         """
         queues = self._taken, self._drawn, self._starts, self._goals
         if not deal(rows, *queues, q, goal):

@@ -1,6 +1,7 @@
 """The Gymnasium environment for many arms, stepped as one batch."""
 
 from collections.abc import Sequence
+from itertools import chain, repeat
 from typing import Any
 
 import numpy as np
@@ -9,17 +10,8 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import DTypeLike, NDArray
 
 from kinarm._validation import whole_number
-from kinarm.envs.environment import (
-    ArmEnvironment,
-    action_space,
-    environment_metadata,
-    make_simulator,
-    pick_scenario,
-)
-from kinarm.envs.infos import Contacts, StepInfos, taken_out
+from kinarm.envs.environment import ArmEnvironment, make_simulator, pick_scenario
 from kinarm.envs.interface import Array, Observations, one_by_one
-from kinarm.envs.rendering import RENDER_MODES, EnvPictures
-from kinarm.envs.scenario_queues import ScenarioQueues
 from kinarm.episodes import RUNNING, Episodes
 from kinarm.errors import InvalidInputError
 from kinarm.problem import ProblemLike
@@ -53,7 +45,7 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012  (as Gymnasium declares it)
-        "render_modes": list(RENDER_MODES),
+        **ArmEnvironment.metadata,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
 
@@ -81,19 +73,18 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
                 f"got {autoreset_mode!r}"
             ) from error
         horizon = {} if max_episode_steps is None else {"horizon": max_episode_steps}
-        self.simulator = make_simulator(problem, threads, {**horizon, **overrides})
-        self.interface = self._make_interface(self.simulator, observation_dtype)
-        self.metadata = environment_metadata(self.simulator, autoreset_mode=self.autoreset_mode)
-        self.num_envs, self.render_mode = num_envs, render_mode
+        simulator = make_simulator(problem, threads, {**horizon, **overrides})
+        picture = {"width": width, "height": height, "camera": camera}
+        self._set_up(simulator, num_envs, observation_dtype, render_mode, **picture)
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
+        self.num_envs = num_envs
         self.single_observation_space = self.interface.observation_space
-        self.single_action_space = action_space(self.simulator)
+        self.single_action_space = self.interface.action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        picture = {"width": width, "height": height, "camera": camera}
-        self._pictures = EnvPictures(self.simulator, render_mode, num_envs, **picture)
-        self._contacts = Contacts(self.simulator.world)
-        self._infos = StepInfos(tells_terms=self.interface.tells_terms)
-        self._queues: ScenarioQueues
+        entries = (*self._told, "success", "collision", "contact")
+        self._numbers = slice(1, 1 + len(self._told))
+        self._told = (*entries, *(f"_{key}" for key in entries))
 
     def reset(
         self,
@@ -110,8 +101,12 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
         chosen = dict(options or {})
         rows = self._masked_rows(chosen.pop("reset_mask", None))
         seeds = self._seeds(seed)
-        start, goal = self._checked_choice(chosen)
-        self._seed_queues(seeds, rows)
+        start, goal = pick_scenario(chosen, self.simulator.arm.home, np.zeros(3))
+        if "start" in chosen:
+            self.simulator.reset(start[None], goal[None])  # refuses what no episode can start at
+        for row in rows.tolist():
+            if seeds[row] is not None:
+                self._queues.seed(row, np.random.default_rng(seeds[row]))
         if self._episodes is None:
             places = np.empty((self.num_envs, len(start))), np.empty((self.num_envs, 3))
         else:
@@ -146,12 +141,13 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
         result = self.simulator.step(episodes, actions)
         reward, terminated, truncated = self.interface.step_outcome(episodes, result)
         self._pictures.step(episodes)
-        self._contacts.find(episodes, result)
-        tables = self._infos.tables(result)
+        self._find_contacts(episodes, result)
+        # Infos as rows of a few tables, which are split at once where episodes are replaced.
+        tables = result.numbers[self._numbers], result.flags[1:], result.contact[None]
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             infos = self._with_finals(episodes, tables, terminated | truncated)
         else:
-            infos = self._infos.named(tables, running)
+            infos = self._named(tables, running)
             if resting:
                 rows = (~running).nonzero()[0]
                 reward[rows] = 0.0
@@ -164,22 +160,32 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
         return self._pictures.render()
 
     def close_extras(self, **_: Any) -> None:
-        """Close the live page, if there is one; the environment cannot be used any more."""
+        """Close the live page, if there is one."""
         self._pictures.close()
+
+    def _named(
+        self, tables: tuple[NDArray[Any], ...], told: NDArray[np.bool_]
+    ) -> dict[str, NDArray[Any]]:
+        """Name the rows of the tables, and add the mask of the arms of which they tell."""
+        infos = dict(zip(self._told, chain(*tables, repeat(told)), strict=False))
+        infos["is_success"], infos["_is_success"] = infos["success"], told
+        return infos
 
     def _with_finals(
         self, episodes: Episodes, tables: tuple[NDArray[Any], ...], over: NDArray[np.bool_]
     ) -> dict[str, Any]:
-        """Infos of a step, after which episodes that are over were replaced."""
+        """Infos of a step, after which episodes that are over are replaced."""
         rows = over.nonzero()[0]
         if not rows.size:
-            return self._infos.named(tables, ~over)
-        finals = self._infos.named(tuple(taken_out(table, over) for table in tables), over)
+            return self._named(tables, ~over)
+        finals = self._named(tuple(np.where(over, table, False) for table in tables), over)
+        for table in tables:
+            np.copyto(table, False, where=over)  # which is a zero of every type
         final_obs = np.empty(self.num_envs, dtype=object)
         shown = one_by_one(self.interface.observe(episodes.observation[rows]), rows.size)
         for row, observation in zip(rows.tolist(), shown, strict=True):
             final_obs[row] = observation
-        infos: dict[str, Any] = self._infos.named(tables, ~over)
+        infos: dict[str, Any] = self._named(tables, ~over)
         infos.update(final_obs=final_obs, _final_obs=over, final_info=finals, _final_info=over)
         self._renew(episodes, rows, infos)
         return infos
@@ -193,25 +199,7 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
         infos["_distance"] = infos["_distance"].copy()  # which is no longer that of the others
         infos["_distance"][rows] = True
 
-    def _checked_choice(self, chosen: dict[str, Any]) -> tuple[Array, Array]:
-        """A start and a goal for all, of which those chosen count; refused if they are bad."""
-        start, goal = pick_scenario(chosen, self.simulator.arm.home, np.zeros(3))
-        if "start" in chosen:
-            self.simulator.reset(start[None], goal[None])
-        return start, goal
-
-    def _seed_queues(self, seeds: list[int | None], rows: NDArray[np.int64]) -> None:
-        """Draw the scenarios to come of some arms with these seeds; all arms need a first one."""
-        if self._episodes is None:
-            rngs = [np.random.default_rng(seed) for seed in seeds]
-            self._queues = ScenarioQueues(self.simulator.world, rngs)
-            return
-        for row in rows.tolist():
-            if seeds[row] is not None:
-                self._queues.seed(row, np.random.default_rng(seeds[row]))
-
     def _masked_rows(self, mask: object) -> NDArray[np.int64]:
-        """Rows to reset."""
         if mask is None:
             return np.arange(self.num_envs)
         if self._episodes is None:
@@ -224,7 +212,6 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
         return np.flatnonzero(array)
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
-        """Seeds of the sub-environments."""
         if seed is None:
             return [None] * self.num_envs
         if isinstance(seed, int | np.integer):

@@ -180,10 +180,8 @@ def closest_pairs(
 
     Parameters
     ----------
-    first, last : int
-        Range of the rows.
-    chain, bodies : Chain and Bodies
-        The arm, and what is measured.
+    first, last, chain, bodies
+        Range of the rows, the arm, and what is measured.
     configurations : ndarray, shape (n, n_joints)
         Joint positions [rad or m].
     bounds : ndarray, shape (n, n_pairs)
@@ -198,7 +196,7 @@ def closest_pairs(
     n_pairs = bodies.pairs.shape[0]
     known = np.empty(n_pairs, dtype=np.bool_)
     for row in range(first, last):
-        forward_kinematics(*chain[:4], configurations, row, poses)
+        forward_kinematics(chain, configurations, row, poses)
         # Bound all distances from below, then measure those of the least bounds.
         for pair in range(n_pairs):
             one, other = bodies.pairs[pair, 0], bodies.pairs[pair, 1]

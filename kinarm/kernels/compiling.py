@@ -67,7 +67,16 @@ def _linked(function: Function, **more: Any) -> Function:
         "no_cfunc_wrapper": True,
         "pipeline_class": HelperCompiler,
     }
-    return cast("Function", compiled_once(njit(**options, **more)(function)))
+    dispatcher: Any = njit(**options, **more)(function)
+    find = dispatcher.get_call_template
+
+    def get_call_template(arguments: list[Any], keywords: dict[str, Any]) -> Any:
+        # Once for all numbers: by itself, Numba compiles a helper anew for each literal.
+        named = {name: types.unliteral(kind) for name, kind in keywords.items()}
+        return find([types.unliteral(kind) for kind in arguments], named)
+
+    dispatcher.get_call_template = get_call_template
+    return cast("Function", dispatcher)
 
 
 WITHOUT = {
@@ -86,57 +95,19 @@ WITHOUT = {
 that are spliced in, literals, and expressions of whole arrays. They take a twelfth of the time."""
 
 
-class KernelCompiler(CompilerBase):
-    """Numba's compiler, without collecting garbage: it keeps nearly all that it makes."""
-
-    def define_pipelines(self) -> list[Any]:
-        """Take those of Numba's passes that do something for kernels."""
-        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        passes.passes = [each for each in passes.passes if each[0].__name__ not in WITHOUT]
-        return [passes]
-
-    def compile_extra(self, func: Callable[..., Any]) -> Any:
-        """Compile a function, and the helpers that it calls."""
-        collects = gc.isenabled()
-        gc.disable()
-        try:
-            with doing(COMPILING):
-                return super().compile_extra(func)
-        finally:
-            if collects:
-                gc.enable()
-
-
-class LeanCompiler(KernelCompiler):
-    """Compiles a kernel into a `LeanLibrary`."""
-
-    def compile_extra(self, func: Callable[..., Any]) -> Any:
-        """Compile a kernel, and the helpers that it calls."""
-        codegen = self.state.targetctx.codegen()
-        self.state.library = LeanLibrary(codegen, func.__qualname__)
-        self.state.library.enable_object_caching()
-        return super().compile_extra(func)
-
-
 class LeanLibrary(JITCodeLibrary):
     """Code of a kernel in lanes, optimised once; Numba does so twice, to prune reference counts.
 
     LLVM does not look for loops to make vectors of: lanes are vectors already.
     """
 
+    def __init__(self, codegen: Any, name: str) -> None:
+        super().__init__(codegen, name)
+        self.enable_object_caching()
+
     def _optimize_final_module(self) -> None:
         passes, builder = self._codegen._module_pass_manager(loop_vectorize=False)
         passes.run(self._final_module, builder)
-
-
-class HelperCompiler(KernelCompiler):
-    """Compiles what only kernels call, into a `LinkedLibrary`."""
-
-    def compile_extra(self, func: Callable[..., Any]) -> Any:
-        """Compile a helper, and those that it calls."""
-        codegen = self.state.targetctx.codegen()
-        self.state.library = LinkedLibrary(codegen, func.__qualname__)
-        return super().compile_extra(func)
 
 
 class LinkedLibrary(JITCodeLibrary):
@@ -163,13 +134,40 @@ class LinkedLibrary(JITCodeLibrary):
         return 0
 
 
-def compiled_once(dispatcher: Any) -> Any:
-    """Let a helper be compiled once for all numbers: by itself, Numba does so for each literal."""
-    find = dispatcher.get_call_template
+class KernelCompiler(CompilerBase):
+    """Numba's compiler, without collecting garbage: it keeps nearly all that it makes."""
 
-    def get_call_template(arguments: list[Any], keywords: dict[str, Any]) -> Any:
-        named = {name: types.unliteral(kind) for name, kind in keywords.items()}
-        return find([types.unliteral(kind) for kind in arguments], named)
+    library: type[JITCodeLibrary] | None = None
+    """Instead of Numba's own."""
 
-    dispatcher.get_call_template = get_call_template
-    return dispatcher
+    def define_pipelines(self) -> list[Any]:
+        """Take those of Numba's passes that do something for kernels."""
+        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes.passes = [each for each in passes.passes if each[0].__name__ not in WITHOUT]
+        return [passes]
+
+    def compile_extra(self, func: Callable[..., Any]) -> Any:
+        """Compile a function, and the helpers that it calls."""
+        if self.library is not None:
+            codegen = self.state.targetctx.codegen()
+            self.state.library = self.library(codegen, func.__qualname__)
+        collects = gc.isenabled()
+        gc.disable()
+        try:
+            with doing(COMPILING):
+                return super().compile_extra(func)
+        finally:
+            if collects:
+                gc.enable()
+
+
+class LeanCompiler(KernelCompiler):
+    """Compiles a kernel into a `LeanLibrary`."""
+
+    library = LeanLibrary
+
+
+class HelperCompiler(KernelCompiler):
+    """Compiles what only kernels call, into a `LinkedLibrary`."""
+
+    library = LinkedLibrary

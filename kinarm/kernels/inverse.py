@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, Vector, helper, inlined, kernel
 from kinarm.kernels.elementary import nearest_whole
-from kinarm.kernels.kinematics import POSE, forward_kinematics, rotated, spatial_jacobian, to_world
+from kinarm.kernels.kinematics import POSE, place, rotated, spatial_jacobian, to_world
 from kinarm.kernels.lanes import LANES, any_lane, as_lanes, as_numbers, lane_bits, select
 
 PRECISION = 1e-10
@@ -134,32 +134,22 @@ def damped_step(jacobian: Array, error: Array, damping: float, square: Array, st
             step[k] += jacobian[i, k] * solved[i]
 
 
-@inlined
-def difference(first: float, second: float, turns: bool) -> float:
-    """Difference of two joint positions, whole turns apart if the joint turns without end."""
-    apart = first - second
-    if turns:
-        apart -= TURN * nearest_whole(apart / TURN)
-    return abs(apart)
-
-
 @helper
 def keep_new(
     q: Array,
     lane: int,
     search: Search,
-    prismatic: NDArray[np.bool_],
-    lower: Array,
-    upper: Array,
+    chain: Chain,
+    n: int,
     configurations: Array,
     hits: NDArray[np.int64],
     found: int,
 ) -> int:
     """Add what a lane holds to the solutions found, unless it is there or out of the limits.
 
-    Returns how many there are.
+    The first n joints move. Returns how many there are.
     """
-    n = lower.shape[0]
+    prismatic, lower, upper = chain.prismatic, chain.lower, chain.upper
     for k in range(configurations.shape[1]):
         value = q[0, k, lane]
         if k < n:
@@ -177,9 +167,10 @@ def keep_new(
     for other in range(found):
         apart = 0.0
         for k in range(n):
-            turns = not prismatic[k] and upper[k] - lower[k] >= TURN
-            here, there = configurations[found, k], configurations[other, k]
-            apart = max(apart, difference(here, there, turns))
+            difference = configurations[found, k] - configurations[other, k]
+            if not prismatic[k] and upper[k] - lower[k] >= TURN:
+                difference -= TURN * nearest_whole(difference / TURN)
+            apart = max(apart, abs(difference))
         if apart <= search.separation:
             hits[other] += 1
             return found
@@ -204,10 +195,8 @@ def solve_targets(
 
     Parameters
     ----------
-    first, last : int
-        Range of the rows.
-    chain, search : Chain and Search
-        The arm, and what is looked for.
+    first, last, chain, search
+        Range of the rows, the arm, and what is looked for.
     positions, directions : ndarray, shape (n_targets, 3) and (n_targets, n_axes, 3)
         Wanted tool points [m], and directions of the tool's axes.
     configurations : ndarray, shape (n_targets, most + 1, n_joints)
@@ -215,7 +204,7 @@ def solve_targets(
     counts : ndarray of int, shape (n_targets,)
         Where it goes how many there are of each target.
     """
-    prismatic, translation, rotation, axis = chain[:4]
+    prismatic = chain.prismatic
     n_joints, (n_seeds, n) = configurations.shape[2], search.seeds.shape
     most, n_axes, tool = configurations.shape[1] - 1, directions.shape[1], search.tool
     rows = 3 if n_axes == 0 else 6
@@ -254,7 +243,7 @@ def solve_targets(
             if n_moving == 0:
                 break
             # Errors of position and orientation, and the Jacobian by which they change.
-            forward_kinematics(prismatic, translation, rotation, axis, q, 0, poses)
+            place(chain, q, poses)
             point = to_world(poses, n_joints, tool[0], tool[1], tool[2])
             spatial_jacobian(chain, poses, point, jacobian)
             squared = 0.0 * point[0]
@@ -284,17 +273,8 @@ def solve_targets(
                 if ended_bits >> lane & 1:
                     tried, n_moving = tried + 1, n_moving - 1
                     if arrived_bits >> lane & 1 and found < most:
-                        found = keep_new(
-                            numbers,
-                            lane,
-                            search,
-                            prismatic,
-                            lower,
-                            upper,
-                            configurations[target],
-                            hits,
-                            found,
-                        )
+                        row = configurations[target]
+                        found = keep_new(numbers, lane, search, chain, n, row, hits, found)
             free |= ended_bits
             # End as soon as there are enough solutions, or every one was found often enough.
             if found == most:

@@ -12,28 +12,20 @@ POSE = 16
 
 
 @helper
-def forward_kinematics(
-    prismatic: NDArray[np.bool_],
-    translation: Array,
-    rotation: Array,
-    axis: Array,
-    configurations: Array,
-    row: int,
-    poses: Array,
-) -> None:
+def forward_kinematics(chain: Chain, configurations: Array, row: int, poses: Array) -> None:
     """Fill in the world poses of all joint frames at a row of configurations [rad or m].
 
     Quaternions are composed along the chain, so they are continuous in the joint positions.
     """
+    prismatic, translation = chain.prismatic, chain.translation
+    rotation, axis = chain.rotation, chain.axis
     for i in range(POSE):
         poses[0, i] = 1.0 if i == 0 or i == 4 or i == 8 or i == 12 else 0.0
     for k in range(configurations.shape[1]):
         # The origin of the frame, in the one before.
         c = k + 1
         tx, ty, tz = translation[k, 0], translation[k, 1], translation[k, 2]
-        poses[c, 13] = poses[k, 13] + (poses[k, 4] * tx + poses[k, 5] * ty + poses[k, 6] * tz)
-        poses[c, 14] = poses[k, 14] + (poses[k, 7] * tx + poses[k, 8] * ty + poses[k, 9] * tz)
-        poses[c, 15] = poses[k, 15] + (poses[k, 10] * tx + poses[k, 11] * ty + poses[k, 12] * tz)
+        poses[c, 13], poses[c, 14], poses[c, 15] = to_world(poses, k, tx, ty, tz)
         # The frame's turn about its axis, after its fixed rotation.
         fw, fx, fy, fz = rotation[k, 0], rotation[k, 1], rotation[k, 2], rotation[k, 3]
         ax, ay, az = axis[k, 0], axis[k, 1], axis[k, 2]
@@ -65,22 +57,16 @@ def forward_kinematics(
         poses[c, 11] = 2.0 * (y * z + w * x)
         poses[c, 12] = 1.0 - 2.0 * (x * x + y * y)
         if prismatic[k]:
-            poses[c, 13] += configurations[row, k] * (
-                poses[c, 4] * ax + poses[c, 5] * ay + poses[c, 6] * az
-            )
-            poses[c, 14] += configurations[row, k] * (
-                poses[c, 7] * ax + poses[c, 8] * ay + poses[c, 9] * az
-            )
-            poses[c, 15] += configurations[row, k] * (
-                poses[c, 10] * ax + poses[c, 11] * ay + poses[c, 12] * az
-            )
+            ax, ay, az = rotated(poses, c, ax, ay, az)
+            poses[c, 13] += configurations[row, k] * ax
+            poses[c, 14] += configurations[row, k] * ay
+            poses[c, 15] += configurations[row, k] * az
 
 
 @inlined
 def place(chain: Chain, configurations: Array, poses: Array) -> None:
     """Fill in the world poses at the first row of the configurations; see `forward_kinematics`."""
-    prismatic, translation, rotation = chain.prismatic, chain.translation, chain.rotation
-    forward_kinematics(prismatic, translation, rotation, chain.axis, configurations, 0, poses)
+    forward_kinematics(chain, configurations, 0, poses)
 
 
 @inlined
@@ -103,10 +89,7 @@ def point_jacobian(
     """
     for k in range(jacobian.shape[1]):
         c = k + 1
-        ax, ay, az = axis[k, 0], axis[k, 1], axis[k, 2]
-        wx = poses[c, 4] * ax + poses[c, 5] * ay + poses[c, 6] * az
-        wy = poses[c, 7] * ax + poses[c, 8] * ay + poses[c, 9] * az
-        wz = poses[c, 10] * ax + poses[c, 11] * ay + poses[c, 12] * az
+        wx, wy, wz = rotated(poses, c, axis[k, 0], axis[k, 1], axis[k, 2])
         if prismatic[k]:
             jacobian[0, k], jacobian[1, k], jacobian[2, k] = wx, wy, wz
         else:
@@ -145,7 +128,7 @@ def spatial_jacobian(chain: Chain, poses: Array, point: Vector, jacobian: Array)
     Per unit speed of each of the first joints, beyond which the point lies; the Jacobian has the
     shape (6, n), or (3, n) without angular velocities.
     """
-    prismatic, axis = chain[0], chain[3]
+    prismatic, axis = chain.prismatic, chain.axis
     point_jacobian(prismatic, axis, poses, point, jacobian)
     for k in range(jacobian.shape[1] if jacobian.shape[0] == 6 else 0):
         x, y, z = rotated(poses, k + 1, axis[k, 0], axis[k, 1], axis[k, 2])
@@ -167,14 +150,10 @@ def place_frame(
 
     Parameters
     ----------
-    first, last : int
-        Range of the rows.
-    chain : Chain
-        The arm.
-    joint : int
-        The joint that carries the frame; 0 is the world.
-    placement : ndarray, shape (4, 4)
-        Where it is in the joint's frame [m].
+    first, last, chain
+        Range of the rows, and the arm.
+    joint, placement : int and ndarray, shape (4, 4)
+        The joint that carries the frame, 0 is the world, and where it is in that one's frame [m].
     configurations : ndarray, shape (n, n_joints)
         Joint positions [rad or m].
     transforms : ndarray, shape (n, 4, 4)
@@ -182,7 +161,7 @@ def place_frame(
     """
     poses = np.zeros((configurations.shape[1] + 1, POSE))
     for row in range(first, last):
-        forward_kinematics(*chain[:4], configurations, row, poses)
+        forward_kinematics(chain, configurations, row, poses)
         for k in range(3):
             x, y, z = placement[0, k], placement[1, k], placement[2, k]
             x, y, z = rotated(poses, joint, x, y, z)
@@ -212,11 +191,8 @@ def move_frame(
     jacobians : ndarray, shape (n, 6, n_joints)
         Where its Jacobians go; columns of the joints beyond the frame are left as they are.
     """
-    poses, jacobian = np.zeros((configurations.shape[1] + 1, POSE)), np.empty((6, joint))
+    poses = np.zeros((configurations.shape[1] + 1, POSE))
     for row in range(first, last):
-        forward_kinematics(*chain[:4], configurations, row, poses)
+        forward_kinematics(chain, configurations, row, poses)
         point = to_world(poses, joint, placement[0, 3], placement[1, 3], placement[2, 3])
-        spatial_jacobian(chain, poses, point, jacobian)
-        for i in range(6):
-            for k in range(joint):
-                jacobians[row, i, k] = jacobian[i, k]
+        spatial_jacobian(chain, poses, point, jacobians[row, :, :joint])

@@ -160,9 +160,8 @@ _teach(abs, lanes, lanes, 1, _call("fabs"))
 _teach(math.sqrt, lanes, lanes, 1, _call("sqrt"))
 
 
-def instruction(function: Callable[..., Any]) -> Any:
-    """Numba's ``intrinsic``: kernels call what is written for the types of their arguments."""
-    return intrinsic(function)
+instruction: Any = intrinsic
+"""Kernels call what is written for the types of their arguments."""
 
 
 @instruction
@@ -227,53 +226,42 @@ def lane_bits(_: Any, condition: types.Type) -> Any:
 @instruction
 def as_lanes(_: Any, array: types.Array) -> Any:
     """View a C-contiguous array of float64 whose last axis has `LANES` entries as one of lanes."""
-    view = types.Array(lanes, array.ndim - 1, "C", aligned=False)
-
-    def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        return _viewed(context, builder, (array, view), arguments[0], lambda shape: shape[:-1])
-
-    return view(array), code
+    return _viewed(array, types.Array(lanes, array.ndim - 1, "C", aligned=False))
 
 
 @instruction
 def as_numbers(_: Any, array: types.Array) -> Any:
     """View a C-contiguous array of lanes as one of float64, which has one axis more."""
-    view = types.Array(types.float64, array.ndim + 1, "C")
+    return _viewed(array, types.Array(types.float64, array.ndim + 1, "C"))
+
+
+def _viewed(array: types.Array, view: types.Array) -> Any:
+    """Signature and code of a view that has the last axis, that of the episodes, more or less."""
 
     def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        many = context.get_constant(types.intp, LANES)
-        return _viewed(context, builder, (array, view), arguments[0], lambda shape: [*shape, many])
+        from numba.core import cgutils
+        from numba.core.imputils import impl_ret_borrowed
+        from numba.np.arrayobj import make_array
+
+        given = make_array(array)(context, builder, arguments[0])
+        shape = [*cgutils.unpack_tuple(builder, given.shape, array.ndim), ir.IntType(64)(LANES)]
+        owner = {"meminfo": given.meminfo, "parent": given.parent}
+        made = array_at(context, builder, view, given.data, shape[: view.ndim], **owner)
+        return impl_ret_borrowed(context, builder, view, made)
 
     return view(array), code
 
 
-def _viewed(
-    context: Any,
-    builder: Any,
-    kinds: tuple[types.Array, types.Array],
-    value: Any,
-    reshaped: Callable[[list[Any]], list[Any]],
+def array_at(
+    context: Any, builder: Any, kind: types.Array, data: Any, shape: list[Any], **owner: Any
 ) -> Any:
-    """View an array as one of another type and shape."""
-    from numba.core import cgutils
-    from numba.core.imputils import impl_ret_borrowed
+    """Make an array of a type and shape, in C order, of what begins at an address."""
     from numba.np.arrayobj import make_array, populate_array
 
-    given = make_array(kinds[0])(context, builder, value)
-    made = make_array(kinds[1])(context, builder)
-    shape = reshaped(list(cgutils.unpack_tuple(builder, given.shape, kinds[0].ndim)))
-    size = context.get_constant(types.intp, 8 * (LANES if kinds[1].dtype == lanes else 1))
-    strides = [size]
+    made, entry = make_array(kind)(context, builder), context.get_data_type(kind.dtype)
+    strides = [ir.IntType(64)(context.get_abi_sizeof(entry))]
     for length in shape[:0:-1]:
         strides.insert(0, builder.mul(strides[0], length))
-    pointer = (NUMBERS if kinds[1].dtype == lanes else ir.DoubleType()).as_pointer()
-    populate_array(
-        made,
-        data=builder.bitcast(given.data, pointer),
-        shape=shape,
-        strides=strides,
-        itemsize=size,
-        meminfo=given.meminfo,
-        parent=given.parent,
-    )
-    return impl_ret_borrowed(context, builder, kinds[1], made._getvalue())
+    data = builder.bitcast(data, entry.as_pointer())
+    populate_array(made, data=data, shape=shape, strides=strides, itemsize=strides[-1], **owner)
+    return made._getvalue()

@@ -54,22 +54,13 @@ def affine_layer(
 @helper
 def activate(kind: int, values: Array, row: int, n: int) -> None:
     """Apply an activation function to the first n entries of a row."""
-    if kind == TANH:
-        for j in range(n):
-            values[row, j] = hyperbolic_tangent(values[row, j])
-    elif kind == RELU:
-        for j in range(n):
-            values[row, j] = max(values[row, j], 0.0)
-    elif kind != LINEAR:
-        activate_unusual(kind, values, row, n)
-
-
-@helper
-def activate_unusual(kind: int, values: Array, row: int, n: int) -> None:
-    """Apply one of the functions that few policies have; called, it keeps `activate` short."""
-    for j in range(n):
+    for j in range(n if kind != LINEAR else 0):
         x = values[row, j]
-        if kind == HARDTANH:
+        if kind == TANH:
+            values[row, j] = hyperbolic_tangent(x)
+        elif kind == RELU:
+            values[row, j] = max(x, 0.0)
+        elif kind == HARDTANH:
             values[row, j] = min(max(x, -1.0), 1.0)
         elif kind == ELU:
             t = hyperbolic_tangent(0.5 * min(x, 0.0))
@@ -89,20 +80,10 @@ def act(
     hidden: Array,
     action: Array,
 ) -> None:
-    """Let a network choose an action.
+    """Let a network choose an action, shape (1, n_actions), for its inputs, shape (1, n_inputs).
 
-    Parameters
-    ----------
-    layers, activations : ndarray of int, shape (n_layers + 1,) and (n_layers,)
-        Widths, and the function after each layer.
-    weights : ndarray, shape (n_parameters,)
-        As `kinarm.episodes.Control` describes them: numbers, or lanes if each episode has its own.
-    inputs : ndarray, shape (1, n_observations)
-        The observation.
-    hidden : ndarray, shape (2, widest layer)
-        Work space for two layers by turns.
-    action : ndarray, shape (1, n_actions)
-        Where the action goes.
+    Layers, activations and weights are those of `kinarm.episodes.Control`; the latter are numbers,
+    or lanes if each episode has its own. ``hidden`` holds two layers by turns.
     """
     n_layers, offset = layers.shape[0] - 1, 0
     for layer in range(n_layers):
@@ -141,14 +122,17 @@ def choose_actions(control: Control, shared: int, row: NDArray[np.int64], block:
         look_up_actions(row, control, block)
     else:
         mirrored = signs.shape[0] > 0
-        if mirrored:
-            reflect_observation(reflected, control, block)
+        # Networks with a mirror have learnt goals on the right alone: goals on the left they are
+        # given reflected, and their actions are reflected in turn.
+        for i in range(signs.shape[0]):
+            given = block.observation[0, i]
+            block.seen[0, i] = select(reflected, signs[i] * given, given)
         seen = block.seen if mirrored else block.observation
         if shared >= 0:
             weights = control.weights[shared]
             act(layers, activations, weights, seen, block.hidden, block.action)
         else:
-            act(layers, activations, block.weights, seen, block.hidden, block.action)
+            act(layers, activations, block.weights[0], seen, block.hidden, block.action)
     for axis in range(block.action.shape[1]):
         action = min(max(block.action[0, axis], -1.0), 1.0)
         if signs.shape[0] > 0:
@@ -165,16 +149,3 @@ def look_up_actions(row: NDArray[np.int64], control: Control, block: Block) -> N
             column = int(steps[0, lane]) if control.actions.shape[1] > 1 else 0
             for axis in range(action.shape[1]):
                 action[0, axis, lane] = control.actions[row[lane], column, axis]
-
-
-@inlined
-def reflect_observation(reflected: bool, control: Control, block: Block) -> None:
-    """Fill in the observation that networks with a mirror act on.
-
-    Such a network has learnt goals on the right alone: where ``reflected`` says that the goal lies
-    on the left it is given the reflected observation, and its action is reflected in turn.
-    """
-    signs = control.observation_signs
-    for i in range(signs.shape[0]):
-        given = block.observation[0, i]
-        block.seen[0, i] = select(reflected, signs[i] * given, given)

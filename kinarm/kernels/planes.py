@@ -28,6 +28,14 @@ ALTERNATIONS = 3
 
 
 @inlined
+def axis_in_world(shapes: ContactShapes, body: int, poses: Array) -> tuple[Vector, Vector]:
+    """End points of the axis of a body's capsule in the world [m]."""
+    link, axis = shapes.bodies[body, 2], shapes.capsules[body]
+    start = to_world(poses, link, axis[0], axis[1], axis[2])
+    return start, to_world(poses, link, axis[3], axis[4], axis[5])
+
+
+@inlined
 def lowest(shapes: ContactShapes, body: int, x: float, y: float, z: float) -> float:
     """Smallest coordinate of a body along a vector of its joint frame, its radius apart."""
     corners, first, last = shapes.corners, shapes.bodies[body, 0], shapes.bodies[body, 1]
@@ -69,14 +77,11 @@ def propose(shapes: ContactShapes, pair: int, poses: Array, plane: Array, row: i
     if carrier == GROUND:
         plane[row, 0], plane[row, 1], plane[row, 2], plane[row, OFFSET] = 0.0, 0.0, 1.0, 0.0
         return
-    base, link, axes = shapes.bodies[carrier, 2], shapes.bodies[mover, 2], shapes.capsules
-    a = to_world(poses, link, axes[mover, 0], axes[mover, 1], axes[mover, 2])
-    b = to_world(poses, link, axes[mover, 3], axes[mover, 4], axes[mover, 5])
-    if carrier < axes.shape[0]:
-        c = to_world(poses, base, axes[carrier, 0], axes[carrier, 1], axes[carrier, 2])
-        d = to_world(poses, base, axes[carrier, 3], axes[carrier, 4], axes[carrier, 5])
+    a, b = axis_in_world(shapes, mover, poses)
+    if carrier < shapes.capsules.shape[0]:
+        c, d = axis_in_world(shapes, carrier, poses)
         x, y, z = between_segments(a, b, c, d)
-        x, y, z = rotated_back(poses, base, x, y, z)
+        x, y, z = rotated_back(poses, shapes.bodies[carrier, 2], x, y, z)
     else:
         lower, upper = shapes.extents[carrier, 0], shapes.extents[carrier, 1]
         x, y, z = from_box(a, b, (lower[0], lower[1], lower[2]), (upper[0], upper[1], upper[2]))

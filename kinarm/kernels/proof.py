@@ -10,9 +10,9 @@ enough, the configurations between are looked at one by one.
 
 from kinarm.chain import Chain
 from kinarm.contact_shapes import GROUND, PLANE, ContactShapes
-from kinarm.kernels.block import Alone, Block
+from kinarm.kernels.block import Alone, Block, put, take, take_rows
 from kinarm.kernels.compiling import Array, helper, inlined
-from kinarm.kernels.kinematics import POSE, place
+from kinarm.kernels.kinematics import place
 from kinarm.kernels.lanes import any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.planes import EVERYDAY, FINE, GAP, height_above, propose
 from kinarm.kernels.separation import separate
@@ -134,36 +134,28 @@ def prove_alone(
 
     Returns a number whose bit k - 1 is set if configuration k could not be proven free.
     """
-    n_joints, plane = block.q.shape[1], alone.plane
-    q, target, planes = as_numbers(block.q), as_numbers(block.target), as_numbers(block.planes)
-    heights, bends, bounds = (
-        as_numbers(block.height),
-        as_numbers(block.bend),
-        as_numbers(block.bound),
-    )
+    plane, planes = alone.plane, as_numbers(block.planes)
+    heights, bends = as_numbers(block.height), as_numbers(block.bend)
     # Give each pair that is not proven a better plane, and list those that remain.
-    take_poses(lane, poses, alone.after)
+    take_rows(poses, lane, alone.after)
     at_start, n_open, all_open, target_bit = False, 0, 0, 1 << (tested - 1)
     for pair in range(shapes.planes.shape[0]):
-        if is_apart(bounds[pair, lane]):
+        if is_apart(as_numbers(block.bound)[pair, lane]):
             continue
         bend = bends[pair, lane]
         before, after = heights[pair, lane], planes[pair, GAP, lane]
         unproven = open_configurations(before, after, bend, tested)
         if unproven != 0 and shapes.planes[pair, 0] != GROUND:
             if not at_start:
-                for joint in range(n_joints):
-                    alone.q[0, joint] = q[0, joint, lane]
+                take(block.q, 0, lane, alone.q, 0)
                 place(chain, alone.q, alone.before)
                 at_start = True
-            for i in range(PLANE):
-                plane[0, i] = planes[pair, i, lane]
+            take(block.planes, pair, lane, plane, 0)
             after = separate(shapes, pair, alone.after, alone.relative, alone.simplex, plane)
             before = height_above(shapes, pair, FINE, alone.before, plane, 0)
             unproven = open_configurations(before, after, bend, tested)
             heights[pair, lane] = before
-            for i in range(PLANE):
-                planes[pair, i, lane] = plane[0, i]
+            put(plane, 0, block.planes, pair, lane)
         alone.listed[n_open, 0], alone.listed[n_open, 1] = pair, unproven
         n_open += 0 if unproven == 0 else 1
         all_open |= unproven
@@ -173,23 +165,37 @@ def prove_alone(
         bit = 1 << (k - 1)
         if all_open & bit == 0:
             continue
-        for joint in range(n_joints):
-            start, end = q[0, joint, lane], target[0, joint, lane]
-            alone.q[0, joint] = start + k / tested * (end - start)
-        place(chain, alone.q, alone.before)
+        place_between(k, tested, lane, chain, block, alone)
         for index in range(n_open):
             pair = alone.listed[index, 0]
             if alone.listed[index, 1] & bit == 0:
                 continue
-            for i in range(PLANE):
-                plane[0, i] = planes[pair, i, lane]
-            height = height_above(shapes, pair, FINE, alone.before, plane, 0)
-            if not is_apart(height) and shapes.planes[pair, 0] != GROUND:
-                height = separate(shapes, pair, alone.before, alone.relative, alone.simplex, plane)
-            if not is_apart(height):
+            if not is_proven_apart(pair, lane, shapes, block, alone):
                 doubt |= bit
                 break
     return doubt
+
+
+@inlined
+def is_proven_apart(
+    pair: int, lane: int, shapes: ContactShapes, block: Block, alone: Alone
+) -> bool:
+    """Whether a pair is proven apart at ``alone.before``, by its plane or by a better one."""
+    take(block.planes, pair, lane, alone.plane, 0)
+    height = height_above(shapes, pair, FINE, alone.before, alone.plane, 0)
+    if not is_apart(height) and shapes.planes[pair, 0] != GROUND:
+        height = separate(shapes, pair, alone.before, alone.relative, alone.simplex, alone.plane)
+    return is_apart(height)
+
+
+@inlined
+def place_between(k: int, tested: int, lane: int, chain: Chain, block: Block, alone: Alone) -> None:
+    """Fill in the poses of a single episode at configuration k of its step, below ``tested``."""
+    q, target = as_numbers(block.q), as_numbers(block.target)
+    for joint in range(block.q.shape[1]):
+        start, end = q[0, joint, lane], target[0, joint, lane]
+        alone.q[0, joint] = start + k / tested * (end - start)
+    place(chain, alone.q, alone.before)
 
 
 @inlined
@@ -213,29 +219,18 @@ def prove_configuration(
 ) -> bool:
     """Prove the configuration of a single episode free as far as first planes have not."""
     plane, planes, free = alone.plane, as_numbers(block.planes), True
-    take_poses(lane, poses, alone.after)
+    take_rows(poses, lane, alone.after)
     for pair in range(shapes.planes.shape[0]):
         if is_apart(planes[pair, GAP, lane]):
             continue
         if shapes.planes[pair, 0] == GROUND:
             free = False
             continue
-        for i in range(PLANE):
-            plane[0, i] = planes[pair, i, lane]
+        take(block.planes, pair, lane, plane, 0)
         height = separate(shapes, pair, alone.after, alone.relative, alone.simplex, plane)
-        for i in range(PLANE):
-            planes[pair, i, lane] = plane[0, i]
+        put(plane, 0, block.planes, pair, lane)
         free = free and is_apart(height)
     return free
-
-
-@inlined
-def take_poses(lane: int, poses: Array, single: Array) -> None:
-    """Copy the poses of a lane."""
-    numbers = as_numbers(poses)
-    for frame in range(single.shape[0]):
-        for i in range(POSE):
-            single[frame, i] = numbers[frame, i, lane]
 
 
 @inlined

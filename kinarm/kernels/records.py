@@ -12,7 +12,7 @@ from ctypes import addressof, c_char
 from functools import cache
 from math import prod
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from llvmlite import ir
@@ -26,10 +26,9 @@ from numba.extending import (
     register_model,
     unbox,
 )
-from numba.np.numpy_support import as_dtype
 from numpy.typing import NDArray
 
-from kinarm.kernels.lanes import LANES, lanes
+from kinarm.kernels.lanes import LANES, array_at, lanes
 
 WORD = ir.IntType(64)
 """An entry of a table: address, length, whole number, or the bits of another number."""
@@ -37,7 +36,9 @@ WORD = ir.IntType(64)
 CACHE_LINE = 8 * LANES
 """Bytes of a line of the cache, and of a number in lanes."""
 
-NOTHING = c_char * 0
+from_buffer: Any = (c_char * 0).from_buffer
+
+Shapes: TypeAlias = dict[str, tuple[types.Type, tuple[int, ...]]]
 
 
 class Fixed(int):
@@ -73,8 +74,8 @@ class Record:
     ----------
     address : int
         Where the table is.
-    values : named tuple
-        What it is a record of.
+    values : named tuple or ndarray
+        What it is a record of, or the buffer in which its arrays lie.
     """
 
     def __init__(self, kind: RecordType, words: NDArray[np.int64], values: Any) -> None:
@@ -106,8 +107,9 @@ def table(values: Any) -> tuple[RecordType, NDArray[np.int64]]:
     kinds: list[Any] = []
     for value in values:
         if isinstance(value, np.ndarray):
-            kinds.append((value.dtype.char, value.ndim))
-            words += (_address(value) if value.size else 0, *value.shape)
+            shape = value.shape
+            kinds.append((value.dtype.char, len(shape)))
+            words += (_address(value) if 0 not in shape else 0, *shape)
         elif isinstance(value, Record):
             kinds.append(value._numba_type_)
             words.append(value.address)
@@ -128,22 +130,18 @@ class Layout:
     name : str
         Name of the type.
     shapes : mapping
-        Per array the type of its entries, `lanes`, float64, int64 or boolean, and its shape, of
-        which some lengths may be `Fixed`.
+        Per array the type of its entries, `lanes`, float64 or int64, and its shape, of which some
+        lengths may be `Fixed`.
     """
 
-    def __init__(self, name: str, shapes: Mapping[str, tuple[types.Type, tuple[int, ...]]]) -> None:
+    def __init__(self, name: str, shapes: Shapes) -> None:
         words: list[int] = []
         moved: list[bool] = []
-        self._views: list[tuple[tuple[int, ...], Any, int]] = []
         end = 0
         for entry, shape in shapes.values():
-            size = 8 * LANES if entry == lanes else as_dtype(entry).itemsize
-            if entry != lanes:
-                self._views.append((shape, as_dtype(entry), end))
             words += (end, *shape)
             moved += (True, *(False for _ in shape))
-            end += -(-size * prod(shape) // 8) * 8
+            end += (CACHE_LINE if entry == lanes else 8) * prod(shape)
         self._words, self._size = np.array(words, dtype=np.int64), end // 8
         self._moved = np.array(moved, dtype=np.int64)
         kinds = [
@@ -152,57 +150,25 @@ class Layout:
         fixed = {
             field: tuple(int(length) if isinstance(length, Fixed) else None for length in shape)
             for field, (_, shape) in shapes.items()
-            if any(isinstance(length, Fixed) for length in shape)
         }
         self._kind = RecordType(name, tuple(kinds), fixed)
 
     def record(self) -> Any:
-        """Record of new arrays, which are zero."""
-        words, buffer = self._placed()
-        return WorkSpace(self._kind, words, buffer, self)
-
-    def record_of(self, named: Any) -> Any:
-        """Record of a named tuple of new arrays, which are zero; none may be of lanes."""
-        words, buffer = self._placed()
-        views = [np.ndarray(shape, dtype, buffer, start) for shape, dtype, start in self._views]
-        return Record(self._kind, words, named(*views))
-
-    def _placed(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """A table, and the buffer that it leads to."""
+        """Record of new arrays, which are zero, with their buffer as its values."""
         buffer = np.zeros(self._size + LANES)
-        start = _address(buffer)
         # Lanes that begin where a line of the cache does lie in one line.
-        shift = -start % CACHE_LINE
-        return self._words + (start + shift) * self._moved, buffer[shift // 8 :][: self._size]
-
-
-class WorkSpace(Record):
-    """Record of arrays that lie side by side in a buffer; copies of it begin anew."""
-
-    def __init__(
-        self,
-        kind: RecordType,
-        words: NDArray[np.int64],
-        buffer: NDArray[np.float64],
-        layout: Layout,
-    ) -> None:
-        super().__init__(kind, words, ())
-        self.buffer, self._layout = buffer, layout
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return self._layout.record, ()
+        start = _address(buffer) + -_address(buffer) % CACHE_LINE
+        return Record(self._kind, self._words + start * self._moved, buffer)
 
 
 def _address(array: NDArray[Any]) -> int:
     """Where an array begins; its entries have to lie side by side."""
-    given: Any = array
     try:
-        return addressof(NOTHING.from_buffer(given))
+        return addressof(from_buffer(array))  # three times as fast as other ways
     except TypeError:  # It is read-only, or has gaps.
         if not array.flags.c_contiguous:
             raise
-    address: int = array.__array_interface__["data"][0]
-    return address
+    return int(array.__array_interface__["data"][0])
 
 
 @cache
@@ -275,24 +241,9 @@ def _read_field(context: Any, builder: Any, record: RecordType, table: Any, name
         return inner
     if not isinstance(kind, types.Array):
         return word(0, context.get_value_type(kind))
-    from numba.np.arrayobj import make_array, populate_array
-
-    made = make_array(kind)(context, builder)
-    entry = context.get_data_type(kind.dtype)
-    width = WORD(context.get_abi_sizeof(entry))
     shape = [
         word(1 + axis, WORD) if length is None else WORD(length)
         for axis, length in enumerate(record.fixed.get(name, (None,) * kind.ndim))
     ]
-    strides = [width]
-    for length in shape[:0:-1]:
-        strides.insert(0, builder.mul(strides[0], length))
-    populate_array(
-        made,
-        data=word(0, entry.as_pointer()),
-        shape=shape,
-        strides=strides,
-        itemsize=width,
-        meminfo=None,
-    )
-    return made._getvalue()
+    data = word(0, context.get_data_type(kind.dtype).as_pointer())
+    return array_at(context, builder, kind, data, shape, meminfo=None)

@@ -7,9 +7,8 @@ pauses the episode until Coal has decided about it.
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.contact_shapes import PLANE
 from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Episodes, Rules
-from kinarm.kernels.block import load_episode, store_episode
+from kinarm.kernels.block import load_episode, put, store_episode, take, take_rows
 from kinarm.kernels.compiling import Array, inlined, lean_kernel
 from kinarm.kernels.kinematics import place
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, select
@@ -28,40 +27,26 @@ from kinarm.kernels.touching import first_contact
 
 
 @lean_kernel
-def begin(first: int, last: int, rows: NDArray[np.int64], session: Session) -> int:
-    """Start episodes at their ``q`` and ``goal``.
+def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]) -> int:
+    """Start episodes at their ``q`` and ``goal``; ``rows``, shape (n,), tells which.
 
-    Parameters
-    ----------
-    first, last : int
-        Range of the rows.
-    rows : ndarray of int
-        Which episodes.
-    session : Session
-        Theirs.
-
-    Returns
-    -------
-    int
-        How many are left paused, since their starts are not proven free of contact.
+    Returns how many are left paused, since their starts are not proven free of contact. Several
+    threads may share them as in `advance`.
     """
     block, alone = session.block, session.alone
     chain, shapes, episodes = session.chain, session.shapes, session.episodes
-    q, planes, path = episodes.q, episodes.planes, episodes.path
-    n_joints, n_observations = q.shape[1], episodes.observation.shape[1]
-    n_pairs = shapes.planes.shape[0]
-    starts, goals = as_numbers(block.q), as_numbers(block.goal)
-    distances, observations = as_numbers(block.distance), as_numbers(block.observation)
-    proposed, n_paused = as_numbers(block.planes), 0
-    for start in range(first, last, LANES):
-        filled = min(last - start, LANES)
+    q, path = episodes.q, episodes.path
+    distances, n_paused = as_numbers(block.distance), 0
+    while True:
+        start = LANES * take_number(counters, 0)
+        if start >= rows.shape[0]:
+            return n_paused
+        filled = min(rows.shape[0] - start, LANES)
         # Load starts and goals; the last one repeats where there are no more.
         for lane in range(LANES):
             e = rows[start + min(lane, filled - 1)]
-            for joint in range(n_joints):
-                starts[0, joint, lane] = q[e, joint]
-            for axis in range(3):
-                goals[0, axis, lane] = episodes.goal[e, axis]
+            put(q, e, block.q, 0, lane)
+            put(episodes.goal, e, block.goal, 0, lane)
         place(chain, block.q, block.after)
         free = prove_configurations(shapes, 0, filled, block, alone)
         block.distance[0] = observe(chain.tool, block.after, block.goal, 0, block.observation)
@@ -76,15 +61,10 @@ def begin(first: int, last: int, rows: NDArray[np.int64], session: Session) -> i
             episodes.distance[e] = distances[0, lane]
             for term in range(episodes.terms.shape[1]):
                 episodes.terms[e, term] = 0.0
-            for i in range(n_observations):
-                episodes.observation[e, i] = observations[0, i, lane]
-            for pair in range(n_pairs):
-                for i in range(PLANE):
-                    planes[e, pair, i] = proposed[pair, i, lane]
+            take(block.observation, 0, lane, episodes.observation, e)
+            take_rows(block.planes, lane, episodes.planes[e])
             if path.shape[0] > 0:
-                for joint in range(n_joints):
-                    path[e, 0, joint] = q[e, joint]
-    return n_paused
+                take(block.q, 0, lane, path[e], 0)
 
 
 @lean_kernel
@@ -104,7 +84,7 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
     tool, lower, upper, row = chain.tool, chain.lower, chain.upper, block.row
     n_joints, n_actuated = episodes.q.shape[1], rules.step_limit.shape[0]
     n_episodes, n_pairs = episodes.status.shape[0], shapes.planes.shape[0]
-    shared, summed = shared_policy(n_episodes, control), block.first.shape[0]
+    shared, summed = shared_policy(n_episodes, control), block.moments.shape[1]
     before, poses = block.before, block.after
     for lane in range(LANES):
         row[lane] = -1
@@ -126,8 +106,8 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
         fresh = (block.alive[0] > 0.0) & ~(block.cleared[0] > 0.0)
         for i in range(summed):
             centred = select(fresh, block.observation[0, i] - episodes.shift[i], 0.0)
-            block.first[i] += centred
-            block.second[i] += centred * centred
+            block.moments[0, i] += centred
+            block.moments[1, i] += centred * centred
         for axis in range(n_actuated):
             moved = block.q[0, axis] + block.action[0, axis] * rules.step_limit[axis]
             moved = min(max(moved, lower[axis]), upper[axis])
@@ -180,8 +160,7 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
             for lane in range(row.shape[0]):
                 if row[lane] >= 0:
                     step = int(as_numbers(block.steps)[0, lane])
-                    for joint in range(n_joints):
-                        episodes.path[row[lane], step, joint] = as_numbers(block.q)[0, joint, lane]
+                    take(block.q, 0, lane, episodes.path[row[lane]], step)
         # Take out what has ended or is to be handed back.
         late = block.steps[0] >= rules.horizon
         finished = lane_bits((block.steps[0] >= block.stop[0]) | reached | late)
@@ -225,15 +204,7 @@ def allow_one_step(session: Session) -> bool:
 def results_of_step(
     session: Session, numbers: Array, flags: NDArray[np.bool_], contact: NDArray[np.int64]
 ) -> None:
-    """Read off the one step that was allowed.
-
-    Parameters
-    ----------
-    session : Session
-        The episodes.
-    numbers, flags, contact
-        Tables to fill in; see `kinarm.rollouts.StepResult`.
-    """
+    """Read off the one step that was allowed, into the tables of `kinarm.rollouts.StepResult`."""
     episodes = session.episodes
     for e in range(contact.shape[0]):
         stepped = episodes.steps[e] == episodes.stop[e]

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.contact_shapes import ContactShapes
-from kinarm.kernels.block import Alone, Block
+from kinarm.kernels.block import Alone, Block, put, take
 from kinarm.kernels.compiling import Array, kernel, lean_kernel
 from kinarm.kernels.kinematics import place, to_world
-from kinarm.kernels.lanes import LANES, as_numbers, lane_bits
-from kinarm.kernels.proof import prove_configurations
-from kinarm.kernels.touching import deepest_overlap, overlaps
+from kinarm.kernels.lanes import LANES, lane_bits
+from kinarm.kernels.proof import MARGIN, prove_configurations
+from kinarm.kernels.touching import deepest_overlap
 
 
 @kernel
@@ -26,22 +26,15 @@ def propose_starts(
 
     Parameters
     ----------
-    rows : ndarray of int, shape (n_rows,)
-        Which of the starts.
-    uniforms : ndarray, shape (n_rows, n_actuated)
-        Numbers in [0, 1).
-    lower, extent : ndarray, shape (n_joints,)
-        Lower ends and widths of the ranges [rad or m].
-    starts : ndarray, shape (n, n_joints)
-        All starts; changed [rad or m].
+    rows, uniforms : ndarray, of int, shape (n_rows,), and (n_rows, n_actuated)
+        Which of the starts, and numbers in [0, 1).
+    lower, extent, starts : ndarray, shape (n_joints,), twice, and (n, n_joints)
+        Lower ends and widths of the ranges, and all starts, which are changed [rad or m].
     """
-    proposed = np.empty((rows.shape[0], starts.shape[1]))
     for i in range(rows.shape[0]):
         for joint in range(uniforms.shape[1]):
             starts[rows[i], joint] = lower[joint] + uniforms[i, joint] * extent[joint]
-        for joint in range(starts.shape[1]):
-            proposed[i, joint] = starts[rows[i], joint]
-    return proposed
+    return starts[rows]
 
 
 @kernel
@@ -56,14 +49,12 @@ def rejected_rows(
 
     Parameters
     ----------
-    rows : ndarray of int, shape (n_rows,)
-        Rows of the starts in question.
-    goals : ndarray, shape (n, 3)
-        Goals of all starts [m].
-    tools, touching : ndarray, shape (n_rows, 3) and (n_rows,)
-        Tool points of those in question [m], and whether they touch something.
+    rows, goals : ndarray, of int, shape (n_rows,), and (n, 3)
+        Which of the starts are in question, and the goals of all [m].
+    tools, touching : ndarray, shape (n_rows, 3), and of bool, shape (n_rows,)
+        Their tool points [m], and whether they touch something.
     tolerance : float
-        Distance within which the goal is reached [m].
+        Distance within which a goal is reached [m].
     """
     rejected, count = np.empty_like(rows), 0
     for i in range(rows.shape[0]):
@@ -94,16 +85,12 @@ def screen(
     ----------
     first, last : int
         Range of rows to work on.
-    block, alone : Block and Alone
-        Work space.
-    chain, shapes : Chain and ContactShapes
-        The arm, and what may touch.
+    block, alone, chain, shapes
+        Work space, the arm, and what may touch.
     configurations : ndarray, shape (n, n_joints)
         Joint positions [rad or m].
-    tools : ndarray, shape (n, 3)
-        Where tool points go [m].
-    free, touching : ndarray of bool, shape (n,)
-        Where it goes what is proven.
+    tools, free, touching : ndarray, shape (n, 3), and of bool, shape (n,)
+        Where tool points go [m], and what is proven.
 
     Returns
     -------
@@ -111,15 +98,13 @@ def screen(
         Of how many one of both is proven; Coal has to decide about the others.
     """
     n_joints, tool = configurations.shape[1], chain.tool
-    q, points, n_proven = as_numbers(block.q), as_numbers(block.goal), 0
+    n_proven = 0
     for start in range(first, last, LANES):
         filled = min(last - start, LANES)
         for lane in range(LANES):
-            row = start + min(lane, filled - 1)
-            for joint in range(n_joints):
-                q[0, joint, lane] = configurations[row, joint]
+            put(configurations, start + min(lane, filled - 1), block.q, 0, lane)
         place(chain, block.q, block.after)
-        touched = lane_bits(overlaps(deepest_overlap(shapes, block.after)))
+        touched = lane_bits(deepest_overlap(shapes, block.after) > MARGIN)
         apart = prove_configurations(shapes, touched, filled, block, alone)
         x, y, z = to_world(block.after, n_joints, tool[0], tool[1], tool[2])
         block.goal[0, 0], block.goal[0, 1], block.goal[0, 2] = x, y, z
@@ -127,6 +112,5 @@ def screen(
             free[start + lane] = apart >> lane & 1 != 0
             touching[start + lane] = touched >> lane & 1 != 0
             n_proven += (apart | touched) >> lane & 1
-            for axis in range(3):
-                tools[start + lane, axis] = points[0, axis, lane]
+            take(block.goal, 0, lane, tools, start + lane)
     return n_proven

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.contact_shapes import ContactShapes
-from kinarm.kernels.compiling import Array, Vector, helper, inlined
+from kinarm.kernels.compiling import Array, helper, inlined
 from kinarm.kernels.distance import shrink
 from kinarm.kernels.kinematics import rotated_back
 from kinarm.kernels.planes import FINE, GAP, OFFSET
@@ -42,16 +42,6 @@ def lowest_corner(
     return found
 
 
-@inlined
-def turned_back(relative: Array, x: float, y: float, z: float) -> Vector:
-    """Turn a vector of the carrier's frame into the mover's."""
-    return (
-        relative[0, 0] * x + relative[0, 1] * y + relative[0, 2] * z,
-        relative[1, 0] * x + relative[1, 1] * y + relative[1, 2] * z,
-        relative[2, 0] * x + relative[2, 1] * y + relative[2, 2] * z,
-    )
-
-
 @helper
 def separate(
     shapes: ContactShapes,
@@ -64,17 +54,17 @@ def separate(
     """Find a plane that separates a pair well, and return the height of its mover above it [m].
 
     Takes poses of numbers. The plane, shape (1, PLANE), is where the search begins, and is
-    replaced by a better one. ``relative``, shape (4, 3), and ``simplex``, shape (4, 3), are work
+    replaced by a better one. ``relative``, shape (1, POSE), and ``simplex``, shape (4, 3), are work
     space.
     """
     carrier, mover = shapes.proxies[pair, FINE, 0], shapes.proxies[pair, FINE, 1]
     base, link = shapes.bodies[carrier, 2], shapes.bodies[mover, 2]
-    for column in range(3):
-        x, y, z = rotated_back(
-            poses, base, poses[link, 4 + column], poses[link, 7 + column], poses[link, 10 + column]
+    # The pose of the mover's frame in the carrier's.
+    for k in range(3):
+        relative[0, 4 + k], relative[0, 7 + k], relative[0, 10 + k] = rotated_back(
+            poses, base, poses[link, 4 + k], poses[link, 7 + k], poses[link, 10 + k]
         )
-        relative[column, 0], relative[column, 1], relative[column, 2] = x, y, z
-    relative[3, 0], relative[3, 1], relative[3, 2] = rotated_back(
+    relative[0, 13], relative[0, 14], relative[0, 15] = rotated_back(
         poses,
         base,
         poses[link, 13] - poses[base, 13],
@@ -86,13 +76,13 @@ def separate(
     best, size, norm = -math.inf, 0, math.inf
     for _ in range(CORNERS_TRIED):
         # The mover's corner that lies lowest, and the carrier's that lies highest.
-        x, y, z = turned_back(relative, nx, ny, nz)
+        x, y, z = rotated_back(relative, 0, nx, ny, nz)
         low = lowest_corner(shapes.corners, shapes.bodies, mover, x, y, z)
         high = lowest_corner(shapes.corners, shapes.bodies, carrier, -nx, -ny, -nz)
         x, y, z = corners[low, 0], corners[low, 1], corners[low, 2]
-        wx = relative[3, 0] + relative[0, 0] * x + relative[1, 0] * y + relative[2, 0] * z
-        wy = relative[3, 1] + relative[0, 1] * x + relative[1, 1] * y + relative[2, 1] * z
-        wz = relative[3, 2] + relative[0, 2] * x + relative[1, 2] * y + relative[2, 2] * z
+        wx = relative[0, 13] + relative[0, 4] * x + relative[0, 5] * y + relative[0, 6] * z
+        wy = relative[0, 14] + relative[0, 7] * x + relative[0, 8] * y + relative[0, 9] * z
+        wz = relative[0, 15] + relative[0, 10] * x + relative[0, 11] * y + relative[0, 12] * z
         above = nx * corners[high, 0] + ny * corners[high, 1] + nz * corners[high, 2]
         gap = nx * wx + ny * wy + nz * wz - above
         wx, wy, wz = wx - corners[high, 0], wy - corners[high, 1], wz - corners[high, 2]

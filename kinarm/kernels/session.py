@@ -2,13 +2,16 @@
 
 from typing import Any, NamedTuple
 
+import numpy as np
 from llvmlite import ir
 from numba import types
+from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.contact_shapes import ContactShapes
 from kinarm.episodes import Control, Episodes, Rules
 from kinarm.kernels.block import Alone, Block, work_space
+from kinarm.kernels.compiling import Array
 from kinarm.kernels.lanes import instruction
 from kinarm.kernels.records import Record, table
 
@@ -26,53 +29,69 @@ class SessionFields(NamedTuple):
 
 
 class Session(Record):
-    """Arm, scene, rules, source of actions and episodes, and work space.
+    """Arm, scene, rules, source of actions and episodes, all records, and work space.
 
-    One thread at a time may use it; others need `another`.
+    One thread at a time may use it; others need one `of_thread`.
 
-    Parameters
+    Attributes
     ----------
-    chain, shapes, rules, control, episodes
-        Records.
+    control, episodes : Control and Episodes
+        Source of actions and episodes, as Python sees them.
     """
 
-    chain: Chain
-    shapes: ContactShapes
-    rules: Rules
-    control: Control
-    episodes: Episodes
-    block: Block
-    alone: Alone
-
     def __init__(self, chain: Any, shapes: Any, rules: Any, control: Any, episodes: Any) -> None:
-        weights, layers = control.values.weights, control.values.layers.tolist()
-        q, observation = episodes.values.q, episodes.values.observation
+        self.control: Control = control.values
+        self.episodes: Episodes = episodes.values
+        weights, n_observations = self.control.weights, self.episodes.observation.shape[1]
         space = work_space(
-            n_joints=q.shape[1],
+            n_joints=self.episodes.q.shape[1],
             n_actuated=rules.values.step_limit.shape[0],
-            n_observations=observation.shape[1],
-            n_pairs=episodes.values.planes.shape[1],
+            n_observations=n_observations,
+            n_pairs=self.episodes.planes.shape[1],
             n_terms=rules.values.reward.shape[0],
-            widest=max(layers[1:], default=1),
+            widest=max(self.control.layers.tolist()[1:], default=1),
             own=weights.shape[1] if weights.shape[0] > 1 else 0,
-            summed=observation.shape[1] if len(episodes.values.moments) > 0 else 0,
+            summed=n_observations if len(self.episodes.moments) > 0 else 0,
         )
         parts = SessionFields(chain, shapes, rules, control, episodes, *space)
         super().__init__(*table(parts), parts)
         self._others: list[Session] = []
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Session, self.values[:5]
-
-    def another(self) -> "Session":
-        """A session of the same, with work space of its own."""
-        return Session(*self.values[:5])
-
     def of_thread(self, number: int) -> "Session":
         """Which session one of several threads is to use, counted from 0: this one, or another."""
         while len(self._others) < number:
-            self._others.append(self.another())
+            self._others.append(Session(*self.values[:5]))
         return self._others[number - 1] if number else self
+
+    def refill(self, control: Control, starts: Array, goals: Array, shift: Array | None) -> bool:
+        """Take other networks, starts and goals, if they are as many and of the same form.
+
+        Parameters
+        ----------
+        control, starts, goals, shift
+            As for `kinarm.episodes.Episodes.allocate`, and the networks.
+        """
+        episodes = self.episodes
+        parts = [*zip(_arrays(self.control), _arrays(control), strict=True)]
+        collected = 0 if shift is None else len(starts)
+        if (
+            episodes.q.shape != starts.shape
+            or len(episodes.moments) != collected
+            or any(own.shape != other.shape for own, other in parts)
+        ):
+            return False
+        for own, other in parts:
+            own[...] = other
+        episodes.q[:], episodes.target[:], episodes.goal[:] = starts, starts, goals
+        episodes.touched[:] = 0
+        if shift is not None:
+            episodes.shift[:], episodes.moments[:] = shift, 0.0
+        return True
+
+
+def _arrays(control: Control) -> list[NDArray[Any]]:
+    """All that differs from one control to another."""
+    return [part for part in control if isinstance(part, np.ndarray)]
 
 
 @instruction

@@ -8,15 +8,13 @@ with other shapes nothing is claimed.
 import math
 
 from kinarm.chain import Chain
-from kinarm.contact_shapes import BETWEEN_CAPSULES, GROUND, PLANE, WITH_GROUND, ContactShapes
-from kinarm.kernels.block import Alone, Block
+from kinarm.contact_shapes import BETWEEN_CAPSULES, WITH_GROUND, ContactShapes
+from kinarm.kernels.block import Alone, Block, take
 from kinarm.kernels.compiling import Array, helper, inlined
 from kinarm.kernels.distance import between_segments, closest_to_box, turned_back
-from kinarm.kernels.kinematics import place, to_world
-from kinarm.kernels.lanes import as_numbers
-from kinarm.kernels.planes import FINE, height_above
-from kinarm.kernels.proof import MARGIN, is_apart
-from kinarm.kernels.separation import separate
+from kinarm.kernels.kinematics import place
+from kinarm.kernels.planes import axis_in_world
+from kinarm.kernels.proof import MARGIN, is_proven_apart, place_between
 
 
 @inlined
@@ -30,17 +28,14 @@ def is_exact(shapes: ContactShapes, pair: int) -> bool:
 def overlap(shapes: ContactShapes, pair: int, poses: Array) -> float:
     """Lower bound of how deep an exact pair overlaps [m]; negative if it may be apart."""
     kind, first, second = shapes.pairs[pair, 0], shapes.pairs[pair, 1], shapes.pairs[pair, 2]
-    link, axes = shapes.link, shapes.capsules
-    a = to_world(poses, link[first], axes[first, 0], axes[first, 1], axes[first, 2])
-    b = to_world(poses, link[first], axes[first, 3], axes[first, 4], axes[first, 5])
-    radius = axes[first, 6]
+    a, b = axis_in_world(shapes, first, poses)
+    radius = shapes.capsules[first, 6]
     if kind == WITH_GROUND:
         return radius - min(a[2], b[2])
     if kind == BETWEEN_CAPSULES:
-        c = to_world(poses, link[second], axes[second, 0], axes[second, 1], axes[second, 2])
-        d = to_world(poses, link[second], axes[second, 3], axes[second, 4], axes[second, 5])
+        c, d = axis_in_world(shapes, second, poses)
         x, y, z = between_segments(a, b, c, d)
-        radius += axes[second, 6]
+        radius += shapes.capsules[second, 6]
     else:
         low, high = shapes.boxes[second, 0], shapes.boxes[second, 1]
         lower, upper = (low[0], low[1], low[2]), (high[0], high[1], high[2])
@@ -52,12 +47,6 @@ def overlap(shapes: ContactShapes, pair: int, poses: Array) -> float:
         y -= min(max(y, lower[1]), upper[1])
         z -= min(max(z, lower[2]), upper[2])
     return radius - math.sqrt(x * x + y * y + z * z)
-
-
-@inlined
-def overlaps(depth: float) -> bool:
-    """Whether a lower bound of a depth proves contact: shallower ones are left to Coal."""
-    return depth > MARGIN
 
 
 @inlined
@@ -87,21 +76,14 @@ def first_contact(
     k = 1
     while doubt >> (k - 1) & 1 == 0:
         k += 1
-    q, target, planes = as_numbers(block.q), as_numbers(block.target), as_numbers(block.planes)
-    for joint in range(block.q.shape[1]):
-        start, end = q[0, joint, lane], target[0, joint, lane]
-        alone.q[0, joint] = end if k == tested else start + k / tested * (end - start)
-    place(chain, alone.q, alone.before)
+    if k == tested:
+        take(block.target, 0, lane, alone.q, 0)
+        place(chain, alone.q, alone.before)
+    else:
+        place_between(k, tested, lane, chain, block, alone)
     for pair in range(shapes.pairs.shape[0]):
-        if is_exact(shapes, pair) and overlaps(overlap(shapes, pair, alone.before)):
+        if is_exact(shapes, pair) and overlap(shapes, pair, alone.before) > MARGIN:
             return pair + 1
-        for i in range(PLANE):
-            alone.plane[0, i] = planes[pair, i, lane]
-        height = height_above(shapes, pair, FINE, alone.before, alone.plane, 0)
-        if not is_apart(height) and shapes.planes[pair, 0] != GROUND:
-            height = separate(
-                shapes, pair, alone.before, alone.relative, alone.simplex, alone.plane
-            )
-        if not is_apart(height):
+        if not is_proven_apart(pair, lane, shapes, block, alone):
             return 0
     return 0

@@ -10,7 +10,6 @@ import pinocchio as pin
 from kinarm.arm import Arm
 from kinarm.arm_specification import ArmSpecification
 from kinarm.collision import ContactModel
-from kinarm.errors import ArmError
 from kinarm.scene import Scene
 from kinarm.viewer.drawing import SHAPE, CapturingWindow, draw_stage, put
 from kinarm.viewer.html_page import HtmlPage, arm_data, page_html
@@ -45,13 +44,6 @@ def arm_page(
         File of the page; without it, no file is written.
     scene : Scene
         The scene around the arm; the bare ground by default.
-
-    Raises
-    ------
-    KinarmError
-        If there is no such arm, or it cannot be loaded.
-    OutputError
-        If the file cannot be written.
     """
     if not isinstance(arm, Arm):
         arm = Arm.load(arm).placed(scene.mount.position, scene.mount.rotation)
@@ -69,16 +61,12 @@ def _arm_html(arm: Arm, scene: Scene) -> str:
     for number, part in enumerate(collision_parts(arm)):
         put(frames[part.joint][f"shape_{number}"], SHAPE, part.mesh)
     objects = zip(model.geometry.geometryObjects, model.body_names, strict=True)
+    bodies = [{"name": name, "joint": s.parentJoint, **_shape_data(s)} for s, name in objects]
     data = arm_data(arm, scene) | {
         "joints": list(arm.joint_names),
-        "lower": arm.lower.tolist(),
-        "upper": arm.upper.tolist(),
-        "home": arm.home.tolist(),
+        **{name: getattr(arm, name).tolist() for name in ("lower", "upper", "home")},
         "reach": arm.reach,
-        "bodies": [
-            {"name": name, "joint": shape.parentJoint, **_shape_data(shape)}
-            for shape, name in objects
-        ],
+        "bodies": bodies,
         "pairs": [[pair.first, pair.second] for pair in model.geometry.collisionPairs],
     }
     data["scale"] *= NEARER
@@ -102,9 +90,7 @@ def _shape_data(shape: pin.GeometryObject) -> dict[str, Any]:
         discs, radius = (0.0, body.radius) if rounded else (body.radius, 0.0)
     elif isinstance(body, coal.Box):
         points = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T * body.halfSide
-    elif isinstance(body, coal.ConvexBase):
-        points = np.array(body.points())
     else:
-        raise ArmError(f"collision shape {shape.name!r} is a {type(body).__name__}: not supported")
+        points = np.array(body.points())
     placed = points @ shape.placement.rotation.T + shape.placement.translation
     return {"points": placed.tolist(), "discs": float(discs), "radius": float(radius)}

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm._validation import finite_array, whole_number
+from kinarm._validation import finite_array
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError
 from kinarm.problem import ReachProblem
@@ -36,20 +36,15 @@ class Camera(NamedTuple):
         Angle between the picture's upper and lower edges [degrees].
     """
 
-    position: tuple[float, float, float]
-    target: tuple[float, float, float]
+    position: tuple[float, ...]
+    target: tuple[float, ...]
     field_of_view: float = FIELD_OF_VIEW
 
     @classmethod
     def of_replays(cls, problem: ReachProblem, arm: Arm | None = None) -> Camera:
         """Stand where the replay page does: behind the arm, on the side of most goals.
 
-        Parameters
-        ----------
-        problem : ReachProblem
-            The problem.
-        arm : Arm, optional
-            Its arm, if that is loaded.
+        The problem's arm is loaded if it is not given.
         """
         regions = [problem.scene.goal_region(name) for name in problem.task.goal_regions]
         across = sum(region.lower[1] + region.upper[1] for region in regions)
@@ -57,7 +52,7 @@ class Camera(NamedTuple):
         scale = stage_scale(arm or problem.load_arm(), problem.scene)
         target = scale * np.array(TARGET) * (1, side, 1)
         eye = target + scale * np.array(EYE) * (1, side, 1)
-        return cls(_point(eye), _point(target))
+        return cls(tuple(eye.tolist()), tuple(target.tolist()))
 
     @classmethod
     def checked(cls, camera: CameraLike) -> Camera:
@@ -74,18 +69,17 @@ class Camera(NamedTuple):
             raise InvalidInputError(
                 f"camera must be a Camera, got {camera!r}; expected {', '.join(cls._fields)}"
             ) from error
-        position, target = (
-            finite_array(f"camera's {name}", value, (3,))
-            for name, value in zip(cls._fields, given[:2], strict=False)
+        position, target, angle = (
+            finite_array(f"camera's {name}", getattr(given, name), shape).tolist()
+            for name, shape in zip(cls._fields, ((3,), (3,), ()), strict=True)
         )
-        angle: object = given.field_of_view
-        if isinstance(angle, bool) or not isinstance(angle, int | float) or not 0 < angle < 180:
+        if not 0 < angle < 180:
             raise InvalidInputError(
-                f"camera's field_of_view must be between 0 and 180 degrees, got {angle!r}"
+                f"camera's field_of_view must be between 0 and 180 degrees, got {angle:g}"
             )
-        if np.linalg.norm(target - position) < 1e-6:
+        if math.dist(target, position) < 1e-6:
             raise InvalidInputError(f"camera's position and target are the same: {position}")
-        return cls(_point(position), _point(target), float(angle))
+        return cls(tuple(position), tuple(target), angle)
 
     def projection(self, width: int, height: int) -> NDArray[np.float64]:
         """World to picture, shape (3, 4).
@@ -114,19 +108,3 @@ def stage_scale(arm: Arm, scene: Scene) -> float:
 
 
 CameraLike = Camera | Mapping[str, Any] | Sequence[Any]
-
-
-def picture_size(width: object, height: object) -> tuple[int, int]:
-    """Check the size of a picture [pixels].
-
-    Raises
-    ------
-    InvalidInputError
-        If a side is not a whole number of at least 1.
-    """
-    return whole_number("width", width, 1), whole_number("height", height, 1)
-
-
-def _point(numbers: NDArray[np.float64]) -> tuple[float, float, float]:
-    x, y, z = (float(number) for number in numbers)
-    return x, y, z

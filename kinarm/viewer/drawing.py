@@ -2,13 +2,14 @@
 
 import struct
 from collections import defaultdict
+from collections.abc import Mapping
+from itertools import count
 from typing import Any
 
 import numpy as np
 import umsgpack
 from meshcat import Visualizer
-from meshcat.geometry import Geometry, LineBasicMaterial, LineSegments, Material, Object
-from meshcat.geometry import Mesh as DrawnMesh
+from meshcat.geometry import LineBasicMaterial, Object
 from numpy.typing import NDArray
 
 from kinarm.arm import Arm
@@ -17,14 +18,16 @@ from kinarm.scene import Scene
 from kinarm.viewer.camera import stage_scale
 from kinarm.viewer.lighting import SUN, SUN_PLACE
 from kinarm.viewer.meshes import Mesh, capsule, cylinder, tube
-from kinarm.viewer.parts import OUTCOME_COLOURS, TRACES, Finish
-from kinarm.viewer.surroundings import (
+from kinarm.viewer.parts import (
     FLASH_RADIUS,
     FLOOR_RADIUS,
     GRID_RADIUS,
     GRID_STEP,
+    OUTCOME_COLOURS,
     TRACE_RADIUS,
     TRACE_SIDES,
+    TRACES,
+    Finish,
     cube_mesh,
     obstacle_meshes,
 )
@@ -41,136 +44,116 @@ GRID_COLOUR = 0xC6CCD3
 BACKGROUND = [0.93, 0.945, 0.96]
 
 CLUTTER = ("/Axes", "/Grid", "/Lights/PointLightPositiveX", "/Lights/PointLightNegativeX")
-"""What Meshcat shows by default and a replay does not."""
+"""Objects that Meshcat shows by default and a replay does not."""
 DIMMED = {"/Lights/AmbientLight/<object>": 0.42, "/Lights/FillLight/<object>": 0.2}
 FIELD_OF_VIEW, CAMERA_PLACE = 32, (-2.4, 1.6, 1.9)
 """Of the live page [degrees, m], in the frame of three.js, whose y axis points up."""
 
 
 class CapturingWindow:
-    """Stands in for Meshcat's window and keeps every command as bytes, in order.
+    """Stands in for Meshcat's window and keeps every command, in order and framed.
 
-    The same drawing gives the same bytes: Meshcat's random ids are replaced by numbers.
-
-    Attributes
-    ----------
-    top : meshcat.Visualizer
-        What to draw on.
+    The same drawing gives the same bytes.
     """
 
     def __init__(self) -> None:
-        self.top = Visualizer(window=self)
-        self._commands: list[bytes] = []
-        self._numbers: dict[str, str] = {}
+        self.top, self.ids, self.content = Visualizer(window=self), count(), b""
 
     def send(self, command: Any) -> None:
         """Keep a command; Meshcat calls this."""
-        self._commands.append(umsgpack.packb(self._renumbered(command.lower())))
-
-    @property
-    def content(self) -> bytes:
-        """All commands, each led by its length."""
-        return b"".join(struct.pack("<I", len(each)) + each for each in self._commands)
-
-    def _renumbered(self, value: Any, key: str = "") -> Any:
-        """Part of a command with its ids replaced."""
-        if isinstance(value, dict):
-            return {name: self._renumbered(entry, name) for name, entry in value.items()}
-        if isinstance(value, list):
-            return [self._renumbered(entry) for entry in value]
-        if key in ("uuid", "geometry", "material"):
-            return self._numbers.setdefault(value, f"id-{len(self._numbers)}")
-        return value
+        self.content += framed(command.lower())
 
 
-class _BufferGeometry(Geometry):
-    """Points with attributes, in as few bytes as three.js reads; triangles if there are faces."""
-
-    def __init__(
-        self, faces: NDArray[np.int64] | None = None, **attributes: NDArray[np.generic]
-    ) -> None:
-        super().__init__()
-        self.data: dict[str, object] = {
-            "attributes": {name: _typed_array(array, 3) for name, array in attributes.items()}
-        }
-        if faces is not None:
-            few = faces.max(initial=0) < 2**16
-            self.data["index"] = _typed_array(faces.astype(np.uint16 if few else np.uint32), 1)
-
-    def lower(self, _: dict[str, object]) -> dict[str, object]:
-        """Describe it to three.js."""
-        return {"uuid": self.uuid, "type": "BufferGeometry", "data": self.data}
+def framed(command: Mapping[str, Any]) -> bytes:
+    """A command as pages read it, led by its length."""
+    packed: bytes = umsgpack.packb(command)
+    return struct.pack("<I", len(packed)) + packed
 
 
-class _QuantisedGeometry(_BufferGeometry):
-    """A mesh whose corners lie on a grid of 65535 steps along its longest side."""
+class _Described(Object):
+    """An object in the words of three.js."""
 
-    def __init__(self, mesh: Mesh) -> None:
-        vertices, normals, faces = mesh.with_normals()
-        low, high = vertices.min(axis=0), vertices.max(axis=0)
-        self._middle, self._step = (low + high) / 2, max((high - low).max(), 1e-9) / 65534
-        position = np.round((vertices - self._middle) / self._step).astype(np.int16)
-        super().__init__(faces, position=position, normal=np.round(127 * normals).astype(np.int8))
+    def __init__(self, description: Mapping[str, Any]) -> None:
+        self.description = description
 
-    def intrinsic_transform(self) -> NDArray[np.float64]:
-        """Grid to frame, shape (4, 4), transposed: three.js reads it column by column."""
-        transform = np.diag([self._step, self._step, self._step, 1.0])
-        transform[3, :3] = self._middle
-        return transform
-
-
-class _FinishMaterial(Material):
-    """A finish as a material."""
-
-    def __init__(self, finish: Finish) -> None:
-        super().__init__()
-        self.finish = finish
-
-    def lower(self, _: dict[str, object]) -> dict[str, object]:
-        """Describe it to three.js."""
-        look = self.finish
-        described = {"uuid": self.uuid, "color": look.colour, "opacity": look.opacity}
-        if look.opacity < 1:
-            described |= {"transparent": True, "depthWrite": False}
-        if look.glow:
-            return described | {"type": "MeshBasicMaterial"}
-        shine = {"roughness": look.roughness, "metalness": look.metalness}
-        return described | shine | {"type": "MeshStandardMaterial"}
-
-
-class _Sun(Object):
-    """A light from afar that casts shadows."""
-
-    def __init__(self) -> None:
-        super().__init__(None, None)
-
-    def lower(self) -> dict[str, object]:
-        """Describe it to three.js."""
-        sides = {"left": -1.7, "right": 1.7, "top": 1.7, "bottom": -1.7, "near": 0.5, "far": 8.0}
-        shadow = {"mapSize": [2048, 2048], "bias": -0.0004, "normalBias": 0.004, "radius": 3}
-        camera = {"uuid": f"{self.uuid}-camera", "type": "OrthographicCamera", "zoom": 1, **sides}
-        light = {"uuid": self.uuid, "type": "DirectionalLight", "color": SUN, "intensity": 0.5}
-        return {"object": {**light, "shadow": {**shadow, "camera": camera}}}
-
-
-BUFFER_TYPES = {
-    "float32": ("Float32Array", 0x17),
-    "int16": ("Int16Array", 0x13),
-    "int8": ("Int8Array", 0x11),
-    "uint16": ("Uint16Array", 0x14),
-    "uint32": ("Uint32Array", 0x16),
-}
-
-
-def _typed_array(array: NDArray[np.generic], size: int) -> dict[str, object]:
-    name, code = BUFFER_TYPES[array.dtype.name]
-    data = umsgpack.Ext(code, np.ascontiguousarray(array).tobytes())
-    return {"itemSize": size, "type": name, "array": data, "normalized": name == "Int8Array"}
+    def lower(self) -> Mapping[str, Any]:
+        """Describe it; Meshcat calls this."""
+        return self.description
 
 
 def put(window: Visualizer, finish: Finish, *meshes: Mesh) -> None:
-    """Show meshes with one finish."""
-    window.set_object(DrawnMesh(_QuantisedGeometry(Mesh.joined(meshes)), _FinishMaterial(finish)))
+    """Show meshes with one finish; corners lie on a grid of 65535 steps along the longest side."""
+    vertices, normals, faces = Mesh.joined(meshes).with_normals()
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    middle, step = (low + high) / 2, max((high - low).max(), 1e-9) / 65534
+    transform = np.diag([step, step, step, 1.0])
+    transform[3, :3] = middle  # transposed: three.js reads it column by column
+    position = np.round((vertices - middle) / step).astype(np.int16)
+    normal = np.round(127 * normals).astype(np.int8)
+    index = faces.astype(np.uint16 if faces.max(initial=0) < 2**16 else np.uint32)
+    geometry = {
+        "attributes": {"position": _typed_array(position, 3), "normal": _typed_array(normal, 3)},
+        "index": _typed_array(index, 1),
+    }
+    _show(window, "Mesh", geometry, _material(finish), transform)
+
+
+def _show(
+    window: Visualizer,
+    kind: str,
+    geometry: Mapping[str, Any],
+    material: Mapping[str, Any],
+    transform: NDArray[np.float64],
+) -> None:
+    """Show an object of three.js."""
+    shape, look, own = (f"id-{next(window.window.ids)}" for _ in range(3))
+    description = {
+        "metadata": {"version": 4.5, "type": "Object"},
+        "geometries": [{"uuid": shape, "type": "BufferGeometry", "data": geometry}],
+        "materials": [{"uuid": look, **material}],
+        "object": {
+            "uuid": own,
+            "type": kind,
+            "geometry": shape,
+            "material": look,
+            "matrix": transform.ravel().tolist(),
+        },
+    }
+    window.set_object(_Described(description))
+
+
+def _material(look: Finish) -> dict[str, Any]:
+    """A finish in the words of three.js."""
+    described: dict[str, Any] = {"color": look.colour, "opacity": look.opacity}
+    if look.opacity < 1:
+        described |= {"transparent": True, "depthWrite": False}
+    if look.glow:
+        return described | {"type": "MeshBasicMaterial"}
+    shine = {"roughness": look.roughness, "metalness": look.metalness}
+    return described | shine | {"type": "MeshStandardMaterial"}
+
+
+def _show_sun(window: Visualizer) -> None:
+    """Show a light from afar that casts shadows."""
+    own, eye = (f"id-{next(window.window.ids)}" for _ in range(2))
+    sides = {"left": -1.7, "right": 1.7, "top": 1.7, "bottom": -1.7, "near": 0.5, "far": 8.0}
+    shadow = {"mapSize": [2048, 2048], "bias": -0.0004, "normalBias": 0.004, "radius": 3}
+    camera = {"uuid": eye, "type": "OrthographicCamera", "zoom": 1, **sides}
+    light = {"uuid": own, "type": "DirectionalLight", "color": SUN, "intensity": 0.5}
+    window.set_object(_Described({"object": {**light, "shadow": {**shadow, "camera": camera}}}))
+    window["<object>"].set_property("position", list(SUN_PLACE))
+
+
+EXTENSIONS = {"int8": 0x11, "int16": 0x13, "uint16": 0x14, "uint32": 0x16, "float32": 0x17}
+"""Codes of MessagePack's extensions that three.js reads as arrays of a type."""
+
+
+def _typed_array(array: NDArray[np.generic], size: int) -> dict[str, object]:
+    """An array in as few bytes as three.js reads."""
+    name = array.dtype.name
+    data = umsgpack.Ext(EXTENSIONS[name], array.tobytes())
+    kind, normalized = f"{name.capitalize()}Array", name == "int8"
+    return {"itemSize": size, "type": kind, "array": data, "normalized": normalized}
 
 
 def draw_stage(window: Visualizer, arm: Arm, scene: Scene) -> list[Visualizer]:
@@ -180,10 +163,8 @@ def draw_stage(window: Visualizer, arm: Arm, scene: Scene) -> list[Visualizer]:
     ----------
     window : meshcat.Visualizer
         Where to draw.
-    arm : Arm
-        The arm.
-    scene : Scene
-        What stands around it.
+    arm, scene : Arm, Scene
+        The arm, and what stands around it.
     """
     draw_surroundings(window, scene)
     put(window["flash"], FLASH, capsule(0.0, stage_scale(arm, scene) * FLASH_RADIUS))
@@ -198,17 +179,18 @@ def draw_surroundings(window: Visualizer, scene: Scene) -> None:
         window[path].set_property("intensity", intensity)
     for end in ("top_color", "bottom_color"):
         window["/Background"].set_property(end, BACKGROUND)
-    window["sun"].set_object(_Sun())
-    window["sun"]["<object>"].set_property("position", list(SUN_PLACE))
+    _show_sun(window["sun"])
     if scene.ground:
         put(window["floor"], FLOOR, cylinder(0.002, FLOOR_RADIUS, 0.0).moved((0, 0, -0.002)))
-        grid = _BufferGeometry(position=_grid_lines().astype(np.float32))
-        window["grid"].set_object(LineSegments(grid, LineBasicMaterial(color=GRID_COLOUR)))
+        lines = {"attributes": {"position": _typed_array(_grid_lines().astype(np.float32), 3)}}
+        material = LineBasicMaterial(color=GRID_COLOUR).lower({})
+        del material["uuid"]
+        _show(window["grid"], "LineSegments", lines, material, np.eye(4))
     for number, obstacle in enumerate(scene.obstacles):
-        place, meshes = window[f"obstacles/{number}"], obstacle_meshes(obstacle, scene)
-        if meshes.top is not None:
-            put(place["top"], GOAL_SLAB, meshes.top)
-        put(place["body"], OBSTACLE, meshes.body)
+        body, *slab = obstacle_meshes(obstacle, scene)
+        if slab:
+            put(window[f"obstacles/{number}/top"], GOAL_SLAB, *slab)
+        put(window[f"obstacles/{number}/body"], OBSTACLE, body)
 
 
 def _grid_lines() -> NDArray[np.float64]:
@@ -260,10 +242,10 @@ def draw_trace(
         Where to draw.
     points : ndarray, shape (n, 3)
         Where the tool has been [m].
-    outcome : {"success", "collision", "truncated"}, optional
+    outcome : str, optional
         How the episode ended, if it has, which decides about the colour.
     scale : float
-        Size of the stage; see `kinarm.viewer.camera.stage_scale`.
+        Size of the stage; see `stage_scale`.
     """
     if len(points) > 1:
         put(window, TRACES[outcome], tube(points, scale * TRACE_RADIUS, TRACE_SIDES))

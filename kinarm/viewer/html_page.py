@@ -6,7 +6,7 @@ import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -32,24 +32,12 @@ NOTEBOOK_FRAME = Markup(
 
 @dataclass(frozen=True)
 class HtmlPage:
-    """A page. In a notebook it shows itself.
-
-    Attributes
-    ----------
-    html : str
-        The whole page; it refers to nothing outside of itself.
-    """
+    """A page, whose ``html`` refers to nothing outside of itself. In a notebook it shows itself."""
 
     html: str
 
     def save(self, path: str | Path) -> None:
-        """Write the page to a file.
-
-        Raises
-        ------
-        OutputError
-            If the file cannot be written; an existing file is then left as it was.
-        """
+        """Write the page to a file; if that fails, an existing one is left as it was."""
         write_text(path, self.html)
 
     def __repr__(self) -> str:
@@ -66,12 +54,10 @@ def page_html(
 
     Parameters
     ----------
-    template : str
-        Name of the template, which extends ``page.html``, and of its style sheet.
-    title : str
-        Title of the page.
+    template, title
+        Name of the template, which extends ``page.html``, and of its style sheet; the page's title.
     scene : bytes
-        Commands to Meshcat's viewer, each led by its length.
+        Commands to Meshcat's viewer, each framed.
     data : mapping
         What the scripts have to know, in terms that JSON can hold.
     parts : sequence of str
@@ -87,8 +73,8 @@ def page_html(
     return environment.get_template(f"{template}.html").render(
         title=title,
         style=_own_text("page.css") + _own_text(f"{template}.css"),
-        licence=_licence(),
-        meshcat=_meshcat_base64(),
+        licence=Markup(_meshcat(".LICENSE.txt").decode().replace("--", "- -")),
+        meshcat=_gzip_base64(_meshcat()),
         scene=_gzip_base64(scene),
         data=_gzip_base64(described.encode()),
         scripts=[_own_text(f"{name}.js") for name in ("page", "stage", *parts)],
@@ -98,18 +84,14 @@ def page_html(
 def arm_data(arm: Arm, scene: Scene) -> dict[str, Any]:
     """Describe an arm: its axes and tool, which joint carries which body, its colour and size."""
     chain, painted = arm.chain, Counter[int]()
+    columns = chain.translation, chain.rotation, chain.axis, chain.prismatic
     for part in arm_parts(arm):
         painted[part.finish.colour] += len(part.mesh.faces)
     return {
         "arm": arm.name,
         "axes": [
-            {
-                "translation": chain.translation[k].tolist(),
-                "rotation": chain.rotation[k].tolist(),
-                "axis": chain.axis[k].tolist(),
-                "slides": bool(chain.prismatic[k]),
-            }
-            for k in range(arm.n_joints)
+            dict(zip(("translation", "rotation", "axis", "slides"), axis, strict=True))
+            for axis in zip(*(column.tolist() for column in columns), strict=True)
         ],
         "tool": chain.tool.tolist(),
         "links": link_joints(arm),
@@ -123,18 +105,11 @@ def _own_text(name: str) -> Markup:
     return Markup((resources.files("kinarm.viewer") / name).read_text(encoding="utf-8"))
 
 
-@cache
-def _licence() -> Markup:
-    """Licence of Meshcat's viewer, fit for a comment."""
-    text = resources.files("meshcat") / "viewer/dist/main.min.js.LICENSE.txt"
-    return Markup(text.read_text(encoding="utf-8").replace("--", "- -"))
+def _meshcat(ending: str = "") -> bytes:
+    """Meshcat's viewer, or what lies beside it."""
+    return (resources.files("meshcat") / f"viewer/dist/main.min.js{ending}").read_bytes()
 
 
-@cache
-def _meshcat_base64() -> str:
-    script = resources.files("meshcat") / "viewer/dist/main.min.js"
-    return _gzip_base64(script.read_bytes())
-
-
+@lru_cache(maxsize=4)
 def _gzip_base64(content: bytes) -> str:
     return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()

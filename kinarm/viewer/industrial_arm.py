@@ -51,7 +51,7 @@ def fits(arm: Arm) -> bool:
     if chain.n_joints != 6 or chain.prismatic.any() or not np.allclose(chain.axis, AXES):
         return False
     upper, forearm = chain.translation[2][2], chain.translation[3][0]
-    first = _base_placement(arm) * pin.SE3(np.eye(3), np.array([0, 0, 0.33]))
+    first = arm.model.frames[1].placement * pin.SE3(np.eye(3), np.array([0, 0, 0.33]))
     expected = [(0.075, 0, 0), (0, 0, upper), (forearm, 0, 0.075), (0, 0, 0), (0.08, 0, 0)]
     return (
         arm.model.jointPlacements[1].isApprox(first, 1e-6)
@@ -64,14 +64,9 @@ def fits(arm: Arm) -> bool:
     )
 
 
-def _base_placement(arm: Arm) -> pin.SE3:
-    """Where the link stands that is fixed in the world."""
-    return arm.model.frames[1].placement
-
-
 def parts(arm: Arm) -> Iterator[ArmPart]:
     """All parts of an arm that `fits`."""
-    chain, base = arm.chain, _base_placement(arm)
+    chain, base = arm.chain, arm.model.frames[1].placement  # of the link fixed in the world
     for part in _base():
         yield part._replace(mesh=part.mesh.moved(base.translation, base.rotation))
     yield from _shoulder()
@@ -132,18 +127,17 @@ def _upper_arm(length: float) -> Iterator[ArmPart]:
     ]
     yield ArmPart(2, PAINT, housing(web))
     for side in (-1, 1):
-        yield ArmPart(2, PAINT, lathe(_towards(side, lower_hub), "y"))
-        yield ArmPart(2, PAINT, lathe(_towards(side, upper_hub), "y").moved((0, 0, length)))
+        lower, upper = (  # profiles to the left, or their mirror images
+            [(side * position, radius) for position, radius in hub[::side]]
+            for hub in (lower_hub, upper_hub)
+        )
+        yield ArmPart(2, PAINT, lathe(lower, "y"))
+        yield ArmPart(2, PAINT, lathe(upper, "y").moved((0, 0, length)))
         yield ArmPart(2, PAINT, housing(cheek).moved((0, 0.072 * side, 0)))
         yield ArmPart(2, STEEL, cylinder(0.006, 0.04, 0.002, "y").moved((0, 0.093 * side, length)))
     for angle in np.arange(6) * np.pi / 3 + 0.26:
         place = (0.05 * np.cos(angle), -0.093, 0.05 * np.sin(angle))
         yield ArmPart(2, STEEL, cylinder(0.006, 0.006, 0.001, "y").moved(place))
-
-
-def _towards(side: int, profile: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """A profile on the positive side (1), or its mirror image (-1)."""
-    return profile if side > 0 else [(-position, radius) for position, radius in profile[::-1]]
 
 
 def _elbow() -> Iterator[ArmPart]:

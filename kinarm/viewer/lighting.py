@@ -61,7 +61,6 @@ def _blurred(nodes: int, lobe: Callable[[Array], Array]) -> Array:
     return mean.reshape(nodes, nodes, 3)
 
 
-@lru_cache(maxsize=1)
 def _even_directions() -> Array:
     """Unit vectors that are spread evenly (Fibonacci's spiral), shape (n, 3)."""
     number = np.arange(DIRECTIONS) + 0.5

@@ -1,25 +1,32 @@
 """A scene served to browsers of this machine while it is drawn, by threads of this process."""
 
 import errno
-import struct
 import sys
 import threading
 from collections.abc import Iterator, Mapping
-from functools import cache, partial
 from http.server import BaseHTTPRequestHandler
 from importlib import resources
+from itertools import count
 from socketserver import ThreadingTCPServer
 from typing import Any
 
-import umsgpack
 from meshcat import Visualizer
 
 from kinarm._validation import whole_number
-from kinarm.errors import InvalidInputError, OutputError
+from kinarm.errors import OutputError
+from kinarm.viewer.drawing import framed
 
 HOST = "127.0.0.1"
 PORT, LAST_PORT = 7000, 65535
 PORTS_TRIED = 100
+
+FILES = {
+    "/": ("text/html; charset=utf-8", "kinarm.viewer", "live_page.html"),
+    "/live_page.js": ("text/javascript", "kinarm.viewer", "live_page.js"),
+    "/meshcat.js": ("text/javascript; charset=utf-8", "meshcat", "viewer/dist/main.min.js"),
+    "/scene": ("application/octet-stream", "", ""),
+}
+"""Type, package and name of what a page consists of, by address; the scene is no file."""
 
 
 class LiveServer:
@@ -30,26 +37,23 @@ class LiveServer:
     Parameters
     ----------
     port : int
-        Port to listen on; the next free one if it is taken.
+        Port to listen on; the next free one if it is taken. The attribute is the one taken.
 
     Attributes
     ----------
-    port : int
-        Port that it listens on.
     window : meshcat.Visualizer
         What to draw on.
 
     Raises
     ------
-    InvalidInputError
-        If there is no such port.
     OutputError
         If no port is free.
     """
 
     def __init__(self, port: int = PORT) -> None:
-        self._scene = LiveScene()
-        self._server = _listening_server(port, self._scene)
+        self._scene, self.ids = LiveScene(), count()
+        self._server = _listening_server(whole_number("port", port, 0, LAST_PORT))
+        self._server.scene = self._scene
         self.port: int = self._server.server_address[1]
         self.window = Visualizer(window=self)
         threading.Thread(target=self._server.serve_forever, args=(0.05,), daemon=True).start()
@@ -90,7 +94,6 @@ class LiveScene:
 
     def add(self, command: Mapping[str, Any]) -> None:
         """Take one of Meshcat's commands."""
-        packed = umsgpack.packb(command)
         path, kind = command["path"], command["type"]
         key = (path, kind, command.get("property", ""))
         below = f"{path.rstrip('/')}/"
@@ -100,7 +103,7 @@ class LiveScene:
                     del self._commands[other]
             self._commands.pop(key, None)  # so that the order is that of the latest commands
             self._last += 1
-            self._commands[key] = self._last, struct.pack("<I", len(packed)) + packed
+            self._commands[key] = self._last, framed(command)
             self._changed.notify_all()
 
     def close(self) -> None:
@@ -130,6 +133,7 @@ class _Server(ThreadingTCPServer):
     """Answers each visitor in a thread of its own."""
 
     allow_reuse_address = daemon_threads = True
+    scene: LiveScene
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Connections that break are no news to a user."""
@@ -138,59 +142,36 @@ class _Server(ThreadingTCPServer):
 
 
 class _Visit(BaseHTTPRequestHandler):
-    """Answers a visitor with a file of the page, or with the scene as a stream without end.
+    """Answers a visitor with a file of the page, or with the scene as a stream without end."""
 
-    Only requests to a name of this machine are answered: sites can make theirs point here.
-    """
-
-    timeout = 10.0
-    """So long a visitor may keep silent, or not take what is sent [s]."""
-
-    def __init__(self, scene: LiveScene, *connection: Any) -> None:
-        self._scene = scene
-        super().__init__(*connection)
+    server: _Server
 
     def do_GET(self) -> None:
         """Answer."""
-        kind, content = _files().get(self.path.partition("?")[0], (None, b""))
-        if self.headers.get("Host", "").partition(":")[0] not in ("localhost", HOST):
-            self.send_error(403)
-        elif kind is None:
+        address = self.path.partition("?")[0]
+        if address not in FILES:
             self.send_error(404)
-        else:
-            self.send_response(200)
-            self.send_header("Content-Type", kind)
-            self.send_header("Cache-Control", "no-store")
-            self.end_headers()
-            for piece in [content] if content else self._scene.changes():
-                self.wfile.write(piece)
+            return
+        kind, package, name = FILES[address]
+        self.send_response(200)
+        self.send_header("Content-Type", kind)
+        self.send_header("Cache-Control", "no-store")
+        self.end_headers()
+        content = (resources.files(package) / name).read_bytes() if name else None
+        for piece in [content] if content else self.server.scene.changes():
+            self.wfile.write(piece)
 
     def log_message(self, *_: Any) -> None:
         """Say nothing about requests."""
 
 
-def _listening_server(port: int, scene: LiveScene) -> _Server:
+def _listening_server(port: int) -> _Server:
     """Listen on a port, or on the next free one."""
-    if whole_number("port", port, 0) > LAST_PORT:
-        raise InvalidInputError(f"port must be at most {LAST_PORT}, got {port}")
     for candidate in range(port, min(port + PORTS_TRIED, LAST_PORT) + 1):
         try:
-            return _Server((HOST, candidate), partial(_Visit, scene))
+            return _Server((HOST, candidate), _Visit)
         except OSError as error:
             reason = error.strerror
             if error.errno != errno.EADDRINUSE:
                 break
     raise OutputError(f"cannot serve on port {port}: {reason}")
-
-
-@cache
-def _files() -> dict[str, tuple[str, bytes]]:
-    """Type and content of what a page consists of, by address; the scene has no fixed content."""
-    own = resources.files("kinarm.viewer")
-    meshcat = resources.files("meshcat") / "viewer/dist/main.min.js"
-    return {
-        "/": ("text/html; charset=utf-8", (own / "live_page.html").read_bytes()),
-        "/live_page.js": ("text/javascript", (own / "live_page.js").read_bytes()),
-        "/meshcat.js": ("text/javascript; charset=utf-8", meshcat.read_bytes()),
-        "/scene": ("application/octet-stream", b""),
-    }

@@ -14,25 +14,13 @@ from kinarm.viewer.live_server import LiveServer
 
 
 class LiveStage:
-    """Surroundings, goal, arm and the way of its tool on a live page.
-
-    Parameters
-    ----------
-    server : LiveServer
-        Where it is shown.
-    problem : ReachProblem
-        What stands around the arm.
-    arm : Arm
-        The arm.
-    """
+    """Surroundings, goal, arm and the way of its tool on a live page."""
 
     def __init__(self, server: LiveServer, problem: ReachProblem, arm: Arm) -> None:
-        self.server, self._arm = server, arm
-        self._data = arm.model.createData()
-        self._due = 0.0
+        self.server, self._arm, self._data = server, arm, arm.model.createData()
+        self._due, self._scale = 0.0, stage_scale(arm, problem.scene)
         window = server.window
         draw_surroundings(window, problem.scene)
-        self._scale = stage_scale(arm, problem.scene)
         aim_camera(window, self._scale)
         draw_goal(window["goal"], problem)
         self._frames = draw_arm(window["arm"], arm)[1:]

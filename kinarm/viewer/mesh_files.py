@@ -46,15 +46,7 @@ this share of their light; links that went through it more often than others loo
 
 
 class PaintedMesh(NamedTuple):
-    """Triangles of one material.
-
-    Attributes
-    ----------
-    mesh : Mesh
-        Its triangles, in the frame of the file [m, if that says so].
-    colour : int or None
-        Red, green and blue as 0xRRGGBB; None if the file does not say.
-    """
+    """Triangles of one material, whose colour is 0xRRGGBB, or None if the file does not say."""
 
     mesh: Mesh
     colour: int | None
@@ -64,14 +56,8 @@ def read_mesh_file(path: Path, scale: Sequence[float]) -> tuple[PaintedMesh, ...
     """Read a mesh file and simplify it; or look up what came of it before.
 
     Nodes are placed and units converted as the file says. Its up axis counts for nothing, as in
-    ROS and in Pinocchio, so that looks and collision shapes agree.
-
-    Parameters
-    ----------
-    path : Path
-        A file of Collada, OBJ or STL.
-    scale : sequence of float
-        Factors along the axes.
+    ROS and in Pinocchio, so that looks and collision shapes agree. ``scale`` are factors along the
+    axes.
 
     Raises
     ------
@@ -105,14 +91,12 @@ def _versions() -> list[str]:
 def _simplified_arrays(path: Path, scale: Sequence[float]) -> dict[str, ArrayLike]:
     """Triangles and colours of a file, as they are kept."""
     pieces = _pieces(path, scale)
-    arrays: dict[str, ArrayLike] = {
-        "colours": [UNKNOWN if piece.colour is None else piece.colour for piece in pieces]
-    }
+    colours = [UNKNOWN if piece.colour is None else piece.colour for piece in pieces]
+    arrays: dict[str, ArrayLike] = {"colours": colours}
     for number, piece in enumerate(pieces):
         vertices, normals, faces = _simplified(piece.mesh).with_normals()
-        arrays[f"vertices {number}"] = vertices
-        arrays[f"faces {number}"] = faces
-        arrays[f"normals {number}"] = normals
+        made = {"vertices": vertices, "normals": normals, "faces": faces}
+        arrays |= {f"{name} {number}": array for name, array in made.items()}
     return arrays
 
 
@@ -144,20 +128,12 @@ def _pieces(path: Path, scale: Sequence[float]) -> list[PaintedMesh]:
 
 def _placed(geometry: Any, transform: NDArray[np.float64], scale: Sequence[float]) -> Mesh:
     """Triangles of a geometry where a node puts it."""
-    factors = _unit(geometry) * np.asarray(scale, dtype=float)
+    unit = str(geometry.metadata.get("units", "")).partition(" * ")  # "0.001 * meters", or none
+    factors = (float(unit[0]) if unit[1] else 1.0) * np.asarray(scale, dtype=float)
     stretch = factors[:, None] * transform[:3, :3]
     mirrored = np.linalg.det(stretch) < 0  # which turns triangles inside out
     faces = geometry.faces[:, ::-1] if mirrored else geometry.faces
     return Mesh(geometry.vertices, faces).moved(factors * transform[:3, 3], stretch)
-
-
-def _unit(geometry: Any) -> float:
-    """Unit of length of a geometry [m]; files that name none are in metres."""
-    factor = str(geometry.metadata.get("units", "")).partition(" * ")[0]
-    try:
-        return float(factor)
-    except ValueError:
-        return 1.0
 
 
 def _colour(geometry: Any, path: Path) -> int | None:
@@ -175,8 +151,7 @@ def original_colour(path: Path, colour: NDArray[np.float64]) -> NDArray[np.float
         for times in range(MOST_TIMES + 1):
             apart = np.abs(UNIVERSAL_ROBOTS * DIMMING**times - colour).max(axis=1)
             if apart.min() < SAME_COLOUR:
-                original: NDArray[np.float64] = UNIVERSAL_ROBOTS[apart.argmin()]
-                return original
+                return np.array(UNIVERSAL_ROBOTS[apart.argmin()])
     return colour
 
 
@@ -188,10 +163,7 @@ def _simplified(mesh: Mesh) -> Mesh:
     # Without loss means for this package that the squared distances of a corner from the planes
     # that meet there sum up to less than this.
     unit = TOLERANCE / np.sqrt(np.finfo(float).eps)
-    vertices, faces = fast_simplification.simplify(
-        welded.vertices / unit,
-        welded.faces.astype(np.int32),
-        lossless=True,
-        preserve_border=True,
-    )
+    places, corners = welded.vertices / unit, welded.faces.astype(np.int32)
+    simplify = fast_simplification.simplify
+    vertices, faces = simplify(places, corners, lossless=True, preserve_border=True)
     return Mesh(vertices * unit, faces.astype(np.int64))

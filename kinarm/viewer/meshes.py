@@ -24,12 +24,10 @@ class Mesh:
 
     Attributes
     ----------
-    vertices : ndarray, shape (n, 3)
-        Corners [m].
+    vertices, normals : ndarray, shape (n, 3)
+        Corners [m], and unit normals there; `with_normals` finds these if they are not given.
     faces : ndarray of int, shape (m, 3)
         Indices of corners, anticlockwise seen from outside.
-    normals : ndarray, shape (n, 3), optional
-        Unit normals at the corners; `with_normals` finds them if they are not given.
     """
 
     vertices: Array
@@ -101,12 +99,8 @@ def loft(rings: Array) -> Mesh:
     here = np.arange(around)
     after = (here + 1) % around
     below, above = np.full(around, levels * around), np.full(around, levels * around + 1)
-    stretch = np.concatenate(
-        [
-            np.stack([here, after, after + around], 1),
-            np.stack([here, after + around, here + around], 1),
-        ]
-    )
+    first = np.stack([here, after, after + around], 1)
+    stretch = np.concatenate([first, np.stack([here, after + around, here + around], 1)])
     last = (levels - 1) * around
     walls = (stretch + around * np.arange(levels - 1)[:, None, None]).reshape(-1, 3)
     ends = [np.stack([below, after, here], 1), np.stack([above, last + here, last + after], 1)]
@@ -125,14 +119,12 @@ def lathe(profile: Sequence[tuple[float, float]], axis: str = "z") -> Mesh:
 
 
 def cylinder(length: float, radius: float, chamfer: float, axis: str = "z") -> Mesh:
-    """A cylinder about the origin with chamfered rims.
+    """A cylinder about the origin, along an axis, with chamfered rims [m].
 
     Parameters
     ----------
-    length, radius, chamfer : float
-        Its sizes [m].
-    axis : {"x", "y", "z"}
-        Where it points.
+    length, radius, chamfer, axis
+        Its sizes [m], and where it points: ``"x"``, ``"y"`` or ``"z"``.
     """
     half = length / 2
     profile = [(-half, radius - chamfer), (-half + chamfer, radius)]
@@ -142,42 +134,23 @@ def cylinder(length: float, radius: float, chamfer: float, axis: str = "z") -> M
 def housing(sections: Sequence[tuple[float, float, float, float, float]]) -> Mesh:
     """Blend a casting through rounded cross sections that are stacked along z.
 
-    Parameters
-    ----------
-    sections : sequence of (z, x, half_x, half_y, exponent)
-        Height, centre and half widths [m]; exponent 2 is an ellipse, larger ones are boxier.
+    Each section states height, centre and half widths [m], and an exponent: 2 is an ellipse, larger
+    ones are boxier.
     """
     angle = np.linspace(0, 2 * np.pi, SEGMENTS, endpoint=False)
-    cosine, sine = np.cos(angle), np.sin(angle)
-    rings = [
-        np.stack(
-            [
-                x + half_x * np.sign(cosine) * np.abs(cosine) ** (2 / exponent),
-                half_y * np.sign(sine) * np.abs(sine) ** (2 / exponent),
-                np.full(SEGMENTS, z),
-            ],
-            axis=1,
-        )
-        for z, x, half_x, half_y, exponent in sections
-    ]
-    return loft(np.array(rings))
+    z, x, half_x, half_y, exponent = np.array(sections, dtype=float).T[..., None]
+    cosine, sine = (
+        np.sign(f) * np.abs(f) ** (2 / exponent) for f in (np.cos(angle), np.sin(angle))
+    )
+    return loft(np.stack([x + half_x * cosine, half_y * sine, z + 0 * angle], axis=2))
 
 
 def box(size: ArrayLike, chamfer: float = 0.0) -> Mesh:
     """A box about the origin with chamfered edges [m]."""
     half = np.asarray(size, dtype=float) / 2
-    if chamfer == 0:
-        return _convex_hull(half * _cube_corners())
-    inset = half - chamfer
-    return _convex_hull(
-        np.concatenate(
-            [_cube_corners() * np.where(np.arange(3) == k, half, inset) for k in range(3)]
-        )
-    )
-
-
-def _cube_corners() -> Array:
-    return np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T
+    halves = half - chamfer * (1 - np.eye(3)) if chamfer else half[None]
+    corners = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T
+    return _convex_hull((corners * halves[:, None]).reshape(-1, 3))
 
 
 def _convex_hull(points: Array) -> Mesh:
@@ -204,10 +177,8 @@ def tube(points: ArrayLike, radius: float, sides: int = 6) -> Mesh:
 
     Parameters
     ----------
-    points : array_like, shape (n, 3)
-        At least two points [m].
-    radius : float
-        Radius of the tube [m].
+    points, radius : array_like, shape (n, 3), and float
+        At least two points, and the radius of the tube [m].
     sides : int
         Corners of its cross section.
     """
@@ -230,13 +201,7 @@ def tube(points: ArrayLike, radius: float, sides: int = 6) -> Mesh:
 
 
 def from_coal(shape: coal.CollisionGeometry) -> Mesh:
-    """Skin of a primitive or a convex hull, in its own frame.
-
-    Raises
-    ------
-    TypeError
-        For any other shape.
-    """
+    """Skin of a primitive or a convex hull, in its own frame."""
     if isinstance(shape, coal.Box):
         return box(2 * np.array(shape.halfSide))
     if isinstance(shape, coal.Sphere):
@@ -245,6 +210,4 @@ def from_coal(shape: coal.CollisionGeometry) -> Mesh:
         return capsule(2 * shape.halfLength, shape.radius)
     if isinstance(shape, coal.Cylinder):
         return cylinder(2 * shape.halfLength, shape.radius, 0.0)
-    if isinstance(shape, coal.ConvexBase):
-        return _convex_hull(np.array(shape.points()))
-    raise TypeError(f"cannot draw a {type(shape).__name__}")
+    return _convex_hull(np.array(shape.points()))

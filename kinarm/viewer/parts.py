@@ -1,31 +1,37 @@
-"""Parts of drawn things: meshes with a finish, carried by a joint; and colours."""
+"""Parts that are drawn: of arms, obstacles and the cube, their sizes, finishes and colours."""
 
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm.viewer.meshes import Mesh
+from kinarm.scene import GoalRegion, Obstacle, Scene
+from kinarm.viewer.meshes import Mesh, box
 
 Array = NDArray[np.float64]
+
+FLOOR_RADIUS, GRID_RADIUS, GRID_STEP = 12.0, 2.0, 0.25
+"""Of the floor, and of the lines on it [m]."""
+
+SLAB_THICKNESS = 0.02
+"""Thickness of the slab that covers an obstacle on which goals lie [m]."""
+
+TRACE_RADIUS = 0.0042
+TRACE_SIDES = 6
+FLASH_RADIUS = 0.025
+"""Radius of what lights up where two bodies touch [m]."""
+
+CUBE_CHAMFER = 0.08
+"""Of the cube's edges, as a share of their length."""
 
 REFLECTANCE = 0.7
 """Of white lacquer; a white that reflected everything would show no shape in bright light."""
 
 
 class Finish(NamedTuple):
-    """A surface.
+    """A surface of three.js' standard material, its colour as 0xRRGGBB.
 
-    Attributes
-    ----------
-    colour : int
-        Red, green and blue as 0xRRGGBB.
-    roughness, metalness : float
-        Of three.js' standard material, in 0..1.
-    opacity : float
-        Less than 1 lets see through.
-    glow : bool
-        Whether the surface shows its colour without any light.
+    A surface that glows shows its colour without any light.
     """
 
     colour: int
@@ -36,17 +42,7 @@ class Finish(NamedTuple):
 
 
 class ArmPart(NamedTuple):
-    """A piece of an arm.
-
-    Attributes
-    ----------
-    joint : int
-        Joint that carries it; 0 is the base.
-    finish : Finish
-        Its surface.
-    mesh : Mesh
-        Its shape in the joint's frame.
-    """
+    """A piece of an arm in the frame of the joint that carries it; 0 is the base."""
 
     joint: int
     finish: Finish
@@ -102,3 +98,32 @@ def to_srgb(linear: ArrayLike) -> Array:
         value <= 0.0031308, 12.92 * value, 1.055 * np.maximum(value, 0) ** (1 / 2.4) - 0.055
     )
     return encoded
+
+
+def obstacle_meshes(obstacle: Obstacle, scene: Scene) -> list[Mesh]:
+    """An obstacle in the world; if goals lie on it, a bench: a body, and a slab on its top."""
+    size, centre = obstacle.size, obstacle.centre
+    if any(_lies_on(region, obstacle, scene.cube_edge) for region in scene.goal_regions):
+        top = min(SLAB_THICKNESS, size[2] / 2)
+        inset = np.minimum(0.03, 0.2 * size[:2])
+        body = box((*size[:2] - inset, size[2] - top)).moved((0, 0, -top / 2))
+        slab = box((*size[:2], top), 0.2 * top).moved((0, 0, (size[2] - top) / 2))
+        parts = [body, slab]
+    else:
+        parts = [box(size, 0.04 * size.min())]
+    return [part.moved(centre, obstacle.rotation) for part in parts]
+
+
+def _lies_on(region: GoalRegion, obstacle: Obstacle, edge: float) -> bool:
+    """Whether cubes with a given edge [m], centred in a region, lie on an obstacle."""
+    gap = region.lower[2] - obstacle.upper[2]
+    half = np.abs(obstacle.rotation) @ obstacle.size / 2
+    lower, upper = obstacle.centre - half, obstacle.centre + half
+    above = all(region.lower[k] < upper[k] and lower[k] < region.upper[k] for k in (0, 1))
+    return above and 0 <= gap <= edge
+
+
+def cube_mesh(scene: Scene) -> Mesh:
+    """The cube that marks a goal, about the origin."""
+    edge = scene.cube_edge or 0.01
+    return box((edge, edge, edge), CUBE_CHAMFER * edge)

@@ -1,14 +1,12 @@
 """Replay pages: recordings as one HTML file that plays offline, in any browser with WebGL."""
 
 from collections.abc import Sequence
-from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError
 from kinarm.paths import record_path
 from kinarm.problem import ProblemLike
@@ -16,12 +14,8 @@ from kinarm.recording import Recording
 from kinarm.viewer.camera import stage_scale
 from kinarm.viewer.drawing import CapturingWindow, draw_goal, draw_stage, draw_trace
 from kinarm.viewer.html_page import HtmlPage, arm_data, page_html
-from kinarm.viewer.parts import OUTCOME_COLOURS
-from kinarm.viewer.surroundings import TRACE_SIDES
+from kinarm.viewer.parts import OUTCOME_COLOURS, TRACE_SIDES
 from kinarm.world import World
-
-Trials = Sequence[Sequence[Recording]]
-"""One or two recordings of each trial."""
 
 
 class ReplayPage(HtmlPage):
@@ -58,8 +52,6 @@ def replay_page(
         If there is no recording, or they cannot share a page.
     ArmError
         If the recorded arm is missing, or has changed.
-    OutputError
-        If the file cannot be written.
     """
     chosen = [recordings] if isinstance(recordings, Recording) else list(recordings)
     _check_recordings(chosen, ghosts)
@@ -89,11 +81,6 @@ def replay_path(
         As for `kinarm.record_path`.
     file : str or Path, optional
         Where to write the page, if at all.
-
-    Raises
-    ------
-    KinarmError
-        As `kinarm.record_path` and `kinarm.viewer.replay_page` do.
     """
     return replay_page(record_path(problem, path, goal=goal, name=name), file)
 
@@ -131,8 +118,16 @@ def _replay_html(
 ) -> str:
     """Page of recordings that can share one."""
     arm, scene = recordings[0].problem.load_arm(), recordings[0].problem.scene
-    trials = [[run for run in runs if run is not None] for runs in zip_longest(recordings, ghosts)]
+    trials = list(zip(recordings, ghosts, strict=True)) if ghosts else [(r,) for r in recordings]
     policies = dict.fromkeys(run.policy for runs in trials for run in runs)
+    window, problem = CapturingWindow(), recordings[0].problem
+    draw_stage(window.top, arm, scene)
+    draw_goal(window.top["goal"], problem)
+    for number, runs in enumerate(trials):
+        for name, run in zip(("run", "ghost"), runs, strict=False):
+            points = np.array([arm.tool_position(state) for state in run.states])
+            way = window.top[f"trials/{number}/{name}"]
+            draw_trace(way, points, run.outcome, stage_scale(arm, scene))
     data = {
         **arm_data(arm, scene),
         "traceIndices": 6 * TRACE_SIDES,
@@ -143,20 +138,7 @@ def _replay_html(
     }
     title = f"{' and '.join(policies)} · kinarm replay"
     scripts = ("replay_stage", "trial_list", "player")
-    return page_html("player", title, _replay_commands(trials, arm), data, scripts)
-
-
-def _replay_commands(trials: Trials, arm: Arm) -> bytes:
-    """Draw a stage, the goal, and the ways of the tool in each trial's recordings."""
-    window, problem = CapturingWindow(), trials[0][0].problem
-    draw_stage(window.top, arm, problem.scene)
-    draw_goal(window.top["goal"], problem)
-    scale = stage_scale(arm, problem.scene)
-    for number, runs in enumerate(trials):
-        for name, run in zip(("run", "ghost"), runs, strict=False):
-            points = np.array([arm.tool_position(state) for state in run.states])
-            draw_trace(window.top[f"trials/{number}/{name}"], points, run.outcome, scale)
-    return window.content
+    return page_html("player", title, window.content, data, scripts)
 
 
 def _trial_data(runs: Sequence[Recording]) -> dict[str, Any]:
@@ -175,11 +157,8 @@ def _trial_data(runs: Sequence[Recording]) -> dict[str, Any]:
 
 
 def _run_data(run: Recording) -> dict[str, Any]:
-    arrays = {
-        "contactPoint": run.contact_point,
-        "refused": run.refused,
-        "states": run.states,
-        "distances": run.distances,
-    }
-    lists = {name: None if value is None else value.tolist() for name, value in arrays.items()}
-    return {"policy": run.policy, "outcome": run.outcome, "contact": run.contact, **lists}
+    """A recording, as JSON."""
+    data = {name: getattr(run, name) for name in ("policy", "outcome", "contact")}
+    arrays = {"contactPoint": run.contact_point, "refused": run.refused}
+    arrays |= {"states": run.states, "distances": run.distances}
+    return data | {name: None if a is None else a.tolist() for name, a in arrays.items()}

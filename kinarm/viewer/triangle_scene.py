@@ -9,11 +9,18 @@ from numpy.typing import NDArray
 from kinarm.arm import Arm
 from kinarm.problem import ReachProblem
 from kinarm.viewer.camera import stage_scale
-from kinarm.viewer.kernels.rasterising import place
+from kinarm.viewer.kernels.rasterising import transform
 from kinarm.viewer.kernels.views import Surfaces
 from kinarm.viewer.meshes import Mesh, tube
-from kinarm.viewer.parts import TRACES, Finish, channels
-from kinarm.viewer.surroundings import TRACE_RADIUS, TRACE_SIDES, cube_mesh, obstacle_meshes
+from kinarm.viewer.parts import (
+    TRACE_RADIUS,
+    TRACE_SIDES,
+    TRACES,
+    Finish,
+    channels,
+    cube_mesh,
+    obstacle_meshes,
+)
 from kinarm.viewer.visual_shapes import arm_parts, link_joints
 
 Array = NDArray[np.float64]
@@ -29,47 +36,36 @@ CUBE_GLOW, TOUCH_GLOW = 0x0B6B50, 0x8C2F00
 
 
 class TriangleScene:
-    """Surfaces of a problem, which are moved to where they are at a moment.
-
-    Parameters
-    ----------
-    problem : ReachProblem
-        The problem.
-    arm : Arm
-        Its arm.
+    """Surfaces of a problem and its arm, which are moved to where they are at a moment.
 
     Attributes
     ----------
-    n_joints : int
-        Length of a configuration.
-    scale : float
-        Size of the stage; see `kinarm.viewer.camera.stage_scale`.
+    n_joints, scale
+        Length of a configuration, and size of the stage; see `stage_scale`.
+    finishes : list of Finish
+        Finishes of the surfaces, by material; the floor comes first.
     """
 
     def __init__(self, problem: ReachProblem, arm: Arm) -> None:
-        self.n_joints = arm.n_joints
-        self.scale = stage_scale(arm, problem.scene)
-        self._arm, self._data = arm, arm.model.createData()
-        self._goal_frame = arm.n_joints + 1
-        self._links = link_joints(arm)
-        parts = _parts(problem, arm, self._goal_frame)
-        self._arm_owners = {(part.joint, part.finish) for part in arm_parts(arm)}
+        scene = problem.scene
+        self.n_joints, self.scale = arm.n_joints, stage_scale(arm, scene)
+        self._arm, self._data, self._links = arm, arm.model.createData(), link_joints(arm)
+        standing = [
+            (0, finish, mesh)
+            for obstacle in scene.obstacles
+            for finish, mesh in zip((BODY, SLAB), obstacle_meshes(obstacle, scene), strict=False)
+        ]
+        parts = [*standing, *arm_parts(arm), (arm.n_joints + 1, CUBE, cube_mesh(scene))]
+        self._arm_owners = {part[:2] for part in arm_parts(arm)}
         # Each frame has materials of its own, so that a link can light up.
         owners = [(0, GROUND), *((0, finish) for finish in TRACES.values())]
-        self._owners = list(dict.fromkeys([*owners, *((frame, look) for frame, look, _ in parts)]))
-        meshes = [mesh.with_normals() for *_, mesh in parts]
-        sizes = [len(vertices) for vertices, _, _ in meshes]
-        starts = np.cumsum([0, *sizes[:-1]])
-        self._vertices = np.concatenate([vertices for vertices, _, _ in meshes])
-        self._normals = np.concatenate([normals for _, normals, _ in meshes])
-        self._faces = np.concatenate([f + s for (_, _, f), s in zip(meshes, starts, strict=True)])
+        self._owners = list(dict.fromkeys([*owners, *(part[:2] for part in parts)]))
+        self.finishes = [finish for _, finish in self._owners]
+        meshes = [Mesh.joined([mesh]) for *_, mesh in parts]
+        sizes = [len(mesh.vertices) for mesh in meshes]
+        self._vertices, self._normals, self._faces = Mesh.joined(meshes).with_normals()
         self._frames = np.repeat([frame for frame, *_ in parts], sizes)
         self._materials = np.repeat([self._owners.index(part[:2]) for part in parts], sizes)
-
-    @property
-    def finishes(self) -> tuple[Finish, ...]:
-        """Finishes of the surfaces, by material; the floor comes first."""
-        return tuple(finish for _, finish in self._owners)
 
     def surfaces(
         self, configuration: Array, goal: Array, trace: Array, outcome: str | None
@@ -81,16 +77,17 @@ class TriangleScene:
         configuration, goal, trace, outcome
             As for `kinarm.viewer.Renderer.render`.
         """
-        n_vertices = len(self._vertices)
-        places, normals = np.empty((n_vertices, 3)), np.empty((n_vertices, 3))
+        places, normals = np.empty_like(self._vertices), np.empty_like(self._normals)
         poses = self._poses(configuration, goal)
-        place(self._vertices, self._normals, self._frames, poses, places, normals)
+        transform(self._vertices, self._frames, poses, places)
+        poses[:, :, 3] = 0.0
+        transform(self._normals, self._frames, poses, normals)
         faces, materials = self._faces, self._materials
         if len(trace) > 1:
             way, aside, stretches = _tube(trace, self.scale * TRACE_RADIUS)
             material = self._owners.index((0, TRACES[outcome]))
+            faces = np.concatenate([faces, stretches + len(places)])
             places, normals = np.concatenate([places, way]), np.concatenate([normals, aside])
-            faces = np.concatenate([faces, stretches + n_vertices])
             materials = np.concatenate([materials, np.full(len(way), material)])
         return Surfaces(places, normals, np.empty_like(places), faces, materials)
 
@@ -108,24 +105,12 @@ class TriangleScene:
     def _poses(self, configuration: Array, goal: Array) -> Array:
         """Frames in the world, shape (n_joints + 2, 3, 4): the world, the joints, the goal."""
         pin.forwardKinematics(self._arm.model, self._data, configuration)
-        poses = np.zeros((self._goal_frame + 1, 3, 4))
+        poses = np.zeros((self.n_joints + 2, 3, 4))
         poses[0, :, :3] = poses[-1, :, :3] = np.eye(3)
-        for joint in range(1, self._goal_frame):
+        for joint in range(1, self.n_joints + 1):
             poses[joint] = self._data.oMi[joint].homogeneous[:3]
         poses[-1, :, 3] = goal
         return poses
-
-
-def _parts(problem: ReachProblem, arm: Arm, goal_frame: int) -> list[tuple[int, Finish, Mesh]]:
-    """Frame, finish and shape of all that stands or moves."""
-    parts: list[tuple[int, Finish, Mesh]] = []
-    for obstacle in problem.scene.obstacles:
-        meshes = obstacle_meshes(obstacle, problem.scene)
-        parts.append((0, BODY, meshes.body))
-        if meshes.top is not None:
-            parts.append((0, SLAB, meshes.top))
-    parts += [(part.joint, part.finish, part.mesh) for part in arm_parts(arm)]
-    return [*parts, (goal_frame, CUBE, cube_mesh(problem.scene))]
 
 
 def _tube(points: Array, radius: float) -> tuple[Array, Array, NDArray[np.int64]]:

@@ -18,10 +18,18 @@ from kinarm.errors import ArmError, KinarmError
 from kinarm.urdf_tree import check_numbers
 from kinarm.viewer import industrial_arm
 from kinarm.viewer.mesh_files import PaintedMesh, read_mesh_file
-from kinarm.viewer.meshes import Mesh, box, capsule, cylinder, from_coal
+from kinarm.viewer.meshes import Mesh, from_coal
 from kinarm.viewer.parts import ACCENT, PLAIN, ArmPart, packed_colour, shape_finish
 
 Element = ElementTree.Element
+
+SIZES = {
+    "box": (("size",), coal.Box),
+    "sphere": (("radius",), coal.Sphere),
+    "cylinder": (("radius", "length"), coal.Cylinder),
+    "capsule": (("radius", "length"), coal.Capsule),
+}
+"""Attributes that state the sizes of visual shapes, and what they make."""
 
 TOOL_RADIUS = 0.012
 """Of the ball at the tool point; a share of the arm's reach if that is less than 1 m [m]."""
@@ -32,8 +40,7 @@ def arm_parts(arm: Arm) -> tuple[ArmPart, ...]:
     """All parts of an arm.
 
     One with the geometry of the shipped ones looks like an industrial arm; any other shows the
-    visual shapes of its URDF, or where there are none that can be read, its collision shapes. Why
-    they cannot is logged as a warning, in one line.
+    visual shapes of its URDF, or its collision shapes where none can be read, which is logged.
     """
     if industrial_arm.fits(arm):
         return tuple(industrial_arm.parts(arm))
@@ -75,29 +82,26 @@ def visual_parts(arm: Arm) -> Iterator[ArmPart]:
 
     Raises
     ------
-    MissingExtraError
-        If there are meshes, and the extra ``robots`` is not installed.
-    ArmError
-        If a shape cannot be read.
+    KinarmError
+        If a shape cannot be read, for want of the extra ``robots`` or because it is damaged.
     """
     robot = ElementTree.fromstring(arm.description.text)
-    named: dict[str, int | None] = {}
-    for defined in robot.iter("material"):
-        name, colour = str(defined.get("name")), _stated_colour(defined)
-        named[name] = named.get(name) if named.get(name) is not None else colour
+    named: dict[str | None, int] = {}
+    for material in robot.iter("material"):
+        if (colour := _stated_colour(material)) is not None:
+            named.setdefault(material.get("name"), colour)
     for link in robot.findall("link"):
         frame = arm.model.frames[arm.model.getFrameId(link.get("name"), pin.FrameType.BODY)]
         for visual in link.findall("visual"):
             placement = frame.placement * _origin(visual)
-            material = visual.find("material")
-            stated = None if material is None else _stated_colour(material)
-            if material is not None and stated is None:
-                stated = named[str(material.get("name"))]
+            look, stated = visual.find("material"), None
+            if look is not None and (stated := _stated_colour(look)) is None:
+                stated = named.get(look.get("name"))
             pieces = _shapes(visual, arm.description.path.name)
-            alike = len({piece.colour for piece in pieces}) == 1
+            if stated is not None and len({piece.colour for piece in pieces}) == 1:
+                pieces = tuple(piece._replace(colour=stated) for piece in pieces)
             for mesh, colour in pieces:
-                chosen = stated if stated is not None and alike else colour
-                yield _placed_part(frame.parentJoint, chosen, mesh, placement)
+                yield _placed_part(frame.parentJoint, colour, mesh, placement)
 
 
 def _shapes(visual: Element, file: str) -> tuple[PaintedMesh, ...]:
@@ -108,23 +112,17 @@ def _shapes(visual: Element, file: str) -> tuple[PaintedMesh, ...]:
         raise ArmError(f"{file} has a visual shape without geometry")
     if shape.tag == "mesh":
         return read_mesh_file(Path(shape.get("filename", "")), _numbers(shape, "scale", where))
-    if shape.tag == "box":
-        mesh = box(_numbers(shape, "size", where))
-    elif shape.tag == "sphere":
-        mesh = capsule(0.0, *_numbers(shape, "radius", where))
-    elif shape.tag in ("cylinder", "capsule"):
-        (length,), (radius,) = (_numbers(shape, name, where) for name in ("length", "radius"))
-        mesh = capsule(length, radius) if shape.tag == "capsule" else cylinder(length, radius, 0.0)
-    else:
+    if shape.tag not in SIZES:
         raise ArmError(f"{file} has a visual shape <{shape.tag}>: not supported")
-    return (PaintedMesh(mesh, None),)
+    names, kind = SIZES[shape.tag]
+    solid = kind(*(size for name in names for size in _numbers(shape, name, where)))
+    return (PaintedMesh(from_coal(solid), None),)
 
 
 def _origin(visual: Element) -> pin.SE3:
     """Where a shape stands on its link."""
     origin = visual.find("origin")
-    if origin is None:
-        return pin.SE3.Identity()
+    origin = Element("origin") if origin is None else origin
     turn = pin.rpy.rpyToMatrix(np.array(_numbers(origin, "rpy")))
     return pin.SE3(turn, np.array(_numbers(origin, "xyz")))
 

@@ -1,8 +1,7 @@
 """Augmented Random Search, for the registry of learners."""
 
-from kinarm.policies.ars.config import ARSConfig
+from kinarm.policies.ars.config import ARSConfig, ARSState
 from kinarm.policies.ars.recipes import RECIPES, adapted
-from kinarm.policies.ars.state import ARSState
 from kinarm.policies.learners import Learner, imported
 
 LEARNER = Learner(

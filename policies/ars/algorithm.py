@@ -1,18 +1,15 @@
 """Augmented Random Search (paper, Algorithm 1 and Table 1; Mania, Guy and Recht 2018)."""
 
+import math
 import time
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.failed_scenarios import FailedScenarios
+from kinarm.failed_scenarios import FailedScenarios, StartsAndGoals
 from kinarm.networks import Mirror, Networks
-from kinarm.policies.ars.config import ARSConfig
-from kinarm.policies.ars.kernels import (
-    mean_and_deviation,
-    perturbed_weights,
-    weighted_sum,
-)
+from kinarm.policies.ars.config import ARSConfig, ARSState
 from kinarm.policies.ars.networks import (
     first_deviations,
     initial_network,
@@ -21,15 +18,14 @@ from kinarm.policies.ars.networks import (
     perturbations,
     perturbed_networks,
 )
-from kinarm.policies.ars.scenarios import draw_shared, failed_after
-from kinarm.policies.ars.state import ARSState
 from kinarm.policies.learners import CurvePoint
+from kinarm.policies.library import starting_policy, statistics
 from kinarm.policies.mirror import problem_mirror
 from kinarm.policies.normalizer import Normalizer, input_scale
 from kinarm.policies.policy import Layer, Policy
 from kinarm.policies.provenance import Provenance
-from kinarm.policies.warm_start import starting_policy, statistics
 from kinarm.randomness import Stream, stream_generator
+from kinarm.rollouts import Rollouts
 from kinarm.simulator import Simulator
 
 
@@ -45,10 +41,7 @@ class ARSTraining:
         self._rng = stream_generator(Stream.ARS, config.seed)
 
     def initial_state(self) -> ARSState:
-        """State before the first iteration: mu = 0, Sigma = I, and theta = 0 if it is linear.
-
-        Or those of the policy to begin with.
-        """
+        """State before the first iteration: mu = 0, Sigma = I, and theta = 0 if it is linear."""
         n_actions, n_observations = self.simulator.n_actions, self.simulator.n_observations
         rng = stream_generator(Stream.ARS, self.config.seed)
         normalizer = Normalizer.empty(n_observations)
@@ -71,70 +64,120 @@ class ARSTraining:
         )
 
     def iterate(self, state: ARSState) -> ARSState:
-        """One pass through the loop of Algorithm 1."""
-        return ars_iteration(self.config, self.simulator, state, self.mirror, self._rng)
+        """One pass through the loop of Algorithm 1.
+
+        The statistics are frozen within it: they are updated at its end with all observations of
+        its episodes.
+        """
+        began, config, simulator = time.perf_counter(), self.config, self.simulator
+        rng, N = self._rng, config.directions
+        theta, normalizer = state.theta, state.normalizer
+        rng.bit_generator.state = state.generator
+        delta = perturbations(rng, (N, *theta.shape))
+        scenarios = draw_shared(config, simulator, rng, state.failed, self.mirror)
+        seen = policy_normalizer(config, normalizer)
+        if config.net_arch:
+            widths = (simulator.n_observations, *config.net_arch, simulator.n_actions)
+            policies = perturbed_networks(theta, config.noise * delta, seen, widths)
+        else:
+            policies = perturbed_policies(theta, config.noise * delta, seen)
+        rollouts = simulator.rollout(
+            policies,
+            *scenarios.of_all_episodes,
+            policy_index=np.repeat(np.arange(2 * N), config.episodes),
+            shift=normalizer.mean,
+        )
+        returns = rollouts.returns.reshape(2, N, config.episodes).mean(axis=2)
+        theta = theta + ars_step(config, delta, returns, config.step_size_at(state.iteration))
+        normalizer = normalizer.updated(rollouts.moments, rollouts.steps)
+        mean_return, std_return, success = scenarios.outcome_of_new(rollouts)
+        point = CurvePoint(
+            mean_return=mean_return,
+            std_return=std_return,
+            success=success,
+            environment_steps=state.environment_steps + int(rollouts.steps.sum()),
+            wall_time=state.wall_time + time.perf_counter() - began,
+        )
+        return ARSState(
+            theta=theta,
+            normalizer=normalizer,
+            generator=dict(rng.bit_generator.state),
+            failed=failed_after(config, state.failed, scenarios, rollouts),
+            curve=(*state.curve, point),
+        )
 
 
-def ars_iteration(
+class Scenarios(NamedTuple):
+    """Starts and goals of an iteration, which of them were failed before, and how often each comes.
+
+    All of them, repeated, are those of the episodes in the order sign, direction, episode.
+    """
+
+    starts: NDArray[np.float64]
+    goals: NDArray[np.float64]
+    replayed: NDArray[np.bool_]
+    copies: int
+
+    @property
+    def of_all_episodes(self) -> StartsAndGoals:
+        """Starts and goals of all episodes."""
+        return np.tile(self.starts, (self.copies, 1)), np.tile(self.goals, (self.copies, 1))
+
+    def outcome_of_new(self, rollouts: Rollouts) -> tuple[float, float, float]:
+        """Mean and deviation of the returns of new scenarios, and share of success; or NaN."""
+        new = np.tile(~self.replayed, self.copies)
+        if not new.any():
+            return math.nan, math.nan, math.nan
+        returns, success = rollouts.returns[new], rollouts.success[new]
+        return *mean_and_deviation(returns), int(np.count_nonzero(success)) / len(success)
+
+
+def draw_shared(
     config: ARSConfig,
     simulator: Simulator,
-    state: ARSState,
+    rng: np.random.Generator,
+    failed: FailedScenarios,
     mirror: Mirror | None = None,
-    rng: np.random.Generator | None = None,
-) -> ARSState:
-    """One pass through the loop of Algorithm 1.
-
-    With a mirror, scenarios with goals to the left are met reflected. The statistics are frozen
-    within an iteration: they are updated at its end with all observations of its episodes. A
-    generator can be lent.
+) -> Scenarios:
+    """Draw the scenarios of an iteration, shared and replayed as configured.
 
     Parameters
     ----------
-    config : ARSConfig
-        The settings.
-    simulator : Simulator
-        Where policies are tried.
-    state : ARSState
-        State before the iteration; it is left as it is.
+    config, simulator, rng
+        Settings, and what draws starts and goals, from which random numbers.
+    failed : FailedScenarios
+        Those that may be replayed.
     mirror : Mirror, optional
-        Reflects scenarios with goals to the left.
-    rng : numpy.random.Generator, optional
-        A generator to be reused; the state says in which state it begins.
+        Reflects new scenarios with goals to the left.
     """
-    began, rng = time.perf_counter(), state.random_generator(rng)
-    N, theta, normalizer = config.directions, state.theta, state.normalizer
-    delta = perturbations(rng, (N, *theta.shape))
-    scenarios = draw_shared(config, simulator, rng, state.failed, mirror)
-    seen = policy_normalizer(config, normalizer)
-    if config.net_arch:
-        widths = (simulator.n_observations, *config.net_arch, simulator.n_actions)
-        policies = perturbed_networks(theta, config.noise * delta, seen, widths)
-    else:
-        policies = perturbed_policies(theta, config.noise * delta, seen)
-    rollouts = simulator.rollout(
-        policies,
-        *scenarios.of_all_episodes,
-        policy_index=np.repeat(np.arange(2 * N), config.episodes),
-        shift=normalizer.mean,
-    )
-    returns = rollouts.returns.reshape(2, N, config.episodes).mean(axis=2)
-    theta = theta + ars_step(config, delta, returns, config.step_size_at(state.iteration))
-    normalizer = normalizer.updated(rollouts.moments, rollouts.steps)
-    mean_return, std_return, success = scenarios.outcome_of_new(rollouts)
-    point = CurvePoint(
-        mean_return=mean_return,
-        std_return=std_return,
-        success=success,
-        environment_steps=state.environment_steps + int(rollouts.steps.sum()),
-        wall_time=state.wall_time + time.perf_counter() - began,
-    )
-    return ARSState(
-        theta=theta,
-        normalizer=normalizer,
-        generator=dict(rng.bit_generator.state),
-        failed=failed_after(config, state.failed, scenarios, rollouts),
-        curve=(*state.curve, point),
-    )
+    copies = {"none": 1, "pair": 2, "iteration": 2 * config.directions}[config.sharing]
+
+    def draw(places: NDArray[np.int64]) -> StartsAndGoals:
+        drawn = simulator.sample(rng, len(places))
+        return drawn if mirror is None else mirror.scenarios_from_the_right(*drawn)
+
+    count = 2 * config.directions * config.episodes // copies
+    (starts, goals), replayed = failed.mixed(config.replay_share, rng, count, draw)
+    return Scenarios(starts, goals, replayed, copies)
+
+
+def failed_after(
+    config: ARSConfig, failed: FailedScenarios, scenarios: Scenarios, rollouts: Rollouts
+) -> FailedScenarios:
+    """Add the scenarios that at least half of the policies that faced them failed.
+
+    Parameters
+    ----------
+    config, failed
+        Settings, and the failed scenarios before the iteration.
+    scenarios, rollouts
+        What its policies faced, and how they did.
+    """
+    if not config.replay_share:
+        return failed
+    reached = np.count_nonzero(rollouts.success.reshape(scenarios.copies, -1), axis=0)
+    missed = 2 * reached <= scenarios.copies
+    return failed.followed_by(scenarios.starts[missed], scenarios.goals[missed], config.replay_size)
 
 
 def policy_normalizer(config: ARSConfig, seen: Normalizer) -> Normalizer:
@@ -147,21 +190,23 @@ def perturbed_policies(
 ) -> Networks:
     """Policies (theta + step) diag(Sigma)^(-1/2) (x - mu), then those of theta - step.
 
-    Steps have the shape (N, n_actions, n_observations). The normaliser is folded in.
-
     Parameters
     ----------
-    theta : ndarray, shape (n_actions, n_observations)
-        Parameters.
-    step : ndarray, shape (N, n_actions, n_observations)
-        What is added to them, and subtracted.
+    theta, step : ndarray, shape (n_actions, n_observations) and (N, n_actions, n_observations)
+        Parameters, and what is added to them, and subtracted.
     normalizer : Normalizer
         Statistics mu and Sigma, which are folded in.
     """
-    n_actions, n_observations = theta.shape
-    weights = np.empty((2, len(step), (n_observations + 1) * n_actions))
-    perturbed_weights(theta, step, input_scale(normalizer.std), normalizer.mean, weights)
-    return Networks(np.array([n_observations, n_actions]), weights.reshape(2 * len(step), -1))
+    maps = np.concatenate([theta + step, theta - step]) * input_scale(normalizer.std)
+    by_input = np.ascontiguousarray(maps.transpose(2, 0, 1))
+    shifts = (by_input * normalizer.mean[:, None, None]).sum(axis=0)
+    return Networks.linear(maps, 0.0 - shifts)
+
+
+def mean_and_deviation(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Mean and population standard deviation of some numbers, shape (n,), added up in order."""
+    mean = float(np.cumsum(values)[-1]) / len(values)
+    return mean, math.sqrt(np.cumsum((values - mean) ** 2)[-1] / len(values))
 
 
 def top_directions(returns: NDArray[np.float64], b: int) -> NDArray[np.int64]:
@@ -180,28 +225,24 @@ def ars_step(
 ) -> NDArray[np.float64]:
     """Update of theta: alpha / (b sigma_R) times the sum of (r+ - r-) delta over the top b.
 
-    sigma_R is the population standard deviation of the returns of all perturbations, shape (2, N),
-    as the paper defines it in section 2.1; the step is zero when all returns tie. Perturbations
-    delta have the shape (N, n_actions, n_observations).
+    sigma_R is the population standard deviation of the returns of all perturbations, as the paper
+    defines it in section 2.1; the step is zero when all returns tie.
 
     Parameters
     ----------
-    config : ARSConfig
-        The settings.
-    delta : ndarray, shape (N, n_actions, n_observations)
-        Perturbations.
-    returns : ndarray, shape (2, N)
-        Mean returns r+ and r- of the perturbed policies.
-    step_size : float
-        Learning rate alpha.
+    config, step_size
+        The settings, and the learning rate alpha.
+    delta, returns : ndarray, shape (N, n_actions, n_observations) and (2, N)
+        Perturbations, and mean returns r+ and r- of the perturbed policies.
     """
     b = config.top_directions
     top = top_directions(returns, b)
     sigma = mean_and_deviation(returns.reshape(-1))[1] if config.scale_by_deviation else 1.0
-    step = np.zeros(delta.shape[1:])
-    if sigma >= 1e-12:
-        difference = returns[0, top] - returns[1, top]
-        weighted_sum(step_size / (b * sigma) * difference, top, delta, step)
+    if sigma < 1e-12:
+        return np.zeros(delta.shape[1:])
+    difference = returns[0, top] - returns[1, top]
+    weights = step_size / (b * sigma) * difference
+    step: NDArray[np.float64] = (weights[:, None, None] * delta[top]).sum(axis=0)
     return step
 
 
@@ -210,7 +251,8 @@ def trained_policy(config: ARSConfig, state: ARSState) -> Policy:
     normalizer = policy_normalizer(config, state.normalizer)
     layers: tuple[Layer, ...] = (Layer(state.theta, np.zeros(len(state.theta))),)
     if config.net_arch:
-        layers = network_layers(state.theta, (len(normalizer.mean), *config.net_arch))
+        n_actions = config.problem.load_arm().n_actuated
+        layers = network_layers(state.theta, (len(normalizer.mean), *config.net_arch, n_actions))
     return Policy(
         mean=normalizer.mean,
         std=normalizer.std,

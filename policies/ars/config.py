@@ -1,11 +1,14 @@
-"""Settings of Augmented Random Search."""
+"""Settings of Augmented Random Search, and the state of a training between two iterations."""
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 from kinarm._fields import OPTIONAL
 from kinarm.errors import InvalidInputError
-from kinarm.failed_scenarios import LARGEST_REPLAY
+from kinarm.failed_scenarios import LARGEST_REPLAY, FailedScenarios
 from kinarm.policies.config import (
     MANY,
     POSITIVE,
@@ -15,6 +18,8 @@ from kinarm.policies.config import (
     TrainingConfig,
     scheduled,
 )
+from kinarm.policies.learners import TrainingState
+from kinarm.policies.normalizer import Normalizer
 
 Sharing = Literal["none", "pair", "iteration"]
 
@@ -77,30 +82,59 @@ class ARSConfig(TrainingConfig):
     replay_size: int = field(default=512, metadata={"at_most": LARGEST_REPLAY, **OPTIONAL})
     initial_policy: str | None = field(default=None, metadata=OPTIONAL)
 
+    learner = "ars"
+
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.top_directions > self.directions:
+            limit, given = self.directions, self.top_directions
             raise InvalidInputError(
-                f"top_directions must be at most directions ({self.directions}), "
-                f"got {self.top_directions}"
+                f"top_directions must be at most directions ({limit}), got {given}"
             )
-
-    @property
-    def learner(self) -> str:
-        """Name by which the learner is found."""
-        return "ars"
 
     @property
     def can_extend(self) -> bool:
         """Whether a training with more iterations begins just as this one goes."""
         return self.step_size_schedule == "constant"
 
-    @property
-    def cost(self) -> float:
-        """Rough duration of the training [s of a core]."""
-        episodes = 2 * self.iterations * self.directions * self.episodes
-        return 5e-7 * episodes * self.problem.task.horizon
-
     def step_size_at(self, iteration: int) -> float:
         """Learning rate of an iteration."""
         return scheduled(self.step_size, self.step_size_schedule, iteration / self.iterations)
+
+
+_PROBE: np.random.BitGenerator = np.random.PCG64(0)
+"""Refuses what is no state of a generator."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ARSState(TrainingState):
+    """Everything that the next iteration depends on.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (n_actions, n_observations) or (1, n_parameters)
+        Parameters of a linear policy, or of a network as `kinarm.Networks` keeps them.
+    normalizer : Normalizer
+        Statistics mu and Sigma of the observations.
+    generator : dict
+        State of the random generator.
+    failed : FailedScenarios
+        What may be replayed.
+    """
+
+    theta: NDArray[np.float64]
+    normalizer: Normalizer
+    generator: dict[str, Any]
+    failed: FailedScenarios
+
+    def __post_init__(self) -> None:
+        widths = {self.normalizer.mean.shape, self.normalizer.squares.shape}
+        if len(self.theta) > 1:
+            widths.add(self.theta.shape[1:])
+        if len(widths) > 1 or self.theta.ndim != 2:
+            raise InvalidInputError(
+                f"theta of shape {self.theta.shape} needs as many statistics, "
+                f"got {self.normalizer.mean.shape} and {self.normalizer.squares.shape}"
+            )
+        self.failed.check()
+        _PROBE.state = self.generator

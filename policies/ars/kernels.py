@@ -1,9 +1,6 @@
-"""Kernels of Augmented Random Search: normal numbers, and the policies of an iteration."""
+"""Normal numbers for Augmented Random Search, the same bits on every machine."""
 
 import math
-
-import numpy as np
-from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import Array, inlined, kernel
 from kinarm.kernels.elementary import LOG_2, LOG_2_REST, sine_cosine
@@ -52,61 +49,3 @@ def normal_pairs(numbers: Array) -> None:
         sine, cosine = sine_cosine(TURN * pairs[1, i])
         pairs[0, i] = radius * cosine
         pairs[1, i] = radius * sine
-
-
-@kernel
-def perturbed_weights(theta: Array, step: Array, scale: Array, mean: Array, weights: Array) -> None:
-    """Fill in the networks of the policies (theta +- step) diag(scale) (x - mean).
-
-    Parameters
-    ----------
-    theta, step : ndarray, shape (n_actions, n_observations) and (n, n_actions, n_observations)
-        The policy, and its perturbations.
-    scale, mean : ndarray, shape (n_observations,)
-        Of the observations: what they are multiplied by, and their mean.
-    weights : ndarray, shape (2, n, n_parameters)
-        Where the networks go, those with plus first, each as `kinarm.Networks` keeps it.
-    """
-    n_actions, n_observations = theta.shape
-    for k in range(step.shape[0]):
-        for i in range(n_actions):
-            more, less = 0.0, 0.0
-            for j in range(n_observations):
-                plus = (theta[i, j] + step[k, i, j]) * scale[j]
-                minus = (theta[i, j] - step[k, i, j]) * scale[j]
-                weights[0, k, j * n_actions + i] = plus
-                weights[1, k, j * n_actions + i] = minus
-                more -= plus * mean[j]
-                less -= minus * mean[j]
-            weights[0, k, n_observations * n_actions + i] = more
-            weights[1, k, n_observations * n_actions + i] = less
-
-
-@kernel
-def mean_and_deviation(values: Array) -> tuple[float, float]:
-    """Mean and population standard deviation of some numbers, shape (n,)."""
-    mean, squares = 0.0, 0.0
-    for value in values:
-        mean += value
-    mean /= len(values)
-    for value in values:
-        squares += (value - mean) * (value - mean)
-    return mean, math.sqrt(squares / len(values))
-
-
-@kernel
-def weighted_sum(weights: Array, chosen: NDArray[np.int64], delta: Array, total: Array) -> None:
-    """Add up chosen perturbations, each with its weight.
-
-    Parameters
-    ----------
-    weights, chosen : ndarray, shape (n_chosen,)
-        Weights, and rows of the perturbations.
-    delta, total : ndarray, shape (n, n_actions, n_observations) and (n_actions, n_observations)
-        The perturbations, and what they are added to.
-    """
-    n_actions, n_observations = total.shape
-    for k in range(chosen.shape[0]):
-        for i in range(n_actions):
-            for j in range(n_observations):
-                total[i, j] += weights[k] * delta[chosen[k], i, j]

@@ -1,12 +1,11 @@
-"""Small networks as policies of Augmented Random Search, all parameters in one row.
+"""Small networks as policies of Augmented Random Search, with tanh between the layers.
 
-Their order is that of `kinarm.Networks`: layer after layer, weights (inputs x outputs, row by row),
-then biases. tanh is between the layers.
+All parameters are in one row, in the order of `kinarm.Networks`.
 """
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,6 @@ from kinarm.policies.normalizer import Normalizer, fold_normalizer
 from kinarm.policies.policy import Layer, Policy
 
 Numbers = NDArray[np.float64]
-
 
 DEVIATION = 1.5
 """Standard deviation of what a unit of the first layer adds up to, for normalised observations."""
@@ -42,8 +40,7 @@ def perturbations(rng: np.random.Generator, shape: tuple[int, ...]) -> NDArray[n
 def first_deviations(n_joints: int) -> Numbers:
     """Standard deviations of the first layer's initial weights, shape (n_observations,).
 
-    All parts of the observation have the same say in what a unit adds up to: else the few entries
-    that tell of the goal would drown among those of the joints.
+    All parts of the observation have the same say: else the few entries of the goal would drown.
     """
     parts = list(part_slices(n_joints).values())
     sizes = np.array([part.stop - part.start for part in parts])
@@ -56,18 +53,19 @@ def initial_network(
 ) -> Numbers:
     """Draw a network that does nothing yet: its last layer and its biases are zero.
 
-    The other weights are normal numbers: those of the first layer with a standard deviation for
-    each input, the others over the root of the layer's inputs. The widths are those of the layers
-    after the observation. Parameters have the shape (1, n_parameters).
-
     Parameters
     ----------
     rng : numpy.random.Generator
-        Draws the weights.
+        Draws the other weights, which are normal numbers.
     deviations : ndarray, shape (n_observations,)
-        Standard deviations of the weights of each input.
+        Standard deviations of the first layer's weights, by their input; those of the others are
+        one over the root of the layer's inputs.
     widths : sequence of int
-        Of the layers after the observation.
+        Widths of the layers after the observation.
+
+    Returns
+    -------
+    ndarray, shape (1, n_parameters)
     """
     parts = []
     for n_out in widths[:-1]:
@@ -82,18 +80,12 @@ def perturbed_networks(
 ) -> Networks:
     """Networks theta + step of normalised observations, then those of theta - step.
 
-    Steps have the shape (n, 1, n_parameters). The normaliser is folded in.
-
     Parameters
     ----------
-    theta : ndarray, shape (1, n_parameters)
-        Parameters.
-    step : ndarray, shape (n, 1, n_parameters)
-        What is added to them, and subtracted.
-    normalizer : Normalizer
-        Statistics, which are folded in.
-    widths : sequence of int
-        Of the layers, from the observation to the action.
+    theta, step : ndarray, shape (1, n_parameters) and (n, 1, n_parameters)
+        Parameters, and what is added to them, and subtracted.
+    normalizer, widths
+        Statistics, which are folded in, and widths from the observation to the action.
     """
     parameters = np.concatenate([theta + step, theta - step])[:, 0]
     n_in, n_out = widths[:2]
@@ -104,13 +96,11 @@ def perturbed_networks(
     return Networks(np.array(widths), np.concatenate([first, folded[1], rest], axis=1))
 
 
-def network_layers(theta: Numbers, inner: Sequence[int]) -> tuple[Layer, ...]:
+def network_layers(theta: Numbers, widths: Sequence[int]) -> tuple[Layer, ...]:
     """Layers of the network with these parameters, shape (1, n_parameters).
 
-    The width of the last layer follows from the others, those of observation and hidden layers.
+    The widths are those from the observation to the action.
     """
-    rest = theta.size - sum((n_in + 1) * n_out for n_in, n_out in pairwise(inner))
-    widths = (*inner, rest // (inner[-1] + 1))
     return tuple(Layer(weights[0], bias[0]) for weights, bias in _layers(theta, widths))
 
 
@@ -124,17 +114,10 @@ def _layers(parameters: Numbers, widths: Sequence[int]) -> Iterator[tuple[Number
 
 
 def parameters_of(policy: Policy) -> Numbers:
-    """Parameters of a policy as a training has them: a linear one has no bias.
-
-    Raises
-    ------
-    InvalidInputError
-        If it is linear and has one.
-    """
+    """Parameters of a policy as a training has them: a linear one has no bias."""
     if len(policy.layers) > 1:
-        return np.concatenate(
-            [part for weights, bias in policy.layers for part in (weights.T.ravel(), bias)]
-        )[None]
+        parts = chain(*((weights.T.ravel(), bias) for weights, bias in policy.layers))
+        return np.concatenate([*parts])[None]
     weights, bias = policy.layers[0]
     if bias.any():
         raise InvalidInputError("initial_policy has a bias, which linear policies of ARS have not")

@@ -45,12 +45,7 @@ RECIPES = {
     "v1": ARSConfig(recipe="v1", normalize=False, top_directions=24),
     "brs": ARSConfig(recipe="brs", normalize=False, scale_by_deviation=False, top_directions=24),
 }
-"""ARS settings by name.
-
-``paper`` is Table 1. ``tuned`` gives a linear policy in a minute, ``linear`` the best linear policy
-that we found, in four, and ``best`` a small network. ``v1`` and ``brs`` are Table 1 without the
-augmentations that the names lack.
-"""
+"""ARS settings by name; the summaries of the learner say what they are."""
 
 NETWORK: dict[str, Any] = {
     "net_arch": (16,),
@@ -62,7 +57,7 @@ NETWORK: dict[str, Any] = {
     "episodes": 4,
     "reward": RewardWeights(collision=-2.0, success=2.0),
 }
-"""What ``tuned`` is where it trains a network."""
+"""Settings of ``tuned`` where it trains a network."""
 
 
 def adapted(config: ARSConfig) -> ARSConfig:

@@ -5,24 +5,21 @@ of this normalisation lie apart from the model.
 """
 
 import pickle
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium.spaces import Box, Dict
-from numpy.typing import NDArray
 
 from kinarm._archive import reading
 from kinarm.envs.goal import GoalInterface
 from kinarm.envs.interface import Interface
 from kinarm.errors import InvalidInputError, PolicyFileError
-from kinarm.observation import Ranges, observation_bounds, part_slices
+from kinarm.networks import Layer
+from kinarm.observation import OBSERVATION, part_slices
 from kinarm.policies.conversion.layers import Clip, Piece
-from kinarm.policies.policy import Layer
 from kinarm.simulator import Simulator
-
-Array = NDArray[np.float64]
 
 FILES = ("vecnormalize.pkl", "vec_normalize.pkl")
 """Names that rl-zoo3 and the documentation of Stable-Baselines3 give to the statistics."""
@@ -33,7 +30,6 @@ UNLIMITED = 2.0**20
 WHOLE = ""
 """Key of an observation that is no dictionary."""
 
-
 ROUNDING = 1e-5
 """How exactly the bounds of a space of float32 have to agree."""
 
@@ -41,20 +37,13 @@ ROUNDING = 1e-5
 class ModelInputs(NamedTuple):
     """How the inputs of a model's network follow from observations.
 
-    Attributes
-    ----------
-    interface : Interface
-        Shows observations as the model's environment does.
-    selection : Layer
-        From the flat observation to the network's inputs.
-    lower, upper : dict of str to ndarray
-        What the parts of the inputs range over, in their order, for goals within the arm's reach.
+    The interface shows observations as the model's environment does; the selection leads from the
+    flat observation to the inputs, whose parts have these sizes, in their order.
     """
 
     interface: Interface
     selection: Layer
-    lower: dict[str, Array]
-    upper: dict[str, Array]
+    sizes: dict[str, int]
 
 
 def model_inputs(policy: Any, simulator: Simulator) -> ModelInputs:
@@ -69,36 +58,30 @@ def model_inputs(policy: Any, simulator: Simulator) -> ModelInputs:
     actor = getattr(policy, "actor", None)
     extractor = policy.pi_features_extractor if actor is None else actor.features_extractor
     kinds = {"FlattenExtractor": Interface, "CombinedExtractor": GoalInterface}
-    parts = {type(part).__name__ for part in getattr(extractor, "extractors", {}).values()}
-    if type(extractor).__name__ not in kinds or parts - {"Flatten"}:
+    parts = getattr(extractor, "extractors", {})
+    computed = {type(part).__name__ for part in parts.values()} - {"Flatten"}
+    if type(extractor).__name__ not in kinds or computed:
         raise InvalidInputError(
             f"the model computes features of observations ({type(extractor).__name__}): only "
             "policies whose networks see the observation itself can be converted"
         )
     interface = kinds[type(extractor).__name__](simulator)
     _check_observations(policy.observation_space, interface, simulator)
-    keys = [*extractor.extractors] if isinstance(interface, GoalInterface) else [WHOLE]
-    units = np.eye(simulator.n_observations)
-    shown = interface.observe(units)
-    columns = {key: (shown if key == WHOLE else shown[key]) for key in keys}
+    shown = interface.observe(np.eye(simulator.n_observations))
+    columns = {key: shown[key] for key in parts} if parts else {WHOLE: shown}
     rows = np.ascontiguousarray(np.concatenate(list(columns.values()), axis=1).T)
-    low, high = _attainable(simulator)
-    positive, negative = np.maximum(rows, 0.0), np.minimum(rows, 0.0)
-    ends = (positive @ low + negative @ high, positive @ high + negative @ low)
-    cuts = np.cumsum([part.shape[1] for part in columns.values()])[:-1]
-    lower, upper = (dict(zip(keys, np.split(end, cuts), strict=True)) for end in ends)
-    return ModelInputs(interface, Layer(rows, np.zeros(len(rows))), lower, upper)
+    sizes = {key: part.shape[1] for key, part in columns.items()}
+    return ModelInputs(interface, Layer(rows, np.zeros(len(rows))), sizes)
 
 
 def _check_actions(space: Any, simulator: Simulator) -> None:
     """Refuse actions that are not fractions of the joints' velocity limits."""
-    if not isinstance(space, Box):
-        raise InvalidInputError(f"the model's actions are no vectors: {_described(space)}")
-    if space.shape != (simulator.n_actions,) or (space.low != -1).any() or (space.high != 1).any():
+    n = simulator.n_actions
+    fits = isinstance(space, Box) and space.shape == (n,)
+    if not fits or (space.low != -1).any() or (space.high != 1).any():
         raise InvalidInputError(
-            f"the model's actions are {_described(space)} from {space.low.min():g} to "
-            f"{space.high.max():g}; arm {simulator.arm.name!r} takes {simulator.n_actions} numbers "
-            "from -1 to 1"
+            f"the model's actions are {space}; arm {simulator.arm.name!r} takes {n} numbers from "
+            "-1 to 1"
         )
 
 
@@ -112,17 +95,22 @@ def _check_observations(space: Any, interface: Interface, simulator: Simulator) 
                 f"the model sees {frames} observations at once (a frame stack): kinarm's policies "
                 "see one"
             )
-        if space.shape == own.shape and _agree(space, _space_of_goals(space, simulator)):
-            return
-    elif isinstance(space, Dict) and isinstance(own, Dict) and set(space) == set(own):
-        fixed = (_agree(space[key], own[key]) for key in own if key != "desired_goal")
-        if all(fixed) and space["desired_goal"].shape == own["desired_goal"].shape:
-            return
-    raise InvalidInputError(
-        f"the model's observations, {_described(space)}, are not those of arm "
-        f"{simulator.arm.name!r}, {_described(own)}, within its bounds: was it trained in another "
-        "environment, or in a wrapper that changes observations?"
-    )
+    places = part_slices(simulator.arm.n_joints)
+    goals = [places[part.name] for part in OBSERVATION if part.of_goal]
+    of_goal = {WHOLE: goals, "desired_goal": [slice(None)]}
+    theirs, ours = _parts(space), _parts(own)
+    same = theirs.keys() == ours.keys()
+    if not same or not all(_agree(theirs[key], ours[key], of_goal.get(key, ())) for key in ours):
+        raise InvalidInputError(
+            f"the model's observations, {_described(space)}, are not those of arm "
+            f"{simulator.arm.name!r}, {_described(own)}, within its bounds: was it trained in "
+            "another environment, or in a wrapper that changes observations?"
+        )
+
+
+def _parts(space: Any) -> dict[str, Any]:
+    """Parts of a space by their keys."""
+    return dict(space.spaces) if isinstance(space, Dict) else {WHOLE: space}
 
 
 def _described(space: Any) -> str:
@@ -132,26 +120,15 @@ def _described(space: Any) -> str:
     return f"{type(space).__name__} of shape {space.shape}"
 
 
-def _space_of_goals(space: Any, simulator: Simulator) -> Any:
-    """Bounds of an arm's observations if goals lie where a space of observations says."""
-    goals = part_slices(simulator.arm.n_joints)["goal"]
-    ranges = Ranges(space.low[goals], space.high[goals], simulator.arm.reach)
-    return Box(*observation_bounds(ranges, simulator.arm.n_joints), dtype=np.float64)
-
-
-def _agree(first: Any, second: Any) -> bool:
-    """Whether two boxes have the same shape and bounds, to within rounding."""
+def _agree(first: Any, second: Any, but_for: Iterable[slice] = ()) -> bool:
+    """Whether two boxes have the same shape and, but for some entries, bounds."""
     if first.shape != second.shape:
         return False
-    ends = ((first.low, second.low), (first.high, second.high))
-    return all(np.allclose(a, b, rtol=0, atol=ROUNDING) for a, b in ends)
-
-
-def _attainable(simulator: Simulator) -> tuple[Array, Array]:
-    """Bounds of observations for all goals within the arm's reach, to within the tolerance."""
-    reach = simulator.arm.reach
-    corner = np.full(3, reach + simulator.task.tolerance)
-    return observation_bounds(Ranges(-corner, corner, reach), simulator.arm.n_joints)
+    ends, others = [first.low, first.high], [second.low, second.high]
+    alike = np.isclose(ends, others, rtol=0, atol=ROUNDING)
+    for part in but_for:  # goals lie elsewhere in other problems
+        alike[:, part] = True
+    return bool(alike.all())
 
 
 def find_vec_normalize(model: Path) -> Path | None:
@@ -188,19 +165,10 @@ def load_vec_normalize(given: Any) -> Any:
     return given
 
 
-def normalization(
-    statistics: Any, lower: Mapping[str, Array], upper: Mapping[str, Array]
-) -> Iterator[Piece]:
-    """What ``VecNormalize`` does to observations: (x - mean) / sqrt(var + epsilon), and a clip.
+def normalization(statistics: Any, sizes: Mapping[str, int]) -> Iterator[Piece]:
+    """The map by ``VecNormalize``: (x - mean) / sqrt(var + epsilon), and a clip.
 
-    Parameters
-    ----------
-    statistics : VecNormalize
-        The wrapper, or None.
-    lower, upper : mapping of str to ndarray
-        What the parts of the observation range over, in the order of the network's inputs; an
-        observation that is no dictionary is the part `WHOLE`. A clip that the ranges rule out is
-        left out.
+    It has the statistics of some parts of the inputs, whose sizes are given in their order.
 
     Raises
     ------
@@ -209,20 +177,18 @@ def normalization(
     """
     if statistics is None or not statistics.norm_obs:
         return
-    known = (
-        statistics.obs_rms if isinstance(statistics.obs_rms, dict) else {WHOLE: statistics.obs_rms}
-    )
-    if not all(key in lower and known[key].mean.shape == lower[key].shape for key in known):
+    known = statistics.obs_rms
+    known = known if isinstance(known, dict) else {WHOLE: known}
+    if not all(each.mean.shape == (sizes.get(key),) for key, each in known.items()):
         raise InvalidInputError("VecNormalize has statistics of other observations than the model")
-    scales, shifts, limits = [], [], []
-    for key, low in lower.items():
-        each = known.get(key)
-        scale = 1 / np.sqrt(each.var + statistics.epsilon) if each else np.ones_like(low)
-        scales.append(scale)
-        shifts.append(-each.mean * scale if each else np.zeros_like(low))
-        limits.append(np.full_like(low, statistics.clip_obs if each else UNLIMITED))
-    scale, shift, limit = map(np.concatenate, (scales, shifts, limits))
+    n, end = sum(sizes.values()), 0
+    scale, shift, limit = np.ones(n), np.zeros(n), np.full(n, UNLIMITED)
+    for key, size in sizes.items():
+        place, end = slice(end, end + size), end + size
+        if key in known:
+            scale[place] = 1 / np.sqrt(known[key].var + statistics.epsilon)
+            shift[place] = -known[key].mean * scale[place]
+            limit[place] = statistics.clip_obs
     yield Layer(np.diag(scale), shift)
-    ends = (np.concatenate(list(end.values())) * scale + shift for end in (lower, upper))
-    if any((np.abs(end) > limit).any() for end in ends):
+    if np.isfinite(statistics.clip_obs):
         yield Clip(-limit, limit)

@@ -1,102 +1,136 @@
-"""Bounds of the steps to goals, and of the distances from them, for the trials of a batch.
+"""Proven bounds of the steps to goals, and of the distances from them, for batches of trials."""
 
-Each is a search of its own, or a few (`kinarm.policies.oracle.kernels.approach.search`).
-"""
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.chain import Chain
+from kinarm._parallel import run_rows
 from kinarm.kernels.compiling import Array
-from kinarm.policies.oracle.kernels.approach import ArmInScene, search
-from kinarm.policies.oracle.kernels.boxes import ROUNDING, WAITING, Boxes, layout
+from kinarm.kernels.records import recorded
+from kinarm.motion_bounds import MotionBounds
+from kinarm.policies.oracle.kernels.approach import search
+from kinarm.policies.oracle.kernels.boxes import WAITING, Boxes, layout
+from kinarm.simulator import Simulator
+
+BUDGET = 100_000
+"""Boxes that a proof may examine, for each number of steps."""
+
+RESOLUTION = 1e-3
+"""By how much a proven distance may fall short of the smallest possible one [m]."""
+
+Search = Callable[..., tuple[bool, int, float, float]]
 
 
-def bound_steps(
-    first: int,
-    last: int,
-    arm: ArmInScene,
-    starts: Array,
-    goals: Array,
-    step_limit: Array,
-    tolerance: float,
-    contact: bool,
-    budget: int,
-    fewest: NDArray[np.int64],
-    most: NDArray[np.int64],
-    lower_bounds: NDArray[np.int64],
-    tight: NDArray[np.bool_],
-    witnesses: Array,
-) -> None:
-    """Prove how many steps it takes at least to bring the tool to goals, for some rows.
+class Prover:
+    """Proves bounds for the arm and scene of a simulator.
 
-    Numbers of steps from ``fewest`` to ``most`` are examined; fewer than ``fewest`` are impossible.
-    Written are ``lower_bounds``, below which no number of steps suffices; whether they are
-    ``tight``, that is, some configuration that counts reaches the goal in so many steps, or none
-    does in ``most``; and such configurations as ``witnesses``. A search may examine as many boxes
-    as are in the budget.
+    Each trial is a `search` of its own, or a few. Starts have the shape (n, n_joints) [rad or m],
+    goals (n, 3) [m]. With ``contact``, what is proven to touch something does not count, and a
+    search may examine as many boxes as are in the ``budget``.
     """
-    best, limits = np.empty(starts.shape[1]), step_limit.copy()
-    space = work_space(arm, len(step_limit))
-    for row in range(first, last):
-        start, goal = starts[row].copy(), (*goals[row].tolist(),)
-        few, many, all_at_once = int(fewest[row]), int(most[row]), not contact
-        lower_bounds[row], tight[row] = few, True
-        while few <= many:
-            limit = many if all_at_once else few
-            box = within_steps(arm.chain, start, limits, limit)
-            inputs = (arm, start, goal, limits, few, limit, tolerance, np.inf, contact, budget)
-            complete, steps, _, _ = search(*inputs, *box, best, *space)
-            if steps <= limit:
-                witnesses[row] = best
-            if complete:
-                few = steps
-            lower_bounds[row], tight[row] = few, complete
-            if steps <= limit if complete else not all_at_once:
-                break
-            # All at once is least work, unless the budget is too small: then each number of steps
-            # has one of its own, up to those that the configuration found takes. Where contact
-            # counts, what is closest to the goal rarely counts, and larger boxes are harder.
-            if all_at_once:
-                many, all_at_once = steps - 1, False
 
+    def __init__(self, simulator: Simulator) -> None:
+        chain, shapes, _ = simulator.world.records
+        bounds = MotionBounds.of(simulator.arm.chain, simulator.n_actions)
+        self._simulator = simulator
+        self._search: Search = partial(search, chain, recorded(bounds), shapes)
 
-def bound_distance(
-    first: int,
-    last: int,
-    arm: ArmInScene,
-    lower: Array,
-    upper: Array,
-    starts: Array,
-    goals: Array,
-    resolution: float,
-    contact: bool,
-    budget: int,
-    distances: Array,
-    configurations: Array,
-) -> None:
-    """Bound from below how close the tool can come to goals, for some rows.
+    def bound_steps(
+        self,
+        starts: Array,
+        goals: Array,
+        witnesses: Array,
+        rows: NDArray[np.int64],
+        fewest: NDArray[np.int64],
+        most: NDArray[np.int64],
+        *,
+        contact: bool = False,
+        budget: int = BUDGET,
+    ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Prove how many steps it takes at least to bring the tool to goals.
 
-    Written are the distances, shape (m, 2), proven and found [m], and the closest configurations
-    found; joints beyond those of the boxes stay as in ``starts``.
-    """
-    n = lower.shape[1]
-    unlimited, space = np.full(n, np.inf), work_space(arm, n)
-    for row in range(first, last):
-        box, goal = (lower[row].copy(), upper[row].copy()), (*goals[row].tolist(),)
-        inputs = (arm, starts[row].copy(), goal, unlimited, n, n, 0.0, resolution, contact, budget)
-        _, _, found, proven = search(*inputs, *box, configurations[row], *space)
-        distances[row] = proven, found
+        Returned are lower bounds, and whether some configuration that counts attains them, or none
+        reaches the goal in ``most``; for some of the trials, which the rows number.
 
+        Parameters
+        ----------
+        starts, goals, contact, budget
+            See `Prover`.
+        witnesses : ndarray, shape (n, n_joints)
+            Where configurations go that reach the goals in as many steps [rad or m].
+        rows, fewest, most : ndarray of int, shape (n_rows,)
+            The trials, and numbers of steps that are examined; fewer are impossible.
+        """
+        simulator, n = self._simulator, len(rows)
+        lower_bounds, tight = np.empty(n, dtype=np.int64), np.empty(n, dtype=bool)
 
-def within_steps(chain: Chain, start: Array, step_limit: Array, steps: int) -> tuple[Array, Array]:
-    """Corners of what the first joints can reach in some steps."""
-    n, reach = len(step_limit), steps * step_limit + ROUNDING
-    lower, upper = start[:n] - reach, start[:n] + reach
-    return np.maximum(chain.lower[:n], lower), np.minimum(chain.upper[:n], upper)
+        def bound_some(first: int, last: int) -> None:
+            limits, space = simulator.step_limit.copy(), self._space()
+            best, (lower, upper) = np.empty(starts.shape[1]), np.empty((2, len(limits)))
+            tolerance = simulator.task.tolerance
+            for i in range(first, last):
+                start, goal = starts[rows[i]].copy(), (*goals[rows[i]].tolist(),)
+                few, many, all_at_once = int(fewest[i]), int(most[i]), not contact
+                lower_bounds[i], tight[i] = few, True
+                while few <= many:
+                    limit = many if all_at_once else few
+                    inputs = (limits, few, limit, tolerance, np.inf, contact, budget, lower, upper)
+                    complete, steps, _, _ = self._search(start, goal, *inputs, best, *space)
+                    if steps <= limit:
+                        witnesses[rows[i]] = best
+                    if complete:
+                        few = steps
+                    lower_bounds[i], tight[i] = few, complete
+                    if steps <= limit if complete else not all_at_once:
+                        break
+                    # All at once is least work, unless the budget is too small, or contact counts:
+                    # then each number of steps has one, up to those that were found.
+                    if all_at_once:
+                        many, all_at_once = steps - 1, False
 
+        run_rows(bound_some, n, BUDGET * n, simulator.threads)
+        return lower_bounds, tight
 
-def work_space(arm: ArmInScene, n: int) -> tuple[Array, Boxes]:
-    """Space for the boxes of n joints that wait, and for those that are examined."""
-    n_joints, n_shapes = len(arm.chain.lower), len(arm.shapes.link)
-    return np.empty((WAITING, 2 * n + 1)), layout(n, n_joints, n_shapes).record()
+    def bound_distance(
+        self,
+        starts: Array,
+        goals: Array,
+        box: tuple[Array, Array],
+        *,
+        resolution: float = RESOLUTION,
+        budget: int = BUDGET,
+    ) -> tuple[Array, Array]:
+        """Bound from below how close the tool can come to goals, whatever it touches.
+
+        Returned are distances proven and found, shape (n, 2) [m], and where they were found.
+
+        Parameters
+        ----------
+        starts, goals, budget
+            See `Prover`; joints that are not actuated stay as at the start.
+        box : tuple of ndarray, shape (n, n_actions)
+            Lower and upper corners of where the others can be [rad or m].
+        resolution : float
+            By how much a proven distance may fall short of the smallest one [m].
+        """
+        n, n_moved = len(starts), self._simulator.n_actions
+        distances, configurations = np.empty((n, 2)), np.empty(starts.shape)
+
+        def bound_some(first: int, last: int) -> None:
+            unlimited, space = np.full(n_moved, np.inf), self._space()
+            inputs = (unlimited, n_moved, n_moved, 0.0, resolution, False, budget)
+            for row in range(first, last):
+                start, goal = starts[row].copy(), (*goals[row].tolist(),)
+                corners = (box[0][row].copy(), box[1][row].copy(), configurations[row])
+                _, _, found, proven = self._search(start, goal, *inputs, *corners, *space)
+                distances[row] = proven, found
+
+        run_rows(bound_some, n, BUDGET * n, self._simulator.threads)
+        return distances, configurations
+
+    def _space(self) -> tuple[Array, Boxes]:
+        """Space for the boxes that wait, and for those that are examined."""
+        n, n_joints = self._simulator.n_actions, self._simulator.arm.n_joints
+        return np.empty((WAITING, 2 * n + 1)), layout(n, n_joints).record()

@@ -3,14 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.policies.oracle.motion import steps_between
+from kinarm.policies.oracle.inverse import steps_between
 from kinarm.simulator import Simulator
 
-EXTENSIONS = 1500
-"""Samples before the search is given up."""
-
-LONGEST_EXTENSION = 6.0
-"""How far a tree grows towards a sample [steps]."""
+EXTENSIONS, LONGEST_EXTENSION = 1500, 6.0
+"""Samples before the search is given up, and how far a tree grows towards one [steps]."""
 
 SHORTCUTS = 120
 """Pairs of points of a path between which the straight way is tried."""
@@ -46,19 +43,15 @@ def find_detour(
 ) -> NDArray[np.float64] | None:
     """Find a contact-free path of straight segments to one of several configurations.
 
-    A tree grows from either side, in turns, until they meet. Start and ends are contact-free; the
-    path, shape (m, n_joints), leads from the start to an end. None if none was found.
+    A tree grows from either side, in turns, until they meet. The path has the shape (m, n_joints);
+    None if none was found.
 
     Parameters
     ----------
-    simulator : Simulator
-        Arm and scene.
-    start : ndarray, shape (n_joints,)
-        Where the path begins [rad or m].
-    ends : ndarray, shape (k, n_joints)
-        Where it may end [rad or m].
-    rng : numpy.random.Generator
-        Draws samples and shortcuts.
+    simulator, rng
+        Arm and scene, and what draws samples and shortcuts.
+    start, ends : ndarray, shape (n_joints,) and (k, n_joints)
+        Where the path begins and may end, without contact [rad or m].
     """
     moved, n = slice(simulator.n_actions), simulator.n_actions
     lower, upper = simulator.arm.lower[moved], simulator.arm.upper[moved]

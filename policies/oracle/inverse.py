@@ -1,11 +1,8 @@
-"""Inverse kinematics: configurations that bring the tool to a goal without contact.
-
-Kinematics and Jacobian are those of the Pinocchio model, flattened for the compiled kernels.
-"""
+"""Inverse kinematics: configurations that bring the tool to a goal without contact."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +11,6 @@ from kinarm._parallel import run_rows
 from kinarm._validation import finite_array, whole_number
 from kinarm.errors import InvalidInputError
 from kinarm.policies.oracle.kernels.projection import damped_least_squares, layout
-from kinarm.policies.oracle.motion import steps_between
 from kinarm.randomness import low_discrepancy_points
 from kinarm.simulator import Simulator
 
@@ -23,15 +19,7 @@ RESERVE = 1e-6
 
 
 class Solutions(NamedTuple):
-    """Configurations at which the tool is within the tolerance of a goal and nothing touches.
-
-    Attributes
-    ----------
-    configurations : ndarray, shape (m, n_joints)
-        In the order of their owners [rad or m].
-    owner : ndarray of int, shape (m,)
-        Which goal they belong to.
-    """
+    """Configurations at a goal where nothing touches, shape (m, n_joints), and whose goal it is."""
 
     configurations: NDArray[np.float64]
     owner: NDArray[np.int64]
@@ -48,8 +36,7 @@ def inverse_kinematics(
     """Find the distinct contact-free configurations that reach a goal within the horizon.
 
     Evenly spread configurations and the current one are moved into the ball about the goal by
-    damped least squares within the limits. An arm with more joints than a position has coordinates
-    has a continuum of solutions: those returned differ from each other.
+    damped least squares within the limits. Of a continuum of solutions, those returned differ.
 
     Parameters
     ----------
@@ -68,12 +55,6 @@ def inverse_kinematics(
     -------
     ndarray, shape (k, n_joints)
         The solution that takes the fewest steps first [rad or m]; k may be 0.
-
-    Raises
-    ------
-    InvalidInputError
-        If a shape is wrong, an entry is not finite, the start is beyond the limits or a number
-        is not positive.
     """
     q = finite_array("start", start, (simulator.arm.n_joints,))
     g = finite_array("goal", goal, (3,))
@@ -102,10 +83,6 @@ def solve_within(
 ) -> Solutions:
     """Find contact-free configurations close to goals that are at most some steps away.
 
-    Row by row: the tool within ``tolerances`` of ``goals`` [m], and ``steps`` or fewer from
-    ``starts``. The search begins at as many ``samples``: the start, the guess, and evenly spread
-    configurations.
-
     Parameters
     ----------
     simulator : Simulator
@@ -114,12 +91,11 @@ def solve_within(
         Where the arm is, and configurations that may be close to a solution [rad or m].
     goals : ndarray, shape (m, 3)
         Goal positions [m].
-    steps : ndarray of int, shape (m,)
-        Steps at most from the starts.
-    tolerances : ndarray, shape (m,)
-        Distances at most from the goals [m].
+    steps, tolerances : ndarray of int and of float, shape (m,)
+        Steps at most from the starts, and distances at most from the goals [m].
     samples : int
-        Configurations from which each search begins.
+        From how many configurations each search begins: the start, the guess, and others that are
+        evenly spread.
     """
     m, n_joints = len(starts), simulator.arm.n_joints
     box = step_box(simulator, starts, steps)
@@ -154,9 +130,7 @@ def project(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Move configurations towards goals by damped least squares; contact is ignored.
 
-    Returns where they ended [rad or m], and the distances from tool to goal [m]. ``owner`` says
-    which row of the box's corners and of the goals belongs to each, and ``radius`` how far from
-    the goal it may rest [m].
+    Returns where they ended [rad or m], and the distances from tool to goal [m].
 
     Parameters
     ----------
@@ -164,45 +138,66 @@ def project(
         The arm.
     configurations : ndarray, shape (k, n_joints)
         Where they begin [rad or m].
-    owner : ndarray of int, shape (k,)
-        Rows of the box and of the goals that they belong to.
-    box : tuple of ndarray, shape (m, n_actions)
-        Lower and upper corners, which they do not leave [rad or m].
-    goals : ndarray, shape (m, 3)
-        Goal positions [m].
-    radius : ndarray, shape (k,)
-        How far from the goal they may rest [m].
+    owner, radius : ndarray of int and of float, shape (k,)
+        Row of the box and of the goals for each, and how far from the goal it may rest [m].
+    box, goals : tuple of ndarray, shape (m, n_actions), and ndarray, shape (m, 3)
+        Lower and upper corners, which they do not leave [rad or m], and goal positions [m].
     """
     ended, distances = configurations.copy(), np.empty(len(configurations))
-    chain, _, _ = simulator.world.records
-    arrays = (chain, owner, *box, goals, radius, ended, distances)
-    run_rows(_project_some, len(ended), 4 * len(ended), simulator.threads, *arrays)
+    arrays = (simulator.world.records[0], owner, *box, goals, radius, ended, distances)
+
+    def project_some(first: int, last: int) -> None:
+        moving = layout(simulator.arm.n_joints, simulator.n_actions).record()
+        damped_least_squares(first, last, moving, *arrays)
+
+    run_rows(project_some, len(ended), 4 * len(ended), simulator.threads)
     return ended, distances
-
-
-def _project_some(first: int, last: int, *arrays: Any) -> None:
-    """Move some of the configurations, with work space that no other thread uses."""
-    chain, _, lower = arrays[:3]
-    moving = layout(len(chain.lower), lower.shape[1]).record()
-    damped_least_squares(first, last, moving, *arrays)
 
 
 def step_box(
     simulator: Simulator, starts: NDArray[np.float64], steps: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Corners of what the actuated joints can reach in some steps, shapes (m, n_actions).
+    """Corners of what the joints can reach from starts in some steps.
 
     Parameters
     ----------
     simulator : Simulator
-        The arm and its step.
+        The arm, its limits and its step.
     starts : ndarray, shape (m, n_joints)
-        Where it is [rad or m].
+        Where the arm is [rad or m].
     steps : ndarray of int, shape (m,)
-        How many.
+        Steps at most.
+
+    Returns
+    -------
+    tuple of ndarray, shape (m, n_actions)
+        The lower and the upper corners [rad or m].
     """
     moved = slice(simulator.n_actions)
     extent = steps[:, None] * simulator.step_limit
     lower = np.maximum(simulator.arm.lower[moved], starts[:, moved] - extent)
     upper = np.minimum(simulator.arm.upper[moved], starts[:, moved] + extent)
     return lower, upper
+
+
+def steps_between(
+    simulator: Simulator, first: NDArray[np.float64], second: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Steps that the straight motion between configurations takes, before rounding up.
+
+    The slowest joint decides: the largest of |dq_i| / (rate_i dt) over the actuated joints.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        The arm and its step.
+    first, second : ndarray, shape (..., n_joints)
+        The configurations [rad or m].
+
+    Returns
+    -------
+    ndarray, shape (...)
+    """
+    moved = np.abs(second - first)[..., : simulator.n_actions] / simulator.step_limit
+    steps: NDArray[np.float64] = moved.max(axis=-1)
+    return steps

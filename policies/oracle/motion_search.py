@@ -1,4 +1,4 @@
-"""Search for the motions that reach goals in the fewest steps."""
+"""Search for the motions that reach goals in the fewest steps, as tables of actions."""
 
 import hashlib
 
@@ -11,16 +11,14 @@ from kinarm.policies.oracle.inverse import (
     inverse_kinematics,
     solve_within,
     step_box,
+    steps_between,
 )
-from kinarm.policies.oracle.motion import along_path, steps_between, straight, two_segments
 from kinarm.randomness import low_discrepancy_points
 from kinarm.simulator import Simulator
 
-SAMPLES = (8, 48, 512)
-"""Configurations from which goals are sought for each number of steps: a few, then more."""
-
-VIAS = 128
-"""Motions by way of another configuration that are tried for each number of steps."""
+SAMPLES, VIAS = (8, 48, 512), 128
+"""For each number of steps: configurations from which goals are sought, a few, then more; and
+motions by way of another configuration that are tried."""
 
 DETOURS = 4
 """Detours that are planned for a trial; the shortest one counts."""
@@ -40,8 +38,6 @@ class MotionSearch:
 
     Attributes
     ----------
-    starts, goals : ndarray, shape (n, n_joints) and (n, 3)
-        The trials [rad or m], [m].
     witnesses : ndarray, shape (n, n_joints)
         Configurations that attain what was proven last, from which goals are sought [rad or m].
     actions : ndarray, shape (n, horizon, n_actions)
@@ -66,8 +62,7 @@ class MotionSearch:
     @property
     def reached(self) -> NDArray[np.bool_]:
         """Whether the motions reach the goals, shape (n,)."""
-        reached: NDArray[np.bool_] = self.costs <= self.simulator.task.horizon
-        return reached
+        return self.costs <= self.simulator.task.horizon
 
     @property
     def steps(self) -> NDArray[np.int64]:
@@ -76,10 +71,7 @@ class MotionSearch:
         return steps
 
     def try_steps(self, rows: NDArray[np.int64], steps: NDArray[np.int64]) -> None:
-        """Look for motions of so many steps in trials where none reaches the goal yet.
-
-        Beyond the horizon there are none.
-        """
+        """Look for motions of so many steps in trials where none reaches the goal yet."""
         for samples in SAMPLES:
             due = ~self.reached[rows] & (steps <= self.simulator.task.horizon)
             rows, steps = rows[due], steps[due]
@@ -112,10 +104,7 @@ class MotionSearch:
                         self._replay(np.array([row]), actions[None])
 
     def try_approach(self, rows: NDArray[np.int64], distances: NDArray[np.float64]) -> None:
-        """Look for motions that end close to goals which none reaches.
-
-        The distances are the smallest ones that may be possible [m].
-        """
+        """Look for motions that end as close to goals as may be possible, which none reaches."""
         for nearer in APPROACHES:
             due = np.isinf(self.costs[rows])
             rows, distances = rows[due], distances[due]
@@ -136,7 +125,9 @@ class MotionSearch:
         starts, goals, guesses = self.starts[rows], self.goals[rows], self.witnesses[rows]
         found = solve_within(self.simulator, starts, goals, steps, tolerances, guesses, samples)
         owner, ends = found.owner, found.configurations
-        self._replay(rows[owner], straight(self.simulator, starts[owner], ends, steps[owner]))
+        due = steps[owner]
+        motions = two_segments(self.simulator, starts[owner], ends, ends, due, due)
+        self._replay(rows[owner], motions)
         return found
 
     def _try_vias(
@@ -174,3 +165,68 @@ class MotionSearch:
         better = best[costs[best] < self.costs[trials[best]]]
         self.actions[trials[better]] = actions[better]
         self.costs[trials[better]] = costs[better]
+
+
+def two_segments(
+    simulator: Simulator,
+    starts: NDArray[np.float64],
+    vias: NDArray[np.float64],
+    ends: NDArray[np.float64],
+    turn: NDArray[np.int64],
+    steps: NDArray[np.int64],
+) -> NDArray[np.float64]:
+    """Actions that move straight to one configuration, then straight to another, then rest.
+
+    Shape (m, horizon, n_actions).
+
+    Parameters
+    ----------
+    simulator : Simulator
+        The arm, its step and the horizon.
+    starts, vias, ends : ndarray, shape (m, n_joints)
+        Where the motions begin, turn and end [rad or m].
+    turn, steps : ndarray of int, shape (m,)
+        Steps to the turn, and to the end; where these are equal, the ends are not visited.
+    """
+    moved = slice(simulator.n_actions)
+    after = np.maximum(steps - turn, 1)
+    first = (vias - starts)[:, moved] / (turn[:, None] * simulator.step_limit)
+    second = (ends - vias)[:, moved] / (after[:, None] * simulator.step_limit)
+    step = np.arange(simulator.task.horizon)[None, :, None]
+    turning, ending = turn[:, None, None], steps[:, None, None]
+    actions: NDArray[np.float64] = np.where(
+        step < turning, first[:, None], np.where(step < ending, second[:, None], 0.0)
+    )
+    return actions
+
+
+def along_path(
+    simulator: Simulator, path: NDArray[np.float64], *, through_corners: bool
+) -> NDArray[np.float64] | None:
+    """Actions that follow a path of straight segments at full speed, then rest.
+
+    Shape (horizon, n_actions); None if the horizon is too short.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        The arm, its step and the horizon.
+    path : ndarray, shape (m, n_joints)
+        Configurations, connected by straight segments [rad or m].
+    through_corners : bool
+        Whether a step ends at every one of them; else steps cut corners, and are fewer.
+    """
+    lengths = steps_between(simulator, path[:-1], path[1:])
+    if through_corners:
+        lengths = np.ceil(lengths - 1e-9)
+    arrival = np.concatenate([[0.0], np.cumsum(lengths)])
+    n_steps = int(np.ceil(arrival[-1] - 1e-9))
+    if n_steps > simulator.task.horizon:
+        return None
+    times = np.minimum(np.arange(n_steps + 1), arrival[-1])
+    visited = np.stack(
+        [np.interp(times, arrival, path[:, axis]) for axis in range(simulator.n_actions)], axis=1
+    )
+    actions = np.zeros((simulator.task.horizon, simulator.n_actions))
+    actions[:n_steps] = np.diff(visited, axis=0) / simulator.step_limit
+    return actions

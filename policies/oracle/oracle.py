@@ -2,21 +2,16 @@
 
 For each trial the oracle *proves* bounds and *finds* a motion; the best policy lies between them.
 
-Proven, by branch and bound over all configurations within reach:
+Proven, by branch and bound over all configurations within reach: the number of steps below which
+no policy can bring the tool within the tolerance of the goal; and, where none can within the
+horizon, a distance that no policy can beat, to a millimetre if the budget suffices. Contact is
+ignored in that, which makes both hold all the more. Where the motion found is slower than the
+bound, the bound is raised: a motion does not end where the arm touches something, as far as its
+shapes are capsules. Boxes and distances are enlarged by 1e-9 to cover rounding. When the budget of
+a proof runs out, what is proven so far stands and is marked as incomplete.
 
-- the number of steps below which no policy can bring the tool within the tolerance of the goal;
-- where none can within the horizon, a distance that no policy can beat, to a millimetre if the
-  budget suffices.
-
-Contact is ignored in that, which makes both hold all the more for motions that avoid it. Where the
-motion found is slower than the bound, the bound is raised: a motion does not end where the arm
-touches something, as far as its shapes are capsules. Boxes of configurations and distances are
-enlarged by 1e-9 to cover rounding. When the budget of a proof runs out, what is proven so far
-stands and is marked as incomplete.
-
-Found, by search, and replayed in the simulator, whose outcome is what counts: a motion that
-reaches the goal without contact. It need not be the fastest one, and that none was found proves
-nothing.
+Found, by search, and replayed in the simulator: a motion that reaches the goal without contact. It
+need not be the fastest one, and that none was found proves nothing.
 """
 
 from __future__ import annotations
@@ -26,13 +21,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm._parallel import run_rows
 from kinarm._validation import finite_array, one_or_many
-from kinarm.kernels.records import recorded
-from kinarm.motion_bounds import MotionBounds
-from kinarm.policies.oracle.bounding import bound_distance, bound_steps
-from kinarm.policies.oracle.inverse import inverse_kinematics, step_box
-from kinarm.policies.oracle.kernels.approach import ArmInScene
+from kinarm.policies.oracle.bounding import Prover
+from kinarm.policies.oracle.inverse import step_box
 from kinarm.policies.oracle.motion_search import MotionSearch
 from kinarm.policies.oracle.solution import OracleSolution, OracleSolutions
 from kinarm.problem import ProblemLike
@@ -42,12 +33,6 @@ from kinarm.simulator import Simulator
 ORACLE_SEMANTICS = "2"
 """Version of what the oracle proves and finds: raised with every change of its results."""
 
-BUDGET = 100_000
-"""Boxes that a proof may examine, for each number of steps."""
-
-RESOLUTION = 1e-3
-"""By how much a proven distance may fall short of the smallest possible one [m]."""
-
 EXTRA_STEPS = 24
 """How far above its lower bound the number of steps is raised before a detour is planned."""
 
@@ -55,7 +40,6 @@ LOT = 128
 """Trials that are solved together."""
 
 Progress = Callable[[int, int], object]
-"""Called with the number of trials solved so far and in all."""
 
 
 class Oracle:
@@ -70,39 +54,17 @@ class Oracle:
         The problem, its name or its file; its rewards do not matter.
     threads : int, optional
         Threads to use; as many as the processors that this process may use by default.
-
-    Attributes
-    ----------
-    simulator : Simulator
-        Where motions are replayed.
     """
 
     def __init__(self, problem: ProblemLike, *, threads: int | None = None) -> None:
         self.simulator = Simulator(problem, threads=threads)
-        chain, shapes, _ = self.simulator.world.records
-        bounds = MotionBounds.of(self.simulator.arm.chain, self.simulator.n_actions)
-        self._arm = recorded(ArmInScene(chain, recorded(bounds), shapes))
+        self._prover = Prover(self.simulator)
 
     def __repr__(self) -> str:
         return f"Oracle({self.simulator.problem!r})"
 
     def solve(self, start: ArrayLike, goal: ArrayLike) -> OracleSolution:
-        """Solve one trial.
-
-        Parameters
-        ----------
-        start : array_like, shape (n_joints,)
-            Contact-free start configuration [rad or m].
-        goal : array_like, shape (3,)
-            Goal position [m].
-
-        Raises
-        ------
-        InvalidInputError
-            If a shape is wrong, an entry is not finite or the start is beyond the limits.
-        StartInContactError
-            If the start touches something.
-        """
+        """Solve one trial; see `solve_batch`."""
         q = finite_array("start", start, (self.simulator.arm.n_joints,))
         return self.solve_batch(q[None], finite_array("goal", goal, (3,))[None])[0]
 
@@ -122,8 +84,6 @@ class Oracle:
 
         Raises
         ------
-        InvalidInputError
-            If a shape is wrong, an entry is not finite or a start is beyond the limits.
         StartInContactError
             If a start touches something.
         """
@@ -141,18 +101,14 @@ class Oracle:
                 on_progress(min(first + LOT, len(q)), len(q))
         return OracleSolutions.concatenated(parts)
 
-    def inverse_kinematics(self, start: ArrayLike, goal: ArrayLike) -> NDArray[np.float64]:
-        """Find distinct contact-free configurations at a goal; see `inverse_kinematics`."""
-        return inverse_kinematics(self.simulator, start, goal)
-
     def _solve_lot(
         self, starts: NDArray[np.float64], goals: NDArray[np.float64]
     ) -> OracleSolutions:
         """From trials to bounds, motions and their replay."""
         horizon, n = self.simulator.task.horizon, len(starts)
         search = MotionSearch(self.simulator, starts, goals)
-        ones, last = np.ones(n, dtype=np.int64), np.full(n, horizon)
-        steps_bounds, complete = self._bound_steps(search, np.arange(n), ones, last)
+        trials, limits = (starts, goals, search.witnesses), np.tile([[1], [horizon]], n)
+        steps_bounds, complete = self._prover.bound_steps(*trials, np.arange(n), *limits)
         within = np.flatnonzero(steps_bounds <= horizon)
         for extra in range(EXTRA_STEPS + 1):
             search.try_steps(within, steps_bounds[within] + extra)
@@ -177,15 +133,17 @@ class Oracle:
     ) -> None:
         """Raise the bounds of motions that are slower, and of goals that none reaches."""
         horizon = self.simulator.task.horizon
+        trials = (search.starts, search.goals, search.witnesses)
+        bound_steps = self._prover.bound_steps
         # A contact-free configuration ends the proof, whether or not the motion goes there.
         fewest = np.fmin(search.steps, search.solved)
         slow = np.flatnonzero(search.reached & (fewest > steps_bounds))
-        steps_bounds[slow], complete[slow] = self._bound_steps(
-            search, slow, steps_bounds[slow], fewest[slow] - 1, contact=True
+        steps_bounds[slow], complete[slow] = bound_steps(
+            *trials, slow, steps_bounds[slow], fewest[slow] - 1, contact=True
         )
         blocked = np.flatnonzero((fewest > horizon) & (steps_bounds <= horizon))
         last = np.full(blocked.size, horizon)
-        beyond, _ = self._bound_steps(search, blocked, last, last, contact=True)
+        beyond, _ = bound_steps(*trials, blocked, last, last, contact=True)
         unsettled = ~search.reached & (steps_bounds <= horizon)
         complete[unsettled] = False
         shut = blocked[beyond > horizon]
@@ -196,44 +154,15 @@ class Oracle:
     ) -> NDArray[np.float64]:
         """Prove, and seek, how close motions come to the goals that none reaches."""
         task, missed = self.simulator.task, np.flatnonzero(~search.reached)
+        starts, goals = search.starts[missed], search.goals[missed]
+        box = step_box(self.simulator, starts, np.full(missed.size, task.horizon))
+        proven, search.witnesses[missed] = self._prover.bound_distance(starts, goals, box)
         distances = np.zeros(len(steps_bounds))
-        distances[missed] = self._bound_distance(search, missed)
+        distances[missed] = proven[:, 0]
         out_of_reach = steps_bounds > task.horizon
         distances[out_of_reach] = np.fmax(distances[out_of_reach], task.tolerance)
         search.try_approach(missed, np.fmax(distances[missed], task.tolerance))
         return distances
-
-    def _bound_steps(
-        self,
-        search: MotionSearch,
-        rows: NDArray[np.int64],
-        fewest: NDArray[np.int64],
-        most: NDArray[np.int64],
-        *,
-        contact: bool = False,
-    ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Prove how many steps some trials take at least, and note what attains it."""
-        simulator, n = self.simulator, len(rows)
-        lower_bounds, complete = np.empty(n, dtype=np.int64), np.empty(n, dtype=bool)
-        witnesses = search.witnesses[rows]
-        inputs = (self._arm, search.starts[rows], search.goals[rows], simulator.step_limit)
-        limits = (simulator.task.tolerance, contact, BUDGET, fewest, most)
-        arrays = (*inputs, *limits, lower_bounds, complete, witnesses)
-        run_rows(bound_steps, n, BUDGET * n, simulator.threads, *arrays)
-        search.witnesses[rows] = witnesses
-        return lower_bounds, complete
-
-    def _bound_distance(self, search: MotionSearch, rows: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Prove how close the tool can come within the horizon, and note where it does."""
-        simulator, n = self.simulator, len(rows)
-        distances, configurations = np.empty((n, 2)), np.empty((n, simulator.arm.n_joints))
-        starts, goals = search.starts[rows], search.goals[rows]
-        box = step_box(simulator, starts, np.full(n, simulator.task.horizon))
-        inputs = (self._arm, *box, starts, goals, RESOLUTION, False, BUDGET)
-        arrays = (*inputs, distances, configurations)
-        run_rows(bound_distance, n, BUDGET * n, simulator.threads, *arrays)
-        search.witnesses[rows] = configurations
-        return distances[:, 0]
 
     def _reasons(
         self,
@@ -244,16 +173,10 @@ class Oracle:
     ) -> NDArray[np.str_]:
         """Say, per trial, why no motion reaches the goal."""
         horizon = self.simulator.task.horizon
-        reasons = np.where(
-            has_solution,
-            f"no contact-free motion of {horizon} steps or less found",
-            "no contact-free configuration at the goal found",
-        ).tolist()
+        no_motion = f"no contact-free motion of {horizon} steps or less found"
+        no_end = "no contact-free configuration at the goal found"
+        reasons = [no_motion if each else no_end for each in has_solution]
         for row in np.flatnonzero(steps_bounds > horizon):
-            reasons[row] = (
-                f"out of reach: proven to stay {distance_bounds[row]:.3f} m away or more "
-                f"within {horizon} steps"
-            )
-        for row in np.flatnonzero(replay.success):
-            reasons[row] = ""
-        return np.array(reasons, dtype=np.str_)
+            away = f"{distance_bounds[row]:.3f} m away or more within {horizon} steps"
+            reasons[row] = f"out of reach: proven to stay {away}"
+        return np.array(np.where(replay.success, "", reasons), dtype=np.str_)

@@ -1,8 +1,7 @@
-"""What the oracle knows about trials."""
+"""Bounds and motions of trials, as the oracle knows them."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class OracleSolution:
-    """What the oracle knows about one trial.
+    """Bounds and motion of one trial.
 
     Attributes
     ----------
@@ -22,10 +21,9 @@ class OracleSolution:
         Proven: no motion reaches the goal in fewer steps. The horizon + 1 if none does within the
         horizon.
     proof_complete : bool
-        Whether the proof is complete: some configuration at the goal, not proven to touch
-        anything, is that many steps away, or the motion takes as many, or the goal is proven to
-        be out of reach. Else the budget of the proof ran out. A complete proof may leave the bound
-        below ``steps``: contact on the way is no part of it.
+        Whether some configuration at the goal, not proven to touch anything, is that many steps
+        away, or the motion takes as many, or the goal is proven to be out of reach. Else the budget
+        of the proof ran out. Contact on the way is no part of it, so ``steps`` may be more.
     final_distance : float
         Distance from the tool to the goal at the end of the motion [m].
     distance_lower_bound : float
@@ -49,18 +47,17 @@ class OracleSolution:
     reason: str | None
 
 
+NUMBERS = [item.name for item in fields(OracleSolution)][:6]
+
+
 @dataclass(frozen=True, eq=False)
 class OracleSolutions:
-    """What the oracle knows about n trials; indexing gives an `OracleSolution`.
+    """Bounds and motions of n trials; indexing gives an `OracleSolution`.
+
+    Arrays of shape (n,) hold what is said there; the others are
 
     Attributes
     ----------
-    reachable, proof_complete : ndarray of bool, shape (n,)
-        See `OracleSolution`.
-    steps, steps_lower_bound : ndarray of int, shape (n,)
-        See `OracleSolution`.
-    final_distance, distance_lower_bound : ndarray, shape (n,)
-        See `OracleSolution` [m].
     actions : ndarray, shape (n, horizon, n_actions)
         Actions of the motions, zero after their end.
     paths : ndarray, shape (n, horizon + 1, n_joints)
@@ -80,7 +77,7 @@ class OracleSolutions:
     reasons: NDArray[np.str_]
 
     def __post_init__(self) -> None:
-        for array in self.arrays().values():
+        for array in vars(self).values():
             array.flags.writeable = False
 
     def __len__(self) -> int:
@@ -93,25 +90,16 @@ class OracleSolutions:
         return (self[index] for index in range(len(self)))
 
     def __getitem__(self, index: int) -> OracleSolution:
-        steps = int(self.steps[index])
+        steps, known = int(self.steps[index]), vars(self)
         return OracleSolution(
-            reachable=bool(self.reachable[index]),
-            steps=steps,
-            steps_lower_bound=int(self.steps_lower_bound[index]),
-            proof_complete=bool(self.proof_complete[index]),
-            final_distance=float(self.final_distance[index]),
-            distance_lower_bound=float(self.distance_lower_bound[index]),
+            **{name: known[name][index].item() for name in NUMBERS},
             path=self.paths[index, : steps + 1],
             actions=self.actions[index, :steps],
             reason=str(self.reasons[index]) or None,
         )
 
-    def arrays(self) -> dict[str, NDArray[Any]]:
-        """All arrays by name."""
-        return {item.name: getattr(self, item.name) for item in fields(self)}
-
     @classmethod
     def concatenated(cls, parts: "list[OracleSolutions]") -> "OracleSolutions":
         """Join the solutions of several sets of trials."""
-        lots = [part.arrays() for part in parts]
+        lots = [vars(part) for part in parts]
         return cls(**{name: np.concatenate([lot[name] for lot in lots]) for name in lots[0]})

@@ -22,6 +22,4 @@ LEARNER = Learner(
     begin=imported("kinarm.policies.ppo.learner", "PPOTraining"),
     policy=imported("kinarm.policies.ppo.networks", "actor_policy"),
     options=("tensorboard", "threads"),
-    packages=("torch", "stable_baselines3"),
-    extra="ppo",
 )

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from kinarm._fields import OPTIONAL
 from kinarm.errors import InvalidInputError
-from kinarm.failed_scenarios import LARGEST_REPLAY, Replay
+from kinarm.failed_scenarios import LARGEST_REPLAY
 from kinarm.policies.config import (
     MANY,
     NOT_NEGATIVE,
@@ -15,7 +15,6 @@ from kinarm.policies.config import (
     WIDTHS,
     Schedule,
     TrainingConfig,
-    scheduled,
 )
 from kinarm.problem import ReachProblem
 
@@ -140,6 +139,8 @@ class PPOConfig(TrainingConfig):
     initial_policy: str | None = field(default=None, metadata=OPTIONAL)
     demonstrations: int = field(default=0, metadata={"at_least": 0, **MANY, **OPTIONAL})
 
+    learner = "ppo"
+
     DEFAULTS: ClassVar = {
         "final_log_std": "none, it is learnt",
         "training_tolerance": "the task's",
@@ -148,7 +149,7 @@ class PPOConfig(TrainingConfig):
         "replay_log_std": "none, noise as in others",
         "replay_noise_steps": "all",
     }
-    """What happens without an option whose field has no value by default."""
+    """Meaning of leaving an option out whose field has no value by default."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -180,33 +181,11 @@ class PPOConfig(TrainingConfig):
         return self.problem.replace(reward=self.reward, tolerance=self.training_tolerance)
 
     @property
-    def replay(self) -> Replay | None:
-        """How failed scenarios are replayed, if they are."""
-        if not self.replay_share:
-            return None
-        return Replay(share=self.replay_share, size=self.replay_size)
-
-    @property
-    def learner(self) -> str:
-        """Name by which the learner is found."""
-        return "ppo"
-
-    @property
     def can_extend(self) -> bool:
         """Whether a training with more iterations begins just as this one goes."""
         settled = self.widening == 0 and self.initial_penalty == 1
         unset = self.final_log_std is None and self.initial_tolerance is None
         return self.learning_rate_schedule == "constant" and settled and unset
-
-    @property
-    def cost(self) -> float:
-        """Rough duration of the training [s of a core]."""
-        taught = 8e-3 * self.demonstrations
-        return 3e-6 * self.n_epochs * self.environment_steps + taught
-
-    def learning_rate_at(self, done: float) -> float:
-        """Learning rate after this share of the training."""
-        return scheduled(self.learning_rate, self.learning_rate_schedule, done)
 
     def start_spread_at(self, done: float) -> float:
         """Spread of the start configurations after this share of the training."""
@@ -242,7 +221,7 @@ class PPOConfig(TrainingConfig):
         return self.initial_penalty + (1 - self.initial_penalty) * done
 
     def _widened(self, initial: float, final: float, done: float) -> float:
-        """What changes from an initial to a final value, after this share of the training."""
+        """A value between an initial and a final one, after this share of the training."""
         if done >= self.widening:
             return final
         grown = done / self.widening

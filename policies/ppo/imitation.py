@@ -5,7 +5,6 @@ they are. Imitation alone reaches far fewer goals than what follows: it never se
 errors lead.
 """
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -14,8 +13,7 @@ from numpy.typing import NDArray
 from kinarm.errors import InvalidInputError
 from kinarm.failed_scenarios import StartsAndGoals
 from kinarm.policies.normalizer import Normalizer, input_scale
-from kinarm.policies.ppo.kernels.imitation import add_imitation_gradients
-from kinarm.policies.ppo.kernels.update import Descent, descend
+from kinarm.policies.ppo.kernels.update import Descent, add_imitation_gradients, descend
 from kinarm.policies.ppo.networks import ActorCritic
 from kinarm.policies.ppo.update import PARTS, run_parts
 from kinarm.simulator import Simulator
@@ -31,15 +29,7 @@ LEARNING_RATE = 1e-3
 
 
 class Demonstrations(NamedTuple):
-    """Steps of motions of the oracle, one row a step.
-
-    Attributes
-    ----------
-    observations : ndarray, shape (n, n_observations)
-        What was seen.
-    actions : ndarray, shape (n, n_actions)
-        What was done.
-    """
+    """Steps of motions of the oracle: what was seen and done, one row a step."""
 
     observations: NDArray[np.float64]
     actions: NDArray[np.float64]
@@ -58,11 +48,6 @@ def demonstrate(
         Starts [rad or m] and goals [m].
     threads : int, optional
         As for `kinarm.policies.Oracle`.
-
-    Raises
-    ------
-    InvalidInputError
-        If it solves none.
     """
     from kinarm.policies.oracle import Oracle
 
@@ -89,10 +74,8 @@ def imitate(
     ----------
     networks : ActorCritic
         Networks, of which the actor is changed.
-    demonstrations : Demonstrations
-        What is imitated.
-    normalizer : Normalizer
-        Statistics by which observations are normalised.
+    demonstrations, normalizer
+        What is imitated, and how observations are normalised.
     rng : numpy.random.Generator
         Draws minibatches.
     threads : int
@@ -111,11 +94,9 @@ def imitate(
     batches = max(1, len(seen) // BATCH_SIZE)
     for epoch in range(EPOCHS):
         total = 0.0
-        for number, chosen in enumerate(_minibatches(rng, len(seen), batches)):
-            run_parts(
-                *(add_imitation_gradients, PARTS, threads, networks.actor, *arrays),
-                *(chosen, gradients, losses),
-            )
+        for number, chosen in enumerate(np.array_split(rng.permutation(len(seen)), batches)):
+            given = (networks.actor, *arrays, chosen, gradients, losses)
+            run_parts(add_imitation_gradients, threads, *given)
             done = (epoch * batches + number) / (EPOCHS * batches)
             descent = Descent(LEARNING_RATE * (1 - done), 0.9, 0.999, 1e-8, 1e9)
             steps = epoch * batches + number + 1
@@ -123,8 +104,3 @@ def imitate(
             total += losses.sum()
         errors.append(total / demonstrations.actions.size)
     return errors
-
-
-def _minibatches(rng: np.random.Generator, count: int, batches: int) -> Iterator[NDArray[np.int64]]:
-    """Rows in a random order, in minibatches of nearly equal size."""
-    yield from np.array_split(rng.permutation(count), batches)

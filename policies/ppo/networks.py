@@ -31,19 +31,22 @@ Affine = tuple[Vector, Vector]
 
 
 class Parameters(NamedTuple):
-    """Parts of a vector.
-
-    Attributes
-    ----------
-    log_std : ndarray, shape (n_actions,)
-        Logarithms of the standard deviations of the actions.
-    actor, critic : list of tuple of ndarray
-        Layer by layer the weights, shape (n_out, n_in), and the bias, shape (n_out,).
-    """
+    """Parts of a vector: logarithms of the deviations of actions, and layers."""
 
     log_std: Vector
     actor: list[Affine]
     critic: list[Affine]
+
+
+def _layer_widths(
+    n_observations: int, net_arch: Sequence[int], n_actions: int
+) -> list[tuple[int, int]]:
+    """Inputs and outputs of all layers, in the order of Stable-Baselines3.
+
+    These are the hidden layers of actor and critic, then the last ones.
+    """
+    hidden = list(pairwise((n_observations, *net_arch)))
+    return [*hidden, *hidden, (net_arch[-1], n_actions), (net_arch[-1], 1)]
 
 
 def split_parameters(
@@ -51,25 +54,16 @@ def split_parameters(
 ) -> Parameters:
     """Take a vector apart, whose parts are then views of it.
 
-    The order is that of Stable-Baselines3: standard deviations, hidden layers of actor and critic,
-    last layers of actor and critic; of every layer the weights come first.
+    The standard deviations come first; of every layer, the weights.
 
     Parameters
     ----------
     vector : ndarray, shape (n_parameters,)
         All parameters.
-    n_observations, n_actions : int
-        Widths of the input and of the actor's output.
-    net_arch : sequence of int
-        Widths of the hidden layers.
-
-    Raises
-    ------
-    InvalidInputError
-        If it has another length.
+    n_observations, net_arch, n_actions
+        Widths of the input, of the hidden layers, and of the actor's output.
     """
-    hidden = list(pairwise((n_observations, *net_arch)))
-    widths = [*hidden, *hidden, (net_arch[-1], n_actions), (net_arch[-1], 1)]
+    widths = _layer_widths(n_observations, net_arch, n_actions)
     sizes = [n_actions, *(size for n_in, n_out in widths for size in (n_in * n_out, n_out))]
     if len(vector) != sum(sizes):
         raise InvalidInputError(f"expected a state of {sum(sizes)} parameters, got {len(vector)}")
@@ -78,7 +72,7 @@ def split_parameters(
         (weights.reshape(n_out, n_in), bias)
         for (n_in, n_out), weights, bias in zip(widths, parts[::2], parts[1::2], strict=True)
     ]
-    count = len(hidden)
+    count = len(net_arch)
     return Parameters(log_std, [*layers[:count], layers[-2]], [*layers[count:-2], layers[-1]])
 
 
@@ -100,9 +94,8 @@ def initial_parameters(
     log_std : float
         Logarithm of the standard deviation of the actions.
     """
-    widths = [n_observations, *net_arch]
-    inner = sum((n_in + 1) * n_out for n_in, n_out in pairwise(widths))
-    vector = np.zeros(2 * inner + (n_actions + 1) * (net_arch[-1] + 1) + n_actions)
+    widths = _layer_widths(n_observations, net_arch, n_actions)
+    vector = np.zeros(n_actions + sum((n_in + 1) * n_out for n_in, n_out in widths))
     parts = split_parameters(vector, n_observations, net_arch, n_actions)
     parts.log_std[:] = log_std
     for layers, gain in ((parts.actor, ACTOR_GAIN), (parts.critic, CRITIC_GAIN)):
@@ -118,20 +111,14 @@ def orthogonal(normal: NDArray[np.float64]) -> NDArray[np.float64]:
     Of a matrix of normal numbers it makes a matrix that is as likely as any of its rotations. The
     sums are taken in a fixed order, not by BLAS, whose order depends on the processor.
     """
-    if normal.shape[0] >= normal.shape[1]:
-        return _orthonormal_rows(normal.T).T
-    return _orthonormal_rows(normal)
-
-
-def _orthonormal_rows(normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Subtract from each row what the earlier ones hold of it (Gram and Schmidt)."""
-    found = normal.copy()
-    for k, row in enumerate(found):
+    tall = normal.shape[0] >= normal.shape[1]
+    found = (normal.T if tall else normal).copy()
+    for k, row in enumerate(found):  # subtract what earlier rows hold of it (Gram and Schmidt)
         for _ in range(2):  # once more, against rounding
             along = (found[:k] * row).sum(axis=1)
             row -= (along[:, None] * found[:k]).sum(axis=0)
         row /= np.sqrt((row * row).sum())
-    return found
+    return found.T if tall else found
 
 
 class ActorCritic:
@@ -139,12 +126,8 @@ class ActorCritic:
 
     Parameters
     ----------
-    n_observations, n_actions : int
-        Widths of the input and of the actor's output.
-    net_arch : sequence of int
-        Widths of the hidden layers of both.
-    n_parameters : int
-        How many parameters they have.
+    n_observations, net_arch, n_actions
+        As for `split_parameters`.
 
     Attributes
     ----------
@@ -157,11 +140,12 @@ class ActorCritic:
         Logarithms of the standard deviations of the actions.
     """
 
-    def __init__(
-        self, n_observations: int, net_arch: Sequence[int], n_actions: int, n_parameters: int
-    ) -> None:
-        numbers = split_parameters(np.arange(n_parameters), n_observations, net_arch, n_actions)
-        self._places = np.zeros(n_parameters, dtype=np.int64)
+    def __init__(self, n_observations: int, net_arch: Sequence[int], n_actions: int) -> None:
+        widths = _layer_widths(n_observations, net_arch, n_actions)
+        self.n_parameters = n_actions + sum((n_in + 1) * n_out for n_in, n_out in widths)
+        every = np.arange(self.n_parameters)
+        numbers = split_parameters(every, n_observations, net_arch, n_actions)
+        self._places = np.zeros_like(every)
         tables, end, turned = [], 0, 0
         for layers in (numbers.actor, numbers.critic):
             table, end, turned = self._place(layers, end, turned)
@@ -206,13 +190,13 @@ class ActorCritic:
         transpose(self.critic)
 
     def means(self, observations: Numbers) -> Numbers:
-        """What the actor makes of observations, shape (n, n_actions)."""
+        """Actions of the actor before noise, shape (n, n_actions)."""
         outputs = np.empty((len(observations), len(self.log_std)), dtype=np.float32)
         evaluate(0, len(observations), self.actor, observations, outputs)
         return outputs
 
     def values(self, observations: Numbers, threads: int) -> Numbers:
-        """What the critic makes of observations, shape (n,)."""
+        """Values of the critic, shape (n,)."""
         outputs = np.empty((len(observations), 1), dtype=np.float32)
         arrays = (self.critic, observations, outputs)
         run_rows(evaluate, len(observations), STEPS_A_ROW * len(observations), threads, *arrays)
@@ -220,13 +204,7 @@ class ActorCritic:
 
 
 def actor_policy(config: PPOConfig, state: PPOState) -> Policy:
-    """Freeze the actor of a state into a policy, which takes its mean action.
-
-    Raises
-    ------
-    InvalidInputError
-        If the state has another number of parameters than such a training.
-    """
+    """Freeze the actor of a state into a policy, which takes its mean action."""
     arm, parameters = config.problem.load_arm(), state.parameters.astype(np.float64)
     widths = (observation_size(arm.n_joints), config.net_arch, arm.n_actuated)
     return Policy(

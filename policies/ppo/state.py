@@ -17,16 +17,12 @@ class EpisodeStates(NamedTuple):
 
     Attributes
     ----------
-    q : ndarray, shape (n, n_joints)
-        Configurations [rad or m].
+    q, start : ndarray, shape (n, n_joints)
+        Configurations, and those in which they began [rad or m].
     goal : ndarray, shape (n, 3)
         Goal positions [m].
-    steps : ndarray of int, shape (n,)
-        Steps taken.
-    total : ndarray, shape (n,)
-        Sums of rewards so far.
-    start : ndarray, shape (n, n_joints)
-        Configurations in which they began [rad or m].
+    steps, total : ndarray, shape (n,)
+        Steps taken, and sums of rewards so far.
     replayed : ndarray of bool, shape (n,)
         Whether they began where an earlier one had failed.
     """
@@ -37,6 +33,13 @@ class EpisodeStates(NamedTuple):
     total: NDArray[np.float64]
     start: NDArray[np.float64]
     replayed: NDArray[np.bool_]
+
+    @classmethod
+    def begun(cls, starts: NDArray[np.float64], goals: NDArray[np.float64]) -> "EpisodeStates":
+        """Of new episodes."""
+        n = len(starts)
+        counts = np.zeros(n, dtype=np.int64)
+        return cls(starts, goals, counts, np.zeros(n), starts, np.zeros(n, dtype=bool))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -59,11 +62,6 @@ class PPOState(TrainingState):
         Time spent in the simulator so far [s].
     curve : tuple of CurvePoint
         One point per finished iteration.
-
-    Raises
-    ------
-    InvalidInputError
-        If a training could not go on from it.
     """
 
     parameters: NDArray[np.float32]
@@ -76,17 +74,11 @@ class PPOState(TrainingState):
 
     def __post_init__(self) -> None:
         vectors = (self.parameters, self.first_moment, self.second_moment)
-        if len({vector.shape for vector in vectors}) > 1 or self.parameters.ndim != 1:
-            raise InvalidInputError(
-                f"parameters and moments have the shapes {[vector.shape for vector in vectors]}"
-            )
-        if not all(vector.dtype == np.float32 and np.isfinite(vector).all() for vector in vectors):
-            raise InvalidInputError("parameters and moments must be finite, of single precision")
+        statistics = (self.normalizer.mean, self.normalizer.squares)
+        for arrays in (vectors, statistics):
+            if len({array.shape for array in arrays}) > 1 or arrays[0].ndim != 1:
+                shapes = ", ".join(str(array.shape) for array in arrays)
+                raise InvalidInputError(f"parts of the state have the shapes {shapes}")
         if len({len(array) for array in self.episodes}) > 1:
-            raise InvalidInputError(
-                f"episodes have the shapes {[array.shape for array in self.episodes]}"
-            )
+            raise InvalidInputError("parts of the episodes' states are not as many")
         self.failed.check()
-        mean, squares = self.normalizer.mean, self.normalizer.squares
-        if mean.shape != squares.shape or mean.ndim != 1:
-            raise InvalidInputError(f"statistics have the shapes {mean.shape}, {squares.shape}")

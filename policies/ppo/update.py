@@ -1,15 +1,16 @@
 """An update of actor and critic: some epochs of steps of Adam, each by a minibatch."""
 
-import os
-from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
-from functools import cache
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.policies.ppo.kernels.loss import LOSSES, Experience, Objective
+from kinarm._parallel import SHARED_STEPS, run_together
+from kinarm.policies.config import scheduled
+from kinarm.policies.learners import CurvePoint
+from kinarm.policies.ppo.config import PPOConfig
+from kinarm.policies.ppo.kernels.loss import HALF_LOG_2_PI, LOSSES, Experience, Objective
 from kinarm.policies.ppo.kernels.tiles import Numbers
 from kinarm.policies.ppo.kernels.update import Descent, add_gradients, descend, standardisation
 from kinarm.policies.ppo.networks import ActorCritic
@@ -17,21 +18,12 @@ from kinarm.policies.ppo.networks import ActorCritic
 PARTS = 8
 """Parts of a minibatch whose gradients are found independently of each other."""
 
+ADAM = {"first_decay": 0.9, "second_decay": 0.999, "epsilon": 1e-5}
+"""Settings of Adam, as Stable-Baselines3 chooses them."""
+
 
 class UpdateRecords(NamedTuple):
-    """Means over each minibatch; arrays of shape (n_minibatches,).
-
-    Attributes
-    ----------
-    policy_loss, value_loss : ndarray
-        Parts of the loss.
-    clipped : ndarray
-        Share of probability ratios that were clipped.
-    divergence : ndarray
-        Divergence of the policy from that of the rollout.
-    log_std : ndarray
-        Logarithm of the standard deviation of the actions.
-    """
+    """Means over each minibatch, for logs; arrays of shape (n_minibatches,)."""
 
     policy_loss: NDArray[np.float64]
     value_loss: NDArray[np.float64]
@@ -41,14 +33,12 @@ class UpdateRecords(NamedTuple):
 
 
 def update(
+    config: PPOConfig,
+    iteration: int,
     networks: ActorCritic,
     moments: tuple[Numbers, Numbers],
     experience: Experience,
-    epochs: Iterable[NDArray[np.int64]],
-    objective: Objective,
-    descent: Descent,
-    *,
-    steps_before: int,
+    rng: np.random.Generator,
     threads: int,
 ) -> UpdateRecords:
     """Change networks and moments by the experience of a rollout.
@@ -58,71 +48,91 @@ def update(
 
     Parameters
     ----------
+    config, iteration : PPOConfig and int
+        Settings, and how many updates there were before.
     networks : ActorCritic
         What is trained.
     moments : tuple of ndarray of float32
         Adam's two moments, laid out like the weights; changed.
     experience : Experience
         What is learnt from.
-    epochs : iterable of ndarray of int, shape (n_minibatches, batch_size)
-        Rows of the experience, minibatch after minibatch.
-    objective, descent
-        The loss, and how it is descended.
-    steps_before : int
-        Steps of Adam in earlier updates.
+    rng : numpy.random.Generator
+        Draws minibatches.
     threads : int
         Threads that share the parts.
     """
+    n_steps, size = config.steps_per_iteration, config.batch_size
+    objective = Objective(config.clip_range, config.ent_coef, config.vf_coef, 1.0 / size)
+    done = iteration / config.iterations
+    learning_rate = scheduled(config.learning_rate, config.learning_rate_schedule, done)
+    descent = Descent(learning_rate, **ADAM, max_norm=config.max_grad_norm)
+    steps_before = iteration * config.n_epochs * (n_steps // size)
     gradients = np.empty((PARTS, len(networks.weights)), dtype=np.float32)
     losses, records = np.empty((PARTS, LOSSES)), []
-    for minibatches in epochs:
-        for chosen in minibatches:
+    for _ in range(config.n_epochs):
+        for chosen in rng.permutation(n_steps).reshape(-1, size):
             standard = standardisation(chosen, experience.advantages)
             arrays = (experience, chosen, objective, standard, gradients, losses)
             nets = (networks.actor, networks.critic)
-            run_parts(add_gradients, PARTS, threads, *nets, *arrays)
+            run_parts(add_gradients, threads, *nets, *arrays)
             records.append((*losses.sum(axis=0) * objective.share, networks.log_std.mean()))
             descend(*nets, *moments, gradients, descent, steps_before + len(records))
     return UpdateRecords(*np.array(records).T)
 
 
-def run_parts(kernel: Callable[..., None], n_parts: int, threads: int, *arrays: Any) -> None:
-    """Call ``kernel(part, part + 1, *arrays)`` for every part, on several threads.
+def logged(
+    config: PPOConfig, point: CurvePoint, records: UpdateRecords, experience: Experience
+) -> dict[str, float]:
+    """Entries of a log by name, which are those of Stable-Baselines3.
+
+    Parameters
+    ----------
+    config : PPOConfig
+        The settings.
+    point, records, experience
+        What an iteration came to.
+    """
+    n_actions, minibatches = experience.actions.shape[1], len(records.log_std) // config.n_epochs
+    entropy = n_actions * (records.log_std + 0.5 + HALF_LOG_2_PI)
+    losses = records.policy_loss - config.ent_coef * entropy + config.vf_coef * records.value_loss
+    unexplained = np.var(experience.advantages) / np.var(experience.returns)
+    return {
+        "rollout/ep_rew_mean": point.mean_return,
+        "rollout/success_rate": point.success,
+        "train/entropy_loss": -entropy.mean(),
+        "train/policy_gradient_loss": records.policy_loss.mean(),
+        "train/value_loss": records.value_loss.mean(),
+        "train/approx_kl": records.divergence[-minibatches:].mean(),
+        "train/clip_fraction": records.clipped.mean(),
+        "train/loss": losses[-1],
+        "train/explained_variance": 1.0 - unexplained,
+        "train/std": np.exp(records.log_std[-1]),
+    }
+
+
+def run_parts(kernel: Callable[..., None], threads: int, *arrays: Any) -> None:
+    """Call ``kernel(part, part + 1, *arrays)`` for each of `PARTS` parts, on several threads.
 
     The calling thread works, too, and never waits for one that has not begun: where processors
-    are busy with something else, it does all by itself. Kernels release the GIL and treat parts
-    independently, so the result does not depend on who did what.
+    are busy with something else, it does all by itself.
 
     Parameters
     ----------
     kernel : callable
-        Called with the first part, the one after the last, and the arrays.
-    n_parts : int
-        Number of parts.
+        Releases the GIL, and treats parts independently.
     threads : int
         Threads at most.
     *arrays
-        What the kernel reads and writes.
+        Passed on to the kernel.
     """
-    parts = iter(range(n_parts))  # whose next number only one thread gets: it holds the GIL
+    if threads == 1:
+        kernel(0, PARTS, *arrays)
+        return
+    parts = iter(range(PARTS))  # whose next number only one thread gets: it holds the GIL
 
-    def work() -> None:
+    def work(*_: object) -> int:
         for part in parts:
             kernel(part, part + 1, *arrays)
+        return 0
 
-    helpers = min(threads, n_parts) - 1
-    if helpers == 0:
-        kernel(0, n_parts, *arrays)
-        return
-    pool = _helpers(os.getpid(), helpers)
-    helping = [pool.submit(work) for _ in range(helpers)]
-    work()
-    for helper in helping:
-        if not helper.cancel():
-            helper.result()
-
-
-@cache
-def _helpers(process: int, count: int) -> ThreadPoolExecutor:
-    """A pool per process, since threads do not survive a fork."""
-    return ThreadPoolExecutor(count, thread_name_prefix=f"kinarm-ppo-{process}")
+    run_together(work, SHARED_STEPS, min(threads, PARTS), lambda _: None)

@@ -1,15 +1,16 @@
-"""Making the environment for Stable-Baselines3 from a problem, or from an id of Gymnasium."""
+"""Environments and hyperparameters for Stable-Baselines3 and rl-zoo3."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium
 from gymnasium.envs.registration import load_env_creator
 from numpy.typing import DTypeLike
 
+from kinarm._files import shipped_files
 from kinarm._validation import whole_number
 from kinarm.envs import ENVIRONMENTS
 from kinarm.errors import UnknownNameError
-from kinarm.failed_scenarios import Replay
 from kinarm.policies.learners import find_learner
 from kinarm.problem import ProblemLike
 
@@ -36,69 +37,44 @@ def sb3_vec_env(
 ) -> "SB3VecEnv":
     """Make a batch of arms that every learner of Stable-Baselines3 takes as its ``env``.
 
-    Arm i goes through the same episodes as the single environment with the seed + i, and all of
-    them are stepped at once.
+    Arm i goes through the same episodes as the single environment with the seed + i.
 
     Parameters
     ----------
     problem : ReachProblem, str or Path
         As for `kinarm.ReachEnv`; or the id of an environment, such as
         ``"kinarm/ReachRight-v0"`` or, goal-conditioned, ``"kinarm/ReachGoalRight-v0"``.
-    n_envs : int
-        Number of arms.
-    seed : int, optional
-        Of the episodes; a learner's own ``seed`` replaces it.
-    observation_dtype : {"float32", "float64"}
-        Type of observations; the networks of Stable-Baselines3 compute in float32.
-    reward_type : {"sparse", "dense"}, optional
-        Makes any problem goal-conditioned; see `kinarm.ReachGoalEnv`.
+    n_envs, seed : int
+        Number of arms, and seed of the episodes; a learner's own ``seed`` replaces it.
+    observation_dtype, reward_type : str, optional
+        As for `kinarm.ReachGoalEnv`; a reward type makes any problem goal-conditioned.
     threads : int, optional
         As for `kinarm.Simulator`.
-    replay_share : float
-        Probability that an episode begins where an earlier one ended without success, with the
-        same goal; infos tell which did (``replayed``). A policy then learns on harder scenarios
-        than it is judged by: evaluate it in an environment without.
-    replay_size : int
-        How many of the last failures are kept.
+    replay_share, replay_size : float and int
+        Probability that an episode begins where one of the last ``replay_size`` failures did;
+        infos tell which did (``replayed``). Evaluate policies in an environment without.
     render_mode, width, height, camera
         As for `kinarm.ReachEnv`.
     **overrides
-        What `kinarm.ReachProblem.replace` takes, such as ``horizon`` or
-        ``reward={"success": 1.0}``.
+        As for `kinarm.ReachProblem.replace`: ``horizon``, ``reward`` ...
 
     Raises
     ------
     MissingExtraError
         If Stable-Baselines3 is not installed.
-    UnknownNameError
-        If there is no such environment or problem.
-    InvalidInputError
-        If there are no arms, or an argument cannot have its value.
     """
-    find_learner("ppo").check_installed()
+    find_learner("sb3-ppo").check_installed()
     from kinarm.policies.sb3.vec_env import SB3VecEnv
-    from kinarm.simulator import Simulator
 
     whole_number("n_envs", n_envs, 1)
-    if seed is not None:
-        whole_number("seed", seed, 0)
-    replay = Replay(share=replay_share, size=replay_size)
-    goals = {} if reward_type is None else {"reward_type": reward_type}
-    settings = {"observation_dtype": observation_dtype, **goals, **overrides}
+    settings = {"observation_dtype": observation_dtype, **overrides}
+    if reward_type is not None:
+        settings["reward_type"] = reward_type
     single = _single_environment(problem, settings)
-    simulator = Simulator(single.simulator.problem, threads=threads)
-    picture = {"width": width, "height": height, "camera": camera}
-    env = SB3VecEnv(
-        simulator,
-        n_envs,
-        single.interface,
-        spec=single.spec,
-        replay=replay if replay_share else None,
-        render_mode=render_mode,
-        **picture,
-    )
-    if seed is not None:
-        env.seed(seed)
+    replay: Any = {"replay_share": replay_share, "replay_size": replay_size}
+    shown: Any = {"render_mode": render_mode, "width": width, "height": height}
+    env = SB3VecEnv(single, n_envs, threads=threads, camera=camera, **replay, **shown)
+    env.seed(None if seed is None else whole_number("seed", seed, 0))
     return env
 
 
@@ -115,3 +91,22 @@ def _single_environment(problem: ProblemLike, settings: dict[str, Any]) -> "Reac
     elif not name.startswith("kinarm/") or name.endswith(".toml"):
         return (ReachGoalEnv if "reward_type" in settings else ReachEnv)(problem, **settings)
     raise UnknownNameError("environment", str(problem), ENVIRONMENTS)
+
+
+def zoo_hyperparameters(algorithm: str) -> Path:
+    """File that rl-zoo3 takes as ``--conf-file``, with an entry for each of kinarm's environments.
+
+    Parameters
+    ----------
+    algorithm : str
+        As rl-zoo3 names it: ``"ppo"``, ``"a2c"``, ``"sac"``, ``"td3"`` or ``"tqc"``.
+
+    Raises
+    ------
+    UnknownNameError
+        If no such file ships.
+    """
+    files = shipped_files("zoo", ".yml")
+    if algorithm not in files:
+        raise UnknownNameError("algorithm", algorithm, files)
+    return files[algorithm]

@@ -23,13 +23,7 @@ ALGORITHMS = {
 
 
 def hyperparameters_of(text: str) -> dict[str, Any]:
-    """Hyperparameters of a text such as ``"gamma = 0.9, policy_kwargs.net_arch = [64, 64]"``.
-
-    Raises
-    ------
-    InvalidInputError
-        If it is no inline table of TOML.
-    """
+    """Hyperparameters of a text such as ``"gamma = 0.9, policy_kwargs.net_arch = [64, 64]"``."""
     try:
         return dict(tomllib.loads(f"given = {{ {text} }}")["given"])
     except tomllib.TOMLDecodeError as error:
@@ -94,11 +88,6 @@ class SB3Config(TrainingConfig):
         """Name by which the learner is found."""
         return self.algorithm
 
-    @property
-    def cost(self) -> float:
-        """Rough duration of the training [s of a core]."""
-        return 1e-3 * self.iterations * self.n_envs
-
     def changed(self, changes: Mapping[str, Any]) -> TrainingConfig:
         """Replace fields; of reward and hyperparameters, what the mapping names."""
         given = dict(changes)
@@ -111,10 +100,7 @@ class SB3Config(TrainingConfig):
 class SB3State(TrainingState):
     """How far a training is; everything else follows from repeating it up to there.
 
-    Parameters
-    ----------
-    training : SB3Training, optional
-        The training that is there already; checkpoints do not hold it.
+    The training itself, where it is there already, is not in checkpoints.
     """
 
     training: Any = field(default=None, repr=False, metadata={"unsaved": True})
@@ -138,7 +124,7 @@ def _learner(name: str, title: str, **recipes: tuple[str, dict[str, Any]]) -> Le
         begin=imported("kinarm.policies.sb3.training", "SB3Training"),
         policy=imported("kinarm.policies.sb3.training", "trained_policy"),
         packages=("torch", "stable_baselines3", *([package] if contrib else [])),
-        extra="zoo" if contrib else "ppo",
+        extra="zoo" if contrib else "sb3",
     )
 
 
@@ -182,6 +168,21 @@ TD3 = _learner(
         {**EIGHT_ARMS, "action_noise": 0.1, "hyperparameters": OFF_POLICY},
     ),
 )
+HINDSIGHT: dict[str, Any] = {
+    **OFF_POLICY,
+    "top_quantiles_to_drop_per_net": 1,
+    "policy_kwargs": {"net_arch": [128, 128], "n_critics": 2, "n_quantiles": 10},
+    "replay_buffer_kwargs": {"n_sampled_goal": 4, "goal_selection_strategy": "future"},
+}
+ON_POLICY: dict[str, Any] = {
+    "learning_rate": 1e-3,
+    "n_steps": 32,
+    "batch_size": 512,
+    "n_epochs": 5,
+    "gamma": 0.99,
+    "gae_lambda": 0.9,
+}
+
 TQC = _learner(
     "tqc",
     "Truncated Quantile Critics",
@@ -192,15 +193,7 @@ TQC = _learner(
             **EIGHT_ARMS,
             "reward": RewardWeights(collision=-3.0),
             "hindsight": True,
-            "hyperparameters": {
-                **OFF_POLICY,
-                "top_quantiles_to_drop_per_net": 1,
-                "policy_kwargs": {"net_arch": [128, 128], "n_critics": 2, "n_quantiles": 10},
-                "replay_buffer_kwargs": {
-                    "n_sampled_goal": 4,
-                    "goal_selection_strategy": "future",
-                },
-            },
+            "hyperparameters": HINDSIGHT,
         },
     ),
 )
@@ -215,14 +208,7 @@ PPO = _learner(
             "iterations": 18_750,
             "n_envs": 64,
             "normalize": True,
-            "hyperparameters": {
-                "learning_rate": 1e-3,
-                "n_steps": 32,
-                "batch_size": 512,
-                "n_epochs": 5,
-                "gamma": 0.99,
-                "gae_lambda": 0.9,
-            },
+            "hyperparameters": ON_POLICY,
         },
     ),
 )

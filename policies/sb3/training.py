@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
 
 REPEATING = "repeating what was done before"
-"""What is told while a training repeats its beginning."""
+"""Told while a training repeats its beginning."""
 
 REFUSALS = (AssertionError, AttributeError, KeyError, RuntimeError, TypeError, ValueError)
-"""What algorithms raise if they cannot use a setting, or diverge."""
+"""Errors of algorithms that cannot use a setting, or diverge."""
 
 
 @contextmanager
@@ -53,12 +53,7 @@ def alone_in_torch() -> Iterator[None]:
 class SteppedLearning:
     """``model.learn`` in a thread of its own, which waits after every step of all arms.
 
-    Parameters
-    ----------
-    model : BaseAlgorithm
-        The algorithm.
-    steps : int
-        Steps of all arms, in the last of which it does all that is left to do.
+    In the last step it does all that is left to do.
     """
 
     def __init__(self, model: "BaseAlgorithm", steps: int) -> None:
@@ -70,13 +65,7 @@ class SteppedLearning:
         threading.Thread(target=self._learn, daemon=True).start()
 
     def step(self) -> None:
-        """Let it take one step.
-
-        Raises
-        ------
-        InvalidInputError
-            If the algorithm refuses to; it says why.
-        """
+        """Let it take one step; what the algorithm refuses is said in one line."""
         self._may_go_on.release()
         self._has_stopped.acquire()
         if isinstance(self._error, REFUSALS):
@@ -90,7 +79,6 @@ class SteppedLearning:
         self._may_go_on.release()
 
     def _learn(self) -> None:
-        """What the thread does."""
         self._may_go_on.acquire()
         torch.set_num_threads(1)
         environment_steps = self._steps * self.model.n_envs
@@ -101,7 +89,7 @@ class SteppedLearning:
         self._has_stopped.release()
 
     def _after_step(self, *_: object) -> bool:
-        """Wait, unless it was the last step; whether to go on."""
+        """Wait, unless it was the last step; returns whether to go on."""
         self.taken += 1
         if self.taken < self._steps:
             self._has_stopped.release()
@@ -110,10 +98,7 @@ class SteppedLearning:
 
 
 class SB3Training:
-    """A training under way; a state tells how far it is.
-
-    The algorithm computes on one thread.
-    """
+    """A training under way, on one thread; a state tells how far it is."""
 
     def __init__(self, config: SB3Config) -> None:
         self.config = config
@@ -123,12 +108,8 @@ class SB3Training:
         """Build the algorithm anew, and go back to the beginning."""
         with alone_in_torch():
             self._learning = SteppedLearning(sb3_model(self.config), self.config.iterations)
-            self._keep_generators()
+            self._generators = torch.get_rng_state(), np.random.get_state()  # noqa: NPY002
         self._done = 0
-
-    def _keep_generators(self) -> None:
-        """Note the states of the global generators."""
-        self._generators = torch.get_rng_state(), np.random.get_state()  # noqa: NPY002
 
     def initial_state(self) -> SB3State:
         """State before the first iteration."""
@@ -136,8 +117,7 @@ class SB3Training:
 
     def iterate(self, state: SB3State) -> SB3State:
         """One step of all arms, and the updates that are due before it."""
-        self._go_to(state.iteration)
-        began, model = time.perf_counter(), self._learning.model
+        model, began = self.model(state.iteration), time.perf_counter()
         self._step()
         episodes, successes = model.ep_info_buffer or (), model.ep_success_buffer or ()
         returns = [episode["r"] for episode in episodes]
@@ -150,24 +130,17 @@ class SB3Training:
         )
         return SB3State(curve=(*state.curve, point), training=self)
 
-    def policy(self, state: SB3State) -> Policy:
-        """The policy in a state of the training."""
-        self._go_to(state.iteration)
-        config = self.config
-        policy = Policy.from_sb3(self._learning.model, config.problem)
-        made = Provenance.of(config.algorithm, config, state.environment_steps)
-        return replace(policy, provenance=made)
-
-    def _go_to(self, iteration: int) -> None:
-        """Repeat what leads to a state, unless the algorithm is in it."""
+    def model(self, iteration: int) -> "BaseAlgorithm":
+        """The algorithm after an iteration, repeated unless it is just there."""
         if self._done == iteration:
-            return
+            return self._learning.model
         with doing(REPEATING):
             if not 0 <= self._done < iteration:
                 self._learning.abandon()
                 self._begin()
             while self._done < iteration:
                 self._step()
+        return self._learning.model
 
     def _step(self) -> None:
         """Take a step with the generators of the algorithm."""
@@ -176,32 +149,25 @@ class SB3Training:
             torch.set_rng_state(self._generators[0])
             np.random.set_state(self._generators[1])  # noqa: NPY002
             self._learning.step()
-            self._keep_generators()
+            self._generators = torch.get_rng_state(), np.random.get_state()  # noqa: NPY002
         self._done = done + 1
 
 
 def trained_policy(config: SB3Config, state: SB3State) -> Policy:
     """Freeze a state of the training into a policy."""
     training = state.training or SB3Training(config)
-    policy: Policy = training.policy(state)
-    return policy
+    policy = Policy.from_sb3(training.model(state.iteration), config.problem)
+    made = Provenance.of(config.algorithm, config, state.environment_steps)
+    return replace(policy, provenance=made)
 
 
 def sb3_model(config: SB3Config) -> "BaseAlgorithm":
-    """Build the algorithm, with its environment.
-
-    Raises
-    ------
-    InvalidInputError
-        If the algorithm refuses its hyperparameters.
-    """
+    """Build the algorithm, with its environment."""
     from stable_baselines3.common.noise import NormalActionNoise
     from stable_baselines3.common.utils import LinearSchedule
     from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
-    problem = config.training_problem
-    if config.training_tolerance is not None:
-        problem = problem.replace(tolerance=config.training_tolerance)
+    problem = config.training_problem.replace(tolerance=config.training_tolerance)
     kind = "sparse" if config.hindsight else None
     env: VecEnv = sb3_vec_env(problem, config.n_envs, reward_type=kind, threads=1)
     if config.normalize:

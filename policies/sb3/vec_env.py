@@ -5,19 +5,21 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from gymnasium.envs.registration import EnvSpec
 from numpy.typing import ArrayLike, NDArray
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 
-from kinarm.envs.environment import Lifecycle, action_space, environment_metadata, pick_scenario
-from kinarm.envs.interface import Interface, Observations, one_by_one
+from kinarm._validation import whole_number
+from kinarm.envs.environment import Lifecycle, pick_scenario
+from kinarm.envs.interface import Observations, one_by_one
+from kinarm.envs.reach import ReachEnv
 from kinarm.envs.rendering import EnvPictures
+from kinarm.envs.scenario_queues import ScenarioQueues
 from kinarm.episodes import SUCCESS, Episodes
 from kinarm.errors import InvalidInputError
-from kinarm.failed_scenarios import FailedScenarios, Replay, StartsAndGoals
+from kinarm.failed_scenarios import LARGEST_REPLAY, FailedScenarios, StartsAndGoals
+from kinarm.policies.config import SHARE, check_range
 from kinarm.randomness import Stream, stream_generator
-from kinarm.scenarios import ScenarioStream
 from kinarm.simulator import Simulator
 
 StepReturn = tuple[Observations, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]
@@ -28,22 +30,18 @@ Indices = int | Iterable[int] | None
 class SB3VecEnv(Lifecycle, VecEnv):
     """Many arms, stepped by one call of the simulator; made by `kinarm.policies.sb3_vec_env`.
 
-    Arm i goes through the same episodes as a single environment that is reset with the seed + i, as
-    in the ``DummyVecEnv`` of Stable-Baselines3. An episode that ends is replaced at once.
+    An episode that ends is replaced at once.
 
     Parameters
     ----------
-    simulator : Simulator
-        What is stepped.
+    single : ReachEnv
+        The environment of one arm, with the problem, observations and rewards of all.
     num_envs : int
         Number of arms.
-    interface : Interface
-        What is shown of it.
-    spec : EnvSpec, optional
-        Of the single environment, if it is registered.
-    replay : Replay, optional
-        How scenarios of episodes that ended without success are replayed; never, if it is not
-        given.
+    replay_share, replay_size : float and int
+        As for `kinarm.policies.sb3_vec_env`.
+    threads : int, optional
+        As for `kinarm.Simulator`.
     render_mode, **picture
         As for `kinarm.ReachEnv`: mode, ``width``, ``height`` and ``camera`` of pictures.
 
@@ -61,33 +59,30 @@ class SB3VecEnv(Lifecycle, VecEnv):
 
     def __init__(
         self,
-        simulator: Simulator,
+        single: ReachEnv,
         num_envs: int,
-        interface: Interface,
         *,
-        spec: EnvSpec | None = None,
-        replay: Replay | None = None,
+        replay_share: float,
+        replay_size: int,
+        threads: int | None = None,
         render_mode: str | None = None,
         **picture: Any,
     ) -> None:
+        self.simulator = simulator = Simulator(single.simulator.problem, threads=threads)
         self._pictures = EnvPictures(simulator, render_mode, num_envs, **picture)
-        self.simulator, self.interface, self.spec = simulator, interface, spec
-        self.render_mode = render_mode
-        super().__init__(num_envs, interface.observation_space, action_space(simulator))
-        self.metadata = environment_metadata(simulator)
-        self._streams: dict[int, ScenarioStream] = {}
-        self._replay, self._chooser = replay, np.random.default_rng()
+        self.interface, self.spec, self.render_mode = single.interface, single.spec, render_mode
+        super().__init__(num_envs, single.observation_space, single.action_space)
+        self.metadata = single.metadata
+        self._queues = ScenarioQueues(simulator.world, num_envs)
+        check_range("replay_share", float(replay_share), SHARE)
+        self._share = replay_share
+        self._size = whole_number("replay_size", replay_size, 1, LARGEST_REPLAY)
+        self._chooser = np.random.default_rng()
         self._failed = self._restored = FailedScenarios.none(simulator.arm.n_joints)
         self._starts = np.empty((num_envs, simulator.arm.n_joints))
         self._replayed = np.zeros(num_envs, dtype=bool)
-        self._actions = np.zeros((num_envs, simulator.n_actions))
         self._returns = np.zeros(num_envs)
         self._made = time.time()
-
-    @property
-    def replayed(self) -> NDArray[np.bool_]:
-        """Which episodes began where an earlier one had failed, shape (num_envs,)."""
-        return self._replayed
 
     @property
     def failed(self) -> FailedScenarios:
@@ -102,48 +97,22 @@ class SB3VecEnv(Lifecycle, VecEnv):
 
         Parameters
         ----------
-        starts : array_like, shape (n, n_joints)
-            Start configurations, the oldest first [rad or m]; the last ``replay_size`` are kept.
-        goals : array_like, shape (n, 3)
-            Goal positions [m].
-
-        Raises
-        ------
-        InvalidInputError
-            If nothing is replayed here, or as `kinarm.Simulator.reset` says.
-        StartInContactError
-            If a start touches something.
+        starts, goals : array_like, shape (n, n_joints) and (n, 3)
+            Configurations [rad or m] and positions [m], the oldest first; the last ``replay_size``
+            are kept.
         """
-        if self._replay is None:
+        if not self._share:
             raise InvalidInputError("failed scenarios need an environment with a replay_share")
-        checked, size = self.simulator.reset(starts, goals), self._replay.size
+        checked, size = self.simulator.reset(starts, goals), self._size
         self._failed = FailedScenarios(checked.q[-size:], checked.goal[-size:])
         self._restored = self._failed
 
-    @property
-    def steps(self) -> NDArray[np.int64]:
-        """Steps of the running episodes so far, shape (num_envs,)."""
-        return self.episodes.steps
-
     def reset(self) -> Observations:
-        """Begin all episodes anew, with the seeds and options that were set before.
-
-        Returns
-        -------
-        ndarray, shape (num_envs, n_observations), or dict of ndarray
-
-        Raises
-        ------
-        InvalidInputError
-            If the environment is closed, or an option is unknown, has the wrong shape or an entry
-            that is not finite.
-        StartInContactError
-            If a start touches something.
-        """
+        """Begin all episodes anew, with the seeds and options that were set before."""
         self._check_open()
         for row, seed in enumerate(self._seeds):
             if seed is not None:
-                self._streams[row] = self._stream(seed)
+                self._queues.seed(row, np.random.default_rng(seed))
         if self._seeds[0] is not None:
             self._chooser = stream_generator(Stream.REPLAY, self._seeds[0])
             self._failed = self._restored
@@ -152,42 +121,23 @@ class SB3VecEnv(Lifecycle, VecEnv):
             starts[row], goals[row] = pick_scenario(options, starts[row], goals[row])
         self._reset_seeds()
         self._reset_options()
-        return self._begin(self.simulator.reset(starts, goals))
-
-    def _begin(self, episodes: Episodes) -> Observations:
-        """Go on with these episodes, of all arms."""
-        self._episodes = episodes
-        self._starts[:] = episodes.q
-        self._returns[:] = 0.0
+        self._episodes = episodes = self.simulator.reset(starts, goals)
+        self._starts[:], self._returns[:] = episodes.q, 0.0
         self._announce(episodes, np.arange(self.num_envs))
         return self.interface.observe(episodes.observation)
 
     def _draw(self, rows: NDArray[np.int64]) -> StartsAndGoals:
         """Starts and goals of the next episodes of some arms."""
-        return self._new_or_failed(rows, self._chooser)
 
-    def _new_or_failed(self, rows: NDArray[np.int64], rng: np.random.Generator) -> StartsAndGoals:
-        """Starts and goals for some arms, new ones or failed ones again, as a generator decides."""
-        if self._replay is None:
-            return self._draw_new(rows)
+        def draw_new(new: NDArray[np.int64]) -> StartsAndGoals:
+            starts, goals = np.empty(self._starts.shape), np.empty((self.num_envs, 3))
+            self._queues.put(rows[new], starts, goals)
+            return starts[rows[new]], goals[rows[new]]
+
         scenarios, self._replayed[rows] = self._failed.mixed(
-            self._replay.share, rng, rows.size, lambda new: self._draw_new(rows[new])
+            self._share, self._chooser, rows.size, draw_new
         )
         return scenarios
-
-    def _draw_new(self, rows: NDArray[np.int64]) -> StartsAndGoals:
-        """Starts and goals for some arms, each from its own stream."""
-        scenarios = []
-        for row in rows.tolist():
-            if row not in self._streams:
-                self._streams[row] = self._stream(None)
-            scenarios.append(self._streams[row].next())
-        starts, goals = (np.array(part) for part in zip(*scenarios, strict=True))
-        return starts, goals
-
-    def _stream(self, seed: int | None) -> ScenarioStream:
-        """Scenarios of one arm, other ones every time without a seed."""
-        return ScenarioStream(self.simulator.world, np.random.default_rng(seed))
 
     def _announce(self, episodes: Episodes, rows: NDArray[np.int64]) -> None:
         """Tell pictures and infos which episodes begin."""
@@ -200,22 +150,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
         self._actions = actions
 
     def step_wait(self) -> StepReturn:
-        """Move every arm for one time step.
-
-        Returns
-        -------
-        observations : ndarray or dict of ndarray
-            Those of new episodes where one ended.
-        rewards : ndarray of float32, shape (num_envs,)
-        dones : ndarray of bool, shape (num_envs,)
-        infos : list of dict
-
-        Raises
-        ------
-        InvalidInputError
-            If the environment is closed or was never reset, or the actions have another shape or
-            an entry that is not finite.
-        """
+        """Move every arm for one time step; observations are of new episodes where one ended."""
         episodes = self.episodes
         result = self.simulator.step(episodes, self._actions)
         verdict = self.interface.step_outcome(episodes, result)
@@ -227,45 +162,33 @@ class SB3VecEnv(Lifecycle, VecEnv):
         dones = verdict.terminated | verdict.truncated
         ended = np.flatnonzero(dones)
         if ended.size:
-            reasons = (verdict.truncated & ~verdict.terminated, result.success, result.collision)
-            finals = self._final_infos(episodes, ended, *reasons)
-            for row, info in zip(ended.tolist(), finals, strict=True):
-                infos[row] = info
+            columns = {
+                "TimeLimit.truncated": verdict.truncated & ~verdict.terminated,
+                "is_success": result.success,
+                "collision": result.collision,
+                "distance": episodes.distance,
+            }
+            if self._share:
+                columns["replayed"] = self._replayed
+            finals = one_by_one(self.interface.observe(episodes.observation[ended]), ended.size)
+            elapsed = round(time.time() - self._made, 6)
+            for row, final in zip(ended.tolist(), finals, strict=True):
+                total, length = self._returns[row].item(), episodes.steps[row].item()
+                infos[row] = {
+                    "terminal_observation": final,
+                    **{name: column[row].item() for name, column in columns.items()},
+                    "episode": {"r": total, "l": length, "t": elapsed},
+                }
             self._renew(episodes, ended)
         observations = self.interface.observe(episodes.observation)
         return observations, verdict.reward.astype(np.float32), dones, infos
 
-    def _final_infos(
-        self, episodes: Episodes, rows: NDArray[np.int64], *reasons: NDArray[np.bool_]
-    ) -> list[dict[str, Any]]:
-        """Infos of episodes that ended: truncated, reached or touching."""
-        finals = one_by_one(self.interface.observe(episodes.observation[rows]), rows.size)
-        elapsed = round(time.time() - self._made, 6)
-        columns = (*reasons, episodes.distance, self._returns, episodes.steps)
-        infos = [
-            {
-                "terminal_observation": final,
-                "TimeLimit.truncated": truncated,
-                "is_success": reached,
-                "collision": touching,
-                "distance": distance,
-                "episode": {"r": total, "l": length, "t": elapsed},
-            }
-            for final, truncated, reached, touching, distance, total, length in zip(
-                finals, *(column[rows].tolist() for column in columns), strict=True
-            )
-        ]
-        if self._replay is not None:
-            for info, replayed in zip(infos, self._replayed[rows].tolist(), strict=True):
-                info["replayed"] = replayed
-        return infos
-
     def _renew(self, episodes: Episodes, rows: NDArray[np.int64]) -> None:
         """Replace episodes that ended."""
-        if self._replay is not None:
+        if self._share:
             failed = rows[episodes.status[rows] != SUCCESS]
             scenarios = self._starts[failed], episodes.goal[failed]
-            self._failed = self._failed.followed_by(*scenarios, self._replay.size)
+            self._failed = self._failed.followed_by(*scenarios, self._size)
         self._starts[rows], episodes.goal[rows] = self._draw(rows)
         episodes.q[rows] = self._starts[rows]
         self.simulator.begin(episodes, rows)
@@ -273,29 +196,19 @@ class SB3VecEnv(Lifecycle, VecEnv):
         self._announce(episodes, rows)
 
     def render(self, mode: str | None = None) -> Any:
-        """Draw the arms, as the render mode says; see `kinarm.ReachVectorEnv`.
-
-        A picture shows all arms side by side, as in every environment of Stable-Baselines3.
-
-        Raises
-        ------
-        InvalidInputError
-            If the environment is closed or was never reset.
-        """
+        """Draw all arms side by side, as the render mode says; see `kinarm.ReachVectorEnv`."""
         _ = self.episodes  # refuses if there are none
         if self.render_mode is None or mode not in (None, self.render_mode):
             return super().render(mode)
         shown = self._pictures.render()
-        if self.render_mode == "rgb_array_list":
-            return [pictures.tiled for pictures in shown]
-        return shown.tiled if self.render_mode == "rgb_array" else None
+        return shown and shown.tiled
 
     def get_images(self) -> list[NDArray[np.uint8] | None]:
         """One picture of each arm, shape (height, width, 3), if the mode is ``rgb_array``."""
         if self.render_mode != "rgb_array":
             return [None] * self.num_envs
         _ = self.episodes  # refuses if there are none
-        return list(self._pictures.render())
+        return list(self._pictures.render() or ())
 
     def close(self) -> None:
         """Let go of what draws the arms; nothing can be done afterwards."""
@@ -303,13 +216,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
         self.closed = True
 
     def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
-        """Value of an attribute of the environment or of its interface, repeated for every arm.
-
-        Raises
-        ------
-        AttributeError
-            If neither has it.
-        """
+        """Value of an attribute of the environment or of its interface, repeated for every arm."""
         owner = self if hasattr(self, attr_name) else self.interface
         return [getattr(owner, attr_name) for _ in self._get_indices(indices)]
 
@@ -319,12 +226,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
         Parameters
         ----------
         attr_name, value, indices
-            As for ``VecEnv``; there is no choice of arms but all.
-
-        Raises
-        ------
-        InvalidInputError
-            If it is to be set for some arms only.
+            As for ``VecEnv``; a choice of some arms is refused.
         """
         if set(self._get_indices(indices)) != set(range(self.num_envs)):
             raise InvalidInputError(
@@ -335,7 +237,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
     def env_method(
         self, method_name: str, *method_args: Any, indices: Indices = None, **method_kwargs: Any
     ) -> list[Any]:
-        """What a method of the interface returns, repeated for every arm.
+        """The answer of a method of the interface, repeated for every arm.
 
         Parameters
         ----------

@@ -36,11 +36,3 @@ def test_what_is_drawn_is_seen_by_those_who_come_later(browser):
         assert page.evaluate(PLACE) == [0.1, 0.2, 0.3]
         assert all(url.startswith(server.address) for url in requests)
         page.close()
-
-
-def test_it_can_be_closed_and_opened_again():
-    with LiveServer(7400) as server:
-        port = server.port
-    server.close()
-    with LiveServer(port) as again:
-        assert again.port == port

@@ -8,7 +8,6 @@ import pytest
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.contestants import ORACLE, find_contestants
 from kinarm.evaluation.evaluation import evaluation_document, run_trials
-from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.report.groups import group_results
 from kinarm.evaluation.report.page import write_report
 from kinarm.evaluation.report.worst import worst_trials
@@ -122,15 +121,6 @@ def test_text_can_be_read(visit, scheme):
     assert contrast >= 4.5, where
 
 
-def test_everything_is_there(visit, evaluations):
-    page = visit(**DESKTOP)
-    assert page.locator("section").count() == 4
-    assert page.locator("svg.chart").count() == 4
-    for drawing in page.locator("svg.chart, svg.map:not(.sample)").all():
-        box = drawing.bounding_box()
-        assert min(box["width"], box["height"]) > 100
-
-
 def test_replay_waits_until_it_is_near(visit):
     page = visit(**DESKTOP)
     page.wait_for_timeout(500)
@@ -156,13 +146,6 @@ def test_a_row_chooses_the_trial(visit, chosen, settings):
         # With motion, the page scrolls there smoothly.
         top = "document.querySelector('#worst iframe').getBoundingClientRect().y"
         wait_until(page, f"0 <= {top} && {top} < {settings['viewport']['height'] / 2}")
-
-
-def test_a_row_chosen_before_the_replay_is_there(visit, chosen):
-    page = visit(**DESKTOP)
-    page.locator("tr[data-replay='3'] button").dispatch_event("click")
-    wait_until(page, f"Boolean({PLAYER})")
-    wait_until(page, f"{PLAYER}.state.index === 3")
 
 
 def test_page_and_player_go_together(visit):
@@ -220,15 +203,6 @@ def test_a_tap_tells_what_a_figure_means(visit):
     assert tip.is_hidden()
 
 
-def test_a_tap_tells_what_a_mark_stands_for(visit):
-    page = visit(**PHONE)
-    tip = page.locator("#tip")
-    for mark in page.locator("#right .map :has(> title)").all()[:12]:
-        mark.tap(force=True)
-        assert tip.is_visible(), mark.text_content()
-        assert is_within(page, tip)
-
-
 def test_arrows_go_through_the_goals_of_a_map(visit):
     page = visit(**DESKTOP)
     tip, first = page.locator("#tip"), page.locator("#right svg.map[tabindex]").first
@@ -263,16 +237,3 @@ def test_the_keyboard_tells_what_every_figure_means(visit, width):
         page.keyboard.press("Tab")
     cells = page.locator("#right td[data-term]:has(.value)").all()
     assert sorted(told) == sorted({cell.get_attribute("data-term") for cell in cells})
-
-
-def test_a_mouse_and_the_keyboard_tell_what_a_figure_means(visit):
-    page = visit(**DESKTOP)
-    tip, term = page.locator("#tip"), page.locator("#right th .term", has_text="step ratio")
-    term.hover()
-    assert tip.inner_text() == METRICS["step_ratio"].meaning
-    page.locator("#right h2").hover()
-    assert tip.is_hidden()
-    term.focus()
-    assert tip.is_visible()
-    page.keyboard.press("Escape")
-    assert tip.is_hidden()

@@ -22,7 +22,7 @@ import numpy as np
 from kinarm.arm import Arm
 from kinarm.errors import KinarmError
 from kinarm.evaluation import EvaluationDocument, Study, oracle_bounds
-from kinarm.evaluation.contestants import imported_policy
+from kinarm.evaluation.contestants import find_contestants
 from kinarm.meshes import hull_of_mesh
 from kinarm.policies import Policy, load_checkpoint, recipe
 from kinarm.policies.conversion.sb3 import sb3_model
@@ -138,7 +138,7 @@ def _module(path: Path) -> None:
     sys.modules.pop("mine", None)
     sys.path[0], sys.dont_write_bytecode = str(path.parent), True
     with warnings.catch_warnings(action="ignore"):  # they are the module's own
-        imported_policy("mine:act")
+        find_contestants("mine:act")
 
 
 def _mesh(read: Callable[[Path, np.ndarray], object], path: Path) -> None:
@@ -170,7 +170,7 @@ LOADERS: dict[str, Loader] = {
         "file.toml",
     ),
     "arm file": Loader(
-        lambda: [each for each in samples.toml_files("arms") if b".urdf" in each],
+        samples.arm_files,
         damaged_toml,
         _arm,
         "file.toml",
@@ -187,9 +187,7 @@ LOADERS: dict[str, Loader] = {
         f"{folder} of a study": Loader(
             partial(samples.study_file, folder), damage, _study, f"{folder}/{samples.KEYS[folder]}"
         )
-        for folder, damage in zip(
-            samples.KEYS, (damaged_archive, damaged_json, damaged_archive), strict=True
-        )
+        for folder, damage in (("made", damaged_json), ("bounds", damaged_archive))
     },
     "urdf": Loader(
         lambda: [*[samples.SMALL_URDF] * 7, samples.urdf()], damaged_xml, _arm, "file.urdf", _cube

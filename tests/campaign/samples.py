@@ -2,25 +2,21 @@
 
 from collections.abc import Callable
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
+from kinarm._files import shipped_files
 from kinarm.arm import Arm
 from kinarm.evaluation import EvaluationRequest, Study, TrialSet
 from kinarm.policies import load_policy, recipe, save_checkpoint
 from kinarm.policies.learners import begin_training
-from kinarm.problem_files import shipped_files
 from kinarm.recording import record_rollouts, save_recordings
+from tests.conftest import CUBE_CORNERS, CUBE_FACES, write_obj, write_stl
 
-CUBE = [(x, y, z) for x in (0.0, 0.1) for y in (0.0, 0.1) for z in (0.0, 0.1)]
-FACES = [
-    *[(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1)],
-    *[(2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)],
-]
+CUBE = 0.1 * CUBE_CORNERS
 
 
 def written(write: Callable[[Path], object], name: str = "file.npz") -> bytes:
@@ -38,9 +34,9 @@ def policies() -> list[bytes]:
 
 
 def checkpoints() -> list[bytes]:
-    """Of Augmented Random Search and, where PyTorch is, of PPO, before the first iteration."""
+    """Of Augmented Random Search and of PPO, before the first iteration."""
     found = []
-    for learner in ("ars", "ppo") if find_spec("torch") else ("ars",):
+    for learner in ("ars", "ppo"):
         config = recipe(learner, "paper", iterations=3)
         state = begin_training(config).initial_state()
         found.append(written(lambda path, c=config, s=state: save_checkpoint(path, c, s)))
@@ -83,6 +79,12 @@ def toml_files(folder: str) -> list[bytes]:
     return [path.read_bytes() for path in shipped_files(folder).values() if path.suffix == ".toml"]
 
 
+def arm_files() -> list[bytes]:
+    """An arm of kinarm's and one of another package."""
+    arms = shipped_files("arms")
+    return [arms[name].read_bytes() for name in ("paper", "ur5")]
+
+
 def recipes() -> list[bytes]:
     """Recipe files."""
     return [
@@ -122,9 +124,8 @@ SMALL_STUDY = {
 _PLANNED = Study(SMALL_STUDY, Path())
 _RUN, _BOUNDS = _PLANNED.runs[0], _PLANNED.bound_tasks[0]
 KEYS = {
-    "runs": _PLANNED.store.run_path(_RUN).name,
-    "made": _PLANNED.store.made_path(_RUN).name,
-    "bounds": _PLANNED.store.bounds_path(_BOUNDS).name,
+    "made": _PLANNED.store.path("made", _RUN).name,
+    "bounds": _PLANNED.store.path("bounds", _BOUNDS).name,
 }
 """Names of the files of a study whose one training is finished, by their folder."""
 
@@ -164,27 +165,22 @@ def urdf() -> bytes:
 
 def stl(binary: bool) -> bytes:
     """A cube as STL."""
-    if binary:
-        facets = [(np.zeros(3), *(CUBE[i] for i in face)) for face in FACES]
-        content = b"".join(np.array(f, dtype="<f4").tobytes() + b"\x00\x00" for f in facets)
-        return b"\x00" * 80 + len(FACES).to_bytes(4, "little") + content
-    corners = ["".join("vertex {} {} {}\n".format(*CUBE[i]) for i in face) for face in FACES]
-    facets = "".join(
-        f"facet normal 0 0 0\nouter loop\n{each}endloop\nendfacet\n" for each in corners
-    )
-    return f"solid cube\n{facets}endsolid cube\n".encode()
+    if not binary:
+        return written(lambda path: write_stl(path, CUBE))
+    facets = [(np.zeros(3), *(CUBE[i] for i in face)) for face in CUBE_FACES]
+    content = b"".join(np.array(f, dtype="<f4").tobytes() + b"\x00\x00" for f in facets)
+    return b"\x00" * 80 + len(CUBE_FACES).to_bytes(4, "little") + content
 
 
 def obj() -> bytes:
     """A cube as OBJ."""
-    vertices = "".join("v {} {} {}\n".format(*corner) for corner in CUBE)
-    return (vertices + "".join("f {} {} {}\n".format(*(i + 1 for i in f)) for f in FACES)).encode()
+    return written(lambda path: write_obj(path, CUBE))
 
 
 def dae() -> bytes:
     """A cube as Collada."""
     places = " ".join(str(x) for corner in CUBE for x in corner)
-    faces = " ".join(str(i) for face in FACES for i in face)
+    faces = " ".join(str(i) for face in CUBE_FACES for i in face)
     return (
         '<?xml version="1.0"?>'
         '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">'

@@ -3,9 +3,9 @@
 import pytest
 
 from .loaders import LOADERS, fuzz
-from .tally import Tally, table
+from .tally import Tally
 
-INPUTS = 40
+INPUTS = 25
 
 
 @pytest.mark.parametrize("name", LOADERS)
@@ -40,15 +40,4 @@ def test_what_goes_wrong_is_noticed(monkeypatch, tmp_path):
     assert sorted(name.partition(" at ")[0] for name in tally.failed) == [
         "ValueError",
         "hangs, or ends with status 3",
-    ]
-
-
-def test_table_has_sums():
-    rows = {"urdf": {"inputs": 2000, "findings": 3}, "policy": {"inputs": 50, "findings": 0}}
-    assert table(rows).splitlines() == [
-        "|  | inputs | findings |",
-        "| --- | --- | --- |",
-        "| urdf | 2,000 | 3 |",
-        "| policy | 50 | 0 |",
-        "| **all** | 2,050 | 3 |",
     ]

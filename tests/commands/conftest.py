@@ -5,46 +5,19 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 from oracle_calls import count_calls
 
-from kinarm.evaluation.commands import (
-    arms,
-    bench,
-    evaluate,
-    problem,
-    replay,
-    reproduce,
-    study,
-    train,
-)
+from kinarm.__main__ import COMMANDS
 from kinarm.policies import Policy, recipe, train_policy
 from kinarm.problem import PROBLEMS
 
 ROOT = Path(__file__).resolve().parents[2]
-MODULES = {
-    "kinarm-eval": "kinarm.evaluation.commands.evaluate",
-    "kinarm-replay": "kinarm.evaluation.commands.replay",
-    "kinarm-train": "kinarm.evaluation.commands.train",
-    "kinarm-bench": "kinarm.evaluation.commands.bench",
-    "kinarm-arms": "kinarm.evaluation.commands.arms",
-    "kinarm-problem": "kinarm.evaluation.commands.problem",
-    "kinarm-reproduce": "kinarm.evaluation.commands.reproduce",
-    "kinarm-study": "kinarm.evaluation.commands.study",
-}
-MAINS = {
-    "kinarm-eval": evaluate.main,
-    "kinarm-train": train.main,
-    "kinarm-bench": bench.main,
-    "kinarm-replay": replay.main,
-    "kinarm-arms": arms.main,
-    "kinarm-problem": problem.main,
-    "kinarm-reproduce": reproduce.main,
-    "kinarm-study": study.main,
-}
+MODULES = {f"kinarm-{name}": module for name, (module, _) in COMMANDS.items()}
 
 
 class Answer(NamedTuple):
@@ -62,7 +35,7 @@ def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., Answer]:
     def call(program: str, *arguments: object) -> Answer:
         capsys.readouterr()
         with pytest.raises(SystemExit) as stopped:
-            MAINS[program]([str(argument) for argument in arguments])
+            import_module(MODULES[program]).main([str(argument) for argument in arguments])
         return Answer(stopped.value.code or 0, *capsys.readouterr())
 
     return call

@@ -1,7 +1,5 @@
 """Policy files that cannot be used: refused in one line, whatever is wrong with them."""
 
-import io
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -11,48 +9,19 @@ from refusals import check_refused
 from kinarm.policies import Layer
 
 
-def archive(**changes) -> bytes:
-    """A file as Policy.save writes it, with some arrays replaced; None leaves one out."""
-    arrays = {"format": np.array("kinarm-policy"), "version": np.array(2), **changes}
-    file = io.BytesIO()
-    np.savez(file, **{key: value for key, value in arrays.items() if value is not None})
-    return file.getvalue()
-
-
-def single_array() -> bytes:
-    file = io.BytesIO()
-    np.save(file, np.zeros(3))
-    return file.getvalue()
-
-
-@pytest.fixture
-def valid(policy_folder) -> dict[str, np.ndarray]:
-    with np.load(policy_folder / "mine-seed0.npz") as content:
-        return dict(content)
-
-
 @pytest.mark.parametrize("program", ["kinarm-eval", "kinarm-bench"])
-@pytest.mark.parametrize(
-    "case", ["empty", "text", "array", "foreign", "future", "bare", "nan", "provenance", "pickle"]
-)
-def test_unusable_policy_files_are_refused(run, tmp_path, valid, program, case):
-    header = json.loads(str(valid["header"]))
-    incomplete = json.dumps({**header, "provenance": {"algorithm": "ars"}})
-    contents = {
-        "empty": b"",
-        "text": b"hello",
-        "array": single_array(),
-        "foreign": archive(format=np.array("other-policy")),
-        "future": archive(**{**valid, "version": np.array(9)}),
-        "bare": archive(),
-        "nan": archive(**{**valid, "mean": np.full(48, np.nan)}),
-        "provenance": archive(**{**valid, "header": np.array(incomplete)}),
-        "pickle": archive(**{**valid, "mean": np.array([header], dtype=object)}),
+@pytest.mark.parametrize("case", ["empty", "foreign", "pickle"])
+def test_unusable_policy_files_are_refused(run, tmp_path, policy_folder, program, case):
+    with np.load(policy_folder / "mine-seed0.npz") as content:
+        arrays = dict(content)
+    changes = {
+        "empty": {},
+        "foreign": {**arrays, "format": np.array("other-policy")},
+        "pickle": {**arrays, "mean": np.array([{}], dtype=object)},
     }
-    path = tmp_path / "bad.npz"
-    path.write_bytes(contents[case])
-    words = {"future": ["version 9"], "foreign": ["other-policy"]}.get(case, [])
-    check_refused(run(program, "--policy", path), "bad.npz", *words)
+    np.savez(tmp_path / "bad.npz", **changes[case])
+    words = ["other-policy"] if case == "foreign" else []
+    check_refused(run(program, "--policy", tmp_path / "bad.npz"), "bad.npz", *words)
 
 
 def test_a_policy_of_the_wrong_size_is_refused(run, tmp_path, policy):

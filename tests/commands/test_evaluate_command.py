@@ -4,13 +4,14 @@ import json
 
 import numpy as np
 import pytest
-from documents import faced, relative_success
+from documents import faced
 from refusals import check_refused
 
 from kinarm.evaluation import bounds
 from kinarm.evaluation.bounds import bounds_document
 from kinarm.evaluation.evaluation import evaluate
 from kinarm.evaluation.request import EvaluationRequest
+from kinarm.evaluation.selection import select_pairs
 from kinarm.policies import Policy
 from kinarm.policies.library import best_policy
 from kinarm.problem import PROBLEMS
@@ -29,28 +30,10 @@ def test_json_alone_is_printed_and_equals_the_library(evaluated, policy_folder):
     np.testing.assert_array_equal(entry["starts"], expected.trials.starts)
 
 
-def test_defaults(evaluated, run, policy_folder):
-    document = evaluated("--policy", "zero", "--task", "left")
-    protocol = document["protocol"]
-    assert (protocol["trials"], protocol["seed"]) == (200, 0)
-    assert protocol["problems"]["left"]["arm"] == "paper"
-    assert faced(document) == [("zero", "left"), ("oracle", "left")]
-    assert len(protocol["problems"]["left"]["oracle"]["trials"]["steps"]) == 200
-    assert all(relative_success(row) is not None for row in document["results"])
-
-
 def test_a_problem_without_policies_is_told(run):
     answer = run("kinarm-eval", "--problem", "table-paper", "--trials", 1, "--no-oracle")
     assert (answer.status, answer.err) == (0, "")
     assert answer.out.splitlines()[-1] == "no shipped policy was trained for this"
-
-
-def test_named_problem_is_what_named_policies_face(evaluated, policy_folder):
-    document = evaluated(
-        *("--policy", policy_folder / "lefty.npz", "--problem", "both", "--problem", "right"),
-        *("--trials", 3, "--no-oracle"),
-    )
-    assert faced(document) == [("lefty", "both"), ("lefty", "right")]
 
 
 def test_matrix_is_every_policy_on_every_problem(evaluated, policy_folder):
@@ -61,15 +44,6 @@ def test_matrix_is_every_policy_on_every_problem(evaluated, policy_folder):
     assert sorted(faced(document)) == sorted(
         (name, problem) for name in ("lefty", "zero", "oracle") for problem in problems
     )
-
-
-def test_another_arm_when_asked_for(evaluated, policy_folder):
-    document = evaluated(
-        *("--policy", policy_folder / "flange.npz", "--trials", 3, "--allow-other-arm"),
-        *("--arm", "paper"),
-    )
-    assert document["protocol"]["problems"]["right"]["arm"] == "paper"
-    assert faced(document) == [("flange", "right"), ("oracle", "right")]
 
 
 def test_table_for_people(run, policy_folder):
@@ -98,7 +72,7 @@ def test_the_request_does_as_the_command_does(evaluated, policy_folder, tmp_path
 def test_changes_apply_to_what_policies_were_trained_for(policy_folder):
     files = tuple(str(policy_folder / f"{name}.npz") for name in ("lefty", "mine-seed0"))
     request = EvaluationRequest(policies=(*files, "zero"), tolerance=0.2, oracle=False)
-    faced = [(contestant.name, problem) for contestant, problem in request.pairs()]
+    faced = [(contestant.name, problem) for contestant, problem in select_pairs(request)]
     assert [(name, problem.name) for name, problem in faced] == [
         ("lefty", "left"),
         ("zero", "left"),
@@ -107,20 +81,6 @@ def test_changes_apply_to_what_policies_were_trained_for(policy_folder):
     ]
     for _, problem in faced:
         assert problem.digest == PROBLEMS[problem.name].replace(tolerance=0.2).digest
-
-
-def test_a_problem_file(evaluated, policy_folder, tmp_path):
-    PROBLEMS["right"].replace(name="lax", tolerance=0.3).save(tmp_path / "lax.toml")
-    document = evaluated(
-        *("--policy", policy_folder / "mine-seed0.npz", "--problem", tmp_path / "lax.toml"),
-        *("--problem", "right", "--trials", 3),
-    )
-    assert set(faced(document)) == {
-        (name, problem) for name in ("mine-seed0", "oracle") for problem in ("lax", "right")
-    }
-    entries = document["protocol"]["problems"]
-    assert entries["lax"]["problem"]["task"]["tolerance"] == 0.3
-    assert entries["lax"]["starts"] == entries["right"]["starts"]
 
 
 def test_holding_trials_are_told_beside_the_others(run, evaluated, policy_folder):

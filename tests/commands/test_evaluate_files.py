@@ -4,7 +4,6 @@ import json
 
 from kinarm.evaluation import bounds
 from kinarm.evaluation.document import EvaluationDocument
-from kinarm.evaluation.evaluation import evaluate
 
 FILES = {"evaluation.json", "final_distance.png", "final_distance.svg"}
 
@@ -28,19 +27,6 @@ def test_earlier_results_are_replaced_when_asked_for(run, tmp_path):
     run("kinarm-eval", *arguments, "--overwrite")
     assert json.loads((tmp_path / "evaluation.json").read_text())["protocol"]["trials"] == 2
     assert (tmp_path / "notes.txt").read_text() == "mine"
-
-
-def test_report_is_one_page(run, policy_folder, tmp_path):
-    arguments = ("--policy", policy_folder / "mine-seed0.npz", "--trials", 4)
-    answer = run("kinarm-eval", *arguments, "--report", tmp_path / "new" / "report")
-    assert (answer.status, answer.err) == (0, "")
-    (page,) = (tmp_path / "new" / "report").iterdir()
-    assert page.name == "index.html"
-    assert str(page) in "".join(answer.out.split("\n"))
-    text = page.read_text(encoding="utf-8")
-    assert "mine-seed0" in text
-    assert evaluate("zero", "right", trials=4).trials.digest in text
-    assert "kinarm-eval --policy" in text
 
 
 def test_files_are_the_same_from_every_process(run, run_outside, policy_folder, tmp_path):

@@ -4,36 +4,6 @@ import pytest
 from documents import faced, relative_success
 
 from kinarm.evaluation.evaluation import evaluate
-from kinarm.evaluation.request import EvaluationRequest
-
-
-def test_the_oracle_alone(evaluated):
-    document = evaluated("--policy", "oracle", "--task", "right", "--trials", 5)
-    (row,) = document["results"]
-    assert (row["policy"], row["algorithm"], row["problem"]) == ("oracle", "oracle", "right")
-    assert (row["trained_on"], row["training_seed"]) == (None, None)
-    figures = {name: entry["value"] for name, entry in row["metrics"].items()}
-    assert (figures["success"], figures["collision"]) == (1, 0)
-    assert relative_success(row) == 1
-    bounds = document["protocol"]["problems"]["right"]["oracle"]
-    assert row["outcomes"]["steps"] == bounds["trials"]["steps"]
-    assert row["outcomes"]["final_distance"] == bounds["trials"]["final_distance"]
-
-
-def test_the_oracle_lists_what_it_cannot_solve(evaluated):
-    arguments = ("--policy", "oracle", "--task", "right", "--arm", "paper_flange", "--seed", 2)
-    document = evaluated(*arguments, "--trials", 12)
-    (row,) = document["results"]
-    bounds = document["protocol"]["problems"]["right"]["oracle"]
-    solved = row["outcomes"]["outcome"].count("success")
-    success = row["metrics"]["success"]["value"]
-    assert 0 < success == bounds["success"]["value"] == solved / 12 < 1
-    assert relative_success(row) == 1
-    unsolved = [i for i, reachable in enumerate(bounds["trials"]["reachable"]) if not reachable]
-    assert [entry["trial"] for entry in bounds["unsolved"]] == unsolved
-    assert len(unsolved) == 12 - solved
-    assert any("proven" in entry["reason"] for entry in bounds["unsolved"])
-    assert all(row["outcomes"]["final_distance"][trial] > 0.05 for trial in unsolved)
 
 
 @pytest.mark.parametrize(
@@ -118,14 +88,3 @@ def test_histograms_leave_out_the_oracle_unless_it_is_alone(run, policy_folder, 
     arguments = ("--policy", "oracle", "--task", "left", "--trials", 4, "--out", tmp_path / "only")
     assert run("kinarm-eval", *arguments).status == 0
     assert "oracle" in (tmp_path / "only" / name).read_text()
-
-
-def test_what_is_being_done_is_told(empty_cache):
-    told = []
-    request = EvaluationRequest(policies=("zero",), problem="right", trials=3)
-    request.evaluate(told.append)
-    request.evaluate(told.append)
-    solving, *evaluating = told
-    assert "right" in solving
-    assert "3 of 3 trials solved" in solving
-    assert evaluating == ["evaluating on right"] * 2

@@ -1,7 +1,6 @@
 """``kinarm-eval`` pools training seeds by what policies record, whatever their files are called."""
 
 import pytest
-from documents import faced
 
 from kinarm.policies import recipe, train_policy
 
@@ -49,24 +48,7 @@ def test_the_star_of_replaced_settings_is_shown(run, evaluated, tmp_path, count)
     assert note in text
 
 
-def test_trainings_with_other_settings_are_not_pooled(evaluated, policy_folder):
-    """Their names say that they are seeds of one recipe; their settings say otherwise."""
-    names = ("mine-seed0.npz", "mine-seed1.npz")
-    document = evaluated("--policy", *(policy_folder / name for name in names), "--trials", 3)
-    assert document["pooled"] == []
-
-
 def test_a_folder_without_policies(run, tmp_path):
     answer = run("kinarm-eval", "--policy", tmp_path)
     assert (answer.status, answer.out, answer.err.count("\n")) == (2, "", 1)
     assert "no policy (.npz)" in answer.err
-
-
-def test_files_of_one_name_are_named_after_their_folders(
-    evaluated, policy_folder, policy, tmp_path
-):
-    policy.save(tmp_path / "lefty.npz")
-    paths = (policy_folder / "lefty.npz", tmp_path / "lefty.npz")
-    document = evaluated("--policy", *paths, "--trials", 2)
-    names = {name for name, _ in faced(document)} - {"oracle"}
-    assert names == {f"{path.parent.name}/lefty" for path in paths}

@@ -7,17 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from kinarm.__main__ import COMMANDS
+
 ROOT = Path(__file__).resolve().parents[2]
-PROGRAMS = {
-    "kinarm-eval": "kinarm.evaluation.commands.evaluate",
-    "kinarm-replay": "kinarm.evaluation.commands.replay",
-    "kinarm-train": "kinarm.evaluation.commands.train",
-    "kinarm-bench": "kinarm.evaluation.commands.bench",
-    "kinarm-arms": "kinarm.evaluation.commands.arms",
-    "kinarm-problem": "kinarm.evaluation.commands.problem",
-    "kinarm-reproduce": "kinarm.evaluation.commands.reproduce",
-    "kinarm-study": "kinarm.evaluation.commands.study",
-}
+PROGRAMS = {f"kinarm-{name}": module for name, (module, _) in COMMANDS.items()}
 HEAVY = ("torch", "numba", "matplotlib", "pinocchio", "coal", "scipy", "stable_baselines3")
 
 SHOW_HELP = """

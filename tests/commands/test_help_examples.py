@@ -1,7 +1,6 @@
 """The examples of every help succeed, as they are written but for their size."""
 
 import shlex
-from importlib.util import find_spec
 
 import pytest
 
@@ -79,7 +78,6 @@ def test_examples_of_training(run, place):
     assert len(list((place / "right").glob("ars-tuned-right-seed?.npz"))) == 5
 
 
-@pytest.mark.skipif(find_spec("stable_baselines3") is None, reason="needs the extra ppo")
 def test_examples_of_all_learners(run, place):
     check(run, examples_of(run, "kinarm-train"), least=3)
 

@@ -3,16 +3,15 @@
 import csv
 import json
 import shutil
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from small_studies import Counting
 
 from kinarm.evaluation.commands.reproduce import ReproductionRequest
 
 FROZEN = Path(__file__).resolve().parents[1] / "frozen" / "reproduction"
-WITH_PPO = find_spec("stable_baselines3") is not None
-QUICK = ("--quick", "--jobs", 2) if WITH_PPO else ("--quick", "--jobs", 2, "--no-ppo")
+QUICK = ("--quick", "--jobs", 2)
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -37,7 +36,7 @@ def quick(run_outside, tmp_path_factory):
 class TestQuick:
     def test_says_what_it_is_and_where_the_rest_is(self, quick):
         _, answer = quick
-        assert answer.out.startswith(f"A smoke run: each of {36 if WITH_PPO else 30} trainings")
+        assert answer.out.startswith("A smoke run: each of 36 trainings")
         assert "reproduction-quick/REPRODUCTION.md" in answer.out
         assert "Traceback" not in answer.err
 
@@ -48,18 +47,17 @@ class TestQuick:
         expected, found = (document["readings"] for document in frozen)
         claims = [{claim["name"]: claim for claim in reading["claims"]} for reading in expected]
         for reading, known in zip(found, claims, strict=True):
-            assert len(reading["claims"]) == len(known) or not WITH_PPO
+            assert len(reading["claims"]) == len(known)
             for claim in reading["claims"]:
                 assert claim == known[claim["name"]]
         rows, known_rows = (
             [*csv.DictReader((each / "runs.csv").read_text().splitlines())]
             for each in (folder, FROZEN)
         )
-        assert rows == [row for row in known_rows if WITH_PPO or row["purpose"] != "ppo"]
-        if WITH_PPO:
-            page = (folder / "REPRODUCTION.md").read_text().splitlines()
-            kept = [line for line in page if not line.startswith(("Made by", "Versions:"))]
-            assert kept == (FROZEN / "REPRODUCTION.md").read_text().splitlines()
+        assert rows == known_rows
+        page = (folder / "REPRODUCTION.md").read_text().splitlines()
+        kept = [line for line in page if not line.startswith(("Made by", "Versions:"))]
+        assert kept == (FROZEN / "REPRODUCTION.md").read_text().splitlines()
 
     def test_policies_and_figures_lie_beside_the_page(self, quick):
         folder, _ = quick
@@ -84,26 +82,12 @@ class TestQuick:
         first, second, *_ = sorted((folder / "runs").iterdir())
         first.unlink()
         second.write_bytes(second.read_bytes()[:1000])
-        executor = InThisProcess()
-        request = ReproductionRequest(quick=True, ppo=WITH_PPO, out=folder)
+        executor = Counting()
+        request = ReproductionRequest(quick=True, out=folder)
         claims = request.run(executor, command="kinarm-reproduce " + " ".join(map(str, QUICK)))
-        assert executor.tasks == 2
+        assert len(executor.tasks) == 2
         assert contents(folder) == contents(quick[0])
         assert claims[0].name == "ars-left"
-
-
-class InThisProcess:
-    """An executor as simple as can be."""
-
-    shares_files = False
-
-    def __init__(self):
-        self.tasks = 0
-
-    def map(self, work, tasks):
-        for task in tasks:
-            self.tasks += 1
-            yield task, work(task)
 
 
 @pytest.mark.parametrize(
@@ -125,11 +109,3 @@ def test_bad_input_is_refused_in_one_line(run, tmp_path, monkeypatch, arguments,
     assert (answer.status, answer.out) == (2, "")
     assert words in answer.err
     assert len(answer.err.splitlines()) == 1
-
-
-def test_without_the_extra(run, tmp_path, monkeypatch):
-    monkeypatch.setattr("kinarm.policies.learners.find_spec", lambda _: None)
-    answer = run("kinarm-reproduce", "--quick", "--out", tmp_path / "new")
-    assert answer.status == 2
-    assert "pip install 'kinarm[ppo]'" in answer.err
-    assert not (tmp_path / "new").exists()

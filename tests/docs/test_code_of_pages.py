@@ -41,6 +41,9 @@ EXCEPTIONS = {
 """Commands and blocks of Python that are not run here, by how they begin, and why."""
 
 SHORTER = {
+    r"kinarm-train ppo .*--recipe best .*--seeds": (
+        "--iterations 1 --n-envs 8 --batch-size 64 --demonstrations 8 --seeds 1"
+    ),
     r"kinarm-train ppo .*--recipe (taught|best|precise)": (
         "--iterations 1 --n-envs 8 --batch-size 64 --demonstrations 8"
     ),

@@ -213,7 +213,6 @@ assert env.observation_space.contains(observation)
 assert abs(observation[-1] - info["distance"]) < 1e-12
 assert find_mirror(env.simulator.world).observations[-1] == 1
 assert "distance 1" in observation_layout()
-assert "48-48" in kinarm.ReachEnv.__doc__ or "distance from the tool" in kinarm.ReachEnv.__doc__
 try:
     kinarm.policies.load_policy("ars-tuned-both")
 except kinarm.PolicyFileError as error:

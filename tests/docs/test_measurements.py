@@ -1,8 +1,6 @@
 """The scripts in ``docs/measurements``: MuJoCo's arm is kinarm's, and operations are counted."""
 
 import math
-import time
-from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -11,14 +9,12 @@ from known_arms import INSTALLED
 from numba import njit
 
 from docs.measurements import limits
-from docs.measurements.counting import OperationCounter, source_name
+from docs.measurements.counting import OperationCounter
 from docs.measurements.mjcf import mjcf
-from kinarm.evaluation.trials import TrialSet
 from kinarm.kernels.lanes import LANES, as_lanes
 from kinarm.kernels.network import affine_layer
 from kinarm.policies import load_policy
 from kinarm.problem import PROBLEMS
-from kinarm.simulator import Simulator
 from kinarm.world import World
 
 
@@ -67,19 +63,6 @@ class TestOperations:
         found = counted(affine_layer.py_func, weights, 0, 48, 5, inputs, 0, outputs, 0)
         assert found == {"sums": 48 * 5, "products": 48 * 5}
 
-    def test_names_are_those_of_the_source(self):
-        mangled = "_ZN6kinarm7kernels7network3actB3v64B52c8tJT"
-        assert source_name(mangled) == "kinarm.kernels.network.act"
-
-    @pytest.mark.slow
-    def test_steps_are_counted_in_a_process_of_its_own(self):
-        found = limits.measure_operations("ars-tuned-both-seed0")
-        functions = found["functions"]
-        assert found["total"] == pytest.approx(sum(functions.values()))
-        # The policy: five sums of 48 products, in lanes that are not all busy to the end.
-        policy = functions["kinarm.kernels.network.affine_layer"]
-        assert 480 <= policy < 1.1 * 480
-
     def test_attainable_rate_multiplies_and_adds_in_every_lane(self):
         space = np.zeros((2 + limits.CHAINS, LANES))
         space[0], space[1] = 0.5, 3.0
@@ -89,11 +72,6 @@ class TestOperations:
         for _ in range(10):
             expected = expected * 0.5 + 3.0
         assert np.array_equal(space[2:], expected)
-
-    def test_time_is_shared_out_by_module(self):
-        shares = limits.time_shares(lambda: (Simulator("right", threads=1), time.sleep(0.2)))
-        assert sum(shares.values()) == pytest.approx(1)
-        assert shares["Python"] > 0.2
 
 
 class TestMuJoCo:
@@ -176,31 +154,3 @@ class TestPeers:
         policy = load_policy("ars-tuned-both-seed0")
         table = "\n".join(peers.page(policy, 1))
         assert all(f"| {package}" in table for package in peers.PEERS)
-
-    def test_arms_are_driven_along_the_paths_of_the_policy(self, peers):
-        simulator, policy = Simulator("right", threads=1), load_policy("ars-tuned-both-seed0")
-        starts, goals = simulator.sample(np.random.default_rng(0), 6)
-        targets = peers.joint_targets(simulator, policy, starts, goals)
-        rollouts = simulator.rollout(policy, starts, goals, record=True)
-        assert (np.abs(np.diff(targets, axis=1)) <= simulator.step_limit + 1e-12).all()
-        for way, steps, path in zip(targets, rollouts.steps, rollouts.paths[..., :5], strict=True):
-            assert np.array_equal(way[:steps], path[1 : steps + 1])
-            back = min(steps, 64 - steps)
-            assert np.array_equal(way[steps : steps + back], path[:steps][::-1][:back])
-
-    def test_trainings_are_looked_at_now_and_then_until_the_budget_is_spent(
-        self, peers, monkeypatch
-    ):
-        """Ten iterations of a second each, and a look at every second one."""
-        clock = iter(range(100))
-        monkeypatch.setattr(peers, "time", SimpleNamespace(perf_counter=lambda: next(clock)))
-        for name, value in {"BUDGET": 10.0, "BETWEEN": 2.0, "LEVEL": 1.1}.items():
-            monkeypatch.setattr(peers, name, value)
-        looks = []
-
-        def policy():
-            looks.append(len(looks))
-            return lambda seen: np.zeros((len(seen), 5))
-
-        seconds, steps, _ = peers.attempt(lambda: 7, policy, TrialSet.draw(PROBLEMS["right"], 4, 0))
-        assert (seconds, steps, len(looks)) == (10.0, 7, 5)

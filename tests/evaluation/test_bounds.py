@@ -1,17 +1,10 @@
 """Bounds of trials: those of the oracle, found once, kept on disk, whatever happens there."""
 
-import json
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from oracle_calls import count_calls
 from trial_bounds import draw, same
 
-import kinarm
 from kinarm.evaluation import bounds
 from kinarm.evaluation.bounds import bounds_document, oracle_bounds
 from kinarm.evaluation.trials import TrialSet
@@ -21,50 +14,13 @@ from kinarm.task import RewardWeights
 
 FAR = Obstacle(name="far", lower=(5.0, 5.0, 0.0), upper=(6.0, 6.0, 1.0))
 
-HERE = Path(kinarm.__file__).parent.parent
 """What the package is imported from."""
-
-PROCESSES = 3
-
-SOLVE_AT_ONCE = f"""
-import json
-from multiprocessing import get_context
-from kinarm.evaluation import TrialSet, oracle_bounds
-from kinarm.evaluation.bounds import bounds_document
-from kinarm.policies.oracle import Oracle
-
-trials = TrialSet.draw("right", 3, seed=5)
-Oracle("right", threads=1).solve(trials.starts[0], trials.goals[0])
-
-def solve(_):
-    all_ready.wait()
-    return bounds_document(oracle_bounds(trials)).to_json()
-
-context = get_context("fork")
-all_ready = context.Barrier({PROCESSES})
-with context.Pool({PROCESSES}) as pool:
-    print(json.dumps(pool.map(solve, range({PROCESSES}), chunksize=1)))
-"""
 
 
 @pytest.fixture(scope="module")
 def hard() -> TrialSet:
     """Twelve trials, of which some are out of reach."""
     return draw("right", 12, 2, arm="paper_flange")
-
-
-def run_outside(code: str, folder: Path, **variables: str) -> str:
-    """Run code in a process of its own and return what it prints."""
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=folder,
-        env={**os.environ, **variables},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert (done.returncode, done.stderr) == (0, "")
-    return done.stdout.strip()
 
 
 def forbid_solving(monkeypatch) -> None:
@@ -89,14 +45,6 @@ def test_bounds_are_known_as_long_as_the_trials_are(folder, monkeypatch):
     next(folder.iterdir()).unlink()
     forbid_solving(monkeypatch)
     assert oracle_bounds(trials) is first
-
-
-def test_equal_trials_are_looked_up(folder, solutions, monkeypatch):
-    oracle_bounds(draw())
-    forbid_solving(monkeypatch)
-    found = oracle_bounds(draw())
-    assert same(found, solutions)
-    assert not any(array.flags.writeable for array in found.arrays().values())
 
 
 def test_the_reward_does_not_matter(folder, monkeypatch):
@@ -146,28 +94,6 @@ def test_progress_is_told_while_trials_are_solved(folder, monkeypatch):
     oracle_bounds(trials, lambda *counts: told.append(counts))
     oracle_bounds(draw(trials=5), lambda *counts: told.append(counts))
     assert len(told) == 3
-
-
-def test_processes_at_once_find_the_same_and_leave_one_file(
-    folder, solutions, monkeypatch, tmp_path
-):
-    """Each of them waits until all are ready, with an empty cache."""
-    answer = run_outside(SOLVE_AT_ONCE, tmp_path, PYTHONPATH=str(HERE))
-    assert json.loads(answer) == [bounds_document(solutions).to_json()] * PROCESSES
-    forbid_solving(monkeypatch)
-    assert same(oracle_bounds(draw()), solutions)
-    assert len(list(folder.iterdir())) == 1
-
-
-def test_document_tells_the_bounds_of_every_trial(hard):
-    solutions = oracle_bounds(hard)
-    document = bounds_document(solutions).to_json()
-    for name, column in document["trials"].items():
-        assert column == [getattr(solution, name) for solution in solutions]
-    assert set(document["trials"]) == {
-        *("reachable", "steps", "steps_lower_bound", "proof_complete"),
-        *("final_distance", "distance_lower_bound"),
-    }
 
 
 def test_document_sums_up_the_bounds(hard):

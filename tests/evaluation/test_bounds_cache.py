@@ -21,28 +21,12 @@ def archive(arrays: dict[str, np.ndarray]) -> bytes:
     return file.getvalue()
 
 
-def single_array(_, arrays) -> bytes:
-    file = io.BytesIO()
-    np.save(file, arrays["steps"])
-    return file.getvalue()
-
-
 DAMAGES = {
-    "empty": lambda *_: b"",
-    "text": lambda *_: b"hello",
-    "bytes": lambda *_: bytes(range(256)) * 4,
-    "first half": lambda whole, _: whole[: len(whole) // 2],
     "all but the end": lambda whole, _: whole[:-1],
-    "second half": lambda whole, _: whole[len(whole) // 2 :],
-    "single array": single_array,
-    "no array": lambda *_: archive({}),
     "foreign": lambda *_: archive({"weights": np.zeros(3)}),
     "one missing": lambda _, arrays: archive(
         {k: v for k, v in arrays.items() if k != "proof_complete"}
     ),
-    "one too many": lambda _, arrays: archive({**arrays, "more": arrays["steps"]}),
-    "one short": lambda _, arrays: archive({**arrays, "steps": arrays["steps"][:-1]}),
-    "all short": lambda _, arrays: archive({name: array[:-1] for name, array in arrays.items()}),
     "objects": lambda _, arrays: archive({**arrays, "reasons": np.array([None] * 3)}),
 }
 
@@ -51,36 +35,12 @@ DAMAGES = {
 def test_a_file_that_cannot_be_used_is_replaced(folder, solutions, monkeypatch, damage):
     oracle_bounds(draw())
     (path,) = folder.iterdir()
-    path.write_bytes(DAMAGES[damage](path.read_bytes(), solutions.arrays()))
+    path.write_bytes(DAMAGES[damage](path.read_bytes(), vars(solutions)))
     calls = count_calls(monkeypatch)
     assert same(oracle_bounds(draw()), solutions)
     assert same(oracle_bounds(draw()), solutions)
     assert calls == [3]
     assert list(folder.iterdir()) == [path]
-
-
-@pytest.mark.parametrize("inside", ["", "deep"])
-def test_a_file_in_place_of_the_folder_does_no_harm(tmp_path, monkeypatch, solutions, inside):
-    (tmp_path / "file").write_text("mine")
-    monkeypatch.setenv("KINARM_CACHE", str(tmp_path / "file" / inside))
-    assert same(oracle_bounds(draw()), solutions)
-    assert [path.name for path in tmp_path.iterdir()] == ["file"]
-    assert (tmp_path / "file").read_text() == "mine"
-
-
-def test_a_folder_in_place_of_the_file_does_no_harm(folder, solutions):
-    path = folder / f"oracle-{draw().digest}-{bounds.oracle_version()}.npz"
-    path.mkdir(parents=True)
-    assert same(oracle_bounds(draw()), solutions)
-    assert list(folder.iterdir()) == [path]
-
-
-@pytest.mark.parametrize("constant", ["ORACLE_SEMANTICS", "SEMANTICS"])
-def test_the_version_changes_with_what_oracle_and_simulator_mean(monkeypatch, constant):
-    before = bounds.oracle_version.__wrapped__()
-    assert before == bounds.oracle_version()
-    monkeypatch.setattr(bounds, constant, "another")
-    assert bounds.oracle_version.__wrapped__() != before
 
 
 @pytest.mark.parametrize("package", bounds.COMPUTING_PACKAGES)
@@ -125,13 +85,6 @@ class TestRoom:
         oracle_bounds(draw(seed=6))
         assert first in names_in(folder)
         assert "oracle-old-1.npz" not in names_in(folder)
-
-    def test_bounds_larger_than_the_cache_are_kept_alone(self, folder, monkeypatch):
-        monkeypatch.setattr(bounds, "KEPT_BYTES", 1)
-        fill(folder, "oracle-old-1.npz")
-        oracle_bounds(draw())
-        (kept,) = names_in(folder)
-        assert kept != "oracle-old-1.npz"
 
     def test_only_what_belongs_to_the_cache_goes(self, folder, monkeypatch):
         monkeypatch.setattr(bounds, "KEPT_BYTES", 1)

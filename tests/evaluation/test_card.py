@@ -8,7 +8,7 @@ import pytest
 
 from kinarm.errors import InvalidInputError, OutputError
 from kinarm.evaluation.bounds import oracle_bounds
-from kinarm.evaluation.contestants import BASELINES, ORACLE, Contestant
+from kinarm.evaluation.contestants import ORACLE, Contestant
 from kinarm.evaluation.evaluation import evaluation_document, run_trials
 from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.report.card import (
@@ -49,11 +49,6 @@ def test_states_figures_with_intervals_beside_the_oracle(card, document):
     assert line.endswith(f"| {ratio:.2f} | 1.00 |")
 
 
-def test_what_was_not_trained_has_no_card(document, trials):
-    with pytest.raises(InvalidInputError, match="a card is of a trained policy, got 'zero'"):
-        policy_card("zero", document, run_trials(BASELINES["zero"], trials))
-
-
 def test_states_where_the_policy_comes_from(card, skilled, document):
     made = skilled.provenance
     for line in (
@@ -67,17 +62,6 @@ def test_states_where_the_policy_comes_from(card, skilled, document):
         skilled.problem.to_toml().strip(),
     ):
         assert line in card
-
-
-def test_is_well_formed_markdown(card):
-    assert card.startswith("# mine\n\n")
-    assert card.endswith(".\n")
-    assert not re.search(r"\n\n\n|[ \t]\n|None|\{", card)
-    assert card.count("```") % 2 == 0
-    for table in re.findall(r"(?:^\|.*\n)+", card, re.MULTILINE):
-        lines = table.strip().splitlines()
-        assert len({line.count("|") for line in lines}) == 1, lines
-        assert re.fullmatch(r"\|( --- \|)+", lines[1])
 
 
 def test_how_to_use_it_runs(card, document, faced, tmp_path, monkeypatch):
@@ -117,18 +101,10 @@ class TestCheck:
     def mine(self, skilled):
         return Contestant.from_policy("mine", skilled), PROBLEMS["right"]
 
-    def test_one_policy_beside_the_oracle(self, mine, tmp_path):
-        check_card(tmp_path / "mine.md", [mine, (ORACLE, PROBLEMS["right"])])
-
     @pytest.mark.parametrize("count", [2, 5])
     def test_several_policies_are_refused(self, mine, tmp_path, count):
         with pytest.raises(InvalidInputError, match="one trained policy.*got mine on right, mine"):
             check_card(tmp_path / "mine.md", [mine] * count)
-
-    def test_baselines_and_the_oracle_are_refused(self, tmp_path):
-        for contestant, name in ((BASELINES["zero"], "zero on right"), (ORACLE, "oracle")):
-            with pytest.raises(InvalidInputError, match=f"one trained policy.*got {name}"):
-                check_card(tmp_path / "mine.md", [(contestant, PROBLEMS["right"])])
 
     def test_what_exists_is_kept(self, mine, tmp_path):
         for name in ("mine.md", "mine.html", "mine.npz"):
@@ -142,4 +118,4 @@ class TestCheck:
         contestant, problem = mine
         contestant.policy.save(tmp_path / "mine.npz")
         there = replace(contestant, source=(tmp_path / "mine.npz").resolve())
-        check_card(tmp_path / "mine.md", [(there, problem)])
+        check_card(tmp_path / "mine.md", [(there, problem), (ORACLE, problem)])

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinarm.errors import InvalidInputError
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.contestants import find_contestants
 from kinarm.evaluation.evaluation import evaluate, pool, run_trials
@@ -55,38 +54,12 @@ def test_where_the_oracle_reaches_nothing_there_is_nothing_to_compare_with(name)
     assert oracle_figures(evaluation) == [None, None, None]
 
 
-def test_without_the_oracle_there_are_no_bounds(skilled_evaluation):
-    assert skilled_evaluation.bounds is None
-    assert oracle_figures(skilled_evaluation) == [None, None, None]
-    with pytest.raises(InvalidInputError, match="there are no bounds"):
-        _ = skilled_evaluation.step_ratio
-
-
 def test_the_oracle_changes_nothing_but_the_bounds(skilled_evaluation, bounded):
     alone, beside = skilled_evaluation.to_json(), bounded.to_json()
     for name in COMPARED:
         assert alone["metrics"].pop(name) == {"value": None, "ci95": None}
         assert beside["metrics"].pop(name)["value"] is not None
     assert alone == beside
-
-
-def test_the_oracle_evaluated_by_name():
-    evaluation = evaluate("oracle", "right", trials=5, seed=5, oracle=True)
-    expected = Oracle("right").solve_batch(evaluation.trials.starts, evaluation.trials.goals)
-    np.testing.assert_array_equal(evaluation.bounds.paths, expected.paths)
-    np.testing.assert_array_equal(evaluation.rollouts.steps, expected.steps)
-    np.testing.assert_array_equal(evaluation.rollouts.distance, expected.final_distance)
-    assert set(evaluation.outcomes) == {"success"}
-    np.testing.assert_array_equal(
-        evaluation.step_ratio, expected.steps / expected.steps_lower_bound
-    )
-
-
-def test_the_oracle_is_all_that_is_possible_where_not_everything_is():
-    evaluation = evaluate("oracle", "right", trials=12, seed=2, arm="paper_flange", oracle=True)
-    solved = int(evaluation.bounds.reachable.sum())
-    assert 0 < evaluation.success.value == solved / 12 < 1
-    assert (evaluation.metrics["relative_success"].value, evaluation.step_ratio.size) == (1, solved)
 
 
 @pytest.mark.parametrize(

@@ -54,28 +54,10 @@ def test_shares_of_trials_are_those_of_the_causes(evaluations):
         )
 
 
-def test_time_to_reach_is_of_the_trials_that_succeeded(skilled_evaluation):
-    steps = skilled_evaluation.rollouts.steps[skilled_evaluation.rollouts.success]
-    assert skilled_evaluation.metrics["steps_to_success"].value == np.median(steps)
-    assert skilled_evaluation.metrics["time_to_success"].value == 0.02 * np.median(steps)
-
-
-def test_the_worst_seed_is_named(evaluations):
-    rates = {each.contestant.name: each.success.value for each in evaluations[:3]}
-    worst = pool(evaluations)[0].to_json()["worst_seed"]
-    assert rates[worst["policy"]] == worst["success"]["value"] == min(rates.values())
-
-
-def test_causes_read_as_words():
-    assert str(Cause(("hand", "bench"), True)) == "hand touches bench within 3 steps"
-    assert str(Cause(("hand", "bench"), False)) == "hand touches bench after 3 steps"
-    assert str(Cause(None, False)) == "truncated"
-
-
 def test_early_is_within_the_first_steps():
     pair = ("hand", "bench")
-    ends = [("collision", 3, 0.1), ("collision", 4, 0.1), ("success", 3, 0.0), ("truncated", 3, 1)]
-    assert failure_causes(ends, [pair, pair, None, None]) == {
+    outcomes = ("collision", "collision", "success", "truncated")
+    assert failure_causes(outcomes, (3, 4, 3, 3), (pair, pair, None, None)) == {
         0: Cause(pair, True),
         1: Cause(pair, False),
         3: Cause(None, False),

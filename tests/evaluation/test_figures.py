@@ -27,28 +27,10 @@ def legend(axes) -> list[str]:
     return [text.get_text() for text in axes.get_legend().get_texts()]
 
 
-def test_a_panel_per_problem(figure):
-    titles = [axes.get_title() for axes in figure.axes]
-    assert len(titles) == 2
-    assert "right" in titles[0]
-    assert "left" in titles[1]
-
-
-def test_legends_name_every_group_once(figure):
-    assert [len(legend(axes)) for axes in figure.axes] == [2, 1]
-    assert "zero" in legend(figure.axes[0])
-
-
 def test_seeds_are_drawn_besides_their_mean(figure):
     right, left = figure.axes
     assert len(stairs(right)) == 3 + 1 + 1
     assert len(stairs(left)) == 1
-
-
-def test_shares_of_every_line_sum_to_one(figure):
-    for axes in figure.axes:
-        for patch in stairs(axes):
-            assert patch.get_data().values.sum() == pytest.approx(1)
 
 
 def test_shares_are_those_of_the_trials(skilled_evaluation):

@@ -2,17 +2,14 @@
 
 import subprocess
 import sys
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from kinarm.envs import ReachEnv
-from kinarm.errors import InvalidInputError, PolicyFileError, UnknownNameError
+from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation import evaluate, find_contestants
-from kinarm.evaluation.contestants import policy_function
 from kinarm.policies import Policy
-from kinarm.policies.conversion.sb3_inputs import find_vec_normalize
 from kinarm.problem import PROBLEMS
 
 MODULE = """
@@ -48,12 +45,6 @@ def module(tmp_path, monkeypatch):
     sys.modules.pop("mine_for_tests", None)
 
 
-def test_a_predictor_whose_options_nobody_can_see():
-    """Functions in C need not tell them: ``max`` takes the largest row."""
-    policy = policy_function(SimpleNamespace(predict=max), "mine")
-    assert policy([[0.1, 0.2], [0.3, 0.1]]) == [0.3, 0.1]
-
-
 class TestModule:
     @pytest.mark.parametrize("name", ["towards", "remembering", "plain"])
     def test_whatever_chooses_actions(self, module, name):
@@ -78,15 +69,6 @@ class TestModule:
         program = [sys.executable, "-m", "kinarm.evaluation.commands.evaluate", *words]
         done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, check=False)
         assert "cannot import" not in done.stderr, done.stderr
-
-    def test_an_object_that_predicts(self):
-        class Still:
-            def predict(self, observation, deterministic=True):
-                return np.zeros((len(observation), 5)), None
-
-        evaluation = evaluate(Still(), "right", trials=5)
-        assert evaluation.contestant.name == "Still"
-        assert evaluation.success.value == evaluate("zero", "right", trials=5).success.value
 
     def test_missing_names_are_listed(self, module):
         with pytest.raises(UnknownNameError, match="'nothing'; available: .*towards") as caught:
@@ -157,21 +139,10 @@ class TestModel:
         seen = np.random.default_rng(0).normal(size=(20, 48))
         np.testing.assert_array_equal(contestant.policy(seen), own(seen))
 
-    def test_statistics_of_other_models_are_left_alone(self, tmp_path):
-        for name in ("rl_model_vecnormalize_400_steps.pkl", "other/vecnormalize.pkl"):
-            (tmp_path / name).parent.mkdir(exist_ok=True)
-            (tmp_path / name).write_bytes(b"")
-        for name in ("rl_model_500_steps.zip", "model.zip"):
-            assert find_vec_normalize(tmp_path / name) is None
-
     def test_needs_a_problem(self, model, tmp_path):
         model.save(tmp_path / "model.zip")
         with pytest.raises(InvalidInputError, match="model.zip': the model does not say which"):
             find_contestants(tmp_path / "model.zip")
-
-    def test_a_missing_file(self, model, tmp_path):
-        with pytest.raises(PolicyFileError, match="cannot read model"):
-            find_contestants(tmp_path / "gone.zip", "right")
 
 
 @pytest.mark.parametrize("policy", ["ppo-tuned-both", "ars-tuned-both"])

@@ -1,16 +1,13 @@
 """Trials that success does not end, against an environment that is stepped and Pinocchio."""
 
-from dataclasses import replace
-
 import gymnasium
 import numpy as np
 import pytest
-from reseeded import reseeded
 
 import kinarm  # noqa: F401 registers the environments
 from kinarm.evaluation.contestants import ORACLE, Contestant, find_contestants
 from kinarm.evaluation.estimates import estimate_metrics
-from kinarm.evaluation.evaluation import evaluate, pool, run_trials
+from kinarm.evaluation.evaluation import run_trials
 from kinarm.evaluation.holding import AIM, Holding, measure_holding
 from kinarm.evaluation.metrics import CLOSE, HOLDING_WITHIN
 from kinarm.evaluation.outcomes import HOLDING_STEPS, Outcomes
@@ -87,29 +84,6 @@ def test_a_policy_that_does_not_move_stays_where_it_is(trials):
     np.testing.assert_allclose(held.closest, distance, atol=1e-12)
     np.testing.assert_allclose(held.farthest_at_end, distance, atol=1e-12)
     assert (held.steps == trials.problem.task.horizon).all()
-
-
-def test_functions_and_random_actions_are_held_too(trials):
-    moved = evaluate(lambda seen: np.zeros((len(seen), 5)), "right", trials=3, hold=True)
-    assert moved.metrics["held"].value == 0
-    first = measure_holding(find_contestants("random")[0], trials)
-    again = measure_holding(find_contestants("random")[0], trials)
-    np.testing.assert_array_equal(first.closest, again.closest)
-
-
-def test_seeds_are_pooled(skilled, trials):
-    members = [
-        run_trials(
-            Contestant.from_policy(f"made-seed{seed}", reseeded(skilled, seed)), trials, hold=True
-        )
-        for seed in range(2)
-    ]
-    members[1] = replace(
-        members[1], holding=replace(members[1].holding, closest=2 * members[1].holding.closest)
-    )
-    (pooled,) = pool(members)
-    closest = np.concatenate([each.holding.closest for each in members])
-    assert pooled.metrics["median_approach"].value == np.median(closest)
 
 
 def test_without_it_there_is_nothing_to_tell(skilled_evaluation):

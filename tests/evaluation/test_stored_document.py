@@ -101,12 +101,3 @@ class TestChoosing:
         with pytest.raises(InvalidInputError) as caught:
             document.result(None, "left")
         assert str(caught.value).endswith("a-seed0 on left, a-seed1 on left")
-
-    def test_none_on_this_problem(self, document):
-        with pytest.raises(InvalidInputError, match="none on this problem"):
-            document.result(None, "both")
-
-    def test_an_unknown_policy_is_told_what_there_is(self, document):
-        with pytest.raises(UnknownNameError) as caught:
-            document.result("b", "left")
-        assert caught.value.available == ("zero", "a-seed0", "a-seed1")

@@ -1,20 +1,12 @@
 """Trial sets: what they depend on, what they do not, and that they are legal."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
-from kinarm.errors import InvalidInputError, ProblemError
+from kinarm.errors import ProblemError
 from kinarm.evaluation.trials import TrialSet, trial_generator
 from kinarm.problem import PROBLEMS
 from kinarm.scene import PAPER_BENCHES, Obstacle, Scene
-
-PRINT_DIGEST = """
-from kinarm.evaluation import TrialSet
-print(TrialSet.draw("both", 7, seed=3).digest)
-"""
 
 
 def draw(problem="both", trials=7, seed=3, **overrides):
@@ -25,21 +17,12 @@ def same(one: TrialSet, other: TrialSet) -> bool:
     return np.array_equal(one.starts, other.starts) and np.array_equal(one.goals, other.goals)
 
 
-def test_equal_arguments_give_equal_trials():
-    assert same(draw(), draw())
-
-
 def test_a_problem_by_name_file_or_object(tmp_path):
     PROBLEMS["both"].save(tmp_path / "mine.toml")
     for problem in ("both", tmp_path / "mine.toml", PROBLEMS["both"]):
         trials = TrialSet.draw(problem, 7, seed=3)
         assert same(trials, draw())
         assert trials.digest == draw().digest
-
-
-@pytest.mark.parametrize("other", [{"seed": 4}, {"problem": "left"}])
-def test_other_arguments_give_other_trials(other):
-    assert not same(draw(), draw(**other))
 
 
 def test_a_small_set_is_the_beginning_of_a_large_one():
@@ -80,33 +63,6 @@ def test_goals_lie_in_the_region_of_the_task(problem, side):
     assert x.max() > 0.4
 
 
-def test_both_draws_both_sides_about_equally_often():
-    right = int((draw("both", trials=200, seed=0).goals[:, 1] < 0).sum())
-    assert abs(right - 100) < 4 * np.sqrt(200 / 4)
-
-
-def test_trials_cannot_be_changed():
-    trials = draw()
-    with pytest.raises(ValueError, match="read-only"):
-        trials.starts[0, 0] = 0
-    with pytest.raises(ValueError, match="read-only"):
-        trials.goals[0, 0] = 0
-
-
-def test_digest_is_the_same_in_every_process():
-    digests = {
-        subprocess.run(
-            [sys.executable, "-c", PRINT_DIGEST],
-            env={"PYTHONHASHSEED": seed, "PATH": ""},
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout.strip()
-        for seed in ("1", "2")
-    }
-    assert digests == {draw().digest}
-
-
 @pytest.mark.parametrize(
     "other",
     [
@@ -132,12 +88,6 @@ def test_digest_depends_on_obstacles_that_the_starts_do_not_show():
 @pytest.mark.parametrize("other", [{"name": "mine"}, {"reward": {"success": 4}}])
 def test_digest_does_not_depend_on_names_and_rewards(other):
     assert draw().digest == draw(**other).digest
-
-
-@pytest.mark.parametrize(("trials", "seed"), [(0, 0), (-1, 0), (1, -1)])
-def test_numbers_out_of_range_are_refused(trials, seed):
-    with pytest.raises(InvalidInputError, match=r"must be a whole number of at least ., got"):
-        draw(trials=trials, seed=seed)
 
 
 def test_a_scene_without_free_starts_is_refused():

@@ -12,7 +12,6 @@ from docs.transfer.study import Protocol, TransferStudy
 
 @pytest.mark.slow
 def test_a_small_study(tmp_path):
-    pytest.importorskip("torch")
     study = TransferStudy(
         seeds=2,
         lengths=(1.0, 0.5),

@@ -20,7 +20,7 @@ import numpy as np
 from kinarm import SEMANTICS
 from kinarm._fields import to_plain
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.ars.state import ARSState
+from kinarm.policies.ars.config import ARSState
 from kinarm.policies.learners import train_policy
 from kinarm.policies.library import load_policy
 from kinarm.policies.oracle import ORACLE_SEMANTICS, Oracle

@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Callable
-from importlib.util import find_spec
 
 import pytest
 from digests import (
@@ -31,7 +30,6 @@ def test_results_are_those_recorded(found: Callable[[], dict[str, str]]) -> None
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(find_spec("stable_baselines3") is None, reason="needs the extra ppo")
 def test_ppo_is_as_recorded() -> None:
     assert not changed(RECORD, ppo_digests()), ANEW
 

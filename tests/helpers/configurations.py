@@ -23,15 +23,20 @@ def contact_boundary(simulator, seed, count):
     return free, hit
 
 
-def depths(simulator, configurations):
-    """How deep the deepest pair overlaps, according to Coal; less than 0 if nothing touches [m]."""
-    model, geometry = simulator.arm.model, simulator.world.contact_model.geometry
+def pair_distances(world, configurations):
+    """Distances of all tested pairs as Coal finds them, shape (n, n_pairs) [m]."""
+    model, geometry = world.arm.model, world.contact_model.geometry
     data, geometry_data = model.createData(), geometry.createData()
     found = []
     for q in configurations:
         pin.computeDistances(model, data, geometry, geometry_data, q)
-        found.append(-min(result.min_distance for result in geometry_data.distanceResults))
-    return np.array(found)
+        found.append([result.min_distance for result in geometry_data.distanceResults])
+    return np.reshape(found, (-1, len(geometry.collisionPairs)))
+
+
+def depths(simulator, configurations):
+    """How deep the deepest pair overlaps, according to Coal; less than 0 if nothing touches [m]."""
+    return -pair_distances(simulator.world, configurations).min(axis=1)
 
 
 def jittered(configurations, seed):

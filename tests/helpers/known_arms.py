@@ -8,6 +8,10 @@ from kinarm.problem import ReachProblem
 from kinarm.simulator import Simulator
 
 KNOWN_ARMS = ("ur3", "ur5", "ur10", "panda", "xarm7", "z1", "kinova", "so100", "so101")
+EACH_ARM = [
+    pytest.param(name, marks=[] if name in ("ur5", "panda", "so101") else pytest.mark.slow)
+    for name in KNOWN_ARMS
+]
 
 
 def is_installed() -> bool:

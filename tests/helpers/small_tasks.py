@@ -12,11 +12,6 @@ def touch(folder, number):
     (folder / str(number)).touch(exist_ok=False)
 
 
-def kill_own_process_at_seven(number):
-    if number == 7:
-        os.kill(os.getpid(), signal.SIGKILL)
-
-
 def kill_own_process_once(folder, number):
     """The first worker that comes to a task with an odd number does not survive it."""
     mark = folder / str(number)

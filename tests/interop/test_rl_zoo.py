@@ -81,12 +81,6 @@ def trained(folder):
     return folder / "logs" / "ppo" / "kinarm-ReachRight-v0_1"
 
 
-def test_every_command_is_run():
-    source = Path(__file__).read_text(encoding="utf-8")
-    assert len(BLOCKS) == 5
-    assert all(f'"{name}"' in source for name in BLOCKS)
-
-
 def test_the_shown_line_finds_the_hyperparameters(tmp_path):
     code = re.search(r'python -c "(.*)"', PAGE).group(1)
     found = run(f"python -c {shlex.quote(code)}", tmp_path).strip()
@@ -110,10 +104,6 @@ def test_train_with_other_algorithms(folder):
     for algorithm, env_id in others.items():
         name = env_id.replace("/", "-")
         assert list((folder / "logs" / algorithm).glob(f"{name}_*/{name}.zip"))
-
-
-def test_packages_can_be_named_instead(tmp_path):
-    assert "Success rate" in run(training("a2c", FLAT), tmp_path, "--gym-packages", "kinarm")
 
 
 def test_enjoy_evaluates(folder, trained):

@@ -3,16 +3,13 @@
 import gc
 import io
 import pickle
-import tempfile
-import tracemalloc
 import zipfile
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from kinarm._archive import cache_folder, cached_arrays, load_archive, reading, save_archive
-from kinarm.errors import InvalidInputError, PolicyFileError
+from kinarm._archive import cache_folder, cached_arrays, load_archive, save_archive
+from kinarm.errors import PolicyFileError
 
 ARRAYS = {
     "numbers": np.linspace(0, 1, 40).reshape(8, 5),
@@ -46,14 +43,6 @@ def refused(path, message, **changes):
     assert len(str(caught.value)) < 500
 
 
-def rewritten(path, **changes):
-    """The same archive with some entries replaced, or left out if they are None."""
-    with np.load(path, allow_pickle=False) as file:
-        entries = dict(file) | changes
-    np.savez(path, **{name: entry for name, entry in entries.items() if entry is not None})
-    return path
-
-
 @pytest.mark.parametrize("compress", [False, True])
 def test_what_is_written_comes_back(tmp_path, compress):
     path = tmp_path / "thing"
@@ -72,14 +61,6 @@ def test_same_content_same_bytes(saved, tmp_path):
     assert again.read_bytes() == saved.read_bytes()
 
 
-def test_a_failed_write_leaves_the_old_file(saved):
-    before = saved.read_bytes()
-    with pytest.raises(TypeError):
-        save_archive(saved, "test thing", 3, ARRAYS, {"name": object()})
-    assert saved.read_bytes() == before
-    assert list(saved.parent.iterdir()) == [saved]
-
-
 class TestMismatch:
     def test_missing(self, tmp_path):
         refused(tmp_path / "gone.npz", "cannot read test thing .*No such file")
@@ -96,35 +77,24 @@ class TestMismatch:
         np.savez(saved, weights=np.zeros(3))
         refused(saved, "is not a kinarm test thing")
 
-    @pytest.mark.parametrize("name", ["version", "header"])
-    def test_missing_entry(self, saved, name):
-        refused(rewritten(saved, **{name: None}), "is not a complete kinarm test thing")
-
     @pytest.mark.parametrize(
         ("name", "entry"),
         [
-            ("version", np.array("one")),
-            ("version", np.zeros(2)),
-            ("version", np.array(np.nan)),
+            ("version", None),
             ("header", np.array("{")),
-            ("header", np.array("[" * 10_000)),
-            ("header", np.array("[]")),
-            ("header", np.array("3")),
-            ("header", np.zeros(3)),
             ("format", np.array("something-else")),
-            ("format", np.zeros(3)),
             ("numbers", np.array([{}], dtype=object)),
-            ("format", np.array([{}], dtype=object)),
         ],
     )
     def test_bad_entry(self, saved, name, entry):
-        refused(rewritten(saved, **{name: entry}), "thing")
+        with np.load(saved, allow_pickle=False) as file:
+            entries = dict(file) | {name: entry}
+        np.savez(saved, **{name: entry for name, entry in entries.items() if entry is not None})
+        refused(saved, "thing")
 
 
 class TestDamage:
-    @pytest.mark.parametrize("compress", [False, True])
-    def test_truncated_anywhere(self, saved, compress):
-        save_archive(saved, "test thing", 3, ARRAYS, HEADER, compress=compress)
+    def test_truncated_anywhere(self, saved):
         content = saved.read_bytes()
         for length in range(0, len(content), 97):
             saved.write_bytes(content[:length])
@@ -132,11 +102,8 @@ class TestDamage:
                 load(saved)
         gc.collect(1)
 
-    @pytest.mark.parametrize("compress", [False, True])
-    def test_flipped_bits_are_noticed_or_harmless(self, saved, compress):
-        save_archive(saved, "test thing", 3, ARRAYS, HEADER, compress=compress)
-        content = saved.read_bytes()
-        noticed = 0
+    def test_flipped_bits_are_noticed_or_harmless(self, saved):
+        content, noticed = saved.read_bytes(), 0
         for place in range(0, len(content), 41):
             spoilt = bytearray(content)
             spoilt[place] ^= 0xA5
@@ -152,17 +119,7 @@ class TestDamage:
         gc.collect(1)
         assert noticed > 20
 
-    @pytest.mark.parametrize(
-        "content",
-        [
-            b"",
-            b"hello\n",
-            b"\x00" * 100,
-            b"PK\x03\x04junk",
-            b"\x93NUMPY\x01\x00",
-            pickle.dumps({"format": "kinarm-test-thing"}),
-        ],
-    )
+    @pytest.mark.parametrize("content", [b"", b"hello\n", b"PK\x03\x04junk"])
     def test_other_content(self, saved, content):
         saved.write_bytes(content)
         refused(saved, "thing")
@@ -180,59 +137,6 @@ class TestDamage:
         saved.write_bytes(pickle.dumps(Trap()))
         refused(saved, "thing")
         assert not (tmp_path / "sprung").exists()
-
-
-class TestReading:
-    @pytest.mark.parametrize(
-        ("raised", "message"),
-        [
-            (KeyError("mean"), "'a' is not a complete kinarm policy: 'mean'"),
-            (ValueError("one\ntwo"), "'a' is not a complete kinarm policy: one"),
-            (InvalidInputError("bad"), "'a' is not a complete kinarm policy: bad"),
-            (FileNotFoundError(2, "gone"), "cannot read policy 'a': gone"),
-            (PolicyFileError("as it is"), "as it is"),
-        ],
-    )
-    def test_turns_what_is_raised_into_one_line(self, raised, message):
-        with pytest.raises(PolicyFileError) as caught, reading("'a'", "policy", PolicyFileError):
-            raise raised
-        assert str(caught.value) == message
-
-
-class TestHostileFiles:
-    """Files that claim more than they are."""
-
-    def member(self, saved, content):
-        with zipfile.ZipFile(saved, "a") as archive:
-            archive.writestr("extra.npy", content)
-
-    def test_a_bomb_is_not_inflated(self, saved, monkeypatch):
-        monkeypatch.setattr("kinarm._archive.SMALL", 10**7)
-        np.savez_compressed(saved, format=np.array("kinarm-test-thing"), bomb=np.zeros(10**7))
-        assert saved.stat().st_size < 10**6
-        tracemalloc.start()
-        refused(saved, "claims to hold 80 MB")
-        assert tracemalloc.get_traced_memory()[1] < 5e6
-        tracemalloc.stop()
-
-    @pytest.mark.parametrize("shape", ["(99999999999,)", "(3, 3)", "(-1, -6)"])
-    def test_a_shape_that_the_content_does_not_have(self, saved, shape):
-        buffer = io.BytesIO()
-        header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}"
-        header = header + " " * (117 - len(header)) + "\n"
-        buffer.write(b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little"))
-        buffer.write(header.encode() + np.zeros(6).tobytes())
-        self.member(saved, buffer.getvalue())
-        refused(saved, "is not a complete kinarm test thing")
-
-    @pytest.mark.parametrize(
-        "array", [np.zeros(3, complex), np.zeros(2, "S4"), np.zeros(2, "M8[s]")]
-    )
-    def test_arrays_of_other_types(self, saved, array):
-        buffer = io.BytesIO()
-        np.save(buffer, array)
-        self.member(saved, buffer.getvalue())
-        refused(saved, "extra holds")
 
 
 class TestCache:
@@ -267,37 +171,28 @@ class TestCache:
         look_up(version=2)
         assert look_up.made == 3
 
-    @pytest.mark.parametrize("content", [b"", b"no archive", bytes(range(256))])
-    def test_what_cannot_be_read_is_replaced(self, folder, look_up, content):
+    def test_what_cannot_be_read_is_replaced(self, folder, look_up):
         look_up()
         (path,) = folder.iterdir()
-        path.write_bytes(content)
+        path.write_bytes(b"no archive")
         for _ in range(2):
             look_up()
         assert look_up.made == 2
 
-    def test_where_nothing_can_be_written_nothing_is_kept(self, tmp_path, monkeypatch, look_up):
-        (tmp_path / "file").write_text("")
-        monkeypatch.setenv("KINARM_CACHE", str(tmp_path / "file" / "cache"))
+    def test_where_nothing_can_be_written_nothing_is_kept(self, folder, look_up):
+        folder.write_text("")
         for _ in range(2):
             look_up()
         assert look_up.made == 2
 
     def test_the_folder_is_the_users_unless_another_is_named(self, tmp_path, monkeypatch):
-        monkeypatch.setenv("KINARM_CACHE", str(tmp_path))
-        assert cache_folder() == tmp_path
-        monkeypatch.delenv("KINARM_CACHE")
-        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-        assert cache_folder() == tmp_path / "kinarm"
-        monkeypatch.delenv("XDG_CACHE_HOME")
-        monkeypatch.setenv("HOME", str(tmp_path))
-        assert cache_folder() == tmp_path / ".cache" / "kinarm"
-
-    def test_without_a_home_it_is_that_of_temporary_files(self, monkeypatch):
-        def homeless():
-            raise RuntimeError("Could not determine home directory.")
-
-        for name in ("KINARM_CACHE", "XDG_CACHE_HOME"):
-            monkeypatch.delenv(name, raising=False)
-        monkeypatch.setattr("kinarm._archive.Path.home", homeless)
-        assert cache_folder() == Path(tempfile.gettempdir()) / "kinarm"
+        monkeypatch.setenv("HOME", str(tmp_path / "home"))
+        monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+        monkeypatch.delenv("KINARM_CACHE", raising=False)
+        assert cache_folder() == tmp_path / "home" / ".cache" / "kinarm"
+        for variable, folder in (
+            ("XDG_CACHE_HOME", tmp_path / "kinarm"),
+            ("KINARM_CACHE", tmp_path),
+        ):
+            monkeypatch.setenv(variable, str(tmp_path))
+            assert cache_folder() == folder

@@ -24,25 +24,6 @@ def test_is_kept_by_the_arm():
     assert arm.name == "paper_flange"
 
 
-def test_relative_paths_start_at_a_folder(tmp_path):
-    given = ArmSpecification(source="robot.urdf", package_dirs=("meshes", "/opt/meshes"))
-    assert given.resolved(tmp_path) == ArmSpecification(
-        source=str(tmp_path / "robot.urdf"),
-        package_dirs=(str(tmp_path / "meshes"), "/opt/meshes"),
-    )
-
-
-@pytest.mark.parametrize("name", ["paper", "nope"])
-def test_names_are_no_paths(tmp_path, name):
-    assert ArmSpecification(source=name).resolved(tmp_path).source == name
-
-
-def test_a_shipped_name_wins_over_a_file(tmp_path, monkeypatch):
-    (tmp_path / "paper").write_text("")
-    monkeypatch.chdir(tmp_path)
-    assert Arm.load("paper").name == "paper"
-
-
 def test_pinned_digest_has_to_hold(shipped_arms):
     digest = shipped_arms["paper"].digest
     assert Arm.load("paper", digest=digest).digest == digest
@@ -68,9 +49,6 @@ class TestArmFiles:
             for contact in file.arm.allowed_contacts or ():
                 assert contact.reason
 
-    def test_a_urdf_has_none(self):
-        assert ArmFile.of("robot.urdf") is None
-
     def test_an_arm_file_says_what_is_used_and_options_win(self, tmp_path):
         path = self.write(
             tmp_path,
@@ -82,11 +60,6 @@ class TestArmFiles:
         np.testing.assert_array_equal(arm.lower[:2], [-1, -0.5])
         assert arm.n_joints == 5
         assert arm.name == "mine"
-
-    def test_folders_of_packages_are_kept(self, tmp_path):
-        given = ArmSpecification(source="paper", package_dirs=(str(tmp_path),))
-        assert given.completed().package_dirs == (str(tmp_path),)
-        assert ArmSpecification(source="paper").completed().package_dirs == ()
 
     def test_source_and_folders_start_at_the_file(self, tmp_path, shipped_arms, monkeypatch):
         urdf = shipped_arms["paper"].urdf_path.read_text()
@@ -110,10 +83,6 @@ class TestArmFiles:
             Arm.load(self.write(tmp_path, text))
         assert "mine.toml" in str(caught.value)
         assert "\n" not in str(caught.value)
-
-    def test_missing_file(self):
-        with pytest.raises(ArmError, match=r"arm file 'gone.toml' does not exist"):
-            ArmFile.of("gone.toml")
 
 
 class TestAllowedContacts:

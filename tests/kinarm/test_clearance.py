@@ -1,29 +1,18 @@
 """The closest pair and its closest points, held against Coal."""
 
-import pickle
-
 import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-from configurations import contact_boundary, random_configurations
+from configurations import contact_boundary, pair_distances, random_configurations
 
 from kinarm.arm import Arm
-from kinarm.clearance import Closeness
 from kinarm.problem import ReachProblem
 from kinarm.scene import Scene
 from kinarm.world import World
 
 COAL = 2e-6
 """Precision of Coal's distances of hulls and cylinders [m]."""
-
-
-def coal_distances(world, q):
-    """Distances of all tested pairs according to Coal."""
-    geometry, data = world.contact_model.geometry, world.arm.model.createData()
-    distances = geometry.createData()
-    pin.computeDistances(world.arm.model, data, geometry, distances, q)
-    return np.array([result.min_distance for result in distances.distanceResults])
 
 
 def test_equals_the_smallest_distance_of_coal(any_simulator):
@@ -34,8 +23,7 @@ def test_equals_the_smallest_distance_of_coal(any_simulator):
     assert (found.distance > 0.01).sum() > 20
     assert (found.distance < -0.01).sum() > 20
     names = list(world.contact_model.pair_names)
-    for row, each in enumerate(q):
-        distances = coal_distances(world, each)
+    for row, distances in enumerate(pair_distances(world, q)):
         assert found.distance[row] == pytest.approx(distances.min(), rel=0, abs=COAL)
         pair = names.index(tuple(found.bodies[row]))
         assert distances[pair] == pytest.approx(distances.min(), rel=0, abs=COAL)
@@ -43,16 +31,9 @@ def test_equals_the_smallest_distance_of_coal(any_simulator):
 
 def test_capsules_are_exact(simulator):
     q = random_configurations(simulator, 3, 300)
-    expected = [coal_distances(simulator.world, each).min() for each in q]
+    expected = pair_distances(simulator.world, q).min(axis=1)
     found = simulator.world.clearance(q).distance
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
-
-
-def test_sign_tells_contact(any_simulator):
-    world, q = any_simulator.world, random_configurations(any_simulator, 4, 1500)
-    distance = world.clearance(q).distance
-    sure = np.abs(distance) > COAL
-    np.testing.assert_array_equal((distance < 0)[sure], world.in_contact(q)[sure])
 
 
 def test_points_are_as_far_apart_and_on_the_line_between_the_bodies(any_simulator):
@@ -117,15 +98,7 @@ def test_where_everything_overlaps_the_deepest_pair_counts(make_joint, make_coll
     problem = ReachProblem.load("right")
     empty = Scene(obstacles=(), goal_regions=problem.scene.goal_regions, ground=False)
     world = World(problem.replace(arm=path, scene=empty))
-    for q in np.random.default_rng(2).uniform((-2, 2.9), (2, 3.1), (20, 2)):
-        distances = coal_distances(world, q)
-        assert len(distances) == 1
-        assert distances[0] < -0.1
-        assert world.clearance(q).distance == pytest.approx(distances.min(), abs=COAL)
-
-
-def test_survives_a_copy(simulator):
-    closeness = Closeness(simulator.world.contact_model)
-    again, q = pickle.loads(pickle.dumps(closeness)), random_configurations(simulator, 8, 20)
-    for first, second in zip(closeness.measure(q, 1), again.measure(q, 1), strict=True):
-        np.testing.assert_array_equal(first, second)
+    q = np.random.default_rng(2).uniform((-2, 2.9), (2, 3.1), (20, 2))
+    (distances,) = pair_distances(world, q).T
+    assert distances.max() < -0.1
+    np.testing.assert_allclose(world.clearance(q).distance, distances, rtol=0, atol=COAL)

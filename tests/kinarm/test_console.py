@@ -1,13 +1,11 @@
 """Bars and messages: of what takes long, and how far it is; in a notebook, too."""
 
-import builtins
 import io
 import re
 
 import numpy as np
 import pytest
 from rich.console import Console
-from rich.progress import track
 
 from kinarm import _console
 from kinarm._console import (
@@ -66,14 +64,14 @@ def shown(monkeypatch, width=80, **settings):
     with ProgressLine("baking", 4, "loaves", Console(file=file, width=width, **settings)) as line:
         line.update(0, ["starting"])
         line.update(2, ["crisp"])
-        line.update(4, count="all", words=["done"])
+        line.update(4, ["done"])
     return file.getvalue()
 
 
 def test_without_a_terminal_there_are_lines_of_progress_now_and_then(monkeypatch):
     first, *_, last = shown(monkeypatch).splitlines()
     assert first == "baking: 0/4 loaves, -:--:-- left, starting"
-    assert last == "baking: all loaves, 0:00:00 left, done"
+    assert last == "baking: 4/4 loaves, 0:00:00 left, done"
 
 
 @pytest.mark.parametrize("colourful", [True, False])
@@ -85,36 +83,9 @@ def test_on_a_terminal_there_is_a_bar(monkeypatch, colourful):
     text = shown(monkeypatch, force_terminal=True)
     assert bool(re.search(r"\x1b\[[0-9;]*3\d", text)) is colourful
     plain = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", text)
-    assert "---------- baking: all 0:00:00 left done" in plain.replace(
+    assert "---------- baking: 4/4 0:00:00 left done" in plain.replace(
         "\N{BOX DRAWINGS HEAVY HORIZONTAL}", "-"
     )
-
-
-def test_what_matters_least_is_cut_off_where_there_is_no_room(monkeypatch):
-    text = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", shown(monkeypatch, 27, force_terminal=True))
-    assert "baking: all 0:00:00 left" in text.splitlines()[-1]
-    assert "done" not in text
-
-
-class ZMQInteractiveShell:
-    """What tells rich that it is in a notebook."""
-
-
-@pytest.fixture
-def notebook(monkeypatch):
-    monkeypatch.setattr(builtins, "get_ipython", ZMQInteractiveShell, raising=False)
-
-
-def test_a_bar_without_ipywidgets_is_a_line_at_the_end(notebook, monkeypatch, capsys):
-    """And rich does not warn, which would be an error here."""
-    monkeypatch.setattr("kinarm._console.find_spec", lambda _: None)
-    console = open_console(stderr=True)
-    assert list(track(range(3), "training", console=console)) == [0, 1, 2]
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert said.err.startswith("training")
-    assert len(said.err.splitlines()) == 1
-    assert "\x1b" not in said.err
 
 
 @pytest.mark.parametrize(("columns", "width"), [(None, 1000), ("70", 70)])

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from kinarm.errors import InvalidInputError
-from kinarm.failed_scenarios import FailedScenarios, Replay
+from kinarm.failed_scenarios import FailedScenarios
 
 
 def numbered(*numbers):
@@ -19,10 +19,6 @@ def numbers(scenarios):
     assert (starts == starts[:, :1]).all()
     np.testing.assert_array_equal(starts[:, 0], goals[:, 0])
     return starts[:, 0].tolist()
-
-
-def fail_to_draw(places):
-    raise AssertionError(places)
 
 
 def test_the_last_ones_are_kept_and_repeated_ones_more_than_once():
@@ -59,27 +55,6 @@ def test_a_share_comes_again_each_as_often_as_it_is_kept():
     np.testing.assert_array_equal(found[~replayed], np.flatnonzero(~replayed))
     twos = int((found[replayed] == -2).sum())
     assert stats.binomtest(twos, int(replayed.sum()), 0.75).pvalue > 1e-3
-
-
-def test_all_can_come_again():
-    failed = FailedScenarios(*numbered(-1, -2))
-    scenarios, replayed = failed.mixed(1.0, np.random.default_rng(1), 50, fail_to_draw)
-    assert replayed.all()
-    assert set(numbers(scenarios)) == {-1, -2}
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"share": 1.5}, r"share must lie in \[0, 1\], got 1.5"),
-        ({"share": float("nan")}, "share"),
-        ({"size": 0}, "size must be a whole number of at least 1"),
-        ({"size": 10**9}, "size must be"),
-    ],
-)
-def test_bad_settings(settings, message):
-    with pytest.raises(InvalidInputError, match=message):
-        Replay(**settings)
 
 
 def test_shapes_have_to_agree():

@@ -10,16 +10,10 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 import tomli_w
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kinarm._fields import (
-    check_fields,
-    field_docs,
-    from_plain,
-    init_fields,
-    to_plain,
-)
+from kinarm._fields import check_fields, field_docs, from_plain, init_fields, to_plain
 from kinarm.errors import InvalidInputError, ProblemError
 
 
@@ -105,32 +99,17 @@ bicycles = st.builds(
 )
 
 
-class TestRoundTrip:
-    @given(bicycles)
-    def test_json_and_toml_are_without_loss(self, bicycle):
-        plain = to_plain(bicycle)
-        assert from_plain(Bicycle, json.loads(json.dumps(plain)), "it") == bicycle
-        assert from_plain(Bicycle, tomllib.loads(tomli_w.dumps(plain)), "it") == bicycle
-
-    def test_what_is_none_is_left_out(self):
-        assert to_plain(Bicycle(name="a", bell=False)) == {
-            "name": "a",
-            "wheels": [],
-            "saddle": [0.0, 1.0],
-            "handlebar": [0.5, 1.0],
-            "gears": [11, 13],
-            "colour": "red",
-            "bell": False,
-            "notes": {},
-        }
+@settings(max_examples=40)
+@given(bicycles)
+def test_json_and_toml_are_without_loss(bicycle):
+    plain = to_plain(bicycle)
+    assert from_plain(Bicycle, json.loads(json.dumps(plain)), "it") == bicycle
+    assert from_plain(Bicycle, tomllib.loads(tomli_w.dumps(plain)), "it") == bicycle
 
 
 class TestFromPlain:
     def build(self, **changes):
         return from_plain(Bicycle, {"name": "a", **changes}, "shed.toml")
-
-    def test_what_is_missing_has_its_default(self):
-        assert self.build() == Bicycle(name="a")
 
     def test_nested(self):
         made = self.build(wheels=[{"radius": 1}, {"radius": 0.5, "spokes": 3}], spare={"radius": 2})
@@ -143,24 +122,14 @@ class TestFromPlain:
             ({"pedals": 2}, "unknown key 'pedals'; available: name, wheels, saddle"),
             ({"name": 3}, "name must be a text, got 3"),
             ({"gears": [1, 2.5]}, r"gears\[1\] must be a whole number, got 2.5"),
-            ({"gears": [True]}, r"gears\[0\] must be a whole number, got True"),
             ({"gears": 11}, "gears must be a list, each entry a whole number, got 11"),
-            ({"gears": "11"}, "gears must be a list, each entry a whole number, got '11'"),
             ({"saddle": [1]}, r"saddle must be a list of 2, each a number \[m\], got \[1\]"),
-            ({"handlebar": [1, "x"]}, r"handlebar\[1\] must be a number \[m\], got 'x'"),
             ({"colour": "pink"}, "colour must be one of red, blue, got 'pink'"),
-            ({"colour": ["red"]}, "colour must be one of red, blue"),
             ({"bell": 1}, "bell must be true or false, got 1"),
             ({"picture": 1}, "picture must be a path, got 1"),
             ({"spare": 1}, "spare must be a table, got 1"),
-            ({"notes": []}, r"notes must be a table, got \[\]"),
             ({"wheels": [{"spokes": 3}]}, r"'wheels\[0\].radius' is missing: From the hub to"),
-            ({"wheels": [{"radius": 1, "rim": 1}]}, r"unknown key 'wheels\[0\].rim'; av.*radius"),
-            ({"wheels": [{"radius": "x"}]}, r"wheels\[0\].radius must be a number \[m\], got 'x'"),
-            ({"wheels": [1]}, r"wheels\[0\] must be a table, got 1"),
-            ({"wheels": [{"radius": -1}]}, r"wheels\[0\]: radius must be above 0 m, got -1"),
             ({"spare": {"radius": 0}}, "spare: radius must be above 0 m, got 0"),
-            ({"saddle": [0, 10**400]}, r"saddle\[1\] must be a number"),
         ],
     )
     def test_one_line_names_source_key_and_what_is_expected(self, changes, message):
@@ -169,48 +138,31 @@ class TestFromPlain:
         assert "\n" not in str(caught.value)
 
 
-class TestCheckFields:
-    def test_values_become_what_is_annotated(self):
-        made = Bicycle(
-            name="a",
-            wheels=[Wheel(radius=1), {"radius": 2}],
-            saddle=np.array([1, 2]),
-            gears=[np.int64(11)],
-            bell=np.bool_(False),
-            picture="a.png",
-        )
-        assert made == Bicycle(
-            name="a",
-            wheels=(Wheel(radius=1.0), Wheel(radius=2.0)),
-            saddle=(1.0, 2.0),
-            gears=(11,),
-            bell=False,
-            picture=Path("a.png"),
-        )
-        assert type(made.gears[0]) is int
-        assert type(made.saddle[0]) is float
-
-    def test_zeros_lose_their_sign(self):
-        assert math.copysign(1, Bicycle(name="a", saddle=(-0.0, 0)).saddle[0]) == 1
-
-    @pytest.mark.parametrize(
-        ("changes", "message"),
-        [
-            ({"name": None}, "^name must be a text, got None"),
-            ({"colour": "pink"}, "^colour must be one of red, blue, got 'pink'"),
-            ({"saddle": np.zeros(3)}, r"^saddle must be a list of 2, each a number \[m\]"),
-            ({"gears": (11.0,)}, r"^gears\[0\] must be a whole number, got 11.0"),
-            ({"spare": Bicycle(name="b")}, "^spare must be a table, got Bicycle"),
-        ],
+def test_values_become_what_is_annotated():
+    made = Bicycle(
+        name="a",
+        wheels=[Wheel(radius=1), {"radius": 2}],
+        saddle=np.array([-0.0, 2]),
+        gears=[np.int64(11)],
+        bell=np.bool_(False),
+        picture="a.png",
     )
-    def test_wrong_types_are_refused(self, changes, message):
-        with pytest.raises(InvalidInputError, match=message):
-            Bicycle(**{"name": "a", **changes})
+    assert made == Bicycle(
+        name="a",
+        wheels=(Wheel(radius=1.0), Wheel(radius=2.0)),
+        saddle=(0.0, 2.0),
+        gears=(11,),
+        bell=False,
+        picture=Path("a.png"),
+    )
+    assert (type(made.gears[0]), type(made.saddle[0])) == (int, float)
+    assert math.copysign(1, made.saddle[0]) == 1
+    with pytest.raises(InvalidInputError, match="^spare must be a table, got Bicycle"):
+        Bicycle(name="a", spare=Bicycle(name="b"))
 
 
-class TestDocs:
-    def test_descriptions_of_the_fields(self):
-        docs = field_docs(Bicycle)
-        assert list(docs) == list(init_fields(Bicycle))
-        assert docs["saddle"] == docs["handlebar"] == "Where they are [m]."
-        assert docs["notes"] == "Anything else."
+def test_descriptions_of_the_fields():
+    docs = field_docs(Bicycle)
+    assert list(docs) == list(init_fields(Bicycle))
+    assert docs["saddle"] == docs["handlebar"] == "Where they are [m]."
+    assert docs["notes"] == "Anything else."

@@ -1,12 +1,10 @@
 """Atomic writing, and seeing beforehand that a file can be written."""
 
-import fcntl
 import multiprocessing
 import os
 import signal
 import stat
 import time
-from pathlib import Path
 
 import pytest
 
@@ -14,21 +12,11 @@ from kinarm._files import (
     check_folder,
     check_output,
     is_being_written,
-    is_file,
-    is_folder,
     only_writer,
-    read_file,
     write_atomically,
     write_text,
 )
 from kinarm.errors import OutputError
-
-
-def test_replaces_an_existing_file(tmp_path):
-    path = tmp_path / "file.bin"
-    path.write_bytes(b"a much longer old content")
-    write_atomically(path, lambda file: file.write(b"new"))
-    assert path.read_bytes() == b"new"
 
 
 def test_failure_leaves_the_old_file_and_nothing_else(tmp_path):
@@ -45,11 +33,6 @@ def test_failure_leaves_the_old_file_and_nothing_else(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_missing_folder(tmp_path):
-    with pytest.raises(OutputError, match="cannot write .*file.bin.*No such file"):
-        write_atomically(tmp_path / "gone" / "file.bin", lambda file: file.write(b""))
-
-
 def test_permissions_follow_the_mask_or_the_old_file(tmp_path):
     path = tmp_path / "file.bin"
     before = os.umask(0o027)
@@ -63,37 +46,24 @@ def test_permissions_follow_the_mask_or_the_old_file(tmp_path):
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
 
 
-def test_full_disk_is_reported(tmp_path):
-    def fail(_):
-        raise OSError(28, "No space left on device")
+def test_a_link_stays_and_its_file_is_written(tmp_path):
+    real, link = tmp_path / "far" / "real.bin", tmp_path / "link.bin"
+    real.parent.mkdir()
+    link.symlink_to(real)
+    for content in (b"first", b"second"):
+        write_atomically(link, lambda file, content=content: file.write(content))
+        assert link.is_symlink()
+        assert real.read_bytes() == content
+    assert list(real.parent.iterdir()) == [real]
 
-    with pytest.raises(OutputError, match="cannot write .*No space left"):
-        write_atomically(tmp_path / "file.bin", fail)
-    assert list(tmp_path.iterdir()) == []
 
-
-class TestWhatIsNoPlainFile:
-    def test_a_link_stays_and_its_file_is_written(self, tmp_path):
-        real, link = tmp_path / "far" / "real.bin", tmp_path / "link.bin"
-        real.parent.mkdir()
-        link.symlink_to(real)
-        for content in (b"first", b"second"):
-            write_atomically(link, lambda file, content=content: file.write(content))
-            assert link.is_symlink()
-            assert real.read_bytes() == content
-        assert list(real.parent.iterdir()) == [real]
-
-    def test_a_device_stays_a_device(self):
-        write_atomically("/dev/null", lambda file: file.write(b"gone"))
-        assert Path("/dev/null").is_char_device()
-
-    def test_a_pipe_gets_the_content(self, tmp_path):
-        pipe = tmp_path / "pipe"
-        os.mkfifo(pipe)
-        reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
-        write_atomically(pipe, lambda file: file.write(b"content"))
-        assert os.read(reader, 100) == b"content"
-        os.close(reader)
+def test_a_pipe_gets_the_content(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    write_atomically(pipe, lambda file: file.write(b"content"))
+    assert os.read(reader, 100) == b"content"
+    os.close(reader)
 
 
 def _write_slowly(path):
@@ -156,47 +126,18 @@ class TestOnlyWriter:
 
     def test_what_it_writes_is_being_written(self, tmp_path):
         path = tmp_path / "one"
-        assert not is_being_written(path)
         with only_writer(path):
             assert is_being_written(path)
         (tmp_path / ".one.lock").touch()  # which a process that was killed left behind
         assert not is_being_written(path)
 
-    @pytest.mark.parametrize("left", [False, True])
-    def test_a_lock_that_its_last_owner_removes_meanwhile(self, tmp_path, monkeypatch, left):
-        """It is locked, but another file or none lies in its place: another one is opened."""
-        lock, flock, calls = tmp_path / ".one.lock", fcntl.flock, []
 
-        def race(file, operation):
-            calls.append(file)
-            if len(calls) == 1:
-                lock.unlink()
-                if left:
-                    lock.touch()
-            flock(file, operation)
-
-        monkeypatch.setattr(fcntl, "flock", race)
-        with only_writer(tmp_path / "one"):
-            assert len(calls) == 2
-            assert calls[0].closed is left or calls[0] is not calls[1]
-            assert os.path.samestat(os.fstat(calls[1].fileno()), lock.stat())
-        assert list(tmp_path.iterdir()) == []
-
-    def test_missing_folder(self, tmp_path):
-        with pytest.raises(OutputError, match="cannot write"), only_writer(tmp_path / "a" / "b"):
-            pass
-
-
-class TestCheckFolder:
-    def test_missing_folders_are_made(self, tmp_path):
-        check_folder(tmp_path / "new" / "newer")
-        assert (tmp_path / "new" / "newer").is_dir()
-
-    def test_file_in_the_way(self, tmp_path):
-        (tmp_path / "file").write_text("")
-        for folder in (tmp_path / "file", tmp_path / "file" / "below"):
-            with pytest.raises(OutputError, match="cannot write to .*file"):
-                check_folder(folder)
+def test_a_folder_is_made_unless_a_file_is_in_the_way(tmp_path):
+    check_folder(tmp_path / "new" / "newer")
+    assert (tmp_path / "new" / "newer").is_dir()
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="cannot write to .*file"):
+        check_folder(tmp_path / "file" / "below")
 
 
 class TestCheckOutput:
@@ -214,36 +155,7 @@ class TestCheckOutput:
         check_output(path, overwrite=True)
         assert path.read_text() == "old"
 
-    @pytest.mark.parametrize("overwrite", [False, True])
-    def test_folder_is_no_file(self, tmp_path, overwrite):
-        with pytest.raises(OutputError, match="the output must be a file, got"):
-            check_output(tmp_path, overwrite=overwrite)
-        with pytest.raises(OutputError, match="the output must be a file that ends in .npz, got"):
-            check_output(tmp_path, overwrite=overwrite, suffix=".npz")
-
-    @pytest.mark.parametrize("name", ["policy", "policy.npy", "policy.npz.txt", ".npz"])
-    def test_other_endings_are_refused(self, tmp_path, name):
-        with pytest.raises(OutputError, match=f"ends in .npz, got .*{name}"):
-            check_output(tmp_path / "new" / name, suffix=".npz")
+    def test_other_endings_are_refused(self, tmp_path):
+        with pytest.raises(OutputError, match=r"ends in .npz, got .*policy.npz.txt"):
+            check_output(tmp_path / "new" / "policy.npz.txt", suffix=".npz")
         assert not (tmp_path / "new").exists()
-
-
-class TestNamesThatNoFileCanHave:
-    LONG = "x" * 5000
-
-    @pytest.mark.parametrize("name", [LONG, "a\0b"])
-    def test_there_is_none(self, name):
-        assert not is_file(name)
-        assert not is_folder(name)
-
-    def test_they_cannot_be_written(self):
-        with pytest.raises(OutputError, match="cannot write 'xxx.*File name too long"):
-            check_output(self.LONG)
-
-
-def test_files_are_read_up_to_a_size(tmp_path):
-    path = tmp_path / "file"
-    path.write_bytes(bytes(2_000_001))
-    assert len(read_file(path)) == len(read_file(path, 2_000_001)) == 2_000_001
-    with pytest.raises(ValueError, match="it is larger than 2 MB"):
-        read_file(path, 2_000_000)

@@ -4,8 +4,6 @@ import numpy as np
 import pinocchio as pin
 from configurations import random_configurations
 
-from kinarm.world import World
-
 
 def pinocchio_frame(arm, name, kind, q):
     """Pose and Jacobian of a frame, along the world's axes."""
@@ -57,10 +55,3 @@ def test_one_is_as_many(simulator):
         for row, each in enumerate(q):
             np.testing.assert_array_equal(ask(each.tolist()), together[row])
         assert ask(np.empty((0, 6))).shape == (0, *together.shape[1:])
-
-
-def test_threads_do_not_matter(simulator):
-    q = random_configurations(simulator, 5, 9000)
-    first, second = (World(simulator.problem, threads=threads) for threads in (1, 3))
-    np.testing.assert_array_equal(first.poses(q), second.poses(q))
-    np.testing.assert_array_equal(first.jacobians(q), second.jacobians(q))

@@ -128,10 +128,9 @@ def restarted_solutions(arm, pose, count, rng):
 
 
 class TestPoses:
-    @pytest.mark.parametrize("name", ["paper", "paper_flange", "lrmate200ic_5l", "sliding", "mesh"])
-    def test_are_met_within_the_limits_and_the_known_one_is_among_them(self, simulators, name):
-        world, arm = simulators[name].world, simulators[name].arm
-        known = random_configurations(simulators[name], 1, 60)
+    def test_are_met_within_the_limits_and_the_known_one_is_among_them(self, any_simulator):
+        world, arm = any_simulator.world, any_simulator.arm
+        known = random_configurations(any_simulator, 1, 60)
         poses = world.poses(known)
         found = world.inverse_kinematics(poses)
         assert found.isolated
@@ -154,7 +153,7 @@ class TestPoses:
 
     def test_of_the_paper_s_arm_are_those_of_random_restarts(self, simulator):
         rng = np.random.default_rng(3)
-        poses = simulator.world.poses(random_configurations(simulator, 3, 12))
+        poses = simulator.world.poses(random_configurations(simulator, 3, 6))
         found = simulator.world.inverse_kinematics(poses)
         for row, pose in enumerate(poses):
             assert_same(found.of(row), restarted_solutions(simulator.arm, pose, 300, rng))
@@ -182,11 +181,6 @@ class TestPoses:
         pose[0, 3] = 1.2
         assert simulator.world.inverse_kinematics(pose).of(0).shape == (0, 6)
 
-    def test_at_a_limit(self, simulator):
-        q = simulator.arm.upper.copy()
-        found = simulator.world.inverse_kinematics(simulator.world.poses(q))
-        assert is_among(q, found.of(0))
-
 
 class TestDirections:
     def test_are_those_of_the_poses_that_point_there(self, ur5):
@@ -212,19 +206,11 @@ class TestDirections:
             poses[:, :3, :3] @ axis, direction[None].repeat(len(found), 0), atol=1e-9
         )
 
-    @pytest.mark.parametrize("name", ["paper", "paper_flange", "lrmate200ic_5l"])
-    def test_by_default_of_the_axis_away_from_the_arm(self, simulators, name):
-        world = simulators[name].world
+    def test_by_default_of_the_axis_away_from_the_arm(self, simulator):
+        world = simulator.world
         target = world.poses([0.3, 0.2, 0.1, 0.5, 0.4, 0.0])
         found = world.inverse_kinematics(target[:3, 3], target[:3, 0])
         assert is_among([0.3, 0.2, 0.1, 0.5, 0.4, 0.0], found.of(0))
-
-    def test_one_for_all_positions(self, ur5):
-        positions = [[0.4, 0.2, 0.3], [0.3, 0.3, 0.4]]
-        one = ur5.inverse_kinematics(positions, [0, 0, -1])
-        many = ur5.inverse_kinematics(positions, [[0, 0, -1], [0, 0, -1]])
-        np.testing.assert_array_equal(one.configurations, many.configurations)
-        assert set(one.owner) == {0, 1}
 
 
 class TestPositions:
@@ -276,17 +262,13 @@ class TestPositions:
 
 
 class TestChoices:
-    def test_nearest_first(self, ur5):
-        q = np.random.default_rng(8).uniform(-np.pi, np.pi, 6)
+    @pytest.mark.parametrize(
+        "q", [[0.3, -1.2, 1.4, -1, -1.5, 0.4], [5.0, -4.0, 3.5, -5.5, 6.0, -6.1]]
+    )
+    def test_nearest_first_which_says_which_turn(self, ur5, q):
         found = ur5.inverse_kinematics(ur5.poses(q), near=q).configurations
         np.testing.assert_allclose(found[0], q, atol=1e-8)
         assert (np.diff(np.abs(found - q).max(axis=1)) >= 0).all()
-        assert (np.abs(found - q) <= np.pi + 1e-9).all()
-
-    def test_near_says_which_turn(self, ur5):
-        q = np.array([5.0, -4.0, 3.5, -5.5, 6.0, -6.1])
-        found = ur5.inverse_kinematics(ur5.poses(q), near=q).configurations
-        np.testing.assert_allclose(found[0], q, atol=1e-8)
 
     def test_turns_are_told_apart(self, ur5):
         pose = ur5.poses([0.3, -1.2, 1.4, -1, -1.5, 0.4])
@@ -309,56 +291,32 @@ class TestChoices:
         np.testing.assert_array_equal(free.owner, found.owner[~touching])
 
 
-class TestDeterminism:
-    def test_of_other_targets_and_threads(self, simulator):
-        poses = simulator.world.poses(random_configurations(simulator, 10, 200))
-        together = simulator.world.inverse_kinematics(poses)
-        spread = World(simulator.problem, threads=3).inverse_kinematics(poses)
-        np.testing.assert_array_equal(together.configurations, spread.configurations)
-        for row in (0, 57, 199):
-            alone = simulator.world.inverse_kinematics(poses[row])
-            np.testing.assert_array_equal(alone.configurations, together.of(row))
-
-    def test_many_lots(self, simulator):
-        positions = simulator.world.poses(random_configurations(simulator, 11, 1100))[:, :3, 3]
-        found = simulator.world.inverse_kinematics(positions, most=2)
-        assert found.owner[-1] == 1099
-        np.testing.assert_array_equal(
-            found.of(1099), simulator.world.inverse_kinematics(positions[-1], most=2).of(0)
-        )
-
-    def test_no_targets(self, simulator):
-        found = simulator.world.inverse_kinematics(np.empty((0, 3)))
-        assert len(found) == 0
-        assert repr(found) == "InverseSolutions(0 spread configurations)"
+def test_other_targets_and_threads_do_not_matter(simulator):
+    positions = simulator.world.poses(random_configurations(simulator, 11, 1100))[:, :3, 3]
+    together = simulator.world.inverse_kinematics(positions, most=2)
+    spread = World(simulator.problem, threads=3).inverse_kinematics(positions, most=2)
+    np.testing.assert_array_equal(together.configurations, spread.configurations)
+    for row in (0, 577, 1099):
+        alone = simulator.world.inverse_kinematics(positions[row], most=2)
+        np.testing.assert_array_equal(alone.configurations, together.of(row))
 
 
 POINT = [0.1, -0.5, 0.4]
 
 
-class TestRefusals:
-    @pytest.mark.parametrize(
-        ("given", "message"),
-        [
-            ({"targets": [0, 0]}, r"targets must have shape \(3\)"),
-            ({"targets": [[0, 0, 0], [0, 0]]}, "targets must be numbers"),
-            ({"targets": np.full((2, 3), np.nan)}, "targets must be finite"),
-            ({"targets": np.zeros((4, 4))}, "target 0 is no pose"),
-            ({"targets": [np.eye(4), np.diag([1, 1, -1, 1.0])]}, "target 1 is no pose"),
-            ({"targets": np.eye(4), "directions": [0, 0, 1]}, "do not apply"),
-            ({"targets": POINT, "tool_axis": [0, 0, 1]}, "only with directions"),
-            ({"targets": POINT, "directions": [0, 0, 0]}, "directions must not be zero"),
-            ({"targets": POINT, "directions": np.ones((2, 3))}, "2 for 1"),
-            ({"targets": POINT, "directions": [0, 1, 0], "tool_axis": [0, 0]}, "tool_axis must"),
-            ({"targets": POINT, "near": np.zeros(5)}, "near must have shape"),
-            ({"targets": POINT, "near": np.full(6, 7.0)}, "near lies outside the limits"),
-            ({"targets": POINT, "joints": 0}, "joints must be a whole number"),
-            ({"targets": POINT, "joints": 7}, "joints must be at most 6, got 7"),
-            ({"targets": POINT, "most": 0}, "most must be a whole number"),
-            ({"targets": POINT, "separation": 0.0}, "separation must be greater than 0"),
-        ],
-    )
-    def test_in_one_line(self, simulator, given, message):
-        with pytest.raises(InvalidInputError, match=message) as caught:
-            simulator.world.inverse_kinematics(**given)
-        assert "\n" not in str(caught.value)
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"targets": [0, 0]}, r"targets must have shape \(3\)"),
+        ({"targets": [np.eye(4), np.diag([1, 1, -1, 1.0])]}, "target 1 is no pose"),
+        ({"targets": POINT, "tool_axis": [0, 0, 1]}, "only with directions"),
+        ({"targets": POINT, "directions": np.ones((2, 3))}, "2 for 1"),
+        ({"targets": POINT, "near": np.full(6, 7.0)}, "near lies outside the limits"),
+        ({"targets": POINT, "joints": 7}, "joints must be at most 6, got 7"),
+        ({"targets": POINT, "separation": 0.0}, "separation must be greater than 0"),
+    ],
+)
+def test_refusals_are_one_line(simulator, given, message):
+    with pytest.raises(InvalidInputError, match=message) as caught:
+        simulator.world.inverse_kinematics(**given)
+    assert "\n" not in str(caught.value)

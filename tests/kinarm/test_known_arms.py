@@ -1,4 +1,4 @@
-"""Arms of other packages: kinematics against Pinocchio's and MuJoCo's reading of the whole URDF."""
+"""Arms of other packages: kinematics and contact against Pinocchio, MuJoCo and Coal."""
 
 import math
 from xml.etree import ElementTree
@@ -6,20 +6,25 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 import pytest
-from known_arms import INSTALLED, KNOWN_ARMS
+from configurations import contact_boundary, jittered, random_configurations
+from known_arms import EACH_ARM, INSTALLED, simulator_among_boxes
+from reference_episodes import compare_actions
 
 from kinarm.arm import Arm
 from kinarm.collision import ContactModel
-from kinarm.problem import PROBLEMS
 from kinarm.scene import Scene
-from kinarm.world import World
 
 pytestmark = INSTALLED
 
 
-@pytest.fixture(scope="module", params=KNOWN_ARMS)
+@pytest.fixture(scope="module", params=EACH_ARM)
 def arm(request):
     return Arm.load(request.param)
+
+
+@pytest.fixture(scope="module")
+def simulator(arm):
+    return simulator_among_boxes(arm.name)
 
 
 def configurations(arm, count=100):
@@ -64,28 +69,8 @@ def test_joint_frames_and_tool_are_those_of_the_whole_robot(arm):
         np.testing.assert_allclose(arm.tool_position(q), expected, rtol=0, atol=1e-12)
 
 
-def test_and_those_of_pinocchios_own_reduced_model(arm):
-    if arm.name == "so100":
-        pytest.skip("Pinocchio reduces no robot of which a joint and a link share a name")
-    whole = pin.buildModelFromUrdf(str(arm.urdf_path))
-    locked = [
-        whole.getJointId(name) for name in list(whole.names)[1:] if name not in arm.joint_names
-    ]
-    held = whole_configuration(whole, arm, arm.home)
-    reduced = pin.buildReducedModel(whole, locked, held)
-    assert tuple(reduced.names)[1:] == arm.joint_names
-    data, frame = reduced.createData(), arm.specification.completed().tool_frame
-    for q in configurations(arm, 20):
-        own = whole_configuration(whole, arm, q)
-        rows = [whole.joints[whole.getJointId(name)] for name in arm.joint_names]
-        shorter = np.concatenate([own[row.idx_q : row.idx_q + row.nq] for row in rows])
-        pin.framesForwardKinematics(reduced, data, shorter)
-        expected = tool_of(arm, data.oMf[reduced.getFrameId(frame, pin.FrameType.BODY)])
-        np.testing.assert_allclose(arm.tool_position(q), expected, rtol=0, atol=1e-12)
-
-
-def test_kernels_agree_with_pinocchio(arm):
-    world = World(PROBLEMS["both"].replace(arm=arm))
+def test_kernels_agree_with_pinocchio(simulator):
+    arm, world = simulator.arm, simulator.world
     q = configurations(arm)
     expected = [arm.tool_position(each) for each in q]
     np.testing.assert_allclose(world.screen(q)[0], expected, rtol=0, atol=1e-12)
@@ -144,3 +129,20 @@ def test_agrees_with_mujocos_reading_of_the_urdf(name):
             turned = body.xmat.reshape(3, 3)
             np.testing.assert_allclose(own.oMi[index].rotation, turned, rtol=0, atol=1e-6)
         np.testing.assert_allclose(arm.tool_position(q), data.body(tool).xpos, rtol=0, atol=1e-6)
+
+
+def test_the_proof_never_clears_what_touches(simulator):
+    near = np.concatenate(contact_boundary(simulator, 6, 300))
+    parts = [near, *(jittered(near, 6 + number) for number in range(3))]
+    asked = np.concatenate([*parts, random_configurations(simulator, 6, 4000)])
+    _, free, surely_touching, _ = simulator.world.proven(asked)
+    touching = simulator.world.contact_model.in_contact(asked)
+    assert 0.05 < touching.mean() < 0.99
+    assert not (free & touching).any()
+    assert not (surely_touching & ~touching).any()
+    assert free.any()
+
+
+def test_rollouts_equal_the_reference_path(simulator):
+    _, collision, count = compare_actions(simulator, 5, 12)
+    assert 0 < collision <= count

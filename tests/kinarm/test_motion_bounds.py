@@ -3,13 +3,11 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from kinarm.arm import Arm
 from kinarm.motion_bounds import MotionBounds, link_lengths, point_speed
 
-NAMES = ("lrmate200ic_5l", "paper", "paper_flange", "sliding", "mesh", "gantry", "crane")
+NAMES = ("paper", "sliding", "mesh", "gantry", "crane")
 
 ROUNDING = 1e-12
 
@@ -136,12 +134,6 @@ class TestPointSpeed:
         assert point_speed(planar_chain, 0, 2, tool) == pytest.approx(0.5 + np.hypot(0.3, 0.2))
         assert point_speed(planar_chain, 0, 1, np.array([[0.3, 0.4, 9.0]])) == pytest.approx(0.5)
 
-    def test_slides_move_every_point_alike(self, arms):
-        chain = arms["gantry"].chain
-        for link in (2, 3, 4):
-            assert point_speed(chain, 0, link, np.full((1, 3), 7.0)) == 1
-            assert point_speed(chain, 1, link, np.full((1, 3), 7.0)) == 1
-
     def test_the_extent_of_a_slide_counts(self, arms):
         # Joint 3 starts (0, 0.02, 0.1) from joint 2, whose axis is y, and slides by up to 0.6 m.
         speed = point_speed(arms["crane"].chain, 1, 3, np.zeros((1, 3)))
@@ -153,30 +145,6 @@ class TestCurvature:
         deviations, allowed = remainder_shares(arm, *moves(arm, np.random.default_rng(2), 900))
         assert (deviations <= allowed + ROUNDING).all()
         assert (deviations > 0.3 * allowed)[allowed > 1e-6].any()
-
-    @settings(max_examples=60)
-    @given(st.integers(0, 2**32 - 1), st.sampled_from(NAMES))
-    def test_holds_for_random_moves(self, arms, seed, name):
-        before, after = moves(arms[name], np.random.default_rng(seed), 3)
-        deviations, allowed = remainder_shares(arms[name], before, after)
-        assert (deviations <= allowed + ROUNDING).all()
-
-    def test_bounds_second_differences(self, arm):
-        curvature, n, h = bounds_of(arm).curvature, arm.n_actuated, 1e-4
-        rng = np.random.default_rng(3)
-        largest = np.zeros((n, n))
-        for q in rng.uniform(arm.lower + 2 * h, arm.upper - 2 * h, (60, arm.n_joints)):
-            for i in range(n):
-                ahead, behind = (
-                    velocities(
-                        arm, q + s * h * np.eye(arm.n_joints)[i], arm.n_joints, arm.chain.tool
-                    )
-                    for s in (1, -1)
-                )
-                change = np.linalg.norm(ahead - behind, axis=0)[:n] / (2 * h)
-                largest[i] = np.fmax(largest[i], change)
-        assert (largest <= curvature + 1e-6).all()
-        assert (largest[curvature > 0] > 0.2 * curvature[curvature > 0]).all()
 
     def test_is_symmetric_and_zero_where_slides_come_first(self, arm):
         curvature = bounds_of(arm).curvature
@@ -206,11 +174,6 @@ class TestJointOrigins:
             shares = np.fmax(shares, motion / np.fmax(allowed, 1e-9))
         assert (shares[bounds.swing.any(axis=0)] > 0.3).all()
 
-    def test_only_axes_before_an_origin_move_it(self, arm):
-        swing = bounds_of(arm).swing
-        np.testing.assert_array_equal(swing, np.triu(swing))
-        np.testing.assert_array_equal(np.diag(swing), arm.chain.prismatic[: arm.n_actuated])
-
     def test_length_bounds_the_distance_to_the_tool(self, arm):
         length, n = bounds_of(arm).length, arm.n_actuated
         farthest = np.zeros(n)
@@ -220,14 +183,6 @@ class TestJointOrigins:
             assert (distance <= length + ROUNDING).all()
             farthest = np.fmax(farthest, distance)
         assert (farthest > 0.6 * length).all()
-
-    def test_lengths_of_the_default_arm(self, shipped_arms):
-        chain = shipped_arms["paper"].chain
-        forearm = np.hypot(0.32, 0.075)
-        expected = [0.33, 0.075, 0.30, forearm, 0, 0.08]
-        np.testing.assert_allclose(link_lengths(chain), expected, atol=1e-15)
-        beyond = [0.605 + forearm, 0.53 + forearm, 0.23 + forearm, 0.23, 0.23]
-        np.testing.assert_allclose(MotionBounds.of(chain, 5).length, beyond, atol=1e-15)
 
     def test_slides_count_with_their_longer_side(self, arms):
         lengths = link_lengths(arms["gantry"].chain)

@@ -10,16 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kinarm.observation import (
-    GOAL_SIDE,
     Ranges,
     observation_bounds,
     observation_layout,
     observation_signs,
     observation_size,
-    observation_table,
     part_slices,
 )
-from kinarm.reference import ReferenceSimulator
 
 REFLECTION = np.array([1.0, -1.0, 1.0])
 
@@ -52,20 +49,6 @@ class TestParts:
                 np.testing.assert_allclose(rotation, data.oMi[k + 1].rotation, rtol=0, atol=1e-12)
             assert distance == pytest.approx(np.linalg.norm(goal - tool), abs=1e-12)
 
-    def test_equal_the_reference(self, any_simulator, situations):
-        reference = ReferenceSimulator(any_simulator)
-        distances = any_simulator.world.distances(*situations[:2])
-        for q, goal, seen, distance in zip(*situations, distances, strict=True):
-            expected, expected_distance = reference.observe(q, goal)
-            np.testing.assert_allclose(seen, expected, rtol=0, atol=1e-12)
-            assert distance == pytest.approx(expected_distance, abs=1e-12)
-
-    def test_at_zero(self, simulator):
-        seen = simulator.world.observe(np.zeros((1, 6)), np.zeros((1, 3)))[0]
-        np.testing.assert_array_equal(seen[6:30].reshape(6, 4), np.tile([1, 0, 0, 0], (6, 1)))
-        heights = seen[30:].reshape(6, 3)[:, 2]
-        np.testing.assert_allclose(heights, [0.33, 0.33, 0.63, 0.705, 0.705, 0.705], atol=1e-12)
-
 
 class TestTable:
     @pytest.mark.parametrize("n_joints", [1, 3, 6, 7])
@@ -79,17 +62,6 @@ class TestTable:
 
     def test_layout_names_version_parts_and_lengths(self):
         assert observation_layout() == ("1: goal 3, goal_minus_tool 3, orientation 4n, position 3n")
-
-    def test_table_for_people(self):
-        rows = observation_table(6)
-        assert [row[0] for row in rows] == ["0-2", "3-5", "6-29", "30-47"]
-        assert [row[2] for row in rows] == ["m", "m", "1", "m"]
-        assert all(row[1] for row in rows)
-
-    def test_goal_side_is_the_y_of_the_goal(self):
-        goal = part_slices(6)["goal"]
-        assert goal.start + 1 == GOAL_SIDE
-        assert observation_signs(6)[GOAL_SIDE] == -1
 
 
 class TestSigns:
@@ -114,9 +86,6 @@ class TestSigns:
                 np.testing.assert_allclose(
                     positions[k], REFLECTION * data.oMi[k + 1].translation, atol=1e-12
                 )
-
-    def test_reflecting_twice_changes_nothing(self):
-        assert set(np.abs(observation_signs(6))) == {1.0}
 
 
 class TestBounds:

@@ -8,8 +8,8 @@ import pytest
 from kinarm._parallel import run_rows, run_together
 
 
-@pytest.mark.parametrize("n", [1, 2, 7, 255, 256, 1000])
-@pytest.mark.parametrize("threads", [1, 2, 3, 8])
+@pytest.mark.parametrize("n", [1, 7, 1000])
+@pytest.mark.parametrize("threads", [1, 3])
 @pytest.mark.parametrize("work", [1, 10**6])
 def test_every_row_is_worked_on_once(n, threads, work):
     counts = np.zeros(n, dtype=int)
@@ -75,10 +75,3 @@ class TestTogether:
         finally:
             free.set()
             others.join()
-
-    def test_failure_of_a_thread_reaches_the_caller(self):
-        def fail(counters, thread):
-            raise RuntimeError("no")
-
-        with pytest.raises(RuntimeError, match="no"):
-            run_together(fail, 10**6, 2, int)

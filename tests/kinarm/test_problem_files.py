@@ -1,19 +1,15 @@
 """Problems, scenes and tasks: by name, and from files."""
 
 import shutil
+from contextlib import nullcontext
 
 import pytest
 
+from kinarm._files import shipped_files
 from kinarm.arm import ArmSpecification
 from kinarm.errors import InvalidInputError, OutputError, ProblemError, UnknownNameError
 from kinarm.problem import PROBLEMS, ReachProblem
-from kinarm.problem_files import (
-    find_scene,
-    find_task,
-    problem_names,
-    scene_names,
-    shipped_files,
-)
+from kinarm.problem_files import find_scene, find_task
 from kinarm.scene import GoalRegion, Obstacle, Scene
 from kinarm.task import ReachTask, RewardWeights
 from kinarm.world import World
@@ -33,30 +29,13 @@ def write(tmp_path):
     return write_file
 
 
-class TestLoad:
-    def test_by_name_object_and_file(self, write):
-        assert ReachProblem.load("left") is PROBLEMS["left"]
-        assert ReachProblem.load(RIGHT) is RIGHT
-        path = write(RIGHT.replace(name="mine").to_toml())
-        for source in (path, str(path)):
-            assert ReachProblem.load(source) == RIGHT.replace(name="mine")
-
-    def test_unknown_name(self):
-        with pytest.raises(
-            UnknownNameError,
-            match="problem 'up'; available: left, right, both, .*shelf-panda.*, path/to/problem",
-        ):
-            ReachProblem.load("up")
-
-    @pytest.mark.parametrize("name", ["gone.toml", "folder/gone", "gone/mine.toml"])
-    def test_missing_file(self, tmp_path, name):
-        with pytest.raises(InvalidInputError, match="cannot read problem .*gone.*No such file"):
-            ReachProblem.load(tmp_path / name)
-
-    def test_name_of_a_file_in_the_current_folder(self, write, monkeypatch, tmp_path):
-        write("", "plain")
-        monkeypatch.chdir(tmp_path)
-        assert ReachProblem.load("plain").name == "plain"
+def test_problems_are_loaded_by_name_object_and_file(write, monkeypatch, tmp_path):
+    assert ReachProblem.load("left") is PROBLEMS["left"]
+    assert ReachProblem.load(RIGHT) is RIGHT
+    path = write(RIGHT.replace(name="mine").to_toml(), "plain")
+    monkeypatch.chdir(tmp_path)
+    for source in (path, str(path), "plain"):
+        assert ReachProblem.load(source) == RIGHT.replace(name="mine")
 
 
 class TestFile:
@@ -120,44 +99,14 @@ class TestFile:
         ("text", "message"),
         [
             ("[task]\nhorizons = 3", "unknown key 'task.horizons'; available: .*horizon"),
-            ("horizon = 3", "unknown key 'horizon'; available: name, arm, scene, task, stepping"),
-            ("[arm]\nn_actuated = 5", "unknown key 'arm.n_actuated'"),
             ('[task]\ntolerance = "5 cm"', r"task.tolerance must be a number \[m\], got '5 cm'"),
-            ("[task]\nhorizon = 0", "task: horizon must be a whole number of at least 1, got 0"),
-            ("[task]\ntolerance = -1", "task: tolerance must be greater than 0 m, got -1"),
             ("[task.reward]\ncollision = 1", "task.reward: .*collision = 1 rewards contact"),
             ('[task]\ngoal_regions = ["up"]', "goal region in task.goal_regions: 'up'"),
-            ('[task]\ngoal_regions = ["left", "left"]', "goal_regions names one twice: left, left"),
-            ("[stepping]\ntime_step = 0", "stepping: time_step must be finite and above 0 s"),
-            ("task = 3", "task must be a table, got 3"),
-            ('[arm]\nhome = "zero"', r"arm.home must be a list, each entry a number \[rad or m\]"),
             ('base = "up"', "base must be one of left, right, both, got 'up'"),
             ("[task", r"not a problem file: .* \(at end of document\)"),
             (
-                "[task]\nhorizon = 3\nhorizon = 4",
-                "not a problem file: Cannot overwrite a value",
-            ),
-            ("a = " + "[" * 5000, "not a problem file: "),
-            (
                 '[[scene.obstacles]]\nname = "post"\nlower = [0, 0, 0]',
                 r"'scene.obstacles\[0\].upper' is missing: Opposite corners",
-            ),
-            (
-                '[[scene.obstacles]]\nname = "post"\nlower = [0, 0]\nupper = [1, 1, 1]',
-                r"scene.obstacles\[0\].lower must be a list of 3, each a number \[m\]",
-            ),
-            (
-                '[[scene.goal_regions]]\nname = "right"\nlower = [0, 0, 1]\nupper = [1, 0, 1]',
-                r"scene.goal_regions\[0\]: goal region 'right' is empty",
-            ),
-            (
-                2
-                * '[[scene.goal_regions]]\nname = "right"\nlower = [0, 0, 1]\nupper = [1, 1, 1]\n',
-                "scene: two goal regions are called 'right'",
-            ),
-            (
-                2 * '[[scene.obstacles]]\nname = "box"\nlower = [0, 0, 0]\nupper = [1, 1, 1]\n',
-                "scene: two obstacles are called 'box'",
             ),
         ],
     )
@@ -182,14 +131,6 @@ class TestShippedProblems:
             names = [part.name for part in getattr(scene, parts)]
             assert [part.name for part in getattr(problem.scene, parts)] == names
 
-    def test_the_benches_are_the_papers(self):
-        assert find_scene("benches") == Scene()
-
-    def test_names(self):
-        assert problem_names()[:3] == ("left", "right", "both")
-        assert {"shelf-panda", "benches-ur5", "desk-so101", "post-paper"} < set(problem_names())
-        assert {"benches", "table", "shelf", "ring", "post", "desk"} <= set(scene_names())
-
 
 class TestScenesAndTasks:
     BOX = (
@@ -205,7 +146,7 @@ class TestScenesAndTasks:
         assert find_scene(write(self.BOX[self.BOX.index("[[goal") :])).obstacles == ()
 
     def test_of_a_problem_by_name_or_file(self, write):
-        assert find_scene("both") == Scene()
+        assert find_scene("both") == find_scene("benches") == Scene()
         assert find_scene("shelf-panda") == ReachProblem.load("shelf-panda").scene
         assert find_task("left") == PROBLEMS["left"].task
         path = write('base = "left"\n[task]\nhorizon = 7')
@@ -225,19 +166,23 @@ class TestScenesAndTasks:
         assert problem.task == ReachTask(goal_regions=("top",), horizon=9)
         assert problem.scene.obstacles[0].name == "box"
 
-    def test_unknown_names_list_what_there_is(self):
-        with pytest.raises(UnknownNameError, match="scene 'up'; .*both.*shelf, table, path"):
-            find_scene("up")
-        with pytest.raises(UnknownNameError, match="task 'up'; .*both, .*path/to/task"):
-            find_task("up")
+    @pytest.mark.parametrize(
+        ("find", "message"),
+        [
+            (ReachProblem.load, "problem 'up'; available: left, right, both, .*shelf-panda"),
+            (find_scene, "scene 'up'; .*both.*shelf, table, path"),
+            (find_task, "task 'up'; .*both, .*path/to/task"),
+        ],
+    )
+    def test_unknown_names_list_what_there_is(self, find, message):
+        with pytest.raises(UnknownNameError, match=message):
+            find("up")
 
     @pytest.mark.parametrize(
         ("text", "message"),
         [
             ("ground = true", "'goal_regions' is missing"),
-            ("[[goal_regions]]\nname = 3", "missing|must be a text"),
             ("ground = ", r"not a scene file: .*\(at end of document"),
-            (BOX + "[mount]\nrpy = [0, 0]", "mount.rpy must be a list of 3"),
             (BOX.replace("yaw = 0.5", "yaw = inf"), "yaw"),
         ],
     )
@@ -248,36 +193,22 @@ class TestScenesAndTasks:
         assert str(caught.value).startswith(f"{path}: ")
 
 
-class TestGoalsInObstacles:
-    """A region all of which lies inside an obstacle is refused; yaw counts."""
+QUARTER = 1.5707963267948966
 
-    WALL = Obstacle(name="wall", lower=(0.3, -0.5, 0), upper=(0.4, 0.5, 1))
 
-    def problem(self, lower, upper, yaw=0.0):
-        wall = Obstacle(name="wall", lower=self.WALL.lower, upper=self.WALL.upper, yaw=yaw)
-        region = GoalRegion(name="goal", lower=lower, upper=upper)
-        scene = Scene(obstacles=(wall,), goal_regions=(region,))
-        return ReachProblem(name="made", scene=scene, task=ReachTask())
-
-    @pytest.mark.parametrize(
-        ("lower", "upper", "yaw"),
-        [
-            ((0.32, -0.2, 0.5), (0.38, 0.2, 0.6), 0.0),
-            ((0.3, -0.5, 0.5), (0.4, 0.5, 0.5), 0.0),
-            ((0.15, -0.04, 0.5), (0.55, 0.04, 0.6), 1.5707963267948966),
-        ],
-    )
-    def test_inside(self, lower, upper, yaw):
-        with pytest.raises(ProblemError, match="goal region 'goal' lies inside obstacle 'wall'"):
-            self.problem(lower, upper, yaw)
-
-    @pytest.mark.parametrize(
-        ("lower", "upper", "yaw"),
-        [
-            ((0.32, -0.2, 0.5), (0.42, 0.2, 0.6), 0.0),
-            ((0.3, -0.5, 1.0), (0.4, 0.5, 1.0), 0.0),
-            ((0.32, -0.2, 0.5), (0.38, 0.2, 0.6), 1.5707963267948966),
-        ],
-    )
-    def test_partly_or_on_it_or_beside_it_when_it_is_turned(self, lower, upper, yaw):
-        assert self.problem(lower, upper, yaw).task.goal_regions == ("goal",)
+@pytest.mark.parametrize(
+    ("lower", "upper", "yaw", "inside"),
+    [
+        ((0.32, -0.2, 0.5), (0.38, 0.2, 0.6), 0.0, True),
+        ((0.15, -0.04, 0.5), (0.55, 0.04, 0.6), QUARTER, True),
+        ((0.32, -0.2, 0.5), (0.42, 0.2, 0.6), 0.0, False),
+        ((0.32, -0.2, 0.5), (0.38, 0.2, 0.6), QUARTER, False),
+    ],
+)
+def test_goals_that_all_lie_inside_an_obstacle_are_refused(lower, upper, yaw, inside):
+    wall = Obstacle(name="wall", lower=(0.3, -0.5, 0), upper=(0.4, 0.5, 1), yaw=yaw)
+    region = GoalRegion(name="goal", lower=lower, upper=upper)
+    scene = Scene(obstacles=(wall,), goal_regions=(region,))
+    told = pytest.raises(ProblemError, match="goal region 'goal' lies inside obstacle 'wall'")
+    with told if inside else nullcontext():
+        ReachProblem(name="made", scene=scene, task=ReachTask())

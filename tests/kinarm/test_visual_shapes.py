@@ -48,16 +48,3 @@ def test_shapes_have_their_sizes_and_places(write_robot, make_joint, shape, exte
 def test_what_cannot_be_shown(write_robot, make_joint, visual, words):
     with pytest.raises(ArmError, match=words):
         seen(write_robot, make_joint, visual)
-
-
-def test_a_colour_that_is_not_said_is_black(write_robot, make_joint):
-    parts = [
-        seen(
-            write_robot,
-            make_joint,
-            f'<geometry><box size="1 1 1"/></geometry><material name="m"><color{rgba}/></material>',
-        )
-        for rgba in ("", ' rgba="0 0 0 1"', ' rgba="1 0 0 1"')
-    ]
-    unsaid, black, red = (each[0].finish for each in parts)
-    assert unsaid == black != red

@@ -1,6 +1,6 @@
 """Test every extra with the oldest libraries that ``pyproject.toml`` allows.
 
-``python tests/packaging/oldest_extras.py ppo render`` makes an environment for each of these
+``python tests/packaging/oldest_extras.py sb3 render`` makes an environment for each of these
 extras, by default for all in `EXTRAS`, and runs the tests that are not slow. Needs the network; the
 oldest torch brings 3 GB of CUDA packages. ``everywhere.py`` does the same without extras, and
 compares results.
@@ -16,7 +16,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 
-EXTRAS = ("peers", "ppo", "ray", "render", "robots", "slurm", "study", "tune", "zoo")
+EXTRAS = ("peers", "ray", "render", "robots", "sb3", "slurm", "study", "tune", "zoo")
 
 
 def oldest(extra: str) -> Iterator[str]:

@@ -6,23 +6,20 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from numba import njit
-from scipy import stats
 
 from kinarm.errors import InvalidInputError
 from kinarm.failed_scenarios import FailedScenarios
-from kinarm.kernels.lanes import LANES
 from kinarm.policies import ARSConfig, state_policy, train_policy
 from kinarm.policies.ars.algorithm import (
     ARSTraining,
-    ars_iteration,
+    Scenarios,
     ars_step,
+    draw_shared,
+    failed_after,
     perturbed_policies,
     top_directions,
 )
-from kinarm.policies.ars.kernels import logarithm, normal_pairs
 from kinarm.policies.ars.networks import perturbations
-from kinarm.policies.ars.scenarios import Scenarios, draw_shared, failed_after
 from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
 from kinarm.policies.mirror import problem_mirror
 from kinarm.policies.normalizer import Normalizer
@@ -44,10 +41,17 @@ def random_round(seed, directions=6):
     return rng.normal(size=(directions, 5, 48)), rng.normal(size=(2, directions))
 
 
+def iterate(config, simulator, state):
+    """One iteration, in a simulator that is there already."""
+    training = ARSTraining(config, threads=1)
+    training.simulator = simulator
+    return training.iterate(state)
+
+
 def run(config, simulator, iterations, state=None):
     states = [state or ARSTraining(config, threads=1).initial_state()]
     for _ in range(iterations):
-        states.append(ars_iteration(config, simulator, states[-1]))
+        states.append(iterate(config, simulator, states[-1]))
     return states
 
 
@@ -57,27 +61,20 @@ def assert_same_state(first, second):
     assert first.normalizer.mean.tobytes() == second.normalizer.mean.tobytes()
     assert first.normalizer.squares.tobytes() == second.normalizer.squares.tobytes()
     assert first.generator == second.generator
-    for a, b in zip(first.curve, second.curve, strict=True):
-        assert a[:4] == b[:4]
+    assert [point[:4] for point in first.curve] == [point[:4] for point in second.curve]
 
 
 def assert_same_policy(first, second):
-    assert first.mean.tobytes() == second.mean.tobytes()
-    assert first.std.tobytes() == second.std.tobytes()
-    assert first.layers[0].weights.tobytes() == second.layers[0].weights.tobytes()
+    pairs = zip(
+        (first.mean, first.std, *first.layers[0]),
+        (second.mean, second.std, *second.layers[0]),
+        strict=True,
+    )
+    assert all(a.tobytes() == b.tobytes() for a, b in pairs)
     assert first.provenance.environment_steps == second.provenance.environment_steps
 
 
 class TestStep:
-    def test_by_hand(self):
-        config = ARSConfig(directions=3, top_directions=2)
-        delta = np.array([[[1.0, 0.0]], [[0.0, 1.0]], [[1.0, 1.0]]])
-        returns = np.array([[1.0, 0.0, 0.2], [0.0, 3.0, 0.1]])
-        # Directions 2 and 1 lead; sigma is the population's over all six returns.
-        sigma = np.sqrt(np.mean((np.array([1, 0, 0.2, 0, 3, 0.1]) - 4.3 / 6) ** 2))
-        expected = 0.5 / (2 * sigma) * np.array([[1.0, -3.0]])
-        np.testing.assert_allclose(ars_step(config, delta, returns, 0.5), expected)
-
     @pytest.mark.parametrize("b", [1, 3, 6])
     def test_equals_algorithm_1(self, b):
         config = ARSConfig(directions=6, top_directions=b)
@@ -101,56 +98,10 @@ class TestStep:
         np.testing.assert_array_equal(step, np.zeros((5, 48)))
 
 
-class TestTopDirections:
-    def test_by_hand(self):
-        returns = np.array([[0, 5, 1, 2.0], [4, 0, 1, 3]])
-        np.testing.assert_array_equal(top_directions(returns, 2), [1, 0])
-
-    def test_exactly_b_with_ties_in_their_order(self):
-        returns = np.array([[1, 2, 1, 2, 1, 0.0], [0, 0, 1, 2, 0, 1]])
-        np.testing.assert_array_equal(top_directions(returns, 3), [1, 3, 0])
-        np.testing.assert_array_equal(top_directions(returns, 4), [1, 3, 0, 2])
-
-
-class TestPerturbations:
-    def test_are_those_of_box_and_muller(self):
-        drawn = perturbations(np.random.default_rng(1), (3, 5, 48))
-        radius, angle = np.random.default_rng(1).random((2, 360))
-        radius, angle = np.sqrt(-2 * np.log1p(-radius)), 2 * np.pi * angle
-        expected = [radius * np.cos(angle), radius * np.sin(angle)]
-        np.testing.assert_allclose(drawn, np.reshape(expected, (3, 5, 48)), rtol=0, atol=1e-14)
-
-    @pytest.mark.parametrize("shape", [(1, 1, 1), (2, 3, 3), (1, 2, 8), (4, 1, 7)])
-    def test_any_number_of_them(self, shape):
-        drawn = perturbations(np.random.default_rng(2), shape)
-        assert drawn.shape == shape
-        assert (drawn != 0).all()
-        assert len(np.unique(drawn)) == drawn.size
-
-    def test_are_normal_and_independent(self):
-        drawn = perturbations(np.random.default_rng(3), (200_000,))
-        assert stats.kstest(drawn, "norm").pvalue > 0.01
-        assert stats.kstest(drawn[:-1] * drawn[1:], drawn[::-1][:-2] * drawn[2:]).pvalue > 0.01
-        assert abs(np.corrcoef(drawn[:100_000], drawn[100_000:])[0, 1]) < 0.01
-        assert abs(np.corrcoef(drawn[:100_000] ** 2, drawn[100_000:] ** 2)[0, 1]) < 0.01
-
-    def test_the_least_likely_are_finite(self):
-        numbers = np.zeros((2, 1, LANES))
-        numbers[0, 0, :3] = (0.0, 1 - 2.0**-53, 0.5)
-        normal_pairs(numbers)
-        expected = [0, np.sqrt(2 * 53 * np.log(2)), np.sqrt(2 * np.log(2))]
-        np.testing.assert_allclose(numbers[0, 0, :3], expected, rtol=1e-15)
-
-
-@njit
-def logarithms(numbers):
-    return np.array([logarithm(number) for number in numbers])
-
-
-def test_logarithm():
-    rng = np.random.default_rng(4)
-    x = np.concatenate([1 - rng.random(10_000), 2.0 ** -np.arange(54), rng.random(1000) * 1e-9])
-    np.testing.assert_allclose(logarithms(x), np.log(x), rtol=4e-16)
+def test_exactly_b_directions_with_ties_in_their_order():
+    returns = np.array([[1, 2, 1, 2, 1, 0.0], [0, 0, 1, 2, 0, 1]])
+    np.testing.assert_array_equal(top_directions(returns, 3), [1, 3, 0])
+    np.testing.assert_array_equal(top_directions(returns, 4), [1, 3, 0, 2])
 
 
 class TestPolicies:
@@ -188,7 +139,7 @@ class TestIteration:
         simulator = config.simulator(threads=1)
         reference = ReferenceSimulator(simulator)
         state = run(config, simulator, 2)[-1]
-        after = ars_iteration(config, simulator, state)
+        after = iterate(config, simulator, state)
 
         rng = np.random.default_rng()
         rng.bit_generator.state = state.generator
@@ -221,56 +172,20 @@ class TestIteration:
         variance = np.maximum(second / count - combined**2, 0)
         np.testing.assert_allclose(after.normalizer.std**2, variance, atol=1e-10)
 
-    def test_statistics_are_frozen_within_an_iteration(self, tiny_simulator, monkeypatch):
-        state = run(TINY, tiny_simulator, 1)[-1]
-        used = []
-        original = tiny_simulator.rollout
-
-        def spy(networks, *args, **settings):
-            used.append((networks, settings["shift"].copy()))
-            return original(networks, *args, **settings)
-
-        monkeypatch.setattr(tiny_simulator, "rollout", spy)
-        ars_iteration(TINY, tiny_simulator, state)
-        assert len(used) == 1
-        networks, _ = used[0]
-        rng = np.random.default_rng()
-        rng.bit_generator.state = state.generator
-        delta = perturbations(rng, (4, 5, 48))
-        expected = perturbed_policies(state.theta, 0.03 * delta, state.normalizer)
-        np.testing.assert_array_equal(networks.weights, expected.weights)
-
-    def test_curve(self, tiny_simulator):
-        states = run(TINY, tiny_simulator, 4)
-        curve = states[-1].curve
-        assert [state.iteration for state in states] == [0, 1, 2, 3, 4]
-        steps = [point.environment_steps for point in curve]
-        assert all(8 <= b - a <= 8 * 8 for a, b in zip([0, *steps], steps, strict=False))
-        assert steps[-1] == states[-1].normalizer.count
-        assert all(np.isfinite(point).all() and point.std_return > 0 for point in curve)
-        assert all(0 <= point.success <= 1 for point in curve)
-
 
 class TestScenarios:
-    def draw(self, sharing, simulator, **settings):
-        config = replace(TINY, sharing=sharing, **settings)
-        starts, goals = drawn(config, simulator, np.random.default_rng(12)).of_all_episodes
-        table = np.concatenate([starts, goals], axis=1)
-        return table.reshape(2, config.directions, config.episodes, 9)
-
-    def test_none_shares_nothing(self, tiny_simulator):
-        table = self.draw("none", tiny_simulator, episodes=3)
-        assert len(np.unique(table.reshape(-1, 9), axis=0)) == 24
-
-    def test_pair_shares_between_the_signs(self, tiny_simulator):
-        table = self.draw("pair", tiny_simulator, episodes=3)
-        np.testing.assert_array_equal(table[0], table[1])
-        assert len(np.unique(table.reshape(-1, 9), axis=0)) == 12
-
-    def test_iteration_shares_among_all(self, tiny_simulator):
-        table = self.draw("iteration", tiny_simulator, episodes=3)
-        assert (table == table[:1, :1]).all()
-        assert len(np.unique(table.reshape(-1, 9), axis=0)) == 3
+    @pytest.mark.parametrize(
+        ("sharing", "different"), [("none", 24), ("pair", 12), ("iteration", 3)]
+    )
+    def test_are_shared(self, tiny_simulator, sharing, different):
+        config = replace(TINY, sharing=sharing, episodes=3)
+        scenarios = drawn(config, tiny_simulator, np.random.default_rng(12))
+        table = np.concatenate(scenarios.of_all_episodes, axis=1).reshape(2, 4, 3, 9)
+        assert len(np.unique(table.reshape(-1, 9), axis=0)) == different
+        if sharing == "pair":
+            np.testing.assert_array_equal(table[0], table[1])
+        if sharing == "iteration":
+            assert (table == table[:1, :1]).all()
 
     def test_with_a_mirror_all_goals_lie_on_the_right(self):
         """What was drawn on the right is as drawn; the rest is its image, free of contact, too."""
@@ -293,11 +208,8 @@ class TestScenarios:
         config = replace(TINY, sharing="iteration", episodes=30, replay_share=0.5, replay_size=20)
         states = run(config, tiny_simulator, 6)
         met = [set(map(tuple, state.failed.goals)) for state in states]
-        sizes = [len(state.failed.goals) for state in states]
-        assert sizes[0] == 0
-        assert sizes[-1] == 20
-        again = [len(before & after) for before, after in pairwise(met)]
-        assert sum(again) > 5
+        assert [len(state.failed.goals) for state in states][:: len(states) - 1] == [0, 20]
+        assert sum(len(before & after) for before, after in pairwise(met)) > 5
         for state in states[1:]:
             assert not tiny_simulator.world.screen(state.failed.starts)[1].any()
 
@@ -329,13 +241,12 @@ class TestTraining:
         )
 
     def test_equals_its_iterations(self, tiny_simulator):
-        states = run(TINY, tiny_simulator, TINY.iterations)
-        seen = []
+        states, seen = run(TINY, tiny_simulator, TINY.iterations), []
         result = train_policy(TINY, on_iteration=seen.append)
         assert [state.iteration for state in seen] == [1, 2, 3, 4, 5, 6]
         assert_same_state(seen[-1], states[-1])
-        assert_same_policy(result.policy, state_policy(TINY, states[-1]))
-        assert len(result.curve) == 6
+        assert result.curve[-1].environment_steps == states[-1].normalizer.count
+        assert all(np.isfinite(point).all() and point.std_return > 0 for point in result.curve)
 
     def test_policy_behaves_like_the_last_parameters(self, tiny_simulator):
         state = run(TINY, tiny_simulator, 3)[-1]
@@ -346,12 +257,6 @@ class TestTraining:
             policy.networks().weights, trained.weights[:1], rtol=1e-12, atol=1e-15
         )
 
-    def test_policy_without_normaliser(self):
-        config = replace(TINY, normalize=False)
-        policy = train_policy(config).policy
-        np.testing.assert_array_equal(policy.mean, np.zeros(48))
-        np.testing.assert_array_equal(policy.std, np.ones(48))
-
     def test_constant_inputs_of_the_training_have_weight_zero(self):
         # On one bench the height of the goal never changes, nor does the place of axis 1.
         policy = train_policy(TINY).policy
@@ -359,31 +264,14 @@ class TestTraining:
         np.testing.assert_array_equal(weights[[2, 30, 31, 32]], 0)
         assert (weights[[0, 1, 3]] != 0).all()
 
-    def test_provenance_says_how(self, shipped_arms):
-        result = train_policy(replace(TINY, recipe="mine"))
-        trained = result.policy.provenance
-        assert (trained.algorithm, trained.recipe, trained.seed) == ("ars", "mine", 5)
-        assert trained.problem == TINY.problem.pinned
-        assert trained.problem.arm.digest == shipped_arms["paper"].digest
-        assert trained.environment_steps == result.curve[-1].environment_steps
-        settings = {**trained.config, "problem": SHORT}
-        assert ARSConfig(**settings) == replace(TINY, recipe="mine")
-        assert "numpy" in trained.versions
-
     def test_linear_schedule_falls_to_zero(self):
         config = ARSConfig(step_size=0.4, step_size_schedule="linear", iterations=4)
         assert [config.step_size_at(k) for k in range(5)] == pytest.approx([0.4, 0.3, 0.2, 0.1, 0])
         assert ARSConfig(step_size=0.4).step_size_at(700) == 0.4
 
-    def test_without_weights_those_of_the_task_count(self):
-        weights = RewardWeights(success=3)
-        config = replace(TINY, problem=SHORT.replace(reward=weights))
-        assert config.simulator().task.reward == weights
-
     @pytest.mark.slow
     @pytest.mark.parametrize(
-        "settings",
-        [{}, {"step_size_schedule": "linear", "reward": RewardWeights(success=0.5)}],
+        "settings", [{}, {"step_size_schedule": "linear", "reward": RewardWeights(success=0.5)}]
     )
     def test_short_training_beats_standing_still_by_far(self, settings):
         """In half of six seeds at least: about one in three stops short of the goals."""
@@ -406,84 +294,52 @@ class TestTraining:
         assert good >= 3
 
 
-class TestResume:
-    @pytest.mark.parametrize("stop", [1, 3, 5])
-    def test_equals_an_uninterrupted_training(self, tmp_path, stop):
-        seen = []
-        whole = train_policy(TINY, on_iteration=seen.append)
-        save_checkpoint(tmp_path / "run.ckpt", TINY, seen[stop - 1])
-        config, state = load_checkpoint(tmp_path / "run.ckpt")
-        assert config == TINY
-        assert state.iteration == stop
-        rest = []
-        resumed = train_policy(config, state=state, on_iteration=rest.append)
-        assert len(rest) == 6 - stop
-        assert_same_state(rest[-1], seen[-1])
-        assert_same_policy(resumed.policy, whole.policy)
-
-    def test_equals_with_shared_scenarios_and_a_schedule(self, tmp_path):
-        config = replace(
-            TINY, sharing="pair", step_size_schedule="linear", episodes=2, problem="both"
-        )
-        seen = []
-        whole = train_policy(config, on_iteration=seen.append)
-        save_checkpoint(tmp_path / "run.ckpt", config, seen[2])
-        resumed = train_policy(config, state=load_checkpoint(tmp_path / "run.ckpt")[1])
-        assert_same_policy(resumed.policy, whole.policy)
-
-    def test_equals_with_replay(self, tmp_path):
-        config = replace(TINY, replay_share=0.5, replay_size=40, episodes=2)
-        seen = []
-        train_policy(config, on_iteration=seen.append)
-        save_checkpoint(tmp_path / "run.ckpt", config, seen[2])
-        rest = []
-        train_policy(
-            config, state=load_checkpoint(tmp_path / "run.ckpt")[1], on_iteration=rest.append
-        )
-        assert len(seen[-1].failed.goals) == 40
-        assert_same_state(rest[-1], seen[-1])
-
-    def test_finished_training_stays_as_it_is(self):
-        seen = []
-        whole = train_policy(TINY, on_iteration=seen.append)
-        again = train_policy(TINY, state=seen[-1])
-        assert_same_policy(again.policy, whole.policy)
+@pytest.mark.parametrize("stop", [1, 3, 6])
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"sharing": "pair", "step_size_schedule": "linear", "episodes": 2, "problem": "both"},
+        {"replay_share": 0.5, "replay_size": 40, "episodes": 2},
+    ],
+)
+def test_resumed_training_equals_an_uninterrupted_one(tmp_path, stop, changes):
+    config, seen = replace(TINY, **changes), []
+    whole = train_policy(config, on_iteration=seen.append)
+    save_checkpoint(tmp_path / "run.ckpt", config, seen[stop - 1])
+    loaded, state = load_checkpoint(tmp_path / "run.ckpt")
+    assert (loaded, state.iteration) == (config, stop)
+    rest = []
+    resumed = train_policy(loaded, state=state, on_iteration=rest.append)
+    assert len(rest) == 6 - stop
+    assert_same_state(resumed.state, seen[-1])
+    assert_same_policy(resumed.policy, whole.policy)
+    assert len(seen[-1].failed.goals) == config.replay_size if config.replay_share else True
 
 
-class TestConfig:
-    @pytest.mark.parametrize(
-        ("settings", "message"),
-        [
-            ({"directions": 0}, "directions must be a whole number of at least 1, got 0"),
-            ({"top_directions": 0}, "top_directions must be a whole number of at least 1"),
-            ({"top_directions": 25}, r"top_directions must be at most directions \(24\), got 25"),
-            ({"iterations": 0}, "iterations"),
-            ({"iterations": 1.5}, "iterations"),
-            ({"directions": 24.5}, "directions"),
-            ({"episodes": 0}, "episodes"),
-            ({"step_size": 0}, "step_size must be greater than 0, got 0"),
-            ({"step_size": float("nan")}, "step_size"),
-            ({"noise": -0.1}, "noise"),
-            ({"noise": float("inf")}, "noise"),
-            ({"seed": -1}, "seed must be a whole number of at least 0, got -1"),
-            ({"sharing": "all"}, "sharing must be one of none, pair, iteration, got 'all'"),
-            ({"step_size_schedule": "cosine"}, "step_size_schedule must be one of"),
-        ],
-    )
-    def test_impossible_settings_are_refused(self, settings, message):
-        with pytest.raises(InvalidInputError, match=message):
-            ARSConfig(**settings)
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"directions": 0}, "directions must be a whole number of at least 1, got 0"),
+        ({"top_directions": 25}, r"top_directions must be at most directions \(24\), got 25"),
+        ({"iterations": 1.5}, "iterations"),
+        ({"step_size": 0}, "step_size must be greater than 0, got 0"),
+        ({"step_size": float("nan")}, "step_size"),
+        ({"noise": float("inf")}, "noise"),
+        ({"seed": -1}, "seed must be a whole number of at least 0, got -1"),
+        ({"sharing": "all"}, "sharing must be one of none, pair, iteration, got 'all'"),
+    ],
+)
+def test_impossible_settings_are_refused(settings, message):
+    with pytest.raises(InvalidInputError, match=message):
+        ARSConfig(**settings)
 
 
-class TestMirror:
-    """Of a policy that treats mirror images alike, at any time of its training."""
-
-    def test_snapshots_have_it(self):
-        config = replace(TINY, problem="both", symmetric=True)
-        states = []
-        train_policy(config, on_iteration=states.append)
-        mirror = problem_mirror(config.problem)
-        for state in states:
-            policy = state_policy(config, state)
-            np.testing.assert_array_equal(policy.mirror.observations, mirror.observations)
-            np.testing.assert_array_equal(policy.mirror.actions, mirror.actions)
+def test_policies_at_any_time_of_a_training_have_the_mirror():
+    config, states = replace(TINY, problem="both", symmetric=True), []
+    train_policy(config, on_iteration=states.append)
+    mirror = problem_mirror(config.problem)
+    for state in states:
+        policy = state_policy(config, state)
+        np.testing.assert_array_equal(policy.mirror.observations, mirror.observations)
+        np.testing.assert_array_equal(policy.mirror.actions, mirror.actions)

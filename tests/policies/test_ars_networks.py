@@ -1,16 +1,21 @@
-"""Networks as policies of Augmented Random Search."""
+"""Networks as policies of Augmented Random Search, and its normal numbers."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from numba import njit
+from scipy import stats
 
+from kinarm.kernels.lanes import LANES
 from kinarm.observation import part_slices
 from kinarm.policies import ARSConfig, train_policy
+from kinarm.policies.ars.kernels import logarithm, normal_pairs
 from kinarm.policies.ars.networks import (
     first_deviations,
     initial_network,
     network_layers,
+    perturbations,
     perturbed_networks,
 )
 from kinarm.policies.normalizer import Normalizer
@@ -41,7 +46,7 @@ def test_first_network_does_nothing_and_has_lively_inner_layers():
     deviations = np.repeat([0.5, 0.02], 200)
     theta = initial_network(np.random.default_rng(0), deviations, (100, 50, 2))
     assert theta.shape == (1, 401 * 100 + 101 * 50 + 51 * 2)
-    first, second, last = network_layers(theta, (400, 100, 50))
+    first, second, last = network_layers(theta, (400, 100, 50, 2))
     assert first.weights[:, :200].std() == pytest.approx(0.5, rel=0.02)
     assert first.weights[:, 200:].std() == pytest.approx(0.02, rel=0.02)
     assert second.weights.std() == pytest.approx(1 / 10, rel=0.05)
@@ -68,7 +73,7 @@ def test_perturbed_networks_take_raw_observations():
     networks = perturbed_networks(theta, step, normalizer, WIDTHS)
     for row in range(6):
         parameters = theta + step[row] if row < 3 else theta - step[row - 3]
-        layers = network_layers(parameters, WIDTHS[:-1])
+        layers = network_layers(parameters, WIDTHS)
         expected = forward(layers, (x - normalizer.mean) * scale)
         np.testing.assert_allclose(by_networks(networks, row, x), expected, atol=1e-12)
 
@@ -100,3 +105,44 @@ def test_symmetric_networks_see_goals_on_the_left_in_the_mirror():
     second = simulator.rollout(policy, starts * signs, goals * [1, -1, 1])
     np.testing.assert_array_equal(first.steps, second.steps)
     np.testing.assert_allclose(first.distance, second.distance, rtol=0, atol=1e-9)
+
+
+class TestPerturbations:
+    def test_are_those_of_box_and_muller(self):
+        drawn = perturbations(np.random.default_rng(1), (3, 5, 48))
+        radius, angle = np.random.default_rng(1).random((2, 360))
+        radius, angle = np.sqrt(-2 * np.log1p(-radius)), 2 * np.pi * angle
+        expected = [radius * np.cos(angle), radius * np.sin(angle)]
+        np.testing.assert_allclose(drawn, np.reshape(expected, (3, 5, 48)), rtol=0, atol=1e-14)
+
+    @pytest.mark.parametrize("shape", [(1, 1, 1), (2, 3, 3), (1, 2, 8), (4, 1, 7)])
+    def test_any_number_of_them(self, shape):
+        drawn = perturbations(np.random.default_rng(2), shape)
+        assert drawn.shape == shape
+        assert (drawn != 0).all()
+        assert len(np.unique(drawn)) == drawn.size
+
+    def test_are_normal_and_independent(self):
+        drawn = perturbations(np.random.default_rng(3), (200_000,))
+        assert stats.kstest(drawn, "norm").pvalue > 0.01
+        assert stats.kstest(drawn[:-1] * drawn[1:], drawn[::-1][:-2] * drawn[2:]).pvalue > 0.01
+        assert abs(np.corrcoef(drawn[:100_000], drawn[100_000:])[0, 1]) < 0.01
+        assert abs(np.corrcoef(drawn[:100_000] ** 2, drawn[100_000:] ** 2)[0, 1]) < 0.01
+
+    def test_the_least_likely_are_finite(self):
+        numbers = np.zeros((2, 1, LANES))
+        numbers[0, 0, :3] = (0.0, 1 - 2.0**-53, 0.5)
+        normal_pairs(numbers)
+        expected = [0, np.sqrt(2 * 53 * np.log(2)), np.sqrt(2 * np.log(2))]
+        np.testing.assert_allclose(numbers[0, 0, :3], expected, rtol=1e-15)
+
+
+@njit
+def logarithms(numbers):
+    return np.array([logarithm(number) for number in numbers])
+
+
+def test_logarithm():
+    rng = np.random.default_rng(4)
+    x = np.concatenate([1 - rng.random(10_000), 2.0 ** -np.arange(54), rng.random(1000) * 1e-9])
+    np.testing.assert_allclose(logarithms(x), np.log(x), rtol=4e-16)

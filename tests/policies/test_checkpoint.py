@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinarm.errors import InvalidInputError, PolicyFileError
+from kinarm.errors import PolicyFileError
 from kinarm.policies import ARSConfig, train_policy
 from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
 from kinarm.problem import PROBLEMS
@@ -62,9 +62,8 @@ def test_before_the_first_iteration(state, tmp_path):
     assert load_checkpoint(tmp_path / "new.ckpt")[1].iteration == 0
 
 
-@pytest.mark.parametrize("content", [b"hello\n", b"PK\x03\x04junk", pickle.dumps({"theta": 1})])
-def test_other_content(saved, content):
-    saved.write_bytes(content)
+def test_pickle_is_no_checkpoint(saved):
+    saved.write_bytes(pickle.dumps({"theta": 1}))
     refused(saved)
 
 
@@ -73,30 +72,17 @@ def test_policy_is_no_checkpoint(saved, make_policy):
     refused(saved)
 
 
-@pytest.mark.parametrize(
-    "key",
-    [
-        *("header", "state.theta", "state.generator", "state.curve"),
-        *(f"state.normalizer.{name}" for name in ("count", "mean", "squares")),
-    ],
-)
-def test_missing_entry(saved, key):
-    kept = contents(saved)
-    del kept[key]
-    with saved.open("wb") as file:
-        np.savez(file, **kept)
-    refused(saved)
-
-
-def resume(path):
-    config, state = load_checkpoint(path)
-    return train_policy(config, state=state)
-
-
-def spoil(path, **entries):
-    kept = contents(path)
+def spoil(path, without=None, **entries):
+    kept = {**contents(path), **entries}
+    kept.pop(without, None)
     with path.open("wb") as file:
-        np.savez(file, **{**kept, **entries})
+        np.savez(file, **kept)
+
+
+@pytest.mark.parametrize("key", ["header", "state.theta", "state.curve", "state.normalizer.count"])
+def test_missing_entry(saved, key):
+    spoil(saved, without=key)
+    refused(saved)
 
 
 @pytest.mark.parametrize(
@@ -108,14 +94,10 @@ def test_bad_entry(saved, entries):
     refused(saved)
 
 
-def spoil_settings(path, **settings):
-    header = json.loads(str(contents(path)["header"]))
-    header["config"] |= settings
-    spoil(path, header=json.dumps(header))
-
-
 def test_impossible_setting_is_named(saved):
-    spoil_settings(saved, directions=0)
+    header = json.loads(str(contents(saved)["header"]))
+    header["config"]["directions"] = 0
+    spoil(saved, header=json.dumps(header))
     with pytest.raises(PolicyFileError, match="directions"):
         load_checkpoint(saved)
 
@@ -132,8 +114,7 @@ def test_impossible_setting_is_named(saved):
 )
 def test_state_that_does_not_fit_is_refused_before_training(saved, entries):
     spoil(saved, **entries)
-    with pytest.raises((InvalidInputError, PolicyFileError)):
-        resume(saved)
+    refused(saved)
 
 
 def test_an_arm_that_changed_since_is_refused(tmp_path, write_robot, make_joint):

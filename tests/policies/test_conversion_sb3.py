@@ -160,11 +160,10 @@ class TestNormalization:
         check_same(model, Policy.from_sb3(model), observations)
 
     def test_a_clip_that_cannot_happen_is_left_out(self, observations):
-        for clip_obs in (1e6, np.inf):
-            model = make_model("PPO", env=normalized(clip_obs=clip_obs))
-            policy = Policy.from_sb3(model)
-            assert "hardtanh" not in policy.activations
-            check_same(model, policy, observations)
+        model = make_model("PPO", env=normalized(clip_obs=np.inf))
+        policy = Policy.from_sb3(model)
+        assert "hardtanh" not in policy.activations
+        check_same(model, policy, observations)
 
     def test_a_clip_that_is_often_reached(self, observations):
         model = make_model("PPO", env=normalized(clip_obs=0.5, epsilon=1e-3))
@@ -284,12 +283,6 @@ class TestRefused:
             (name,) = own
             self.check(model, f"the model's observations, .*{name} \\({own[name].shape[0]},\\)")
 
-    def test_other_parts(self):
-        spaces = gymnasium.spaces.Dict({"camera": box(3)})
-        env = vec_env.DummyVecEnv([partial(Wrapped, spaces)])
-        model = sb3.PPO("MultiInputPolicy", env, device="cpu")
-        self.check(model, r"the model's observations, camera \(3,\), are not those of arm")
-
     def test_an_environment_that_is_none_of_ours(self):
         env = vec_env.DummyVecEnv([lambda: gymnasium.make("Pendulum-v1")])
         assert sb3_model(sb3.PPO("MlpPolicy", env, device="cpu")).problem is None
@@ -301,14 +294,6 @@ class TestRefused:
     @pytest.mark.parametrize("space", [box(7), box(48), box(50)])
     def test_other_observations(self, space):
         self.check(self.of_spaces(observation=space), "not those of arm 'paper'")
-
-    def test_flattened_goals_are_no_observation_of_the_simulator(self):
-        def make():
-            return gymnasium.wrappers.FlattenObservation(ReachGoalEnv("right"))
-
-        model = sb3.PPO("MlpPolicy", vec_env.DummyVecEnv([make]), device="cpu")
-        assert model.observation_space.shape == (48,)
-        self.check(model, "not those of arm 'paper'")
 
     def test_normalised_by_a_wrapper(self):
         def make():
@@ -348,5 +333,5 @@ class TestBadFile:
 
     def test_without_stable_baselines3(self, saved, monkeypatch):
         monkeypatch.setitem(sys.modules, "stable_baselines3.common.save_util", None)
-        with pytest.raises(MissingExtraError, match="stable-baselines3 is not installed.*ppo"):
+        with pytest.raises(MissingExtraError, match="stable-baselines3 is not installed.*sb3"):
             Policy.from_sb3(saved, "right")

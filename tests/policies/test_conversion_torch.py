@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from kinarm.errors import InvalidInputError, MissingExtraError, UnknownNameError
+from kinarm.errors import InvalidInputError, MissingExtraError
 from kinarm.policies import Policy
 from kinarm.policies.conversion.layers import module_pieces
 
@@ -96,11 +96,6 @@ def test_what_cannot_be_converted(module, message):
         Policy.from_torch(module, "right")
 
 
-def test_an_unknown_problem():
-    with pytest.raises(UnknownNameError, match="problem 'upwards'"):
-        Policy.from_torch(nn.Linear(48, 5), "upwards")
-
-
 def test_parameters_that_are_not_finite():
     module = nn.Linear(48, 5)
     module.weight.data[0, 0] = torch.nan
@@ -110,5 +105,5 @@ def test_parameters_that_are_not_finite():
 
 def test_without_torch_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "torch", None)
-    with pytest.raises(MissingExtraError, match=r"kinarm\[ppo\]"):
+    with pytest.raises(MissingExtraError, match=r"kinarm\[sb3\]"):
         next(module_pieces(nn.Tanh()))

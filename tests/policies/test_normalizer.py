@@ -35,18 +35,6 @@ def test_equals_the_statistics_of_all_observations(seed, batches):
     np.testing.assert_allclose(normalizer.std, data.std(axis=0), rtol=1e-6, atol=1e-9)
 
 
-def test_deviation_is_that_of_the_population():
-    normalizer = add(Normalizer.empty(1), [np.array([[1.0], [3.0]])])
-    assert normalizer.std == 1.0
-
-
-def test_before_the_first_observation_nothing_is_changed():
-    normalizer = Normalizer.empty(3)
-    np.testing.assert_array_equal(normalizer.mean, 0)
-    np.testing.assert_array_equal(normalizer.std, 1)
-    assert normalizer.count == 0
-
-
 @pytest.mark.parametrize("value", [0.325, 1e3, -1e6, 0.0])
 def test_constant_inputs_get_weight_zero(value):
     normalizer = Normalizer.empty(2)
@@ -61,14 +49,6 @@ def test_constant_inputs_get_weight_zero(value):
 
 def test_scale_is_the_inverse_deviation():
     np.testing.assert_array_equal(input_scale(np.array([2.0, 0.5, 0.0, 1e-7])), [0.5, 2, 0, 0])
-
-
-def test_statistics_of_given_observations():
-    data = np.random.default_rng(3).normal(2, 3, size=(200, 4))
-    seen = Normalizer.of(data)
-    assert seen.count == 200
-    np.testing.assert_allclose(seen.mean, data.mean(axis=0), rtol=1e-12)
-    np.testing.assert_allclose(seen.std, data.std(axis=0), rtol=1e-12)
 
 
 @pytest.mark.parametrize(("count", "squares"), [(-1, [0.0, 0.0]), (3, [0.0, -1e-9])])

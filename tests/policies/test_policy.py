@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, OutputError, PolicyFileError
 from kinarm.networks import Mirror
 from kinarm.observation import observation_layout
@@ -67,15 +68,15 @@ class TestCall:
         expected = 0.3 * np.tanh(2 * 0.7) + 0.4 * np.tanh(0.5 - 0.7) - 0.1
         np.testing.assert_allclose(policy([0.7]), [expected])
 
-    @pytest.mark.parametrize("output", FUNCTIONS)
-    @pytest.mark.parametrize("activation", FUNCTIONS)
-    def test_functions_between_and_after_the_layers(self, make_policy, activation, output):
-        policy = make_policy(9, 7, activations=(activation, activation, output))
+    @pytest.mark.parametrize(
+        ("between", "after"), [("tanh", "relu"), ("relu", "tanh"), ("linear",) * 2]
+    )
+    def test_functions_between_and_after_the_layers(self, make_policy, between, after):
+        policy = make_policy(9, 7, activations=(between, between, after))
         seen = np.random.default_rng(0).normal(size=(20, 48))
         x = (seen - policy.mean) / policy.std
-        between, after = FUNCTIONS[activation], FUNCTIONS[output]
-        for number, (weights, bias) in enumerate(policy.layers):
-            x = (after if number == 2 else between)(x @ weights.T + bias)
+        for (weights, bias), name in zip(policy.layers, policy.activations, strict=True):
+            x = FUNCTIONS[name](x @ weights.T + bias)
         np.testing.assert_allclose(policy(seen), np.clip(x, -1, 1), rtol=0, atol=1e-12)
 
     def test_batch_equals_single(self, make_policy):
@@ -124,11 +125,6 @@ class TestNetworks:
         for i, policy in enumerate(policies):
             alone = simulator.rollout(policy, starts[i : i + 1], goals[i : i + 1])
             assert alone.returns[0] == together.returns[i]
-
-    def test_constant_inputs_have_weight_zero(self, make_policy):
-        weights = make_policy(constant=2).networks().weights[0, : 48 * 5].reshape(48, 5)
-        np.testing.assert_array_equal(weights[:2], 0)
-        assert (weights[2:] != 0).all()
 
 
 class TestInvariants:
@@ -181,8 +177,6 @@ class TestCheckArm:
             make_policy().check_arm(shipped_arms["paper_flange"])
 
     def test_refuses_another_version_of_the_arm(self, make_policy):
-        from kinarm.arm import Arm
-
         with pytest.raises(PolicyFileError, match="another version of arm 'paper'"):
             make_policy().check_arm(Arm.load("paper", actuated=("axis_1", "axis_2")))
 
@@ -195,20 +189,6 @@ class TestFile:
         policy = make_policy(*hidden, activations=activations, mirror=mirror)
         policy.save(tmp_path / "policy.npz")
         assert_bitwise_equal(policy, Policy.load(tmp_path / "policy.npz"))
-
-    def test_constant_inputs_stay_without_influence(self, make_policy, tmp_path):
-        policy = make_policy(constant=5)
-        policy.save(tmp_path / "policy.npz")
-        loaded = Policy.load(str(tmp_path / "policy.npz"))
-        seen = np.random.default_rng(5).normal(size=48)
-        np.testing.assert_array_equal(policy(seen), loaded(seen))
-        np.testing.assert_array_equal(policy.networks().weights, loaded.networks().weights)
-        seen[:5] = 100
-        np.testing.assert_array_equal(policy(seen), loaded(seen))
-
-    def test_needs_no_pickle(self, saved):
-        with np.load(saved, allow_pickle=False) as file:
-            assert all(file[key].dtype != object for key in file.files)
 
     def test_failed_write_leaves_the_old_file(self, make_policy, saved, monkeypatch):
         before = saved.read_bytes()
@@ -239,10 +219,6 @@ class TestBadFile:
             with pytest.raises(PolicyFileError, match=f"^[^\n]*{saved.name}[^\n]*$"):
                 Policy.load(saved)
 
-    def test_foreign_npz(self, saved):
-        np.savez(saved, weights=np.zeros(3))
-        self.refused(saved, "not a kinarm policy")
-
     def test_pickle_inside(self, saved):
         np.savez(saved, **{**contents(saved), "mean": np.array([{}], dtype=object)})
         self.refused(saved, "policy")
@@ -266,11 +242,8 @@ class TestBadFile:
             ("std", np.full(48, np.nan)),
             ("std", np.full(48, -1.0)),
             ("weights_0", np.zeros((5, 47))),
-            ("bias_0", np.zeros(4)),
             ("mean", np.array(["a"] * 48)),
-            ("version", np.array("one")),
             ("header", np.array("{")),
-            ("header", np.array("[]")),
             ("header", np.array("{}")),
         ],
     )
@@ -279,7 +252,8 @@ class TestBadFile:
         self.refused(saved, "policy|provenance")
 
     def test_observations_of_another_layout(self, saved):
-        self.rewrite_header(saved, observation="0: goal 3")
+        header = json.loads(str(contents(saved)["header"])) | {"observation": "0: goal 3"}
+        np.savez(saved, **{**contents(saved), "header": json.dumps(header)})
         self.refused(saved, f"layout '0: goal 3', not '{observation_layout()}'")
 
     def test_half_a_mirror(self, make_policy, saved):
@@ -290,12 +264,6 @@ class TestBadFile:
             spoilt = saved.with_name(f"{name}.npz")
             np.savez(spoilt, **kept)
             self.refused(spoilt, "mirror")
-
-    def rewrite_header(self, path, without=None, **changes):
-        kept = contents(path)
-        header = {**json.loads(str(kept["header"])), **changes}
-        header.pop(without, None)
-        np.savez(path, **{**kept, "header": json.dumps(header)})
 
 
 def test_what_would_overflow_is_refused(provenance):

@@ -17,12 +17,7 @@ from kinarm.policies.provenance import (
 from kinarm.problem import ReachProblem
 
 
-def test_round_trip_through_json(provenance):
-    text = json.dumps(provenance.to_json())
-    assert Provenance.from_json(json.loads(text)) == provenance
-
-
-@pytest.mark.parametrize("entry", ["algorithm", "recipe", "problem", "environment_steps"])
+@pytest.mark.parametrize("entry", ["algorithm", "problem"])
 def test_missing_entry_is_named(provenance, entry):
     entries = provenance.to_json()
     del entries[entry]
@@ -71,14 +66,6 @@ def test_the_semantics_of_an_older_file_are_unknown(provenance):
     assert Provenance.from_json(known.to_json()) == known
 
 
-@pytest.fixture
-def anew():
-    """What is looked up once in a process is looked up again, before and after."""
-    source_commit.cache_clear()
-    yield
-    source_commit.cache_clear()
-
-
-def test_without_git_the_commit_is_unknown(anew, monkeypatch):
+def test_without_git_the_commit_is_unknown(monkeypatch):
     monkeypatch.setenv("PATH", "")
-    assert source_commit() == ""
+    assert source_commit.__wrapped__() == ""

@@ -6,10 +6,7 @@ from dataclasses import fields, replace
 import pytest
 
 from kinarm.errors import InvalidInputError, KinarmError, UnknownNameError
-from kinarm.policies import (
-    find_learner,
-    recipe,
-)
+from kinarm.policies import find_learner, recipe
 from kinarm.problem import PROBLEMS
 from kinarm.task import RewardWeights
 
@@ -82,12 +79,6 @@ class TestPPO:
         assert config.environment_steps == 1_200_000
         assert (config.recipe, config.problem, config.seed) == (name, PROBLEMS["both"], 2)
 
-    def test_paper_has_the_papers_reward(self):
-        config = recipe("ppo", "paper")
-        assert config.training_problem == config.problem == PROBLEMS["right"]
-        assert config.start_spread_at(0) == 1
-        assert not config.symmetric
-
     def test_paper_has_the_defaults_of_stable_baselines3(self):
         """All but those of arms and batches."""
         sb3 = pytest.importorskip("stable_baselines3")
@@ -147,22 +138,13 @@ class TestFile:
         ("text", "words"),
         [
             ("speed = 3", "mine.toml: unknown key 'speed'; available: problem, reward, seed"),
-            ('noise = "a"', "mine.toml: noise must be a number, got 'a'"),
-            ("iterations = 2.5", "mine.toml: iterations must be a whole number, got 2.5"),
             ("iterations = 0", "mine.toml: iterations must be .* at least 1, got 0"),
-            ('sharing = "all"', "mine.toml: sharing must be one of none, pair, iteration"),
             ("[reward]\nbonus = 1", "mine.toml: unknown key 'reward.bonus'; available: progress"),
             ("[reward]\ncollision = 2", "mine.toml: reward: .*rewards contact"),
-            ("reward = 1", "mine.toml: reward must be a table, got 1"),
             (
                 'base = "precise"',
                 "mine.toml: base must be one of paper, tuned, linear, best, v1, brs, got 'precise'",
             ),
-            (
-                'base = ["paper"]',
-                "mine.toml: base must be one of paper, tuned, linear, best, v1, brs",
-            ),
-            (f"noise = {'[' * 10_000}", "mine.toml: not a recipe file"),
             ("problem = 3", "mine.toml: problem must be the name or file of a problem, got 3"),
             ("noise =", "mine.toml: not a recipe file: "),
         ],

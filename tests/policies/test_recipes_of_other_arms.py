@@ -79,7 +79,6 @@ def test_progress_counts_in_the_arms_reach(half_right):
 
 
 def test_ppo_learns_the_same_in_a_world_of_half_the_size(half_right):
-    pytest.importorskip("stable_baselines3")
     small = {"iterations": 12, "n_epochs": 2, "seed": 1}
     half = train_policy(recipe("ppo", "tuned", problem=half_right, **small))
     whole = train_policy(recipe("ppo", "tuned", problem="right", **small))

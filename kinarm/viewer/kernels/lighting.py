@@ -8,7 +8,6 @@ from kinarm.viewer.kernels.views import Lights, Materials
 SHADOW_BIAS = 0.002
 """How much nearer the sun a shadow's cause must be [m]."""
 
-
 LOG_2 = math.log(2.0)
 
 Cell = tuple[int, int, float, float]
@@ -110,12 +109,8 @@ def light_up(
 
     Parameters
     ----------
-    materials : Materials
-        All materials.
-    lights : Lights
-        Where light comes from.
-    material : int
-        Row of the surface's material.
+    materials, lights, material
+        As in a `View`, and the row of the surface's material.
     share : float
         Share of the sun that reaches it.
     normal, view : tuple of float
@@ -135,7 +130,7 @@ def light_up(
     lost = 1.0 - slope - base
     # Where the maps of the room are looked up, and the two lights from afar.
     around = _octahedral(x, y, z, lights.irradiance.shape[0])
-    table = lights.reflections[materials.room[material]]
+    table = materials.reflections[material]
     mirrored = _octahedral(
         (2.0 * along * x - view[0]) * (1.0 - alpha) + x * alpha,
         (2.0 * along * y - view[1]) * (1.0 - alpha) + y * alpha,

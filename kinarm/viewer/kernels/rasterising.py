@@ -1,4 +1,4 @@
-"""Vertices to places, and triangles to the samples of a picture and to the texels of a shadow."""
+"""Triangles to the samples of a picture and to the texels of a shadow; see `views`."""
 
 import math
 
@@ -34,59 +34,24 @@ def _within(a: float, b: float, c: float, row: int, first: int, last: int) -> tu
 
 
 @kernel
-def place(
-    vertices: Array,
-    normals: Array,
-    frames: NDArray[np.int64],
-    poses: Array,
-    places: Array,
-    facings: Array,
-) -> None:
-    """Move vertices and normals from their frames to the world.
+def transform(points: Array, frames: NDArray[np.int64], transforms: Array, result: Array) -> None:
+    """Apply to each point the transform of its frame.
 
     Parameters
     ----------
-    vertices, normals : ndarray, shape (n_vertices, 3)
-        In their frames [m].
-    frames : ndarray of int, shape (n_vertices,)
-        Frame of each vertex.
-    poses : ndarray, shape (n_frames, 3, 4)
-        Frames in the world.
-    places, facings : ndarray, shape (n_vertices, 3)
-        Vertices and normals in the world; filled in.
-    """
-    for i in range(vertices.shape[0]):
-        pose = frames[i]
-        x, y, z = vertices[i, 0], vertices[i, 1], vertices[i, 2]
-        u, v, w = normals[i, 0], normals[i, 1], normals[i, 2]
-        for k in range(3):
-            a, b, c = poses[pose, k, 0], poses[pose, k, 1], poses[pose, k, 2]
-            places[i, k] = a * x + b * y + c * z + poses[pose, k, 3]
-            facings[i, k] = a * u + b * v + c * w
-
-
-@kernel
-def project(places: Array, projection: Array, corners: Array) -> None:
-    """Apply a projection to places.
-
-    Parameters
-    ----------
-    places : ndarray, shape (n, 3)
-        In the world [m].
-    projection : ndarray, shape (3, 4)
+    points, result : ndarray, shape (n, 3)
+        Points, and where they go; ``result`` is filled in.
+    frames : ndarray of int, shape (n,)
+        Frame of each point.
+    transforms : ndarray, shape (n_frames, 3, 4)
         For columns of x, y, z and 1.
-    corners : ndarray, shape (n, 3)
-        Filled in.
     """
-    for i in range(places.shape[0]):
-        x, y, z = places[i, 0], places[i, 1], places[i, 2]
+    for i in range(points.shape[0]):
+        frame = frames[i]
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
         for k in range(3):
-            corners[i, k] = (
-                projection[k, 0] * x
-                + projection[k, 1] * y
-                + projection[k, 2] * z
-                + projection[k, 3]
-            )
+            a, b, c = transforms[frame, k, 0], transforms[frame, k, 1], transforms[frame, k, 2]
+            result[i, k] = a * x + b * y + c * z + transforms[frame, k, 3]
 
 
 @kernel
@@ -104,16 +69,10 @@ def draw_view(
 
     Parameters
     ----------
-    corners : ndarray, shape (n_vertices, 3)
-        Vertices as the camera sees them: column and row of the picture times the distance along
-        the line of sight, and that distance [m].
-    faces : ndarray of int, shape (n_faces, 3)
-        Vertices of each triangle.
-    offsets : ndarray, shape (n_samples, 2)
-        Where in a pixel its samples lie, from its upper left corner.
+    corners, faces, offsets
+        As in `Surfaces` and `Eye`.
     nearness, index : ndarray, shape (height, width, n_samples)
-        What a sample shows: the inverse of its distance [1/m], and the triangle, -1 for none;
-        changed in place.
+        As ``nearness`` and ``seen`` in `View`; changed in place.
     """
     height, width, n_samples = index.shape
     for face in range(faces.shape[0]):
@@ -171,10 +130,8 @@ def draw_shadow(shadowed: Array, faces: NDArray[np.int64], depth: NDArray[np.flo
     ----------
     shadowed : ndarray, shape (n_vertices, 3)
         Vertices as the sun sees them: column and row of the shadow map, and how near the sun [m].
-    faces : ndarray of int, shape (n_faces, 3)
-        Vertices of each triangle.
-    depth : ndarray, shape (n_texels, n_texels)
-        The map; changed in place.
+    faces, depth
+        As ``faces`` in `Surfaces` and ``shadow`` in `Lights`; the latter is changed in place.
     """
     height, width = depth.shape
     for face in range(faces.shape[0]):

@@ -5,19 +5,26 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.kernels.compiling import Array, Vector, helper, inlined, kernel
+from kinarm.kernels.compiling import Array, Vector, inlined, kernel
 from kinarm.viewer.kernels.lighting import light_up, sunlit, unit
 from kinarm.viewer.kernels.rasterising import edge
-from kinarm.viewer.kernels.views import Backdrop, Balls, Eye, Lights, Materials, Surfaces, View
+from kinarm.viewer.kernels.views import Eye, Lights, Materials, Surfaces, View
+from kinarm.viewer.parts import FLOOR_RADIUS, GRID_RADIUS, GRID_STEP, channels, to_srgb
 
 FLOOR = 0
 """Material of the floor."""
 
+BACKGROUND, GRID = (tuple(channels(colour).tolist()) for colour in (0xEEF1F4, 0xB4BDC7))
+"""Colours, in sRGB, into which all fades, and of the lines on the floor."""
+
+GAMMA = to_srgb(np.linspace(0, 1, 4096))
+"""Encoding of linear values from 0 to 1."""
+
 
 @inlined
-def _encoded(gamma: Array, value: float) -> float:
+def _encoded(value: float) -> float:
     """Encode a linear value as sRGB."""
-    code: float = gamma[int(min(max(value, 0.0), 1.0) * (gamma.shape[0] - 1) + 0.5)]
+    code: float = GAMMA[int(min(max(value, 0.0), 1.0) * (GAMMA.shape[0] - 1) + 0.5)]
     return code
 
 
@@ -63,22 +70,21 @@ def _mixed(table: Array, corners: tuple[int, int, int], share: Vector) -> Vector
 
 
 @inlined
-def _line_cover(across: float, radius: float, step: float, slope: float, width: float) -> float:
+def _line_cover(across: float, slope: float, width: float) -> float:
     """Share of a pixel that the nearest of lines covers; ``slope`` is a pixel's size [m]."""
-    line = step * math.floor(across / step + 0.5)
-    if abs(line) >= radius:
+    line = GRID_STEP * math.floor(across / GRID_STEP + 0.5)
+    if abs(line) >= GRID_RADIUS:
         return 0.0
     return min(max(0.5 * width + 0.5 - abs(across - line) / max(slope, 1e-9), 0.0), min(width, 1.0))
 
 
 @inlined
-def _grid_cover(eye: Eye, backdrop: Backdrop, x: float, y: float, ahead: float) -> float:
+def _grid_cover(eye: Eye, line_width: float, x: float, y: float, ahead: float) -> float:
     """Share of a pixel that is covered by lines, where the floor is seen there."""
     rays = eye.rays
     dx, dy, dz = _line_of_sight(eye, x, y)
     px, py = eye.position[0] + ahead * dx, eye.position[1] + ahead * dy
-    radius, step, width = backdrop.grid_radius, backdrop.grid_step, backdrop.line_width
-    if px * px + py * py > radius * radius:
+    if px * px + py * py > GRID_RADIUS * GRID_RADIUS:
         return 0.0
     column_x = ahead * (rays[1, 0] - dx * rays[1, 2] / dz)
     column_y = ahead * (rays[1, 1] - dy * rays[1, 2] / dz)
@@ -86,74 +92,66 @@ def _grid_cover(eye: Eye, backdrop: Backdrop, x: float, y: float, ahead: float) 
     row_y = ahead * (rays[2, 1] - dy * rays[2, 2] / dz)
     slope_x = math.sqrt(column_x * column_x + row_x * row_x)
     slope_y = math.sqrt(column_y * column_y + row_y * row_y)
-    return max(
-        _line_cover(px, radius, step, slope_x, width), _line_cover(py, radius, step, slope_y, width)
-    )
+    return max(_line_cover(px, slope_x, line_width), _line_cover(py, slope_y, line_width))
 
 
 @inlined
-def _faded(backdrop: Backdrop, ahead: float) -> float:
+def _faded(eye: Eye, ahead: float) -> float:
     """How much of a surface at a distance is lost in the background."""
-    share = (ahead - backdrop.fog[0]) / (backdrop.fog[1] - backdrop.fog[0])
+    share = (ahead - eye.fog[0]) / (eye.fog[1] - eye.fog[0])
     share = min(max(share, 0.0), 1.0)
     fog: float = share * share * (3.0 - 2.0 * share)
     return fog
 
 
 @inlined
-def _finished(backdrop: Backdrop, light: Vector, lines: float, fog: float) -> Vector:
-    """Encode light, with lines over it, in the fog."""
-    back, grid, gamma = backdrop.colour, backdrop.grid, backdrop.gamma
-    red, green, blue = (
-        _encoded(gamma, light[0]),
-        _encoded(gamma, light[1]),
-        _encoded(gamma, light[2]),
-    )
+def _towards(colour: Vector, other: Vector, share: float) -> Vector:
+    """A colour between two."""
     return (
-        (1.0 - fog) * (red + lines * (grid[0] - red)) + fog * back[0],
-        (1.0 - fog) * (green + lines * (grid[1] - green)) + fog * back[1],
-        (1.0 - fog) * (blue + lines * (grid[2] - blue)) + fog * back[2],
+        colour[0] + share * (other[0] - colour[0]),
+        colour[1] + share * (other[1] - colour[1]),
+        colour[2] + share * (other[2] - colour[2]),
     )
 
 
 @inlined
-def _surface_colour(
-    eye: Eye,
-    surfaces: Surfaces,
-    materials: Materials,
-    lights: Lights,
-    backdrop: Backdrop,
-    face: int,
-    x: float,
-    y: float,
-) -> Vector:
+def _finished(light: Vector, lines: float, fog: float) -> Vector:
+    """Encode light, with lines over it, in the fog."""
+    encoded = _encoded(light[0]), _encoded(light[1]), _encoded(light[2])
+    red, green, blue = _towards(encoded, GRID, lines)
+    return (
+        (1.0 - fog) * red + fog * BACKGROUND[0],
+        (1.0 - fog) * green + fog * BACKGROUND[1],
+        (1.0 - fog) * blue + fog * BACKGROUND[2],
+    )
+
+
+@inlined
+def _surface_colour(view: View, face: int, x: float, y: float) -> Vector:
     """Colour of a triangle that is seen at a place of the picture."""
-    dx, dy, dz = _line_of_sight(eye, x, y)
+    surfaces = view.surfaces
+    dx, dy, dz = _line_of_sight(view.eye, x, y)
     corners = surfaces.faces[face, 0], surfaces.faces[face, 1], surfaces.faces[face, 2]
     share = _shares(surfaces, face, x, y)
-    px, py, pz = _mixed(surfaces.places, corners, share)
-    nx, ny, nz = _mixed(surfaces.normals, corners, share)
-    ahead = (
-        share[0] * surfaces.corners[corners[0], 2]
-        + share[1] * surfaces.corners[corners[1], 2]
-        + share[2] * surfaces.corners[corners[2], 2]
-    )
-    material = surfaces.materials[corners[0]]
-    view, sun = unit((-dx, -dy, -dz)), sunlit(lights, (px, py, pz))
-    light = light_up(materials, lights, material, sun, unit((nx, ny, nz)), view)
-    return _finished(backdrop, light, 0.0, _faded(backdrop, ahead))
+    place = _mixed(surfaces.places, corners, share)
+    normal = unit(_mixed(surfaces.normals, corners, share))
+    _, _, ahead = _mixed(surfaces.corners, corners, share)
+    material, sun = surfaces.materials[corners[0]], sunlit(view.lights, place)
+    back = unit((-dx, -dy, -dz))
+    light = light_up(view.materials, view.lights, material, sun, normal, back)
+    return _finished(light, 0.0, _faded(view.eye, ahead))
 
 
 @inlined
-def _floor_distance(eye: Eye, backdrop: Backdrop, x: float, y: float) -> float:
+def _floor_distance(eye: Eye, x: float, y: float) -> float:
     """Distance ahead of the floor that is seen at a place of the picture; 0 if none is."""
     dx, dy, dz = _line_of_sight(eye, x, y)
     if dz >= 0.0 or eye.position[2] <= 0.0:
         return 0.0
     ahead = -eye.position[2] / dz
     px, py = eye.position[0] + ahead * dx, eye.position[1] + ahead * dy
-    radius: float = backdrop.floor_radius
-    return ahead if px * px + py * py < radius * radius else 0.0
+    within: bool = px * px + py * py < FLOOR_RADIUS * FLOOR_RADIUS
+    return ahead if within else 0.0
 
 
 @kernel
@@ -161,71 +159,63 @@ def paint_floor(
     eye: Eye,
     materials: Materials,
     lights: Lights,
-    backdrop: Backdrop,
+    line_width: float,
     floor: NDArray[np.float32],
+    nearness: NDArray[np.float32],
 ) -> None:
-    """Colour floor and background, in shadow and in the sun.
+    """Colour the floor, in shadow and in the sun, and find how near it is.
 
     Parameters
     ----------
-    eye, materials, lights, backdrop
+    eye, materials, lights
         Parts of a `View`.
-    floor : ndarray of float32, shape (height, width, 2, 3)
-        Filled in.
+    line_width : float
+        Of a line on the floor [pixels].
+    floor, nearness
+        Parts of a `View`, which are filled in where the floor is seen.
     """
-    back = backdrop.colour
     for row in range(floor.shape[0]):
         for column in range(floor.shape[1]):
+            for sample in range(nearness.shape[2]):
+                x, y = column + eye.offsets[sample, 0], row + eye.offsets[sample, 1]
+                _, _, dz = _line_of_sight(eye, x, y)
+                if dz < 0.0 and eye.position[2] > 0.0:
+                    nearness[row, column, sample] = -dz / max(eye.position[2], 1e-6)
             x, y = column + 0.5, row + 0.5
-            ahead = _floor_distance(eye, backdrop, x, y)
-            for sun in range(2):
-                colour = back[0], back[1], back[2]
-                if ahead > 0.0:
-                    dx, dy, dz = _line_of_sight(eye, x, y)
-                    up, view = (0.0, 0.0, 1.0), unit((-dx, -dy, -dz))
+            ahead = _floor_distance(eye, x, y)
+            if ahead > 0.0:
+                dx, dy, dz = _line_of_sight(eye, x, y)
+                up, view = (0.0, 0.0, 1.0), unit((-dx, -dy, -dz))
+                lines, fog = _grid_cover(eye, line_width, x, y, ahead), _faded(eye, ahead)
+                for sun in range(2):
                     light = light_up(materials, lights, FLOOR, float(sun), up, view)
-                    lines = _grid_cover(eye, backdrop, x, y, ahead)
-                    colour = _finished(backdrop, light, lines, _faded(backdrop, ahead))
-                for channel in range(3):
-                    floor[row, column, sun, channel] = colour[channel]
+                    colour = _finished(light, lines, fog)
+                    for channel in range(3):
+                        floor[row, column, sun, channel] = colour[channel]
 
 
 @inlined
-def _floor_colour(
-    eye: Eye,
-    lights: Lights,
-    backdrop: Backdrop,
-    floor: NDArray[np.float32],
-    row: int,
-    column: int,
-) -> Vector:
+def _floor_colour(view: View, row: int, column: int) -> Vector:
     """Colour of the floor at a pixel."""
-    ahead = _floor_distance(eye, backdrop, column + 0.5, row + 0.5)
+    eye, floor = view.eye, view.floor
+    ahead = _floor_distance(eye, column + 0.5, row + 0.5)
     sun = 1.0
     if ahead > 0.0:
         dx, dy, _ = _line_of_sight(eye, column + 0.5, row + 0.5)
-        sun = sunlit(lights, (eye.position[0] + ahead * dx, eye.position[1] + ahead * dy, 0.0))
-    return (
-        floor[row, column, 0, 0] + sun * (floor[row, column, 1, 0] - floor[row, column, 0, 0]),
-        floor[row, column, 0, 1] + sun * (floor[row, column, 1, 1] - floor[row, column, 0, 1]),
-        floor[row, column, 0, 2] + sun * (floor[row, column, 1, 2] - floor[row, column, 0, 2]),
-    )
+        place = eye.position[0] + ahead * dx, eye.position[1] + ahead * dy, 0.0
+        sun = sunlit(view.lights, place)
+    dark, lit = floor[row, column, 0], floor[row, column, 1]
+    return _towards((dark[0], dark[1], dark[2]), (lit[0], lit[1], lit[2]), sun)
 
 
 @inlined
-def _ball_cover(
-    eye: Eye,
-    balls: Balls,
-    ball: int,
-    nearness: NDArray[np.float32],
-    row: int,
-    column: int,
-) -> float:
+def _ball_cover(view: View, ball: int, row: int, column: int) -> float:
     """Share of a pixel's samples at which a ball is seen."""
-    cx = balls.centres[ball, 0] - eye.position[0]
-    cy = balls.centres[ball, 1] - eye.position[1]
-    cz = balls.centres[ball, 2] - eye.position[2]
-    beyond = cx * cx + cy * cy + cz * cz - balls.radii[ball] * balls.radii[ball]
+    eye, balls = view.eye, view.balls
+    cx = balls[ball, 0] - eye.position[0]
+    cy = balls[ball, 1] - eye.position[1]
+    cz = balls[ball, 2] - eye.position[2]
+    beyond = cx * cx + cy * cy + cz * cz - balls[ball, 3] * balls[ball, 3]
     covered, n_samples = 0, eye.offsets.shape[0]
     for sample in range(n_samples):
         x, y = column + eye.offsets[sample, 0], row + eye.offsets[sample, 1]
@@ -238,52 +228,10 @@ def _ball_cover(
                 return 0.0
             continue
         ahead = (along - math.sqrt(bend)) / square
-        if balls.on_top[ball] or nearness[row, column, sample] * ahead < 1.0:
+        if balls[ball, 8] > 0.0 or view.nearness[row, column, sample] * ahead < 1.0:
             covered += 1
     cover: float = covered / n_samples
     return cover
-
-
-@helper
-def _shade_row(row: int, view: View, picture: NDArray[np.uint8]) -> None:
-    """Colour a row of pixels."""
-    eye, surfaces, materials, lights, backdrop, balls, floor, nearness, index = view
-    offsets = eye.offsets
-    n_samples = offsets.shape[0]
-    for column in range(index.shape[1]):
-        red, green, blue = 0.0, 0.0, 0.0
-        done = 0
-        for sample in range(n_samples):
-            face = index[row, column, sample]
-            if done == n_samples:
-                break
-            first, count, x, y = True, 0, 0.0, 0.0
-            for other in range(n_samples):
-                if index[row, column, other] == face:
-                    first = first and other >= sample
-                    count += 1
-                    x += offsets[other, 0]
-                    y += offsets[other, 1]
-            if not first:
-                continue
-            done += count
-            x, y = column + x / count, row + y / count
-            if face < 0:
-                r, g, b = _floor_colour(eye, lights, backdrop, floor, row, column)
-            else:
-                r, g, b = _surface_colour(eye, surfaces, materials, lights, backdrop, face, x, y)
-            red += count * r
-            green += count * g
-            blue += count * b
-        red, green, blue = red / n_samples, green / n_samples, blue / n_samples
-        for ball in range(balls.radii.shape[0]):
-            veil = balls.opacities[ball] * _ball_cover(eye, balls, ball, nearness, row, column)
-            red += veil * (balls.colours[ball, 0] - red)
-            green += veil * (balls.colours[ball, 1] - green)
-            blue += veil * (balls.colours[ball, 2] - blue)
-        picture[row, column, 0] = int(255.0 * red + 0.5)
-        picture[row, column, 1] = int(255.0 * green + 0.5)
-        picture[row, column, 2] = int(255.0 * blue + 0.5)
 
 
 @kernel
@@ -292,5 +240,37 @@ def shade(view: View, picture: NDArray[np.uint8]) -> None:
 
     What is seen at several samples of a pixel is lit once, in their middle.
     """
-    for row in range(picture.shape[0]):
-        _shade_row(row, view, picture)
+    index, balls, offsets = view.seen, view.balls, view.eye.offsets
+    height, width, n_samples = index.shape
+    for row in range(height):
+        for column in range(width):
+            red, green, blue, done = 0.0, 0.0, 0.0, 0
+            for sample in range(n_samples):
+                if done == n_samples:
+                    break
+                face = index[row, column, sample]
+                first, count, x, y = True, 0, 0.0, 0.0
+                for other in range(n_samples):
+                    if index[row, column, other] == face:
+                        first = first and other >= sample
+                        count += 1
+                        x += offsets[other, 0]
+                        y += offsets[other, 1]
+                if not first:
+                    continue
+                done += count
+                if face < 0:
+                    r, g, b = _floor_colour(view, row, column)
+                else:
+                    r, g, b = _surface_colour(view, face, column + x / count, row + y / count)
+                red += count * r
+                green += count * g
+                blue += count * b
+            red, green, blue = red / n_samples, green / n_samples, blue / n_samples
+            for ball in range(balls.shape[0]):
+                veil = balls[ball, 7] * _ball_cover(view, ball, row, column)
+                glow = balls[ball, 4], balls[ball, 5], balls[ball, 6]
+                red, green, blue = _towards((red, green, blue), glow, veil)
+            picture[row, column, 0] = int(255.0 * red + 0.5)
+            picture[row, column, 1] = int(255.0 * green + 0.5)
+            picture[row, column, 2] = int(255.0 * blue + 0.5)

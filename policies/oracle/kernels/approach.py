@@ -9,12 +9,12 @@ halved. Several boxes of a search are examined side by side, in lanes.
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from kinarm.chain import Chain
 from kinarm.contact_shapes import ContactShapes
+from kinarm.kernels.block import put, take
 from kinarm.kernels.compiling import Array, Vector, lean_kernel
 from kinarm.kernels.kinematics import point_jacobian
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits
@@ -26,29 +26,15 @@ from kinarm.policies.oracle.kernels.box_bound import (
     offset_from_goal,
     trim,
 )
-from kinarm.policies.oracle.kernels.boxes import (
-    ROUNDING,
-    WAITING,
-    Boxes,
-    halve,
-    load_boxes,
-    store_box,
-    within_steps,
-)
+from kinarm.policies.oracle.kernels.boxes import ROUNDING, WAITING, Boxes, halve, within_steps
 from kinarm.policies.oracle.kernels.overlap import overlaps
-
-
-class ArmInScene(NamedTuple):
-    """An arm in a scene, for proofs: its kinematics, motion bounds and contact pairs."""
-
-    chain: Chain
-    bounds: MotionBounds
-    shapes: ContactShapes
 
 
 @lean_kernel
 def search(
-    arm: ArmInScene,
+    chain: Chain,
+    bounds: MotionBounds,
+    shapes: ContactShapes,
     start: Array,
     goal: Vector,
     step_limit: Array,
@@ -72,22 +58,19 @@ def search(
 
     Parameters
     ----------
-    arm : ArmInScene
-        The arm.
+    chain, bounds, shapes
+        The arm, bounds of its motion, and what may touch.
     start, goal, step_limit
-        Where it starts, shape (n_joints,), the goal [m], and moves in a step, shape (n,)
-        [rad or m].
+        The arm's start, shape (n_joints,), the goal [m], and moves in a step, shape (n,).
     fewest, most : int
-        Range of the steps; those that the box takes are the most.
+        Range of the steps.
     enough, resolution : float
         Distances from the goal that is close enough, and that makes a difference [m].
-    contact : bool
-        Rule out what is proven to touch something.
-    budget : int
-        Boxes after which the search ends without a proof.
+    contact, budget : bool and int
+        Rule out what is proven to touch something; boxes after which the search is given up.
     lower, upper : ndarray, shape (n,)
-        The box of the first n joints; it shrinks with every configuration found that takes fewer
-        steps [rad or m].
+        The box of the first n joints [rad or m]. In a search for the fewest steps it is that of the
+        most, and shrinks with every configuration found that takes fewer.
     best : ndarray, shape (n_joints,)
         Where the configuration found goes; joints beyond the n-th stay as at the start.
     stack, block : ndarray, shape (WAITING, 2 n + 1), and Boxes
@@ -95,32 +78,32 @@ def search(
 
     Returns
     -------
-    complete : bool
-        Whether nothing better is proven to exist.
-    steps : int
-        That the configuration found takes; more than ``most`` if there is none.
+    complete, steps : bool and int
+        Whether nothing better is proven to exist, and the steps of the configuration found; more
+        than ``most`` if there is none.
     distance, proven : float
         That of the closest configuration found, and a lower bound over the box [m].
     """
-    chain, bounds, shapes = arm.chain, arm.bounds, arm.shapes
     n, n_joints = lower.shape[0], start.shape[0]
-    jacobian, turns, ends, model = block.jacobian, block.turns, block.ends, block.model
-    lever = block.lever
+    box, half, lever = block.box, block.half, block.lever
+    jacobian, turns, model = block.jacobian, block.turns, block.model
     offset, step, scale = model[0], model[1], model[2]
     slope, least, bend = model[3], model[4], model[5]
     places = (as_numbers(block.q), as_numbers(block.tried))
-    found, lower_bounds = as_numbers(block.distance), as_numbers(block.proven)
+    found, lower_bounds = as_numbers(block.distance), as_numbers(box)
     shares = as_numbers(block.share)
     for i in range(n_joints):
         block.q[0, i] = start[i]
         block.tried[0, i] = start[i]
         best[i] = start[i]
+    fewer = resolution == np.inf
+    if fewer:
+        within_steps(chain, start, step_limit, most, lower, upper)
     for i in range(n):
         lever[i] = 1.0 if chain.prismatic[i] else bounds.curvature[i, i]
         # Joints that hardly move the tool still decide what it touches.
         lever[i] = math.sqrt(lever[i]) if contact else lever[i]
         stack[0, i], stack[0, n + i], stack[0, 2 * n] = lower[i], upper[i], 0.0
-    fewer = resolution == np.inf
     steps, closest, proven = most + 1, np.inf, np.inf
     # Boxes are excluded beyond the cutoff. It falls with every closer configuration that is found:
     # what is not closer by the resolution is of no interest.
@@ -132,36 +115,27 @@ def search(
         if steps <= fewest if fewer else closest <= enough:
             break
         count = min(waiting, LANES, budget - examined)
-        load_boxes(stack, waiting - 1, count, block)
+        for lane in range(LANES):  # of which the last ones may hold the same box
+            put(stack, waiting - 1 - min(lane, count - 1), box, 0, lane)
         waiting -= count
         examined += count
         # Cut the boxes to what is still of interest, and find their centres.
-        narrowest = 0.0 * block.lower[0]
+        narrowest = 0.0 * box[0, 0]
         for i in range(n):
-            block.lower[i] = max(block.lower[i], lower[i])
-            block.upper[i] = min(block.upper[i], upper[i])
-            block.half[i] = 0.5 * (block.upper[i] - block.lower[i])
-            block.q[0, i] = 0.5 * (block.upper[i] + block.lower[i])
-            narrowest = min(narrowest, block.half[i])
+            box[0, i] = max(box[0, i], lower[i])
+            box[0, n + i] = min(box[0, n + i], upper[i])
+            half[i] = 0.5 * (box[0, n + i] - box[0, i])
+            block.q[0, i] = 0.5 * (box[0, n + i] + box[0, i])
+            narrowest = min(narrowest, half[i])
         # Nothing is left of a box that takes no fewer steps than what was found.
         empty = narrowest < 0.0
         # Bound the distance over a box by a linear model at its centre and its curvature.
         block.distance[0] = offset_from_goal(chain, block.q, goal, block.poses, offset)
         tool = (goal[0] + offset[0], goal[1] + offset[1], goal[2] + offset[2])
         point_jacobian(chain.prismatic, chain.axis, block.poses, tool, jacobian)
-        direction = closest_step(jacobian, offset, block.half, step, scale)
-        bound = curved_bound(
-            chain,
-            bounds.curvature,
-            block.poses,
-            jacobian,
-            offset,
-            direction,
-            block.half,
-            slope,
-            least,
-            bend,
-        )
+        direction = closest_step(jacobian, offset, half, step, scale)
+        linear = (block.poses, jacobian, offset, direction, half)
+        bound = curved_bound(chain, bounds.curvature, *linear, slope, least, bend)
         # Where the linear model comes closest to the goal, the arm mostly does, too.
         for i in range(n):
             block.tried[0, i] = block.q[0, i] + step[i]
@@ -171,7 +145,7 @@ def search(
         at_centre = ~empty & (block.distance[0] <= far)
         at_step = ~empty & (block.distance[1] <= far)
         if contact and any_lane(at_centre | at_step):
-            work = (block.half, 0.0, ends, turns)
+            work = (half, 0.0, turns)
             at_centre = at_centre & ~overlaps(at_centre, chain, shapes, block.poses, *work)
             at_step = at_step & ~overlaps(at_step, chain, shapes, block.between, *work)
         bits = (lane_bits(at_centre), lane_bits(at_step))
@@ -197,18 +171,17 @@ def search(
             closest = distance
             for i in range(n):
                 best[i] = tried[0, i, lane]
-        block.share[0] = trim(
-            cutoff, bound, slope, least, bend, block.q, block.half, block.lower, block.upper
-        )
+        sides = (box[0, :n], box[0, n : 2 * n])
+        block.share[0] = trim(cutoff, bound, slope, least, bend, block.q, half, *sides)
         # The bound of the joints settles large boxes far from the goal.
-        bound = max(bound, joint_bound(bounds, block.poses, goal, block.half))
+        bound = max(bound, joint_bound(bounds, block.poses, goal, half))
         # What is proven of the whole holds for its parts.
-        block.proven[0] = max(block.proven[0], bound)
-        beyond = block.proven[0] > cutoff
+        box[0, 2 * n] = max(box[0, 2 * n], bound)
+        beyond = box[0, 2 * n] > cutoff
         if contact and any_lane(~beyond & ~empty):
             # Contact comes last, since it asks about every pair. A box that touches something
             # throughout holds no configuration that counts: nothing is to be proven of it.
-            work = (block.half, 1.0, ends, turns)
+            work = (half, 1.0, turns)
             empty = empty | overlaps(~beyond & ~empty, chain, shapes, block.poses, *work)
         # Leave out boxes that are decided, and put what is left of the others back, or halves.
         excluded, gone = lane_bits(beyond), lane_bits(empty)
@@ -217,19 +190,19 @@ def search(
                 continue
             if excluded >> lane & 1:
                 # Nothing in the box comes closer than this.
-                proven = min(proven, lower_bounds[0, lane])
+                proven = min(proven, lower_bounds[0, 2 * n, lane])
                 continue
             if shares[0, lane] < 1.0:
                 proven = min(proven, cutoff)
             if shares[0, lane] < 0.5:
-                store_box(stack, waiting, lane, block)
+                take(box, 0, lane, stack, waiting)
                 waiting += 1
-            elif halve(stack, waiting, lane, lever, block):
+            elif halve(stack, waiting, lane, block):
                 waiting += 2
             else:
                 # Such boxes are left where bounds meet what is asked for, or proofs of contact end.
                 undecided = True
-                proven = min(proven, lower_bounds[0, lane])
+                proven = min(proven, lower_bounds[0, 2 * n, lane])
     complete = (waiting == 0 and not undecided) or (steps <= fewest if fewer else closest <= enough)
     # Of boxes that still wait, no more is known than of those that they are halves of.
     for i in range(waiting):

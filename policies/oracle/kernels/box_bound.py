@@ -60,8 +60,8 @@ def joint_bound(bounds: MotionBounds, poses: Array, goal: Vector, half: Array) -
 def closest_step(jacobian: Array, offset: Array, half: Array, step: Array, scale: Array) -> Vector:
     """Fill in the e, |e_i| <= half_i, for which |offset + J e| is nearly least; return the vector.
 
-    A descent, one joint at a time. It need not have converged: what remains only proposes a
-    direction, along which the bound holds whatever it is. ``scale``, shape (n,), is work space.
+    A descent, one joint at a time. It need not have converged: along any direction the bound holds.
+    ``scale``, shape (n,), is work space.
     """
     n = half.shape[0]
     x, y, z = offset[0], offset[1], offset[2]

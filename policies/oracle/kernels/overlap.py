@@ -14,20 +14,20 @@ from kinarm.chain import Chain
 from kinarm.contact_shapes import BETWEEN_CAPSULES, WITH_BOX, ContactShapes
 from kinarm.kernels.compiling import Array, Vector, helper, inlined
 from kinarm.kernels.distance import between_segments, closest_to_box, turned_back
-from kinarm.kernels.kinematics import point_jacobian, to_world
+from kinarm.kernels.kinematics import point_jacobian
 from kinarm.kernels.lanes import any_lane, select
+from kinarm.kernels.planes import axis_in_world
 from kinarm.kernels.proof import MARGIN
+from kinarm.kernels.touching import is_exact
 
 TRIED = 5
 """Evenly spaced points of an axis that are tried for the deepest one, beside the closest one."""
 
-ENDS = 7
-"""Entries of a capsule in the world: its end points (3 + 3), and half their distance."""
-
 
 @inlined
-def distance_from_box(x: float, y: float, z: float) -> float:
+def distance_from_box(beyond: Vector) -> float:
     """Distance from a box, given how far a point is beyond it per axis; less than 0 within."""
+    x, y, z = beyond
     farthest = max(max(x, y), z)
     x, y, z = max(x, 0.0), max(y, 0.0), max(z, 0.0)
     return select(farthest <= 0.0, farthest, math.sqrt(x * x + y * y + z * z))
@@ -57,27 +57,22 @@ def along(a: Vector, b: Vector, share: float) -> Vector:
 def deepest_share(a: Vector, b: Vector, lower: Vector, upper: Vector) -> float:
     """Where on the segment ab it is deepest in a box, or closest to it: the best of a few."""
     share = closest_to_box(a, b, lower, upper)
-    x, y, z = excess_over_box(along(a, b, share), lower, upper)
-    least = distance_from_box(x, y, z)
+    least = distance_from_box(excess_over_box(along(a, b, share), lower, upper))
     for k in range(TRIED):
-        x, y, z = excess_over_box(along(a, b, k / (TRIED - 1)), lower, upper)
-        distance = distance_from_box(x, y, z)
+        tried = along(a, b, k / (TRIED - 1))
+        distance = distance_from_box(excess_over_box(tried, lower, upper))
         share = select(distance < least, k / (TRIED - 1), share)
         least = min(distance, least)
     return share
 
 
 @inlined
-def place_capsules(shapes: ContactShapes, poses: Array, ends: Array) -> None:
-    """Fill in where the capsules are in the world, shape (n_shapes, ENDS)."""
-    link, capsules = shapes.link, shapes.capsules
-    for i in range(link.shape[0]):
-        a = to_world(poses, link[i], capsules[i, 0], capsules[i, 1], capsules[i, 2])
-        b = to_world(poses, link[i], capsules[i, 3], capsules[i, 4], capsules[i, 5])
-        ends[i, 0], ends[i, 1], ends[i, 2] = a
-        ends[i, 3], ends[i, 4], ends[i, 5] = b
-        x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-        ends[i, 6] = 0.5 * math.sqrt(x * x + y * y + z * z)
+def axis_of(shapes: ContactShapes, i: int, poses: Array) -> tuple[Vector, Vector, float]:
+    """End points of a capsule's axis in the world, and half their distance."""
+    axis = shapes.capsules[i]
+    a, b = axis_in_world(shapes, i, poses)
+    x, y, z = axis[3] - axis[0], axis[4] - axis[1], axis[5] - axis[2]
+    return a, b, 0.5 * math.sqrt(x * x + y * y + z * z)
 
 
 @helper
@@ -88,35 +83,33 @@ def overlaps(
     poses: Array,
     half: Array,
     share: float,
-    ends: Array,
     jacobian: Array,
 ) -> bool:
     """Whether some pair of bodies is proven to touch throughout a box of configurations.
 
     The box is centred where the ``poses`` are, with half-widths ``share`` times ``half``; a share
-    of 0 leaves its centre alone. Only what is ``wanted`` is examined. ``ends``, shape
-    (n_shapes, ENDS), and the Jacobian, shape (3, n), are work space.
+    of 0 leaves its centre alone. Only what is ``wanted`` is examined. The Jacobian, shape (3, n),
+    is work space.
     """
     prismatic, axes = chain.prismatic, chain.axis
-    link, capsules, boxes, turns = shapes.link, shapes.capsules, shapes.boxes, shapes.turns
-    pairs, travel, exact = shapes.pairs, shapes.travel, shapes.exact
+    bodies, capsules, boxes, turns = shapes.bodies, shapes.capsules, shapes.boxes, shapes.turns
+    pairs, travel = shapes.pairs, shapes.travel
     n = half.shape[0]
-    place_capsules(shapes, poses, ends)
     proven: bool = wanted & (half[0] < 0.0)
     for pair in range(pairs.shape[0]):
         kind, i, j = pairs[pair, 0], pairs[pair, 1], pairs[pair, 2]
-        if not exact[i] or (kind == BETWEEN_CAPSULES and not exact[j]):
+        if not is_exact(shapes, pair):
             continue
-        a, b = (ends[i, 0], ends[i, 1], ends[i, 2]), (ends[i, 3], ends[i, 4], ends[i, 5])
+        a, b, reach = axis_of(shapes, i, poses)
         middle = along(a, b, 0.5)
         # What only just touches is left to Coal, whose iterations are no more precise.
         radius = capsules[i, 6] - MARGIN
         if kind == BETWEEN_CAPSULES:
-            c, d = (ends[j, 0], ends[j, 1], ends[j, 2]), (ends[j, 3], ends[j, 4], ends[j, 5])
+            c, d, beyond = axis_of(shapes, j, poses)
             other, radius = along(c, d, 0.5), radius + capsules[j, 6]
             x, y, z = middle[0] - other[0], middle[1] - other[1], middle[2] - other[2]
             # Most pairs are far apart at the centre already.
-            reach = ends[i, 6] + ends[j, 6] + radius
+            reach += beyond + radius
             if not any_lane((x * x + y * y + z * z < reach * reach) & wanted & ~proven):
                 continue
             x, y, z = between_segments(a, b, c, d)
@@ -138,19 +131,19 @@ def overlaps(
             c, d = turned_back(a, cosine, sine), turned_back(b, cosine, sine)
             lower = (boxes[j, 0, 0], boxes[j, 0, 1], boxes[j, 0, 2])
             upper = (boxes[j, 1, 0], boxes[j, 1, 1], boxes[j, 1, 2])
-            x, y, z = excess_over_box(along(c, d, 0.5), lower, upper)
-            apart = distance_from_box(x, y, z) >= radius + ends[i, 6]
+            centre = excess_over_box(along(c, d, 0.5), lower, upper)
+            apart = distance_from_box(centre) >= radius + reach
             if not any_lane(wanted & ~proven & ~apart):
                 continue
             point = along(a, b, deepest_share(c, d, lower, upper))
         x, y, z = excess_over_box(turned_back(point, cosine, sine), lower, upper)
-        if not any_lane(wanted & ~proven & (distance_from_box(x, y, z) < radius)):
+        if not any_lane(wanted & ~proven & (distance_from_box((x, y, z)) < radius)):
             continue
         # The point's motion along each edge to first order, by its Jacobian: an arm that
         # slides along an obstacle does not leave it, however far it goes.
         point_jacobian(prismatic, axes, poses, point, jacobian)
         remainder = 0.0 * half[0]
-        for axis in range(min(n, link[i])):
+        for axis in range(min(n, bodies[i, 2])):
             width = share * half[axis]
             speed = (jacobian[0, axis], jacobian[1, axis], jacobian[2, axis])
             speed = turned_back(speed, cosine, sine)
@@ -161,8 +154,8 @@ def overlaps(
             # later joint, by its angle. A pair of joints counts once, a joint with itself by half.
             if not prismatic[axis]:
                 later = 0.5 * width * travel[axis, pair]
-                for other_axis in range(axis + 1, min(n, link[i])):
+                for other_axis in range(axis + 1, min(n, bodies[i, 2])):
                     later += share * half[other_axis] * travel[other_axis, pair]
                 remainder += width * later
-        proven = proven | (wanted & (distance_from_box(x, y, z) + remainder < radius))
+        proven = proven | (wanted & (distance_from_box((x, y, z)) + remainder < radius))
     return proven

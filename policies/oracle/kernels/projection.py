@@ -2,13 +2,14 @@
 
 import math
 from functools import cache
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
 from kinarm.chain import Chain
+from kinarm.kernels.block import ONE, THREE, put, take
 from kinarm.kernels.compiling import Array, Vector, inlined, lean_kernel
 from kinarm.kernels.inverse import take_out_blocked, take_step
 from kinarm.kernels.kinematics import POSE, place, point_jacobian, to_world
@@ -22,58 +23,27 @@ DAMPING = 1e-4
 """Added to the diagonal of J J^T, which limits steps near singular configurations [m^2]."""
 
 
-class Moving(NamedTuple):
-    """Configurations side by side in lanes.
-
-    Attributes
-    ----------
-    q : (1, n_joints)
-        Configuration [rad or m].
-    lower, upper : (n,)
-        Limits of the first n joints [rad or m].
-    goal : (3,)
-        Goal position [m].
-    radius, distance : (1,)
-        Distance from the goal at which it is left, and where it is [m].
-    iteration : (1,)
-        Steps so far.
-    poses : (n_joints + 1, POSE)
-        Forward kinematics.
-    jacobian : (3, n)
-        How fast the tool moves per unit speed of each joint [m/rad, or m/m].
-    step : (n,)
-        Where the joints go next [rad or m].
-    rows : (LANES,) of whole numbers, not of lanes
-        Which configurations are in the lanes.
-    """
-
-    q: Array
-    lower: Array
-    upper: Array
-    goal: Array
-    radius: Array
-    distance: Array
-    iteration: Array
-    poses: Array
-    jacobian: Array
-    step: Array
-    rows: NDArray[np.int64]
+Moving = Any
+"""Record of a `layout`."""
 
 
 @cache
 def layout(n_joints: int, n: int) -> Layout:
-    """How `Moving` lies in memory."""
+    """Configurations side by side in lanes, of which the first n joints move."""
     shapes = {
-        "q": (Fixed(1), n_joints),
-        "lower": (n,),
-        "upper": (n,),
-        "goal": (Fixed(3),),
-        **dict.fromkeys(("radius", "distance", "iteration"), (Fixed(1),)),
+        # Configurations, and their limits [rad or m].
+        "q": (ONE, n_joints),
+        **dict.fromkeys(("lower", "upper"), (ONE, n)),
+        # Goal, distance from it at which it is left, and where it is [m]; steps so far.
+        "goal": (ONE, THREE),
+        **dict.fromkeys(("radius", "distance", "iteration"), (ONE,)),
+        # Forward kinematics, Jacobian of the tool [m/rad, or m/m], and the next step [rad or m].
         "poses": (n_joints + 1, Fixed(POSE)),
-        "jacobian": (Fixed(3), n),
+        "jacobian": (THREE, n),
         "step": (n,),
     }
     arrays = {name: (lanes, shape) for name, shape in shapes.items()}
+    # Which configurations are in the lanes.
     return Layout("Moving", {**arrays, "rows": (types.int64, (Fixed(LANES),))})
 
 
@@ -101,17 +71,6 @@ def damped_step(jacobian: Array, vector: Vector, step: Array) -> None:
         step[k] = jacobian[0, k] * x + jacobian[1, k] * y + jacobian[2, k] * z
 
 
-@inlined
-def move(moving: Moving, vector: Vector, jacobian: Array, step: Array) -> None:
-    """Move configurations by a damped step along a vector [m], within their limits."""
-    q, lower, upper = moving.q, moving.lower, moving.upper
-    blocked = True
-    while blocked:
-        damped_step(jacobian, vector, step)
-        blocked = take_out_blocked(q, lower, upper, step, jacobian)
-    take_step(q, lower, upper, step)
-
-
 @lean_kernel
 def damped_least_squares(
     first: int,
@@ -132,27 +91,20 @@ def damped_least_squares(
 
     Parameters
     ----------
-    first, last : int
-        Range of the rows.
-    moving, chain : Moving and Chain
-        Work space, and the arm.
-    owner : ndarray of int, shape (n_rows,)
-        Which row of goals and limits belongs to a configuration.
+    first, last, moving, chain
+        Range of the rows, work space, and the arm.
+    owner, radius : ndarray, shape (n_rows,)
+        Row of goals and limits for each, and distance from the goal at which it is left [m].
     lower, upper, goals : ndarray, shape (n_goals, n) twice and (n_goals, 3)
         Limits of the first n joints, the others stay [rad or m]; goals [m].
-    radius : ndarray, shape (n_rows,)
-        Distance from the goal at which a configuration is left [m].
-    configurations : ndarray, shape (n_rows, n_joints)
-        Joint positions; changed [rad or m].
-    distances : ndarray, shape (n_rows,)
-        Where the distances from the tool to the goal go [m].
+    configurations, distances : ndarray, shape (n_rows, n_joints) and (n_rows,)
+        Changed: joint positions [rad or m], and distances from the tool to the goal [m].
     """
     tool, rows = chain.tool, moving.rows
-    n_joints, n = configurations.shape[1], lower.shape[1]
+    n_joints, aim = configurations.shape[1], moving.goal[0]
     poses, jacobian, step = moving.poses, moving.jacobian, moving.step
     # The numbers in the lanes.
-    q, lowest, highest = as_numbers(moving.q), as_numbers(moving.lower), as_numbers(moving.upper)
-    aims, radii = as_numbers(moving.goal), as_numbers(moving.radius)
+    radii = as_numbers(moving.radius)
     found, iterations = as_numbers(moving.distance), as_numbers(moving.iteration)
     waiting, n_moving, free = first, 0, (1 << LANES) - 1
     while True:
@@ -160,13 +112,10 @@ def damped_least_squares(
         for lane in range(LANES if waiting < last else 0):
             if free >> lane & 1 and waiting < last:
                 goal, rows[lane] = owner[waiting], waiting
-                for k in range(n_joints):
-                    q[0, k, lane] = configurations[waiting, k]
-                for k in range(n):
-                    lowest[k, lane] = lower[goal, k]
-                    highest[k, lane] = upper[goal, k]
-                for k in range(3):
-                    aims[k, lane] = goals[goal, k]
+                put(configurations, waiting, moving.q, 0, lane)
+                put(lower, goal, moving.lower, 0, lane)
+                put(upper, goal, moving.upper, 0, lane)
+                put(goals, goal, moving.goal, 0, lane)
                 radii[0, lane] = radius[waiting]
                 iterations[0, lane] = 0.0
                 waiting += 1
@@ -177,20 +126,23 @@ def damped_least_squares(
         # Measure the distance to the goal, and take out what has come close enough.
         place(chain, moving.q, poses)
         point = to_world(poses, n_joints, tool[0], tool[1], tool[2])
-        x, y, z = moving.goal[0] - point[0], moving.goal[1] - point[1], moving.goal[2] - point[2]
+        x, y, z = aim[0] - point[0], aim[1] - point[1], aim[2] - point[2]
         distance = math.sqrt(x * x + y * y + z * z)
         moving.distance[0] = distance
         ended = (distance <= moving.radius[0]) | (moving.iteration[0] >= ITERATIONS)
         ended_bits = lane_bits(ended) & ~free
         for lane in range(LANES if ended_bits != 0 else 0):
             if ended_bits >> lane & 1:
-                for k in range(n):
-                    configurations[rows[lane], k] = q[0, k, lane]
+                take(moving.q, 0, lane, configurations, rows[lane])
                 distances[rows[lane]] = found[0, lane]
                 n_moving -= 1
         free |= ended_bits
         # Aimed at half the radius, a step that falls short still arrives. What has ended stays.
         share = select(ended, 0.0, 1.0 - 0.5 * moving.radius[0] / distance)
         point_jacobian(chain.prismatic, chain.axis, poses, point, jacobian)
-        move(moving, (share * x, share * y, share * z), jacobian, step)
+        limits, blocked = (moving.lower[0], moving.upper[0]), True
+        while blocked:
+            damped_step(jacobian, (share * x, share * y, share * z), step)
+            blocked = take_out_blocked(moving.q, *limits, step, jacobian)
+        take_step(moving.q, *limits, step)
         moving.iteration[0] += 1.0

@@ -24,15 +24,9 @@ N_IN, N_OUT, WEIGHTS, TURNED, INPUTS, OUTPUTS = range(6)
 class Network(NamedTuple):
     """A dense network with tanh between its layers.
 
-    Rows of matrices and of values are padded with zeros to whole vectors.
-
-    Attributes
-    ----------
-    layers : ndarray of int, shape (n_layers, 6)
-        Per layer its widths, and where its weights begin in ``weights`` (inputs x outputs, then
-        the bias) and ``turned`` (outputs x inputs) and its inputs and outputs in a work space.
-    weights, turned : ndarray of float32
-        Parameters, and the matrices among them transposed.
+    ``layers`` holds per layer its widths, and where its weights begin in ``weights`` (inputs x
+    outputs, then the bias) and, transposed, in ``turned``, and its inputs and outputs in a work
+    space. Rows of matrices and of values are padded with zeros to whole vectors.
     """
 
     layers: NDArray[np.int64]
@@ -66,16 +60,9 @@ def hyperbolic_tangent(x: np.float32) -> np.float32:
 
 @helper
 def forward(network: Network, rows: int, work: Numbers) -> None:
-    """Pass samples, whose inputs lie in a work space, through all layers.
+    """Pass samples through all layers, whose inputs and outputs lie in a work space row by row.
 
-    Parameters
-    ----------
-    network : Network
-        The network.
-    rows : int
-        Number of samples: a multiple of `ROWS`, at most `BLOCK`.
-    work : ndarray of float32
-        Inputs and outputs of all layers, one row a sample.
+    The number of rows is a multiple of `ROWS`, at most `BLOCK`.
     """
     layers, weights = network.layers, network.weights
     for layer in range(layers.shape[0]):
@@ -106,8 +93,8 @@ def backward(
     Parameters
     ----------
     network, rows, work
-        As for `forward`; in place of the network's outputs are the derivatives by them. They
-        replace the outputs of the other layers, too.
+        As for `forward`; derivatives by outputs replace the outputs: those of the network before,
+        those of the other layers here.
     samples : int
         The first samples, which count.
     behind : ndarray of float32

@@ -22,18 +22,8 @@ LOSSES = 4
 class Experience(NamedTuple):
     """Experience of a rollout, one row a step.
 
-    Attributes
-    ----------
-    observations : ndarray of float32, shape (n, n_observations)
-        Observations.
-    actions : ndarray of float32, shape (n, n_actions)
-        Actions, not clipped.
-    scales : ndarray of float32, shape (n,)
-        By how much wider than usual the noise was with which they were chosen.
-    densities : ndarray of float32, shape (n,)
-        Logarithms of the probability densities of that noise, over the scale.
-    advantages, returns : ndarray of float32, shape (n,)
-        What `RolloutBuffer` makes of the rewards.
+    Actions are not clipped. Scales tell by how much wider than usual the noise was with which they
+    were chosen, densities are the logarithms of its probability densities, over the scale.
     """
 
     observations: Numbers
@@ -45,15 +35,7 @@ class Experience(NamedTuple):
 
 
 class Objective(NamedTuple):
-    """Weights of the loss of a minibatch; see `PPOConfig`.
-
-    Attributes
-    ----------
-    clip_range, ent_coef, vf_coef : float
-        As in the settings.
-    share : float
-        Weight of a sample in the means over the minibatch.
-    """
+    """Weights of the loss of a minibatch (see `PPOConfig`), and of a sample in its means."""
 
     clip_range: float
     ent_coef: float

@@ -1,12 +1,15 @@
 """Products of matrices whose sums stay in vector registers."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
 from numba import types
+from numba.core.cgutils import alloca_once_value, for_range
 from numba.extending import intrinsic
+from numba.np.arrayobj import make_array
 from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import helper
@@ -21,19 +24,12 @@ ROWS = 8
 NUMBER, WORD = ir.FloatType(), ir.IntType(64)
 VECTOR = ir.VectorType(NUMBER, LANES)
 
+Pointers = Callable[[Any, Any], Any]
+"""Pointers to the entries of a matrix, by row and column."""
+
 
 class Matrix(NamedTuple):
-    """A matrix in an array of numbers.
-
-    Attributes
-    ----------
-    numbers : ndarray of float32, shape (n,)
-        What holds it.
-    first : int
-        Index of its first entry.
-    row, column : int
-        How far apart rows and columns are.
-    """
+    """A matrix in an array of numbers: where it begins, and how far apart rows and columns are."""
 
     numbers: Numbers
     first: int
@@ -45,85 +41,64 @@ def _tile(columns: int) -> Any:
     """Make a kernels' function for `ROWS` rows and so many columns, counted in vectors."""
 
     @intrinsic
-    def product(
+    def tile(
         _: Any, left: types.Type, right: types.Type, start: types.Type, sink: types.Type, depth: Any
     ) -> Any:
         def code(context: Any, builder: Any, signature: Any, arguments: Any) -> None:
             *matrices, depth = arguments
             entries = [
-                _Entries(context, builder, kind, given)
+                _pointers(context, builder, kind, given)
                 for kind, given in zip(signature.args, matrices, strict=False)
             ]
             _multiply(builder, columns, entries, depth)
 
         return types.void(left, right, start, sink, depth), code
 
-    return product
+    return tile
 
 
-class _Entries:
-    """Where the entries of a `Matrix` lie in memory."""
+def _pointers(context: Any, builder: Any, kind: Any, given: Any) -> Pointers:
+    """Make a function that gives pointers to entries of a `Matrix`, by row and column."""
+    numbers, first, *strides = (builder.extract_value(given, k) for k in range(4))
+    array: Any = make_array(kind.types[0])
+    data = array(context, builder, numbers).data
 
-    def __init__(self, context: Any, builder: Any, kind: Any, given: Any) -> None:
-        from numba.np.arrayobj import make_array
-
-        numbers, self._first, self._row, self._column = (
-            builder.extract_value(given, k) for k in range(4)
+    def pointer(*place: Any) -> Any:
+        row, column = (
+            builder.mul(WORD(number) if isinstance(number, int) else number, stride)
+            for number, stride in zip(place, strides, strict=True)
         )
-        array: Any = make_array(kind.types[0])
-        self._data = array(context, builder, numbers).data
-        self._builder = builder
+        return builder.gep(data, [builder.add(first, builder.add(row, column))])
 
-    def number(self, row: Any, column: Any) -> Any:
-        """Pointer to an entry."""
-        builder = self._builder
-        across = builder.add(builder.mul(row, self._row), builder.mul(column, self._column))
-        return builder.gep(self._data, [builder.add(self._first, across)])
-
-    def vector(self, row: Any, column: int) -> Any:
-        """Pointer to `LANES` entries of a row."""
-        at = self.number(row, ir.Constant(WORD, column * LANES))
-        return self._builder.bitcast(at, VECTOR.as_pointer())
+    return pointer
 
 
-def _multiply(builder: Any, columns: int, matrices: Sequence[_Entries], depth: Any) -> None:
+def _multiply(builder: Any, columns: int, matrices: Sequence[Pointers], depth: Any) -> None:
     """Emit the loop over the depth: in each round, a column of tiles times a row of vectors."""
     left, right, start, sink = matrices
-    places = [(row, column) for row in range(ROWS) for column in range(columns)]
-    whole = [ir.Constant(WORD, row) for row in range(ROWS)]
-    begun = [builder.load(start.vector(whole[r], c), align=4) for r, c in places]
-    fused = builder.module.declare_intrinsic(
-        f"llvm.fma.v{LANES}f32", (), ir.FunctionType(VECTOR, [VECTOR] * 3)
-    )
-    before = builder.block
-    head, body, after = (builder.append_basic_block(name) for name in ("head", "body", "after"))
-    builder.branch(head)
 
-    builder.position_at_end(head)
-    k = builder.phi(WORD)
-    k.add_incoming(ir.Constant(WORD, 0), before)
-    sums = [builder.phi(VECTOR) for _ in places]
-    for total, value in zip(sums, begun, strict=True):
-        total.add_incoming(value, before)
-    builder.cbranch(builder.icmp_signed("<", k, depth), body, after)
+    def vector(matrix: Pointers, row: Any, column: int) -> Any:
+        return builder.bitcast(matrix(row, column * LANES), VECTOR.as_pointer())
 
-    builder.position_at_end(body)
-    vectors = [builder.load(right.vector(k, column), align=4) for column in range(columns)]
+    sums = {
+        place: alloca_once_value(builder, builder.load(vector(start, *place), align=4))
+        for place in product(range(ROWS), range(columns))
+    }
+    form = ir.FunctionType(VECTOR, [VECTOR] * 3)
+    fused = builder.module.declare_intrinsic(f"llvm.fma.v{LANES}f32", (), form)
     nothing = ir.Constant(VECTOR, ir.Undefined)
     lanes = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
-    for row in range(ROWS):
-        number = builder.load(left.number(whole[row], k), align=4)
-        single = builder.insert_element(nothing, number, ir.Constant(ir.IntType(32), 0))
-        factor = builder.shuffle_vector(single, nothing, lanes)
-        for column in range(columns):
-            total = sums[row * columns + column]
-            total.add_incoming(builder.call(fused, [factor, vectors[column], total]), body)
-    k.add_incoming(builder.add(k, ir.Constant(WORD, 1)), body)
-    builder.branch(head)
-
-    builder.position_at_end(after)
-    for total, (row, column) in zip(sums, places, strict=True):
-        builder.store(total, sink.vector(whole[row], column), align=4)
+    with for_range(builder, depth) as loop:
+        vectors = [builder.load(vector(right, loop.index, k), align=4) for k in range(columns)]
+        for row in range(ROWS):
+            number = builder.load(left(row, loop.index), align=4)
+            single = builder.insert_element(nothing, number, ir.IntType(32)(0))
+            factor = builder.shuffle_vector(single, nothing, lanes)
+            for column, other in enumerate(vectors):
+                total = sums[row, column]
+                builder.store(builder.call(fused, [factor, other, builder.load(total)]), total)
+    for place, total in sums.items():
+        builder.store(builder.load(total), vector(sink, *place), align=4)
 
 
 _wide, _narrow = _tile(2), _tile(1)

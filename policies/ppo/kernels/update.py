@@ -36,15 +36,7 @@ from kinarm.policies.ppo.kernels.tiles import LANES, Numbers
 
 
 class Descent(NamedTuple):
-    """Settings of Adam.
-
-    Attributes
-    ----------
-    learning_rate, first_decay, second_decay, epsilon : float
-        Adam's settings.
-    max_norm : float
-        Largest norm of a gradient; longer ones are clipped to it.
-    """
+    """Settings of Adam, and the largest norm of a gradient, to which longer ones are clipped."""
 
     learning_rate: float
     first_decay: float
@@ -63,8 +55,6 @@ def evaluate(
     ----------
     first, last : int
         Range of the rows.
-    network : Network
-        The network.
     observations, outputs : ndarray of float32, shape (n, n_observations) and (n, n_out)
         What it is given, and where its values go.
     """
@@ -87,28 +77,31 @@ def choose(
     means: Numbers,
     log_std: Numbers,
     noise: Numbers,
-    scales: Numbers,
+    noisy: NDArray[np.bool_],
+    least: float,
     actions: Numbers,
+    scales: Numbers,
     densities: Numbers,
 ) -> None:
-    """Turn noise, shape (n, n_actions), into actions about their means, and find its densities.
+    """Turn noise into actions about their means, and find its densities.
 
     Parameters
     ----------
-    means, actions : ndarray of float32, shape (n, n_actions)
-        What the actor says, and what is done.
+    means, noise, actions : ndarray of float32, shape (n, n_actions)
+        What the actor says, standard normal numbers, and what is done.
     log_std : ndarray of float32, shape (n_actions,)
         Logarithms of the standard deviations.
-    noise : ndarray of float32, shape (n, n_actions)
-        Standard normal numbers.
-    scales : ndarray of float32, shape (n,)
-        Factors on the standard deviations.
-    densities : ndarray of float32, shape (n,)
-        Logarithms of the probability densities of the deviations from the means over the scales.
+    noisy, least : ndarray of bool, shape (n,), and float
+        Rows whose mean logarithm of the standard deviations is at least so large.
+    scales, densities : ndarray of float32, shape (n,)
+        Factors on the standard deviations, and logarithms of the probability densities of the
+        deviations from the means over the scales.
     """
     precision = np.zeros(means.shape[1])
     find_precision(log_std, precision)
+    wider = exponential(max(0.0, least - log_std.mean()))
     for i in range(means.shape[0]):
+        scales[i] = wider if noisy[i] else 1.0
         scale = float(scales[i])
         for j in range(means.shape[1]):
             actions[i, j] = means[i, j] + scale * exponential(float(log_std[j])) * noise[i, j]
@@ -117,26 +110,6 @@ def choose(
             deviation = (float(actions[i, j]) - means[i, j]) / scale
             density += log_density(deviation, precision[j], log_std[j])
         densities[i] = density
-
-
-@kernel
-def fill_in_scales(
-    noisy: NDArray[np.bool_], log_std: Numbers, least: float, scales: Numbers
-) -> None:
-    """Fill in by how much wider than usual the noise of episodes is, shape (n,) each.
-
-    Parameters
-    ----------
-    noisy : ndarray of bool, shape (n,)
-        Which episodes have more.
-    log_std : ndarray of float32, shape (n_actions,)
-        Logarithms of the usual standard deviations.
-    least : float
-        What their mean is then at least.
-    """
-    wider = exponential(max(0.0, least - log_std.mean()))
-    for i in range(len(scales)):
-        scales[i] = wider if noisy[i] else 1.0
 
 
 @kernel
@@ -174,16 +147,12 @@ def add_gradients(
     actor, critic : Network
         Networks, whose parameters lie in one array; the logarithms of the standard deviations of
         the actions are its last entries, padded.
-    experience, objective
-        See there.
     chosen : ndarray of int, shape (batch_size,)
         Rows of the minibatch.
     standard : tuple of float
         What is subtracted from the advantages, and by what they are then multiplied.
-    gradients : ndarray of float32, shape (n_parts, n_weights)
-        Where the derivatives by the weights go.
-    losses : ndarray, shape (n_parts, LOSSES)
-        Where the sums that are logged go.
+    gradients, losses : ndarray, shape (n_parts, n_weights) and (n_parts, LOSSES)
+        Filled with the derivatives by the weights, and the sums that are logged.
     """
     n_parts, n_weights = gradients.shape
     n_actions = experience.actions.shape[1]
@@ -226,6 +195,56 @@ def add_gradients(
 
 
 @kernel
+def add_imitation_gradients(
+    first: int,
+    last: int,
+    actor: Network,
+    observations: Numbers,
+    actions: Numbers,
+    chosen: NDArray[np.int64],
+    gradients: Numbers,
+    losses: NDArray[np.float64],
+) -> None:
+    """Find the gradient of the mean squared error, in parts that do not depend on threads.
+
+    Parameters
+    ----------
+    first, last : int
+        Which parts.
+    actor : Network
+        The actor; other weights in its array get derivatives of zero.
+    observations, actions : ndarray of float32, shape (n, n_observations) and (n, n_actions)
+        What was seen and done.
+    chosen : ndarray of int, shape (batch_size,)
+        Rows of the minibatch.
+    gradients, losses : ndarray, shape (n_parts, n_weights) and (n_parts,)
+        Filled with the derivatives by the weights, and sums of squared errors.
+    """
+    layers, n_parts, n_actions = actor.layers, gradients.shape[0], actions.shape[1]
+    sink, wide = layers[layers.shape[0] - 1, OUTPUTS], padded(n_actions)
+    weight = 2.0 / (len(chosen) * n_actions)
+    work = np.zeros(work_length(layers), dtype=np.float32)
+    behind = np.zeros((BLOCK + 1) * widest(layers), dtype=np.float32)
+    for part in range(first, last):
+        gradient = gradients[part]
+        gradient[:] = np.float32(0.0)
+        losses[part] = 0.0
+        begin, end = part * len(chosen) // n_parts, (part + 1) * len(chosen) // n_parts
+        for start in range(begin, end, BLOCK):
+            rows = chosen[start : min(start + BLOCK, end)]
+            samples, tiled = len(rows), whole_tiles(len(rows))
+            for s in range(samples):
+                load_sample(observations, rows[s], layers, work, s)
+            forward(actor, tiled, work)
+            for s in range(samples):
+                for j in range(n_actions):
+                    error = float(work[sink + s * wide + j]) - actions[rows[s], j]
+                    losses[part] += error * error
+                    work[sink + s * wide + j] = weight * error
+            backward(actor, tiled, samples, work, behind, gradient)
+
+
+@kernel
 def descend(
     actor: Network,
     critic: Network,
@@ -245,8 +264,6 @@ def descend(
         Running means of the gradients and of their squares; changed.
     gradients : ndarray of float32, shape (n_parts, n_weights)
         Parts of the gradient; the first is overwritten.
-    descent : Descent
-        Settings.
     steps : int
         Which step it is, counted from 1.
     """

@@ -2,16 +2,13 @@
 
 import os
 import queue
-import sys
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 import small_tasks
 from small_tasks import (
-    kill_own_process_at_seven,
     kill_own_process_once,
     seem_to_leak,
     square,
@@ -19,10 +16,10 @@ from small_tasks import (
 )
 
 from kinarm.errors import InvalidInputError, WorkerError
+from kinarm.evaluation.commands.study import RunningOptions, StudyRequest
 from kinarm.evaluation.experiments import clusters, executors
-from kinarm.evaluation.experiments.clusters import Bundle, RayExecutor, SlurmExecutor
-from kinarm.evaluation.experiments.executors import Failure, LocalExecutor, Work
-from kinarm.evaluation.experiments.options import RunningOptions
+from kinarm.evaluation.experiments.clusters import RayExecutor, SlurmExecutor, do_alike
+from kinarm.evaluation.experiments.executors import Failure, LocalExecutor
 
 NOBODY = "127.0.0.1:9"
 """An address that nothing listens at."""
@@ -74,33 +71,30 @@ class TestEach:
     def test_nothing_to_do(self, executor):
         assert list(executor.map(square, [])) == []
 
-    def test_a_worker_that_differs_is_refused(self, executor, monkeypatch):
-        others = (*executors.identity(), ("coal", "0.0.1"))
-        monkeypatch.setattr(executors, "identity", lambda: others)
-        if executor == LocalExecutor(1):
-            monkeypatch.undo()
-            with pytest.raises(WorkerError, match=r"coal is .* there, 0\.0\.1 here"):
-                Work(square, others)(b"")
-            return
-        with pytest.raises(WorkerError, match=r"coal is .* there, 0\.0\.1 here"):
-            list(executor.map(square, [1]))
+    def test_work_of_another_kinarm_is_refused(self, executor):
+        work = partial(do_alike, square, {**clusters.identity(), "coal": "0.0.1"})
+        ((_, failure),) = executor.map(work, [1])
+        assert failure.error.startswith("a worker differs from this process: coal is ")
+        assert failure.error.endswith(" there, 0.0.1 here")
 
 
 def test_one_at_a_time_tasks_are_done_in_the_given_order():
     assert list(LocalExecutor(1).map(square, (3, 1, 2))) == [(3, 9), (1, 1), (2, 4)]
 
 
-@pytest.mark.parametrize(
-    "executor", [LocalExecutor(2), pytest.param(RayExecutor("local", 2), marks=of_ray)]
-)
-def test_what_lost_workers_had_begun_is_done_again(executor, tmp_path):
-    done = executor.map(partial(kill_own_process_once, tmp_path), range(4))
+@needs_ray
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_what_lost_workers_had_begun_is_done_again_on_a_cluster(tmp_path):
+    done = RayExecutor("local", 2).map(partial(kill_own_process_once, tmp_path), range(4))
     assert sorted(done) == [(number, number) for number in range(4)]
 
 
-def test_a_task_that_kills_every_worker():
+def test_a_lost_worker(tmp_path):
+    """The next workers are new ones."""
     with pytest.raises(WorkerError, match="workers ended unexpectedly"):
-        list(LocalExecutor(2).map(kill_own_process_at_seven, range(9)))
+        list(LocalExecutor(2).map(partial(kill_own_process_once, tmp_path), range(4)))
+    assert sorted(LocalExecutor(2).map(square, range(3))) == [(0, 0), (1, 1), (2, 4)]
 
 
 def test_workers_that_grow_are_replaced_in_silence():
@@ -111,25 +105,21 @@ def test_workers_that_grow_are_replaced_in_silence():
 
 def test_a_worker_ends_when_its_parent_has_ended(monkeypatch):
     """Linux then gives it another one."""
-    parents, waited, watched = iter([17, 17, 1]), [], queue.SimpleQueue()
+    parents, ended = iter([17, 17, 1]), queue.SimpleQueue()
     monkeypatch.setattr(os, "getppid", lambda: next(parents))
-    monkeypatch.setattr(executors, "time", SimpleNamespace(sleep=waited.append))
-    monkeypatch.setattr(os, "_exit", sys.exit)
-    with pytest.raises(SystemExit):
-        executors._end_with_parent(17)
-    assert waited == [executors.WATCHED] * 2
-    monkeypatch.setattr(executors, "_end_with_parent", watched.put)
-    executors._prepare_worker(17)
-    assert watched.get(timeout=30) == 17
+    monkeypatch.setattr(executors, "WATCHED", 0.0)
+    monkeypatch.setattr(os, "_exit", ended.put)
+    executors._end_with(17)
+    assert ended.get(timeout=30) == 1
+    assert list(parents) == []
 
 
 def test_workers_agree_on_packages_results_and_all_of_the_source(monkeypatch):
-    executors.check_identity(executors.identity())
-    names = {name for name, _ in executors.identity()}
-    assert {"python", "numpy", "numba", "coal", "pin", "semantics", "source of kinarm"} <= names
-    before = executors.source_digest()
-    monkeypatch.setattr(executors, "BESIDE", ("policies",))
-    assert executors.source_digest() != before
+    known = {"python", "numpy", "numba", "coal", "pin", "semantics", "source of kinarm"}
+    before = clusters.identity()
+    assert known <= set(before)
+    monkeypatch.setattr(clusters, "PACKAGES", clusters.PACKAGES[:-1])
+    assert clusters.identity.__wrapped__()["source of kinarm"] != before["source of kinarm"]
 
 
 @needs_ray
@@ -146,36 +136,14 @@ def test_without_slurm(tmp_path):
         list(SlurmExecutor(tmp_path / "slurm").map(square, [1]))
 
 
-@needs_slurm
-def test_what_slurm_takes_away_goes_on_where_it_was():
-    """Slurm interrupts a bundle amid its second task; the rest is what it is to run."""
-    seen = []
-
-    def work(task):
-        seen.append(task)
-        if task == 20 and seen.count(20) == 1:
-            raise KeyboardInterrupt
-        return task + 1
-
-    bundle = Bundle(work, [(0, 10), (1, 20), (2, 30)])
-    with pytest.raises(KeyboardInterrupt):
-        bundle()
-    rest = bundle.checkpoint()
-    assert rest.result() == [(0, 11), (1, 21), (2, 31)]
-    assert seen == [10, 20, 20, 30]
-
-
 class TestOptions:
     @pytest.mark.parametrize(
         ("given", "words"),
         [
             ({"jobs": 0}, "jobs must be a whole number of at least 1"),
-            ({"bundle": 0}, "bundle must be"),
-            ({"minutes": 0}, "minutes must be"),
             ({"ray": "auto", "slurm": True}, "--ray and --slurm exclude each other"),
             ({"jobs": 2, "slurm": True}, "--jobs is for this machine"),
             ({"bundle": 2}, "--bundle goes with --slurm"),
-            ({"partition": "a", "ray": "auto"}, "--partition goes with --slurm"),
         ],
     )
     def test_refused(self, given, words):
@@ -184,9 +152,8 @@ class TestOptions:
 
     @pytest.mark.parametrize("given", [{"jobs": 2}, {"ray": "auto"}, {"slurm": True}])
     def test_without_training_nothing_runs_anywhere(self, given):
-        RunningOptions().refuse_without_training()
         with pytest.raises(InvalidInputError, match="does not go with --no-train"):
-            RunningOptions(**given).refuse_without_training()
+            StudyRequest(experiment=Path("it"), train=False, **given)
 
     @pytest.mark.parametrize(
         ("given", "made"),

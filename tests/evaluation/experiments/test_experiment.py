@@ -8,7 +8,6 @@ import pytest
 from kinarm.errors import InvalidInputError, KinarmError
 from kinarm.evaluation.experiments.experiment import Experiment
 from kinarm.evaluation.experiments.plan import changed_problem, plan
-from kinarm.evaluation.experiments.variation import LARGEST
 from kinarm.policies.recipes import recipe
 from kinarm.problem import PROBLEMS, ReachProblem
 
@@ -85,11 +84,6 @@ class TestChoices:
         assert many[:3] == few
         assert len({c["noise"] for c in many}) == 20
 
-    def test_another_seed_draws_others(self):
-        ranges = {"count": 5, "noise": {"low": 0.0, "high": 1.0}}
-        first, second = (list(made(random={**ranges, "seed": n}).choices()) for n in (0, 1))
-        assert first != second
-
     def test_draws_fill_their_range(self):
         ranges = {"low": 1, "high": 3}, {"low": 0.001, "high": 10.0, "log": True}
         entries = {"count": 400, "episodes": ranges[0], "noise": ranges[1], "size": ["a", "b"]}
@@ -101,21 +95,9 @@ class TestChoices:
         assert 0.9 < logs[-1] <= 1
         assert logs[200] == pytest.approx(-1, abs=0.4)
 
-    @pytest.mark.parametrize("number", [float, int])
-    @pytest.mark.parametrize("log", [True, False])
-    def test_draws_from_the_widest_ranges_are_finite(self, log, number):
-        low = 1 / LARGEST if log else -LARGEST
-        widest = {"low": number(low) or 1, "high": number(LARGEST), "log": log}
-        drawn = [c["noise"] for c in made(random={"count": 9, "noise": widest}).choices()]
-        assert all(widest["low"] <= value <= widest["high"] for value in drawn)
-        assert len(set(drawn)) == 9
-
     def test_shipped_ones_are_found_by_name(self):
         with pytest.raises(InvalidInputError, match="unknown experiment 'nothing'; available: "):
             Experiment.load("nothing")
-
-    def test_nothing_varies(self):
-        assert list(made().choices()) == [{}]
 
 
 TOY = {"learner": "ars", "recipe": "tuned"}
@@ -133,49 +115,14 @@ TOY = {"learner": "ars", "recipe": "tuned"}
         ({"trials": {"curve": {"points": 0}}}, "points must be a whole number of at least 1"),
         ({"trials": {"curve": {"spacing": "wide"}}}, "trials.curve.spacing must be"),
         ({"seeds": 0}, "seeds must be a whole number of at least 1, got 0"),
-        ({"seeds": 2**63}, "seeds must be at most 100000, got 9223372036854775808"),
-        (
-            {"random": {"count": 10**6, "noise": [1]}},
-            "random.count must be at most 100000, got 1000000",
-        ),
-        (
-            {"seeds": 1000, "grid": {"noise": [1, 2], "step_size": [0.1] * 100}},
-            "an experiment has at most 100,000 trainings, this one 200,000",
-        ),
         ({"learners": []}, "learners must not be empty"),
         ({"problems": ["right", "right"]}, "problems names the same twice: right, right"),
         ({"grid": {"noise": []}}, "grid.noise must be a list of at least one value, got []"),
-        ({"grid": {"noise": 0.1}}, "grid.noise must be a list of at least one value, got 0.1"),
         ({"grid": {"noise": [1]}, "fixed": {"noise": 1}}, "'noise' stands in fixed and in grid"),
         ({"random": {"noise": [1]}}, "random.count must be a whole number of at least 1"),
         ({"random": {"count": 1, "noise": {"low": 1, "high": 1}}}, "low below high"),
-        ({"random": {"count": 1, "noise": {"low": 1, "hihg": 2}}}, "low below high"),
-        ({"random": {"count": 1, "noise": {"low": True, "high": 2}}}, "low below high"),
-        ({"random": {"count": 1, "noise": []}}, "random.noise must be a list of at least one"),
         ({"random": {"count": 1, "noise": 3}}, "random.noise must be a list of values"),
-        (
-            {"random": {"count": 1, "noise": {"low": 0, "high": 2, "log": True}}},
-            "random.noise.low must be greater than 0 with log, got 0",
-        ),
-        (
-            {"random": {"count": 1, "noise": {"low": 1, "high": 10**400, "log": True}}},
-            "random.noise.high must be between 1e-30 and 1e+30, got 10000",
-        ),
-        (
-            {"search": {"count": 1, "noise": {"low": -(10**400), "high": 1}}},
-            "search.noise.low must be between -1e+30 and 1e+30, got -10000",
-        ),
-        (
-            {"random": {"count": 1, "noise": {"low": 0.0, "high": math.inf}}},
-            "random.noise.high must be between -1e+30 and 1e+30, got inf",
-        ),
-        (
-            {"random": {"count": 1, "noise": {"low": 5e-324, "high": 1, "log": True}}},
-            "random.noise.low must be between 1e-30 and 1e+30, got 5e-324",
-        ),
-        ({"trials": {"count": 0}}, "trials: count must be a whole number of at least 1"),
-        ({"trials": {"count": 10**8}}, "trials: count must be at most 10000000, got 100000000"),
-        ({"trials": {"per_decade": 10**4}}, "trials: per_decade must be at most 1000, got 10000"),
+        ({"random": {"count": 1, "noise": {"low": 0, "high": 2, "log": True}}}, "low is above 0"),
         ({"trials": {"cuont": 5}}, "unknown key 'trials.cuont'; available: count"),
         ({"sedes": 5}, "unknown key 'sedes'; available: name, learners"),
         ({"grid": 5}, "grid must be a table, got 5"),
@@ -252,13 +199,6 @@ class TestRuns:
         assert [run.entry.name for run in runs] == ["a", "b"]
         assert runs[0].key == runs[1].key
 
-    def test_choices_are_what_varies(self):
-        runs = planned(grid={"problem.task.tolerance": [0.05, 0.1]}, fixed={"noise": 0.2})
-        assert [run.choices for run in runs] == [
-            {"problem.task.tolerance": 0.05},
-            {"problem.task.tolerance": 0.1},
-        ]
-
 
 class TestKey:
     def test_everything_that_matters_is_in_it(self):
@@ -281,11 +221,6 @@ class TestKey:
         (after,) = planned()
         assert before.key != after.key
 
-    def test_the_base_key_is_without_iterations(self):
-        short, long = (planned(fixed={"iterations": n})[0] for n in (5, 6))
-        other = planned(fixed={"iterations": 6, "noise": 0.3})[0]
-        assert short.base_key == long.base_key != other.base_key
-
 
 class TestProblem:
     @pytest.mark.parametrize(
@@ -293,16 +228,11 @@ class TestProblem:
         [
             ("task.start_spread", 0.3, lambda p: p.task.start_spread),
             ("task.reward.success", 2.0, lambda p: p.task.reward.success),
-            ("stepping.time_step", 0.2, lambda p: p.stepping.time_step),
             ("horizon", 9, lambda p: p.task.horizon),
         ],
     )
     def test_a_field(self, path, value, found):
         assert found(changed_problem(PROBLEMS["right"], path, value)) == value
-
-    def test_the_rest_stays(self):
-        problem = changed_problem(PROBLEMS["both"], "task.start_spread", 0.5)
-        assert problem == PROBLEMS["both"].replace(start_spread=0.5)
 
     def test_a_field_of_a_pinned_arm_makes_another_arm(self):
         """The hash of the arm that it was is not held against it."""
@@ -320,9 +250,9 @@ class TestProblem:
     @pytest.mark.parametrize(
         ("path", "words"),
         [
-            ("task.spread", "unknown field of problem.task 'spread'"),
-            ("tusk.spread", "unknown field of problem 'tusk'"),
-            ("task.horizon.x", "unknown field of problem.task.horizon 'x'"),
+            ("task.spread", "unknown key 'task.spread'; available: "),
+            ("tusk.spread", "unknown key 'tusk'; available: "),
+            ("task.horizon.x", "'horizon' of 'task.horizon.x' is no table"),
         ],
     )
     def test_unknown(self, path, words):
@@ -337,20 +267,17 @@ class TestProblem:
         ({"fixed": {"learning_rate": 1.0}}, "unknown field of a recipe or problem 'learning_rate'"),
         ({"grid": {"ppo.noise": [1]}}, "unknown field of a recipe or problem 'ppo.noise'"),
         ({"fixed": {"seed": 1}}, "unknown field of a recipe or problem 'seed'"),
-        ({"fixed": {"noise": "much"}}, "noise must be a number, got 'much'"),
         ({"grid": {"noise": [0.1, -1.0]}}, "noise must be greater than 0, got -1.0"),
         (
             {"grid": {"problem.task.start_spread": [0.2, 3.0]}},
             "problem.task.start_spread: problem: task: start_spread must",
         ),
         (
-            {"fixed": {"problem.task.sperad": 1}},
-            "problem.task.sperad: unknown field of problem.task",
+            {"seeds": 1000, "grid": {"noise": [1, 2], "step_size": [0.1, *range(1, 100)]}},
+            "an experiment has at most 100,000 trainings, this one 200,000",
         ),
         ({"entries": [{"learner": "ars", "fixed": {"n_epochs": 1}}]}, "problem 'n_epochs'"),
         ({"learners": "arse"}, "unknown learner 'arse'"),
-        ({"recipes": "tunde"}, "unknown recipe 'tunde'"),
-        ({"problems": "rihgt"}, "rihgt"),
     ],
 )
 def test_plans_that_are_refused(entries, words):

@@ -2,21 +2,16 @@
 
 import csv
 import re
-import sys
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from small_studies import SMALL
 
-from kinarm.errors import MissingExtraError
 from kinarm.evaluation.experiments import page
-from kinarm.evaluation.experiments.figures import _band, beside_bound, draw_all, effects
-from kinarm.evaluation.experiments.page import write_all, write_parquet
-from kinarm.evaluation.experiments.results import shown
+from kinarm.evaluation.experiments.figures import beside_bound, draw_all, effects, learning_curves
+from kinarm.evaluation.experiments.page import write_all
 from kinarm.evaluation.experiments.study import Study
 from kinarm.evaluation.experiments.table import group_row
-from kinarm.evaluation.statistics import share_over_seeds, wilson_interval
 
 
 class TestTable:
@@ -34,7 +29,6 @@ class TestTable:
         assert (table["processor_seconds"] > 0).all()
 
     def test_texts_and_missing_values(self, tmp_path):
-        pytest.importorskip("torch")
         study = Study(
             {
                 **SMALL,
@@ -53,10 +47,6 @@ class TestTable:
         assert [text.get_text() for text in panels["sharing"].get_xticklabels()] == ["none", "pair"]
         assert set(panels) == {"learner", "sharing"}
 
-    def test_lists_of_numbers_are_joined(self):
-        assert shown((64, 32)) == "64-32"
-        assert shown([0.5, "tanh"]) == "0.5-tanh"
-
     def test_nothing_finished(self, small):
         assert len(small().table()) == 0
         assert small().groups() == ()
@@ -74,16 +64,6 @@ class TestGroups:
     def test_the_best_comes_first(self, finished):
         best = finished.best(2)
         assert best[0].relative_success >= best[1].relative_success
-
-    def test_an_interval_covers_that_over_trials(self):
-        hits = np.zeros((3, 50))
-        assert share_over_seeds(hits).ci95 == (0.0, wilson_interval(0, 50)[1])
-
-    def test_and_that_over_seeds(self):
-        hits = np.array([np.ones(50), np.zeros(50), np.ones(50)])
-        low, high = share_over_seeds(hits).ci95
-        assert (low, high) == (0.0, 1.0)
-        assert share_over_seeds(hits).value == pytest.approx(2 / 3)
 
 
 @pytest.fixture(scope="module")
@@ -105,11 +85,6 @@ class TestFiles:
         parquet = pytest.importorskip("pyarrow.parquet")
         read = parquet.read_table(folder / "runs.parquet")
         assert read.column("success").to_pylist() == finished.table()["success"].tolist()
-
-    def test_parquet_needs_an_extra(self, finished, monkeypatch, tmp_path):
-        monkeypatch.setitem(sys.modules, "pyarrow", None)
-        with pytest.raises(MissingExtraError, match=r"kinarm\[study\]"):
-            write_parquet(finished, tmp_path / "runs.parquet")
 
     def test_without_it_everything_else_is_written(self, small, monkeypatch):
         monkeypatch.setattr(page, "find_spec", lambda _: None)
@@ -146,30 +121,15 @@ class TestFigures:
         assert draw_all(small()) == {}
         assert beside_bound(small()) is None
 
-    def test_curves_that_nothing_is_known_of_are_left_out(self):
-        axes = Figure().subplots()
-        known = (np.array([1.0, 10.0]), np.array([0.0, 1.0]))
-        unknown = [(np.array([]), np.array([])), (np.array([np.nan]), np.array([0.5]))]
-        _band(axes, unknown, "unknown", 0)
-        assert len(axes.lines) == 0
-        _band(axes, [*unknown, known], "known", 0)
-        (line,) = axes.lines
-        assert (line.get_ydata()[0], line.get_ydata()[-1]) == (0.0, 1.0)
-
-    def test_places_that_no_field_fills_are_empty(self, small):
-        """Four fields in rows of three, of which one has more values than there is room for."""
-        ranges = {name: {"low": 0.01, "high": 0.1} for name in ("step_size", "noise")}
-        more = {"episodes": {"low": 1, "high": 9}, "reward.success": {"low": 0.0, "high": 1.0}}
-        study = small(grid={}, random={"count": 3, **ranges, **more}, seeds=1).run(jobs=1)
-        assert [axes.get_visible() for axes in effects(study).axes] == [True] * 4 + [False] * 2
-
-    def test_of_many_numbers_not_each_has_a_tick(self, small):
-        sizes = [0.01 * (k + 1) for k in range(7)]
-        study = small(grid={"step_size": sizes}, seeds=1).run(jobs=1)
-        (axes,) = effects(study).axes
-        drawn = sorted(line.get_xdata()[0] for line in axes.lines if line.get_marker() == "o")
-        assert drawn == pytest.approx(sizes)
-        assert axes.get_xticks().tolist() != drawn
+    def test_curves_that_nothing_is_known_of_are_left_out(self, small):
+        """Here, the times of one seed."""
+        study = small(grid={}).run(jobs=1)
+        study.store.path("made", study.runs[0]).unlink()
+        steps, seconds = learning_curves(study).axes
+        (known,), (whole,) = seconds.lines[:-1], steps.lines[:-1]
+        trained = study.finished[study.runs[1]]
+        assert known.get_ydata()[-1] == trained.last.success
+        assert whole.get_ydata()[-1] == np.mean([run.last.success for run in study])
 
     def test_effects_are_means_over_the_rest(self, finished):
         (axes,) = effects(finished).axes
@@ -188,8 +148,3 @@ class TestFigures:
         assert sorted(line.get_xdata()[0] for line in axes.lines) == sorted(
             study.table()["step_size"]
         )
-
-    def test_texts_stand_side_by_side(self, small):
-        study = small(grid={"sharing": ["none", "pair", "iteration"]}, seeds=1).run(jobs=1)
-        (axes,) = effects(study).axes
-        assert [text.get_text() for text in axes.get_xticklabels()] == ["none", "pair", "iteration"]

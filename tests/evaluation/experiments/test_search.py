@@ -1,13 +1,8 @@
-"""Searches by Optuna: as many settings as asked for, and nothing stuck after a kill."""
+"""Searches by Optuna: as many settings as asked for, and nothing stuck after an interruption."""
 
-import signal
-import subprocess
 import sys
-import time
-from pathlib import Path
 
 import pytest
-import tomli_w
 from small_studies import SMALL
 
 from kinarm.errors import InvalidInputError, MissingExtraError
@@ -53,13 +48,6 @@ class TestSearch:
             assert run.config.episodes in (1, 2)
         assert len({run.config.step_size for run in searched.runs}) == len(searched) == 6
 
-    def test_values_are_the_success_of_the_policies(self, searched):
-        trials = open_search(searched.experiment, searched.store.folder).trials
-        by_step_size = {run.config.step_size: each for run, each in searched.finished.items()}
-        for trial in trials:
-            trained = by_step_size[trial.params["step_size"]]
-            assert trial.value == trained.outcomes.success.mean()
-
     def test_the_best_is_a_recipe(self, searched):
         best = max(searched.finished.values(), key=lambda run: run.outcomes.success.mean())
         made = recipe("ars", searched.store.folder / "best.toml", problem="right", seed=0)
@@ -82,17 +70,6 @@ class TestSearch:
         again = Study(SEARCH, tmp_path).run(jobs=1)
         assert states(again) == ["COMPLETE"] * 6
         assert (tmp_path / "best.toml").read_bytes() == best
-
-    def test_there_is_no_best_of_nothing(self, tmp_path):
-        study = Study(SEARCH, tmp_path)
-        with study.store.writing(study.experiment):
-            searches.write_recipe(study.experiment, tmp_path)
-        assert not (tmp_path / "best.toml").exists()
-
-    def test_a_search_under_way_is_read(self, tmp_path):
-        study = Study(SEARCH, tmp_path)
-        assert study.runs == ()
-        assert len(study.table()) == 0
 
     def test_what_was_under_way_is_tried_again(self, tmp_path):
         study = Study(SEARCH, tmp_path)
@@ -128,36 +105,10 @@ class TestSearch:
         assert len(study) == 3
 
 
-@pytest.mark.slow
-def test_killed_at_any_time(tmp_path):
-    """No settings are stuck, and none are lost that were tried to the end."""
-    file, folder = tmp_path / "search.toml", tmp_path / "it"
-    file.write_text(tomli_w.dumps({**SEARCH, "search": {**SEARCH["search"], "count": 12}}))
-    command = [sys.executable, "-m", "kinarm.evaluation.commands.study", file, "--out", folder]
-    for seconds in (4.0, 6.0):
-        process = subprocess.Popen(
-            [*command, "--jobs", "2"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-        )
-        time.sleep(seconds)
-        process.send_signal(signal.SIGKILL)
-        process.wait()
-        time.sleep(0.5)  # in which its workers see that it is gone
-    before = set(Path(folder).glob("runs/*.npz"))
-    subprocess.run([*command, "--jobs", "2"], check=True, capture_output=True)
-    study = Study.load(folder)
-    found = states(study)
-    assert found.count("COMPLETE") == len(study) == 12
-    assert "RUNNING" not in found
-    assert "WAITING" not in found
-    assert before <= set(folder.glob("runs/*.npz"))
-
-
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
         ({"search": {"count": 2}}, "search names no field"),
-        ({"search": {"noise": [1]}}, "search.count must be a whole number of at least 1"),
-        ({"search": {"count": 2, "noise": []}}, "search.noise must be a list of at least one"),
         ({"grid": {"noise": [1]}}, "search and grid exclude each other"),
         ({"learners": ["ars", "ppo"]}, "a search has one learner and one recipe, got 2"),
         ({"search": {"count": 2, "sampler": "gp", "noise": [1]}}, "search.sampler must be one of"),

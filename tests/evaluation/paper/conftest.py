@@ -39,12 +39,12 @@ def made_up_run() -> Callable[..., TrainedRun]:
         if curve is None:
             curve = np.ones((POINTS, CURVE_TRIALS))
         return TrainedRun(
-            settings={},
             curve=tuple(points),
             last=points[-1],
             outcomes=TrialOutcomes(distance, np.full(n, 64), np.zeros(n), nowhere, nowhere),
             returns=np.linspace(0, 1, POINTS),
             curve_distance=curve.astype(np.float32),
+            clock=Clock(seconds=1.0, points=(0.1, 0.4, 0.7, 1.0)),
         )
 
     return make
@@ -53,13 +53,12 @@ def made_up_run() -> Callable[..., TrainedRun]:
 @pytest.fixture(scope="session")
 def results_of(experiment: Experiment, planned: tuple[Run, ...]) -> Callable[..., PaperResults]:
     """Make results from a function from trainings to runs, which are told their purpose."""
-    clock = Clock(seconds=1.0, points=(0.1, 0.4, 0.7, 1.0))
 
     def make(run_of: Callable[[PaperRun], TrainedRun]) -> PaperResults:
         runs = []
         for run in planned:
-            asked = PaperRun(planned=run, trained=None, clock=clock)
-            runs.append(PaperRun(planned=run, trained=run_of(asked), clock=clock))
+            asked = PaperRun(planned=run, trained=None)
+            runs.append(PaperRun(planned=run, trained=run_of(asked)))
         return PaperResults(experiment, tuple(sorted(runs, key=lambda run: run.place)))
 
     return make

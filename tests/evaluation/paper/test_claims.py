@@ -163,13 +163,13 @@ class TestSpeed:
     )
     def test_steps_to_level(self, made_up_run, distance, share, steps):
         curve = np.array([[0.5, 0.5], [0.2, 0.5], [0.1, 0.1], [0.3, 0.3]])
-        run = PaperRun(planned=None, trained=made_up_run(np.ones(3), curve), clock=None)
+        run = PaperRun(planned=None, trained=made_up_run(np.ones(3), curve))
         assert run.steps_to_level(distance, share) == steps
 
     @pytest.mark.parametrize(("steps", "distance"), [(4000, 0.3), (3999, 0.1), (10, 0.5)])
     def test_distance_after(self, made_up_run, steps, distance):
         curve = np.array([[0.5, 0.5], [0.2, 0.5], [0.1, 0.1], [0.3, 0.3]])
-        run = PaperRun(planned=None, trained=made_up_run(np.ones(3), curve), clock=None)
+        run = PaperRun(planned=None, trained=made_up_run(np.ones(3), curve))
         assert run.distance_after(steps)[1] == pytest.approx(distance)
 
 

@@ -2,13 +2,12 @@
 
 import csv
 import io
-from collections import Counter
 
 import numpy as np
 import pytest
 
 from kinarm.evaluation.paper.claims import assess
-from kinarm.evaluation.paper.page import median_cell, readings_table, runs_csv, timing
+from kinarm.evaluation.paper.page import median_cell, readings_table, runs_csv
 from kinarm.evaluation.paper.results import LITERAL, Reading
 
 
@@ -22,11 +21,6 @@ def test_a_line_for_each_training(results_of, made_up_run):
     assert [first[f"within_{limit}"] for limit in ("0.05", "0.1", "0.2")] == ["0.4", "0.6", "0.8"]
     assert (first["mean_distance"], first["median_distance"]) == ("0.1200", "0.0800")
     assert (first["environment_steps"], first["contact"]) == ("4000", "0.0")
-
-
-def test_time_is_summed_by_purpose(results_of, made_up_run):
-    results = results_of(lambda _: made_up_run(np.ones(3)))
-    assert timing(results) == {"training_seconds": Counter(run.purpose for run in results.runs)}
 
 
 def test_readings_without_ppo_leave_its_claims_out(results_of, made_up_run):

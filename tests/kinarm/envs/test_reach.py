@@ -3,16 +3,16 @@
 import copy
 import math
 import pickle
-import warnings
 
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env, data_equivalence
+from gymnasium.utils.env_checker import data_equivalence
 
 import kinarm
-from kinarm.envs import ENVIRONMENTS
+from kinarm.envs import ENVIRONMENTS, ClosedEnvironmentError
 from kinarm.envs.reach import ReachEnv
+from kinarm.envs.vector import ReachVectorEnv
 from kinarm.errors import InvalidInputError, StartInContactError
 from kinarm.problem import ReachProblem
 from kinarm.task import REWARD_TERMS
@@ -45,18 +45,6 @@ def goal_of(observation):
 
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 class TestContract:
-    def test_gymnasium_checker(self, name):
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            warnings.filterwarnings("ignore", "zmq.eventloop.ioloop is deprecated")  # by meshcat
-            check_env(gymnasium.make(name).unwrapped)
-
-    def test_stable_baselines_checker(self, name):
-        checker = pytest.importorskip("stable_baselines3.common.env_checker")
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            checker.check_env(gymnasium.make(name).unwrapped)
-
     def test_same_seed_same_bits(self, name):
         first, second = gymnasium.make(name), gymnasium.make(name)
         assert_bitwise_equal(bitwise_episode(first, 7), bitwise_episode(second, 7))
@@ -101,11 +89,8 @@ class TestEpisode:
         assert info["distance"] == pytest.approx(distance)
         assert reward == pytest.approx(1 - distance)
         assert info["contact"] == 0
-        assert not terminated
-        assert not truncated
-        assert type(reward) is float
-        assert type(terminated) is bool
-        assert type(truncated) is bool
+        assert (terminated, truncated) == (False, False)
+        assert [type(each) for each in (reward, terminated, truncated)] == [float, bool, bool]
 
     def test_contact_ends_and_is_named(self, env):
         env.reset(options={"start": HOME, "goal": [0, 5, 5]})
@@ -146,12 +131,6 @@ class TestEpisode:
         assert again[4]["is_success"]
         assert again[4]["distance"] == over[4]["distance"]
 
-    def test_returned_arrays_are_not_overwritten(self, env):
-        first, _ = env.reset(seed=0)
-        kept = first.copy()
-        env.step(np.ones(5))
-        np.testing.assert_array_equal(first, kept)
-
     def test_larger_actions_are_clipped(self, env):
         options = {"start": HOME, "goal": [0, 5, 5]}
         env.reset(options=options)
@@ -174,12 +153,6 @@ class TestSeeding:
         env.step(np.ones(5))
         np.testing.assert_array_equal(env.reset()[0], expected)
 
-    def test_global_generator_is_left_alone(self, env):
-        before = np.random.get_state()[1].copy()  # noqa: NPY002
-        env.reset(seed=6)
-        env.step(np.zeros(5))
-        np.testing.assert_array_equal(np.random.get_state()[1], before)  # noqa: NPY002
-
 
 class TestErrors:
     @pytest.mark.parametrize("error", [InvalidInputError, gymnasium.error.ResetNeeded])
@@ -188,15 +161,14 @@ class TestErrors:
             ReachEnv().step(np.zeros(5))
 
     @pytest.mark.parametrize("use", ["step", "render", "reset"])
-    def test_closed(self, use):
-        env = ReachEnv()
+    @pytest.mark.parametrize("kind", [ReachEnv, ReachVectorEnv])
+    def test_closed(self, kind, use):
+        env = kind()
         env.reset(seed=0)
         env.close()
         env.close()
-        arguments = (np.zeros(5),) if use == "step" else ()
-        with pytest.raises(gymnasium.error.ClosedEnvironmentError, match="is closed"):
-            getattr(env, use)(*arguments)
-        with pytest.raises(InvalidInputError):
+        arguments = (env.action_space.sample(),) if use == "step" else ()
+        with pytest.raises(ClosedEnvironmentError, match="is closed"):
             getattr(env, use)(*arguments)
 
     @pytest.mark.parametrize(

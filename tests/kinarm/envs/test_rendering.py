@@ -1,7 +1,6 @@
 """Pictures and the live page of environments."""
 
 import copy
-import pickle
 import urllib.error
 import urllib.request
 import webbrowser
@@ -9,11 +8,9 @@ import webbrowser
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env
 from live_pages import commands
 
 from kinarm.envs import ReachEnv, ReachGoalEnv, ReachVectorEnv
-from kinarm.envs.rendering import EnvPictures
 from kinarm.errors import InvalidInputError
 from kinarm.viewer import Renderer, live_stage
 
@@ -79,45 +76,20 @@ class TestPicture:
         assert above.shape == (30, 50, 3)
         np.testing.assert_array_equal(above, same)
 
-    def test_copies_have_renderers_of_their_own(self):
-        env = moved(ReachEnv(render_mode="rgb_array", **SMALL))
-        picture = env.render()
-        for other in (copy.deepcopy(env), pickle.loads(pickle.dumps(env))):
-            np.testing.assert_array_equal(other.render(), picture)
 
-    def test_passes_the_checker(self):
-        env = gymnasium.make("kinarm/ReachRight-v0", render_mode="rgb_array", **SMALL)
-        check_env(env.unwrapped, skip_close_check=True)
-
-
-class TestFrames:
-    def test_list_holds_all_since_the_last_call(self):
-        env = ReachEnv(render_mode="rgb_array_list", **SMALL)
-        single = ReachEnv(render_mode="rgb_array", **SMALL)
-        for each in (env, single):
-            each.reset(seed=0)
-        expected = [single.render()]
-        for action in np.random.default_rng(0).uniform(-0.2, 0.2, (4, 5)):
-            env.step(action)
-            single.step(action)
-            expected.append(single.render())
-        np.testing.assert_array_equal(env.render(), expected)
-        assert env.render() == []
-        env.step(np.zeros(5))
-        assert len(env.render()) == 1
-
-    @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
-    def test_last_frame_shows_what_was_begun(self, mode):
-        env = ReachVectorEnv(
-            2, render_mode="rgb_array_list", horizon=2, autoreset_mode=mode, **SMALL
-        )
-        plain = ReachVectorEnv(2, render_mode="rgb_array", horizon=2, autoreset_mode=mode, **SMALL)
-        for each in (env, plain):
-            each.reset(seed=0)
-        for _ in range(7):
-            for each in (env, plain):
-                each.step(np.full((2, 5), 0.3))
-            np.testing.assert_array_equal(env.render()[-1], plain.render())
+def test_gymnasium_collects_pictures():
+    """In the mode ``rgb_array_list``: all since the last call."""
+    env = gymnasium.make("kinarm/ReachRight-v0", render_mode="rgb_array_list", **SMALL)
+    single = ReachEnv(render_mode="rgb_array", **SMALL)
+    for each in (env, single):
+        each.reset(seed=0)
+    expected = [single.render()]
+    for action in np.random.default_rng(0).uniform(-0.2, 0.2, (4, 5)):
+        env.step(action)
+        single.step(action)
+        expected.append(single.render())
+    np.testing.assert_array_equal(env.render(), expected)
+    assert env.render() == []
 
 
 class TestBatch:
@@ -148,16 +120,6 @@ class TestBatch:
         assert {picture.shape for picture in pictures} == {(*shape, 3)}
         assert pictures.tiled.shape == (*tiled, 3)
         np.testing.assert_array_equal(pictures.tiled[: shape[0], : shape[1]], pictures[0])
-
-
-class TestNothingToShow:
-    def test_costs_nothing(self, simulator):
-        pictures = EnvPictures(simulator, None, 1000)
-        pictures.begin(None, None)
-        pictures.step(None)
-        assert pictures.render() is None
-        assert pictures._traces.size == 0
-        pictures.close()
 
 
 class TestHuman:
@@ -199,18 +161,6 @@ class TestHuman:
 
 
 class TestFilms:
-    def test_single(self, tmp_path):
-        pytest.importorskip("moviepy")
-        reader = pytest.importorskip("imageio_ffmpeg")
-        env = gymnasium.make("kinarm/ReachRight-v0", render_mode="rgb_array", horizon=5, **SMALL)
-        env = gymnasium.wrappers.RecordVideo(
-            env, str(tmp_path / "films"), episode_trigger=lambda _: True
-        )
-        moved(env, 3).close()
-        (film,) = tmp_path.glob("films/*.mp4")
-        frames, _ = reader.count_frames_and_secs(str(film))
-        assert frames == 4
-
     def test_batch(self, tmp_path):
         pytest.importorskip("moviepy")
         env = gymnasium.make_vec(

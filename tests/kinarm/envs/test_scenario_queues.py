@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kinarm.envs.scenario_queues import ScenarioQueues
-from kinarm.scenarios import PREFETCHED, ScenarioStream
+from kinarm.scenarios import PREFETCHED, draw_scenarios
 from kinarm.world import World
 
 ARMS = 5
@@ -19,9 +19,21 @@ def generators():
     return [np.random.default_rng(seed) for seed in range(ARMS)]
 
 
+def seeded_queues(world):
+    queues = ScenarioQueues(world, ARMS)
+    for row, rng in enumerate(generators()):
+        queues.seed(row, rng)
+    return queues
+
+
+def scenarios_of(world, rng):
+    while True:
+        yield from zip(*draw_scenarios(world, rng, PREFETCHED), strict=True)
+
+
 def test_each_arm_goes_through_its_own_stream(world):
-    queues = ScenarioQueues(world, generators())
-    streams = [ScenarioStream(world, rng) for rng in generators()]
+    queues = seeded_queues(world)
+    streams = [scenarios_of(world, rng) for rng in generators()]
     rng, dealt = np.random.default_rng(9), np.zeros(ARMS, dtype=int)
     q, goal = np.zeros((ARMS, 6)), np.zeros((ARMS, 3))
     while dealt.min() <= 2 * PREFETCHED:
@@ -29,14 +41,14 @@ def test_each_arm_goes_through_its_own_stream(world):
         kept = q.copy(), goal.copy()
         queues.put(rows, q, goal)
         for row in range(ARMS):
-            start, aim = streams[row].next() if row in rows else (kept[0][row], kept[1][row])
+            start, aim = next(streams[row]) if row in rows else (kept[0][row], kept[1][row])
             np.testing.assert_array_equal(q[row], start)
             np.testing.assert_array_equal(goal[row], aim)
         dealt[rows] += 1
 
 
 def test_another_generator_begins_anew(world):
-    queues, other = (ScenarioQueues(world, generators()) for _ in range(2))
+    queues, other = seeded_queues(world), seeded_queues(world)
     everyone, seen = np.arange(ARMS), np.zeros((2, ARMS, 6))
     goal = np.zeros((ARMS, 3))
     for _ in range(3):

@@ -154,10 +154,6 @@ class TestSeeding:
         np.testing.assert_array_equal(observations[0], observations[1])
         np.testing.assert_array_equal(observations[2], ReachEnv("both").reset(seed=1)[0])
 
-    def test_unseeded_batches_differ(self):
-        first, second = (native("SameStep").reset()[0] for _ in range(2))
-        assert (first[:, 0] != second[:, 0]).all()
-
     def test_batch_size_does_not_matter(self):
         small, large = native("SameStep", 3), native("SameStep", 200)
         observations = small.reset(seed=0)[0], large.reset(seed=0)[0][:3]
@@ -187,10 +183,6 @@ class TestOptions:
         )
         np.testing.assert_array_equal(observations[:, :3], np.tile(goal, (NUMBER, 1)))
         np.testing.assert_array_equal(observations[0], observations[-1])
-
-    def test_unknown_option(self):
-        with pytest.raises(InvalidInputError, match="unknown reset options"):
-            native("SameStep").reset(options={"begin": 1})
 
     def test_failed_reset_leaves_no_half_begun_episodes(self):
         batch, untouched = native("SameStep"), native("SameStep")
@@ -237,20 +229,6 @@ def test_bad_actions_are_refused(actions):
         batch.step(actions)
 
 
-def test_problems_and_overrides_are_those_of_single_environments():
-    settings = {"arm": "paper_flange", "reward": {"success": 2.0}, "horizon": 5}
-    batch = ReachVectorEnv(2, "both", **settings)
-    assert batch.simulator.problem == ReachEnv("both", **settings).simulator.problem
-
-
-def test_spaces_are_batched():
-    batch = native("SameStep")
-    assert batch.single_observation_space.shape == (48,)
-    assert batch.observation_space.shape == (NUMBER, 48)
-    assert batch.action_space.shape == (NUMBER, 5)
-    assert isinstance(batch, ReachVectorEnv)
-
-
 def test_returned_arrays_are_not_overwritten():
     batch = native("SameStep")
     first, _ = batch.reset(seed=0)
@@ -260,23 +238,6 @@ def test_returned_arrays_are_not_overwritten():
     np.testing.assert_array_equal(kept[0], first)
     np.testing.assert_array_equal(kept[1], second[0])
     np.testing.assert_array_equal(kept[2], second[1])
-
-
-def test_actions_of_either_type():
-    batch = native("NextStep")
-    for dtype in (np.float32, np.float64):
-        batch.reset(seed=0)
-        assert np.isfinite(batch.step(np.full((NUMBER, 5), 0.5, dtype=dtype))[0]).all()
-
-
-@pytest.mark.parametrize("use", ["step", "render", "reset"])
-def test_closed(use):
-    batch = native("NextStep")
-    batch.reset(seed=0)
-    batch.close()
-    arguments = (np.zeros((NUMBER, 5)),) if use == "step" else ()
-    with pytest.raises(gymnasium.error.ClosedEnvironmentError, match="is closed"):
-        getattr(batch, use)(*arguments)
 
 
 @pytest.mark.parametrize(

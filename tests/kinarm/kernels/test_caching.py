@@ -1,7 +1,6 @@
 """Kernels are found in Numba's cache if nothing has changed, and work whatever happens to it."""
 
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -13,11 +12,11 @@ import resource, sys
 import numpy as np
 if "full" in sys.argv:
     resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
-from kinarm.kernels.screening import propose_starts
-rows = np.arange(2)
-starts = propose_starts(rows, np.full((2, 3), 0.5), np.zeros(3), np.ones(3), np.zeros((2, 3)))
-assert (starts == 0.5).all()
-print(sum(propose_starts.stats.cache_hits.values()))
+from kinarm.kernels.distance import distances_from_hull
+distances = np.zeros(2)
+distances_from_hull(np.zeros((1, 3)), np.ones((2, 3)), distances)
+assert (distances > 1).all()
+print(sum(distances_from_hull.stats.cache_hits.values()))
 """
 
 
@@ -37,25 +36,21 @@ def found(folder, *arguments):
 
 @pytest.fixture(scope="module")
 def filled(tmp_path_factory):
-    """A cache that was to be filled twice while the disk was full, and what was found there."""
+    """A cache that was to be filled while the disk was full, and what was found there."""
     folder = tmp_path_factory.mktemp("filled")
-    return folder, [found(folder, *full) for full in (["full"], ["full"], [], [])]
+    return folder, [found(folder, *full) for full in (["full"], [], [])]
 
 
 def test_a_full_disk_is_no_failure(filled):
-    assert filled[1] == [0, 0, 0, 1]
+    assert filled[1] == [0, 0, 1]
 
 
-@pytest.mark.parametrize("ending", [".nbi", ".nbc"])
-@pytest.mark.parametrize("content", [b"", b"nonsense", None])
-def test_damaged_files_are_made_anew(filled, tmp_path, ending, content):
-    folder = shutil.copytree(filled[0], tmp_path / "damaged")
-    damaged = list(folder.rglob(f"*{ending}"))
+def test_damaged_files_are_made_anew(filled):
+    damaged = [path for path in filled[0].rglob("*.nb*") if path.is_file()]
     assert damaged
     for path in damaged:
-        path.write_bytes(path.read_bytes()[:-7] if content is None else content)
-    found(folder)
-    assert found(folder) == 1
+        path.write_bytes(path.read_bytes()[:-7])
+    assert [found(filled[0]) for _ in range(2)] == [0, 1]
 
 
 SOURCES = {
@@ -97,15 +92,12 @@ def test_machine_code_is_as_fresh_as_all_that_is_compiled_in(tmp_path):
         (package / name).parent.mkdir(parents=True, exist_ok=True)
         (package / name).write_text(text)
 
-    def value_of_one(old="", new="", file="__init__.py", version=None):
+    def value_of_one(old="", new="", file="__init__.py"):
         """The kernel's value for 1 after a change, and whether it was in the cache."""
         path = package / file
         path.write_text(path.read_text().replace(old, new) if old else path.read_text() + new)
-        ask = (
-            "from arm.kernels.outer import value; print(value(1.0), value.stats.cache_hits.total())"
-        )
-        if version:
-            ask = f"import llvmlite; llvmlite.__version__ = {version!r}; {ask}"
+        asked = "print(value(1.0), value.stats.cache_hits.total())"
+        ask = f"from arm.kernels.outer import value; {asked}"
         done = subprocess.run(
             [sys.executable, "-c", ask],
             env={
@@ -125,11 +117,7 @@ def test_machine_code_is_as_fresh_as_all_that_is_compiled_in(tmp_path):
     assert value_of_one() == (40.0, True)
     assert value_of_one("1.0", "2.0", "kernels/inner.py") == (60.0, False)
     assert value_of_one("2.0", "3.0", "constants.py") == (90.0, False)
-    assert value_of_one("10.0", "1.0", "kernels/middle.py") == (9.0, False)
-    assert value_of_one(new="UNUSED = 1\n", file="kernels/other.py") == (9.0, True)
-    assert value_of_one(version="another") == (9.0, False)
-    assert value_of_one() == (9.0, False)
-    assert value_of_one() == (9.0, True)
+    assert value_of_one(new="UNUSED = 1\n", file="kernels/other.py") == (90.0, True)
 
 
 def test_versions_of_numba_that_are_not_known_are_refused_in_one_line():

@@ -4,15 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
 from numba import njit
 
 from kinarm.kernels.distance import between_segments, closest_to_box
-
-coordinate = st.floats(-2, 2, allow_subnormal=False).map(lambda x: round(x, 9))
-point = st.tuples(coordinate, coordinate, coordinate)
-edge = st.floats(0.01, 2)
 
 ORIGIN = (0.0, 0.0, 0.0)
 UNIT = (1.0, 1.0, 1.0)
@@ -116,42 +110,17 @@ class TestBetweenSegments:
     def test_hand_computed(self, segments, expected):
         assert segment_gaps(*rows(*segments))[0] == pytest.approx(expected, abs=1e-12)
 
-    @settings(max_examples=300)
-    @example(ORIGIN, UNIT, ORIGIN, UNIT)
-    @example(ORIGIN, UNIT, (0.0, 0.0, 1e-9), (1.0, 1.0, 1.0 + 1e-9))
-    @given(point, point, point, point)
-    def test_is_close_to_the_distance(self, a, b, c, d):
-        segments = rows(a, b, c, d)
-        assert abs(segment_gaps(*segments)[0] - segment_distances(*segments)[0]) < 1e-6
-
-    @settings(max_examples=200)
-    @given(point, point, point, st.floats(-1.5, 1.5), st.floats(0, 1e-6))
-    def test_is_close_for_nearly_parallel_segments(self, a, b, c, factor, skew):
-        d = tuple(c[i] + factor * (b[i] - a[i]) + skew * (i == 0) for i in range(3))
-        segments = rows(a, b, c, d)
-        assert abs(segment_gaps(*segments)[0] - segment_distances(*segments)[0]) < 1e-6
-
-    def test_is_close_for_many_random_segments(self):
-        a, b, c, d = np.random.default_rng(8).normal(size=(4, 200_000, 3))
-        gaps, distances = segment_gaps(a, b, c, d), segment_distances(a, b, c, d)
-        assert np.abs(distances - gaps).max() < 1e-6
-
-    def test_is_close_for_parallel_and_degenerate_segments(self):
-        rng = np.random.default_rng(9)
-        a, b, c = rng.normal(size=(3, 60_000, 3))
-        factor = rng.uniform(-1.5, 1.5, (60_000, 1))
+    def test_is_close_for_random_parallel_degenerate_and_nearly_touching_segments(self):
+        rng, n = np.random.default_rng(8), 60_000
+        a, b, c, d = rng.normal(size=(4, 4 * n, 3))
+        parallel, touching = slice(n), slice(n, 2 * n)
+        factor = rng.uniform(-1.5, 1.5, (n, 1))
         factor[:20_000] = 0
-        d = c + factor * (b - a)
+        d[parallel] = (c + np.concatenate([factor, np.zeros((3 * n, 1))]) * (b - a))[parallel]
         b[10_000:30_000] = a[10_000:30_000]
-        gaps, distances = segment_gaps(a, b, c, d), segment_distances(a, b, c, d)
-        assert np.abs(distances - gaps).max() < 1e-6
-
-    def test_is_close_for_segments_that_nearly_touch(self):
-        rng = np.random.default_rng(10)
-        a, b, c = rng.normal(size=(3, 60_000, 3))
-        on_first = a + rng.random((60_000, 1)) * (b - a)
-        apart = 10.0 ** rng.uniform(-14, -1, (60_000, 1)) * rng.normal(size=(60_000, 3))
-        d = on_first + apart + rng.random((60_000, 1)) * (on_first + apart - c)
+        met = (a + rng.random((4 * n, 1)) * (b - a))[touching]
+        met += 10.0 ** rng.uniform(-14, -1, (n, 1)) * rng.normal(size=(n, 3))
+        d[touching] = met + rng.random((n, 1)) * (met - c[touching])
         gaps, distances = segment_gaps(a, b, c, d), segment_distances(a, b, c, d)
         assert np.abs(distances - gaps).max() < 1e-6
 
@@ -168,6 +137,8 @@ class TestClosestToBox:
             ([(0.5, 0.5, 0.5), (5, 5, 5)], 0),
             ([(1, 1, 1), (2, 2, 2)], 0),
             ([(0, 0, 1), (1, 1, 1)], 0),
+            ([(0, 0, 0), (0, 0, 0)], 0),
+            ([(0.5, 0.5, 1 + 1e-9), (0.7, 0.5, 1 + 1e-9)], 1e-9),
             ([(3, 0.5, 0.5), (0, 3.5, 0.5)], 1.5 / math.sqrt(2)),
         ],
     )
@@ -175,41 +146,18 @@ class TestClosestToBox:
         gap = box_gaps(*rows(*segment, ORIGIN, UNIT))[0]
         assert gap == pytest.approx(expected, abs=1e-9)
 
-    @settings(max_examples=300)
-    @example(ORIGIN, ORIGIN, ORIGIN, UNIT)
-    @example((0.5, 0.5, 1.0 + 1e-9), (0.7, 0.5, 1.0 + 1e-9), ORIGIN, UNIT)
-    @given(point, point, point, st.tuples(edge, edge, edge))
-    def test_is_close_to_the_distance(self, a, b, low, edges):
-        high = tuple(low[i] + edges[i] for i in range(3))
-        shapes = rows(a, b, low, high)
-        assert abs(box_gaps(*shapes)[0] - box_distances(*shapes)[0]) < 1e-6
-
-    def test_is_close_for_many_random_segments(self):
-        rng = np.random.default_rng(11)
-        a, b = rng.normal(size=(2, 100_000, 3))
-        low = rng.uniform(-1, 0, (100_000, 3))
-        high = low + rng.uniform(0.05, 1, (100_000, 3))
-        gaps, distances = box_gaps(a, b, low, high), box_distances(a, b, low, high)
-        assert np.abs(distances - gaps).max() < 1e-6
-
-    def test_is_close_near_faces_edges_and_corners(self):
-        rng = np.random.default_rng(12)
-        n = 100_000
+    @pytest.mark.parametrize("where", ["anywhere", "near the box", "along faces"])
+    def test_is_close(self, where):
+        rng, n = np.random.default_rng(11), 50_000
         low, high = np.zeros((n, 3)), np.ones((n, 3))
-        on_box = np.clip(rng.uniform(-1, 2, (n, 3)), 0, 1)
-        apart = 10.0 ** rng.uniform(-12, -1, (n, 1)) * rng.normal(size=(n, 3))
-        direction = rng.normal(size=(n, 3))
-        a = on_box + apart - rng.random((n, 1)) * direction
-        b = on_box + apart + rng.random((n, 1)) * direction
-        gaps, distances = box_gaps(a, b, low, high), box_distances(a, b, low, high)
-        assert np.abs(distances - gaps).max() < 1e-6
-
-    def test_segments_along_faces_and_zero_length_segments(self):
-        rng = np.random.default_rng(13)
-        n = 50_000
-        low, high = np.zeros((n, 3)), np.ones((n, 3))
-        a = rng.uniform(-1, 2, (n, 3))
-        b = a.copy()
-        b[: n // 2, 0] += rng.normal(size=n // 2)
+        a, b = rng.uniform(-1, 2, (2, n, 3))
+        if where == "anywhere":
+            a, b, low = 3 * a, 3 * b, rng.uniform(-1, 0.9, (n, 3))
+        elif where == "near the box":
+            middle = np.clip(a, 0, 1) + 10.0 ** rng.uniform(-12, -1, (n, 1)) * rng.normal(size=3)
+            a, b = middle - rng.random((n, 1)) * b, middle + rng.random((n, 1)) * b
+        else:
+            b[: n // 2, 1:] = a[: n // 2, 1:]
+            b[n // 2 :] = a[n // 2 :]
         gaps, distances = box_gaps(a, b, low, high), box_distances(a, b, low, high)
         assert np.abs(distances - gaps).max() < 1e-6

@@ -10,31 +10,29 @@ from kinarm.kernels.elementary import exponential, hyperbolic_tangent, nearest_w
 from kinarm.kernels.lanes import LANES, as_lanes
 
 
-@njit
-def evaluate(which, values):
-    """Sine, cosine, exponential or hyperbolic tangent, number by number and in lanes."""
-    numbers, many = np.empty_like(values), np.empty_like(values)
-    block = values.reshape(-1, LANES)
-    given, found = as_lanes(block), as_lanes(many.reshape(-1, LANES))
-    for i in range(len(values)):
-        if which == 0:
-            numbers[i] = sine_cosine(values[i])[0]
-        elif which == 1:
-            numbers[i] = sine_cosine(values[i])[1]
-        elif which == 2:
-            numbers[i] = exponential(values[i])
-        else:
-            numbers[i] = hyperbolic_tangent(values[i])
-    for i in range(len(given)):
-        if which == 0:
-            found[i] = sine_cosine(given[i])[0]
-        elif which == 1:
-            found[i] = sine_cosine(given[i])[1]
-        elif which == 2:
-            found[i] = exponential(given[i])
-        else:
-            found[i] = hyperbolic_tangent(given[i])
-    return numbers, many
+def evaluator(function):
+    """A kernel that evaluates a function number by number and in lanes."""
+
+    @njit
+    def evaluate(values):
+        numbers, many = np.empty_like(values), np.empty_like(values)
+        given = as_lanes(values.reshape(-1, LANES))
+        found = as_lanes(many.reshape(-1, LANES))
+        for i in range(len(values)):
+            numbers[i] = function(values[i])
+        for i in range(len(given)):
+            found[i] = function(given[i])
+        return numbers, many
+
+    return evaluate
+
+
+KERNELS = [
+    evaluator(njit(lambda x: sine_cosine(x)[0])),
+    evaluator(njit(lambda x: sine_cosine(x)[1])),
+    evaluator(exponential),
+    evaluator(hyperbolic_tangent),
+]
 
 
 @njit
@@ -61,21 +59,21 @@ EXACT = {0: np.sin, 1: np.cos, 2: np.exp, 3: np.tanh}
 def test_as_precise_as_stated(which, largest, absolute, relative):
     x = spread(largest)
     exact = EXACT[which](x.astype(np.longdouble))
-    error = np.abs(evaluate(which, x)[0].astype(np.longdouble) - exact)
+    error = np.abs(KERNELS[which](x)[0].astype(np.longdouble) - exact)
     assert (error <= absolute + relative * np.abs(exact)).all()
 
 
 @pytest.mark.parametrize("which", range(4))
 def test_lanes_have_the_bits_of_numbers(which):
     x = spread(300.0)
-    numbers, many = evaluate(which, x)
+    numbers, many = KERNELS[which](x)
     np.testing.assert_array_equal(numbers.view(np.int64), many.view(np.int64))
 
 
 @pytest.mark.parametrize("which", range(4))
 def test_special_values(which):
     x = np.array([0.0, -0.0, 1e-300, -1e-300, 5e-324, 0.625, -0.625, 20.0])
-    np.testing.assert_allclose(evaluate(which, x)[0], EXACT[which](x), rtol=4e-16, atol=1e-15)
+    np.testing.assert_allclose(KERNELS[which](x)[0], EXACT[which](x), rtol=4e-16, atol=1e-15)
 
 
 def test_nearest_whole_numbers():

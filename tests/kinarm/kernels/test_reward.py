@@ -8,7 +8,7 @@ from numba import njit
 from simulators import changed
 
 from kinarm.kernels import reward
-from kinarm.kernels.reward import COLLISION, add_reward
+from kinarm.kernels.reward import add_reward
 from kinarm.reference import ReferenceSimulator
 from kinarm.task import REWARD_TERMS, RewardWeights
 
@@ -62,12 +62,6 @@ def test_terms_by_hand(before, after, collided, reached, expected):
     assert added == pytest.approx(sum(expected))
 
 
-def test_steps_closer_count_the_same_however_far():
-    weights = RewardWeights(progress=0, closer=0.5)
-    for after, expected in ((0.9, 0.5), (1 - 1e-15, 0.5), (1.0, 0), (1 + 1e-15, -0.5), (2, -0.5)):
-        assert terms_of(weights, 1.0, after)[1] == expected
-
-
 @given(weight, weight, weight, weight, weight, distance, distance, st.integers(0, 2))
 def test_terms_equal_the_formulas(progress, closer, step, collision, success, before, after, end):
     weights = RewardWeights(
@@ -82,11 +76,6 @@ def test_terms_equal_the_formulas(progress, closer, step, collision, success, be
     expected = by_hand(weights, before, after, end == 1, end == 2)
     assert terms == pytest.approx(expected, abs=1e-12)
     assert added == pytest.approx(sum(expected.values()), abs=1e-12)
-
-
-def test_terms_of_the_end_come_last():
-    """The kernel sums those of every step before those that are paid at the end."""
-    assert REWARD_TERMS[COLLISION:] == ("collision", "success")
 
 
 @pytest.mark.parametrize("term", REWARD_TERMS)

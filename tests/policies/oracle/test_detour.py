@@ -8,9 +8,9 @@ from configurations import depths
 
 from kinarm.arm import Arm
 from kinarm.policies.oracle import motion_search
-from kinarm.policies.oracle.detour import Tree, find_detour
-from kinarm.policies.oracle.motion import along_path, steps_between, straight
-from kinarm.policies.oracle.motion_search import MotionSearch
+from kinarm.policies.oracle.detour import find_detour
+from kinarm.policies.oracle.inverse import steps_between
+from kinarm.policies.oracle.motion_search import MotionSearch, along_path, two_segments
 from kinarm.problem import PROBLEMS
 from kinarm.scene import PAPER_BENCHES, Obstacle, Scene
 from kinarm.simulator import Simulator
@@ -96,15 +96,9 @@ class TestAroundTheWall:
         starts, goals = np.tile(START, (len(detours), 1)), np.repeat(goal, len(detours), axis=0)
         outcome = walled.rollout_actions(actions, starts, goals)
         assert outcome.success.mean() > 0.8
-        blocked = straight(walled, START[None], END[None], np.array([64]))
+        ends, steps = END[None], np.array([64])
+        blocked = two_segments(walled, START[None], ends, ends, steps, steps)
         assert walled.rollout_actions(blocked, START[None], goal).collision[0]
-
-    def test_threads_do_not_matter(self, walled):
-        other = Simulator(walled.problem, threads=2)
-        np.testing.assert_array_equal(
-            find_detour(walled, START, END[None], generator(5)),
-            find_detour(other, START, END[None], generator(5)),
-        )
 
 
 class TestEnds:
@@ -135,15 +129,6 @@ class TestEnds:
         start, ends = np.array([0.0, 0.1]), np.array([[3.0, 0.1], [-2.5, 0.4]])
         path = find_detour(parted, start, ends, generator())
         np.testing.assert_array_equal(path[-1], ends[1])
-
-
-def test_nodes_lead_back_to_their_root():
-    tree = Tree(np.array([[0.0, 0.0], [1.0, 0.0]]))
-    first = tree.add(np.array([0.0, 1.0]), 0)
-    second = tree.add(np.array([0.0, 2.0]), first)
-    assert (first, second) == (2, 3)
-    np.testing.assert_array_equal(tree.path_to_root(second), [[0, 2], [0, 1], [0, 0]])
-    np.testing.assert_array_equal(tree.path_to_root(1), [[1, 0]])
 
 
 class TestWhatIsTried:

@@ -1,27 +1,24 @@
 """PPO: returns by hand, exact resuming, the exported actor, and that it learns."""
 
-import random
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-pytest.importorskip("torch")
-pytest.importorskip("stable_baselines3")
-
-import torch
-
-from kinarm._fields import from_plain
 from kinarm.errors import InvalidInputError, MissingExtraError
+from kinarm.observation import part_slices
 from kinarm.policies import (
     PPOConfig,
-    learners,
     load_checkpoint,
     save_checkpoint,
     state_policy,
     train_policy,
 )
-from kinarm.policies.ppo.learner import PPOTraining, seed_iteration
+from kinarm.policies.normalizer import input_scale
+from kinarm.policies.ppo.learner import PPOTraining
+from kinarm.policies.ppo.networks import split_parameters
+from kinarm.policies.ppo.rollout import collect as collect_rollout
 from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
 from kinarm.task import RewardWeights
@@ -99,16 +96,16 @@ class TestAdvantages:
                 **settings,
             )
             training = PPOTraining(config)
-            training.load(training.initial_state())
-            with torch.no_grad():
-                for net in (training.model.policy.action_net, training.model.policy.value_net):
-                    net.weight.zero_()
-                    net.bias.zero_()
-                training.model.policy.value_net.bias.fill_(self.VALUE)
-            model = training.model
-            _, callback = model._setup_learn(6, None, reset_num_timesteps=False)
-            model.collect_rollouts(training.env, callback, model.rollout_buffer, 3)
-            return model.rollout_buffer
+            state = training.initial_state()
+            parts = split_parameters(state.parameters, 48, config.net_arch, 5)
+            for weights, bias in (parts.actor[-1], parts.critic[-1]):
+                weights[:], bias[:] = 0.0, 0.0
+            parts.critic[-1][1][:] = self.VALUE
+            training.networks.load(state.parameters)
+            training.arms.restore(state, np.random.default_rng(1))
+            given = (training.networks, training.arms, np.random.default_rng(2))
+            found = collect_rollout(*given, gamma=self.GAMMA, threads=1)
+            return found.advantages.reshape(2, 3), found.returns.reshape(2, 3)
 
         return collect
 
@@ -119,16 +116,16 @@ class TestAdvantages:
         the critic's value counts. The second step ends its episode, so that nothing flows back
         into it from the third; the first one gets gamma lambda = 0.25 of the second.
         """
-        advantages = collect(horizon=2).advantages
+        advantages, _ = collect(horizon=2)
         expected = np.array([-1.25 - 0.25 * 1.25, -1.25, -1.25])
-        np.testing.assert_allclose(advantages, np.tile(expected[:, None], 2), atol=1e-5)
+        np.testing.assert_allclose(advantages, np.tile(expected, (2, 1)), atol=1e-5)
 
     def test_within_an_episode(self, collect):
         """The same deltas, and all steps but the last get 0.25 of the next one."""
-        buffer = collect(horizon=64)
+        advantages, returns = collect(horizon=64)
         expected = np.array([-1.25 * (1 + 0.25 + 0.0625), -1.25 * 1.25, -1.25])
-        np.testing.assert_allclose(buffer.advantages, np.tile(expected[:, None], 2), atol=1e-5)
-        np.testing.assert_allclose(buffer.returns, buffer.advantages + self.VALUE, atol=1e-5)
+        np.testing.assert_allclose(advantages, np.tile(expected, (2, 1)), atol=1e-5)
+        np.testing.assert_allclose(returns, advantages + self.VALUE, atol=1e-5)
 
     def test_success_does_not_bootstrap(self, collect):
         """A tolerance beyond reach of any start ends no episode; one that all starts meet cannot
@@ -136,7 +133,7 @@ class TestAdvantages:
         whole = Simulator.sample
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(Simulator, "sample", near_goals(whole))
-            advantages = collect(horizon=64, training_tolerance=0.3).advantages
+            advantages = collect(horizon=64, training_tolerance=0.3)[0]
         # delta = r - V at every step, each of which ends an episode.
         np.testing.assert_allclose(advantages, self.REWARD - self.VALUE, atol=1e-5)
 
@@ -164,20 +161,6 @@ class TestResuming:
         assert len(later) == config.iterations - stopped_after
         assert_same_states(later[-1], states[-1])
         assert_same_policies(resumed.policy, result.policy)
-
-    def test_loading_a_state_equals_never_having_stopped(self, trained):
-        """The model of Stable-Baselines3 that just goes on, without our putting a state into it."""
-        config, _, states = trained
-        if config.initial_tolerance is not None:
-            pytest.skip("another tolerance needs new episodes")
-        training = PPOTraining(config)
-        training.iterate(states[0])
-        training.model.rng, scenarios = seed_iteration(config.seed, 2 + 1)
-        training.env.draw_from(scenarios)
-        training.model.lr_schedule = lambda _: config.learning_rate_at(2 / config.iterations)
-        training.model.learn(config.steps_per_iteration, reset_num_timesteps=False)
-        assert training.model.parameters().tobytes() == states[2].parameters.tobytes()
-        assert training.model.num_timesteps == states[2].environment_steps
 
     def test_finished_training_is_left_alone(self, trained):
         config, result, states = trained
@@ -220,51 +203,29 @@ class TestResult:
         point = train_policy(config).curve[0]
         assert np.isnan([point.mean_return, point.std_return, point.success]).all()
 
-    def test_provenance(self, trained):
-        config, result, _ = trained
-        made = result.policy.provenance
-        assert (made.algorithm, made.seed) == ("ppo", 5)
-        assert made.problem == config.problem.pinned
-        assert from_plain(PPOConfig, made.config, "it") == replace(config, problem="right")
-        assert {"torch", "stable-baselines3"} <= set(made.versions)
+
+def predicted(training, state, observations):
+    """What the actor of a training does, given raw observations."""
+    mirror, left = training.arms.mirror, np.zeros(len(observations), dtype=bool)
+    if mirror is not None:
+        left, observations = mirror.on_the_left(observations), mirror.from_the_right(observations)
+    seen = (observations - state.normalizer.mean) * input_scale(state.normalizer.std)
+    training.networks.load(state.parameters)
+    actions = np.clip(training.networks.means(seen.astype(np.float32)), -1, 1)
+    return actions if mirror is None else np.where(left[:, None], actions * mirror.actions, actions)
 
 
-def predicted(training, observations):
-    """What Stable-Baselines3 itself would do, given raw observations."""
-    env = training.env
-    if env.mirror is None:
-        return training.model.predict(env.interface.observe(observations), deterministic=True)[0]
-    seen = env.interface.observe(env.mirror.from_the_right(observations))
-    actions, _ = training.model.predict(seen, deterministic=True)
-    left = env.mirror.on_the_left(observations)
-    return np.where(left[:, None], actions * env.mirror.actions, actions)
-
-
-def test_policy_acts_like_the_model(trained):
+def test_policy_acts_like_the_actor(trained):
     config, _, states = trained
-    training = PPOTraining(config)
-    training.load(states[-1])
-    with torch.no_grad():  # so that some actions are clipped
-        training.model.policy.action_net.weight.mul_(100)
-    state = replace(states[-1], parameters=training.model.parameters())
+    training, state = PPOTraining(config), replace(states[-1], parameters=states[-1].parameters * 1)
+    actor = split_parameters(state.parameters, 48, config.net_arch, 5).actor
+    actor[-1][0][:] *= 100  # so that some actions are clipped
     policy = state_policy(config, state)
     simulator = Simulator(config.problem, threads=1)
     observations = simulator.world.observe(*simulator.sample(np.random.default_rng(0), 500))
-    expected = predicted(training, observations)
+    expected = predicted(training, state, observations)
     assert 0.01 < (np.abs(expected) == 1).mean() < 0.99
     np.testing.assert_allclose(policy(observations), expected, rtol=0, atol=1e-5)
-
-
-def test_compiled_rollouts_follow_the_model(trained):
-    config, result, states = trained
-    training = PPOTraining(config)
-    training.load(states[-1])
-    simulator = Simulator(config.problem, threads=1)
-    starts, goals = simulator.sample(np.random.default_rng(1), 50)
-    compiled = simulator.rollout(result.policy, starts, goals)
-    stepped = simulator.rollout(lambda seen: predicted(training, seen), starts, goals)
-    np.testing.assert_array_equal(compiled.steps, stepped.steps)
-    np.testing.assert_allclose(compiled.configurations, stepped.configurations, atol=1e-3)
 
 
 def test_starts_spread_out_as_configured():
@@ -298,42 +259,58 @@ def test_discount_of_each_iteration():
     assert (states[1].first_moment != constant.first_moment).any()
 
 
-class TestGlobalState:
-    def test_random_states_and_threads_are_put_back(self):
-        random.seed(1)
-        torch.manual_seed(1)
-        np.random.seed(1)  # noqa: NPY002
-        before = random.getstate(), torch.get_rng_state(), np.random.get_state()  # noqa: NPY002
-        threads = torch.get_num_threads()
-        train_policy(replace(TINY, iterations=1))
-        assert random.getstate() == before[0]
-        assert torch.equal(torch.get_rng_state(), before[1])
-        np.testing.assert_array_equal(np.random.get_state()[1], before[2][1])  # noqa: NPY002
-        assert torch.get_num_threads() == threads
+def test_seeds_differ(trained):
+    config, result, _ = trained
+    other = train_policy(replace(config, seed=6)).policy
+    assert (other.layers[0].weights != result.policy.layers[0].weights).any()
+    assert (other.mean != result.policy.mean).any()
 
-    def test_result_does_not_depend_on_it(self, trained):
-        config, result, _ = trained
-        threads = torch.get_num_threads()
-        torch.manual_seed(99)
-        torch.set_num_threads(threads + 1)
-        try:
-            assert_same_policies(train_policy(config).policy, result.policy)
-        finally:
-            torch.set_num_threads(threads)
 
-    def test_seeds_differ(self, trained):
-        config, result, _ = trained
-        other = train_policy(replace(config, seed=6)).policy
-        assert (other.layers[0].weights != result.policy.layers[0].weights).any()
-        assert (other.mean != result.policy.mean).any()
+def test_threads_do_not_matter(trained):
+    config = replace(trained[0], iterations=2)
+    first = train_policy(config, threads=1).state
+    for threads in (2, 3, 11):
+        assert_same_states(train_policy(config, threads=threads).state, first)
+
+
+def explored(**changes):
+    """Actions of a rollout with replays less their means, and its observations, arm by arm."""
+    noise = {"log_std_init": -4.0, "final_log_std": -4.0, "replay_log_std": -1.0}
+    problem = PROBLEMS["right"].replace(horizon=9)
+    changes = {"problem": problem, "replay_share": 0.5, "learning_rate": 1e-12, **noise, **changes}
+    config = replace(TINY, iterations=100, training_tolerance=0.3, **changes)
+    training = PPOTraining(config)
+    state = training.initial_state()
+    for _ in range(6):
+        state = training.iterate(state)
+    training.networks.load(state.parameters)
+    training.arms.restore(state, np.random.default_rng(1))
+    given = (training.networks, training.arms, np.random.default_rng(2))
+    found = collect_rollout(*given, gamma=0.99, threads=1)
+    deviations = found.actions - training.networks.means(found.observations)
+    wide = np.abs(deviations).max(axis=1) > 0.12  # 6.5 narrow deviations
+    return deviations, wide, found.observations.reshape(6, 20, 48)
+
+
+def test_replays_are_explored_with_more_noise():
+    deviations, wide, _ = explored()
+    assert 0.2 < wide.mean() < 0.8
+    assert deviations[wide].std() == pytest.approx(np.exp(-1), rel=0.2)
+    assert deviations[~wide].std() == pytest.approx(np.exp(-4), rel=0.2)
+
+
+def test_the_noise_of_replays_ends_after_some_steps():
+    _, wide, seen = explored(replay_noise_steps=1)
+    other_goal = (np.diff(seen[..., part_slices(6)["goal"]], axis=1) != 0).any(axis=2)
+    wide = wide.reshape(6, 20)[:, 1:]
+    assert wide.any()
+    assert not wide[~other_goal].any()
+    assert not wide[other_goal].all()  # some are new
 
 
 class TestTensorBoard:
     def test_missing_package_is_named(self, monkeypatch):
-        whole = learners.find_spec
-        monkeypatch.setattr(
-            learners, "find_spec", lambda name: None if name == "tensorboard" else whole(name)
-        )
+        monkeypatch.setitem(sys.modules, "tensorboard.summary", None)
         with pytest.raises(MissingExtraError, match="tensorboard is not installed"):
             train_policy(TINY, tensorboard="logs")
 

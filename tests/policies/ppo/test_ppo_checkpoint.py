@@ -1,12 +1,11 @@
 """Checkpoint files of PPO, which need none of its packages; resuming is tested in test_ppo."""
 
 import gc
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from kinarm.errors import InvalidInputError, PolicyFileError
+from kinarm.errors import PolicyFileError
 from kinarm.failed_scenarios import FailedScenarios
 from kinarm.policies import (
     CurvePoint,
@@ -104,8 +103,3 @@ def test_round_trip(saved, state):
 def test_bad_entry(saved, entries):
     spoil(saved, **entries)
     refused(saved)
-
-
-def test_numbers_of_double_precision(state):
-    with pytest.raises(InvalidInputError, match="must be finite, of single precision"):
-        replace(state, parameters=state.parameters.astype(np.float64))

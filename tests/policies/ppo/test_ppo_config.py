@@ -18,24 +18,13 @@ from kinarm.task import RewardWeights
         ({"n_envs": 0}, "n_envs must be a whole number of at least 1, got 0"),
         ({"iterations": 2.5}, "iterations"),
         ({"seed": -1}, "seed"),
-        ({"n_epochs": True}, "n_epochs"),
         ({"batch_size": 300}, "batch_size must be above 1 and divide the 2000 steps"),
         ({"batch_size": 1}, "batch_size"),
         ({"net_arch": ()}, "net_arch must name at least one layer"),
-        ({"net_arch": (64, 0)}, "net_arch"),
         ({"learning_rate": 0}, "learning_rate must be greater than 0, got 0"),
-        ({"learning_rate": float("inf")}, "learning_rate"),
-        ({"clip_range": -0.1}, "clip_range"),
-        ({"max_grad_norm": 0}, "max_grad_norm"),
         ({"training_tolerance": 0}, "training_tolerance must be greater than 0, got 0"),
         ({"gamma": 1.5}, r"gamma must lie in \[0, 1\], got 1.5"),
-        ({"gae_lambda": float("nan")}, "gae_lambda"),
-        ({"initial_start_spread": -0.1}, "initial_start_spread"),
-        ({"initial_gamma": 1.1}, "initial_gamma"),
-        ({"initial_penalty": -0.5}, "initial_penalty"),
-        ({"widening": 2}, "widening"),
         ({"ent_coef": -1}, "ent_coef must not be negative, got -1"),
-        ({"vf_coef": float("nan")}, "vf_coef"),
         ({"log_std_init": float("inf")}, "log_std_init must be finite"),
         ({"replay_log_std": -1.0}, "replay_log_std needs a replay_share above 0"),
         ({"replay_noise_steps": 5}, "replay_noise_steps needs a replay_log_std"),
@@ -45,12 +34,6 @@ from kinarm.task import RewardWeights
 def test_bad_settings_are_refused(settings, words):
     with pytest.raises(InvalidInputError, match=words):
         PPOConfig(**settings)
-
-
-def test_learning_rate():
-    assert PPOConfig(learning_rate=0.01).learning_rate_at(0.25) == 0.01
-    falling = PPOConfig(learning_rate=0.01, learning_rate_schedule="linear")
-    assert [falling.learning_rate_at(done) for done in (0, 0.75)] == [0.01, 0.0025]
 
 
 def test_discount_widens_as_the_starts_do():
@@ -121,24 +104,15 @@ def test_training_differs_from_the_problem_in_reward_and_tolerance():
     assert config.problem == problem
 
 
-@pytest.mark.parametrize("package", ["torch", "stable_baselines3"])
-def test_without_the_extra_everything_but_training_works(package):
-    code = f"""
+def test_without_the_extra_everything_works():
+    code = """
 import sys
-from importlib.machinery import ModuleSpec
-from types import ModuleType
-for name in ("torch", "stable_baselines3"):  # the other one is there, wherever this runs
-    sys.modules[name] = ModuleType(name)
-    sys.modules[name].__spec__ = ModuleSpec(name, None)
-sys.modules[{package!r}] = None
+sys.modules["torch"] = sys.modules["stable_baselines3"] = sys.modules["tensorboard"] = None
 import kinarm.policies as policies
 for name in policies.__all__:
     getattr(policies, name)
-from kinarm.errors import MissingExtraError
-try:
-    policies.train_policy(policies.recipe("ppo", "tuned"))
-except MissingExtraError as error:
-    print(error)
+changes = {"iterations": 1, "n_steps": 2, "batch_size": 32, "seed": 1}
+print(policies.train_policy(policies.recipe("ppo", **changes)).policy)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == f"{package} is not installed: pip install 'kinarm[ppo]'\n"
+    assert done.stdout.startswith("Policy(ppo paper*")

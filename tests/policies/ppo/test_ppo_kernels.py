@@ -1,12 +1,11 @@
 """Products, networks and gradients of PPO's kernels held against NumPy, all in double precision."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
+from kinarm.errors import InvalidInputError
 from kinarm.kernels.compiling import kernel
-from kinarm.policies.ppo.kernels.layers import BLOCK, hyperbolic_tangent, padded
+from kinarm.policies.ppo.kernels.layers import BLOCK, hyperbolic_tangent
 from kinarm.policies.ppo.kernels.loss import LOSSES, Experience, Objective
 from kinarm.policies.ppo.kernels.tiles import Matrix, multiply
 from kinarm.policies.ppo.kernels.update import (
@@ -15,7 +14,6 @@ from kinarm.policies.ppo.kernels.update import (
     choose,
     descend,
     evaluate,
-    fill_in_scales,
     standardisation,
 )
 from kinarm.policies.ppo.networks import ActorCritic, split_parameters
@@ -76,12 +74,10 @@ class Reference:
 
     def __init__(self, arch, seed=0):
         self.rng = np.random.default_rng(seed)
-        widths = [N_OBSERVATIONS, *arch]
-        inner = sum((a + 1) * b for a, b in pairwise(widths))
-        self.count = 2 * inner + (arch[-1] + 1) * (N_ACTIONS + 1) + N_ACTIONS
-        self.vector = 0.3 * numbers(self.rng, self.count)
         self.arch = arch
-        self.networks = ActorCritic(N_OBSERVATIONS, arch, N_ACTIONS, self.count)
+        self.networks = ActorCritic(N_OBSERVATIONS, arch, N_ACTIONS)
+        self.count = self.networks.n_parameters
+        self.vector = 0.3 * numbers(self.rng, self.count)
         self.networks.load(self.vector)
 
     def outputs(self, vector, observations):
@@ -211,26 +207,19 @@ def test_steps_of_adam():
 
 
 def test_chosen_actions():
+    """Noise is wider in replays alone, and never narrower."""
     rng = np.random.default_rng(0)
-    means, noise = numbers(rng, 20, 3), numbers(rng, 20, 3)
-    scales = rng.choice([1.0, 3.0], 20).astype(np.float32)
+    means, noise, replayed = numbers(rng, 20, 3), numbers(rng, 20, 3), rng.random(20) < 0.5
     log_std = np.array([-0.7, 0.0, 1.5], dtype=np.float32)
-    actions, densities = np.empty_like(means), np.empty(20, dtype=np.float32)
-    choose(means, log_std, noise, scales, actions, densities)
     std = np.exp(log_std.astype(float))
-    deviations = scales[:, None] * std * noise
-    np.testing.assert_allclose(actions, means + deviations, rtol=0, atol=2e-6)
     expected = -(noise**2) / 2 - np.log(std * np.sqrt(2 * np.pi))
-    np.testing.assert_allclose(densities, expected.sum(axis=1), rtol=0, atol=1e-5)
-
-
-def test_noise_is_wider_in_replays_alone_and_never_narrower():
-    replayed, scales = np.array([True, False, True]), np.empty(3, dtype=np.float32)
-    log_std = np.array([-2.0, -3.0], dtype=np.float32)
-    fill_in_scales(replayed, log_std, -1.0, scales)
-    np.testing.assert_allclose(scales, [np.exp(1.5), 1, np.exp(1.5)], rtol=1e-6)
-    fill_in_scales(replayed, log_std, -2.6, scales)
-    assert scales.tolist() == [1, 1, 1]
+    for least, wider in ((1.3, np.exp(1.3 - 0.8 / 3)), (0.2, 1.0), (-np.inf, 1.0)):
+        actions, scales, densities = np.empty_like(means), *np.empty((2, 20), dtype=np.float32)
+        choose(means, log_std, noise, replayed, least, actions, scales, densities)
+        np.testing.assert_allclose(scales, np.where(replayed, wider, 1), rtol=1e-6)
+        deviations = scales[:, None] * std * noise
+        np.testing.assert_allclose(actions, means + deviations, rtol=0, atol=4e-6)
+        np.testing.assert_allclose(densities, expected.sum(axis=1), rtol=0, atol=1e-5)
 
 
 def test_standardisation():
@@ -242,6 +231,7 @@ def test_standardisation():
     assert np.isfinite(standardisation(chosen, np.ones(100, dtype=np.float32))).all()
 
 
-@pytest.mark.parametrize(("width", "whole"), [(1, 16), (16, 16), (17, 32), (64, 64)])
-def test_padded_widths(width, whole):
-    assert padded(width) == whole
+def test_a_vector_of_another_network_is_refused():
+    """By hand: 1 deviation, 24 + 8 in the layers of each, 3 for the action and 3 for the value."""
+    with pytest.raises(InvalidInputError, match="expected a state of 71 parameters, got 70"):
+        split_parameters(np.arange(70), 7, (3, 2), 1)

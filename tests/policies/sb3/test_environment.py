@@ -11,7 +11,7 @@ from kinarm.policies import sb3_vec_env
 class TestWithoutTheExtra:
     def test_it_is_named_in_one_line(self, monkeypatch):
         monkeypatch.setattr("kinarm.policies.learners.find_spec", lambda name: None)
-        with pytest.raises(MissingExtraError, match=r"pip install 'kinarm\[ppo\]'$"):
+        with pytest.raises(MissingExtraError, match=r"pip install 'kinarm\[sb3\]'$"):
             sb3_vec_env("right", 2)
 
 
@@ -44,12 +44,6 @@ class TestProblems:
         env = sb3_vec_env("both", 2, reward_type="dense", horizon=4)
         assert set(env.reset()) == {"observation", "achieved_goal", "desired_goal"}
         assert (env.step(np.zeros((2, 5)))[1] < -0.05).all()
-
-    def test_settings_reach_what_they_are_for(self):
-        env = sb3_vec_env("right", 2, threads=1, observation_dtype="float64", render_mode="human")
-        assert env.simulator.threads == 1
-        assert env.observation_space.dtype == np.float64
-        assert env.render_mode == "human"
 
 
 @pytest.mark.parametrize("n_envs", [0, -1, 1.5, True, "2", None])

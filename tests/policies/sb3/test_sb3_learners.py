@@ -144,6 +144,6 @@ def test_a_recipe_file_and_a_change_replace_the_hyperparameters_that_they_name(t
 
 def test_missing_packages_are_named(monkeypatch):
     monkeypatch.setattr("kinarm.policies.learners.find_spec", lambda name: None)
-    for name, extra in (("sac", "ppo"), ("tqc", "zoo")):
+    for name, extra in (("sac", "sb3"), ("tqc", "zoo")):
         with pytest.raises(MissingExtraError, match=f"kinarm\\[{extra}\\]"):
             find_learner(name).check_installed()

@@ -6,7 +6,6 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 
-from stable_baselines3 import PPO
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, VecFrameStack
 
@@ -111,21 +110,6 @@ class TestSeeds:
         assert_same(env.reset(), other.reset())
         assert_same(env.reset(), other.reset())
 
-    def test_arms_and_resets_differ(self):
-        env = sb3_vec_env("both", 3, seed=4)
-        first, second = env.reset(), env.reset()
-        assert len(np.unique(np.vstack([first, second]), axis=0)) == 6
-
-    def test_seed_of_a_learner(self):
-        def trained():
-            env = sb3_vec_env("both", 4, horizon=8)
-            model = PPO("MlpPolicy", env, n_steps=16, batch_size=64, n_epochs=1, seed=7)
-            model.learn(64)
-            return model.policy.state_dict()
-
-        first, second = trained(), trained()
-        assert all((first[name] == second[name]).all() for name in first)
-
 
 class TestOptions:
     def test_starts_and_goals_can_be_set_once(self):
@@ -164,19 +148,6 @@ class TestMisuse:
         for use in (env.reset, lambda: env.step(np.zeros((2, 5))), env.render):
             with pytest.raises(ClosedEnvironmentError, match="is closed"):
                 use()
-
-    @pytest.mark.parametrize(
-        ("actions", "message"),
-        [
-            (np.zeros((3, 5)), r"actions must have shape \(2, 5\), got \(3, 5\)"),
-            (np.full((2, 5), np.nan), "actions must be finite"),
-        ],
-    )
-    def test_bad_actions(self, actions, message):
-        env = sb3_vec_env(FLAT, 2)
-        env.reset()
-        with pytest.raises(InvalidInputError, match=message):
-            env.step(actions)
 
 
 class TestAttributes:
@@ -223,15 +194,6 @@ class TestPictures:
         assert (picture.shape, picture.dtype) == ((96, 128, 3), np.uint8)
         np.testing.assert_array_equal(picture[:48, 64:], images[1])
         assert len(np.unique(np.array(images), axis=0)) == 3
-
-    def test_pictures_are_those_of_single_environments(self):
-        env = sb3_vec_env(FLAT, 1, seed=5, render_mode="rgb_array", **SIZE)
-        single = gymnasium.make(FLAT, render_mode="rgb_array", **SIZE)
-        env.reset()
-        single.reset(seed=5)
-        env.step(np.ones((1, 5)))
-        single.step(np.ones(5))
-        np.testing.assert_array_equal(env.render(), single.render())
 
 
 class TestReplay:

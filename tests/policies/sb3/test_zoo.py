@@ -5,7 +5,6 @@ import inspect
 import pytest
 
 from kinarm.envs import ENVIRONMENTS
-from kinarm.errors import UnknownNameError
 from kinarm.policies import zoo_hyperparameters
 
 NAMED = {name for name in ENVIRONMENTS if not name.endswith(("/Reach-v0", "/ReachGoal-v0"))}
@@ -38,10 +37,3 @@ def test_settings_are_those_of_the_algorithm(algorithm):
     known = set(inspect.signature(zoo.ALGOS[algorithm]).parameters) | OF_THE_ZOO | NOISE
     for settings in yaml.safe_load(zoo_hyperparameters(algorithm).read_text("utf-8")).values():
         assert set(settings) <= known
-
-
-def test_other_algorithms():
-    with pytest.raises(
-        UnknownNameError, match=r"unknown algorithm 'dqn'; available: a2c, ppo, sac"
-    ):
-        zoo_hyperparameters("dqn")

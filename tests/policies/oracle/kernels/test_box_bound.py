@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from configurations import random_configurations
 from numba import njit
+from proofs import within
 
 from kinarm.kernels.kinematics import POSE, point_jacobian
 from kinarm.kernels.lanes import LANES, as_lanes, select
@@ -15,7 +16,7 @@ from kinarm.policies.oracle.kernels.box_bound import (
     offset_from_goal,
     trim,
 )
-from kinarm.policies.oracle.kernels.overlap import ENDS, overlaps
+from kinarm.policies.oracle.kernels.overlap import overlaps
 
 
 @njit
@@ -24,36 +25,26 @@ def examine(chain, shapes, bounds, goal, cutoff, wanted, q, half, lower, upper, 
 
     The corners are trimmed, and the centre moves to where the linear model is closest to the goal.
     """
-    poses, offset, jacobian, step, scale, slope, least, bend, ends = work
+    poses, offset, jacobian, step, scale, slope, least, bend = work
     results[0] = offset_from_goal(chain, q, goal, poses, offset)
     tool = (goal[0] + offset[0], goal[1] + offset[1], goal[2] + offset[2])
     point_jacobian(chain.prismatic, chain.axis, poses, tool, jacobian)
     direction = closest_step(jacobian, offset, half, step, scale)
-    bound = curved_bound(
-        chain,
-        bounds.curvature,
-        poses,
-        jacobian,
-        offset,
-        direction,
-        half,
-        slope,
-        least,
-        bend,
-    )
+    linear = (poses, jacobian, offset, direction, half)
+    bound = curved_bound(chain, bounds.curvature, *linear, slope, least, bend)
     results[1] = bound
     results[2] = joint_bound(bounds, poses, goal, half)
     results[3] = trim(max(bound, cutoff), bound, slope, least, bend, q, half, lower, upper)
     for i in range(len(half)):
         q[0, i] = q[0, i] + step[i]
-    touching = overlaps(wanted, chain, shapes, poses, half, 1.0, ends, jacobian)
+    touching = overlaps(wanted, chain, shapes, poses, half, 1.0, jacobian)
     results[4] = select(touching, 1.0, 0.0)
 
 
 @njit
 def examine_lanes(chain, shapes, bounds, goal, cutoff, arrays, work):
     q, half, lower, upper, results = arrays
-    poses, offset, jacobian, step, scale, slope, least, bend, ends = work
+    poses, offset, jacobian, step, scale, slope, least, bend = work
     lanes = as_lanes(half)
     examine(
         chain,
@@ -76,17 +67,15 @@ def examine_lanes(chain, shapes, bounds, goal, cutoff, arrays, work):
             as_lanes(slope),
             as_lanes(least),
             as_lanes(bend),
-            as_lanes(ends),
         ),
     )
 
 
 def work_space(simulator, *lanes):
     n, n_joints = simulator.n_actions, simulator.arm.n_joints
-    shapes = simulator.world.contact_model.shapes
     vectors = [np.zeros((n, *lanes)) for _ in range(5)]
-    poses, ends = np.zeros((n_joints + 1, POSE, *lanes)), np.zeros((len(shapes.link), ENDS, *lanes))
-    return (poses, np.zeros((3, *lanes)), np.zeros((3, n, *lanes)), *vectors, ends)
+    poses = np.zeros((n_joints + 1, POSE, *lanes))
+    return (poses, np.zeros((3, *lanes)), np.zeros((3, n, *lanes)), *vectors)
 
 
 def drawn_boxes(simulator, seed, count):
@@ -110,15 +99,6 @@ def examined(simulator, centre, half, goal, cutoff=0.0):
     return results, lower, upper
 
 
-def within(rng, lower, upper, centre, count):
-    """Configurations of a box: inside, on its faces and at its corners."""
-    n = len(lower)
-    shares = np.clip(rng.uniform(-0.5, 1.5, (count, n)), 0, 1)
-    drawn = np.tile(centre, (count, 1))
-    drawn[:, :n] = lower + shares * (upper - lower)
-    return drawn
-
-
 def distances(simulator, configurations, goal):
     tools, _ = simulator.world.screen(configurations)
     return np.linalg.norm(tools - goal, axis=1)
@@ -130,7 +110,7 @@ class TestBounds:
         positive = 0
         for centre, half, goal in zip(*drawn_boxes(simulator, 2, 300), strict=True):
             results, lower, upper = examined(simulator, centre, half, goal, np.inf)
-            away = distances(simulator, within(rng, lower, upper, centre, 200), goal).min()
+            away = distances(simulator, within(lower, upper, centre, rng, 200), goal).min()
             assert results[1] <= away + 1e-12
             assert results[2] <= away + 1e-12
             positive += results[1] > 0
@@ -162,7 +142,7 @@ class TestBounds:
             n = len(half)
             assert (lower >= centre[:n] - half).all()
             assert (upper <= centre[:n] + half).all()
-            drawn = within(rng, centre[:n] - half, centre[:n] + half, centre, 200)
+            drawn = within(centre[:n] - half, centre[:n] + half, centre, rng, 200)
             inside = (drawn[:, :n] >= lower - 1e-12) & (drawn[:, :n] <= upper + 1e-12)
             outside = ~inside.all(axis=1)
             assert (distances(simulator, drawn[outside], goal) > cutoff - 1e-11).all()

@@ -2,7 +2,7 @@
 
 import pickle
 
-from kinarm.evaluation.experiments.executors import Work
+from kinarm.evaluation.experiments.executors import attempt
 
 SMALL = {
     "name": "small",
@@ -33,4 +33,4 @@ class Counting:
             if len(self.tasks) == self._limit:
                 raise KeyboardInterrupt
             self.tasks.append(task)
-            yield task, Work.of(work)(pickle.dumps(task))
+            yield task, attempt(work, pickle.dumps(task))

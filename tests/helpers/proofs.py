@@ -1,0 +1,64 @@
+"""Proofs of the oracle, and configurations that are drawn to beat them."""
+
+import numpy as np
+import pytest
+
+from kinarm.policies.oracle.bounding import Prover
+from kinarm.reference import ReferenceSimulator
+
+
+def prove_steps(simulator, starts, goals, *, fewest=1, most=None, **settings):
+    """Floors under the number of steps, whether they are tight, and witnesses."""
+    n, witnesses = len(starts), starts.copy()
+    last = simulator.task.horizon if most is None else most
+    limits = (np.full(n, 1) * fewest, np.full(n, 1) * last)
+    trials = (starts, goals, witnesses, np.arange(n))
+    found = Prover(simulator).bound_steps(*trials, *limits, **settings)
+    return *found, witnesses
+
+
+def prove_distance(simulator, starts, goals, box=None, **settings):
+    """Distances proven and found, and where they were found."""
+    arm, moved = simulator.arm, slice(simulator.n_actions)
+    whole = tuple(np.tile(limit[moved], (len(starts), 1)) for limit in (arm.lower, arm.upper))
+    prover = Prover(simulator)
+    distances, configurations = prover.bound_distance(starts, goals, box or whole, **settings)
+    return *distances.T, configurations
+
+
+def within(lower, upper, start, rng, count):
+    """Random configurations of a box: inside, on its faces and at its corners."""
+    n = len(lower)
+    shares = np.clip(rng.uniform(-0.5, 1.5, (count, n)), 0, 1)
+    drawn = np.tile(start, (count, 1))
+    drawn[:, :n] = lower + shares * (upper - lower)
+    return drawn
+
+
+def drawn(simulator, seed, count):
+    return simulator.sample(np.random.default_rng(seed), count)
+
+
+def assert_identical(first, second, rows=slice(None)):
+    for name, array in vars(first).items():
+        other = vars(second)[name]
+        if name == "reasons":
+            assert array[rows].tolist() == other.tolist()
+        else:
+            assert array[rows].tobytes() == other.tobytes(), name
+
+
+def replayed(simulator, start, goal, solution):
+    """The motion of a solution, as the slow reference runs it."""
+    actions = iter([*solution.actions, *np.zeros((simulator.task.horizon, simulator.n_actions))])
+    return ReferenceSimulator(simulator).rollout(lambda _: next(actions), start, goal)
+
+
+def assert_reference_agrees(oracle, starts, goals, known):
+    for start, goal, solution in zip(starts, goals, known, strict=True):
+        episode = replayed(oracle.simulator, start, goal, solution)
+        assert episode.contact is None
+        assert episode.success == solution.reachable
+        assert len(episode.rewards) == solution.steps
+        assert episode.distance == pytest.approx(solution.final_distance, abs=1e-9)
+        np.testing.assert_allclose(solution.path, episode.path, rtol=0, atol=1e-9)

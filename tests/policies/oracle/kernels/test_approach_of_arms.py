@@ -1,0 +1,88 @@
+"""Branch and bound for shipped arms: searches that try to beat it."""
+
+import numpy as np
+import pytest
+from proofs import prove_distance, prove_steps, within
+from scipy.optimize import minimize
+
+from kinarm.policies.oracle.inverse import project, solve_within, step_box
+
+CAPSULE_ARMS = ("lrmate200ic_5l", "paper", "paper_flange")
+
+
+@pytest.fixture(scope="module", params=CAPSULE_ARMS)
+def shipped(request, simulators):
+    """A shipped arm, trials, and what is proven of them."""
+    simulator = simulators[request.param]
+    starts, goals = simulator.sample(np.random.default_rng(14), 40)
+    return simulator, starts, goals, *prove_steps(simulator, starts, goals)[:2]
+
+
+class TestSearchesDoNotBeatTheFloor:
+    def test_descent_from_many_configurations(self, shipped):
+        simulator, starts, goals, floors, tight = shipped
+        assert not reached_within(simulator, starts, goals, floors - 1).any()
+        found = reached_within(simulator, starts, goals, floors + 1)
+        assert found[tight & (floors + 1 <= 64)].mean() > 0.9
+
+    def test_contact_free_configurations(self, shipped):
+        simulator, starts, goals, floors, _ = shipped
+        # Lowered towards the bench, the tool reaches the tolerance only where the hand touches.
+        goals = goals - [0, 0, 0.06]
+        floors, _, _ = prove_steps(simulator, starts, goals)
+        rows = np.flatnonzero(floors <= 64)[:24]
+        starts, goals, floors = starts[rows], goals[rows], floors[rows]
+        limits = {"fewest": floors, "most": np.minimum(floors + 8, 64)}
+        counting, _, witnesses = prove_steps(
+            simulator, starts, goals, contact=True, budget=20_000, **limits
+        )
+        assert (counting >= floors).all()
+        raised = np.flatnonzero(counting > floors)
+        assert raised.size > 0
+        tolerances = np.full(raised.size, simulator.task.tolerance)
+        sought = [part[raised] for part in (starts, goals, counting - 1)]
+        found = solve_within(simulator, *sought, tolerances, witnesses[raised], 3000)
+        assert len(found.owner) == 0
+        assert reached_within(simulator, *sought).all()
+
+
+def reached_within(simulator, starts, goals, steps):
+    """Whether a descent from some of many configurations reaches the goal, contact ignored."""
+    n, rng = len(starts), np.random.default_rng(17)
+    box = step_box(simulator, starts, steps)
+    begun = [within(box[0][i], box[1][i], starts[i], rng, 300) for i in range(n)]
+    owner, radius = np.repeat(np.arange(n), 300), np.full(300 * n, simulator.task.tolerance)
+    _, distances = project(simulator, np.concatenate(begun), owner, box, goals, radius)
+    return (distances.reshape(n, -1) <= simulator.task.tolerance).any(axis=1)
+
+
+class TestSearchesDoNotBeatTheDistance:
+    def test_random_configurations_and_descent(self, shipped):
+        simulator, starts, _, _, _ = shipped
+        starts, rng, n = starts[:8], np.random.default_rng(18), simulator.n_actions
+        goals = rng.uniform([-1.5, -1.5, -0.5], [1.5, 1.5, 1.8], (8, 3))
+        box = step_box(simulator, starts, rng.integers(3, 40, 8))
+        proven, found, at = prove_distance(simulator, starts, goals, box, budget=15_000)
+        assert (proven > 0).sum() > 4
+        # Where the budget runs out, the proof lags behind.
+        assert (found - proven < 1.1e-3).sum() > 2
+        for i, (lower, upper) in enumerate(zip(*box, strict=True)):
+            assert ((at[i, :n] >= lower - 1e-12) & (at[i, :n] <= upper + 1e-12)).all()
+
+            def distance(moved, i=i):
+                q = np.append(moved, starts[i, n:])
+                return np.linalg.norm(simulator.arm.tool_position(q) - goals[i])
+
+            assert distance(at[i, :n]) == pytest.approx(found[i], abs=1e-12)
+            drawn = within(lower, upper, starts[i], rng, 5000)
+            tools, _ = simulator.world.screen(drawn)
+            away = np.linalg.norm(tools - goals[i], axis=1)
+            limits = list(zip(lower, upper, strict=True))
+            descended = [
+                minimize(distance, q[:n], method="L-BFGS-B", bounds=limits).fun
+                for q in drawn[np.argsort(away)[:3]]
+            ]
+            least = min(away.min(), *descended)
+            assert least >= proven[i]
+            if found[i] - proven[i] < 1.1e-3:
+                assert least > found[i] - 1.1e-3

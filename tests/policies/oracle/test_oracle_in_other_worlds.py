@@ -1,0 +1,93 @@
+"""The oracle with other arms and scenes: detours, slides and shapes of other kinds."""
+
+import numpy as np
+import pytest
+from proofs import assert_identical, assert_reference_agrees, drawn, replayed
+
+from kinarm.arm import Arm
+from kinarm.policies import Oracle
+from kinarm.problem import PROBLEMS
+from kinarm.scene import PAPER_BENCHES, Obstacle, Scene
+
+HORIZON, TOLERANCE = 64, 0.05
+
+
+@pytest.fixture(scope="module")
+def posts(make_joint, make_collision, write_robot):
+    """Oracles with and without two posts, which a stretched arm cannot pass, and a trial.
+
+    The outer link has to fold in before the first post, turn, and unfold after the second.
+    """
+    limit = '<limit lower="-3" upper="3" velocity="8" effort="0"/>'
+    bar = make_collision(
+        '<capsule radius="0.02" length="0.35"/>', xyz="0.2 0 0", rpy="0 1.5707963267948966 0"
+    )
+    joints = [make_joint(xyz="0 0 0.4", limit=limit), make_joint(xyz="0.3 0 0", limit=limit)]
+    arm = Arm.load(write_robot(joints, {2: bar}, tool="0.4 0 0"))
+    obstacles = []
+    for name, angle in (("left post", 0.9), ("right post", -0.9)):
+        x, y = 0.5 * np.cos(angle), 0.5 * np.sin(angle)
+        lower, upper = (x - 0.03, y - 0.03, 0.0), (x + 0.03, y + 0.03, 1.0)
+        obstacles.append(Obstacle(name=name, lower=lower, upper=upper))
+    problem = PROBLEMS["left"].replace(arm=arm, tolerance=0.02)
+    among, without = (
+        Oracle(problem.replace(scene=Scene(obstacles=placed)), threads=1)
+        for placed in (tuple(obstacles), PAPER_BENCHES[1:])
+    )
+    return among, without, np.array([-1.2, 0.0]), arm.tool_position([1.2, 0.0])
+
+
+class TestOtherWorlds:
+    def test_posts_force_a_detour(self, posts):
+        among, without, start, goal = posts
+        free, detour = without.solve(start, goal), among.solve(start, goal)
+        assert free.steps == free.steps_lower_bound
+        assert detour.reachable
+        assert detour.steps > free.steps + 6
+        assert detour.steps_lower_bound >= free.steps_lower_bound
+        assert np.abs(detour.path[:, 1]).max() > 1.5
+        episode = replayed(among.simulator, start, goal, detour)
+        assert episode.success
+        assert len(episode.rewards) == detour.steps
+        assert "right post" in replayed(among.simulator, start, goal, free).contact
+
+    def test_detours_do_not_depend_on_other_trials(self, posts):
+        among, _, start, goal = posts
+        alone = among.solve_batch([start], [goal])
+        starts = np.array([start * [-1, 1], start, start + np.array([0.0, 0.1]), start])
+        together = among.solve_batch(starts, [goal * [1, -1, 1], goal, goal, goal])
+        for row in (1, 3):
+            assert_identical(together, alone, slice(row, row + 1))
+
+    def test_arm_with_a_slide(self, make_joint, make_collision, write_robot):
+        # A column that lifts two links, which turn in the horizontal plane: 0.016 m a step.
+        lift = '<limit lower="0.35" upper="1" velocity="0.8" effort="0"/>'
+        turn = '<limit lower="-3" upper="3" velocity="4" effort="0"/>'
+        bar = make_collision(
+            '<capsule radius="0.03" length="0.3"/>', xyz="0.2 0 0", rpy="0 1.5707963267948966 0"
+        )
+        joints = [
+            make_joint("prismatic", xyz="0 0 0", limit=lift),
+            make_joint(xyz="0 0 0", limit=turn),
+            make_joint(xyz="0.4 0 0", limit=turn),
+        ]
+        arm = Arm.load(write_robot(joints, {2: bar, 3: bar}, tool="0.4 0 -0.02"))
+        assert arm.n_actuated == 3
+        oracle = Oracle(PROBLEMS["both"].replace(arm=arm), threads=1)
+        starts, goals = drawn(oracle.simulator, 13, 60)
+        known = oracle.solve_batch(starts, goals)
+        assert known.reachable.mean() > 0.7
+        lowering = np.abs(starts[:, 0] - 0.02 - goals[:, 2]) - TOLERANCE
+        lifts = np.ceil(np.fmax(lowering, 0) / 0.016 - 1e-9)
+        assert (known.steps_lower_bound >= np.fmin(lifts, HORIZON + 1)).all()
+        assert (known.steps_lower_bound == lifts).any()
+        assert_reference_agrees(oracle, starts, goals, known)
+        assert (known.steps >= known.steps_lower_bound)[known.reachable].all()
+
+    @pytest.mark.parametrize("name", ["sliding", "mesh"])
+    def test_arms_of_other_shapes(self, simulators, name):
+        oracle = Oracle(simulators[name].problem, threads=1)
+        starts, goals = drawn(oracle.simulator, 14, 12)
+        known = oracle.solve_batch(starts, goals)
+        assert_reference_agrees(oracle, starts, goals, known)
+        assert (known.final_distance >= known.distance_lower_bound).all()

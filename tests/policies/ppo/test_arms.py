@@ -1,0 +1,254 @@
+"""The arms of trainings held against single environments and their own rules."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinarm.envs import ReachEnv
+from kinarm.failed_scenarios import FailedScenarios
+from kinarm.policies import Normalizer, PPOConfig, PPOState
+from kinarm.policies.ppo.arms import TrainingArms
+from kinarm.policies.ppo.state import EpisodeStates
+from kinarm.problem import PROBLEMS
+from kinarm.simulator import Simulator
+from kinarm.task import RewardWeights
+
+NUMBER = 7
+AXES = np.array([-1.0, 1.0, 1.0, -1.0, 1.0, -1.0])
+"""Signs of the axes in the mirror."""
+REWARD = RewardWeights(success=2.0, step=-0.1)
+
+
+@pytest.fixture(scope="module")
+def normalizer():
+    simulator = Simulator("both", threads=1)
+    return Normalizer.of(simulator.world.observe(*simulator.sample(np.random.default_rng(1), 500)))
+
+
+def made(*, number=NUMBER, horizon=64, tolerance=0.5, **settings):
+    """Arms that have not begun."""
+    problem = PROBLEMS["both"].replace(reward=REWARD, tolerance=tolerance, horizon=horizon)
+    config = PPOConfig(problem=problem, n_envs=number, n_steps=100, batch_size=20, **settings)
+    return TrainingArms(config)
+
+
+@pytest.fixture
+def begun(normalizer):
+    def begin(seed=0, **settings):
+        arms, rng = made(**settings), np.random.default_rng(seed)
+        nothing = np.zeros(0, dtype=np.float32)
+        state = PPOState(
+            parameters=nothing,
+            first_moment=nothing,
+            second_moment=nothing,
+            normalizer=normalizer,
+            episodes=EpisodeStates.begun(*arms.sample(rng, arms.config.n_envs)),
+            failed=FailedScenarios.none(6),
+        )
+        arms.restore(state, rng)
+        return arms, state
+
+    return begin
+
+
+def go_on(arms, state):
+    """The state in which the arms are now."""
+    return replace(state, episodes=arms.states(), failed=arms.failed)
+
+
+def begin_single(arms, row):
+    """A `ReachEnv` in the situation of one arm at its start."""
+    states, single = arms.states(), ReachEnv(arms.simulator.problem)
+    start = {"start": states.q[row], "goal": states.goal[row]}
+    return single, single.reset(seed=0, options=start)[0]
+
+
+def assert_normalized(normalizer, found, observation):
+    """As the learner sees it, constants left out."""
+    moving = normalizer.std > 1e-6
+    expected = (observation[moving] - normalizer.mean[moving]) / normalizer.std[moving]
+    np.testing.assert_allclose(found[moving], expected, rtol=1e-5, atol=1e-5)
+    np.testing.assert_array_equal(found[~moving], 0)
+
+
+@pytest.mark.parametrize(("horizon", "steps"), [(64, 150), (3, 40)])
+def test_equals_single_environments(begun, normalizer, horizon, steps):
+    arms, _ = begun(horizon=horizon)
+    rng = np.random.default_rng(0)
+    singles = [begin_single(arms, row) for row in range(NUMBER)]
+    returns, told, reached = np.zeros(NUMBER), [], []
+    ends = {"success": 0, "collision": 0, "truncated": 0}
+    for _ in range(steps):
+        for seen, (_, observation) in zip(arms.observe(), singles, strict=True):
+            assert_normalized(normalizer, seen, observation)
+        actions = rng.uniform(-1, 1, (NUMBER, 5)).astype(np.float32)
+        step = arms.step(actions)
+        finals = dict(zip(step.cut_short.tolist(), step.finals, strict=True))
+        for row, (single, _) in enumerate(singles):
+            observation, reward, terminated, truncated, info = single.step(actions[row])
+            returns[row] += reward
+            assert step.rewards[row] == np.float32(reward)
+            assert step.ended[row] == (terminated or truncated)
+            assert (row in finals) == truncated
+            if not step.ended[row]:
+                singles[row] = single, observation
+                continue
+            if truncated:
+                assert_normalized(normalizer, finals[row], observation)
+            told.append(returns[row])
+            reached.append(info["success"])
+            ends["truncated"] += truncated
+            ends["success"] += info["success"]
+            ends["collision"] += info["collision"]
+            returns[row] = 0.0
+            singles[row] = begin_single(arms, row)
+    np.testing.assert_allclose(np.concatenate(arms.returns), told, rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(np.concatenate(arms.successes), reached)
+    assert arms.time > 0
+    assert ends["collision"] > 2
+    assert (ends["truncated"] if horizon == 3 else ends["success"]) > 2
+
+
+@pytest.mark.parametrize("replay", [{}, {"replay_share": 0.5, "replay_size": 30}])
+def test_restored_episodes_go_on_as_if_nothing_had_happened(begun, replay):
+    arms, state = begun(4, number=40, **replay)
+    rng = np.random.default_rng(0)
+    for _ in range(40):
+        arms.step(rng.uniform(-1, 1, (40, 5)))
+    state = go_on(arms, state)
+    other, _ = begun(99, number=40, **replay)
+    other.restore(state, np.random.default_rng(5))
+    np.testing.assert_array_equal(other.observe(), arms.observe())
+    arms._rng = np.random.default_rng(5)
+    before = len(np.concatenate(arms.returns))
+    for _ in range(100):
+        actions = rng.uniform(-1, 1, (40, 5))
+        for a, b in zip(arms.step(actions), other.step(actions), strict=True):
+            np.testing.assert_array_equal(a, b)
+        for a, b in zip(arms.states(), other.states(), strict=True):
+            np.testing.assert_array_equal(a, b)
+    ended = np.concatenate(other.returns)
+    np.testing.assert_array_equal(np.concatenate(arms.returns)[before:], ended)
+    assert len(ended) > 5
+    np.testing.assert_array_equal(np.hstack(arms.failed), np.hstack(other.failed))
+
+
+class TestMirror:
+    def test_goals_always_lie_to_the_right(self, begun):
+        drawn, met = (begun(number=50, symmetric=on)[1].episodes for on in (False, True))
+        left = drawn.goal[:, 1] > 0
+        assert 10 < left.sum() < 40
+        image = np.where(left[:, None], drawn.q * AXES, drawn.q)
+        np.testing.assert_array_equal(met.q[:, :5], image[:, :5])  # the last joint is held
+        np.testing.assert_array_equal(met.goal[:, 1], -np.abs(drawn.goal[:, 1]))
+
+    def test_right_goals_are_untouched(self, begun):
+        plain, mirrored = (begun(number=30, symmetric=on)[0] for on in (False, True))
+        right = plain.states().goal[:, 1] < 0
+        np.testing.assert_array_equal(plain.observe()[right], mirrored.observe()[right])
+        actions = np.random.default_rng(2).uniform(-1, 1, (30, 5))
+        first, second = plain.step(actions), mirrored.step(actions)
+        np.testing.assert_array_equal(first.rewards[right], second.rewards[right])
+        np.testing.assert_array_equal(first.ended[right], second.ended[right])
+
+
+def test_tolerance_can_change_between_restored_states(begun):
+    """All else goes on; episodes end as in arms that were made with it."""
+    arms, state = begun(tolerance=0.05)
+    built, rng = made(tolerance=0.7), np.random.default_rng(9)
+    arms.config = built.config
+    for each in (arms, built):
+        each.restore(state, np.random.default_rng(10))
+    for _ in range(80):
+        actions = rng.uniform(-1, 1, (NUMBER, 5))
+        for a, b in zip(arms.step(actions), built.step(actions), strict=True):
+            np.testing.assert_array_equal(a, b)
+    assert np.concatenate(arms.successes).any()
+
+
+class TestReplay:
+    """Episodes that begin where earlier ones failed."""
+
+    SIZE = 30
+
+    @pytest.fixture
+    def arms(self, begun):
+        return begun(11, number=40, replay_share=0.5, replay_size=self.SIZE)[0]
+
+    def play(self, arms, steps):
+        """Of all episodes that end: whether they are replays and reach the goal; scenarios."""
+        rng, ended = np.random.default_rng(6), []
+        for _ in range(steps):
+            before, replayed = arms.states(), arms.states().replayed
+            over = arms.step(rng.uniform(-1, 1, (40, 5))).ended
+            for row in np.flatnonzero(over):
+                scenario = (*before.start[row], *before.goal[row])
+                held = arms.failed.goals[-over.sum() :]
+                ended.append((replayed[row], (held == before.goal[row]).all(1).any(), scenario))
+        return ended
+
+    def test_the_last_failures_are_kept(self, arms):
+        ended = self.play(arms, 60)
+        failed = [scenario for _, missed, scenario in ended if missed]
+        assert self.SIZE < len(failed) < len(ended)
+        np.testing.assert_array_equal(np.hstack(arms.failed), failed[-self.SIZE :])
+
+    def test_a_share_begins_where_one_failed(self, arms):
+        failed, replays = set(), 0
+        ended = self.play(arms, 150)
+        for replayed, missed, scenario in ended:
+            assert replayed == (scenario in failed)
+            replays += replayed
+            if missed:
+                failed.add(scenario)
+        assert 0.35 < replays / len(ended) < 0.55
+
+    def test_the_record_leaves_them_out(self, arms):
+        ended = self.play(arms, 100)
+        new = [not missed for replayed, missed, _ in ended if not replayed]
+        assert 0 < len(new) < len(ended)
+        np.testing.assert_array_equal(np.concatenate(arms.successes), new)
+        assert len(np.concatenate(arms.returns)) == len(new)
+
+
+def test_a_share_of_the_penalty(begun):
+    """All else is rewarded as before."""
+    (whole, _), (mild, _) = begun(number=60), begun(number=60, initial_penalty=0.25)
+    rng, touched = np.random.default_rng(3), 0
+    for _ in range(30):
+        actions = rng.uniform(-1, 1, (60, 5))
+        rewards, milder = whole.step(actions).rewards, mild.step(actions).rewards
+        touching = rewards < -0.8
+        expected = rewards - 0.75 * REWARD.collision * touching
+        np.testing.assert_allclose(milder, expected, rtol=0, atol=1e-6)
+        touched += touching.sum()
+    assert touched > 5
+
+
+def drive(arms, steps=200):
+    """Distances before and after, steps, rewards, ends of random actions, a row per step."""
+    rng, history = np.random.default_rng(0), []
+    for _ in range(steps):
+        before, distances = arms.states(), arms.episodes.distance.copy()
+        rewards, ended, *_ = arms.step(rng.uniform(-0.4, 0.4, (NUMBER, 5)).astype(np.float32))
+        history.append((distances, before.steps, rewards, ended))
+    return [np.array(column) for column in zip(*history, strict=True)]
+
+
+class TestStopAtGoal:
+    def test_success_takes_two_steps_within_or_the_last(self, begun):
+        arms, _ = begun(stop_at_goal=True, tolerance=0.9, horizon=4)
+        distances, steps, rewards, ended = drive(arms)
+        reached, within, last = rewards > 1, distances <= 0.9, steps == 3
+        assert reached.sum() == np.concatenate(arms.successes).sum()
+        assert ended[reached].all()
+        assert (within | last)[reached].all()
+        assert reached[within & ~last].any()
+        assert reached[~within & last].any()
+
+    def test_only_a_success_has_its_bonus(self, begun):
+        distances, _, rewards, ended = drive(begun(stop_at_goal=True, tolerance=0.9, horizon=4)[0])
+        passing = (distances[:-1] > 0.9) & (distances[1:] <= 0.9) & ~ended[:-1]
+        assert passing.any()
+        assert (rewards[:-1][passing] < 1).all()
