@@ -2,11 +2,13 @@
 
 import os
 import pickle
+import queue
 import threading
 import time
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -122,6 +124,9 @@ class LocalExecutor:
             ) from error
         finally:
             if not all(each.done() for each in under_way):
+                with suppress(queue.Empty):  # loky forgets these tasks, then looks them up
+                    while True:
+                        pool._work_ids.get_nowait()
                 pool.shutdown(kill_workers=True)
 
 
