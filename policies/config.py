@@ -33,9 +33,6 @@ def scheduled(value: float, schedule: Schedule, done: float) -> float:
     return value if schedule == "constant" else value * (1 - done)
 
 
-RECIPE_REACH = 1.264
-"""Reach of the arm ``paper``, in which the lengths of recipes were found [m]."""
-
 POSITIVE = {"must": "be greater than 0", "holds": lambda value: value > 0}
 NOT_NEGATIVE = {"must": "not be negative", "holds": lambda value: value >= 0}
 SHARE = {"must": "lie in [0, 1]", "holds": lambda value: 0 <= value <= 1}
@@ -136,10 +133,3 @@ class TrainingConfig:
 
 
 ConfigT = TypeVar("ConfigT", bound=TrainingConfig)
-
-
-def rewarded_per_reach(config: ConfigT) -> ConfigT:
-    """Let progress count per reach of the problem's arm instead of per reach of ``paper``."""
-    weights = config.training_problem.task.reward
-    relative = round(config.problem.load_arm().reach / RECIPE_REACH, 2)
-    return replace(config, reward=replace(weights, progress=weights.progress / relative))

@@ -1,4 +1,4 @@
-"""Recipes: settings by name, or from a file."""
+"""Recipes: settings by name, or from a file; those that ship with kinarm, and their adaption."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -6,13 +6,17 @@ from pathlib import Path
 from typing import Any
 
 from kinarm._fields import from_plain, init_fields, read_toml, take_base, to_plain
-from kinarm._files import is_file
+from kinarm._files import is_file, shipped_files
 from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.policies.config import ConfigT
 from kinarm.policies.learners import Learner, find_learner
-from kinarm.problem import ReachProblem
+from kinarm.problem import PROBLEMS, ReachProblem
 
 PER_TRAINING = ("problem", "seed")
 """Settings that vary from one training with a recipe to the next."""
+
+RECIPE_REACH = 1.264
+"""Reach of the arm ``paper``, in which the lengths of recipes were found [m]."""
 
 
 def recipe(learner: str, name_or_file: str | Path | None = None, **changes: Any) -> Any:
@@ -82,3 +86,66 @@ def _read_recipe(learner: Learner[Any, Any], path: Path, circumstances: Mapping[
             given[name] = {**plain[name], **entry}
     made = from_plain(learner.config, {**plain, **given}, str(path))
     return replace(made, problem=standard.problem)
+
+
+def shipped_learner(name: str, config: type[ConfigT], **parts: Any) -> Learner[ConfigT, Any]:
+    """A learner of kinarm, with the recipes of its file in ``data/recipes``.
+
+    A recipe has a ``summary``, the settings that it replaces of its ``base``, and maybe those that
+    are others ``where_regions_differ``; see `adapted`.
+
+    Parameters
+    ----------
+    name, config
+        Name of the learner, and its settings.
+    **parts
+        What else a `Learner` has.
+    """
+    path, summaries, recipes, apart = shipped_files("recipes")[name], {}, {}, {}
+    tables = read_toml(path, "recipe")
+    for recipe_name, table in tables.items():
+        summaries[recipe_name] = table.pop("summary")
+        differing = table.pop("where_regions_differ", {})
+        table |= {**tables.get(table.pop("base", ""), {}), **table, "recipe": recipe_name}
+        recipes[recipe_name] = from_plain(config, table, str(path))
+        apart[recipe_name] = from_plain(config, {**table, **differing}, str(path))
+    return Learner(
+        name=name,
+        config=config,
+        recipes=recipes,
+        summaries=summaries,
+        adapt=lambda made: adapted(made, apart),
+        **parts,
+    )
+
+
+def adapted(config: ConfigT, apart: Mapping[str, ConfigT]) -> ConfigT:
+    """Adapt a recipe to its problem, if it is symmetric.
+
+    Progress is rewarded in proportion to the arm's reach, and tolerances of the training are shares
+    of the task's.
+
+    Parameters
+    ----------
+    config : TrainingConfig
+        The recipe, with problem and seed.
+    apart : mapping of str to TrainingConfig
+        What takes its place where several regions are to be reached and no reflection maps one to
+        another.
+    """
+    if not getattr(config, "symmetric", False):
+        return config
+    from kinarm.policies.mirror import different_regions, missing_mirror  # loads Pinocchio
+
+    problem, changes = config.problem, dict[str, Any]()
+    changes["symmetric"] = symmetric = not missing_mirror(problem)
+    if different_regions(problem, symmetric) > 1:
+        config = replace(apart[config.recipe], problem=problem, seed=config.seed)
+    scale = problem.task.tolerance / PROBLEMS["right"].task.tolerance
+    for name in ("initial_tolerance", "training_tolerance"):
+        if (length := getattr(config, name, None)) is not None:
+            changes[name] = round(scale * length, 9)
+    weights = config.training_problem.task.reward
+    relative = round(problem.load_arm().reach / RECIPE_REACH, 2)
+    changes["reward"] = replace(weights, progress=weights.progress / relative)
+    return replace(config, **changes)

@@ -8,7 +8,7 @@ from typing import Any
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.policies.config import MANY, NOT_NEGATIVE, POSITIVE, Schedule, TrainingConfig
 from kinarm.policies.learners import Learner, TrainingState, imported
-from kinarm.task import RewardWeights
+from kinarm.policies.recipes import shipped_learner
 
 ALGORITHMS = {
     "a2c": "stable_baselines3:A2C",
@@ -106,21 +106,15 @@ class SB3State(TrainingState):
     training: Any = field(default=None, repr=False, metadata={"unsaved": True})
 
 
-def _learner(name: str, title: str, **recipes: tuple[str, dict[str, Any]]) -> Learner[Any, Any]:
-    """A learner by its name and recipes: what they are in a few words, and their settings."""
+def _learner(name: str, title: str) -> Learner[SB3Config, SB3State]:
+    """A learner by the name and title of its algorithm."""
     package = ALGORITHMS[name].partition(":")[0]
     contrib = package == "sb3_contrib"
-    every = {"default": ("the defaults of the library, with one arm", {}), **recipes}
-    return Learner(
-        name=name,
+    return shipped_learner(
+        name,
+        SB3Config,
         title=f"{title} of {'sb3-contrib' if contrib else 'Stable-Baselines3'}",
-        config=SB3Config,
         state=SB3State,
-        recipes={
-            recipe: SB3Config(recipe=recipe, algorithm=name, **settings)
-            for recipe, (_, settings) in every.items()
-        },
-        summaries={recipe: summary for recipe, (summary, _) in every.items()},
         begin=imported("kinarm.policies.sb3.training", "SB3Training"),
         policy=imported("kinarm.policies.sb3.training", "trained_policy"),
         packages=("torch", "stable_baselines3", *([package] if contrib else [])),
@@ -128,87 +122,10 @@ def _learner(name: str, title: str, **recipes: tuple[str, dict[str, Any]]) -> Le
     )
 
 
-OFF_POLICY: dict[str, Any] = {
-    "learning_rate": 1e-3,
-    "gamma": 0.95,
-    "tau": 0.05,
-    "batch_size": 128,
-    "learning_starts": 1000,
-    "train_freq": 1,
-    "gradient_steps": 2,
-    "policy_kwargs": {"net_arch": [128, 128]},
-}
-"""The settings of rl-zoo for FetchReach, with faster targets and 128 units."""
-
-EIGHT_ARMS: dict[str, Any] = {
-    "iterations": 15_000,
-    "n_envs": 8,
-    "learning_rate_schedule": "linear",
-    "training_tolerance": 0.04,
-    "reward": RewardWeights(success=5.0),
-}
-"""120,000 environment steps of eight arms, with kinarm's reward and tolerance."""
-
 A2C = _learner("a2c", "Advantage Actor-Critic")
 DDPG = _learner("ddpg", "Deep Deterministic Policy Gradient")
+PPO = _learner("sb3-ppo", "Proximal Policy Optimization")
+SAC = _learner("sac", "Soft Actor-Critic")
+TD3 = _learner("td3", "Twin Delayed DDPG")
+TQC = _learner("tqc", "Truncated Quantile Critics")
 TRPO = _learner("trpo", "Trust Region Policy Optimization")
-SAC = _learner(
-    "sac",
-    "Soft Actor-Critic",
-    tuned=(
-        "rl-zoo's FetchReach; eight arms, faster targets, 128 units; kinarm's reward and tolerance",
-        {**EIGHT_ARMS, "hyperparameters": OFF_POLICY},
-    ),
-)
-TD3 = _learner(
-    "td3",
-    "Twin Delayed DDPG",
-    tuned=(
-        "as that of SAC, with rl-zoo's usual noise",
-        {**EIGHT_ARMS, "action_noise": 0.1, "hyperparameters": OFF_POLICY},
-    ),
-)
-HINDSIGHT: dict[str, Any] = {
-    **OFF_POLICY,
-    "top_quantiles_to_drop_per_net": 1,
-    "policy_kwargs": {"net_arch": [128, 128], "n_critics": 2, "n_quantiles": 10},
-    "replay_buffer_kwargs": {"n_sampled_goal": 4, "goal_selection_strategy": "future"},
-}
-ON_POLICY: dict[str, Any] = {
-    "learning_rate": 1e-3,
-    "n_steps": 32,
-    "batch_size": 512,
-    "n_epochs": 5,
-    "gamma": 0.99,
-    "gae_lambda": 0.9,
-}
-
-TQC = _learner(
-    "tqc",
-    "Truncated Quantile Critics",
-    hindsight=(
-        "hindsight replay; rl-zoo's FetchReach; as SAC, and fewer quantiles, for speed; contact "
-        "costs three steps more",
-        {
-            **EIGHT_ARMS,
-            "reward": RewardWeights(collision=-3.0),
-            "hindsight": True,
-            "hyperparameters": HINDSIGHT,
-        },
-    ),
-)
-PPO = _learner(
-    "sb3-ppo",
-    "Proximal Policy Optimization",
-    tuned=(
-        "rl-zoo's ReacherBullet; more arms and fewer epochs, for speed; kinarm's reward and "
-        "tolerance",
-        {
-            **EIGHT_ARMS,
-            "iterations": 18_750,
-            "n_envs": 64,
-            "normalize": True,
-            "hyperparameters": ON_POLICY,
-        },
-    ),
-)

@@ -1,0 +1,1 @@
+"""Recipes: settings of kinarm's learners by name, a file for each learner."""
