@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from kinarm._files import write_text
+from kinarm.episodes import Rollouts
 from kinarm.evaluation.bounds import MOST_BOUNDED, oracle_bounds
 from kinarm.evaluation.contestants import find_contestants
 from kinarm.evaluation.metrics import METRICS
@@ -29,7 +30,6 @@ from kinarm.evaluation.trials import trial_set
 from kinarm.policies.library import RANKING, group_of, policy_names
 from kinarm.policies.oracle import OracleSolutions
 from kinarm.problem import PROBLEMS
-from kinarm.rollouts import Rollouts
 
 TRIALS, SEED = 10_000, 20_161
 

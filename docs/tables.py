@@ -10,7 +10,7 @@ from sphinx.util.docutils import SphinxDirective
 
 from kinarm import PROBLEMS, REWARD_TERMS, Arm, RewardWeights, Scene, Simulator
 from kinarm._fields import summary_of
-from kinarm.enclosures import enclosing_capsule
+from kinarm.contact_shapes import enclosing_capsule
 from kinarm.envs import ENVIRONMENTS
 from kinarm.evaluation import METRICS
 from kinarm.evaluation.commands import arms, problem

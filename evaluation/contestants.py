@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm._files import first_line
 from kinarm.arm import Arm
+from kinarm.episodes import Rollouts
 from kinarm.errors import InvalidInputError, PolicyFileError, UnknownNameError
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.trials import TrialSet, trial_generator
@@ -24,7 +25,6 @@ from kinarm.policies.conversion.sb3_inputs import find_vec_normalize
 from kinarm.policies.library import policy_files
 from kinarm.policies.policy import Policy
 from kinarm.problem import ProblemLike, ReachProblem
-from kinarm.rollouts import Rollouts
 from kinarm.simulator import PolicyFunction
 
 

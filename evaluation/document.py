@@ -7,6 +7,7 @@ import msgspec
 
 from kinarm._archive import load_json
 from kinarm._validation import finite_array
+from kinarm.episodes import Outcome
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.bounds import Bounds
 from kinarm.evaluation.outcomes import Cause, Pair
@@ -14,7 +15,6 @@ from kinarm.evaluation.schemas import Count, Digest, Document, Share
 from kinarm.evaluation.statistics import BOOTSTRAP_SEED, LEVEL, RESAMPLES, Estimate
 from kinarm.evaluation.trials import TrialSet
 from kinarm.problem import ReachProblem
-from kinarm.rollouts import Outcome
 from kinarm.simulator import Simulator
 
 

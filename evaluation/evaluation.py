@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm.episodes import Outcome, Rollouts
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.bounds import MOST_BOUNDED, oracle_bounds
 from kinarm.evaluation.contestants import Contestant, Predictor, find_contestants, policy_function
@@ -25,7 +26,6 @@ from kinarm.policies.oracle.solution import OracleSolutions
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.problem import ProblemLike, ReachProblem
-from kinarm.rollouts import Outcome, Rollouts
 from kinarm.simulator import PolicyFunction
 
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm.episodes import Rollouts
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.contestants import ORACLE, Contestant
 from kinarm.evaluation.outcomes import HOLDING_STEPS
 from kinarm.evaluation.trials import TrialSet
-from kinarm.rollouts import Rollouts
 
 NEVER = sys.float_info.min
 """A tolerance that nothing meets [m]."""

@@ -9,6 +9,8 @@ from .envs import ReachEnv as ReachEnv
 from .envs import ReachGoalEnv as ReachGoalEnv
 from .envs import ReachGoalVectorEnv as ReachGoalVectorEnv
 from .envs import ReachVectorEnv as ReachVectorEnv
+from .episodes import Rollouts as Rollouts
+from .episodes import StepResult as StepResult
 from .errors import ArmError as ArmError
 from .errors import InvalidInputError as InvalidInputError
 from .errors import KinarmError as KinarmError
@@ -25,18 +27,15 @@ from .kinematics import InverseSolutions as InverseSolutions
 from .networks import CompiledPolicy as CompiledPolicy
 from .networks import Mirror as Mirror
 from .networks import Networks as Networks
-from .paths import record_path as record_path
 from .problem import PROBLEMS as PROBLEMS
 from .problem import ReachProblem as ReachProblem
-from .problem import Stepping as Stepping
-from .problem_files import problem_names as problem_names
-from .problem_files import scene_names as scene_names
+from .problem import problem_names as problem_names
+from .problem import scene_names as scene_names
 from .recording import Recording as Recording
 from .recording import load_recordings as load_recordings
+from .recording import record_path as record_path
 from .recording import save_recordings as save_recordings
 from .reference import ReferenceSimulator as ReferenceSimulator
-from .rollouts import Rollouts as Rollouts
-from .rollouts import StepResult as StepResult
 from .scene import GoalRegion as GoalRegion
 from .scene import Mount as Mount
 from .scene import Obstacle as Obstacle
@@ -45,6 +44,7 @@ from .simulator import Simulator as Simulator
 from .task import REWARD_TERMS as REWARD_TERMS
 from .task import ReachTask as ReachTask
 from .task import RewardWeights as RewardWeights
+from .task import Stepping as Stepping
 from .viewer import ReplayPage as ReplayPage
 from .world import World as World
 

@@ -7,18 +7,19 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from kinarm._files import first_line
 from kinarm._validation import finite_array
-from kinarm.arm_model import build_model, build_shapes
 from kinarm.arm_specification import AllowedContact, ArmSpecification
-from kinarm.chain import Chain
+from kinarm.chain import Chain, link_lengths
 from kinarm.errors import ArmError
-from kinarm.motion_bounds import link_lengths
+from kinarm.meshes import hull_of_mesh
 from kinarm.urdf import Description, read_urdf
 
 DEFAULT_ARM = "paper"
@@ -89,13 +90,13 @@ class Arm:
         specification = replace(arm, **changes).resolved(Path())
         wanted = specification.completed()
         description = read_urdf(wanted)
-        model = build_model(description, wanted.velocity_limits)
+        model = _build_model(description, wanted.velocity_limits)
         chain = Chain.from_model(model, description.tool_frame)
         loaded = cls(
             specification=specification,
             description=description,
             model=model,
-            geometry=build_shapes(description, model),
+            geometry=_build_shapes(description, model),
             n_actuated=_n_actuated(wanted.actuated, model, chain, description),
             home=_home(wanted.home, chain),
             allowed_contacts=wanted.allowed_contacts or (),
@@ -211,6 +212,60 @@ class Arm:
 
     def __repr__(self) -> str:
         return f"Arm({self.name!r}, {self.n_joints} axes, {self.n_actuated} actuated)"
+
+
+def _build_model(description: Description, speeds: tuple[float, ...] | None) -> pin.Model:
+    """Build the kinematics, with these velocity limits or those of the URDF [rad/s or m/s].
+
+    Raises ArmError if Pinocchio cannot, nothing moves, or a joint has no velocity limit.
+    """
+    name = description.path.name
+    try:
+        model = pin.buildModelFromXML(ElementTree.tostring(_robot(description), "unicode"))
+    except (ValueError, RuntimeError) as error:
+        raise ArmError(f"{name} is not a readable URDF: {first_line(error)}") from error
+    if model.njoints < 2:
+        raise ArmError(f"{name} has no moving joint")
+    if speeds is not None:
+        limits = finite_array("velocity_limits", speeds, (model.nv,))
+        if (limits <= 0).any():
+            raise ArmError(f"velocity_limits of {name} must be greater than 0, got {list(speeds)}")
+        model.velocityLimit = limits
+    for joint, speed in zip(list(model.names)[1:], model.velocityLimit, strict=True):
+        if not 0 < speed < 1e10:
+            raise ArmError(f"joint {joint!r} of {name} has no velocity limit: velocity={speed}")
+    return model
+
+
+def _robot(description: Description) -> ElementTree.Element:
+    """Pinocchio's input: links with their collision shapes, and joints."""
+    robot = ElementTree.fromstring(description.text)
+    robot.attrib = {"name": "robot", "version": "1.2"}
+    for parent in (robot, *robot):
+        for element in (*parent.findall("material"), *parent.findall("visual")):
+            parent.remove(element)
+    return robot
+
+
+def _build_shapes(description: Description, model: pin.Model) -> pin.GeometryModel:
+    """Load the collision shapes; meshes become convex hulls."""
+    robot, hulls = _robot(description), {}
+    for link in robot.findall("link"):
+        for number, shape in enumerate(link.findall("collision/geometry")):
+            mesh = shape.find("mesh")
+            if mesh is not None:
+                scale = np.array([float(factor) for factor in mesh.get("scale", "").split()])
+                hull = hull_of_mesh(Path(mesh.get("filename", "")), scale)
+                hulls[f"{link.get('name')}_{number}"] = hull
+                shape.remove(mesh)
+                ElementTree.SubElement(shape, "sphere", radius="1")
+    text = ElementTree.tostring(robot, "unicode")
+    geometry = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
+    for shape in geometry.geometryObjects:
+        if shape.name in hulls:
+            shape.geometry = hulls[shape.name]
+        shape.geometry.computeLocalAABB()
+    return geometry
 
 
 def _trailing_idle_axes(model: pin.Model, chain: Chain) -> int:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kinarm._parallel import run_rows
 from kinarm.collision import ContactModel
-from kinarm.enclosures import enclosing_polytope
+from kinarm.contact_shapes import enclosing_polytope
 from kinarm.kernels.closest import Bodies, closest_pairs
 
 

@@ -28,6 +28,9 @@ CLOSE, OFTEN, CLOSENESS_SAMPLES = 0.025, 0.05, 200
 GUESS, HINT = np.array([1.0, 0.0, 0.0]), np.zeros(2, dtype=np.int32)
 """Where Coal's searches start: direction between two shapes, and numbers of corners."""
 
+FEW = 4
+"""Of up to so many steps in doubt, Coal also tells what touches."""
+
 MOUNT_SAMPLES = 721
 """Positions of the first joint at which the mounting is tested."""
 
@@ -167,6 +170,40 @@ class ContactModel:
         )
         # Pairs are tested in order up to the first in contact; later results are of other calls.
         return next(index for index, result in enumerate(results) if result.isCollision())
+
+    def first_contacts(
+        self, ways: NDArray[np.float64], doubt: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], int]:
+        """Find what steps touch first whose kernels have proven them neither free nor in contact.
+
+        Coal is asked in the order of the motion, and not beyond the first contact.
+
+        Parameters
+        ----------
+        ways : ndarray, shape (n, n_tested, n_joints)
+            Configurations in the order of the motion [rad or m].
+        doubt : ndarray of int, shape (n,)
+            Bit k set: that of number k, from 0, is in doubt.
+
+        Returns
+        -------
+        touched : ndarray of int, shape (n,)
+            Numbers of the pairs, from 1; -1 where only contact as such is known, 0 where there is
+            none.
+        asked : int
+            Configurations that Coal was asked about.
+        """
+        touched, asked = np.zeros(len(ways), dtype=np.int64), 0
+        for k in range(ways.shape[1]):
+            rows = np.flatnonzero((doubt & 1 << k != 0) & (touched == 0))
+            if rows.size:
+                hit = rows[self.in_contact(ways[rows, k])]
+                touched[hit] = -1
+                asked += rows.size
+                for row in hit if len(ways) <= FEW else ():
+                    index = self.first_in_contact(ways[row, k])
+                    touched[row] = -1 if index is None else index + 1
+        return touched, asked
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
         return type(self), tuple(getattr(self, item.name) for item in fields(self))

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm._parallel import run_rows
 from kinarm._validation import finite_array, one_or_many, whole_number
 from kinarm.arm import Arm
+from kinarm.chain import Frame, Frames
 from kinarm.errors import InvalidInputError
-from kinarm.frames import Frame, Frames
 from kinarm.kernels.inverse import TURN, Search, solve_targets
 from kinarm.kernels.kinematics import move_frame, place_frame
 from kinarm.randomness import low_discrepancy_points
@@ -78,7 +78,7 @@ class Kinematics(ABC):
     @cached_property
     def frames(self) -> Frames:
         """Frames that `poses` and `jacobians` know; ``frames.names`` lists them."""
-        return Frames(self.arm)
+        return Frames(self.arm.model, self.arm.tool_frame)
 
     def poses(self, configurations: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
         """Poses of a frame, compiled.

@@ -1,54 +1,37 @@
 """The problem: an arm, a scene, a task and a stepping, as one value.
 
 Everything that simulates, trains, bounds, evaluates, records or stores takes a problem and names
-it. What cannot be used is refused by a `KinarmError`, in one line that names it.
+it. What cannot be used is refused by a `KinarmError`, in one line that names it. Problems, scenes
+and tasks also lie in files: those that ship with kinarm, and the user's own.
 """
 
 import hashlib
 import json
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import tomli_w
 
-from kinarm._fields import check_fields, from_plain, init_fields, to_plain
-from kinarm._files import absolute, named_file, write_text
-from kinarm._validation import whole_number
+from kinarm._fields import check_fields, from_plain, init_fields, read_toml, take_base, to_plain
+from kinarm._files import absolute, is_file, named_file, shipped_files, write_text
 from kinarm.arm_specification import ArmSpecification
-from kinarm.errors import ProblemError, UnknownNameError
-from kinarm.problem_files import PAPER_TASKS, find_scene, find_task, read_problem
+from kinarm.errors import InvalidInputError, ProblemError, UnknownNameError
 from kinarm.scene import Scene
-from kinarm.task import ReachTask, RewardWeights
+from kinarm.task import ReachTask, RewardWeights, Stepping
 
 if TYPE_CHECKING:
     from kinarm.arm import Arm
 
+Part = TypeVar("Part", Scene, ReachTask)
 
-@dataclass(frozen=True, kw_only=True)
-class Stepping:
-    """How time passes.
+PAPER_TASKS = {"left": ("left",), "right": ("right",), "both": ("left", "right")}
+"""Goal regions of the paper's tasks 1, 2 and 3 by the names of their problems."""
 
-    Parameters
-    ----------
-    time_step : float
-        Duration of a step [s].
-    tested_configurations : int
-        Evenly spaced configurations, from 1 to 32, at which the motion of a step is tested for
-        contact, its end included.
-    """
-
-    time_step: float = 0.02
-    tested_configurations: int = 4
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-        if not (math.isfinite(self.time_step) and self.time_step > 0):
-            raise ProblemError(f"time_step must be finite and above 0 s, got {self.time_step}")
-        whole_number("tested_configurations", self.tested_configurations, 1, 32)
+KEYS = {"base", "name", "arm", "scene", "task", "stepping"}
+"""Keys of a problem file."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -273,3 +256,74 @@ def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
             yield from _leaves(entry, f"{path}[{number}]")
     else:
         yield path, value
+
+
+def problem_names() -> tuple[str, ...]:
+    """Names of the problems that ship with kinarm."""
+    return (*PAPER_TASKS, *shipped_files("problems"))
+
+
+def scene_names() -> tuple[str, ...]:
+    """Names of the scenes that ship with kinarm."""
+    return tuple(shipped_files("scenes"))
+
+
+def read_problem(path: Path) -> dict[str, Any]:
+    """Read a problem file, as a table of what differs from the defaults of a problem.
+
+    Its parts are tables; ``arm``, ``scene`` and ``task`` may also be names or files. What is left
+    out is that of the problem ``base``. Without a word on goal regions, another scene's are all
+    to be reached.
+    """
+    entries = read_toml(path, "problem")
+    regions = PAPER_TASKS[take_base(entries, str(path), PAPER_TASKS, "right")]
+    scene, task = entries.get("scene"), entries.get("task", {})
+    if isinstance(entries.get("arm"), str):
+        entries["arm"] = {"source": entries["arm"]}
+    if isinstance(scene, str):
+        entries["scene"] = to_plain(find_scene(_beside(path, scene)))
+    if isinstance(task, str):
+        entries["task"] = to_plain(find_task(_beside(path, task)))
+    elif isinstance(task, Mapping):
+        new = isinstance(scene, str) or (isinstance(scene, Mapping) and "goal_regions" in scene)
+        entries["task"] = {"goal_regions": () if new else regions, **task}
+    return {"name": path.stem, **entries}
+
+
+def find_scene(name: str | Path) -> Scene:
+    """Find a scene by its name, by the name of a problem, or in a file of either."""
+    return _find_part(Scene, "scene", name)
+
+
+def find_task(name: str | Path) -> ReachTask:
+    """Find a task: by the name of a problem that has it, or in a file of task or problem."""
+    if str(name) in PAPER_TASKS:
+        return ReachTask(goal_regions=PAPER_TASKS[str(name)])
+    return _find_part(ReachTask, "task", name)
+
+
+def _find_part(kind: type[Part], what: str, name: str | Path) -> Part:
+    if str(name) in PAPER_TASKS:
+        return kind()
+    available = shipped_files(f"{what}s")
+    of_problem = str(name) in shipped_files("problems") and str(name) not in available
+    path = named_file("problem" if of_problem else what, name, problem_names())
+    entries = read_toml(path, what)
+    if entries.keys() & KEYS:
+        entries = read_problem(path)
+        part = from_plain(kind, entries.get(what, {}), str(path), f"{what}.")
+        if isinstance(part, ReachTask) and not part.goal_regions:
+            scene = from_plain(Scene, entries.get("scene", {}), str(path), "scene.")
+            part = replace(part, goal_regions=tuple(each.name for each in scene.goal_regions))
+        return part
+    if kind is Scene:
+        if "goal_regions" not in entries:
+            raise InvalidInputError(f"{path}: 'goal_regions' is missing: where goals may lie")
+        entries = {"obstacles": [], **entries}
+    return from_plain(kind, entries, str(path))
+
+
+def _beside(path: Path, name: str) -> str | Path:
+    """Another file by its name, or by its path from the folder of the file that names it."""
+    beside = path.parent / name
+    return beside if is_file(beside) else name

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, ClassVar
 
 from kinarm._fields import init_fields
 from kinarm.arm_specification import arm_names
-from kinarm.problem_files import problem_names, scene_names
+from kinarm.problem import ProblemLike, ReachProblem, problem_names, scene_names
 
 if TYPE_CHECKING:
     from kinarm.arm import Arm
-    from kinarm.problem import ProblemLike, ReachProblem
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,10 +67,8 @@ class ProblemOptions:
     }
     """Values without an option, in words."""
 
-    def resolve(self, default: "ProblemLike" = "right") -> "ReachProblem":
+    def resolve(self, default: ProblemLike = "right") -> ReachProblem:
         """The problem that the options make of a default one."""
-        from kinarm.problem import ReachProblem
-
         changed = {name: getattr(self, name) for name in init_fields(ProblemOptions)}
         named = changed.pop("problem")
         if named is None and self.task is not None:
@@ -81,7 +78,7 @@ class ProblemOptions:
             del changed[name]
         return problem.replace(arm=self._arm(problem), **changed)
 
-    def _arm(self, problem: "ReachProblem") -> "Arm | None":
+    def _arm(self, problem: ReachProblem) -> "Arm | None":
         """The arm that the options name or change; None if they do neither."""
         from kinarm.arm import Arm  # loads Pinocchio: --help does without
 
@@ -92,7 +89,7 @@ class ProblemOptions:
         return Arm.load(replace(problem.arm, digest=None), **given) if given else None
 
 
-def say_choices(problems: "Iterable[ReachProblem]") -> None:
+def say_choices(problems: Iterable[ReachProblem]) -> None:
     """Say on standard error what was chosen where a URDF says nothing, a line for each arm."""
     for specification in dict.fromkeys(problem.arm for problem in problems):
         if specification.source not in arm_names():

@@ -13,15 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm._parallel import run_together
 from kinarm._validation import finite_array
 from kinarm.arm import Arm
-from kinarm.doubtful_steps import decide_doubtful_steps
-from kinarm.episodes import PAUSED, RUNNING, Control, Episodes
+from kinarm.episodes import PAUSED, RUNNING, Control, Episodes, Rollouts, StepResult
 from kinarm.errors import InvalidInputError, StartInContactError
 from kinarm.kernels.compiling import Array
-from kinarm.kernels.rollout import advance, allow_one_step, begin, results_of_step
+from kinarm.kernels.rollout import advance, allow_one_step, begin, refuse, results_of_step
 from kinarm.kernels.session import Session
 from kinarm.networks import CompiledPolicy, Networks, network_control
 from kinarm.problem import ProblemLike, ReachProblem
-from kinarm.rollouts import Rollouts, StepResult
 from kinarm.scenarios import draw_scenarios
 from kinarm.scene import Scene
 from kinarm.task import ReachTask
@@ -302,11 +300,28 @@ class Simulator:
         episodes = session.episodes
         while run_together(advance, work, self.threads, session.of_thread):
             paused = np.flatnonzero(episodes.status == PAUSED)
-            self.checked_by_coal += decide_doubtful_steps(self.world, session, paused)
-            resumed = paused[episodes.cleared[paused]]
+            resumed = self._decide(session, paused)
             if resumed.size == 0:
                 return
             work = int((episodes.stop - episodes.steps)[resumed].sum())
+
+    def _decide(self, session: Session, paused: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Let Coal refuse steps in doubt that touch something; return which episodes go on."""
+        episodes = session.episodes
+        ways = self.world.substeps(episodes.q[paused], episodes.target[paused])
+        contacts = self.world.contact_model
+        touched, asked = contacts.first_contacts(ways, episodes.doubt[paused])
+        self.checked_by_coal += asked
+        refused = touched != 0
+        episodes.touched[paused] = touched
+        episodes.status[paused[~refused]] = RUNNING
+        episodes.cleared[paused] = ~refused
+        if refused.any():
+            refuse(paused[refused], session)
+            # Those of which only contact as such is known.
+            episodes.touched[paused[touched < 0]] = 0
+        resumed: NDArray[np.int64] = paused[~refused]
+        return resumed
 
     def _follow(self, policy: PolicyFunction, episodes: Episodes) -> None:
         """Drive episodes to their end with a Python function."""

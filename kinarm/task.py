@@ -1,4 +1,4 @@
-"""Reaching tasks: goals, tolerance, horizon, starts and reward.
+"""Reaching tasks: goals, tolerance, horizon, starts and reward; and how time passes.
 
 Numbers that are out of range, and what does not fit together, are a `ProblemError`.
 """
@@ -163,3 +163,26 @@ class ReachTask:
         moving = np.flatnonzero((upper - lower).any(axis=0))
         ends = np.cumsum(weights[:-1]) / sum(weights)
         return Goals(lower, (upper - lower)[:, moving], moving, ends)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stepping:
+    """How time passes.
+
+    Parameters
+    ----------
+    time_step : float
+        Duration of a step [s].
+    tested_configurations : int
+        Evenly spaced configurations, from 1 to 32, at which the motion of a step is tested for
+        contact, its end included.
+    """
+
+    time_step: float = 0.02
+    tested_configurations: int = 4
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if not (math.isfinite(self.time_step) and self.time_step > 0):
+            raise ProblemError(f"time_step must be finite and above 0 s, got {self.time_step}")
+        whole_number("tested_configurations", self.tested_configurations, 1, 32)

@@ -11,7 +11,7 @@ from kinarm._command_line import Commands, run_commands
 from kinarm._console import print_table
 from kinarm._files import check_output, write_atomically, write_text
 from kinarm._validation import MOST_TRIALS, whole_number
-from kinarm.problem_files import problem_names
+from kinarm.problem import problem_names
 from kinarm.problem_options import ProblemOptions, say_choices
 
 if TYPE_CHECKING:

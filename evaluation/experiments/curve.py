@@ -7,8 +7,8 @@ import numpy as np
 
 from kinarm._fields import check_fields
 from kinarm._validation import MOST_TRIALS, whole_number
+from kinarm.episodes import Rollouts
 from kinarm.policies.learners import TrainingState
-from kinarm.rollouts import Rollouts
 
 MOST_POINTS = 1000
 """Points of a learning curve at most, or per decade of environment steps."""

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from kinarm._archive import Archive, load_archive, reading, save_archive
 from kinarm._fields import from_plain, to_plain
+from kinarm.episodes import Rollouts
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.experiments.curve import CurvePoint
 from kinarm.evaluation.experiments.plan import Run
 from kinarm.policies.checkpoint import arrays_of, rebuilt
 from kinarm.policies.learners import TrainingState, find_learner
 from kinarm.policies.policy import Policy, policy_content, policy_of_content
-from kinarm.rollouts import Rollouts
 
 RUN_ARCHIVE, BOUNDS_ARCHIVE = ("study run", 1), ("study bounds", 1)
 CHECKPOINT_ARCHIVE = ("study checkpoint", 1)

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kinarm import SEMANTICS
+from kinarm.episodes import Rollouts
 from kinarm.evaluation.experiments.curve import CurvePoint, TrialSettings
 from kinarm.evaluation.experiments.plan import Run
 from kinarm.evaluation.experiments.runs import (
@@ -29,7 +30,6 @@ from kinarm.policies.oracle import ORACLE_SEMANTICS, Oracle
 from kinarm.policies.policy import Policy
 from kinarm.policies.training import CHECKPOINT_SECONDS
 from kinarm.problem import ReachProblem
-from kinarm.rollouts import Rollouts
 
 
 @dataclass(frozen=True)

@@ -16,10 +16,9 @@ from kinarm._validation import finite_array
 from kinarm.envs.interface import Interface
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
 from kinarm.envs.scenario_queues import ScenarioQueues
-from kinarm.episodes import Episodes
+from kinarm.episodes import Episodes, StepResult
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.problem import ProblemLike, ReachProblem
-from kinarm.rollouts import StepResult
 from kinarm.simulator import Simulator
 from kinarm.task import REWARD_TERMS
 

@@ -18,10 +18,9 @@ from kinarm.envs.interface import (
 )
 from kinarm.envs.reach import ReachEnv
 from kinarm.envs.vector import ReachVectorEnv
-from kinarm.episodes import TRUNCATED, Episodes
+from kinarm.episodes import TRUNCATED, Episodes, StepResult
 from kinarm.errors import InvalidInputError
 from kinarm.observation import OBSERVATION, part_slices
-from kinarm.rollouts import StepResult
 from kinarm.simulator import Simulator
 
 RewardType = Literal["sparse", "dense"]

@@ -7,10 +7,9 @@ from gymnasium.spaces import Box, Space
 from numpy.typing import DTypeLike, NDArray
 
 from kinarm.envs.rendering import RENDER_MODES
-from kinarm.episodes import Episodes
+from kinarm.episodes import Episodes, StepResult
 from kinarm.errors import InvalidInputError
 from kinarm.observation import Ranges, observation_bounds
-from kinarm.rollouts import StepResult
 from kinarm.simulator import Simulator
 
 Array = NDArray[np.float64]

@@ -9,9 +9,8 @@ from numpy.typing import DTypeLike
 from kinarm._validation import finite_array
 from kinarm.envs.environment import ArmEnvironment, make_simulator, pick_scenario
 from kinarm.envs.interface import Array, Observations, one_by_one
-from kinarm.episodes import COLLISION, RUNNING, SUCCESS, TRUNCATED, Episodes
+from kinarm.episodes import COLLISION, RUNNING, SUCCESS, TRUNCATED, Episodes, StepResult
 from kinarm.problem import ProblemLike
-from kinarm.rollouts import StepResult
 
 FIRST_ROW = np.zeros(1, dtype=np.int64)
 """The only row of a batch of one."""

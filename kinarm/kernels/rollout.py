@@ -204,7 +204,7 @@ def allow_one_step(session: Session) -> bool:
 def results_of_step(
     session: Session, numbers: Array, flags: NDArray[np.bool_], contact: NDArray[np.int64]
 ) -> None:
-    """Read off the one step that was allowed, into the tables of `kinarm.rollouts.StepResult`."""
+    """Read off the one step that was allowed, into the tables of `kinarm.episodes.StepResult`."""
     episodes = session.episodes
     for e in range(contact.shape[0]):
         stepped = episodes.steps[e] == episodes.stop[e]

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kinarm.errors import InvalidInputError
-from kinarm.paths import record_path
 from kinarm.problem import ProblemLike
-from kinarm.recording import Recording
+from kinarm.recording import Recording, record_path
 from kinarm.viewer.camera import stage_scale
 from kinarm.viewer.drawing import CapturingWindow, draw_goal, draw_stage, draw_trace
 from kinarm.viewer.html_page import HtmlPage, arm_data, page_html

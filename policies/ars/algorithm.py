@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm.episodes import Rollouts
 from kinarm.failed_scenarios import FailedScenarios, StartsAndGoals
 from kinarm.networks import Mirror, Networks
 from kinarm.policies.ars.config import ARSConfig, ARSState
@@ -25,7 +26,6 @@ from kinarm.policies.normalizer import Normalizer, input_scale
 from kinarm.policies.policy import Layer, Policy
 from kinarm.policies.provenance import Provenance
 from kinarm.randomness import Stream, stream_generator
-from kinarm.rollouts import Rollouts
 from kinarm.simulator import Simulator
 
 

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._parallel import run_rows
+from kinarm.chain import MotionBounds
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.records import recorded
-from kinarm.motion_bounds import MotionBounds
 from kinarm.policies.oracle.kernels.approach import search
 from kinarm.policies.oracle.kernels.boxes import WAITING, Boxes, layout
 from kinarm.simulator import Simulator

@@ -22,12 +22,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._validation import finite_array, one_or_many
+from kinarm.episodes import Rollouts
 from kinarm.policies.oracle.bounding import Prover
 from kinarm.policies.oracle.inverse import step_box
 from kinarm.policies.oracle.motion_search import MotionSearch
 from kinarm.policies.oracle.solution import OracleSolution, OracleSolutions
 from kinarm.problem import ProblemLike
-from kinarm.rollouts import Rollouts
 from kinarm.simulator import Simulator
 
 ORACLE_SEMANTICS = "2"

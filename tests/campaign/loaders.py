@@ -28,8 +28,7 @@ from kinarm.policies import Policy, load_checkpoint, recipe
 from kinarm.policies.conversion.sb3 import sb3_model
 from kinarm.policies.conversion.sb3_inputs import load_vec_normalize
 from kinarm.policies.learners import state_policy
-from kinarm.problem import ReachProblem
-from kinarm.problem_files import find_scene, find_task
+from kinarm.problem import ReachProblem, find_scene, find_task
 from kinarm.recording import load_recordings
 from kinarm.viewer.mesh_files import read_mesh_file
 from kinarm.viewer.visual_shapes import visual_parts

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.envs.interface import Interface
+from kinarm.episodes import Rollouts
 from kinarm.policies import load_policy, policy_names, recipe, train_policy
 from kinarm.policies.oracle import Oracle, OracleSolutions
 from kinarm.problem import ReachProblem
 from kinarm.reference import ReferenceSimulator
-from kinarm.rollouts import Rollouts
 from kinarm.simulator import Simulator
 from tests.helpers.reference_episodes import assert_equal_outcome, scripted
 

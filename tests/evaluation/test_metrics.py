@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+from kinarm.episodes import Rollouts
 from kinarm.evaluation.estimates import estimate_metrics
 from kinarm.evaluation.metrics import METRICS, Metric
 from kinarm.evaluation.outcomes import Outcomes
 from kinarm.evaluation.statistics import Estimate
-from kinarm.rollouts import Rollouts
 
 NAMES = {"mean": "mean_distance", "median": "median_distance", "iqm": "iqm_distance"}
 NAMES["p95"] = "p95_distance"

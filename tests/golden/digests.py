@@ -19,6 +19,7 @@ import numpy as np
 
 from kinarm import SEMANTICS
 from kinarm._fields import to_plain
+from kinarm.episodes import Rollouts
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.ars.config import ARSState
 from kinarm.policies.learners import train_policy
@@ -26,7 +27,6 @@ from kinarm.policies.library import load_policy
 from kinarm.policies.oracle import ORACLE_SEMANTICS, Oracle
 from kinarm.policies.recipes import recipe
 from kinarm.problem import PROBLEMS
-from kinarm.rollouts import Rollouts
 from kinarm.simulator import Simulator
 
 RECORDED = Path(__file__).with_name("digests.json")

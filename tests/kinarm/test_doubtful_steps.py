@@ -3,7 +3,7 @@
 import numpy as np
 from configurations import contact_boundary, jittered
 
-from kinarm.doubtful_steps import FEW, first_contacts
+from kinarm.collision import FEW
 
 
 def test_few_and_many_steps_are_refused_alike_and_few_name_the_pair(any_simulator):
@@ -12,10 +12,10 @@ def test_few_and_many_steps_are_refused_alike_and_few_name_the_pair(any_simulato
     sizes = 10.0 ** rng.uniform(-3, -1, (len(starts), 1))
     ways = any_simulator.world.substeps(starts, starts + rng.normal(size=starts.shape) * sizes)
     doubt = rng.integers(0, 1 << ways.shape[1], len(starts))
-    together, asked = first_contacts(contacts, ways, doubt)
+    together, asked = contacts.first_contacts(ways, doubt)
     lots = [slice(k, k + FEW) for k in range(0, len(ways), FEW)]
     named, asked_each = zip(
-        *(first_contacts(contacts, ways[k], doubt[k]) for k in lots), strict=True
+        *(contacts.first_contacts(ways[k], doubt[k]) for k in lots), strict=True
     )
     assert sum(asked_each) == asked
     for way, bits, flag, number in zip(ways, doubt, together, np.concatenate(named), strict=True):

@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 
 from kinarm.arm import Arm
-from kinarm.motion_bounds import MotionBounds, link_lengths, point_speed
+from kinarm.chain import MotionBounds, link_lengths, point_speed
 
 NAMES = ("paper", "sliding", "mesh", "gantry", "crane")
 

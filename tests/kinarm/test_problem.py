@@ -10,9 +10,9 @@ import pytest
 
 from kinarm.arm import ArmSpecification
 from kinarm.errors import KinarmError, ProblemError, UnknownNameError
-from kinarm.problem import PROBLEMS, ReachProblem, Stepping
+from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.scene import PAPER_BENCHES, GoalRegion, Mount, Scene
-from kinarm.task import ReachTask, RewardWeights
+from kinarm.task import ReachTask, RewardWeights, Stepping
 
 RIGHT = PROBLEMS["right"]
 

@@ -6,11 +6,11 @@ import pytest
 
 from kinarm.arm import Arm, ArmSpecification
 from kinarm.errors import ArmError, InvalidInputError, ProblemError, UnknownNameError
-from kinarm.problem import PROBLEMS, Stepping
+from kinarm.problem import PROBLEMS
 from kinarm.problem_options import ProblemOptions, say_choices
 from kinarm.scene import Scene
 from kinarm.simulator import Simulator
-from kinarm.task import RewardWeights
+from kinarm.task import RewardWeights, Stepping
 
 RIGHT = PROBLEMS["right"]
 

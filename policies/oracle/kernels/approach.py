@@ -12,13 +12,12 @@ import math
 
 import numpy as np
 
-from kinarm.chain import Chain
+from kinarm.chain import Chain, MotionBounds
 from kinarm.contact_shapes import ContactShapes
 from kinarm.kernels.block import put, take
 from kinarm.kernels.compiling import Array, Vector, lean_kernel
 from kinarm.kernels.kinematics import point_jacobian
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits
-from kinarm.motion_bounds import MotionBounds
 from kinarm.policies.oracle.kernels.box_bound import (
     closest_step,
     curved_bound,

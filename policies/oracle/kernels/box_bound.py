@@ -17,11 +17,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.chain import Chain
+from kinarm.chain import Chain, MotionBounds
 from kinarm.kernels.compiling import Array, Vector, helper, inlined
 from kinarm.kernels.kinematics import place, to_world
 from kinarm.kernels.lanes import select
-from kinarm.motion_bounds import MotionBounds
 
 SWEEPS = 3
 """Passes of the descent over the joints."""

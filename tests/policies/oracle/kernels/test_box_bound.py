@@ -6,9 +6,9 @@ from configurations import random_configurations
 from numba import njit
 from proofs import within
 
+from kinarm.chain import MotionBounds
 from kinarm.kernels.kinematics import POSE, point_jacobian
 from kinarm.kernels.lanes import LANES, as_lanes, select
-from kinarm.motion_bounds import MotionBounds
 from kinarm.policies.oracle.kernels.box_bound import (
     closest_step,
     curved_bound,
