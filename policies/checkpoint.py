@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterable
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
+from typing import IO, Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,12 @@ from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import TrainingState, find_learner
 
+T = TypeVar("T")
+
 FORMAT_VERSION = 2
+
+CHECKPOINT_SECONDS = 5.0
+"""How often a training saves how far it is [s]."""
 
 
 class Checkpoint(NamedTuple):
@@ -25,22 +30,33 @@ class Checkpoint(NamedTuple):
     state: Any
 
 
-def save_checkpoint(path: str | Path, config: TrainingConfig, state: TrainingState) -> None:
+def save_checkpoint(
+    path: str | Path | IO[bytes],
+    config: TrainingConfig,
+    state: TrainingState,
+    beside: Any = None,
+) -> None:
     """Write the state of a training, replacing an earlier checkpoint only when complete.
 
     Parameters
     ----------
-    path : str or Path
+    path : str, Path or binary file
         The file, ``.npz`` without pickle.
     config, state : TrainingConfig and TrainingState
         Settings and state of the training.
+    beside : dataclass, optional
+        What else is kept, for `load_beside`.
     """
     header = {
         "learner": config.learner,
         "config": to_plain(config),
         "arm_digest": config.problem.arm_digest,
+        "iteration": state.iteration,
     }
-    save_archive(path, "checkpoint", FORMAT_VERSION, arrays_of("state", state), header)
+    arrays = arrays_of("state", state)
+    if beside is not None:
+        arrays |= arrays_of("beside", beside)
+    save_archive(path, "checkpoint", FORMAT_VERSION, arrays, header)
 
 
 def load_checkpoint(path: str | Path) -> Checkpoint:
@@ -65,10 +81,28 @@ def load_checkpoint(path: str | Path) -> Checkpoint:
     return Checkpoint(config, state)
 
 
+def load_beside(path: Path, kind: type[T]) -> T:
+    """Read what a checkpoint holds beside the state, which is of some type."""
+    _, arrays = load_archive(
+        path, "checkpoint", FORMAT_VERSION, PolicyFileError, unless=("state.",)
+    )
+    with reading(repr(str(path)), "checkpoint", PolicyFileError):
+        value: T = rebuilt(kind, "beside", arrays)
+        return value
+
+
+def load_progress(path: Path) -> tuple[int, int]:
+    """Read how many iterations of a training are done, and how many there are."""
+    every = ("state.", "beside.")
+    header, _ = load_archive(path, "checkpoint", FORMAT_VERSION, PolicyFileError, unless=every)
+    with reading(repr(str(path)), "checkpoint", PolicyFileError):
+        return int(header["iteration"]), int(header["config"]["iterations"])
+
+
 def arrays_of(name: str, value: Any) -> dict[str, NDArray[Any]]:
     """Flatten a value into arrays; parts of records get names such as ``state.theta``.
 
-    Dictionaries are kept as JSON, tuples of named tuples of numbers as tables.
+    Dictionaries are kept as JSON, tuples of numbers and of named tuples of them as tables.
     """
     if is_dataclass(value) or hasattr(value, "_fields"):
         parts = [(part, getattr(value, part)) for part in _field_names(type(value))]
@@ -101,6 +135,8 @@ def rebuilt(kind: Any, name: str, arrays: Arrays) -> Any:
         return kind(**{part: rebuilt(hints[part], f"{name}.{part}", arrays) for part in names})
     if get_origin(kind) is tuple:
         record = get_args(kind)[0]
+        if record is float:
+            return tuple(arrays[name].tolist())
         types = get_type_hints(record).values()
         rows = arrays[name].reshape(-1, len(types)).tolist()
         return tuple(record(*(t(x) for t, x in zip(types, row, strict=True))) for row in rows)

@@ -6,7 +6,7 @@ group ``kinarm.learners``, or as ``module:LEARNER``, wherever a learner is named
 """
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
@@ -223,14 +223,31 @@ def train_policy(
         What does not change the result: ``threads``, and the folder of the ``tensorboard`` logs
         for PPO.
     """
+    states = training_states(config, state, **options)
+    last = next(states)
+    for last in states:
+        if on_iteration is not None:
+            on_iteration(last)
+    return TrainingResult(state_policy(config, last), last.curve, last)
+
+
+def training_states(
+    config: TrainingConfig, state: TrainingState | None = None, **options: Any
+) -> Iterator[Any]:
+    """States of a training: the given one or the initial one, then one after every iteration.
+
+    Parameters
+    ----------
+    config, state, **options
+        See `train_policy`.
+    """
     training = begin_training(config, **options)
     if state is None:
         state = training.initial_state()
+    yield state
     while state.iteration < config.iterations:
         state = training.iterate(state)
-        if on_iteration is not None:
-            on_iteration(state)
-    return TrainingResult(state_policy(config, state), state.curve, state)
+        yield state
 
 
 def begin_training(config: TrainingConfig, **options: Any) -> Training[Any]:

@@ -16,22 +16,24 @@ from kinarm._console import ProgressLine, told_of_activities
 from kinarm._files import check_output, only_writer, write_text
 from kinarm._interrupts import telling
 from kinarm.errors import InvalidInputError, KinarmError, PolicyFileError
-from kinarm.policies.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+from kinarm.policies.checkpoint import (
+    CHECKPOINT_SECONDS,
+    Checkpoint,
+    load_checkpoint,
+    save_checkpoint,
+)
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import (
     CurvePoint,
     TrainingResult,
-    TrainingState,
     find_learner,
-    train_policy,
+    state_policy,
+    training_states,
 )
 from kinarm.policies.recipes import recipe
 from kinarm.problem_options import ProblemOptions, say_choices
 
 CHECKPOINT = ".checkpoint.npz"
-
-CHECKPOINT_SECONDS = 5.0
-"""How often a checkpoint is saved [s]."""
 
 STARTING = "starting"
 
@@ -121,25 +123,39 @@ class TrainRequest(ProblemOptions):
                 say_findings(config)
             return self._train(config, state)
 
-    def _train(self, config: TrainingConfig, state: TrainingState | None) -> TrainingResult:
+    def _train(self, config: TrainingConfig, state: Any) -> TrainingResult:
         """Train from a state on, None for the beginning, and write the files."""
         options = {} if self.tensorboard is None else {"tensorboard": self.tensorboard}
         path, name = checkpoint_path(self.out), find_learner(config.learner).name
         title = f"{name} {config.recipe} {config.problem.name} seed {config.seed}"
-        with ProgressLine(title, config.iterations, "iterations") as line:
-            keeper = CheckpointKeeper(config, path, state, line)
-            with telling(keeper.save_on_interrupt):
-                line.update(words=[STARTING])
-                with told_of_activities(lambda what: line.update(words=[what or STARTING])):
-                    result = train_policy(
-                        config, state=state, on_iteration=keeper.update, **options
-                    )
-                try:
-                    write_curve(curve_path(self.out), result.curve)
-                    result.policy.save(self.out)
-                except KinarmError:
-                    keeper.save()
-                    raise
+
+        def what_is_left() -> str:
+            if state is None or not state.iteration:
+                return "interrupted before the first iteration"
+            save_checkpoint(path, config, state)
+            done, all_of_them = state.iteration, config.iterations
+            return f"interrupted after {done} of {all_of_them} iterations; go on with --resume"
+
+        with ProgressLine(title, config.iterations, "iterations") as line, telling(what_is_left):
+            line.update(words=[STARTING])
+            saved = time.monotonic()
+            with told_of_activities(lambda what: line.update(words=[what or STARTING])):
+                states = training_states(config, state, **options)
+                state = next(states)
+                for state in states:
+                    point = state.curve[-1]
+                    success = f"success {100 * point.success:.0f} %"
+                    line.update(state.iteration, [f"return {point.mean_return:+.3f}", success])
+                    if time.monotonic() - saved > CHECKPOINT_SECONDS:
+                        save_checkpoint(path, config, state)
+                        saved = time.monotonic()
+                result = TrainingResult(state_policy(config, state), state.curve, state)
+            try:
+                write_curve(curve_path(self.out), result.curve)
+                result.policy.save(self.out)
+            except KinarmError:
+                save_checkpoint(path, config, state)
+                raise
         path.unlink(missing_ok=True)
         return result
 
@@ -172,38 +188,6 @@ class TrainRequest(ProblemOptions):
             )
         self.resolve(default=config.problem).check_same(config.problem, f"{str(path)!r}")
         return checkpoint
-
-
-class CheckpointKeeper:
-    """Shows how far a training is, and saves its latest state every few seconds and on demand."""
-
-    def __init__(
-        self, config: TrainingConfig, path: Path, state: TrainingState | None, line: ProgressLine
-    ) -> None:
-        self._config, self._path, self._state, self._line = config, path, state, line
-        self._saved_at = time.monotonic()
-
-    def update(self, state: TrainingState) -> None:
-        """Take note of a state, and save it if the last checkpoint is old."""
-        self._state, point = state, state.curve[-1]
-        words = [f"return {point.mean_return:+.3f}", f"success {100 * point.success:.0f} %"]
-        self._line.update(state.iteration, words)
-        if time.monotonic() - self._saved_at > CHECKPOINT_SECONDS:
-            self.save()
-
-    def save_on_interrupt(self) -> str:
-        """Save the latest state, and say how to go on."""
-        if self._state is None:
-            return "interrupted before the first iteration"
-        self.save()
-        done, all_of_them = self._state.iteration, self._config.iterations
-        return f"interrupted after {done} of {all_of_them} iterations; go on with --resume"
-
-    def save(self) -> None:
-        """Save the latest state, if there is one."""
-        if self._state is not None:
-            save_checkpoint(self._path, self._config, self._state)
-            self._saved_at = time.monotonic()
 
 
 def say_findings(config: TrainingConfig) -> None:

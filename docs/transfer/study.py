@@ -13,10 +13,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from kinarm.evaluation import Study
-from kinarm.evaluation.experiments.curve import CurveTrials, TrialSettings
+from kinarm.evaluation.experiments.curve import CurvePoint, CurveTrials, TrialSettings
 from kinarm.evaluation.experiments.executors import Executor
 from kinarm.evaluation.experiments.experiment import Entry, Experiment
-from kinarm.evaluation.experiments.runs import CurvePoint
 from kinarm.policies import Policy, recipe
 from kinarm.problem import PROBLEMS, ReachProblem
 

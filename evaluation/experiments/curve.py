@@ -1,14 +1,19 @@
 """Learning curves: which trials policies face in the course of a training, when, and how."""
 
-from dataclasses import dataclass
-from typing import Literal, NamedTuple
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kinarm._fields import check_fields
 from kinarm._validation import MOST_TRIALS, whole_number
 from kinarm.episodes import Rollouts
-from kinarm.policies.learners import TrainingState
+from kinarm.evaluation.trials import trial_set
+from kinarm.policies.config import TrainingConfig
+from kinarm.policies.learners import TrainingState, state_policy
 
 MOST_POINTS = 1000
 """Points of a learning curve at most, or per decade of environment steps."""
@@ -114,3 +119,104 @@ class CurvePoint(NamedTuple):
             collision=float(rollouts.collision.mean()),
             median_distance=float(np.median(rollouts.distance)),
         )
+
+
+@dataclass(frozen=True)
+class Clock:
+    """How long a training took, without the trials that its policies faced.
+
+    Attributes
+    ----------
+    seconds, processor_seconds : float
+        Wall time, and time of all processors [s].
+    points, processor_points : tuple of float
+        The same at each point of the learning curve [s].
+    """
+
+    seconds: float = 0.0
+    processor_seconds: float = 0.0
+    points: tuple[float, ...] = ()
+    processor_points: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CurveSoFar:
+    """A learning curve, as it is kept beside the state of its training.
+
+    Attributes
+    ----------
+    points : tuple of CurvePoint
+        The policy in the course of the training.
+    distances : ndarray of float32, shape (n_points, n_trials), or empty
+        Final distances at the points, if they are kept [m].
+    clock : Clock
+        What the training took so far.
+    """
+
+    points: tuple[CurvePoint, ...] = ()
+    distances: NDArray[np.float32] = field(default_factory=lambda: np.empty(0, np.float32))
+    clock: Clock = Clock()
+
+
+class Curve:
+    """The learning curve of a training under way, and the time that it took.
+
+    Parameters
+    ----------
+    config, trials : TrainingConfig and TrialSettings
+        The training, and which trials its policies face.
+    so_far : CurveSoFar
+        What there is of it.
+    """
+
+    def __init__(self, config: TrainingConfig, trials: TrialSettings, so_far: CurveSoFar) -> None:
+        self._config, self._settings, clock = config, trials, so_far.clock
+        self.points, self._distances = [*so_far.points], [*so_far.distances]
+        self._spent = np.array([clock.seconds, clock.processor_seconds])
+        self._times = [*zip(clock.points, clock.processor_points, strict=False)]
+        own = trials.curve or trials
+        self._trials = trial_set(config.problem, own.count, own.seed)
+        first = self._trials.chosen([0])
+        simulator = first.simulator
+        actions = np.zeros((1, simulator.task.horizon, simulator.n_actions))
+        simulator.rollout_actions(actions, first.starts, first.goals)  # before any clock runs
+
+    def timed(self, states: Iterator[Any]) -> Iterator[Any]:
+        """The states of the training, whose making counts as its time."""
+        began = time.perf_counter(), time.process_time()
+        for state in states:
+            self._spent += np.subtract((time.perf_counter(), time.process_time()), began)
+            yield state
+            began = time.perf_counter(), time.process_time()
+
+    def update(self, state: TrainingState) -> bool:
+        """Add a point, and its time, if it is time for one; whether it was."""
+        if not self._is_due(state):
+            return False
+        policy, trials = state_policy(self._config, state), self._trials
+        rollouts = trials.simulator.rollout(policy, trials.starts, trials.goals)
+        self.points.append(CurvePoint.of(state, rollouts))
+        self._times.append(tuple(self._spent.round(3).tolist()))
+        if self._settings.curve is not None:
+            self._distances.append(rollouts.distance.astype(np.float32))
+        return True
+
+    def _is_due(self, state: TrainingState) -> bool:
+        """Whether a point of the curve is reached that was not reached before."""
+        settings = self._settings
+        if settings.curve is not None:
+            return state.iteration in settings.curve.iterations(self._config.iterations)
+        if settings.per_decade == 0:
+            return False
+        last = self.points[-1].environment_steps if self.points else 0
+        number = 0  # of the first point beyond the last one
+        while last >= (due := settings.first * 10.0 ** (number / settings.per_decade)):
+            number += 1
+        return bool(state.environment_steps >= due)
+
+    def so_far(self) -> CurveSoFar:
+        """What there is of it now."""
+        times = tuple(zip(*self._times, strict=True)) or ((), ())
+        clock = Clock(*self._spent.round(3).tolist(), *times)
+        distances = np.array(self._distances, dtype=np.float32)
+        return CurveSoFar(points=tuple(self.points), distances=distances, clock=clock)

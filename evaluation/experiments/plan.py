@@ -18,6 +18,7 @@ from kinarm.evaluation.experiments.experiment import MOST_TRAININGS, Entry, Expe
 from kinarm.evaluation.experiments.variation import combinations
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import Learner, find_learner
+from kinarm.policies.oracle import ORACLE_SEMANTICS
 from kinarm.policies.recipes import recipe
 from kinarm.problem import ReachProblem
 
@@ -73,6 +74,17 @@ class Run:
         return hash_of(self.settings)
 
     @property
+    def can_extend(self) -> bool:
+        """Whether a training with more iterations begins just as this one goes."""
+        return self.config.can_extend and self.trials.curve is None
+
+    @cached_property
+    def end_key(self) -> str:
+        """Hash of the settings but for the iterations; the name of the end that others extend."""
+        config = {k: v for k, v in self.settings["config"].items() if k != "iterations"}
+        return hash_of({**self.settings, "config": config})
+
+    @property
     def name(self) -> str:
         """Its name in a line."""
         config = self.config
@@ -92,10 +104,24 @@ def hash_of(entries: Any) -> str:
     return hashlib.sha256(json.dumps(entries, sort_keys=True).encode()).hexdigest()[:20]
 
 
-def base_key(settings: Mapping[str, Any]) -> str:
-    """Hash of the settings of a run but for the number of iterations."""
-    config = {name: value for name, value in settings["config"].items() if name != "iterations"}
-    return hash_of({**settings, "config": config})
+@dataclass(frozen=True)
+class BoundTask:
+    """Trials of a problem, its arm pinned, whose bounds are to be found."""
+
+    problem: ReachProblem
+    trials: TrialSettings
+
+    @property
+    def name(self) -> str:
+        """Its name in a line."""
+        return f"oracle {self.problem.name}"
+
+    @cached_property
+    def key(self) -> str:
+        """Hash of trials and oracle; the name of the file of the bounds."""
+        protocol = (self.trials.count, self.trials.seed)
+        described = f"{self.problem.digest} {protocol} {SEMANTICS} {ORACLE_SEMANTICS}"
+        return hashlib.sha256(described.encode()).hexdigest()[:20]
 
 
 def plan(

@@ -1,4 +1,4 @@
-"""Results of a training, finished or so far, and the files in which they are kept.
+"""One training of an experiment: how it is carried out, what it comes to, and its file.
 
 Each function that reads a file raises `InvalidInputError` where it is missing or damaged, or of
 another training.
@@ -6,9 +6,10 @@ another training.
 
 import io
 import math
-from collections.abc import Iterator, Mapping
+import time
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,21 +17,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._archive import Archive, load_archive, reading, save_archive
-from kinarm._fields import from_plain, to_plain
-from kinarm.episodes import Rollouts
 from kinarm.errors import InvalidInputError
-from kinarm.evaluation.experiments.curve import CurvePoint
-from kinarm.evaluation.experiments.plan import Run
-from kinarm.policies.checkpoint import arrays_of, rebuilt
-from kinarm.policies.learners import TrainingState, find_learner
+from kinarm.evaluation.experiments.curve import Clock, Curve, CurvePoint, CurveSoFar
+from kinarm.evaluation.experiments.plan import BoundTask, Run
+from kinarm.evaluation.trials import trial_set
+from kinarm.policies.checkpoint import CHECKPOINT_SECONDS, rebuilt, save_checkpoint
+from kinarm.policies.learners import CurvePoint as IterationPoint
+from kinarm.policies.learners import find_learner, state_policy, training_states
+from kinarm.policies.oracle import Oracle
 from kinarm.policies.policy import Policy, policy_content, policy_of_content
 
 RUN_ARCHIVE, BOUNDS_ARCHIVE = ("study run", 1), ("study bounds", 1)
-CHECKPOINT_ARCHIVE = ("study checkpoint", 1)
 """Kinds and versions of the files."""
 
 STATE, POLICY, OUTCOMES = "state", "policy.", "outcomes."
-"""Beginnings of the names of arrays."""
+"""Beginnings of the names of arrays; states are in files of version 1.0.0."""
 
 
 TimedPoint = tuple[CurvePoint, float, float]
@@ -74,24 +75,6 @@ class TrialBounds(NamedTuple):
     steps_lower_bound: NDArray[np.int64]
 
 
-@dataclass(frozen=True)
-class Clock:
-    """How long a training took, without the trials that its policies faced.
-
-    Attributes
-    ----------
-    seconds, processor_seconds : float
-        Wall time, and time of all processors [s].
-    points, processor_points : tuple of float
-        The same at each point of the learning curve [s].
-    """
-
-    seconds: float = 0.0
-    processor_seconds: float = 0.0
-    points: tuple[float, ...] = ()
-    processor_points: tuple[float, ...] = ()
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TrainedRun:
     """A finished training.
@@ -117,7 +100,7 @@ class TrainedRun:
     outcomes: TrialOutcomes
     returns: NDArray[np.float64] | None = None
     curve_distance: NDArray[np.float32] | None = None
-    clock: Clock = Clock()
+    clock: Clock = field(default_factory=Clock)
 
     @property
     def timed_curve(self) -> list[TimedPoint]:
@@ -134,44 +117,124 @@ class TrainedRun:
         return timed
 
 
-class Checkpoint(NamedTuple):
-    """A training under way, or the end of a shorter one, from which a longer one goes on.
+class Start(NamedTuple):
+    """Where a training goes on: its state, and its learning curve so far."""
+
+    state: Any
+    curve: CurveSoFar
+
+
+class Task(NamedTuple):
+    """What an executor is given to do.
 
     Attributes
     ----------
-    state, clock : TrainingState and Clock
-        The state that it is in, and what it took.
-    curve, distances : tuple of CurvePoint and of ndarray
-        Its learning curve, and final distances at the points of it, if they are kept [m].
+    work : Run or BoundTask
+        A training, or trials whose bounds are to be found.
+    start : Start or None
+        Where the training goes on; None for its beginning.
+    checkpoint : Path or None
+        Where it saves how far it is; None if its files are not those of the driver.
     """
 
-    state: TrainingState
-    curve: tuple[CurvePoint, ...] = ()
-    distances: tuple[NDArray[np.float32], ...] = ()
+    work: Run | BoundTask
+    start: Start | None = None
+    checkpoint: Path | None = None
+
+
+class TaskResult(NamedTuple):
+    """Result of a task, as it comes back from a worker.
+
+    Attributes
+    ----------
+    content, end : bytes
+        What the file of the run or of the bounds holds, and that from which a longer training can
+        go on; nothing if none can.
+    clock, iterations : Clock and tuple
+        How long a training took, and its iterations as its learner tells of them.
+    """
+
+    content: bytes
+    end: bytes = b""
     clock: Clock = Clock()
+    iterations: tuple[IterationPoint, ...] = ()
 
 
-def run_content(run: Run, end: Checkpoint, policy: Policy, rollouts: Rollouts) -> bytes:
-    """A finished training as its file holds it; equal ones give equal bytes.
+def carry_out(task: Task, threads: int = 1, logs: Path | None = None) -> TaskResult:
+    """Train and evaluate, or find bounds; threads and logs are as for `train`."""
+    if isinstance(task.work, BoundTask):
+        bounds = find_bounds(task.work, threads)
+        return TaskResult(_content(BOUNDS_ARCHIVE, bounds._asdict(), {}))
+    return train(task.work, threads, start=task.start, checkpoint=task.checkpoint, logs=logs)
+
+
+def find_bounds(task: BoundTask, threads: int) -> TrialBounds:
+    """The bounds of some trials."""
+    trials = trial_set(task.problem, task.trials.count, task.trials.seed)
+    oracle = Oracle(trials.simulator.problem, threads=threads)
+    solutions = oracle.solve_batch(trials.starts, trials.goals)
+    return TrialBounds(solutions.reachable, solutions.steps_lower_bound)
+
+
+def train(
+    run: Run,
+    threads: int = 1,
+    *,
+    start: Start | None = None,
+    checkpoint: Path | None = None,
+    on_point: Callable[[CurvePoint], object] | None = None,
+    logs: Path | None = None,
+) -> TaskResult:
+    """Train and evaluate; the result depends neither on threads nor on where a training goes on.
 
     Parameters
     ----------
-    run, end : Run and Checkpoint
-        The training, and how it ended.
-    policy, rollouts : Policy and Rollouts
-        The trained policy, and what it did in the trials.
+    run, threads : Run and int
+        The training, and on how many threads.
+    start, checkpoint
+        As of a `Task`.
+    on_point : callable, optional
+        Is told every point of the learning curve.
+    logs : Path, optional
+        Folder of the logs for TensorBoard, a folder in it for each seed.
     """
+    config, learner = run.config, find_learner(run.learner)
+    options: dict[str, Any] = {"threads": threads} if "threads" in learner.options else {}
+    if logs is not None and "tensorboard" in learner.options:
+        options["tensorboard"] = logs / f"{learner.name}-seed{config.seed}"
+    curve = Curve(config, run.trials, start.curve if start else CurveSoFar())
+    states = curve.timed(training_states(config, start and start.state, **options))
+    state = next(states)
+    if start is None:
+        curve.update(state)
+    saved = time.monotonic()
+    for state in states:
+        if curve.update(state) and on_point is not None:
+            on_point(curve.points[-1])
+        if checkpoint is not None and time.monotonic() - saved > CHECKPOINT_SECONDS:
+            save_checkpoint(checkpoint, config, state, curve.so_far())
+            saved = time.monotonic()
+    so_far, end = curve.so_far(), io.BytesIO()
+    if run.can_extend:
+        save_checkpoint(end, config, state, so_far)
+    content = _run_content(run, Start(state, so_far))
+    return TaskResult(content, end.getvalue(), so_far.clock, state.curve)
+
+
+def _run_content(run: Run, end: Start) -> bytes:
+    """A finished training as its file holds it; equal ones give equal bytes."""
+    policy, trials = state_policy(run.config, end.state), run.trials
+    faced = trial_set(run.config.problem, trials.count, trials.seed)
+    rollouts = faced.simulator.rollout(policy, faced.starts, faced.goals)
     content = policy_content(policy)
     arrays = {
-        "curve": np.array(end.curve, dtype=float).reshape(-1, len(CurvePoint._fields)),
+        "curve": np.array(end.curve.points, dtype=float).reshape(-1, len(CurvePoint._fields)),
         **{OUTCOMES + name: getattr(rollouts, name) for name in TrialOutcomes._fields},
         **{POLICY + name: array for name, array in content.arrays.items()},
     }
-    if run.trials.curve is not None:
+    if trials.curve is not None:
         arrays["returns"] = np.array([point.mean_return for point in end.state.curve])
-        arrays["curve_distance"] = np.array(end.distances)
-    if run.config.can_extend:
-        arrays |= arrays_of(STATE, _timeless(end.state))
+        arrays["curve_distance"] = end.curve.distances
     # Where a file was made must not tell in its bytes.
     made = {**content.header["provenance"], "versions": {}, "commit": ""}
     header = {
@@ -182,25 +245,12 @@ def run_content(run: Run, end: Checkpoint, policy: Policy, rollouts: Rollouts) -
     return _content(RUN_ARCHIVE, arrays, header)
 
 
-def bounds_content(bounds: TrialBounds) -> bytes:
-    """Bounds as their file holds them."""
-    return _content(BOUNDS_ARCHIVE, bounds._asdict(), {})
-
-
 def _content(
     archive: tuple[str, int], arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]
 ) -> bytes:
     file = io.BytesIO()
     save_archive(file, *archive, arrays, header, compress=True)
     return file.getvalue()
-
-
-def _timeless(state: TrainingState) -> TrainingState:
-    """A state without the times that its iterations took."""
-    changes: dict[str, Any] = {"curve": tuple(p._replace(wall_time=0.0) for p in state.curve)}
-    if hasattr(state, "simulator_time"):
-        changes["simulator_time"] = 0.0
-    return replace(state, **changes)
 
 
 @contextmanager
@@ -219,66 +269,6 @@ def load_bounds(path: Path) -> TrialBounds:
     """Read the file of bounds."""
     with _content_of(path, BOUNDS_ARCHIVE) as (_, arrays):
         return TrialBounds(**arrays)
-
-
-def save_checkpoint(path: Path, run: Run, checkpoint: Checkpoint) -> None:
-    """Write how far a training is.
-
-    Parameters
-    ----------
-    path, run, checkpoint : Path, Run and Checkpoint
-        The file, the training, and how far it is.
-    """
-    arrays: dict[str, NDArray[Any]] = {
-        **arrays_of("curve", checkpoint.curve),
-        "distances": np.array(checkpoint.distances),
-        **arrays_of(STATE, checkpoint.state),
-    }
-    header = {"settings": run.settings, "clock": to_plain(checkpoint.clock)}
-    header["iteration"] = checkpoint.state.iteration
-    save_archive(path, *CHECKPOINT_ARCHIVE, arrays, header)
-
-
-def load_checkpoint(path: Path, run: Run) -> Checkpoint:
-    """Read how far a training is."""
-    with _content_of(path, CHECKPOINT_ARCHIVE, run) as (header, arrays):
-        return Checkpoint(
-            state=rebuilt(find_learner(run.learner).state, STATE, arrays),
-            curve=_points(arrays),
-            distances=tuple(arrays["distances"]),
-            clock=from_plain(Clock, header["clock"], "record"),
-        )
-
-
-def load_share(path: Path) -> float:
-    """Read from a checkpoint which share of the iterations is done."""
-    every = (STATE, "curve", "distances")
-    with _content_of(path, CHECKPOINT_ARCHIVE, unless=every) as (header, _):
-        return float(header["iteration"] / header["settings"]["config"]["iterations"])
-
-
-def load_settings(path: Path) -> dict[str, Any]:
-    """Read the settings of the training that a file is of."""
-    every = (STATE, POLICY, OUTCOMES, "curve", "returns")
-    with _content_of(path, RUN_ARCHIVE, unless=every) as (header, _):
-        settings: dict[str, Any] = header["settings"]
-        return settings
-
-
-def load_end(path: Path, learner: str, clock: Clock) -> Checkpoint:
-    """Read the end of a training from which a longer one can go on.
-
-    Parameters
-    ----------
-    path, learner : Path and str
-        The file, and the name of the learner.
-    clock : Clock
-        How long the training took.
-    """
-    with _content_of(path, RUN_ARCHIVE, unless=(POLICY, OUTCOMES)) as (_, arrays):
-        state = rebuilt(find_learner(learner).state, STATE, arrays)
-        distances = tuple(arrays.get("curve_distance", ()))
-        return Checkpoint(state, _points(arrays), distances, clock)
 
 
 def load_policy(path: Path, run: Run) -> Policy:
@@ -300,19 +290,13 @@ def load_run(path: Path, run: Run, clock: Clock) -> TrainedRun:
     """
     with _content_of(path, RUN_ARCHIVE, run, unless=(STATE, POLICY)) as (header, arrays):
         return TrainedRun(
-            curve=_points(arrays),
+            curve=rebuilt(tuple[CurvePoint, ...], "curve", arrays),
             last=CurvePoint(**header["last"]),
             outcomes=TrialOutcomes(**_parts(arrays, OUTCOMES)),
             returns=arrays.get("returns"),
             curve_distance=arrays.get("curve_distance"),
             clock=clock,
         )
-
-
-def _points(arrays: Mapping[str, NDArray[Any]]) -> tuple[CurvePoint, ...]:
-    """Points of the learning curve."""
-    points: tuple[CurvePoint, ...] = rebuilt(tuple[CurvePoint, ...], "curve", arrays)
-    return points
 
 
 def _parts(arrays: Mapping[str, NDArray[Any]], begin: str) -> dict[str, NDArray[Any]]:

@@ -15,8 +15,8 @@ from kinarm.evaluation.experiments.curve import CurvePoint
 from kinarm.evaluation.experiments.executors import LocalExecutor
 from kinarm.evaluation.experiments.experiment import Experiment
 from kinarm.evaluation.experiments.plan import Run, plan
+from kinarm.evaluation.experiments.runs import train
 from kinarm.evaluation.experiments.store import Store
-from kinarm.evaluation.experiments.train import train
 from kinarm.evaluation.experiments.variation import SEARCH_CHOICES
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.recipes import PER_TRAINING

@@ -16,8 +16,8 @@ from kinarm.errors import InvalidInputError, PolicyFileError, WorkerError
 from kinarm.evaluation.experiments.curve import TrialSettings
 from kinarm.evaluation.experiments.experiment import Experiment
 from kinarm.evaluation.experiments.plan import Run, hash_of
+from kinarm.evaluation.experiments.runs import TaskResult
 from kinarm.evaluation.experiments.study import Study
-from kinarm.evaluation.experiments.train import TaskResult
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import CurvePoint as IterationPoint
 from kinarm.policies.learners import find_learner

@@ -12,29 +12,26 @@ import tomli_w
 from kinarm._archive import load_json
 from kinarm._fields import from_plain, init_fields, to_plain
 from kinarm._files import check_folder, only_writer, write_atomically, write_text
-from kinarm.errors import InvalidInputError
+from kinarm.errors import InvalidInputError, KinarmError, PolicyFileError
+from kinarm.evaluation.experiments.curve import Clock, CurveSoFar
 from kinarm.evaluation.experiments.executors import Failure
 from kinarm.evaluation.experiments.experiment import Experiment
-from kinarm.evaluation.experiments.plan import Run, base_key
+from kinarm.evaluation.experiments.plan import BoundTask, Run
 from kinarm.evaluation.experiments.runs import (
-    Checkpoint,
-    Clock,
+    Start,
+    TaskResult,
     TrainedRun,
     TrialBounds,
     load_bounds,
-    load_checkpoint,
-    load_end,
     load_run,
-    load_settings,
-    load_share,
 )
-from kinarm.evaluation.experiments.train import BoundTask, TaskResult
+from kinarm.policies.checkpoint import load_beside, load_checkpoint, load_progress
 from kinarm.policies.provenance import package_versions, source_commit
 
 SPECIFICATION = "study.toml"
 """File of the experiment in its folder."""
 
-FOLDERS = ("runs", "made", "failed", "bounds", "checkpoints")
+FOLDERS = ("runs", "made", "failed", "bounds", "checkpoints", "ends")
 
 
 @dataclass(frozen=True)
@@ -44,16 +41,18 @@ class Store:
     Every finished training is one file under the hash of its settings, ``runs/KEY.npz``, and there
     is no other state: what has no such file is still to be done. How long it took, which no two
     machines agree on, lies apart in ``made/KEY.json``; why a training failed, until it succeeds, in
-    ``failed/KEY.json``; how far it is in ``checkpoints/KEY.npz``; and what the oracle knows about
-    trials in ``bounds/KEY.npz``. A file that is damaged counts as missing.
+    ``failed/KEY.json``; how far it is in ``checkpoints/KEY.npz``; from where longer ones can go on
+    in ``ends``; and what the oracle knows about trials in ``bounds/KEY.npz``. A file that is
+    damaged counts as missing.
     """
 
     folder: Path
 
     def path(self, kind: str, task: Run | BoundTask) -> Path:
-        """Where something is kept of a training or of bounds, in one of the five folders."""
+        """Where something is kept of a training or of bounds, in one of the folders."""
+        key = task.end_key if kind == "ends" and isinstance(task, Run) else task.key
         suffix = ".json" if kind in ("made", "failed") else ".npz"
-        return self.folder / kind / f"{task.key}{suffix}"
+        return self.folder / kind / f"{key}{suffix}"
 
     @contextmanager
     def writing(self, experiment: Experiment) -> Iterator["Store"]:
@@ -90,6 +89,8 @@ class Store:
             kind, made = "runs", {"versions": package_versions(), "commit": source_commit()}
             entries = {**to_plain(result.clock), **made}
             write_text(self.path("made", task), json.dumps(entries) + "\n")
+            if result.end:
+                write_atomically(self.path("ends", task), lambda file: file.write(result.end))
         write_atomically(self.path(kind, task), lambda file: file.write(result.content))
         failure.unlink(missing_ok=True)
         self.path("checkpoints", task).unlink(missing_ok=True)
@@ -102,42 +103,26 @@ class Store:
                 found[run] = load_run(self.path("runs", run), run, self._clock(run.key))
         return found
 
-    def starts(self, runs: Iterable[Run]) -> dict[Run, Checkpoint]:
-        """Where trainings can go on that were interrupted, or that shorter ones began."""
-        runs, found = list(runs), {}
-        shorter = self._lengths() if any(run.config.can_extend for run in runs) else {}
-        for run in runs:
-            lengths = shorter.get(base_key(run.settings), {}) if run.config.can_extend else {}
-            if longest := max((n for n in lengths if n < run.config.iterations), default=0):
-                with suppress(InvalidInputError):
-                    path = lengths[longest]
-                    found[run] = load_end(path, run.learner, self._clock(path.stem))
-            with suppress(InvalidInputError):
-                saved = load_checkpoint(self.path("checkpoints", run), run)
-                if run not in found or saved.state.iteration > found[run].state.iteration:
-                    found[run] = saved
-        return found
-
-    def _lengths(self) -> dict[str, dict[int, Path]]:
-        """Files of finished trainings that differ in their iterations alone, by these.
-
-        They may have been for other experiments.
-        """
-        found: dict[str, dict[int, Path]] = {}
-        for path in self.folder.glob("runs/*.npz"):
-            with suppress(InvalidInputError):
-                settings = load_settings(path)
-                iterations = settings["config"]["iterations"]
-                found.setdefault(base_key(settings), {})[iterations] = path
-        return found
+    def start(self, run: Run) -> Start | None:
+        """Where a training can go on that was interrupted, or that a shorter one began."""
+        paths, found = [self.path("checkpoints", run)], []
+        if run.can_extend:
+            paths.append(self.path("ends", run))
+        for path in paths:
+            with suppress(KinarmError):
+                state = load_checkpoint(path).state
+                if state.iteration <= run.config.iterations:
+                    found.append(Start(state, load_beside(path, CurveSoFar)))
+        return max(found, key=lambda start: start.state.iteration, default=None)
 
     def shares(self, runs: Iterable[Run]) -> list[float]:
         """Shares that are done of trainings under way, by their latest checkpoints."""
         keys, found = {run.key for run in runs}, []
         for path in self.folder.glob("checkpoints/*.npz"):
             if path.stem in keys:
-                with suppress(InvalidInputError):
-                    found.append(load_share(path))
+                with suppress(PolicyFileError):
+                    done, iterations = load_progress(path)
+                    found.append(done / iterations)
         return found
 
     def made(self, run: Run) -> Mapping[str, Any]:

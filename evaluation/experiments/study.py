@@ -20,16 +20,22 @@ from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError, TrainingFailedError
 from kinarm.evaluation.experiments.executors import Executor, Failure, LocalExecutor
 from kinarm.evaluation.experiments.experiment import Experiment
-from kinarm.evaluation.experiments.plan import Run, plan
-from kinarm.evaluation.experiments.runs import TrainedRun, TrialBounds, load_policy
+from kinarm.evaluation.experiments.plan import BoundTask, Run, plan
+from kinarm.evaluation.experiments.runs import (
+    Task,
+    TaskResult,
+    TrainedRun,
+    TrialBounds,
+    carry_out,
+    load_policy,
+)
 from kinarm.evaluation.experiments.search import carry_out_search, searched_runs
 from kinarm.evaluation.experiments.store import SPECIFICATION, Store
 from kinarm.evaluation.experiments.table import Group, figures_of, identity, shorter, shown
-from kinarm.evaluation.experiments.train import BoundTask, Task, TaskResult, carry_out
 from kinarm.evaluation.outcomes import Outcomes
+from kinarm.policies.checkpoint import CHECKPOINT_SECONDS
 from kinarm.policies.learners import find_learner
 from kinarm.policies.policy import Policy
-from kinarm.policies.training import CHECKPOINT_SECONDS
 
 
 class Study:
@@ -187,11 +193,12 @@ class Study:
 
         Trainings that several entries share are trained once.
         """
-        bounds = [Task(each) for each in self.bound_tasks if each.problem.digest not in self.bounds]
+        tasks = [Task(each) for each in self.bound_tasks if each.problem.digest not in self.bounds]
         missing = {run.key: run for run in self.missing}.values()
-        starts = self.store.starts(missing)
-        paths = {run: self.store.path("checkpoints", run) for run in missing if with_checkpoints}
-        return [*bounds, *(Task(run, starts.get(run), paths.get(run)) for run in missing)]
+        for run in missing:
+            path = self.store.path("checkpoints", run) if with_checkpoints else None
+            tasks.append(Task(run, self.store.start(run), path))
+        return tasks
 
     def refresh(self) -> None:
         """Read the folder again."""

@@ -12,7 +12,7 @@ from equal_policies import check_equal
 
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.commands.train import seeds_of
-from kinarm.evaluation.experiments import train as experiments
+from kinarm.evaluation.experiments import runs as experiments
 from kinarm.evaluation.experiments.seeds import shared_name
 from kinarm.policies import Policy, policy_names, recipe, train_policy
 
@@ -71,9 +71,10 @@ def test_resuming_finishes_each_seed_and_repeats_none(run, tmp_path, monkeypatch
     options = ("--jobs", 1, "--out", tmp_path)
     save, resumed = experiments.save_checkpoint, []
 
-    def interrupt(path, run, checkpoint):
-        save(path, run, checkpoint)
-        resumed.append((run.config.seed, checkpoint.state.iteration))
+    def interrupt(path, config, state, curve):
+        save(path, config, state, curve)
+        if isinstance(path, Path):
+            resumed.append((config.seed, state.iteration))
         if resumed[-1] == (1, 4):
             raise KeyboardInterrupt
 

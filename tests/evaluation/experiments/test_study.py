@@ -12,7 +12,7 @@ from small_studies import SMALL, Counting, contents
 
 from kinarm.errors import InvalidInputError, OutputError, TrainingFailedError
 from kinarm.evaluation import evaluate, oracle_bounds
-from kinarm.evaluation.experiments import train as training
+from kinarm.evaluation.experiments import runs as training
 from kinarm.evaluation.experiments.clusters import RayExecutor, SlurmExecutor
 from kinarm.evaluation.experiments.executors import LocalExecutor
 from kinarm.evaluation.experiments.study import Study
@@ -149,9 +149,9 @@ class TestGoingOn:
         study = small(**changes)
         save = training.save_checkpoint
 
-        def interrupt(path, run, checkpoint):
-            save(path, run, checkpoint)
-            if checkpoint.state.iteration == 2:
+        def interrupt(path, config, state, curve):
+            save(path, config, state, curve)
+            if state.iteration == 2:
                 raise KeyboardInterrupt
 
         monkeypatch.setattr(training, "save_checkpoint", interrupt)
@@ -204,7 +204,7 @@ def test_each_write_fails_in_turn(small, monkeypatch, error):
         assert list(study.store.folder.rglob("*.part")) == []
         if len(calls) < failing_at:
             break
-    assert failures == len(calls) == 1 + 1 + 2 * 2  # the experiment, the bounds, two trainings
+    assert failures == len(calls) == 1 + 1 + 2 * 3  # the experiment, the bounds, two trainings
 
 
 class TestFailures:

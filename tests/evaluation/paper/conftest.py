@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from kinarm.evaluation.experiments.curve import CurvePoint
+from kinarm.evaluation.experiments.curve import Clock, CurvePoint
 from kinarm.evaluation.experiments.experiment import Experiment
 from kinarm.evaluation.experiments.plan import Run, plan
-from kinarm.evaluation.experiments.runs import Clock, TrainedRun, TrialOutcomes
+from kinarm.evaluation.experiments.runs import TrainedRun, TrialOutcomes
 from kinarm.evaluation.paper.results import PaperResults, PaperRun
 
 POINTS, CURVE_TRIALS = 4, 10
