@@ -107,7 +107,6 @@ def _page(name: str, study: "Study", document: dict[str, Any], drawings: Mapping
         Figures as SVG, by name.
     """
     environment = template_environment(autoescape=name.endswith(".html"))
-    environment.filters.update(percent=lambda share: f"{100 * share:.1f} %")
     experiment, groups = study.experiment, study.best(len(study))
     best: dict[str, table.Group] = {}
     for group in groups:

@@ -1,8 +1,7 @@
 """The card of a policy: what one publishes beside its file."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from kinarm._files import check_output, write_text
 from kinarm.errors import InvalidInputError
@@ -91,7 +90,6 @@ def policy_card(name: str, document: EvaluationDocument, evaluation: Evaluation)
         name=name,
         policy=policy,
         made=policy.provenance,
-        settings=_settings(policy.provenance.config),
         problem=evaluation.problem.pinned,
         metrics=METRICS,
         row=rows[contestant.name],
@@ -109,15 +107,3 @@ def shown_trials(evaluation: Evaluation) -> list[int]:
     others = range(min(FIRST, count), count)
     ranked = sorted(others, key=lambda n: (bool(rollouts.success[n]), -rollouts.distance[n]))
     return [*range(min(FIRST, count)), *ranked[:WORST]]
-
-
-def _settings(config: Mapping[str, Any], prefix: str = "") -> list[tuple[str, str]]:
-    """Settings of a training, those within others by both names."""
-    lines: list[tuple[str, str]] = []
-    for name, value in config.items():
-        if isinstance(value, Mapping):
-            lines += _settings(value, f"{prefix}{name}.")
-        else:
-            shown = ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
-            lines.append((f"{prefix}{name}", shown))
-    return lines

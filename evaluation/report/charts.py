@@ -1,29 +1,23 @@
-"""Charts of a problem: Matplotlib works out where everything lies, the style sheet how it looks.
+"""Charts and maps of a problem: what they show and where; templates draw it.
 
-A point of a figure is a unit of the page.
+Maps are of the goal regions from above, to scale, and tell where policies fail.
 """
 
-import io
-import json
-import re
-from typing import TYPE_CHECKING
-from xml.etree import ElementTree
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from kinarm.evaluation.figures import BIN_WIDTH
 from kinarm.evaluation.metrics import LIMITS
 from kinarm.evaluation.report.groups import Group, ProblemResults
 from kinarm.evaluation.statistics import share_over_seeds
+from kinarm.scene import GoalRegion, Obstacle
 
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-WIDTH, LEFT, RIGHT, BELOW = 460, 46, 12, 44
-"""Size of a chart and of its margins [points]."""
+WIDTH, LEFT, RIGHT, ABOVE, BELOW = 460, 46, 12, 14, 44
+"""Width of a chart, and its margins, of which histograms have none above [units of the page]."""
 
 PROFILE_HEIGHT, POINTS = 330, 121
 """Height of a profile, and the distances at which it is drawn beside those of the table."""
@@ -31,38 +25,72 @@ PROFILE_HEIGHT, POINTS = 330, 121
 ROW_HEIGHT = 0.76
 """Of the tallest bar of a histogram, of the height of its row."""
 
-SVG = "{http://www.w3.org/2000/svg}"
+SCALE = 200
+"""Units of the SVG to a metre."""
+
+MAP_MARGIN, BASE_RADIUS, AXIS_LENGTH = 0.07, 0.1, 0.2
+"""Beside what a map has to show, of the circle for the arm's base, and of the world axes [m]."""
+
+MARKERS = 1000
+"""Trials of which a map shows markers, the first ones; the figures beside them count all."""
+
+SLICES = 10
+"""Of a region, along x, whose failures are counted."""
+
+BAR_OFFSET, BAR_LENGTH = 0.02, 0.25
+"""Where the bars of failures begin beside the region, and the length of 100 % [m]."""
+
+DISTANCE_COLOURS = 6
+"""Colours of distances: within the tolerance, and twice the distance from one to the next."""
+
+OUTCOME_WORDS = {"success": "reached", "truncated": "out of steps", "collision": "contact"}
+"""How outcomes are called on the page."""
+
+SYMBOLS = {
+    "success": "m-3,0a3,3 0 1,0 6,0a3,3 0 1,0 -6,0z",
+    "truncated": "m-2.8,-2.8h5.6v5.6h-5.6z",
+    "collision": "m0,-4.2l1.3,2.9l2.9,1.3l-2.9,1.3l-1.3,2.9l-1.3,-2.9l-2.9,-1.3l2.9,-1.3z",
+}
+"""Paths of the markers about their centre, by outcome."""
 
 
-def profile_chart(results: ProblemResults) -> str:
-    """Draw the profiles of a problem with their 95 % bands, the oracle's as well, as SVG."""
-    from matplotlib.ticker import LogLocator
+class Chart(NamedTuple):
+    """What a template draws of a problem, in units of the page.
 
+    Ticks are places with their words, across and upwards; shapes are paths of each policy, with
+    their classes and words.
+    """
+
+    height: float
+    across: Sequence[tuple[float, str]]
+    upwards: Sequence[tuple[float, str]]
+    tolerance: float
+    shapes: Sequence[tuple[Group, str, str, str]]
+
+
+def profile_chart(results: ProblemResults) -> Chart:
+    """Profiles of a problem with their 95 % bands, the oracle's as well; the best is on top."""
     limits = profile_limits(results)
-    figure, axes = _chart(PROFILE_HEIGHT, above=14)
-    axes.set(xscale="log", xlim=limits[[0, -1]], ylim=(0, 1))
-    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    axes.set_xticks([], minor=True)
-    axes.set_yticks([0, 0.25, 0.5, 0.75, 1])
-    axes.yaxis.set_major_formatter(lambda share, _: f"{100 * share:g} %")
-    _finish(axes, results.tolerance, "distance d to the goal [m], logarithmic")
-    for place, group in enumerate(reversed(results.groups)):  # the best comes last, on top
+    low, high = np.log10(limits[[0, -1]])
+
+    def x(distances: ArrayLike) -> NDArray[np.float64]:
+        return LEFT + (np.log10(distances) - low) / (high - low) * (WIDTH - RIGHT - LEFT)
+
+    def y(shares: ArrayLike) -> NDArray[np.float64]:
+        return PROFILE_HEIGHT - BELOW - np.multiply(shares, PROFILE_HEIGHT - BELOW - ABOVE)
+
+    shapes, there, back = [], x(limits), x(limits[::-1])
+    for group in reversed(results.groups):
         shares = [share_over_seeds(group.distances <= limit) for limit in limits]
-        rates, low, high = np.array([(share.value, *(share.ci95 or ())) for share in shares]).T
-        (band,) = axes.fill([*limits, *limits[::-1]], [*high, *low[::-1]], clip_on=False)
-        (line,) = axes.plot(limits, rates, clip_on=False)
-        for artist, part in ((band, "band"), (line, "line")):
-            artist.set_zorder(3 + place)
-            _style(artist, part, group, title=group.name)
-    within = "; ".join(
-        f"{group.name}: {100 * float((group.distances <= results.tolerance).mean()):.1f} %"
-        for group in results.groups
-    )
-    return _draw(
-        figure,
-        f"Performance profiles on {results.name}. Share of trials within {results.tolerance:g} m: "
-        + within,
-    )
+        rates, least, most = np.array([(share.value, *(share.ci95 or ())) for share in shares]).T
+        band = f"{_path(there, y(most))}L{_path(back, y(least[::-1]))[1:]}z"
+        shapes += [(group, "band", band, group.name)]
+        shapes += [(group, "line", _path(there, y(rates)), group.name)]
+    ticks = np.outer(10.0 ** np.arange(np.floor(low), high + 1), (1, 2, 5)).ravel()
+    inside = ticks[(ticks > 0.999 * limits[0]) & (ticks < 1.001 * limits[-1])]
+    across = [(float(x(tick)), f"{tick:g}") for tick in inside]
+    upwards = [(float(y(share)), f"{100 * share:g} %") for share in (0, 0.25, 0.5, 0.75, 1)]
+    return Chart(PROFILE_HEIGHT, across, upwards, float(x(results.tolerance)), shapes)
 
 
 def profile_limits(results: ProblemResults) -> NDArray[np.float64]:
@@ -73,97 +101,119 @@ def profile_limits(results: ProblemResults) -> NDArray[np.float64]:
     return np.unique(np.concatenate([np.geomspace(low, high, POINTS), named]))
 
 
-def histogram_chart(results: ProblemResults) -> str:
-    """Draw the histograms of a problem below each other, all on the same scales, as SVG.
+def histogram_chart(results: ProblemResults) -> Chart:
+    """Histograms of a problem below each other, all on the same scales.
 
     The height of a bar is the square root of its share, so that rare failures can be seen.
     """
     rows = len(results.groups)
+    height = max(48, 270 // rows)  # rows share that of a profile, as long as it is enough
     furthest = max(float(group.distances.max()) for group in results.groups)
     edges = np.arange(0.0, furthest + 2 * BIN_WIDTH, BIN_WIDTH)
-    # Rows share the height of a profile, as long as that is enough.
-    figure, axes = _chart(rows * max(48, 270 // rows) + BELOW, above=0)
-    axes.set(xlim=edges[[0, -1]], ylim=(0, rows))
+    unit = (WIDTH - LEFT - RIGHT) / edges[-1]
     spacing = 0.2 if edges[-1] < 2 else 0.5 * np.ceil(edges[-1] / 5)
-    axes.set_xticks(np.arange(0, edges[-1], spacing))
-    counts = [np.histogram(group.distances, edges)[0] for group in results.groups]
-    shares = [n / group.distances.size for n, group in zip(counts, results.groups, strict=True)]
-    firsts = [f"{100 * share[0]:.1f} %" for share in shares]
-    axes.set_yticks(range(rows), firsts[::-1], va="bottom")
-    _finish(axes, results.tolerance, "final distance to the goal [m]")
-    for row, (group, own) in enumerate(zip(results.groups[::-1], shares[::-1], strict=True)):
-        heights = ROW_HEIGHT * np.sqrt(own)
-        bars = axes.bar(edges[:-1], heights, 0.95 * BIN_WIDTH, row, align="edge")
-        for bar, low, share in zip(bars, edges, own, strict=False):
+    shapes, upwards = [], []
+    for row, group in enumerate(results.groups, start=1):
+        shares = np.histogram(group.distances, edges)[0] / group.distances.size
+        upwards.append((row * height, f"{100 * shares[0]:.1f} %"))
+        for low, share in zip(edges, shares, strict=False):
             if share:
+                left, up = LEFT + unit * low, height * ROW_HEIGHT * np.sqrt(share)
+                bar = f"M{left:.1f},{row * height}h{0.95 * BIN_WIDTH * unit:.1f}v{-up:.1f}"
                 title = f"{low:.2f} to {low + BIN_WIDTH:.2f} m: {100 * share:.2f} % of trials"
-                _style(bar, "bars", group, title)
-        name = axes.text(edges[-1], row + 0.5, group.name, fontsize=12, ha="right")
-        _style(name, "name end", group)
-    named = (f"{group.name} {first}" for group, first in zip(results.groups, firsts, strict=True))
-    return _draw(
-        figure,
-        f"Histograms of the final distance on {results.name}. Share of trials in the first bin, "
-        f"below {BIN_WIDTH:g} m: " + "; ".join(named),
-    )
+                shapes.append((group, "bars", f"{bar}H{left:.1f}z", title))
+    across = [(LEFT + unit * d, f"{d:g}") for d in np.arange(0, edges[-1], spacing).tolist()]
+    tolerance = LEFT + unit * results.tolerance
+    return Chart(rows * height + BELOW, across, upwards, tolerance, shapes)
 
 
-def _chart(height: float, above: float) -> "tuple[Figure, Axes]":
-    """An empty chart with these height and margin above its axes [points]."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(WIDTH / 72, height / 72))
-    inside = (WIDTH - LEFT - RIGHT) / WIDTH, (height - above - BELOW) / height
-    axes = figure.add_axes((LEFT / WIDTH, BELOW / height, *inside))
-    axes.spines[:].set_visible(False)
-    axes.tick_params(bottom=False, left=False, labelsize=12, pad=6)
-    axes.grid(visible=True)
-    return figure, axes
+def _path(xs: NDArray[np.float64], ys: NDArray[np.float64]) -> str:
+    """A path through points; a tenth of a unit is what no eye can tell apart."""
+    return "M" + "L".join(f"{x:.1f},{y:.1f}" for x, y in zip(xs, ys, strict=True))
 
 
-def _finish(axes: "Axes", tolerance: float, title: str) -> None:
-    """Add what both charts have, and leave it to the style sheet."""
-    axes.xaxis.set_major_formatter("{x:g}")
-    _style(axes.axvline(tolerance, clip_on=False), "tolerance")
-    _style(axes.set_xlabel(title, fontsize=12, labelpad=4), "tick middle")
-    for axis, classes in ((axes.xaxis, "tick middle"), (axes.yaxis, "tick end")):
-        for line in axis.get_gridlines():
-            _style(line, "grid")
-        for label in axis.get_ticklabels():
-            _style(label, classes)
+class View(NamedTuple):
+    """Bounds of a map of the world, seen from above [m]: x points up and y to the left."""
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+
+    @classmethod
+    def of(cls, regions: Iterable[GoalRegion]) -> "View":
+        """Show some regions, the arm's base and the axes with their names."""
+        corners = [(-BASE_RADIUS,) * 2, (AXIS_LENGTH + MAP_MARGIN,) * 2]
+        corners += [corner[:2] for region in regions for corner in (region.lower, region.upper)]
+        low, high = np.min(corners, axis=0) - MAP_MARGIN, np.max(corners, axis=0) + MAP_MARGIN
+        return cls((float(low[0]), float(high[0])), (float(low[1]), float(high[1])))
+
+    def shows(self, box: Obstacle | GoalRegion) -> bool:
+        """Whether some of a box is in view."""
+        return all(box.lower[k] < high and low < box.upper[k] for k, (low, high) in enumerate(self))
+
+    def across(self, y: float) -> float:
+        """Where a y [m] lies in the SVG, from the left."""
+        return (self.y[1] - y) * SCALE
+
+    def down(self, x: float) -> float:
+        """Where an x [m] lies in the SVG, from the top."""
+        return (self.x[1] - x) * SCALE
+
+    def failure_bars(self, region: GoalRegion) -> tuple[float, float]:
+        """Where bars beside a region begin, and how far 100 % reaches, towards the arm."""
+        right, left = region.lower[1], region.upper[1]
+        inner, inward = (right, 1) if right + left > 0 else (left, -1)
+        return self.across(inner - inward * BAR_OFFSET), inward * BAR_LENGTH * SCALE
 
 
-def _style(artist: "Artist", classes: str, group: Group | None = None, title: str = "") -> None:
-    """Leave an artist to the style sheet, as a part of a policy, with words at the pointer."""
-    series = {"class": f"series {group.style}", "data-series": group.name} if group else {}
-    artist.set_gid(json.dumps((classes, series, title)))
+def worst_outcomes(group: Group) -> list[str]:
+    """Outcome of each trial: contact if any training seed had it, success if all had."""
+    collision = np.any([member.rollouts.collision for member in group.members], axis=0)
+    success = np.where(group.success.all(axis=0), "success", "truncated")
+    outcomes: list[str] = np.where(collision, "collision", success).tolist()
+    return outcomes
 
 
-def _draw(figure: "Figure", description: str) -> str:
-    """SVG of the paths and texts of a figure that `_style` was called for."""
-    import matplotlib
-
-    written = io.StringIO()
-    with matplotlib.rc_context({"svg.fonttype": "none", "path.simplify_threshold": 0.05}):
-        figure.savefig(written, format="svg", dpi=72)
-    width, height = (72 * float(inches) for inches in figure.get_size_inches())
-    page = {"viewBox": f"0 0 {width:g} {height:g}", "class": "chart", "role": "img"}
-    drawing = ElementTree.Element("svg", {**page, "aria-label": description})
-    for drawn in ElementTree.fromstring(written.getvalue()).iter(f"{SVG}g"):
-        if drawn.get("id", "").startswith("["):
-            classes, series, title = json.loads(drawn.get("id", ""))
-            parent = ElementTree.SubElement(drawing, "g", series)
-            for shape in (*drawn.findall(f"{SVG}path"), *drawn.findall(f"{SVG}text")):
-                places = {name: _rounded(shape.get(name, "")) for name in ("d", "x", "y")}
-                looks = {"class": classes, **{name: at for name, at in places.items() if at}}
-                kept = ElementTree.SubElement(parent, shape.tag.removeprefix(SVG), looks)
-                kept.text = (shape.text or "").strip()
-                if title:
-                    ElementTree.SubElement(kept, "title").text = title
-    return ElementTree.tostring(drawing, encoding="unicode")
+def level(distance: float, tolerance: float) -> int:
+    """Which of the `DISTANCE_COLOURS` colours a distance [m] gets."""
+    if distance <= tolerance:
+        return 0
+    return min(int(np.ceil(np.log2(distance / tolerance) - 1e-12)), DISTANCE_COLOURS - 1)
 
 
-def _rounded(coordinates: str) -> str:
-    """Coordinates to a tenth, which no eye can tell apart."""
-    short = re.sub(r"-?\d+\.\d+", lambda number: f"{float(number[0]):.1f}", coordinates)
-    return re.sub(r"\s*([A-Za-z])\s*", r"\1", " ".join(short.split())).replace(".0", "")
+def markers(results: ProblemResults, group: Group) -> Iterator[tuple[str, int, str]]:
+    """Path, level of colour and words of the goals of a problem, the worst last, on top."""
+    view, outcomes = View.of(results.goal_regions), worst_outcomes(group)
+    means, reached = group.distances.mean(axis=0), group.success.sum(axis=0)
+    goals = group.members[0].trials.goals
+    for trial in np.argsort(means[:MARKERS], kind="stable").tolist():
+        (x, y, _), distance = goals[trial], means[trial]
+        path = f"M{view.across(y):.1f},{view.down(x):.1f}{SYMBOLS[outcomes[trial]]}"
+        ending = f"{distance:.3f} m, {OUTCOME_WORDS[outcomes[trial]]}"
+        if len(group.members) > 1:
+            seeds = f"{reached[trial]} of {len(group.members)} seeds reached it"
+            ending = f"{seeds}, mean {distance:.3f} m"
+        title = f"trial {trial}, goal ({x:.2f}, {y:.2f}): {ending}"
+        yield path, level(distance, results.tolerance), title
+
+
+def failure_shares(
+    group: Group, region: GoalRegion
+) -> list[tuple[tuple[float, float], float | None]]:
+    """Share of trials that did not succeed, in slices of a region along x, all seeds alike.
+
+    Each with the ends of its slice [m], ascending; None where no goal lies.
+    """
+    goals, failed = group.members[0].trials.goals, 1 - group.success.mean(axis=0)
+    inside = ((region.lower <= goals) & (goals <= region.upper)).all(axis=1)
+    slices = np.linspace(region.lower[0], region.upper[0], SLICES + 1)
+    places = np.clip(np.searchsorted(slices, goals[:, 0], side="right") - 1, 0, SLICES - 1)
+    rows = [inside & (places == place) for place in range(SLICES)]
+    shares = [float(failed[row].mean()) if row.any() else None for row in rows]
+    return list(zip(pairwise(slices.tolist()), shares, strict=True))
+
+
+def level_ranges(results: ProblemResults) -> list[str]:
+    """Ranges of distances [m] that the colours stand for."""
+    bounds = [f"{results.tolerance * 2**step:g}" for step in range(DISTANCE_COLOURS - 1)]
+    between = [f"{low}\N{EN DASH}{high}" for low, high in pairwise(bounds)]
+    return [f"≤ {bounds[0]}", *between, f"> {bounds[-1]}"]

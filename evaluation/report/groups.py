@@ -1,8 +1,10 @@
-"""Groups that the page shows as one: a policy, or all training seeds of a recipe."""
+"""What a page shows as one: a policy, or all training seeds of a recipe; and its worst trials."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +13,10 @@ from kinarm.errors import InvalidInputError
 from kinarm.evaluation.document import EvaluationDocument, FacedProblem, PooledResult, Row
 from kinarm.evaluation.evaluation import Evaluation
 from kinarm.evaluation.figures import series_labels
+from kinarm.evaluation.replay.runs import record
 from kinarm.evaluation.table import policy_label, table_rows
 from kinarm.evaluation.trials import TrialSet
+from kinarm.recording import Recording
 from kinarm.scene import GoalRegion
 
 PAGE_COLOURS, PAGE_DASHES = 6, 4
@@ -20,6 +24,10 @@ PAGE_COLOURS, PAGE_DASHES = 6, 4
 
 UNTRAINED_ALGORITHMS = ("baseline", "oracle")
 """Algorithms of the contestants that policies are compared with."""
+
+
+BEST_GROUPS, TRIALS, AT_LEAST = 4, 9, 3
+"""Groups of a problem whose worst trials are shown, trials that they share, and the least each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,12 +99,6 @@ class ProblemResults:
         return policies or others or self.groups
 
 
-def count_policies(groups: Iterable[Group]) -> str:
-    """How many policies there are, as rows of the tables: training seeds of a recipe are one."""
-    count = len({group.name for group in groups if group.is_policy})
-    return f"{count} polic{'y' if count == 1 else 'ies'}"
-
-
 def group_results(
     document: EvaluationDocument, evaluations: Sequence[Evaluation]
 ) -> tuple[ProblemResults, ...]:
@@ -129,3 +131,47 @@ def _styles(labels: Sequence[str], evaluations: Sequence[Evaluation]) -> dict[st
             styles[label] = f"colour{colour} dash{dash % PAGE_DASHES}"
             policies += 1
     return styles
+
+
+class WorstTrial(NamedTuple):
+    """A trial that went badly: whose it was, of which training seed, and its number."""
+
+    group: Group
+    evaluation: Evaluation
+    trial: int
+
+
+def worst_trials(results: ProblemResults) -> tuple[WorstTrial, ...]:
+    """The worst trials of the best groups of a problem: failures first, the farthest first.
+
+    No trial is there twice: that of a better group, which has fewer failures, goes first.
+    """
+    groups = results.contenders[:BEST_GROUPS]
+    share = max(AT_LEAST, TRIALS // len(groups))
+    found: dict[int, WorstTrial] = {}
+    for group in groups:
+        others = (worst for worst in _ranked(group) if worst.trial not in found)
+        found |= {worst.trial: worst for worst in islice(others, share)}
+    return tuple(found.values())
+
+
+def _ranked(group: Group) -> list[WorstTrial]:
+    """Each trial of a group by the training seed that does worst in it, the worst first."""
+    order = np.lexsort((-group.distances.ravel(), group.success.ravel())).tolist()
+    found: dict[int, WorstTrial] = {}
+    for place in order:
+        seed, trial = divmod(place, group.success.shape[1])
+        found.setdefault(trial, WorstTrial(group, group.members[seed], trial))
+    return list(found.values())
+
+
+def record_worst(chosen: Sequence[WorstTrial]) -> list[Recording]:
+    """Run policies on the trials again: one recording for each."""
+    recordings = {}
+    for each in dict.fromkeys(worst.evaluation for worst in chosen):
+        trials = [worst.trial for worst in chosen if worst.evaluation is each]
+        # Whether a policy may face another arm was checked when the evaluation was made.
+        contestant, known = each.contestant, each.bounds
+        made = record(contestant, each.trials, trials, bounds=known, allow_other_arm=True)
+        recordings.update({(each, recording.trial): recording for recording in made})
+    return [recordings[worst.evaluation, worst.trial] for worst in chosen]

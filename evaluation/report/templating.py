@@ -10,10 +10,16 @@ def template_environment(**settings: Any) -> "Environment":
     """Jinja's ``Environment`` with these settings, for the templates of all pages."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    return Environment(
+    environment = Environment(
         loader=PackageLoader(__package__),
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=StrictUndefined,
         **settings,
     )
+    environment.filters.update(
+        tenth=lambda length: f"{length:.1f}".removesuffix(".0"),
+        percent=lambda share: f"{100 * share:.1f} %",
+        dashes=lambda text: text.replace("..", "\N{EN DASH}"),
+    )
+    return environment

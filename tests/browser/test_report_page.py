@@ -8,9 +8,8 @@ import pytest
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.contestants import ORACLE, find_contestants
 from kinarm.evaluation.evaluation import evaluation_document, run_trials
-from kinarm.evaluation.report.groups import group_results
+from kinarm.evaluation.report.groups import group_results, worst_trials
 from kinarm.evaluation.report.page import write_report
-from kinarm.evaluation.report.worst import worst_trials
 from kinarm.evaluation.table import metric_columns
 from kinarm.evaluation.trials import TrialSet
 
