@@ -18,6 +18,7 @@ from kinarm.arm import Arm
 from kinarm.episodes import Rollouts
 from kinarm.errors import InvalidInputError, PolicyFileError, UnknownNameError
 from kinarm.evaluation.bounds import oracle_bounds
+from kinarm.evaluation.outcomes import Holding
 from kinarm.evaluation.trials import TrialSet, trial_generator
 from kinarm.networks import Networks
 from kinarm.observation import observation_size
@@ -26,6 +27,12 @@ from kinarm.policies.library import policy_files
 from kinarm.policies.policy import Policy
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.simulator import PolicyFunction
+
+NEVER = sys.float_info.min
+"""A tolerance that nothing meets [m]."""
+
+AIM = 0.005
+"""How close the oracle's motions are to come where success does not end trials [m]."""
 
 
 class Predictor(Protocol):
@@ -169,6 +176,19 @@ ORACLE = Contestant("oracle", _run_oracle, "oracle", "oracle")
 UNTRAINED = {**BASELINES, ORACLE.name: ORACLE}
 
 
+def measure_holding(contestant: Contestant, trials: TrialSet) -> Holding:
+    """Let a contestant face trials that success does not end; the oracle aims at `AIM` there."""
+    endless = trials.with_tolerance(NEVER)
+    if contestant is ORACLE:
+        aimed = trials.with_tolerance(min(AIM, trials.problem.task.tolerance))
+        actions = oracle_bounds(aimed).actions
+        scenarios = (endless.starts, endless.goals)
+        rollouts = endless.simulator.rollout_actions(actions, *scenarios, record=True)
+    else:
+        rollouts = contestant.run(endless, record=True)
+    return Holding.of(rollouts, trials)
+
+
 def find_contestants(
     name_or_file: str | Path, problem: ProblemLike | None = None
 ) -> tuple[Contestant, ...]:
@@ -199,6 +219,24 @@ def find_contestants(
     return tuple(
         Contestant.from_policy(path.stem, Policy.load(path), path.resolve()) for path in paths
     )
+
+
+def contestant_of(
+    policy: str | Path | Policy | Contestant | PolicyFunction | Predictor,
+    problem: ProblemLike | None,
+) -> Contestant:
+    """Enter a policy: by a name or file, of which a group's first seed; itself; or a function."""
+    if isinstance(policy, Contestant):
+        return policy
+    if isinstance(policy, Policy):
+        made = policy.provenance
+        return Contestant.from_policy(
+            f"{made.algorithm}-{made.recipe}-{policy.problem.name}", policy
+        )
+    if isinstance(policy, str | Path):
+        return find_contestants(policy, problem)[0]
+    name = getattr(policy, "__name__", None) or type(policy).__name__
+    return Contestant.from_function(name, policy_function(policy, name))
 
 
 def _model_contestant(path: Path, problem: ProblemLike | None) -> Contestant:

@@ -9,11 +9,12 @@ from kinarm._archive import load_json
 from kinarm._validation import finite_array
 from kinarm.episodes import Outcome
 from kinarm.errors import InvalidInputError, UnknownNameError
-from kinarm.evaluation.bounds import Bounds
+from kinarm.evaluation.bounds import Bounds, bounds_document
 from kinarm.evaluation.outcomes import Cause, Pair
 from kinarm.evaluation.schemas import Count, Digest, Document, Share
 from kinarm.evaluation.statistics import BOOTSTRAP_SEED, LEVEL, RESAMPLES, Estimate
 from kinarm.evaluation.trials import TrialSet
+from kinarm.policies.oracle.solution import OracleSolutions
 from kinarm.problem import ReachProblem
 from kinarm.simulator import Simulator
 
@@ -55,6 +56,19 @@ class FacedProblem(Document, frozen=True, kw_only=True):
     starts: list[list[float]]
     goals: list[tuple[float, float, float]]
     oracle: Bounds | None
+
+    @classmethod
+    def of(cls, trials: TrialSet, bounds: OracleSolutions | None) -> "FacedProblem":
+        """What was faced, with the bounds of the first trials, if they are known."""
+        return cls(
+            arm=trials.simulator.arm.name,
+            problem=trials.problem.pinned.to_json(),
+            digest=trials.problem.digest,
+            trial_set_hash=trials.digest,
+            starts=trials.starts.tolist(),
+            goals=trials.goals.tolist(),
+            oracle=bounds_document(bounds) if bounds is not None else None,
+        )
 
 
 class Protocol(Document, frozen=True, kw_only=True):

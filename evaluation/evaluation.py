@@ -1,26 +1,36 @@
 """Put contestants to trials, and sum up how they did."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.episodes import Outcome, Rollouts
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.bounds import MOST_BOUNDED, oracle_bounds
-from kinarm.evaluation.contestants import Contestant, Predictor, find_contestants, policy_function
-from kinarm.evaluation.document import EvaluationDocument, Intervals, Protocol, Spread
-from kinarm.evaluation.estimates import estimate_metrics
-from kinarm.evaluation.holding import Holding, measure_holding
-from kinarm.evaluation.outcomes import Outcomes
-from kinarm.evaluation.rows import faced_problem_of, pooled_result_of, result_of
-from kinarm.evaluation.selection import check_names
-from kinarm.evaluation.statistics import Estimate
-from kinarm.evaluation.training_seeds import group_names
+from kinarm.evaluation.contestants import Contestant, Predictor, contestant_of, measure_holding
+from kinarm.evaluation.document import (
+    EvaluationDocument,
+    FacedProblem,
+    Failures,
+    Intervals,
+    PooledResult,
+    Protocol,
+    Result,
+    Spread,
+    TrialEnds,
+    TrialHolding,
+    WorstSeed,
+)
+from kinarm.evaluation.outcomes import Holding, Outcomes, failure_causes
+from kinarm.evaluation.selection import check_names, group_names
+from kinarm.evaluation.statistics import Estimate, estimate_metrics
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle.solution import OracleSolutions
 from kinarm.policies.policy import Policy
@@ -82,9 +92,36 @@ class Evaluation:
         """``"success"``, ``"collision"`` or ``"truncated"``, per trial."""
         return self.rollouts.outcomes
 
+    @property
+    def result(self) -> Result:
+        """Figures of merit, and every trial, for a document."""
+        rollouts, holding = self.rollouts, self.holding
+        ends = TrialEnds(
+            final_distance=rollouts.distance.tolist(),
+            steps=rollouts.steps.tolist(),
+            outcome=list(self.outcomes),
+            contact=list(self.contacts),
+        )
+        held = holding and TrialHolding(
+            closest=holding.closest.tolist(),
+            farthest_at_end=[
+                each if np.isfinite(each) else None for each in holding.farthest_at_end.tolist()
+            ],
+            contact=holding.collision.tolist(),
+            steps=holding.steps.tolist(),
+        )
+        return Result(
+            **_row(self.contestant.name, [self]),
+            metrics=self.metrics,
+            training_seed=self.contestant.seed,
+            note=self.contestant.note,
+            outcomes=ends,
+            held=held or msgspec.UNSET,
+        )
+
     def to_json(self) -> dict[str, Any]:
         """Figures of merit and every trial, as a dictionary that JSON can hold."""
-        return result_of(self).to_json()
+        return self.result.to_json()
 
     def __repr__(self) -> str:
         name, problem = self.contestant.name, self.problem.name
@@ -126,9 +163,26 @@ class PooledEvaluation:
                 spread[name] = Spread(min=min(each), max=max(each), std=std, each=each)
         return spread
 
+    @property
+    def result(self) -> PooledResult:
+        """Figures of merit of several training seeds, for a document."""
+        worst = self.worst
+        return PooledResult(
+            **_row(self.name, self.members),
+            metrics=self.metrics,
+            members=[member.contestant.name for member in self.members],
+            training_seeds=[member.contestant.seed for member in self.members],
+            spread=self.spread,
+            worst_seed=WorstSeed(
+                policy=worst.contestant.name,
+                training_seed=worst.contestant.seed,
+                success=worst.success,
+            ),
+        )
+
     def to_json(self) -> dict[str, Any]:
         """Figures of merit, as a dictionary that JSON can hold."""
-        return pooled_result_of(self).to_json()
+        return self.result.to_json()
 
     def __repr__(self) -> str:
         seeds, trials = len(self.members), self.members[0].trials
@@ -144,6 +198,33 @@ def _outcomes(members: Sequence[Evaluation]) -> Outcomes:
         tuple(member.holding for member in members if member.holding),
         members[0].problem.stepping.time_step,
     )
+
+
+def _row(name: str, evaluations: Sequence[Evaluation]) -> dict[str, Any]:
+    """Fields of a row: what it is about, and why trials failed, the most frequent cause first."""
+    contestant, trials = evaluations[0].contestant, evaluations[0].trials
+    causes = (
+        failure_causes(each.outcomes, each.rollouts.steps.tolist(), each.contacts)
+        for each in evaluations
+    )
+    counts = Counter(cause for each in causes for cause in each.values())
+    return {
+        "policy": name,
+        "algorithm": contestant.algorithm,
+        "recipe": contestant.recipe,
+        "problem": trials.problem.name,
+        "trained_on": contestant.problem.name if contestant.problem else None,
+        "trials": len(trials),
+        "failures": [
+            Failures(
+                contact=cause.contact,
+                early=cause.early,
+                trials=count,
+                share_of_failures=count / counts.total(),
+            )
+            for cause, count in sorted(counts.items(), key=lambda item: (-item[1], str(item[0])))
+        ],
+    }
 
 
 def evaluate(
@@ -185,7 +266,7 @@ def evaluate(
     PolicyFileError
         If the policy cannot be read, was trained for another arm, or does not fit this one.
     """
-    contestant = _contestant_of(policy, problem)
+    contestant = contestant_of(policy, problem)
     faced = problem if problem is not None else contestant.problem
     if faced is None:
         raise InvalidInputError(f"{contestant.name!r} was not trained for a problem: name one")
@@ -193,23 +274,6 @@ def evaluate(
     contestant.check(drawn.simulator.arm, allow_other_arm=allow_other_arm)
     bounds = oracle_bounds(drawn.first(MOST_BOUNDED)) if oracle else None
     return run_trials(contestant, drawn, bounds=bounds, hold=hold)
-
-
-def _contestant_of(
-    policy: str | Path | Policy | Contestant | PolicyFunction | Predictor,
-    problem: ProblemLike | None,
-) -> Contestant:
-    if isinstance(policy, Contestant):
-        return policy
-    if isinstance(policy, Policy):
-        made = policy.provenance
-        return Contestant.from_policy(
-            f"{made.algorithm}-{made.recipe}-{policy.problem.name}", policy
-        )
-    if isinstance(policy, str | Path):
-        return find_contestants(policy, problem)[0]
-    name = getattr(policy, "__name__", None) or type(policy).__name__
-    return Contestant.from_function(name, policy_function(policy, name))
 
 
 def run_trials(
@@ -237,7 +301,7 @@ def pool(evaluations: Sequence[Evaluation]) -> tuple[PooledEvaluation, ...]:
     """Pool the training seeds of each recipe and problem that has several.
 
     What belongs together is what policies record of their training; see
-    ``kinarm.evaluation.training_seeds.group_names``.
+    ``kinarm.evaluation.selection.group_names``.
     """
     names = group_names(evaluation.contestant for evaluation in evaluations)
     groups: dict[tuple[str, str], list[Evaluation]] = {}
@@ -260,19 +324,20 @@ def evaluation_document(evaluations: Sequence[Evaluation], command: str) -> Eval
     """
     check_names((each.contestant, each.problem) for each in evaluations)
     any_set = evaluations[0].trials
-    facing = {each.problem.name: each for each in reversed(evaluations)}
+    firsts = {each.problem.name: each for each in reversed(evaluations)}
+    facing = {name: firsts[name] for name in reversed(firsts)}
     protocol = Protocol(
         command=command,
         trials=len(any_set),
         seed=any_set.seed,
         hold=any(each.holding is not None for each in evaluations),
         intervals=Intervals(),
-        problems={name: faced_problem_of(facing[name]) for name in reversed(facing)},
+        problems={n: FacedProblem.of(each.trials, each.bounds) for n, each in facing.items()},
         versions=package_versions(),
         commit=source_commit(),
     )
     return EvaluationDocument(
         protocol=protocol,
-        results=[result_of(each) for each in evaluations],
-        pooled=[pooled_result_of(each) for each in pool(evaluations)],
+        results=[each.result for each in evaluations],
+        pooled=[each.result for each in pool(evaluations)],
     )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kinarm._files import write_atomically
 from kinarm.evaluation.evaluation import Evaluation
-from kinarm.evaluation.training_seeds import group_names
+from kinarm.evaluation.selection import group_names
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

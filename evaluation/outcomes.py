@@ -3,16 +3,15 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm.episodes import Rollouts
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.schemas import Document
-
-if TYPE_CHECKING:
-    from kinarm.evaluation.holding import Holding
+from kinarm.evaluation.trials import TrialSet
 
 EARLY_STEPS = 3
 """Contact within so many steps is early: the arm started close to what it touches."""
@@ -22,6 +21,44 @@ HOLDING_STEPS = 10
 
 Pair = tuple[str, str]
 """Names of two bodies that touch."""
+
+
+@dataclass(frozen=True, eq=False)
+class Holding:
+    """How close a policy came, and whether it stayed, in trials that success does not end.
+
+    Attributes
+    ----------
+    closest : ndarray, shape (n,)
+        Smallest distance from the tool to the goal after any step [m].
+    farthest_at_end : ndarray, shape (n,)
+        Largest distance after the last `HOLDING_STEPS` steps, or all if there are fewer [m];
+        infinite where contact ended the trial.
+    collision, steps : ndarray, shape (n,)
+        Whether contact ended the trial, and steps taken.
+    """
+
+    closest: NDArray[np.float64]
+    farthest_at_end: NDArray[np.float64]
+    collision: NDArray[np.bool_]
+    steps: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, rollouts: Rollouts, trials: TrialSet) -> "Holding":
+        """Measure rollouts that kept the configurations visited."""
+        paths = rollouts.paths[:, 1:]
+        visited = ~np.isnan(paths[..., 0])
+        tools = trials.simulator.world.poses(paths[visited])[:, :3, 3]
+        aims = np.broadcast_to(rollouts.goals[:, None], (*visited.shape, 3))[visited]
+        distances = np.full(visited.shape, np.nan)
+        distances[visited] = np.linalg.norm(tools - aims, axis=1)
+        at_end = distances[:, -HOLDING_STEPS:].max(axis=1)
+        return cls(
+            closest=np.nanmin(distances, axis=1),
+            farthest_at_end=np.where(rollouts.collision, np.inf, at_end),
+            collision=rollouts.collision,
+            steps=rollouts.steps,
+        )
 
 
 def _joined(field: str, name: str, meaning: str) -> "cached_property[NDArray[Any]]":
@@ -58,7 +95,7 @@ class Outcomes:
 
     rollouts: tuple[Any, ...]
     bounds: Any = None
-    holding: "tuple[Holding, ...]" = ()
+    holding: tuple[Holding, ...] = ()
     time_step: float = float("nan")
     numbers: NDArray[np.int64] | None = None
 

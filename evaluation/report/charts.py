@@ -71,7 +71,7 @@ class Chart(NamedTuple):
 def profile_chart(results: ProblemResults) -> Chart:
     """Profiles of a problem with their 95 % bands, the oracle's as well; the best is on top."""
     limits = profile_limits(results)
-    low, high = np.log10(limits[[0, -1]])
+    low, high = (float(end) for end in np.log10(limits[[0, -1]]))
 
     def x(distances: ArrayLike) -> NDArray[np.float64]:
         return LEFT + (np.log10(distances) - low) / (high - low) * (WIDTH - RIGHT - LEFT)
@@ -113,7 +113,7 @@ def histogram_chart(results: ProblemResults) -> Chart:
     unit = (WIDTH - LEFT - RIGHT) / edges[-1]
     spacing = 0.2 if edges[-1] < 2 else 0.5 * np.ceil(edges[-1] / 5)
     shapes, upwards = [], []
-    for row, group in enumerate(results.groups, start=1):
+    for row, group in zip(range(rows, 0, -1), reversed(results.groups), strict=True):
         shares = np.histogram(group.distances, edges)[0] / group.distances.size
         upwards.append((row * height, f"{100 * shares[0]:.1f} %"))
         for low, share in zip(edges, shares, strict=False):

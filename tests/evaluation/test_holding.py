@@ -5,12 +5,17 @@ import numpy as np
 import pytest
 
 import kinarm  # noqa: F401 registers the environments
-from kinarm.evaluation.contestants import ORACLE, Contestant, find_contestants
-from kinarm.evaluation.estimates import estimate_metrics
+from kinarm.evaluation.contestants import (
+    AIM,
+    ORACLE,
+    Contestant,
+    find_contestants,
+    measure_holding,
+)
 from kinarm.evaluation.evaluation import run_trials
-from kinarm.evaluation.holding import AIM, Holding, measure_holding
 from kinarm.evaluation.metrics import CLOSE, HOLDING_WITHIN
-from kinarm.evaluation.outcomes import HOLDING_STEPS, Outcomes
+from kinarm.evaluation.outcomes import HOLDING_STEPS, Holding, Outcomes
+from kinarm.evaluation.statistics import estimate_metrics
 
 
 @pytest.fixture(scope="module")

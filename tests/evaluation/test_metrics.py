@@ -10,10 +10,9 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from kinarm.episodes import Rollouts
-from kinarm.evaluation.estimates import estimate_metrics
 from kinarm.evaluation.metrics import METRICS, Metric
 from kinarm.evaluation.outcomes import Outcomes
-from kinarm.evaluation.statistics import Estimate
+from kinarm.evaluation.statistics import Estimate, estimate_metrics
 
 NAMES = {"mean": "mean_distance", "median": "median_distance", "iqm": "iqm_distance"}
 NAMES["p95"] = "p95_distance"

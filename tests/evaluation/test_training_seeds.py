@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from kinarm.evaluation.contestants import BASELINES, ORACLE, Contestant, find_contestants
-from kinarm.evaluation.training_seeds import group_names, named_apart
+from kinarm.evaluation.selection import group_names, named_apart
 from kinarm.policies import Policy, recipe, train_policy
 from kinarm.problem import PROBLEMS
 
