@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from kinarm._files import absolute, check_output, only_writer, write_text
-from kinarm._validation import MOST_TRIALS, whole_number
+from kinarm._validation import FROM_ZERO, TRIALS
 from kinarm.errors import InvalidInputError
 from kinarm.problem import problem_names
 from kinarm.problem_options import ProblemOptions, say_choices
@@ -92,8 +92,8 @@ class EvaluationRequest(ProblemOptions):
         default=(),
         metadata={"flag": "--problem", "metavar": "NAME_OR_FILE", "names": problem_names},
     )
-    trials: int = 200
-    seed: int = 0
+    trials: int = field(default=200, metadata=TRIALS)
+    seed: int = field(default=0, metadata=FROM_ZERO)
     allow_other_arm: bool = False
     matrix: bool = False
     oracle: bool = True
@@ -118,8 +118,7 @@ class EvaluationRequest(ProblemOptions):
     }
 
     def __post_init__(self) -> None:
-        whole_number("trials", self.trials, 1, MOST_TRIALS)
-        whole_number("seed", self.seed, 0)
+        super().__post_init__()
         if self.json and self.markdown:
             raise InvalidInputError("--json and --markdown exclude each other")
 

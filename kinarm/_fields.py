@@ -16,6 +16,7 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 import numpy as np
 
 from kinarm._files import first_line
+from kinarm._validation import check_range
 from kinarm.errors import InvalidInputError, KinarmError
 
 T = TypeVar("T")
@@ -118,17 +119,21 @@ def from_plain(kind: type[T], entries: object, where: str, path: str = "") -> T:
         raise InvalidInputError(f"{where}: {path and path[:-1] + ': '}{error}") from error
 
 
-def check_fields(given: Any) -> None:
-    """Make the fields of a frozen dataclass what its annotations say, or refuse them.
+class Checked:
+    """Base of frozen dataclasses whose fields are what their annotations and metadata say.
 
-    To be called first in ``__post_init__``: lists and arrays become tuples, and numbers become
-    Python's, whole where whole ones are asked for.
+    When one is built, lists and arrays become tuples, and numbers become Python's, whole where
+    whole ones are asked for. What remains wrong is refused, numbers out of range included; see
+    `kinarm._validation.check_range`.
     """
-    kind = type(given)
-    hints = field_types(kind)
-    for name in init_fields(kind):
-        value = _value(hints[name], getattr(given, name), "", name, kind)
-        object.__setattr__(given, name, value)
+
+    def __post_init__(self) -> None:
+        kind = type(self)
+        hints = field_types(kind)
+        for name, item in init_fields(kind).items():
+            value = _value(hints[name], getattr(self, name), "", name, kind)
+            check_range(name, value, item.metadata)
+            object.__setattr__(self, name, value)
 
 
 def _value(hint: Any, entry: Any, where: str, path: str, kind: type) -> Any:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +13,16 @@ from kinarm.errors import InvalidInputError
 
 MOST_TRIALS = 10_000_000
 """Trials of a set at most: memory grows with them."""
+
+FROM_ZERO: Mapping[str, Any] = {"at_least": 0}
+TRIALS: Mapping[str, Any] = {"at_most": MOST_TRIALS}
+POSITIVE = {"must": "be greater than 0", "holds": lambda value: value > 0}
+NOT_NEGATIVE = {"must": "not be negative", "holds": lambda value: value >= 0}
+SHARE = {"must": "lie in [0, 1]", "holds": lambda value: 0 <= value <= 1}
+"""Ranges of numbers: metadata of fields."""
+
+LARGEST = 1e6
+"""Numbers of settings at most [m or any unit]; parameters would overflow with larger ones."""
 
 
 def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
@@ -75,3 +87,30 @@ def whole_number(name: str, value: object, at_least: int, at_most: float = math.
     if value > at_most:
         raise InvalidInputError(f"{name} must be at most {at_most}, got {value}")
     return int(value)
+
+
+def check_range(name: str, value: Any, demands: Mapping[str, Any]) -> None:
+    """Refuse numbers that are not finite or break what the metadata of their field demand.
+
+    Parameters
+    ----------
+    name : str
+        Name of the field, for messages.
+    value : object
+        Its value, in its unit; entries of tuples are looked at one by one, and what is no number
+        passes.
+    demands : mapping
+        Metadata of the field. For whole numbers: ``at_least``, 1 if it is not said, and
+        ``at_most``. For other numbers: a condition that ``holds``, and what they ``must`` in words.
+    """
+    if isinstance(value, tuple):
+        for each in value:
+            check_range(name, each, demands)
+    elif type(value) is int:
+        whole_number(name, value, demands.get("at_least", 1), demands.get("at_most", math.inf))
+    elif isinstance(value, float):
+        must, holds = demands.get("must", "be finite"), demands.get("holds", math.isfinite)
+        if not (math.isfinite(value) and holds(value)):
+            raise InvalidInputError(f"{name} must {must}, got {value}")
+        if abs(value) > LARGEST:
+            raise InvalidInputError(f"{name} must be at most {LARGEST:g}, got {value}")

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from kinarm._fields import check_fields, from_plain, init_fields, read_toml
+from kinarm._fields import Checked, from_plain, init_fields, read_toml
 from kinarm._files import absolute, is_file, shipped_files
 from kinarm.errors import ArmError
 
@@ -17,7 +17,7 @@ def arm_names() -> tuple[str, ...]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class AllowedContact:
+class AllowedContact(Checked):
     """Two links whose contact counts for nothing.
 
     Parameters
@@ -31,12 +31,9 @@ class AllowedContact:
     links: tuple[str, str]
     reason: str
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
 
 @dataclass(frozen=True, kw_only=True)
-class ArmSpecification:
+class ArmSpecification(Checked):
     """Which arm, and what of it the simulator is to use.
 
     What is left out is what the arm file says, if the source has one; see `ArmFile`.
@@ -83,9 +80,6 @@ class ArmSpecification:
     allowed_contacts: tuple[AllowedContact, ...] | None = None
     digest: str | None = None
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
     def resolved(self, folder: Path) -> "ArmSpecification":
         """The same arm with absolute paths; relative ones start at a folder."""
         source, path = self.source, folder / self.source
@@ -117,7 +111,7 @@ class ArmSpecification:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ArmFile:
+class ArmFile(Checked):
     """An arm file: an arm, and the origin of its data.
 
     A TOML file with a table ``arm``, the fields of `ArmSpecification`, beside what people want to
@@ -141,9 +135,6 @@ class ArmFile:
     velocities: str = ""
     notes: str = ""
     arm: ArmSpecification
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     @classmethod
     def of(cls, source: str) -> "ArmFile | None":

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import tomli_w
 
-from kinarm._fields import check_fields, from_plain, init_fields, read_toml, take_base, to_plain
+from kinarm._fields import Checked, from_plain, init_fields, read_toml, take_base, to_plain
 from kinarm._files import absolute, is_file, named_file, shipped_files, write_text
 from kinarm.arm_specification import ArmSpecification
 from kinarm.errors import InvalidInputError, ProblemError, UnknownNameError
@@ -35,7 +35,7 @@ KEYS = {"base", "name", "arm", "scene", "task", "stepping"}
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReachProblem:
+class ReachProblem(Checked):
     """A reaching problem: an arm, a scene, a task and the rules of a step.
 
     Parameters
@@ -59,7 +59,7 @@ class ReachProblem:
     stepping: Stepping = field(default_factory=Stepping)
 
     def __post_init__(self) -> None:
-        check_fields(self)
+        super().__post_init__()
         available = [region.name for region in self.scene.goal_regions]
         if not available:
             raise ProblemError("a scene needs at least one goal region")

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, ClassVar
 
-from kinarm._fields import init_fields
+from kinarm._fields import Checked, init_fields
 from kinarm.arm_specification import arm_names
 from kinarm.problem import ProblemLike, ReachProblem, problem_names, scene_names
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ProblemOptions:
+class ProblemOptions(Checked):
     """Which problem: the options that all commands share.
 
     Parameters

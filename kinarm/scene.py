@@ -1,42 +1,30 @@
 """The world around the arm: the ground, solid boxes, and where goals may lie.
 
-What is empty, not finite, or named twice is a `ProblemError`.
+What is empty or named twice is a `ProblemError`.
 """
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm._fields import OPTIONAL, check_fields
+from kinarm._fields import OPTIONAL, Checked
+from kinarm._validation import NOT_NEGATIVE
 from kinarm.errors import ProblemError, UnknownNameError
 
 Point = tuple[float, float, float]
-
-FARTHEST = 1e6
-"""Coordinates, lengths and angles at most [m or rad]."""
 
 ROUNDING = 1e-12
 """Lengths that differ by less are the same [m]."""
 
 
 def _check_box(what: str, lower: Point, upper: Point, *, flat: bool) -> None:
-    _check_finite(f"corners of {what}", (*lower, *upper))
     extents = [high - low for low, high in zip(lower, upper, strict=True)]
     if min(extents) < 0 or sum(extent > 0 for extent in extents) < (2 if flat else 3):
         wanted = "lower <= upper, and < along two axes at least" if flat else "lower < upper"
         raise ProblemError(f"{what} is empty: {lower} to {upper}; expected {wanted}")
-
-
-def _check_finite(what: str, numbers: Iterable[float]) -> None:
-    given = list(numbers)
-    if not all(math.isfinite(number) for number in given):
-        raise ProblemError(f"{what} must be finite, got {given}")
-    if max(map(abs, given)) > FARTHEST:
-        raise ProblemError(f"{what} must be at most {FARTHEST:g}, got {given}")
 
 
 def rotation_matrix(rpy: Point) -> NDArray[np.float64]:
@@ -57,7 +45,7 @@ def rotation_matrix(rpy: Point) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Mount:
+class Mount(Checked):
     """Where the arm stands.
 
     Parameters
@@ -71,10 +59,6 @@ class Mount:
     position: Point = (0.0, 0.0, 0.0)
     rpy: Point = (0.0, 0.0, 0.0)
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-        _check_finite("mount", (*self.position, *self.rpy))
-
     @property
     def rotation(self) -> NDArray[np.float64]:
         """Orientation, as a rotation matrix, shape (3, 3)."""
@@ -82,7 +66,7 @@ class Mount:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Obstacle:
+class Obstacle(Checked):
     """A solid box, its edges along the axes of the world, or turned about the vertical.
 
     Parameters
@@ -101,9 +85,8 @@ class Obstacle:
     yaw: float = field(default=0.0, metadata=OPTIONAL)
 
     def __post_init__(self) -> None:
-        check_fields(self)
+        super().__post_init__()
         _check_box(f"obstacle {self.name!r}", self.lower, self.upper, flat=False)
-        _check_finite(f"yaw of obstacle {self.name!r}", (self.yaw,))
 
     @property
     def size(self) -> NDArray[np.float64]:
@@ -124,7 +107,7 @@ class Obstacle:
 
 
 @dataclass(frozen=True, kw_only=True)
-class GoalRegion:
+class GoalRegion(Checked):
     """A box, or a rectangle, over which goals are uniform.
 
     Parameters
@@ -140,7 +123,7 @@ class GoalRegion:
     upper: Point
 
     def __post_init__(self) -> None:
-        check_fields(self)
+        super().__post_init__()
         _check_box(f"goal region {self.name!r}", self.lower, self.upper, flat=True)
 
 
@@ -158,7 +141,7 @@ PAPER_GOALS = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scene:
+class Scene(Checked):
     """Ground, obstacles and goal regions.
 
     The world frame has z up, x forward (the arm's zero heading) and y to the left; the base of
@@ -180,20 +163,18 @@ class Scene:
     """
 
     ground: bool = True
-    cube_edge: float = 0.05
+    cube_edge: float = field(default=0.05, metadata=NOT_NEGATIVE)
     obstacles: tuple[Obstacle, ...] = PAPER_BENCHES
     goal_regions: tuple[GoalRegion, ...] = PAPER_GOALS
     mount: Mount = field(default_factory=Mount, metadata=OPTIONAL)
 
     def __post_init__(self) -> None:
-        check_fields(self)
+        super().__post_init__()
         for what, members in (("obstacle", self.obstacles), ("goal region", self.goal_regions)):
             names = [member.name for member in members]
             for name in names:
                 if names.count(name) > 1:
                     raise ProblemError(f"two {what}s are called {name!r}")
-        if not (math.isfinite(self.cube_edge) and self.cube_edge >= 0):
-            raise ProblemError(f"cube_edge must be at least 0 m, got {self.cube_edge}")
 
     def goal_region(self, name: str) -> GoalRegion:
         """Look a goal region up by name; UnknownNameError if the scene has none such."""

@@ -1,17 +1,17 @@
 """Reaching tasks: goals, tolerance, horizon, starts and reward; and how time passes.
 
-Numbers that are out of range, and what does not fit together, are a `ProblemError`.
+Numbers that are out of range are an `InvalidInputError`, and what does not fit together is a
+`ProblemError`.
 """
 
-import math
 from dataclasses import dataclass, field, fields
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm._fields import OPTIONAL, check_fields
-from kinarm._validation import whole_number
+from kinarm._fields import OPTIONAL, Checked
+from kinarm._validation import POSITIVE, SHARE
 from kinarm.errors import ProblemError
 from kinarm.scene import Scene
 
@@ -20,7 +20,7 @@ LONGEST_HORIZON = 1_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
-class RewardWeights:
+class RewardWeights(Checked):
     """Weights of the reward terms; their formulas are in `kinarm.kernels.reward`.
 
     Parameters
@@ -47,11 +47,7 @@ class RewardWeights:
     allow_perverse: bool = False
 
     def __post_init__(self) -> None:
-        check_fields(self)
-        for name in REWARD_TERMS:
-            value = getattr(self, name)
-            if not math.isfinite(value):
-                raise ProblemError(f"reward weight {name} must be finite, got {value}")
+        super().__post_init__()
         for name, perverse, deed in (
             ("collision", self.collision > 0, "rewards contact"),
             ("success", self.success < 0, "punishes it"),
@@ -108,7 +104,7 @@ class Goals(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReachTask:
+class ReachTask(Checked):
     """Bring the tool to a goal.
 
     Parameters
@@ -131,15 +127,15 @@ class ReachTask:
     """
 
     goal_regions: tuple[str, ...] = ()
-    goal_weights: tuple[float, ...] = ()
-    tolerance: float = 0.05
-    horizon: int = 64
-    start_spread: float = 1.0
+    goal_weights: tuple[float, ...] = field(default=(), metadata=POSITIVE)
+    tolerance: float = field(default=0.05, metadata=POSITIVE)
+    horizon: int = field(default=64, metadata={"at_most": LONGEST_HORIZON})
+    start_spread: float = field(default=1.0, metadata=SHARE)
     starts: tuple[tuple[float, ...], ...] = field(default=(), metadata=OPTIONAL)
     reward: RewardWeights = field(default_factory=RewardWeights)
 
     def __post_init__(self) -> None:
-        check_fields(self)
+        super().__post_init__()
         if len(set(self.goal_regions)) < len(self.goal_regions):
             raise ProblemError(f"goal_regions names one twice: {', '.join(self.goal_regions)}")
         weights = self.goal_weights
@@ -147,13 +143,6 @@ class ReachTask:
             raise ProblemError(
                 f"{len(weights)} goal_weights for {len(self.goal_regions)} goal_regions"
             )
-        if not all(math.isfinite(weight) and weight > 0 for weight in weights):
-            raise ProblemError(f"goal_weights must be greater than 0, got {list(weights)}")
-        if not (math.isfinite(self.tolerance) and self.tolerance > 0):
-            raise ProblemError(f"tolerance must be greater than 0 m, got {self.tolerance}")
-        if not 0 <= self.start_spread <= 1:
-            raise ProblemError(f"start_spread must lie in [0, 1], got {self.start_spread}")
-        whole_number("horizon", self.horizon, 1, LONGEST_HORIZON)
 
     def goals_in(self, scene: Scene) -> Goals:
         """Where in a scene goals lie."""
@@ -166,7 +155,7 @@ class ReachTask:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Stepping:
+class Stepping(Checked):
     """How time passes.
 
     Parameters
@@ -178,11 +167,5 @@ class Stepping:
         contact, its end included.
     """
 
-    time_step: float = 0.02
-    tested_configurations: int = 4
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-        if not (math.isfinite(self.time_step) and self.time_step > 0):
-            raise ProblemError(f"time_step must be finite and above 0 s, got {self.time_step}")
-        whole_number("tested_configurations", self.tested_configurations, 1, 32)
+    time_step: float = field(default=0.02, metadata=POSITIVE)
+    tested_configurations: int = field(default=4, metadata={"at_most": 32})

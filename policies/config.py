@@ -1,13 +1,14 @@
-"""Settings that every learner has, and checks that settings share."""
+"""Settings that every learner has."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
-from kinarm._fields import check_fields, init_fields
-from kinarm._validation import whole_number
-from kinarm.errors import InvalidInputError
+from kinarm._fields import Checked
+from kinarm._validation import FROM_ZERO
+from kinarm._validation import NOT_NEGATIVE as NOT_NEGATIVE
+from kinarm._validation import POSITIVE as POSITIVE
+from kinarm._validation import SHARE as SHARE
 from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.task import RewardWeights
 
@@ -33,47 +34,12 @@ def scheduled(value: float, schedule: Schedule, done: float) -> float:
     return value if schedule == "constant" else value * (1 - done)
 
 
-POSITIVE = {"must": "be greater than 0", "holds": lambda value: value > 0}
-NOT_NEGATIVE = {"must": "not be negative", "holds": lambda value: value >= 0}
-SHARE = {"must": "lie in [0, 1]", "holds": lambda value: 0 <= value <= 1}
-"""Range of a number: metadata of a field."""
-
-LARGEST = 1e6
-"""Numbers of settings at most; parameters would overflow with larger ones."""
-
 MANY, WIDTHS = {"at_most": 100_000}, {"at_most": 4096}
 """Metadata of whole numbers that memory grows with, and of the widths of hidden layers."""
 
 
-def check_range(name: str, value: Any, demands: Mapping[str, Any]) -> None:
-    """Refuse numbers that are not finite or break what the metadata of their field demand.
-
-    Parameters
-    ----------
-    name : str
-        Name of the field, for messages.
-    value : object
-        Its value, in its unit; entries of tuples are looked at one by one, and what is no number
-        passes.
-    demands : mapping
-        Metadata of the field. For whole numbers: ``at_least``, 1 if it is not said, and
-        ``at_most``. For other numbers: a condition that ``holds``, and what they ``must`` in words.
-    """
-    if isinstance(value, tuple):
-        for each in value:
-            check_range(name, each, demands)
-    elif type(value) is int:
-        whole_number(name, value, demands.get("at_least", 1), demands.get("at_most", math.inf))
-    elif isinstance(value, float):
-        must, holds = demands.get("must", "be finite"), demands.get("holds", math.isfinite)
-        if not (math.isfinite(value) and holds(value)):
-            raise InvalidInputError(f"{name} must {must}, got {value}")
-        if abs(value) > LARGEST:
-            raise InvalidInputError(f"{name} must be at most {LARGEST:g}, got {value}")
-
-
 @dataclass(frozen=True, kw_only=True)
-class TrainingConfig:
+class TrainingConfig(Checked):
     """Settings of a training with any learner, which adds its own.
 
     Parameters
@@ -92,15 +58,13 @@ class TrainingConfig:
 
     problem: ReachProblem = PROBLEMS["right"]
     reward: RewardWeights | None = None
-    seed: int = field(default=0, metadata={"at_least": 0})
+    seed: int = field(default=0, metadata=FROM_ZERO)
     recipe: str = "custom"
     iterations: int = 1
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "problem", ReachProblem.load(self.problem))
-        check_fields(self)
-        for name, item in init_fields(type(self)).items():
-            check_range(name, getattr(self, name), item.metadata)
+        super().__post_init__()
 
     @property
     def training_problem(self) -> ReachProblem:

@@ -7,7 +7,7 @@ import csv
 import io
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 from kinarm._console import ProgressLine, told_of_activities
 from kinarm._files import check_output, only_writer, write_text
 from kinarm._interrupts import telling
+from kinarm._validation import FROM_ZERO
 from kinarm.errors import InvalidInputError, KinarmError, PolicyFileError
 from kinarm.policies.checkpoint import (
     CHECKPOINT_SECONDS,
@@ -84,8 +85,8 @@ class TrainRequest(ProblemOptions):
 
     learner: str
     recipe: str | None = field(default=None, metadata={"metavar": "NAME_OR_FILE"})
-    seed: int | None = None
-    settings: Mapping[str, Any] = field(default_factory=dict)
+    seed: int | None = field(default=None, metadata=FROM_ZERO)
+    settings: dict[str, Any] = field(default_factory=dict)
     out: Path | str = field(metadata={"metavar": "FILE.npz"})
     resume: bool = False
     overwrite: bool = False

@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 
 from kinarm._command_line import run_request
 from kinarm._console import open_console
+from kinarm._fields import Checked
 from kinarm._files import check_folder, only_writer, write_text
-from kinarm._validation import whole_number
 from kinarm.evaluation.markdown import markdown_table
 
 EPILOG = """
@@ -20,7 +20,7 @@ examples:
 
 
 @dataclass(frozen=True, kw_only=True)
-class BenchmarkRequest:
+class BenchmarkRequest(Checked):
     """Measure how fast kinarm is on this machine.
 
     Parameters
@@ -48,9 +48,6 @@ class BenchmarkRequest:
         "output": ("out", "json"),
     }
     DEFAULTS: ClassVar = {"out": "a table on standard output alone"}
-
-    def __post_init__(self) -> None:
-        whole_number("repetitions", self.repetitions, 1)
 
     def run(self, command: str | None = None) -> dict[str, Any]:
         """Measure everything, and write ``speed.json`` and ``SPEED.md`` if there is a folder.

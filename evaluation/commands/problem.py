@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, BinaryIO, ClassVar, cast
 from kinarm._command_line import Commands, run_commands
 from kinarm._console import print_table
 from kinarm._files import check_output, write_atomically, write_text
-from kinarm._validation import MOST_TRIALS, whole_number
+from kinarm._validation import FROM_ZERO, TRIALS
 from kinarm.problem import problem_names
 from kinarm.problem_options import ProblemOptions, say_choices
 
@@ -74,8 +74,8 @@ class CheckRequest(ShowRequest):
         Replace earlier files.
     """
 
-    trials: int = 200
-    seed: int = 0
+    trials: int = field(default=200, metadata=TRIALS)
+    seed: int = field(default=0, metadata=FROM_ZERO)
     picture: Path | None = field(default=None, metadata={"metavar": "FILE.png"})
     json: Path | None = field(default=None, metadata={"metavar": "FILE.json"})
     overwrite: bool = False
@@ -85,10 +85,6 @@ class CheckRequest(ShowRequest):
         "output": ("picture", "json", "overwrite"),
         **ProblemOptions.GROUPS,
     }
-
-    def __post_init__(self) -> None:
-        whole_number("trials", self.trials, 1, MOST_TRIALS)
-        whole_number("seed", self.seed, 0)
 
     def run(self) -> "ProblemCheck":
         """Check the problem, and write the outputs."""

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, ClassVar
 
 from kinarm._command_line import run_request
 from kinarm._console import print_table
+from kinarm._fields import Checked
 from kinarm._interrupts import GOES_ON, telling
 from kinarm._parallel import available_threads
-from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError, TrainingFailedError
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ examples:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunningOptions:
+class RunningOptions(Checked):
     """Where trainings run.
 
     Parameters
@@ -91,9 +91,7 @@ class RunningOptions:
     }
 
     def __post_init__(self) -> None:
-        for name in ("jobs", "bundle", "minutes"):
-            if getattr(self, name) is not None:
-                whole_number(name, getattr(self, name), 1)
+        super().__post_init__()
         if self.slurm and self.ray is not None:
             raise InvalidInputError("--ray and --slurm exclude each other")
         if self.slurm and self.jobs is not None:

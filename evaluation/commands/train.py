@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from kinarm._command_line import run_command
+from kinarm._fields import Checked
 from kinarm._options import add_options, given_options
 from kinarm._parser import CommandParser, Parser
-from kinarm._validation import whole_number
+from kinarm._validation import FROM_ZERO
 from kinarm.errors import InvalidInputError
 from kinarm.policies.learners import Learner, find_learner, learner_names
 from kinarm.policies.training import TrainRequest, curve_path
@@ -69,7 +70,7 @@ def seeds_of(text: str) -> tuple[int, ...]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SeedsRequest:
+class SeedsRequest(Checked):
     """Train a policy with each of several seeds, as many at a time as there are processors.
 
     Each policy equals that of a training with this seed alone, bit for bit.
@@ -86,19 +87,18 @@ class SeedsRequest:
     """
 
     training: TrainRequest
-    seeds: tuple[int, ...] = field(metadata={"parse": seeds_of, "metavar": "N"})
+    seeds: tuple[int, ...] = field(metadata={"parse": seeds_of, "metavar": "N", **FROM_ZERO})
     jobs: int | None = None
 
     GROUPS: ClassVar = {"training": ("seeds", "jobs")}
     DEFAULTS: ClassVar = {"seeds": "one training", "jobs": "one a processor"}
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.training.seed is not None:
             raise InvalidInputError("--seed and --seeds exclude each other")
         if not self.seeds:
             raise InvalidInputError("there is no seed to train")
-        if self.jobs is not None:
-            whole_number("jobs", self.jobs, 1)
         if Path(self.training.out).suffix == ".npz":
             folder = Path(self.training.out).with_suffix("")
             raise InvalidInputError(f"with --seeds, --out is a folder: --out {folder}")

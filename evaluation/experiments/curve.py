@@ -8,8 +8,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm._fields import check_fields
-from kinarm._validation import MOST_TRIALS, whole_number
+from kinarm._fields import Checked
+from kinarm._validation import FROM_ZERO, TRIALS
 from kinarm.episodes import Rollouts
 from kinarm.evaluation.trials import trial_set
 from kinarm.policies.config import TrainingConfig
@@ -20,7 +20,7 @@ MOST_POINTS = 1000
 
 
 @dataclass(frozen=True, kw_only=True)
-class CurveTrials:
+class CurveTrials(Checked):
     """Trials of their own for the learning curves, whose files then keep more.
 
     That is, the final distance of every trial at every point of the curve, and the mean return of
@@ -37,16 +37,10 @@ class CurveTrials:
         Number and seed of the trials.
     """
 
-    points: int = 50
+    points: int = field(default=50, metadata={"at_most": MOST_POINTS})
     spacing: Literal["even", "geometric"] = "even"
-    count: int = 100
-    seed: int = 1
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-        whole_number("points", self.points, 1, MOST_POINTS)
-        whole_number("count", self.count, 1, MOST_TRIALS)
-        whole_number("seed", self.seed, 0)
+    count: int = field(default=100, metadata=TRIALS)
+    seed: int = field(default=1, metadata=FROM_ZERO)
 
     def iterations(self, last: int) -> frozenset[int]:
         """After which iterations there is a point; the last is always among them."""
@@ -58,7 +52,7 @@ class CurveTrials:
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrialSettings:
+class TrialSettings(Checked):
     """Which trials the policies of an experiment face, and when.
 
     Parameters
@@ -76,18 +70,11 @@ class TrialSettings:
         Other trials and times for the course of the training.
     """
 
-    count: int = 1000
-    seed: int = 0
-    per_decade: int = 4
+    count: int = field(default=1000, metadata=TRIALS)
+    seed: int = field(default=0, metadata=FROM_ZERO)
+    per_decade: int = field(default=4, metadata={**FROM_ZERO, "at_most": MOST_POINTS})
     first: int = 10_000
     curve: CurveTrials | None = None
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-        whole_number("count", self.count, 1, MOST_TRIALS)
-        whole_number("seed", self.seed, 0)
-        whole_number("per_decade", self.per_decade, 0, MOST_POINTS)
-        whole_number("first", self.first, 1)
 
 
 class CurvePoint(NamedTuple):

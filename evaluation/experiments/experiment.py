@@ -6,9 +6,9 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from kinarm._fields import OPTIONAL, check_fields, from_plain, read_toml, to_plain
+from kinarm._fields import OPTIONAL, Checked, from_plain, read_toml, to_plain
 from kinarm._files import named_file
-from kinarm._validation import whole_number
+from kinarm._validation import FROM_ZERO, whole_number
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.experiments.curve import TrialSettings
 from kinarm.evaluation.experiments.variation import (
@@ -22,6 +22,7 @@ from kinarm.evaluation.experiments.variation import (
 from kinarm.randomness import Stream, stream_generator
 
 MOST_TRAININGS = 100_000
+TRAININGS = {"at_most": MOST_TRAININGS}
 """Trainings of an experiment at most: all of them are planned before the first begins."""
 
 SEVERAL = ("learners", "recipes", "problems")
@@ -29,7 +30,7 @@ SEVERAL = ("learners", "recipes", "problems")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Entry:
+class Entry(Checked):
     """A learner with a recipe and what is different about it.
 
     Parameters
@@ -59,24 +60,22 @@ class Entry:
     learner: str = "ars"
     recipe: str = field(default="", metadata=OPTIONAL)
     problems: tuple[str, ...] = field(default=(), metadata=OPTIONAL)
-    seeds: int = field(default=0, metadata=OPTIONAL)
-    first_seed: int | None = None
+    seeds: int = field(default=0, metadata={**FROM_ZERO, **TRAININGS, **OPTIONAL})
+    first_seed: int | None = field(default=None, metadata=FROM_ZERO)
     fixed: dict[str, Any] = field(default_factory=dict, metadata=OPTIONAL)
     grid: dict[str, Any] = field(default_factory=dict, metadata=OPTIONAL)
 
     def __post_init__(self) -> None:
-        check_fields(self)
+        super().__post_init__()
         if not self.name:
             recipe = Path(self.recipe).stem if self.recipe.endswith(".toml") else self.recipe
             name = f"{self.learner}-{recipe}" if recipe else self.learner
             object.__setattr__(self, "name", name)
-        whole_number("seeds", self.seeds, 0, MOST_TRAININGS)
-        whole_number("first_seed", self.first_seed or 0, 0)
         check_tables(fixed=self.fixed, grid=self.grid)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Experiment:
+class Experiment(Checked):
     """A set of trainings: every entry, problem, choice and seed with every other.
 
     Entries are given one by one, or are all learners with all recipes. Fields of settings are named
@@ -114,8 +113,8 @@ class Experiment:
     learners: tuple[str, ...] = ("ars",)
     recipes: tuple[str, ...] = field(default=(), metadata=OPTIONAL)
     problems: tuple[str, ...] = ("right",)
-    seeds: int = 1
-    first_seed: int = 0
+    seeds: int = field(default=1, metadata=TRAININGS)
+    first_seed: int = field(default=0, metadata=FROM_ZERO)
     trials: TrialSettings = field(default_factory=TrialSettings)
     bounds: bool = field(default=True, metadata=OPTIONAL)
     fixed: dict[str, Any] = field(default_factory=dict, metadata=OPTIONAL)
@@ -125,9 +124,7 @@ class Experiment:
     entries: tuple[Entry, ...] = field(default=(), metadata=OPTIONAL)
 
     def __post_init__(self) -> None:
-        check_fields(self)
-        whole_number("seeds", self.seeds, 1, MOST_TRAININGS)
-        whole_number("first_seed", self.first_seed, 0)
+        super().__post_init__()
         for name in SEVERAL:
             if not getattr(self, name) and name != "recipes":
                 raise InvalidInputError(f"{name} must not be empty")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 from kinarm._console import working
 from kinarm._files import check_output
 from kinarm._options import option_name
-from kinarm._validation import whole_number
+from kinarm._validation import FROM_ZERO
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.request import policy_choices
 from kinarm.problem_options import ProblemOptions, say_choices
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from kinarm.recording import Recording
     from kinarm.viewer import ReplayPage
 
-RANGES = {"trials": (1,), "worst": (1,), "seed": (0,), "port": (1, 65535)}
 ALTERNATIVES = (("policy", "compare"), ("trial", "worst", "collisions", "failures"))
 """Fields of which one at most can be given."""
 
@@ -88,19 +87,19 @@ class ReplayRequest(ProblemOptions):
         default=None, metadata={"metavar": "NAME_OR_FILE", "completes": policy_choices}
     )
     compare: tuple[str, str] | None = field(default=None, metadata={"metavar": ("A", "B")})
-    trial: tuple[int, ...] = field(default=(), metadata={"repeat": True})
+    trial: tuple[int, ...] = field(default=(), metadata={"repeat": True, **FROM_ZERO})
     worst: int | None = None
     collisions: bool = False
     failures: bool = False
     trials: int | None = None
-    seed: int | None = None
+    seed: int | None = field(default=None, metadata=FROM_ZERO)
     allow_other_arm: bool = False
     oracle: bool = True
     out: Path | None = None
     record: Path | None = None
     overwrite: bool = False
     live: bool = False
-    port: int | None = None
+    port: int | None = field(default=None, metadata={"at_most": 65535})
     browser: bool = True
 
     GROUPS: ClassVar = {
@@ -122,11 +121,7 @@ class ReplayRequest(ProblemOptions):
     }
 
     def __post_init__(self) -> None:
-        for name, limits in RANGES.items():
-            if getattr(self, name) is not None:
-                whole_number(name, getattr(self, name), *limits)
-        for trial in self.trial:
-            whole_number("trial", trial, 0)
+        super().__post_init__()
         for names in ALTERNATIVES:
             given = self._given(names)
             if len(given) > 1:

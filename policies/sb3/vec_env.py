@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 
-from kinarm._validation import whole_number
+from kinarm._validation import SHARE, check_range, whole_number
 from kinarm.envs.environment import Lifecycle, pick_scenario
 from kinarm.envs.interface import Observations, one_by_one
 from kinarm.envs.reach import ReachEnv
@@ -18,7 +18,6 @@ from kinarm.envs.scenario_queues import ScenarioQueues
 from kinarm.episodes import SUCCESS, Episodes
 from kinarm.errors import InvalidInputError
 from kinarm.failed_scenarios import LARGEST_REPLAY, FailedScenarios, StartsAndGoals
-from kinarm.policies.config import SHARE, check_range
 from kinarm.randomness import Stream, stream_generator
 from kinarm.simulator import Simulator
 
