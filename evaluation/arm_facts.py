@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from kinarm.arm import Arm
 from kinarm.arm_specification import ArmFile
+from kinarm.clearance import SAMPLES, ContactStatistics
 from kinarm.collision import ContactModel
-from kinarm.contact_statistics import SAMPLES, ContactStatistics
 from kinarm.scene import Scene
 
 

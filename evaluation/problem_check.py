@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.contact_statistics import ContactStatistics, random_configurations
+from kinarm.clearance import ContactStatistics, random_configurations
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.outcomes import Pair
 from kinarm.evaluation.schemas import Count, Digest, Document

@@ -1,21 +1,205 @@
-"""Command lines: how they run, and the statuses that they end with."""
+"""Command lines: their options, from the fields of dataclasses, and how they run and end."""
 
+import argparse
 import io
+import math
 import os
+import re
 import shlex
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
-from typing import Any, NoReturn, TypeVar
+from dataclasses import MISSING, Field, is_dataclass
+from pathlib import Path
+from typing import Any, Literal, NoReturn, TypeVar, get_args, get_origin
 
+from kinarm._fields import alternatives, expected, field_types, init_fields, summary_of
 from kinarm._interrupts import EXIT_STATUS, begin, end, was_interrupted
-from kinarm._options import add_options, given_options
-from kinarm._parser import CommandParser, Parser
+from kinarm._parser import CommandParser, Parser, group_of_options
 from kinarm.errors import KinarmError, one_line
+
+METAVARS = {int: "N", float: "X", Path: "FILE"}
 
 Request = TypeVar("Request")
 Commands = Mapping[str, tuple[type, Callable[[Any], None]]]
 """By name, the request of each command, and what runs it and prints what it came to."""
+
+
+def add_options(
+    parser: argparse._ActionsContainer,
+    kind: type,
+    *,
+    skip: Collection[str] = (),
+    explicit: bool = False,
+    names: Mapping[str, Sequence[str]] | None = None,
+) -> None:
+    """Add an option for every field of a dataclass; only those that are given are parsed.
+
+    Names, types and help come from the dataclass and its docstring. The fields of a nested
+    dataclass get its name as a prefix, such as ``--reward-success``. A class attribute ``GROUPS``
+    puts fields into groups of options by their titles; ``DEFAULTS`` says what happens without an
+    option whose field has no telling default, and such a field need not be given.
+
+    A field's metadata may hold ``flag`` (another name of the option, or one without dashes for a
+    positional argument), ``metavar``, ``repeat`` (a tuple is collected from repetitions of the
+    option of one value each, else of several), ``parse`` (makes the value of the text),
+    ``names`` (a function that lists the names that an option takes, for help and completion) and
+    ``completes`` (the same, for completion alone).
+
+    Parameters
+    ----------
+    parser, kind
+        Where to add them, and the dataclass.
+    skip : collection of str
+        Fields that get no option.
+    explicit : bool
+        Whether every default is said, and what is false by default has an option ``--no-x``.
+    names : mapping, optional
+        Names that options take, by field, where the metadata do not list them.
+    """
+    groups: Mapping[str, Sequence[str]] = getattr(kind, "GROUPS", {})
+    titles = {name: title for title, members in groups.items() for name in members}
+    is_parser = isinstance(parser, argparse.ArgumentParser)
+    rest = group_of_options(parser, "options") if is_parser else parser
+    items = init_fields(kind)
+    for name in dict.fromkeys((*titles, *items)):
+        if name not in skip:
+            group = group_of_options(parser, titles[name]) if name in titles else rest
+            _add_option(group, kind, items[name], explicit=explicit, names=names or {})
+
+
+def _add_option(
+    parser: argparse._ActionsContainer,
+    kind: type,
+    item: Field[Any],
+    prefix: str = "",
+    *,
+    explicit: bool,
+    names: Mapping[str, Sequence[str]],
+) -> None:
+    """Add the option of one field, or those of a nested dataclass."""
+    hint = alternatives(field_types(kind)[item.name])[0]
+    if isinstance(hint, type) and is_dataclass(hint):
+        for inner in init_fields(hint).values():
+            _add_option(parser, hint, inner, f"{prefix}{item.name}.", explicit=True, names=names)
+        return
+    flag = option_name(item, prefix)
+    known = names.get(item.name) or item.metadata.get("names", tuple)()
+    default = _default(kind, item, explicit=explicit)
+    options: dict[str, Any] = {
+        "default": argparse.SUPPRESS,
+        "help": _help(summary_of(kind, item.name), known, default),
+    }
+    if flag.startswith("--"):
+        without = item.default is MISSING and item.default_factory is MISSING
+        options |= {"dest": f"{prefix}{item.name}", "required": without and not default}
+    elif item.default is not MISSING:
+        options["nargs"] = "?"
+    if hint is bool:
+        negative = item.default is True and "flag" not in item.metadata
+        action = argparse.BooleanOptionalAction if explicit or negative else "store_true"
+        parser.add_argument(flag, action=action, **options)
+        return
+    added = parser.add_argument(flag, **options, **_value_options(item, hint, flag))
+    added.completes = _completes(item, hint, known)  # type: ignore[attr-defined]
+
+
+def _value_options(item: Field[Any], hint: Any, flag: str) -> dict[str, Any]:
+    """How argparse takes the value of an option."""
+    options: dict[str, Any] = {}
+    if "parse" in item.metadata:
+        make = _argument_type(item.metadata["parse"], hint)
+        return {"type": make, "metavar": item.metadata["metavar"]}
+    if get_origin(hint) is tuple:
+        hint, *others = get_args(hint)
+        if item.metadata.get("repeat"):
+            options = {"action": "append"}
+        elif Ellipsis in others:
+            options = {"action": "extend", "nargs": "+"}
+        else:
+            options = {"nargs": 1 + len(others)}
+    if get_origin(hint) is Literal:
+        options["choices"] = get_args(hint)
+    else:
+        usual = METAVARS.get(hint, "NAME") if flag.startswith("--") else flag
+        options["metavar"] = item.metadata.get("metavar", usual)
+    return {**options, "type": _argument_type(hint if hint in METAVARS else str, hint)}
+
+
+def _argument_type(make: Callable[[str], Any], hint: Any) -> Callable[[str], Any]:
+    """Makes the value of a text, which may be refused."""
+
+    def parsed(text: str) -> Any:
+        if text is argparse.SUPPRESS:  # a positional argument that is not given
+            return text
+        try:
+            value = make(text)
+        except KinarmError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+        except ValueError:
+            value = math.nan
+        if isinstance(value, float) and not math.isfinite(value):
+            wanted = "a finite number" if hint is float else expected(hint)
+            raise argparse.ArgumentTypeError(f"must be {wanted}, got {text!r}")
+        return value
+
+    return parsed
+
+
+def _completes(item: Field[Any], hint: Any, known: Sequence[str]) -> Any:
+    """How a value is completed: as a ``"file"`` or ``"folder"``, or by a function's names."""
+    if "completes" in item.metadata:
+        return item.metadata["completes"]
+    if known:
+        return lambda: known
+    if item.metadata.get("metavar") in ("DIR", "FOLDER"):
+        return "folder"
+    return "file" if Path in alternatives(hint) or "FILE" in str(item.metadata) else None
+
+
+def option_name(item: Field[Any], prefix: str = "") -> str:
+    """Name of the option of a field."""
+    usual = "--" + re.sub(r"[._]", "-", f"{prefix}{item.name}")
+    return str(item.metadata.get("flag", usual))
+
+
+def _default(kind: type, item: Field[Any], *, explicit: bool) -> str:
+    """Value without an option, in words; empty if that goes without saying."""
+    defaults: Mapping[str, str] = getattr(kind, "DEFAULTS", {})
+    default = item.default
+    if item.name in defaults:
+        return defaults[item.name]
+    if isinstance(default, bool):
+        return "yes" if default else "no" if explicit else ""
+    if default in (None, ()):
+        return "none" if explicit else ""
+    if default is MISSING:
+        return ""
+    return " ".join(map(str, default)) if isinstance(default, tuple) else str(default)
+
+
+def _help(said: str, names: Sequence[str], default: str) -> str:
+    """Description of a field, the names that it takes, and its default, as argparse formats it."""
+    said = said.replace("`", "")
+    if default:
+        said = f"{said} (default: {default})"
+    if names:
+        said = f"{said}. Names: {', '.join(names)}"
+    return said.replace("%", "%%")
+
+
+def given_options(options: argparse.Namespace, kind: type) -> dict[str, Any]:
+    """Fields of a dataclass that the command line gives; nested ones as mappings."""
+    given: dict[str, Any] = {}
+    for name, value in vars(options).items():
+        outer, _, inner = name.partition(".")
+        if outer not in init_fields(kind):
+            continue
+        if inner:
+            given.setdefault(outer, {})[inner] = value
+        else:
+            given[name] = tuple(value) if isinstance(value, list) else value
+    return given
 
 
 def run_command(prog: str, command: Callable[[], None]) -> NoReturn:

@@ -138,7 +138,7 @@ class _PrintCompletion(argparse.Action):
 
 
 def completion_script(parser: argparse.ArgumentParser, shell: str) -> str:
-    """The script with which a shell completes options that `kinarm._options` added to a parser."""
+    """The script with which a shell completes the options that `add_options` added to a parser."""
     import shtab
 
     for action in _actions(parser):

@@ -16,6 +16,7 @@ from kinarm._archive import cached_arrays
 from kinarm.arm import Arm
 from kinarm.chain import Chain, point_speed
 from kinarm.errors import ArmError
+from kinarm.kernels.compiling import Array
 from kinarm.kernels.distance import distances_from_hull
 from kinarm.scene import Obstacle, Scene
 
@@ -47,7 +48,7 @@ SIDES = 32
 class Enclosure(NamedTuple):
     """The hull of some corners, shape (n, 3), widened by a radius [m], in the frame of a joint."""
 
-    corners: NDArray[np.float64]
+    corners: Array
     rounding: float
 
     def moved(self, placement: pin.SE3) -> "Enclosure":
@@ -72,7 +73,7 @@ def enclosing_polytope(shape: pin.GeometryObject, most: int = MANY) -> Enclosure
     return local.moved(shape.placement)
 
 
-def _core(shape: pin.GeometryObject) -> tuple[NDArray[np.float64], float]:
+def _core(shape: pin.GeometryObject) -> tuple[Array, float]:
     """Corners, shape (n, 3), and a radius: widened by it, their hull is or encloses a shape."""
     body = shape.geometry
     if isinstance(body, coal.Sphere):
@@ -87,7 +88,7 @@ def _core(shape: pin.GeometryObject) -> tuple[NDArray[np.float64], float]:
     raise ArmError(f"collision shape {shape.name!r} is a {type(body).__name__}: not supported")
 
 
-def _prism(radius: float, half_length: float) -> NDArray[np.float64]:
+def _prism(radius: float, half_length: float) -> Array:
     """Corners of a prism about a cylinder, shape (n, 3)."""
     angles = np.arange(SIDES) * (2 * np.pi / SIDES)
     ring = radius / np.cos(np.pi / SIDES) * np.stack([np.cos(angles), np.sin(angles)], axis=1)
@@ -95,14 +96,14 @@ def _prism(radius: float, half_length: float) -> NDArray[np.float64]:
     return np.concatenate([np.concatenate([ring, end], axis=1) for end in ends])
 
 
-def _around(points: NDArray[np.float64], most: int) -> Enclosure:
+def _around(points: Array, most: int) -> Enclosure:
     """Enclose the hull of points, shape (n, 3); what took long is kept in the cache folder."""
     made_of = np.int64(most).tobytes() + points.tobytes()
     fitted = cached_arrays("enclosure", ENCLOSURES, made_of, lambda: _fitted(points, most))
     return Enclosure(fitted["corners"], float(fitted["rounding"]))
 
 
-def _fitted(points: NDArray[np.float64], most: int) -> dict[str, Any]:
+def _fitted(points: Array, most: int) -> dict[str, Any]:
     """Corners and rounding of what encloses the hull of points."""
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     chosen = [int(np.square(points - middle).sum(axis=1).argmax())]
@@ -127,7 +128,7 @@ def enclosing_capsule(shape: pin.GeometryObject) -> Enclosure:
     return local.moved(shape.placement)
 
 
-def _capsule_around(points: NDArray[np.float64]) -> Enclosure:
+def _capsule_around(points: Array) -> Enclosure:
     """Capsule along the longest principal direction of a set of points, shape (n, 3)."""
     centre = (points.min(axis=0) + points.max(axis=0)) / 2
     _, _, directions = np.linalg.svd(points - centre, full_matrices=False)
@@ -182,19 +183,19 @@ class ContactShapes(NamedTuple):
         Cosine and sine of the yaw of the obstacles.
     """
 
-    capsules: NDArray[np.float64]
-    boxes: NDArray[np.float64]
+    capsules: Array
+    boxes: Array
     pairs: NDArray[np.int64]
-    travel: NDArray[np.float64]
+    travel: Array
     exact: NDArray[np.bool_]
     bodies: NDArray[np.int64]
-    corners: NDArray[np.float64]
-    rounding: NDArray[np.float64]
-    extents: NDArray[np.float64]
+    corners: Array
+    rounding: Array
+    extents: Array
     planes: NDArray[np.int64]
     proxies: NDArray[np.int64]
-    farthest: NDArray[np.float64]
-    turns: NDArray[np.float64]
+    farthest: Array
+    turns: Array
 
     @classmethod
     def build(
@@ -274,13 +275,13 @@ def _enclosed(
     return bodies, links, finer
 
 
-def _corners(obstacle: Obstacle) -> NDArray[np.float64]:
+def _corners(obstacle: Obstacle) -> Array:
     """Corners of an obstacle in the world, shape (8, 3)."""
     corners = np.array(list(product(*zip(obstacle.lower, obstacle.upper, strict=True))))
     return _turned(corners, obstacle.rotation, obstacle.centre) if obstacle.yaw else corners
 
 
-def _turned_back(obstacle: Obstacle) -> NDArray[np.float64]:
+def _turned_back(obstacle: Obstacle) -> Array:
     """Opposite corners of an obstacle in the world turned back by its yaw, shape (2, 3)."""
     ends = np.array([obstacle.lower, obstacle.upper])
     if not obstacle.yaw:
@@ -288,11 +289,7 @@ def _turned_back(obstacle: Obstacle) -> NDArray[np.float64]:
     return ends - obstacle.centre + _turned(obstacle.centre[None], obstacle.rotation.T)
 
 
-def _turned(
-    points: NDArray[np.float64],
-    rotation: NDArray[np.float64],
-    about: NDArray[np.float64] | float = 0.0,
-) -> NDArray[np.float64]:
+def _turned(points: Array, rotation: Array, about: Array | float = 0.0) -> Array:
     """Points, shape (n, 3), turned about another one; without BLAS, the same on every machine."""
     terms = [(points - about)[:, k, None] * rotation[:, k] for k in range(3)]
     return about + terms[0] + terms[1] + terms[2]

@@ -6,9 +6,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.contact_shapes import PLANE
 from kinarm.kernels.compiling import Array
-from kinarm.observation import GOAL_SIDE, observation_size
+from kinarm.observation import GOAL_SIDE
 from kinarm.task import REWARD_TERMS
 
 RUNNING, PAUSED, SUCCESS, COLLISION, TRUNCATED = range(5)
@@ -137,50 +136,6 @@ class Episodes(NamedTuple):
     moments: Array
     shift: Array
     path: Array
-
-    @classmethod
-    def allocate(
-        cls,
-        starts: Array,
-        goals: Array,
-        *,
-        n_pairs: int,
-        horizon: int,
-        record: bool = False,
-        shift: Array | None = None,
-    ) -> "Episodes":
-        """Allocate episodes at their starts; the kernel ``begin`` fills in the rest.
-
-        Parameters
-        ----------
-        starts, goals : ndarray, shape (n, n_joints) and (n, 3)
-            Configurations [rad or m] and goal positions [m].
-        n_pairs, horizon, record
-            Pairs that are tested for contact, steps to go, and whether configurations are kept.
-        shift : ndarray, shape (n_observations,), optional
-            Collect sums of the observations about this point.
-        """
-        n, n_joints = starts.shape
-        n_observations = observation_size(n_joints)
-        return cls(
-            status=np.zeros(n, dtype=np.int64),
-            steps=np.zeros(n, dtype=np.int64),
-            stop=np.full(n, horizon),
-            q=starts.copy(),
-            target=starts.copy(),
-            doubt=np.zeros(n, dtype=np.int64),
-            touched=np.zeros(n, dtype=np.int64),
-            cleared=np.zeros(n, dtype=bool),
-            planes=np.zeros((n, n_pairs, PLANE)),
-            goal=goals.copy(),
-            observation=np.zeros((n, n_observations)),
-            distance=np.zeros(n),
-            terms=np.zeros((n, len(REWARD_TERMS))),
-            total=np.zeros(n),
-            moments=np.zeros((0 if shift is None else n, 2, n_observations)),
-            shift=np.zeros(n_observations) if shift is None else shift.copy(),
-            path=np.full((n, horizon + 1, n_joints) if record else (0, 0, n_joints), np.nan),
-        )
 
     def resume(self, rows: NDArray[np.int64], horizon: int) -> None:
         """Let episodes go on that success or contact ended; at the horizon they are truncated."""

@@ -16,6 +16,7 @@ from kinarm._validation import finite_array, one_or_many, whole_number
 from kinarm.arm import Arm
 from kinarm.chain import Frame, Frames
 from kinarm.errors import InvalidInputError
+from kinarm.kernels.compiling import Array
 from kinarm.kernels.inverse import TURN, Search, solve_targets
 from kinarm.kernels.kinematics import move_frame, place_frame
 from kinarm.randomness import low_discrepancy_points
@@ -48,7 +49,7 @@ class InverseSolutions:
         them, over which these are spread.
     """
 
-    configurations: NDArray[np.float64]
+    configurations: Array
     owner: NDArray[np.int64]
     isolated: bool
 
@@ -59,9 +60,9 @@ class InverseSolutions:
         kind = "isolated" if self.isolated else "spread"
         return f"InverseSolutions({len(self)} {kind} configurations)"
 
-    def of(self, target: int) -> NDArray[np.float64]:
+    def of(self, target: int) -> Array:
         """Configurations of a target, shape (k, n_joints) [rad or m]; k may be 0."""
-        chosen: NDArray[np.float64] = self.configurations[self.owner == target]
+        chosen: Array = self.configurations[self.owner == target]
         return chosen
 
 
@@ -80,7 +81,7 @@ class Kinematics(ABC):
         """Frames that `poses` and `jacobians` know; ``frames.names`` lists them."""
         return Frames(self.arm.model, self.arm.tool_frame)
 
-    def poses(self, configurations: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
+    def poses(self, configurations: ArrayLike, frame: str | None = None) -> Array:
         """Poses of a frame, compiled.
 
         Parameters
@@ -97,7 +98,7 @@ class Kinematics(ABC):
         """
         return self._of_frame(place_frame, configurations, frame, (4, 4))
 
-    def jacobians(self, configurations: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
+    def jacobians(self, configurations: ArrayLike, frame: str | None = None) -> Array:
         """Jacobians of a frame: how it moves per unit speed of each joint, compiled.
 
         Parameters
@@ -119,7 +120,7 @@ class Kinematics(ABC):
         configurations: ArrayLike,
         frame: str | None,
         shape: tuple[int, int],
-    ) -> NDArray[np.float64]:
+    ) -> Array:
         """Fill in an array of a shape at each configuration."""
         q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
         filled = np.zeros((len(q), *shape))
@@ -189,12 +190,8 @@ class Kinematics(ABC):
         return InverseSolutions(configurations[order], owner[order], search.least > 0)
 
     def _solutions(
-        self,
-        search: Search,
-        positions: NDArray[np.float64],
-        directions: NDArray[np.float64],
-        most: int,
-    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        self, search: Search, positions: Array, directions: Array, most: int
+    ) -> tuple[Array, NDArray[np.int64]]:
         """Configurations at positions (n, 3) and directions (n, n_axes, 3), and their targets."""
         n_joints = self.arm.n_joints
         found, counts = [], np.empty(len(positions), dtype=np.int64)
@@ -210,11 +207,7 @@ class Kinematics(ABC):
 
 
 def _search(
-    arm: Arm,
-    axes: NDArray[np.float64],
-    near: NDArray[np.float64],
-    joints: int | None,
-    separation: float | None,
+    arm: Arm, axes: Array, near: Array, joints: int | None, separation: float | None
 ) -> Search:
     """Check what is looked for, and complete it; see `Kinematics.inverse_kinematics`."""
     moved = _moved(arm, axes) if joints is None else joints
@@ -241,7 +234,7 @@ def _targets(
     targets: ArrayLike,
     directions: ArrayLike | None,
     tool_axis: ArrayLike | None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Array, Array, Array]:
     """Positions (n, 3), directions of the tool's axes (n, n_axes, 3), and these axes (n_axes, 3).
 
     The axes are those of the last joint frame.
@@ -274,7 +267,7 @@ def _targets(
     return positions, np.array(along[:, None], order="C"), np.array(axis[None])
 
 
-def _check_poses(poses: NDArray[np.float64]) -> None:
+def _check_poses(poses: Array) -> None:
     """Refuse matrices that are no homogeneous transforms."""
     turns = poses[:, :3, :3]
     products = (turns[:, :, :, None] * turns[:, :, None, :]).sum(axis=1)
@@ -287,23 +280,23 @@ def _check_poses(poses: NDArray[np.float64]) -> None:
         )
 
 
-def _units(name: str, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+def _units(name: str, vectors: Array) -> Array:
     """Scale vectors, shape (n, 3), to length one."""
     lengths = np.sqrt(np.square(vectors).sum(axis=1, keepdims=True))
     if not (lengths > 0).all():
         raise InvalidInputError(f"{name} must not be zero")
-    units: NDArray[np.float64] = vectors / lengths
+    units: Array = vectors / lengths
     return units
 
 
-def _approach(arm: Arm) -> NDArray[np.float64]:
+def _approach(arm: Arm) -> Array:
     """Axis of the last joint in its own frame, away from the joint before."""
-    axis: NDArray[np.float64] = arm.chain.axis[-1]
+    axis: Array = arm.chain.axis[-1]
     before = arm.model.jointPlacements[arm.n_joints].actInv(np.zeros(3))
     return -axis if float(((before - arm.chain.tool) * axis).sum()) > 0 else axis
 
 
-def _moved(arm: Arm, axes: NDArray[np.float64]) -> int:
+def _moved(arm: Arm, axes: Array) -> int:
     """Number of joints that move: those of the actions, or those that matter for a pose."""
     if len(axes) == 0:
         return arm.n_actuated
@@ -314,8 +307,8 @@ def _moved(arm: Arm, axes: NDArray[np.float64]) -> int:
 
 
 def _turned(
-    arm: Arm, configurations: NDArray[np.float64], owner: NDArray[np.int64], moved: int
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    arm: Arm, configurations: Array, owner: NDArray[np.int64], moved: int
+) -> tuple[Array, NDArray[np.int64]]:
     """Add what differs by whole turns and lies within the limits."""
     for joint in np.flatnonzero(~arm.chain.prismatic[:moved]):
         span = int((arm.upper[joint] - arm.lower[joint]) / TURN)

@@ -14,11 +14,12 @@ from kinarm._validation import finite_array, one_or_many, whole_number
 from kinarm.chain import Chain
 from kinarm.clearance import Clearance, flattened, measure_clearance
 from kinarm.collision import Contact, ContactModel
-from kinarm.contact_shapes import ContactShapes
+from kinarm.contact_shapes import PLANE, ContactShapes
 from kinarm.episodes import Control, Episodes, Rules
 from kinarm.errors import ProblemError
 from kinarm.kernels.block import Alone, Block, work_space
 from kinarm.kernels.closest import Bodies
+from kinarm.kernels.compiling import Array
 from kinarm.kernels.records import recorded
 from kinarm.kernels.rollout import begin
 from kinarm.kernels.screening import screen
@@ -26,7 +27,7 @@ from kinarm.kernels.session import Session
 from kinarm.kinematics import Kinematics
 from kinarm.observation import observation_size
 from kinarm.problem import ProblemLike, ReachProblem
-from kinarm.task import Goals
+from kinarm.task import REWARD_TERMS, Goals
 
 
 class World(Kinematics):
@@ -117,18 +118,18 @@ class World(Kinematics):
         """Length of an action."""
         return self.arm.n_actuated
 
-    def observe(self, configurations: ArrayLike, goals: ArrayLike) -> NDArray[np.float64]:
+    def observe(self, configurations: ArrayLike, goals: ArrayLike) -> Array:
         """Observations of configurations, shape (n, n_observations), whether or not they touch.
 
         Takes joint positions, shape (n, n_joints) [rad or m], and goals, shape (n, 3) [m].
         """
         return self._begun_at(configurations, goals).observation
 
-    def distances(self, configurations: ArrayLike, goals: ArrayLike) -> NDArray[np.float64]:
+    def distances(self, configurations: ArrayLike, goals: ArrayLike) -> Array:
         """Distances from the tool to goals, shape (n,) [m]; takes what `observe` does."""
         return self._begun_at(configurations, goals).distance
 
-    def screen(self, configurations: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    def screen(self, configurations: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
         """Tool points, shape (n, 3) [m], and which configurations touch something, shape (n,).
 
         Takes joint positions, shape (n, n_joints) [rad or m].
@@ -136,7 +137,7 @@ class World(Kinematics):
         q = finite_array("configurations", configurations, (None, self.arm.n_joints))
         return self.screened(q)
 
-    def screened(self, q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    def screened(self, q: Array) -> tuple[Array, NDArray[np.bool_]]:
         """As `screen`, for finite configurations in a contiguous array."""
         tools, free, touching, n_proven = self.proven(q)
         if n_proven < len(q):
@@ -144,9 +145,7 @@ class World(Kinematics):
             touching[doubtful] = self.contact_model.in_contact(q[doubtful])
         return tools, touching
 
-    def proven(
-        self, q: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], int]:
+    def proven(self, q: Array) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_], int]:
         """Tool points of finite configurations [m], and what kernels prove of these.
 
         That is: which surely are free, which surely touch, and how many these are together; about
@@ -213,9 +212,7 @@ class World(Kinematics):
         contact = self.contact(configuration, target)
         return contact.pair if contact else None
 
-    def substeps(
-        self, configurations: NDArray[np.float64], targets: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def substeps(self, configurations: Array, targets: Array) -> Array:
         """Configurations at which the motion of a step is tested for contact.
 
         Takes the ends of steps, shape (n, n_joints), and returns evenly spaced configurations,
@@ -226,11 +223,40 @@ class World(Kinematics):
         return ways
 
     def episodes(
-        self, starts: NDArray[np.float64], goals: NDArray[np.float64], **options: Any
+        self, starts: Array, goals: Array, *, record: bool = False, shift: Array | None = None
     ) -> Episodes:
-        """Episodes at their starts, yet to be begun; options are those of ``Episodes.allocate``."""
-        n_pairs, horizon = len(self.contact_model.shapes.pairs), self.problem.task.horizon
-        return Episodes.allocate(starts, goals, n_pairs=n_pairs, horizon=horizon, **options)
+        """Episodes at their starts; the kernel ``begin`` fills in the rest.
+
+        Parameters
+        ----------
+        starts, goals : ndarray, shape (n, n_joints) and (n, 3)
+            Configurations [rad or m] and goal positions [m].
+        record : bool
+            Whether configurations are kept.
+        shift : ndarray, shape (n_observations,), optional
+            Collect sums of the observations about this point.
+        """
+        n, n_joints = starts.shape
+        horizon, n_observations = self.rules.horizon, self.n_observations
+        return Episodes(
+            status=np.zeros(n, dtype=np.int64),
+            steps=np.zeros(n, dtype=np.int64),
+            stop=np.full(n, horizon),
+            q=starts.copy(),
+            target=starts.copy(),
+            doubt=np.zeros(n, dtype=np.int64),
+            touched=np.zeros(n, dtype=np.int64),
+            cleared=np.zeros(n, dtype=bool),
+            planes=np.zeros((n, len(self.contact_model.shapes.pairs), PLANE)),
+            goal=goals.copy(),
+            observation=np.zeros((n, n_observations)),
+            distance=np.zeros(n),
+            terms=np.zeros((n, len(REWARD_TERMS))),
+            total=np.zeros(n),
+            moments=np.zeros((0 if shift is None else n, 2, n_observations)),
+            shift=np.zeros(n_observations) if shift is None else shift.copy(),
+            path=np.full((n, horizon + 1, n_joints) if record else (0, 0, n_joints), np.nan),
+        )
 
     def session(self, control: Control, episodes: Episodes) -> Session:
         """Bind episodes, and where their actions come from, for the kernels."""

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from kinarm.contact_statistics import random_configurations
+from kinarm.clearance import random_configurations
 from kinarm.errors import InvalidInputError
 from kinarm.networks import Mirror
 from kinarm.observation import observation_signs

@@ -6,7 +6,7 @@ That none is found proves nothing; the oracle does.
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.contact_statistics import ContactStatistics, random_configurations
+from kinarm.clearance import ContactStatistics, random_configurations
 from kinarm.world import World
 
 GOALS, MANY = 100, 0.1

@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from kinarm._command_line import run_command
+from kinarm._command_line import add_options, given_options, run_command
 from kinarm._fields import Checked
-from kinarm._options import add_options, given_options
 from kinarm._parser import CommandParser, Parser
 from kinarm._validation import FROM_ZERO
 from kinarm.errors import InvalidInputError

@@ -8,9 +8,9 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
+from kinarm._command_line import option_name
 from kinarm._console import working
 from kinarm._files import check_output
-from kinarm._options import option_name
 from kinarm._validation import FROM_ZERO
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.request import policy_choices

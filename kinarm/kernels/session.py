@@ -69,7 +69,7 @@ class Session(Record):
         Parameters
         ----------
         control, starts, goals, shift
-            As for `kinarm.episodes.Episodes.allocate`, and the networks.
+            As for `kinarm.World.episodes`, and the networks.
         """
         episodes = self.episodes
         parts = [*zip(_arrays(self.control), _arrays(control), strict=True)]

@@ -10,8 +10,7 @@ from typing import Literal
 
 import pytest
 
-from kinarm._command_line import run_command, run_request
-from kinarm._options import add_options, given_options
+from kinarm._command_line import add_options, given_options, run_command, run_request
 from kinarm._parser import SHELLS, Parser, completion_script
 from kinarm.errors import ArmError, WorkerError
 from kinarm.evaluation.replay.request import ReplayRequest
