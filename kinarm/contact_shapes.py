@@ -64,7 +64,7 @@ def enclosing_polytope(shape: pin.GeometryObject, most: int = MANY) -> Enclosure
     farthest one from the hull of those before, widened by the distance of the farthest one left.
     Other shapes raise ArmError.
     """
-    corners, radius = _core(shape)
+    corners, radius = core(shape)
     local = Enclosure(corners, radius)
     if isinstance(shape.geometry, coal.Cylinder):
         local = _around(_prism(radius, float(corners[1, 2])), most)
@@ -73,7 +73,7 @@ def enclosing_polytope(shape: pin.GeometryObject, most: int = MANY) -> Enclosure
     return local.moved(shape.placement)
 
 
-def _core(shape: pin.GeometryObject) -> tuple[Array, float]:
+def core(shape: pin.GeometryObject) -> tuple[Array, float]:
     """Corners, shape (n, 3), and a radius: widened by it, their hull is or encloses a shape."""
     body = shape.geometry
     if isinstance(body, coal.Sphere):
@@ -122,7 +122,7 @@ def enclosing_capsule(shape: pin.GeometryObject) -> Enclosure:
 
     It equals a capsule or sphere.
     """
-    corners, radius = _core(shape)
+    corners, radius = core(shape)
     few = len(corners) <= 2
     local = Enclosure(corners[[0, -1]], radius) if few else _capsule_around(corners)
     return local.moved(shape.placement)

@@ -3,10 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kinarm.errors import ProblemError
 from kinarm.kernels.compiling import Array
-from kinarm.kernels.screening import propose_starts, rejected_rows
+from kinarm.kernels.screening import deal, propose_starts, rejected_rows
 from kinarm.world import World
 
 START_ATTEMPTS = 2000
@@ -96,3 +97,45 @@ def _draw(rngs: Sequence[np.random.Generator], counts: Sequence[int], width: int
             rng.random(out=uniforms[first : first + count])
         first += count
     return uniforms
+
+
+class ScenarioQueues:
+    """Starts and goals of the successive episodes of many arms, drawn for all of them at a time.
+
+    Those of an arm are what `draw_scenarios` draws with its generator, a few at a
+    time. There is room for twice as many as are drawn: once an arm has none left, all that have
+    room get some.
+    """
+
+    def __init__(self, world: World, n_arms: int) -> None:
+        self._world, self._rngs = world, [np.random.default_rng() for _ in range(n_arms)]
+        self._starts = np.empty((n_arms, 2 * PREFETCHED, world.arm.n_joints))
+        self._goals = np.empty((n_arms, 2 * PREFETCHED, 3))
+        self._taken, self._drawn = np.zeros((2, n_arms), dtype=np.int64)
+
+    def seed(self, row: int, rng: np.random.Generator) -> None:
+        """Give an arm another generator, and forget what was drawn for it."""
+        self._rngs[row] = rng
+        self._taken[row] = self._drawn[row] = 0
+
+    def put(self, rows: NDArray[np.int64], q: Array, goal: Array) -> None:
+        """Put the next scenarios of some arms into their rows of configurations and goals.
+
+        Parameters
+        ----------
+        rows, q, goal
+            As for `kinarm.kernels.screening.deal`.
+        """
+        queues = self._taken, self._drawn, self._starts, self._goals
+        if not deal(rows, *queues, q, goal):
+            self._draw()
+            deal(rows, *queues, q, goal)
+
+    def _draw(self) -> None:
+        """Draw scenarios for all arms that have room for them."""
+        rows = (self._drawn - self._taken <= PREFETCHED).nonzero()[0]
+        rngs = [self._rngs[row] for row in rows.tolist()]
+        places = (self._drawn[rows, None] + np.arange(PREFETCHED)) % (2 * PREFETCHED)
+        drawn = draw_for_each(self._world, rngs, PREFETCHED)
+        self._starts[rows[:, None], places], self._goals[rows[:, None], places] = drawn
+        self._drawn[rows] += PREFETCHED

@@ -17,13 +17,12 @@ from kinarm.collision import Contact, ContactModel
 from kinarm.contact_shapes import PLANE, ContactShapes
 from kinarm.episodes import Control, Episodes, Rules
 from kinarm.errors import ProblemError
-from kinarm.kernels.block import Alone, Block, work_space
 from kinarm.kernels.closest import Bodies
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.records import recorded
 from kinarm.kernels.rollout import begin
 from kinarm.kernels.screening import screen
-from kinarm.kernels.session import Session
+from kinarm.kernels.session import Alone, Block, Session, work_space
 from kinarm.kinematics import Kinematics
 from kinarm.observation import observation_size
 from kinarm.problem import ProblemLike, ReachProblem

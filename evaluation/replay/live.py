@@ -10,8 +10,7 @@ from kinarm.evaluation.replay.runs import record
 from kinarm.evaluation.trials import TrialSet
 from kinarm.recording import Recording
 from kinarm.simulator import Simulator
-from kinarm.viewer.live_server import LiveServer
-from kinarm.viewer.live_stage import LiveStage
+from kinarm.viewer.live_server import LiveServer, LiveStage
 
 SLOWDOWN, REST = 2.5, 1.2
 """How much slower than the arm the page shows its motion, and the pause between trials [s]."""

@@ -1,4 +1,7 @@
-"""The frame of every environment: how it is made and ends, its specification, what touched."""
+"""The frame of every environment: how it is made and ends, its specification, what touched.
+
+And how it shows its simulator: observations, rewards and how episodes end.
+"""
 
 import json
 from collections.abc import Mapping
@@ -10,19 +13,27 @@ from typing import Any
 import gymnasium.error
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
+from gymnasium.spaces import Box, Space
 from numpy.typing import DTypeLike, NDArray
 
 from kinarm._validation import finite_array
-from kinarm.envs.interface import Interface
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
-from kinarm.envs.scenario_queues import ScenarioQueues
 from kinarm.episodes import Episodes, StepResult
 from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.observation import Ranges, observation_bounds
 from kinarm.problem import ProblemLike, ReachProblem
+from kinarm.scenarios import ScenarioQueues
 from kinarm.simulator import Simulator
 from kinarm.task import REWARD_TERMS
 
 Array = NDArray[np.float64]
+Observations = Any
+"""An array, or a dictionary of arrays; one row per arm."""
+
+Outcome = tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]
+"""Rewards of a step, and which episodes ended by themselves or at the horizon, shape (n,) each."""
+
+DTYPES = ("float64", "float32")
 
 TERM_KEYS = tuple(f"reward_{name}" for name in REWARD_TERMS)
 
@@ -46,6 +57,74 @@ class UnexpectedArgumentError(InvalidInputError, TypeError):
 
     As everywhere in Python it is a TypeError, by which libraries that try arguments go.
     """
+
+
+class Interface:
+    """The way in which an environment shows its simulator: with its own observation and reward.
+
+    Spaces are those of one arm; observations are float64 or float32, actions fractions of the
+    velocity limits. ``tells_terms`` says whether the reward is the sum of the problem's reward
+    terms, which infos then tell.
+    """
+
+    observation_space: Space[Any]
+    action_space: Space[Any]
+    tells_terms = True
+
+    def __init__(self, simulator: Simulator, dtype: DTypeLike = np.float64) -> None:
+        self.simulator, self._dtype = simulator, checked_dtype(dtype)
+        self.action_space = Box(-1.0, 1.0, (simulator.n_actions,), dtype=np.float32)
+        rate = round(1 / simulator.problem.stepping.time_step)
+        self.metadata = {"render_modes": list(RENDER_MODES), "render_fps": max(rate, 1)}
+        self.observation_space = self._space()
+
+    def _space(self) -> Space[Any]:
+        """Space of what `observe` returns for one arm."""
+        return bounded_space(state_bounds(self.simulator), self._dtype)
+
+    def observe(self, observations: Array) -> Observations:
+        """Copy the simulator's observations, shape (n, n_observations), as they are shown."""
+        return observations.astype(self._dtype)
+
+    def step_outcome(self, episodes: Episodes, result: StepResult) -> Outcome:  # noqa: ARG002
+        """Reward a step, and say which episodes are over; may let episodes go on."""
+        return result.reward, result.terminated, result.truncated
+
+
+def one_by_one(observations: Observations, count: int) -> list[Any]:
+    """Split a batch of observations, as an interface shows them, into those of single arms."""
+    if isinstance(observations, dict):
+        return [{key: part[k] for key, part in observations.items()} for k in range(count)]
+    return list(observations)
+
+
+def checked_dtype(dtype: DTypeLike) -> np.dtype[Any]:
+    """A type that observations can have, or an error."""
+    try:
+        name = np.dtype(dtype).name
+    except TypeError:
+        name = str(dtype)
+    if name not in DTYPES:
+        raise InvalidInputError(f"observation_dtype must be one of {list(DTYPES)}, got {dtype!r}")
+    return np.dtype(name)
+
+
+def state_bounds(simulator: Simulator) -> tuple[Array, Array]:
+    """Bounds of an observation: goals to within the tolerance, quaternions to within rounding."""
+    task = simulator.task
+    regions = [simulator.scene.goal_region(name) for name in task.goal_regions]
+    ranges = Ranges(
+        goal_lower=np.min([region.lower for region in regions], axis=0) - task.tolerance,
+        goal_upper=np.max([region.upper for region in regions], axis=0) + task.tolerance,
+        reach=simulator.arm.reach,
+    )
+    return observation_bounds(ranges, simulator.arm.n_joints)
+
+
+def bounded_space(bounds: tuple[Array, Array], dtype: np.dtype[Any]) -> Space[Any]:
+    """Space of vectors of a type between a lower and an upper bound, shape (n,) each."""
+    lower, upper = (bound.astype(dtype) for bound in bounds)
+    return Box(lower, upper, dtype=dtype.type)
 
 
 class Lifecycle:

@@ -7,12 +7,12 @@ import numpy as np
 from gymnasium.spaces import Dict, Space
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from kinarm.envs.environment import ArmEnvironment
-from kinarm.envs.interface import (
+from kinarm.envs.environment import (
+    ArmEnvironment,
     Array,
     Interface,
     Observations,
-    StepOutcome,
+    Outcome,
     bounded_space,
     state_bounds,
 )
@@ -131,7 +131,7 @@ class GoalInterface(GoalRewards, Interface):
         tools = goals - observations[:, self._places["goal_minus_tool"]]
         return tools.astype(self._dtype, copy=False), goals.astype(self._dtype)
 
-    def step_outcome(self, episodes: Episodes, result: StepResult) -> StepOutcome:
+    def step_outcome(self, episodes: Episodes, result: StepResult) -> Outcome:
         """Reward by the goals, and let episodes go on whose move was refused."""
         truncated = result.truncated
         if np.count_nonzero(result.collision):
@@ -139,7 +139,7 @@ class GoalInterface(GoalRewards, Interface):
             truncated = truncated | (episodes.status == TRUNCATED) & result.collision
         info = {"collision": result.collision}
         reward = self.compute_reward(*self._goals(episodes.observation), info)
-        return StepOutcome(reward, result.success, truncated)
+        return reward, result.success, truncated
 
 
 class GoalEnvironment(GoalRewards, ArmEnvironment):

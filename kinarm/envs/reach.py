@@ -7,8 +7,14 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from kinarm._validation import finite_array
-from kinarm.envs.environment import ArmEnvironment, make_simulator, pick_scenario
-from kinarm.envs.interface import Array, Observations, one_by_one
+from kinarm.envs.environment import (
+    ArmEnvironment,
+    Array,
+    Observations,
+    make_simulator,
+    one_by_one,
+    pick_scenario,
+)
 from kinarm.episodes import COLLISION, RUNNING, SUCCESS, TRUNCATED, Episodes, StepResult
 from kinarm.problem import ProblemLike
 

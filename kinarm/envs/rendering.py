@@ -18,7 +18,7 @@ from kinarm.viewer.camera import Camera, CameraLike
 
 if TYPE_CHECKING:
     from kinarm.collision import Contact
-    from kinarm.viewer.live_stage import LiveStage
+    from kinarm.viewer.live_server import LiveStage
     from kinarm.viewer.renderer import Renderer
 
 Picture = NDArray[np.uint8]
@@ -152,8 +152,7 @@ class EnvPictures:
 
     def _live_stage(self) -> LiveStage:
         if self._stage is None:
-            from kinarm.viewer.live_server import LiveServer
-            from kinarm.viewer.live_stage import LiveStage
+            from kinarm.viewer.live_server import LiveServer, LiveStage
 
             server = LiveServer()
             self._stage = LiveStage(server, self._simulator.problem, self._simulator.arm)

@@ -10,8 +10,14 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import DTypeLike, NDArray
 
 from kinarm._validation import whole_number
-from kinarm.envs.environment import ArmEnvironment, make_simulator, pick_scenario
-from kinarm.envs.interface import Array, Observations, one_by_one
+from kinarm.envs.environment import (
+    ArmEnvironment,
+    Array,
+    Observations,
+    make_simulator,
+    one_by_one,
+    pick_scenario,
+)
 from kinarm.episodes import RUNNING, Episodes
 from kinarm.errors import InvalidInputError
 from kinarm.problem import ProblemLike

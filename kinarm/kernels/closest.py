@@ -15,7 +15,7 @@ from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, Vector, helper, inlined, kernel
 from kinarm.kernels.distance import of_segment, of_triangle, shrink
 from kinarm.kernels.kinematics import POSE, forward_kinematics, rotated_back, to_world
-from kinarm.kernels.separation import lowest_corner
+from kinarm.kernels.planes import lowest_corner
 
 CORNERS_TRIED = 64
 """Corners after which a distance is taken as it is."""

@@ -1,7 +1,6 @@
 """Forward kinematics, frames and Jacobians, for a number or lanes."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, Vector, helper, inlined, kernel
@@ -80,26 +79,6 @@ def to_world(poses: Array, frame: int, x: float, y: float, z: float) -> Vector:
 
 
 @inlined
-def point_jacobian(
-    prismatic: NDArray[np.bool_], axis: Array, poses: Array, point: Vector, jacobian: Array
-) -> None:
-    """Fill in how fast a point moves per unit speed of each of the first joints [m/rad, or m/m].
-
-    The point lies beyond them; it and the Jacobian, shape (3, n), are those of the world frame.
-    """
-    for k in range(jacobian.shape[1]):
-        c = k + 1
-        wx, wy, wz = rotated(poses, c, axis[k, 0], axis[k, 1], axis[k, 2])
-        if prismatic[k]:
-            jacobian[0, k], jacobian[1, k], jacobian[2, k] = wx, wy, wz
-        else:
-            rx, ry, rz = point[0] - poses[c, 13], point[1] - poses[c, 14], point[2] - poses[c, 15]
-            jacobian[0, k] = wy * rz - wz * ry
-            jacobian[1, k] = wz * rx - wx * rz
-            jacobian[2, k] = wx * ry - wy * rx
-
-
-@inlined
 def rotated(poses: Array, frame: int, x: float, y: float, z: float) -> Vector:
     """Turn a vector of a joint frame into the world's."""
     if frame == 0:
@@ -122,18 +101,26 @@ def rotated_back(poses: Array, frame: int, x: float, y: float, z: float) -> Vect
 
 
 @inlined
-def spatial_jacobian(chain: Chain, poses: Array, point: Vector, jacobian: Array) -> None:
-    """Fill in the velocity of a point and the angular velocity of its link, in the world frame.
+def point_jacobian(chain: Chain, poses: Array, point: Vector, jacobian: Array) -> None:
+    """Fill in how fast a point moves per unit speed of each of the first joints [m/rad, or m/m].
 
-    Per unit speed of each of the first joints, beyond which the point lies; the Jacobian has the
-    shape (6, n), or (3, n) without angular velocities.
+    The point lies beyond them; it and the Jacobian are those of the world frame. A Jacobian of the
+    shape (6, n), rather than (3, n), also tells the angular velocities of the point's link.
     """
     prismatic, axis = chain.prismatic, chain.axis
-    point_jacobian(prismatic, axis, poses, point, jacobian)
-    for k in range(jacobian.shape[1] if jacobian.shape[0] == 6 else 0):
-        x, y, z = rotated(poses, k + 1, axis[k, 0], axis[k, 1], axis[k, 2])
-        turns = 0.0 if prismatic[k] else 1.0
-        jacobian[3, k], jacobian[4, k], jacobian[5, k] = turns * x, turns * y, turns * z
+    for k in range(jacobian.shape[1]):
+        c = k + 1
+        wx, wy, wz = rotated(poses, c, axis[k, 0], axis[k, 1], axis[k, 2])
+        if prismatic[k]:
+            jacobian[0, k], jacobian[1, k], jacobian[2, k] = wx, wy, wz
+        else:
+            rx, ry, rz = point[0] - poses[c, 13], point[1] - poses[c, 14], point[2] - poses[c, 15]
+            jacobian[0, k] = wy * rz - wz * ry
+            jacobian[1, k] = wz * rx - wx * rz
+            jacobian[2, k] = wx * ry - wy * rx
+        if jacobian.shape[0] == 6:
+            turns = 0.0 if prismatic[k] else 1.0
+            jacobian[3, k], jacobian[4, k], jacobian[5, k] = turns * wx, turns * wy, turns * wz
 
 
 @kernel
@@ -195,4 +182,4 @@ def move_frame(
     for row in range(first, last):
         forward_kinematics(chain, configurations, row, poses)
         point = to_world(poses, joint, placement[0, 3], placement[1, 3], placement[2, 3])
-        spatial_jacobian(chain, poses, point, jacobians[row, :, :joint])
+        point_jacobian(chain, poses, point, jacobians[row, :, :joint])

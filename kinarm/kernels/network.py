@@ -4,10 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.episodes import ELU, HARDTANH, LEAKY_RELU, LINEAR, RELU, SILU, TANH, Control
-from kinarm.kernels.block import Block
 from kinarm.kernels.compiling import Array, helper, inlined
 from kinarm.kernels.elementary import hyperbolic_tangent
 from kinarm.kernels.lanes import as_numbers, select
+from kinarm.kernels.session import Block
 
 LEAK = 0.01
 """Slope of the leaky rectifier below zero."""

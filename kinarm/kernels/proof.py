@@ -1,4 +1,4 @@
-"""Proof that steps are free of contact, for a block of episodes.
+"""Proof that steps are free of contact, or that bodies touch, for a block of episodes.
 
 A step moves the arm from q to q' and is tested at n configurations q + k/n (q' - q). Of every pair
 of bodies, the height of the second above the plane of the first (`kinarm.kernels.planes`) is known
@@ -6,16 +6,30 @@ at q. Along the step it is the least of the heights of some corners, whose secon
 bounded by a *bend* c: at the share s of the step it is at least (1 - s) h + s h' - s (1 - s) c / 2.
 Where that does not prove the step, the plane is replaced by a better one, and only if that is not
 enough, the configurations between are looked at one by one.
+
+Contact is proven between bodies whose shapes are known exactly: capsules, obstacles and the ground.
+Two points of them that are closer to each other than the radii about them prove that they overlap,
+wherever these points come from. Of arms with other shapes nothing is claimed.
 """
 
+import math
+
 from kinarm.chain import Chain
-from kinarm.contact_shapes import GROUND, PLANE, ContactShapes
-from kinarm.kernels.block import Alone, Block, put, take, take_rows
+from kinarm.contact_shapes import BETWEEN_CAPSULES, GROUND, PLANE, WITH_GROUND, ContactShapes
 from kinarm.kernels.compiling import Array, helper, inlined
+from kinarm.kernels.distance import between_segments, closest_to_box, turned_back
 from kinarm.kernels.kinematics import place
 from kinarm.kernels.lanes import any_lane, as_numbers, lane_bits, select
-from kinarm.kernels.planes import EVERYDAY, FINE, GAP, height_above, propose
-from kinarm.kernels.separation import separate
+from kinarm.kernels.planes import (
+    EVERYDAY,
+    FINE,
+    GAP,
+    axis_in_world,
+    height_above,
+    propose,
+    separate,
+)
+from kinarm.kernels.session import Alone, Block, put, take, take_rows
 
 MARGIN = 1e-6
 """Distance below which freedom is not claimed [m]: the tolerance of Coal's iterations."""
@@ -244,3 +258,75 @@ def prove_configurations(
         if open_here and prove_configuration(lane, shapes, block.after, block, alone):
             free |= 1 << lane
     return free
+
+
+@inlined
+def is_exact(shapes: ContactShapes, pair: int) -> bool:
+    """Whether the shapes of a pair are known exactly."""
+    kind, first, second = shapes.pairs[pair, 0], shapes.pairs[pair, 1], shapes.pairs[pair, 2]
+    return shapes.exact[first] and (kind != BETWEEN_CAPSULES or shapes.exact[second])
+
+
+@helper
+def overlap(shapes: ContactShapes, pair: int, poses: Array) -> float:
+    """Lower bound of how deep an exact pair overlaps [m]; negative if it may be apart."""
+    kind, first, second = shapes.pairs[pair, 0], shapes.pairs[pair, 1], shapes.pairs[pair, 2]
+    a, b = axis_in_world(shapes, first, poses)
+    radius = shapes.capsules[first, 6]
+    if kind == WITH_GROUND:
+        return radius - min(a[2], b[2])
+    if kind == BETWEEN_CAPSULES:
+        c, d = axis_in_world(shapes, second, poses)
+        x, y, z = between_segments(a, b, c, d)
+        radius += shapes.capsules[second, 6]
+    else:
+        low, high = shapes.boxes[second, 0], shapes.boxes[second, 1]
+        lower, upper = (low[0], low[1], low[2]), (high[0], high[1], high[2])
+        cosine, sine = shapes.turns[second, 0], shapes.turns[second, 1]
+        a, b = turned_back(a, cosine, sine), turned_back(b, cosine, sine)
+        t = closest_to_box(a, b, lower, upper)
+        x, y, z = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
+        x -= min(max(x, lower[0]), upper[0])
+        y -= min(max(y, lower[1]), upper[1])
+        z -= min(max(z, lower[2]), upper[2])
+    return radius - math.sqrt(x * x + y * y + z * z)
+
+
+@inlined
+def deepest_overlap(shapes: ContactShapes, poses: Array) -> float:
+    """Lower bound of how deep the deepest of all exact pairs overlaps [m]."""
+    depth = 0.0 * poses[0, 13] - 1.0
+    for pair in range(shapes.pairs.shape[0]):
+        if is_exact(shapes, pair):
+            depth = max(depth, overlap(shapes, pair, poses))
+    return depth
+
+
+@helper
+def first_contact(
+    lane: int,
+    doubt: int,
+    chain: Chain,
+    shapes: ContactShapes,
+    tested: int,
+    block: Block,
+    alone: Alone,
+) -> int:
+    """Number, from 1, of the pair that surely is the first to touch in a step; 0 if none is.
+
+    Looks at the first configuration of which the bits of ``doubt`` say that it is not proven free.
+    """
+    k = 1
+    while doubt >> (k - 1) & 1 == 0:
+        k += 1
+    if k == tested:
+        take(block.target, 0, lane, alone.q, 0)
+        place(chain, alone.q, alone.before)
+    else:
+        place_between(k, tested, lane, chain, block, alone)
+    for pair in range(shapes.pairs.shape[0]):
+        if is_exact(shapes, pair) and overlap(shapes, pair, alone.before) > MARGIN:
+            return pair + 1
+        if not is_proven_apart(pair, lane, shapes, block, alone):
+            return 0
+    return 0

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Episodes, Rules
-from kinarm.kernels.block import load_episode, put, store_episode, take, take_rows
 from kinarm.kernels.compiling import Array, inlined, lean_kernel
 from kinarm.kernels.kinematics import place
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.network import choose_actions, shared_policy
 from kinarm.kernels.planes import GAP
 from kinarm.kernels.proof import (
+    first_contact,
     is_apart,
     prove_alone,
     prove_configurations,
@@ -22,8 +22,15 @@ from kinarm.kernels.proof import (
     renew_planes,
 )
 from kinarm.kernels.reward import add_reward, observe
-from kinarm.kernels.session import Session, take_number
-from kinarm.kernels.touching import first_contact
+from kinarm.kernels.session import (
+    Session,
+    load_episode,
+    put,
+    store_episode,
+    take,
+    take_number,
+    take_rows,
+)
 
 
 @lean_kernel

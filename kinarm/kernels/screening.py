@@ -1,4 +1,4 @@
-"""Kernels that screen configurations for contact, and those that draw starts.
+"""Kernels that screen configurations for contact, and those that draw and deal starts.
 
 Starts are few numbers, for which calls of NumPy take longer than the sums.
 """
@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.contact_shapes import ContactShapes
-from kinarm.kernels.block import Alone, Block, put, take
 from kinarm.kernels.compiling import Array, kernel, lean_kernel
 from kinarm.kernels.kinematics import place, to_world
 from kinarm.kernels.lanes import LANES, lane_bits
-from kinarm.kernels.proof import MARGIN, prove_configurations
-from kinarm.kernels.touching import deepest_overlap
+from kinarm.kernels.proof import MARGIN, deepest_overlap, prove_configurations
+from kinarm.kernels.session import Alone, Block, put, take
 
 
 @kernel
@@ -64,6 +63,44 @@ def rejected_rows(
             rejected[count] = e
             count += 1
     return rejected[:count]
+
+
+@kernel
+def deal(
+    rows: NDArray[np.int64],
+    taken: NDArray[np.int64],
+    drawn: NDArray[np.int64],
+    starts: Array,
+    goals: Array,
+    q: Array,
+    goal: Array,
+) -> bool:
+    """Copy the next scenario of each of some arms to its row of ``q`` and ``goal``.
+
+    Nothing is dealt, and the answer is no, where one of them has none left.
+
+    Parameters
+    ----------
+    rows : ndarray of int, shape (n,)
+        The arms.
+    taken, drawn : ndarray of int, shape (n_arms,)
+        How many scenarios each arm was dealt, and how many were drawn for it.
+    starts, goals : ndarray, shape (n_arms, n_kept, n_joints) and (n_arms, n_kept, 3)
+        Scenarios; the one of number k has the place k modulo n_kept.
+    q, goal : ndarray, shape (n_arms, n_joints) and (n_arms, 3)
+        Where to.
+    """
+    for row in rows:
+        if taken[row] == drawn[row]:
+            return False
+    for row in rows:
+        kept = taken[row] % starts.shape[1]
+        taken[row] += 1
+        for joint in range(q.shape[1]):
+            q[row, joint] = starts[row, kept, joint]
+        for axis in range(3):
+            goal[row, axis] = goals[row, kept, axis]
+    return True
 
 
 @lean_kernel

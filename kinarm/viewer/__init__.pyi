@@ -1,10 +1,10 @@
-from .arm_page import ArmPage as ArmPage
-from .arm_page import arm_page as arm_page
 from .camera import Camera as Camera
+from .pages import ArmPage as ArmPage
+from .pages import ReplayPage as ReplayPage
+from .pages import arm_page as arm_page
+from .pages import replay_page as replay_page
+from .pages import replay_path as replay_path
 from .renderer import Renderer as Renderer
-from .replays import ReplayPage as ReplayPage
-from .replays import replay_page as replay_page
-from .replays import replay_path as replay_path
 
 __all__ = [
     "ArmPage",

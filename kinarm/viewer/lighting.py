@@ -1,12 +1,13 @@
 """Light on a stage, as on the replay page: sun, fill, sky, and a bright room that is reflected."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.viewer.parts import channels
+from kinarm.viewer.kernels.lighting import Lights, Materials
+from kinarm.viewer.parts import Finish, channels, to_linear
 
 Array = NDArray[np.float64]
 
@@ -27,11 +28,43 @@ ROOM = (
 )
 """Colours, sizes and centres [m] of the boxes whose light is reflected: walls, then panels."""
 
+SHADOW_REACH = 1.75
+"""Half the extent of the shadow map, about the origin [m]."""
+
 DIRECTIONS = 4096
 """From which light of the room is summed up."""
 
 IRRADIANCE_NODES, REFLECTION_NODES = 17, 33
 """Nodes along each side of the octahedral maps."""
+
+
+def lit(finishes: Sequence[Finish], texels: int) -> tuple[Materials, Lights]:
+    """Finishes in the replay page's light, with an empty shadow map of some texels a side."""
+    places = np.array([SUN_PLACE, FILL_PLACE])
+    directions = places / np.linalg.norm(places, axis=1, keepdims=True)
+    right = np.cross((0.0, 0.0, 1.0), directions[0])
+    right /= np.linalg.norm(right)
+    scale = texels / (2 * SHADOW_REACH)
+    turn = [scale * right, scale * np.cross(directions[0], right), directions[0]]
+    sun = SUN_INTENSITY * channels(SUN)
+    fill = FILL_INTENSITY * channels(FILL)
+    lights = Lights(
+        directions=directions,
+        colours=np.array([sun, fill]),
+        sky=SKY_INTENSITY * channels(SKY),
+        ground=SKY_INTENSITY * channels(GROUND),
+        irradiance=irradiance_map(),
+        sunward=np.column_stack([turn, (texels / 2, texels / 2, 0.0)]),
+        shadow=np.empty((texels, texels), dtype=np.float32),
+    )
+    materials = Materials(
+        colour=to_linear([channels(finish.colour) for finish in finishes]),
+        emission=np.zeros((len(finishes), 3)),
+        roughness=np.array([finish.roughness for finish in finishes]),
+        metalness=np.array([finish.metalness for finish in finishes]),
+        reflections=np.array([reflection_map(finish.roughness) for finish in finishes]),
+    )
+    return materials, lights
 
 
 @lru_cache(maxsize=1)

@@ -145,6 +145,12 @@ def housing(sections: Sequence[tuple[float, float, float, float, float]]) -> Mes
     return loft(np.stack([x + half_x * cosine, half_y * sine, z + 0 * angle], axis=2))
 
 
+def plate(outline: Sequence[ArrayLike], levels: Sequence[tuple[float, float]]) -> Mesh:
+    """Stack an outline of points x, z along y, at levels y where it has a scale [m, 1]."""
+    flat = np.array(outline, dtype=float)
+    return loft(np.array([np.insert(scale * flat, 1, y, axis=1) for y, scale in levels]))
+
+
 def box(size: ArrayLike, chamfer: float = 0.0) -> Mesh:
     """A box about the origin with chamfered edges [m]."""
     half = np.asarray(size, dtype=float) / 2

@@ -49,12 +49,15 @@ class ArmPart(NamedTuple):
     mesh: Mesh
 
 
-PAINT = Finish(0xF2B21B, roughness=0.36, metalness=0.05)
-GRAPHITE = Finish(0x2E3238, roughness=0.5, metalness=0.25)
-STEEL = Finish(0xC3C9D0, roughness=0.28, metalness=0.75)
-ACCENT = Finish(0xE8EBEE, roughness=0.3, metalness=0.1)
+FINISHES = {
+    "paint": Finish(0xF2B21B, roughness=0.36, metalness=0.05),
+    "graphite": Finish(0x2E3238, roughness=0.5, metalness=0.25),
+    "steel": Finish(0xC3C9D0, roughness=0.28, metalness=0.75),
+    "accent": Finish(0xE8EBEE, roughness=0.3, metalness=0.1),
+}
+"""Finishes of arms."""
 
-PLAIN = (GRAPHITE, PAINT)
+PLAIN = FINISHES["graphite"], FINISHES["paint"]
 """Finishes of links by turns, where a robot states no colours."""
 
 OUTCOME_COLOURS = {"success": 0x0072B2, "collision": 0xD55E00, "truncated": 0xE69F00}

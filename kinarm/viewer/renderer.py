@@ -1,28 +1,34 @@
 """Pictures of an arm at work, drawn in software: no display, graphics card or OpenGL is needed."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._validation import finite_array, whole_number
+from kinarm.arm import Arm
 from kinarm.collision import Contact
 from kinarm.errors import UnknownNameError
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.recording import OUTCOMES
-from kinarm.viewer import lighting
-from kinarm.viewer.camera import Camera, CameraLike
-from kinarm.viewer.kernels.rasterising import draw_shadow, draw_view, transform
-from kinarm.viewer.kernels.shading import BACKGROUND, paint_floor, shade
-from kinarm.viewer.kernels.views import Eye, Lights, Materials, View
+from kinarm.viewer.camera import Camera, CameraLike, stage_scale
+from kinarm.viewer.kernels.rasterising import Eye, Surfaces, draw_shadow, draw_view, transform
+from kinarm.viewer.kernels.shading import BACKGROUND, View, paint_floor, shade
+from kinarm.viewer.lighting import lit
+from kinarm.viewer.meshes import Mesh, tube
 from kinarm.viewer.parts import (
     FLASH_RADIUS,
     OUTCOME_COLOURS,
+    TRACE_RADIUS,
+    TRACE_SIDES,
+    TRACES,
     Finish,
     channels,
-    to_linear,
+    cube_mesh,
+    obstacle_meshes,
 )
-from kinarm.viewer.triangle_scene import CUBE, TriangleScene
+from kinarm.viewer.visual_shapes import arm_parts, link_joints
 
 Array = NDArray[np.float64]
 
@@ -37,11 +43,17 @@ FADING = (0.2, 3.8)
 
 SHADOW_DETAIL, SHADOW_SIZES = 2, (256, 2048)
 """Texels along the shadow map for each pixel along the picture, and how many there may be."""
-SHADOW_REACH = 1.75
-"""Half the extent of the shadow map, about the origin [m]."""
-
 HALO_OPACITY = 0.16
 FLASH_OPACITY, FLASH_SWELL = 0.55, 1.5
+
+# Finishes under the light of the replay page; the first is the floor's.
+GROUND = Finish(0xD3D9DF, roughness=0.95)
+BODY = Finish(0x8F9AA8, roughness=0.8)
+SLAB = Finish(0xB3BDC8, roughness=0.7)
+CUBE = Finish(0x009E73, roughness=0.5)
+
+CUBE_GLOW, TOUCH_GLOW = 0x0B6B50, 0x8C2F00
+"""Light that the cube emits when it is reached, and links that touch something."""
 
 
 class Renderer:
@@ -83,7 +95,7 @@ class Renderer:
         fog = float(np.linalg.norm(position)) + np.array(FADING)
         self._eye = Eye(position, np.ascontiguousarray(rays), SAMPLES, fog)
         texels = int(np.clip(SHADOW_DETAIL * max(self.width, self.height), *SHADOW_SIZES))
-        self._materials, self._lights = _lit(self._scene.finishes, texels)
+        self._materials, self._lights = lit(self._scene.finishes, texels)
         size = self.height, self.width
         self._floor = np.full((*size, 2, 3), BACKGROUND, dtype=np.float32)
         self._floor_nearness = np.zeros((*size, len(SAMPLES)), dtype=np.float32)
@@ -165,30 +177,88 @@ class Renderer:
         return np.array(balls)
 
 
-def _lit(finishes: Sequence[Finish], texels: int) -> tuple[Materials, Lights]:
-    """Finishes in the replay page's light, with an empty shadow map of some texels a side."""
-    places = np.array([lighting.SUN_PLACE, lighting.FILL_PLACE])
-    directions = places / np.linalg.norm(places, axis=1, keepdims=True)
-    right = np.cross((0.0, 0.0, 1.0), directions[0])
-    right /= np.linalg.norm(right)
-    scale = texels / (2 * SHADOW_REACH)
-    turn = [scale * right, scale * np.cross(directions[0], right), directions[0]]
-    sun = lighting.SUN_INTENSITY * channels(lighting.SUN)
-    fill = lighting.FILL_INTENSITY * channels(lighting.FILL)
-    lights = Lights(
-        directions=directions,
-        colours=np.array([sun, fill]),
-        sky=lighting.SKY_INTENSITY * channels(lighting.SKY),
-        ground=lighting.SKY_INTENSITY * channels(lighting.GROUND),
-        irradiance=lighting.irradiance_map(),
-        sunward=np.column_stack([turn, (texels / 2, texels / 2, 0.0)]),
-        shadow=np.empty((texels, texels), dtype=np.float32),
-    )
-    materials = Materials(
-        colour=to_linear([channels(finish.colour) for finish in finishes]),
-        emission=np.zeros((len(finishes), 3)),
-        roughness=np.array([finish.roughness for finish in finishes]),
-        metalness=np.array([finish.metalness for finish in finishes]),
-        reflections=np.array([lighting.reflection_map(finish.roughness) for finish in finishes]),
-    )
-    return materials, lights
+class TriangleScene:
+    """Surfaces of a problem and its arm, which are moved to where they are at a moment.
+
+    Attributes
+    ----------
+    n_joints, scale
+        Length of a configuration, and size of the stage; see `stage_scale`.
+    finishes : list of Finish
+        Finishes of the surfaces, by material; the floor comes first.
+    """
+
+    def __init__(self, problem: ReachProblem, arm: Arm) -> None:
+        scene = problem.scene
+        self.n_joints, self.scale = arm.n_joints, stage_scale(arm, scene)
+        self._arm, self._data, self._links = arm, arm.model.createData(), link_joints(arm)
+        standing = [
+            (0, finish, mesh)
+            for obstacle in scene.obstacles
+            for finish, mesh in zip((BODY, SLAB), obstacle_meshes(obstacle, scene), strict=False)
+        ]
+        parts = [*standing, *arm_parts(arm), (arm.n_joints + 1, CUBE, cube_mesh(scene))]
+        self._arm_owners = {part[:2] for part in arm_parts(arm)}
+        # Each frame has materials of its own, so that a link can light up.
+        owners = [(0, GROUND), *((0, finish) for finish in TRACES.values())]
+        self._owners = list(dict.fromkeys([*owners, *(part[:2] for part in parts)]))
+        self.finishes = [finish for _, finish in self._owners]
+        meshes = [Mesh.joined([mesh]) for *_, mesh in parts]
+        sizes = [len(mesh.vertices) for mesh in meshes]
+        self._vertices, self._normals, self._faces = Mesh.joined(meshes).with_normals()
+        self._frames = np.repeat([frame for frame, *_ in parts], sizes)
+        self._materials = np.repeat([self._owners.index(part[:2]) for part in parts], sizes)
+
+    def surfaces(
+        self, configuration: Array, goal: Array, trace: Array, outcome: str | None
+    ) -> Surfaces:
+        """All triangles in the world at a moment.
+
+        Parameters
+        ----------
+        configuration, goal, trace, outcome
+            As for `kinarm.viewer.Renderer.render`.
+        """
+        places, normals = np.empty_like(self._vertices), np.empty_like(self._normals)
+        poses = self._poses(configuration, goal)
+        transform(self._vertices, self._frames, poses, places)
+        poses[:, :, 3] = 0.0
+        transform(self._normals, self._frames, poses, normals)
+        faces, materials = self._faces, self._materials
+        if len(trace) > 1:
+            way, aside, stretches = _tube(trace, self.scale * TRACE_RADIUS)
+            material = self._owners.index((0, TRACES[outcome]))
+            faces = np.concatenate([faces, stretches + len(places)])
+            places, normals = np.concatenate([places, way]), np.concatenate([normals, aside])
+            materials = np.concatenate([materials, np.full(len(way), material)])
+        return Surfaces(places, normals, np.empty_like(places), faces, materials)
+
+    def emission(self, outcome: str | None, touching: Iterable[str]) -> Array:
+        """Light of each material, shape (n, 3): a cube that is reached glows, and what touches."""
+        joints = {self._links[body] for body in touching if body in self._links}
+        light = np.zeros((len(self._owners), 3))
+        for material, (frame, finish) in enumerate(self._owners):
+            if finish == CUBE and outcome == "success":
+                light[material] = channels(CUBE_GLOW)
+            elif frame in joints and (frame, finish) in self._arm_owners:
+                light[material] = channels(TOUCH_GLOW)
+        return light
+
+    def _poses(self, configuration: Array, goal: Array) -> Array:
+        """Frames in the world, shape (n_joints + 2, 3, 4): the world, the joints, the goal."""
+        pin.forwardKinematics(self._arm.model, self._data, configuration)
+        poses = np.zeros((self.n_joints + 2, 3, 4))
+        poses[0, :, :3] = poses[-1, :, :3] = np.eye(3)
+        for joint in range(1, self.n_joints + 1):
+            poses[joint] = self._data.oMi[joint].homogeneous[:3]
+        poses[-1, :, 3] = goal
+        return poses
+
+
+def _tube(points: Array, radius: float) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Vertices, normals and faces of a tube along points, shape (n, 3) [m]."""
+    mesh = tube(points, radius, TRACE_SIDES)
+    around = mesh.vertices[:-2].reshape(len(points), TRACE_SIDES, 3) - points[:, None]
+    ends = points[[0, -1]] - points[[1, -2]]
+    normals = np.concatenate([around.reshape(-1, 3), ends])
+    return mesh.vertices, normals, mesh.faces

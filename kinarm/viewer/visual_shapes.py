@@ -6,20 +6,21 @@ import logging
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import coal
 import numpy as np
 import pinocchio as pin
 
+from kinarm._fields import read_toml
 from kinarm.arm import Arm
 from kinarm.collision import body_names
 from kinarm.errors import ArmError, KinarmError
 from kinarm.urdf_tree import check_numbers
-from kinarm.viewer import industrial_arm
 from kinarm.viewer.mesh_files import PaintedMesh, read_mesh_file
-from kinarm.viewer.meshes import Mesh, from_coal
-from kinarm.viewer.parts import ACCENT, PLAIN, ArmPart, packed_colour, shape_finish
+from kinarm.viewer.meshes import Mesh, box, capsule, cylinder, from_coal, housing, lathe, plate
+from kinarm.viewer.parts import FINISHES, PLAIN, ArmPart, packed_colour, shape_finish
 
 Element = ElementTree.Element
 
@@ -30,6 +31,12 @@ SIZES = {
     "capsule": (("radius", "length"), coal.Capsule),
 }
 """Attributes that state the sizes of visual shapes, and what they make."""
+
+SHAPES = {shape.__name__: shape for shape in (box, capsule, cylinder, housing, lathe, plate)}
+"""What the parts of ``industrial_arm.toml`` are."""
+
+AXES = np.array([(0, 0, 1), (0, 1, 0), (0, -1, 0), (-1, 0, 0), (0, -1, 0), (-1, 0, 0)])
+"""Of the joints of an arm that looks like that."""
 
 TOOL_RADIUS = 0.012
 """Of the ball at the tool point; a share of the arm's reach if that is less than 1 m [m]."""
@@ -42,8 +49,8 @@ def arm_parts(arm: Arm) -> tuple[ArmPart, ...]:
     One with the geometry of the shipped ones looks like an industrial arm; any other shows the
     visual shapes of its URDF, or its collision shapes where none can be read, which is logged.
     """
-    if industrial_arm.fits(arm):
-        return tuple(industrial_arm.parts(arm))
+    if looks_industrial(arm):
+        return tuple(industrial_parts(arm))
     try:
         found = tuple(visual_parts(arm))
     except KinarmError as error:
@@ -52,7 +59,50 @@ def arm_parts(arm: Arm) -> tuple[ArmPart, ...]:
         )
         found = ()
     tool = from_coal(coal.Sphere(TOOL_RADIUS * min(arm.reach, 1.0))).moved(arm.chain.tool)
-    return (*(found or collision_parts(arm)), ArmPart(arm.n_joints, ACCENT, tool))
+    return (*(found or collision_parts(arm)), ArmPart(arm.n_joints, FINISHES["accent"], tool))
+
+
+def looks_industrial(arm: Arm) -> bool:
+    """Whether an arm has the axes and offsets that ``industrial_arm.toml`` is made for."""
+    chain = arm.chain
+    if chain.n_joints != 6 or chain.prismatic.any() or not np.allclose(chain.axis, AXES):
+        return False
+    upper, forearm = chain.translation[2][2], chain.translation[3][0]
+    first = arm.model.frames[1].placement * pin.SE3(np.eye(3), np.array([0, 0, 0.33]))
+    expected = [(0.075, 0, 0), (0, 0, upper), (forearm, 0, 0.075), (0, 0, 0), (0.08, 0, 0)]
+    return (
+        arm.model.jointPlacements[1].isApprox(first, 1e-6)
+        and np.allclose(chain.translation[1:], expected)
+        and np.allclose(chain.rotation[1:], [1, 0, 0, 0])
+        and np.allclose(chain.tool[1:], 0)
+        and 0.2 <= upper <= 0.6
+        and 0.25 <= forearm <= 0.6
+        and (chain.tool[0] == 0 or chain.tool[0] >= 0.08)
+    )
+
+
+def industrial_parts(arm: Arm) -> Iterator[ArmPart]:
+    """Parts of ``industrial_arm.toml``, in the lengths of an arm that looks like that."""
+    chain, base = arm.chain, arm.model.frames[1].placement  # of the link fixed in the world
+    lengths = {"upper": chain.translation[2][2], "forearm": chain.translation[3][0]}
+    lengths |= {"tool": chain.tool[0], "m": 1.0}
+
+    def measured(value: Any) -> Any:
+        """Sum up lengths, wherever there are some in the sizes of a part."""
+        if isinstance(value, dict):
+            return sum(share * lengths[name] for name, share in value.items())
+        return [measured(each) for each in value] if isinstance(value, list) else value
+
+    for part in read_toml(Path(__file__).with_name("industrial_arm.toml"), "looks")["part"]:
+        if not lengths[part.get("with", "m")]:
+            continue
+        sizes = {name: measured(size) for name, size in part["sizes"].items()}
+        mesh = SHAPES[part["shape"]](**sizes)
+        for place in part.get("places", [(0.0, 0.0, 0.0)]):
+            there = mesh.moved(measured(place))
+            if part["joint"] == 0:
+                there = there.moved(base.translation, base.rotation)
+            yield ArmPart(part["joint"], FINISHES[part["finish"]], there)
 
 
 def collision_parts(arm: Arm) -> tuple[ArmPart, ...]:

@@ -13,8 +13,8 @@ import numpy as np
 from gymnasium.spaces import Box, Dict
 
 from kinarm._archive import reading
+from kinarm.envs.environment import Interface
 from kinarm.envs.goal import GoalInterface
-from kinarm.envs.interface import Interface
 from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.networks import Layer
 from kinarm.observation import OBSERVATION, part_slices

@@ -10,15 +10,14 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 
 from kinarm._validation import SHARE, check_range, whole_number
-from kinarm.envs.environment import Lifecycle, pick_scenario
-from kinarm.envs.interface import Observations, one_by_one
+from kinarm.envs.environment import Lifecycle, Observations, one_by_one, pick_scenario
 from kinarm.envs.reach import ReachEnv
 from kinarm.envs.rendering import EnvPictures
-from kinarm.envs.scenario_queues import ScenarioQueues
 from kinarm.episodes import SUCCESS, Episodes
 from kinarm.errors import InvalidInputError
 from kinarm.failed_scenarios import LARGEST_REPLAY, FailedScenarios, StartsAndGoals
 from kinarm.randomness import Stream, stream_generator
+from kinarm.scenarios import ScenarioQueues
 from kinarm.simulator import Simulator
 
 StepReturn = tuple[Observations, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]
@@ -152,17 +151,17 @@ class SB3VecEnv(Lifecycle, VecEnv):
         """Move every arm for one time step; observations are of new episodes where one ended."""
         episodes = self.episodes
         result = self.simulator.step(episodes, self._actions)
-        verdict = self.interface.step_outcome(episodes, result)
-        self._returns += verdict.reward
+        reward, terminated, truncated = self.interface.step_outcome(episodes, result)
+        self._returns += reward
         self._pictures.step(episodes)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for row in np.flatnonzero(result.collision).tolist():
             infos[row]["collision"] = True
-        dones = verdict.terminated | verdict.truncated
+        dones = terminated | truncated
         ended = np.flatnonzero(dones)
         if ended.size:
             columns = {
-                "TimeLimit.truncated": verdict.truncated & ~verdict.terminated,
+                "TimeLimit.truncated": truncated & ~terminated,
                 "is_success": result.success,
                 "collision": result.collision,
                 "distance": episodes.distance,
@@ -180,7 +179,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
                 }
             self._renew(episodes, ended)
         observations = self.interface.observe(episodes.observation)
-        return observations, verdict.reward.astype(np.float32), dones, infos
+        return observations, reward.astype(np.float32), dones, infos
 
     def _renew(self, episodes: Episodes, rows: NDArray[np.int64]) -> None:
         """Replace episodes that ended."""

@@ -6,7 +6,7 @@ from itertools import count, cycle
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.envs.interface import Interface
+from kinarm.envs.environment import Interface
 from kinarm.episodes import Rollouts
 from kinarm.policies import load_policy, policy_names, recipe, train_policy
 from kinarm.policies.oracle import Oracle, OracleSolutions

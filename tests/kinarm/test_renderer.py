@@ -12,7 +12,7 @@ from kinarm.problem import ReachProblem
 from kinarm.viewer import Camera, Renderer
 from kinarm.viewer.kernels.rasterising import draw_view, transform
 from kinarm.viewer.lighting import SUN_PLACE
-from kinarm.viewer.triangle_scene import TriangleScene
+from kinarm.viewer.renderer import TriangleScene
 
 CAMERAS = (
     Camera((-2.3, -1.8, 1.7), (0.1, 0.0, 0.3)),

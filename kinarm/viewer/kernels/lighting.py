@@ -1,9 +1,15 @@
-"""The light that a place of a surface sends out, by three.js' standard material."""
+"""The light that a place of a surface sends out, by three.js' standard material.
+
+Lengths are in metres, shapes of arrays in brackets, and colours linear red, green and blue.
+"""
 
 import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import Array, Vector, inlined
-from kinarm.viewer.kernels.views import Lights, Materials
 
 SHADOW_BIAS = 0.002
 """How much nearer the sun a shadow's cause must be [m]."""
@@ -12,6 +18,40 @@ LOG_2 = math.log(2.0)
 
 Cell = tuple[int, int, float, float]
 """Row and column in a map, and the shares of the next row and column."""
+
+
+class Materials(NamedTuple):
+    """Finishes of three.js' standard material, one a row; the first is the floor's.
+
+    colour, emission (n, 3): reflected and emitted light.
+    roughness, metalness (n,): in 0..1.
+    reflections (n, k, k, 3): octahedral maps of the room's light, blurred as in such a mirror.
+    """
+
+    colour: Array
+    emission: Array
+    roughness: Array
+    metalness: Array
+    reflections: Array
+
+
+class Lights(NamedTuple):
+    """Where light comes from.
+
+    directions, colours (2, 3): towards the sun, which casts shadows, and a second light from afar.
+    sky, ground (3,): light from the left (y) and from the right, which fade into each other.
+    irradiance (n, n, 3): octahedral map of the room's light on surfaces that face a direction.
+    sunward (3, 4): world to shadow map.
+    shadow (n, n): how near the sun the last surface is that keeps it off.
+    """
+
+    directions: Array
+    colours: Array
+    sky: Array
+    ground: Array
+    irradiance: Array
+    sunward: Array
+    shadow: NDArray[np.float32]
 
 
 @inlined

@@ -1,6 +1,10 @@
-"""Triangles to the samples of a picture and to the texels of a shadow; see `views`."""
+"""Triangles to the samples of a picture and to the texels of a shadow.
+
+Lengths are in metres, and shapes of arrays in brackets.
+"""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +16,39 @@ NEAR = 0.01
 
 WIDE = 6
 """Columns from which on it is worth while to find those of a row that a triangle reaches."""
+
+
+class Eye(NamedTuple):
+    """From where a picture is seen.
+
+    position (3,): place of the camera in the world.
+    rays (3, 3): line of sight of the picture's upper left corner, as long as it gets ahead by 1,
+    and what is added to it per column and per row.
+    offsets (n_samples, 2): where in a pixel its samples lie, from its upper left corner.
+    fog (2,): distances at which fading into the background begins and ends.
+    """
+
+    position: Array
+    rays: Array
+    offsets: Array
+    fog: Array
+
+
+class Surfaces(NamedTuple):
+    """Triangles.
+
+    places, normals (n_vertices, 3): in the world.
+    corners (n_vertices, 3): vertices as the camera sees them, which are column and row of the
+    picture times the distance along the line of sight, and that distance.
+    faces (n_faces, 3): vertices of each triangle.
+    materials (n_vertices,): row of what each vertex is made of.
+    """
+
+    places: Array
+    normals: Array
+    corners: Array
+    faces: NDArray[np.int64]
+    materials: NDArray[np.int64]
 
 
 @inlined

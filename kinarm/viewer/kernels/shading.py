@@ -1,14 +1,14 @@
 """Samples to pixels: which surface is seen, how it is lit, and what lies over it."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import Array, Vector, inlined, kernel
-from kinarm.viewer.kernels.lighting import light_up, sunlit, unit
-from kinarm.viewer.kernels.rasterising import edge
-from kinarm.viewer.kernels.views import Eye, Lights, Materials, Surfaces, View
+from kinarm.viewer.kernels.lighting import Lights, Materials, light_up, sunlit, unit
+from kinarm.viewer.kernels.rasterising import Eye, Surfaces, edge
 from kinarm.viewer.parts import FLOOR_RADIUS, GRID_RADIUS, GRID_STEP, channels, to_srgb
 
 FLOOR = 0
@@ -19,6 +19,26 @@ BACKGROUND, GRID = (tuple(channels(colour).tolist()) for colour in (0xEEF1F4, 0x
 
 GAMMA = to_srgb(np.linspace(0, 1, 4096))
 """Encoding of linear values from 0 to 1."""
+
+
+class View(NamedTuple):
+    """All that a picture shows, for its pixels to be coloured.
+
+    balls (n, 9): glowing balls: centre, radius, colour in sRGB, opacity, and whether it is seen
+    through everything (1).
+    floor (height, width, 2, 3): colours of floor and background, in shadow and in the sun.
+    nearness (height, width, n_samples): one over the distance ahead of what is seen [1/m].
+    seen (height, width, n_samples): triangle that is seen there; negative for the floor.
+    """
+
+    eye: Eye
+    surfaces: Surfaces
+    materials: Materials
+    lights: Lights
+    balls: Array
+    floor: NDArray[np.float32]
+    nearness: NDArray[np.float32]
+    seen: NDArray[np.int32]
 
 
 @inlined

@@ -14,10 +14,10 @@ import numpy as np
 
 from kinarm.chain import Chain, MotionBounds
 from kinarm.contact_shapes import ContactShapes
-from kinarm.kernels.block import put, take
 from kinarm.kernels.compiling import Array, Vector, lean_kernel
 from kinarm.kernels.kinematics import point_jacobian
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits
+from kinarm.kernels.session import put, take
 from kinarm.policies.oracle.kernels.box_bound import (
     closest_step,
     curved_bound,
@@ -131,7 +131,7 @@ def search(
         # Bound the distance over a box by a linear model at its centre and its curvature.
         block.distance[0] = offset_from_goal(chain, block.q, goal, block.poses, offset)
         tool = (goal[0] + offset[0], goal[1] + offset[1], goal[2] + offset[2])
-        point_jacobian(chain.prismatic, chain.axis, block.poses, tool, jacobian)
+        point_jacobian(chain, block.poses, tool, jacobian)
         direction = closest_step(jacobian, offset, half, step, scale)
         linear = (block.poses, jacobian, offset, direction, half)
         bound = curved_bound(chain, bounds.curvature, *linear, slope, least, bend)

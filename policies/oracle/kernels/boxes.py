@@ -6,11 +6,11 @@ from typing import Any
 from numba import types
 
 from kinarm.chain import Chain
-from kinarm.kernels.block import ONE, THREE, take
 from kinarm.kernels.compiling import Array, inlined
 from kinarm.kernels.kinematics import POSE
 from kinarm.kernels.lanes import as_numbers, lanes
 from kinarm.kernels.records import Fixed, Layout
+from kinarm.kernels.session import ONE, THREE, take
 
 WAITING = 4096
 """Boxes that can wait at a time; halving eight until they are too small takes fewer."""

@@ -17,8 +17,7 @@ from kinarm.kernels.distance import between_segments, closest_to_box, turned_bac
 from kinarm.kernels.kinematics import point_jacobian
 from kinarm.kernels.lanes import any_lane, select
 from kinarm.kernels.planes import axis_in_world
-from kinarm.kernels.proof import MARGIN
-from kinarm.kernels.touching import is_exact
+from kinarm.kernels.proof import MARGIN, is_exact
 
 TRIED = 5
 """Evenly spaced points of an axis that are tried for the deepest one, beside the closest one."""
@@ -91,9 +90,8 @@ def overlaps(
     of 0 leaves its centre alone. Only what is ``wanted`` is examined. The Jacobian, shape (3, n),
     is work space.
     """
-    prismatic, axes = chain.prismatic, chain.axis
     bodies, capsules, boxes, turns = shapes.bodies, shapes.capsules, shapes.boxes, shapes.turns
-    pairs, travel = shapes.pairs, shapes.travel
+    prismatic, pairs, travel = chain.prismatic, shapes.pairs, shapes.travel
     n = half.shape[0]
     proven: bool = wanted & (half[0] < 0.0)
     for pair in range(pairs.shape[0]):
@@ -141,7 +139,7 @@ def overlaps(
             continue
         # The point's motion along each edge to first order, by its Jacobian: an arm that
         # slides along an obstacle does not leave it, however far it goes.
-        point_jacobian(prismatic, axes, poses, point, jacobian)
+        point_jacobian(chain, poses, point, jacobian)
         remainder = 0.0 * half[0]
         for axis in range(min(n, bodies[i, 2])):
             width = share * half[axis]

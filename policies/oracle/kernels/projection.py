@@ -9,12 +9,12 @@ from numba import types
 from numpy.typing import NDArray
 
 from kinarm.chain import Chain
-from kinarm.kernels.block import ONE, THREE, put, take
 from kinarm.kernels.compiling import Array, Vector, inlined, lean_kernel
 from kinarm.kernels.inverse import take_out_blocked, take_step
 from kinarm.kernels.kinematics import POSE, place, point_jacobian, to_world
 from kinarm.kernels.lanes import LANES, as_numbers, lane_bits, lanes, select
 from kinarm.kernels.records import Fixed, Layout
+from kinarm.kernels.session import ONE, THREE, put, take
 
 ITERATIONS = 24
 """Newton steps before a configuration is given up."""
@@ -139,7 +139,7 @@ def damped_least_squares(
         free |= ended_bits
         # Aimed at half the radius, a step that falls short still arrives. What has ended stays.
         share = select(ended, 0.0, 1.0 - 0.5 * moving.radius[0] / distance)
-        point_jacobian(chain.prismatic, chain.axis, poses, point, jacobian)
+        point_jacobian(chain, poses, point, jacobian)
         limits, blocked = (moving.lower[0], moving.upper[0]), True
         while blocked:
             damped_step(jacobian, (share * x, share * y, share * z), step)

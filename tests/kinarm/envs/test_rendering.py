@@ -12,7 +12,7 @@ from live_pages import commands
 
 from kinarm.envs import ReachEnv, ReachGoalEnv, ReachVectorEnv
 from kinarm.errors import InvalidInputError
-from kinarm.viewer import Renderer, live_stage
+from kinarm.viewer import Renderer, live_server
 
 SMALL = {"width": 64, "height": 48}
 
@@ -22,7 +22,7 @@ def opened(monkeypatch):
     """Addresses that would be opened in a browser; no time is spent at real pace."""
     addresses = []
     monkeypatch.setattr(webbrowser, "open", addresses.append)
-    monkeypatch.setattr(live_stage.time, "sleep", lambda _: None)
+    monkeypatch.setattr(live_server.time, "sleep", lambda _: None)
     return addresses
 
 
@@ -148,8 +148,8 @@ class TestHuman:
 
     def test_keeps_the_arms_own_time(self, monkeypatch, opened):
         waits, now = [], [100.0]
-        monkeypatch.setattr(live_stage.time, "sleep", waits.append)
-        monkeypatch.setattr(live_stage.time, "monotonic", lambda: now[0])
+        monkeypatch.setattr(live_server.time, "sleep", waits.append)
+        monkeypatch.setattr(live_server.time, "monotonic", lambda: now[0])
         env = moved(ReachEnv(render_mode="human"), 0)
         env.step(np.zeros(5))
         now[0] += 0.005

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from kinarm.envs.scenario_queues import ScenarioQueues
-from kinarm.scenarios import PREFETCHED, draw_scenarios
+from kinarm.scenarios import PREFETCHED, ScenarioQueues, draw_scenarios
 from kinarm.world import World
 
 ARMS = 5

@@ -18,7 +18,7 @@ def fill(chain, configurations, frame, point, poses, jacobians):
     for i in range(len(configurations)):
         forward_kinematics(chain, configurations, i, poses[i])
         world = to_world(poses[i], frame, point[0], point[1], point[2])
-        point_jacobian(chain.prismatic, chain.axis, poses[i], world, jacobians[i])
+        point_jacobian(chain, poses[i], world, jacobians[i])
 
 
 def poses_and_jacobians(arm, configurations, frame, point, n):

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numba import njit
 
-from kinarm.kernels.block import work_space
 from kinarm.kernels.lanes import LANES, as_numbers
 from kinarm.kernels.network import choose_actions, shared_policy
+from kinarm.kernels.session import work_space
 from kinarm.networks import ACTIVATIONS, Mirror, Networks, network_control
 
 FUNCTIONS = {

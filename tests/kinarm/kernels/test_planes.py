@@ -6,8 +6,7 @@ from numba import njit
 
 from kinarm.contact_shapes import GROUND, PLANE
 from kinarm.kernels.kinematics import POSE, forward_kinematics
-from kinarm.kernels.planes import EVERYDAY, FINE, height_above, propose
-from kinarm.kernels.separation import separate
+from kinarm.kernels.planes import EVERYDAY, FINE, height_above, propose, separate
 
 
 @njit

@@ -28,7 +28,7 @@ def examine(chain, shapes, bounds, goal, cutoff, wanted, q, half, lower, upper, 
     poses, offset, jacobian, step, scale, slope, least, bend = work
     results[0] = offset_from_goal(chain, q, goal, poses, offset)
     tool = (goal[0] + offset[0], goal[1] + offset[1], goal[2] + offset[2])
-    point_jacobian(chain.prismatic, chain.axis, poses, tool, jacobian)
+    point_jacobian(chain, poses, tool, jacobian)
     direction = closest_step(jacobian, offset, half, step, scale)
     linear = (poses, jacobian, offset, direction, half)
     bound = curved_bound(chain, bounds.curvature, *linear, slope, least, bend)

@@ -1,0 +1,348 @@
+"""Pages of recordings and of arms: one HTML file that needs no network, only a browser with WebGL.
+
+It holds Meshcat's viewer and all that it shows. The same recordings make the same page.
+"""
+
+import base64
+import gzip
+import json
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+from jinja2 import Environment, FunctionLoader, StrictUndefined
+from markupsafe import Markup
+from numpy.typing import ArrayLike
+
+from kinarm._files import write_text
+from kinarm.arm import Arm
+from kinarm.arm_specification import ArmSpecification
+from kinarm.collision import ContactModel
+from kinarm.contact_shapes import core
+from kinarm.errors import InvalidInputError
+from kinarm.problem import ProblemLike
+from kinarm.recording import Recording, record_path
+from kinarm.scene import Scene
+from kinarm.viewer.camera import stage_scale
+from kinarm.viewer.drawing import SHAPE, CapturingWindow, draw_goal, draw_stage, draw_trace, put
+from kinarm.viewer.parts import OUTCOME_COLOURS, TRACE_SIDES
+from kinarm.viewer.visual_shapes import arm_parts, collision_parts, link_joints
+from kinarm.world import World
+
+NOTEBOOK_HEIGHT = 560
+"""Height of a page in a notebook [pixels]."""
+
+NOTEBOOK_FRAME = Markup(
+    '<iframe srcdoc="{}" title="{}" '
+    'style="width: 100%; height: {}px; border: 0; border-radius: 8px" '
+    'loading="lazy" allowfullscreen></iframe>'
+)
+
+NEARER = 0.8
+"""Distance of the camera from an arm alone, as a share of that in replays, which show more."""
+
+BARE_GROUND = Scene(obstacles=(), goal_regions=())
+
+
+@dataclass(frozen=True)
+class HtmlPage:
+    """A page, whose ``html`` refers to nothing outside of itself. In a notebook it shows itself."""
+
+    html: str
+
+    def save(self, path: str | Path) -> None:
+        """Write the page to a file; if that fails, an existing one is left as it was."""
+        write_text(path, self.html)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({len(self.html) / 1e6:.1f} MB of HTML)"
+
+    def _repr_html_(self) -> str:
+        return NOTEBOOK_FRAME.format(self.html, type(self).__name__, NOTEBOOK_HEIGHT)
+
+
+def page_html(
+    template: str, title: str, scene: bytes, data: Mapping[str, Any], parts: Sequence[str]
+) -> str:
+    """Fill a template.
+
+    Parameters
+    ----------
+    template, title
+        Name of the template, which extends ``page.html``, and of its style sheet; the page's title.
+    scene : bytes
+        Commands to Meshcat's viewer, each framed.
+    data : mapping
+        What the scripts have to know, in terms that JSON can hold.
+    parts : sequence of str
+        Scripts, after those of every page.
+    """
+    described = json.dumps(data, separators=(",", ":"), sort_keys=True)
+    environment = Environment(
+        autoescape=True,
+        undefined=StrictUndefined,
+        keep_trailing_newline=True,
+        loader=FunctionLoader(_own_text),
+    )
+    return environment.get_template(f"{template}.html").render(
+        title=title,
+        style=_own_text("page.css") + _own_text(f"{template}.css"),
+        licence=Markup(_meshcat(".LICENSE.txt").decode().replace("--", "- -")),
+        meshcat=_gzip_base64(_meshcat()),
+        scene=_gzip_base64(scene),
+        data=_gzip_base64(described.encode()),
+        scripts=[_own_text(f"{name}.js") for name in ("page", "stage", *parts)],
+    )
+
+
+def arm_data(arm: Arm, scene: Scene) -> dict[str, Any]:
+    """Describe an arm: its axes and tool, which joint carries which body, its colour and size."""
+    chain, painted = arm.chain, Counter[int]()
+    columns = chain.translation, chain.rotation, chain.axis, chain.prismatic
+    for part in arm_parts(arm):
+        painted[part.finish.colour] += len(part.mesh.faces)
+    return {
+        "arm": arm.name,
+        "axes": [
+            dict(zip(("translation", "rotation", "axis", "slides"), axis, strict=True))
+            for axis in zip(*(column.tolist() for column in columns), strict=True)
+        ],
+        "tool": chain.tool.tolist(),
+        "links": link_joints(arm),
+        "scale": stage_scale(arm, scene),
+        "swatch": f"#{painted.most_common(1)[0][0]:06x}",
+    }
+
+
+def _own_text(name: str) -> Markup:
+    """Text of a file beside this one, to be put into the page as it is."""
+    return Markup((resources.files("kinarm.viewer") / name).read_text(encoding="utf-8"))
+
+
+def _meshcat(ending: str = "") -> bytes:
+    """Meshcat's viewer, or what lies beside it."""
+    return (resources.files("meshcat") / f"viewer/dist/main.min.js{ending}").read_bytes()
+
+
+@lru_cache(maxsize=4)
+def _gzip_base64(content: bytes) -> str:
+    return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
+
+
+class ReplayPage(HtmlPage):
+    """A page that plays recordings. In a notebook it shows itself."""
+
+
+def replay_page(
+    recordings: Recording | Sequence[Recording],
+    path: str | Path | None = None,
+    *,
+    ghosts: Sequence[Recording] = (),
+    groups: Sequence[str] = (),
+    heading: str = "",
+) -> ReplayPage:
+    """Make a page that plays recordings; the same recordings make the same page.
+
+    Parameters
+    ----------
+    recordings : Recording or sequence of Recording
+        The recordings to play, one trial after the other.
+    path : str or Path, optional
+        File of the page; without it, no file is written.
+    ghosts : sequence of Recording
+        Recordings of another policy in the same trials, shown in the same scene.
+    groups : sequence of str
+        Group of each recording, for a list of the trials; recordings of a group follow each other.
+        Without groups there is no list.
+    heading : str
+        Heading of the list.
+
+    Raises
+    ------
+    InvalidInputError
+        If there is no recording, or they cannot share a page.
+    ArmError
+        If the recorded arm is missing, or has changed.
+    """
+    chosen = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    _check_recordings(chosen, ghosts)
+    if groups and len(groups) != len(chosen):
+        raise InvalidInputError(
+            f"there must be a group for each recording: {len(groups)} for {len(chosen)}"
+        )
+    page = ReplayPage(_replay_html(chosen, ghosts, groups, heading))
+    if path is not None:
+        page.save(path)
+    return page
+
+
+def replay_path(
+    problem: ProblemLike | World,
+    path: ArrayLike,
+    file: str | Path | None = None,
+    *,
+    goal: ArrayLike | None = None,
+    name: str = "path",
+) -> ReplayPage:
+    """Make a page that plays your own path; it ends at contact, and shows it.
+
+    Parameters
+    ----------
+    problem, path, goal, name
+        As for `kinarm.record_path`.
+    file : str or Path, optional
+        Where to write the page, if at all.
+    """
+    return replay_page(record_path(problem, path, goal=goal, name=name), file)
+
+
+def _check_recordings(recordings: Sequence[Recording], ghosts: Sequence[Recording]) -> None:
+    """See that recordings can share a page."""
+    if not recordings:
+        raise InvalidInputError("there is no recording to replay")
+    first = recordings[0].problem
+    for problem in dict.fromkeys(each.problem for each in (*recordings, *ghosts)):
+        if problem.arm_digest != first.arm_digest:
+            raise InvalidInputError(
+                f"the recordings are of different arms: {first.arm.name!r} ({first.arm_digest}) "
+                f"and {problem.arm.name!r} ({problem.arm_digest})"
+            )
+        if problem.scene != first.scene:
+            raise InvalidInputError("the recordings were made in different scenes")
+    if ghosts and len(ghosts) != len(recordings):
+        raise InvalidInputError(
+            f"there must be a ghost for each recording: {len(ghosts)} for {len(recordings)}"
+        )
+    for recording, ghost in zip(recordings, ghosts, strict=False):
+        if not recording.same_trial(ghost):
+            raise InvalidInputError(
+                f"trial {recording.trial} of {recording.policy!r} and trial {ghost.trial} of "
+                f"{ghost.policy!r} differ in start or goal: they cannot be compared"
+            )
+
+
+def _replay_html(
+    recordings: Sequence[Recording],
+    ghosts: Sequence[Recording],
+    groups: Sequence[str],
+    heading: str,
+) -> str:
+    """Page of recordings that can share one."""
+    arm, scene = recordings[0].problem.load_arm(), recordings[0].problem.scene
+    trials = list(zip(recordings, ghosts, strict=True)) if ghosts else [(r,) for r in recordings]
+    policies = dict.fromkeys(run.policy for runs in trials for run in runs)
+    window, problem = CapturingWindow(), recordings[0].problem
+    draw_stage(window.top, arm, scene)
+    draw_goal(window.top["goal"], problem)
+    for number, runs in enumerate(trials):
+        for name, run in zip(("run", "ghost"), runs, strict=False):
+            points = np.array([arm.tool_position(state) for state in run.states])
+            way = window.top[f"trials/{number}/{name}"]
+            draw_trace(way, points, run.outcome, stage_scale(arm, scene))
+    data = {
+        **arm_data(arm, scene),
+        "traceIndices": 6 * TRACE_SIDES,
+        "colours": {name: f"#{colour:06x}" for name, colour in OUTCOME_COLOURS.items()},
+        "trials": [_trial_data(runs) for runs in trials],
+        "groups": list(groups),
+        "heading": heading,
+    }
+    title = f"{' and '.join(policies)} · kinarm replay"
+    scripts = ("replay_stage", "trial_list", "player")
+    return page_html("player", title, window.content, data, scripts)
+
+
+def _trial_data(runs: Sequence[Recording]) -> dict[str, Any]:
+    """The trial that recordings are of, and what happened in it, as JSON."""
+    first, problem = runs[0], runs[0].problem
+    return {
+        "problem": problem.name,
+        "trial": first.trial,
+        "goal": first.goal.tolist(),
+        "tolerance": problem.task.tolerance,
+        "horizon": problem.task.horizon,
+        "timeStep": problem.stepping.time_step,
+        "floor": first.steps_lower_bound,
+        "runs": [_run_data(run) for run in runs],
+    }
+
+
+def _run_data(run: Recording) -> dict[str, Any]:
+    """A recording, as JSON."""
+    data = {name: getattr(run, name) for name in ("policy", "outcome", "contact")}
+    arrays = {"contactPoint": run.contact_point, "refused": run.refused}
+    arrays |= {"states": run.states, "distances": run.distances}
+    return data | {name: None if a is None else a.tolist() for name, a in arrays.items()}
+
+
+class ArmPage(HtmlPage):
+    """A page on which an arm can be moved. In a notebook it shows itself."""
+
+
+def arm_page(
+    arm: Arm | ArmSpecification | str | Path,
+    path: str | Path | None = None,
+    *,
+    scene: Scene = BARE_GROUND,
+) -> ArmPage:
+    """Make a page with a slider for each joint of an arm, which shows contact as it happens.
+
+    The page tests the same pairs of shapes for contact as the simulator, in the browser. Its
+    verdicts are those of Coal, except for shapes that are less than 1e-6 m from touching.
+
+    Parameters
+    ----------
+    arm : Arm, ArmSpecification, str or Path
+        The arm, where it stands; or what `kinarm.Arm.load` takes, mounted as the scene says.
+    path : str or Path, optional
+        File of the page; without it, no file is written.
+    scene : Scene
+        The scene around the arm; the bare ground by default.
+    """
+    if not isinstance(arm, Arm):
+        arm = Arm.load(arm).placed(scene.mount.position, scene.mount.rotation)
+    page = ArmPage(_arm_html(arm, scene))
+    if path is not None:
+        page.save(path)
+    return page
+
+
+def _arm_html(arm: Arm, scene: Scene) -> str:
+    """Page of an arm in a scene, with the shapes and pairs that are tested for contact."""
+    model = ContactModel.build(arm, scene)
+    window = CapturingWindow()
+    frames = draw_stage(window.top, arm, scene)
+    for number, part in enumerate(collision_parts(arm)):
+        put(frames[part.joint][f"shape_{number}"], SHAPE, part.mesh)
+    objects = zip(model.geometry.geometryObjects, model.body_names, strict=True)
+    bodies = [{"name": name, "joint": s.parentJoint, **_shape_data(s)} for s, name in objects]
+    data = arm_data(arm, scene) | {
+        "joints": list(arm.joint_names),
+        **{name: getattr(arm, name).tolist() for name in ("lower", "upper", "home")},
+        "reach": arm.reach,
+        "bodies": bodies,
+        "pairs": [[pair.first, pair.second] for pair in model.geometry.collisionPairs],
+    }
+    data["scale"] *= NEARER
+    title = f"{arm.name} · kinarm arm"
+    return page_html("arm_page", title, window.content, data, ("contact", "arm_page"))
+
+
+def _shape_data(shape: pin.GeometryObject) -> dict[str, Any]:
+    """A shape as the hull of points, widened by a radius or by discs; the ground has no points.
+
+    In the frame of its joint [m].
+    """
+    if isinstance(shape.geometry, coal.Halfspace):
+        return {}
+    points, radius = core(shape)
+    placed = points @ shape.placement.rotation.T + shape.placement.translation
+    discs = radius if isinstance(shape.geometry, coal.Cylinder) else 0.0
+    return {"points": placed.tolist(), "discs": discs, "radius": radius - discs}
