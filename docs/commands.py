@@ -11,7 +11,7 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 from kinarm._command_line import Parser
-from kinarm.evaluation.markdown import markdown_table
+from kinarm.evaluation.report.templating import markdown_table
 
 BESIDE = {"kinarm-study": ["status"]}
 """First words that a program answers with a parser of its own, which its own one does not know."""

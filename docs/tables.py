@@ -14,8 +14,8 @@ from kinarm.contact_shapes import enclosing_capsule
 from kinarm.envs import ENVIRONMENTS
 from kinarm.evaluation import METRICS
 from kinarm.evaluation.commands import arms, problem
-from kinarm.evaluation.markdown import markdown_table
 from kinarm.evaluation.metrics import SYMBOLS
+from kinarm.evaluation.report.templating import markdown_table
 from kinarm.observation import OBSERVATION, part_slices
 from kinarm.policies import find_learner
 

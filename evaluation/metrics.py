@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -9,7 +10,9 @@ from numpy.typing import NDArray
 
 from kinarm.evaluation.outcomes import EARLY_STEPS, HOLDING_STEPS, Outcomes
 
+FINAL = "final distance over all trials, however they ended"
 APPROACH = "closest approach over all trials, if success does not end them; contact does"
+"""Distances that statistics are of."""
 
 LIMITS = (0.1, 0.2)
 """Distances whose shares are reported beside success [m]."""
@@ -90,7 +93,7 @@ class Metric:
 
 
 def _share_of(
-    meaning: str, definition: str, hits: Callable[[Outcomes], NDArray[np.bool_]], **shown: Any
+    meaning: str, definition: str, hits: Callable[..., NDArray[np.bool_]], **shown: Any
 ) -> Metric:
     """Share of trials that hit."""
     return Metric(
@@ -104,47 +107,8 @@ def _share_of(
     )
 
 
-def _share_closer(limit: float) -> Metric:
-    """Share of trials whose closest approach is within a distance [m], if they go on."""
-    return _share_of(
-        f"that come within {1000 * limit:g} mm of the goal, if success does not end them; "
-        "without contact at any time",
-        f"|{{i ∉ H : aᵢ ≤ {limit:g} m}}| / n",
-        lambda trials: (trials.closest <= limit) & ~trials.holding_collision,
-        heading=f"closer than {1000 * limit:g} mm %",
-        needs_holding=True,
-        priority=14,
-    )
-
-
-def _share_within(limit: float) -> Metric:
-    """Share of trials that end within a distance [m]."""
-    return _share_of(
-        f"with a final distance of at most {limit:g} m, however they ended",
-        f"|{{i : dᵢ ≤ {limit:g} m}}| / n",
-        lambda trials: trials.distance <= limit,
-        heading=f"within {limit:g} m %",
-        priority=1,
-    )
-
-
-def _distance_metric(
-    meaning: str,
-    definition: str,
-    formula: Callable[[Outcomes], Any],
-    of: str = "final distance over all trials, however they ended",
-    **shown: Any,
-) -> Metric:
-    """A statistic of the final distance, or of another one."""
-    text = f"{meaning} of the {of}"
-    return Metric(
-        meaning=text,
-        definition=definition,
-        formula=formula,
-        unit="m",
-        interval="bootstrap",
-        **shown,
-    )
+_distance = partial(Metric, unit="m", interval="bootstrap")
+"""A statistic of distances from the goal."""
 
 
 def _middle_half(ordered: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -176,31 +140,40 @@ METRICS: dict[str, Metric] = {
         digits=1,
         priority=7,
     ),
-    **{f"within_{limit:g}": _share_within(limit) for limit in LIMITS},
-    "median_distance": _distance_metric(
-        "median",
-        "median of dᵢ",
-        lambda trials: np.median(trials.ordered_distance, axis=-1),
+    **{
+        f"within_{limit:g}": _share_of(
+            f"with a final distance of at most {limit:g} m, however they ended",
+            f"|{{i : dᵢ ≤ {limit:g} m}}| / n",
+            lambda trials, limit=limit: trials.distance <= limit,
+            heading=f"within {limit:g} m %",
+            priority=1,
+        )
+        for limit in LIMITS
+    },
+    "median_distance": _distance(
+        meaning=f"median of the {FINAL}",
+        definition="median of dᵢ",
+        formula=lambda trials: np.median(trials.ordered_distance, axis=-1),
         heading="median distance m",
         shows_interval=True,
         priority=12,
     ),
-    "mean_distance": _distance_metric(
-        "mean",
-        "Σ dᵢ / n",
-        lambda trials: trials.distance.mean(axis=-1),
+    "mean_distance": _distance(
+        meaning=f"mean of the {FINAL}",
+        definition="Σ dᵢ / n",
+        formula=lambda trials: trials.distance.mean(axis=-1),
         heading="mean distance m",
         priority=2,
     ),
-    "iqm_distance": _distance_metric(
-        "interquartile mean",
-        "mean of dᵢ without the smallest and the largest quarter",
-        lambda trials: _middle_half(trials.ordered_distance).mean(axis=-1),
+    "iqm_distance": _distance(
+        meaning=f"interquartile mean of the {FINAL}",
+        definition="mean of dᵢ without the smallest and the largest quarter",
+        formula=lambda trials: _middle_half(trials.ordered_distance).mean(axis=-1),
     ),
-    "p95_distance": _distance_metric(
-        "95th percentile",
-        "0.95 quantile of dᵢ, interpolated linearly",
-        lambda trials: np.quantile(trials.ordered_distance, 0.95, axis=-1),
+    "p95_distance": _distance(
+        meaning=f"95th percentile of the {FINAL}",
+        definition="0.95 quantile of dᵢ, interpolated linearly",
+        formula=lambda trials: np.quantile(trials.ordered_distance, 0.95, axis=-1),
         heading="p95 distance m",
         priority=2,
     ),
@@ -279,7 +252,18 @@ METRICS: dict[str, Metric] = {
         needs_bounds=True,
         digits=2,
     ),
-    **{f"closer_than_{1000 * limit:g}_mm": _share_closer(limit) for limit in CLOSE},
+    **{
+        f"closer_than_{1000 * limit:g}_mm": _share_of(
+            f"that come within {1000 * limit:g} mm of the goal, if success does not end them; "
+            "without contact at any time",
+            f"|{{i ∉ H : aᵢ ≤ {limit:g} m}}| / n",
+            lambda trials, limit=limit: (trials.closest <= limit) & ~trials.holding_collision,
+            heading=f"closer than {1000 * limit:g} mm %",
+            needs_holding=True,
+            priority=14,
+        )
+        for limit in CLOSE
+    },
     "held": _share_of(
         f"whose last {HOLDING_STEPS} steps stay within {1000 * HOLDING_WITHIN:g} mm of the goal, "
         "if success does not end them; without contact",
@@ -290,21 +274,19 @@ METRICS: dict[str, Metric] = {
         shows_interval=True,
         priority=15,
     ),
-    "median_approach": _distance_metric(
-        "median",
-        "median of aᵢ",
-        lambda trials: np.median(trials.ordered_closest, axis=-1),
-        of=APPROACH,
+    "median_approach": _distance(
+        meaning=f"median of the {APPROACH}",
+        definition="median of aᵢ",
+        formula=lambda trials: np.median(trials.ordered_closest, axis=-1),
         needs_holding=True,
         heading="median approach m",
         beside=("p95_approach", "p95 {}"),
         priority=13,
     ),
-    "p95_approach": _distance_metric(
-        "95th percentile",
-        "0.95 quantile of aᵢ, interpolated linearly",
-        lambda trials: np.quantile(trials.ordered_closest, 0.95, axis=-1),
-        of=APPROACH,
+    "p95_approach": _distance(
+        meaning=f"95th percentile of the {APPROACH}",
+        definition="0.95 quantile of aᵢ, interpolated linearly",
+        formula=lambda trials: np.quantile(trials.ordered_closest, 0.95, axis=-1),
         needs_holding=True,
     ),
     "held_collision": _share_of(

@@ -4,9 +4,9 @@ Written out here, because SciPy's statistics take longer to load than a policy t
 """
 
 import math
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -166,36 +166,22 @@ def estimate_text(estimate: Estimate) -> str:
     return f"{estimate.value:.3f} ({interval})"
 
 
-class Term(NamedTuple):
-    """One part of a contrast of means: values of shape (n_seeds, n_trials), and their weight.
-
-    ``trials`` names the trials. Crossed ones have one name: terms were measured on the same trials,
-    or trial by trial on variants of them, such as the same places of another bench.
-    """
-
-    weight: float
-    values: NDArray[np.float64]
-    trials: Hashable = "crossed"
-
-
-def contrast(terms: Sequence[Term]) -> Estimate:
-    """Weighted sum of means over seeds and trials.
+def contrast(terms: Sequence[tuple[float, NDArray[np.float64]]]) -> Estimate:
+    """Weighted sum of means over seeds and trials: of weights, and values (n_seeds, n_trials).
 
     Seeds and trials are crossed random effects: all seeds of a recipe face the same trials. Several
     recipes may face them as well, also on tasks whose trials differ in the bench only. The variance
-    is the variance of the seeds' means, in each term, plus that of the trials' weighted means, in
-    each set of crossed trials. Both contain the interaction of seed and trial, so the interval is
-    rather too wide. It is Student's, with the degrees of freedom of Welch and Satterthwaite.
+    is the variance of the seeds' means, in each term, plus that of the trials' weighted means. Both
+    contain the interaction of seed and trial, so the interval is rather too wide. It is Student's,
+    with the degrees of freedom of Welch and Satterthwaite.
     """
-    value = sum(term.weight * float(term.values.mean()) for term in terms)
-    parts = [term.weight**2 * _mean_variance(term.values.mean(axis=1)) for term in terms]
-    freedom = [term.values.shape[0] - 1 for term in terms]
-    for name in dict.fromkeys(term.trials for term in terms):
-        shared = [term.weight * term.values.mean(axis=0) for term in terms if term.trials == name]
-        per_trial = np.sum(shared, axis=0)
-        parts.append(_mean_variance(per_trial))
-        freedom.append(len(per_trial) - 1)
-    return student(value, zip(parts, freedom, strict=True))
+    value = sum(weight * float(values.mean()) for weight, values in terms)
+    parts = [
+        (weight**2 * _mean_variance(values.mean(axis=1)), len(values) - 1)
+        for weight, values in terms
+    ]
+    per_trial = np.sum([weight * values.mean(axis=0) for weight, values in terms], axis=0)
+    return student(value, [*parts, (_mean_variance(per_trial), len(per_trial) - 1)])
 
 
 def student(value: float, components: Iterable[tuple[float, int]]) -> Estimate:
@@ -242,7 +228,7 @@ def share_over_seeds(hits: NDArray[Any]) -> Estimate:
     share = float(hits.mean())
     low, high = wilson_interval(round(share * hits.shape[1]), hits.shape[1])
     if len(hits) > 1:
-        crossed = contrast([Term(1.0, hits.astype(np.float64))]).ci95 or (share, share)
+        crossed = contrast([(1.0, hits.astype(np.float64))]).ci95 or (share, share)
         low, high = min(low, crossed[0]), max(high, crossed[1])
     return Estimate(share, (max(low, 0.0), min(high, 1.0)))
 

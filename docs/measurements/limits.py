@@ -21,7 +21,7 @@ import numpy as np
 from docs.measurements.counting import KINDS, OperationCounter
 from docs.measurements.turns import alternated
 from kinarm.errors import MissingExtraError
-from kinarm.evaluation.markdown import markdown_table
+from kinarm.evaluation.report.templating import markdown_table
 from kinarm.kernels.compiling import Array, kernel
 from kinarm.kernels.lanes import LANES, as_lanes
 from kinarm.policies import Policy, load_policy, recipe

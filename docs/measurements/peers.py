@@ -21,7 +21,7 @@ from docs.measurements.mjcf import mjcf
 from docs.measurements.turns import alternated
 from kinarm.envs import ReachVectorEnv
 from kinarm.evaluation.bench import VECTOR_ENVS
-from kinarm.evaluation.markdown import markdown_table
+from kinarm.evaluation.report.templating import markdown_table
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies import Policy, load_policy, recipe, train_policy
 from kinarm.policies.learners import begin_training, state_policy

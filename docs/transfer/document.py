@@ -13,7 +13,6 @@ from docs.transfer.study import SOURCE, Training, TransferRun, TransferStudy, ta
 from kinarm._fields import to_plain
 from kinarm.evaluation.statistics import (
     Estimate,
-    Term,
     contrast,
     share_over_seeds,
     student,
@@ -223,7 +222,7 @@ class TransferResults:
 def _difference(first: NDArray[np.bool_], second: NDArray[np.bool_]) -> Estimate:
     """Difference of shares of the same trials, shape (n_seeds, n_trials) each; from -1 to 1."""
     terms = ((1.0, first), (-1.0, second))
-    estimate = contrast([Term(sign, hits.astype(np.float64)) for sign, hits in terms])
+    estimate = contrast([(sign, hits.astype(np.float64)) for sign, hits in terms])
     if estimate.ci95 is None:
         return estimate
     low, high = estimate.ci95

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from kinarm.evaluation.markdown import markdown_table
+from kinarm.evaluation.report.templating import markdown_table
 
 ZERO_SHOT = (
     *("learner", "on", "as it is: success % (95 %)", "collision %"),

@@ -15,9 +15,8 @@ from kinarm._files import write_atomically, write_text
 from kinarm.evaluation.experiments import table
 from kinarm.evaluation.experiments.figures import draw_all
 from kinarm.evaluation.figures import save_figure
-from kinarm.evaluation.markdown import markdown_table
 from kinarm.evaluation.metrics import METRICS
-from kinarm.evaluation.report.templating import template_environment
+from kinarm.evaluation.report.templating import markdown_table, template_environment
 from kinarm.policies.provenance import package_versions, source_commit
 
 if TYPE_CHECKING:

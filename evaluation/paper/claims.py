@@ -16,7 +16,7 @@ from kinarm.evaluation.paper.results import (
     Reading,
     final_distances,
 )
-from kinarm.evaluation.statistics import Estimate, Term, contrast, mean_share, superiority
+from kinarm.evaluation.statistics import Estimate, contrast, mean_share, superiority
 from kinarm.problem import PROBLEMS
 
 Verdict = Literal["holds", "does not hold", "undecided", "not judged"]
@@ -247,7 +247,5 @@ def _many_perturbations_are_worse(results: PaperResults) -> tuple[Claim, Claim]:
 def _difference(measure: str, groups: Sequence[tuple[bool, NDArray[Any]]]) -> ClaimPart:
     """Mean of the chosen groups of trainings, less that of the others, claimed to be above zero."""
     n = sum(chosen for chosen, _ in groups)
-    terms = [
-        Term(1.0 / n if chosen else -1.0 / (len(groups) - n), values) for chosen, values in groups
-    ]
+    terms = [(1.0 / n if chosen else -1.0 / (len(groups) - n), values) for chosen, values in groups]
     return ClaimPart(measure, contrast(terms), "above", 0.0)

@@ -14,7 +14,6 @@ from kinarm._files import check_folder, write_text
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.experiments.study import Study
 from kinarm.evaluation.figures import save_figure
-from kinarm.evaluation.markdown import markdown_table
 from kinarm.evaluation.paper.claims import LEARNING_LEVELS, Claim, assess, steps_to_levels
 from kinarm.evaluation.paper.figures import figure_2, figure_3, learning_curves
 from kinarm.evaluation.paper.results import (
@@ -25,7 +24,7 @@ from kinarm.evaluation.paper.results import (
     Reading,
     final_distances,
 )
-from kinarm.evaluation.report.templating import template_environment
+from kinarm.evaluation.report.templating import markdown_table, template_environment
 from kinarm.evaluation.statistics import estimate_text
 from kinarm.policies.provenance import package_versions
 from kinarm.problem import PROBLEMS

@@ -208,7 +208,7 @@ class ReplayRequest(ProblemOptions):
 
     def _serve(self, report: Callable[[str], object]) -> None:
         from kinarm.evaluation.replay.choosing import named_contestants
-        from kinarm.evaluation.replay.live import follow, fresh_recordings
+        from kinarm.evaluation.replay.runs import follow, fresh_recordings
         from kinarm.simulator import Simulator
         from kinarm.viewer.live_server import PORT, LiveServer
 

@@ -1,12 +1,23 @@
-"""Recordings of contestants in trials."""
+"""Recordings of contestants in trials, to keep or to follow on a live page."""
 
-from collections.abc import Sequence
+import itertools
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from kinarm.evaluation.contestants import Contestant
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle.solution import OracleSolutions
 from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.recording import Recording, record_rollouts
+from kinarm.simulator import Simulator
+
+if TYPE_CHECKING:
+    from kinarm.viewer.live_server import LiveServer
+
+SLOWDOWN, REST = 2.5, 1.2
+"""How much slower than the arm the page shows its motion, and the pause between trials [s]."""
 
 
 def record(
@@ -56,3 +67,47 @@ def record(
             "commit": source_commit(),
         },
     )
+
+
+def fresh_recordings(
+    contestant: Contestant, simulator: Simulator, seed: int
+) -> Iterator[Recording]:
+    """Record one trial after the other, without end.
+
+    Parameters
+    ----------
+    contestant, simulator
+        Who faces them, and where.
+    seed : int
+        That of the first trial; the next ones count up.
+    """
+    for number in itertools.count():  # pragma: no branch - it counts without end
+        trials = TrialSet.draw(simulator, 1, seed + number)
+        (recording,) = record(contestant, trials, allow_other_arm=True)
+        yield replace(recording, trial=number)
+
+
+def follow(
+    server: "LiveServer", simulator: Simulator, recordings: Iterable[Recording]
+) -> Iterator[Recording]:
+    """Show one recording after the other, and hand it out when it is over.
+
+    Parameters
+    ----------
+    server : LiveServer
+        The live page.
+    simulator, recordings
+        Where and what was recorded; there may be no end of it.
+    """
+    from kinarm.viewer.live_server import LiveStage
+
+    stage = LiveStage(server, simulator.problem, simulator.arm)
+    for recording in recordings:
+        stage.begin(recording.states[0], recording.goal)
+        for state in recording.states:
+            stage.show(state)
+            time.sleep(SLOWDOWN * simulator.problem.stepping.time_step)
+        points = [simulator.arm.tool_position(state) for state in recording.states]
+        stage.draw_trace(points, recording.outcome)
+        yield recording
+        time.sleep(REST)

@@ -1,5 +1,6 @@
-"""Templates of all pages and cards."""
+"""Templates of all pages and cards, and tables in Markdown."""
 
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -23,3 +24,9 @@ def template_environment(**settings: Any) -> "Environment":
         dashes=lambda text: text.replace("..", "\N{EN DASH}"),
     )
     return environment
+
+
+def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Format a table of some columns."""
+    lines = [header, ["---"] * len(header), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"

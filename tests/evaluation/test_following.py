@@ -8,8 +8,8 @@ import pytest
 
 from kinarm.evaluation import ReplayRequest
 from kinarm.evaluation.contestants import ORACLE, find_contestants
-from kinarm.evaluation.replay import live
-from kinarm.evaluation.replay.live import follow, fresh_recordings
+from kinarm.evaluation.replay import runs
+from kinarm.evaluation.replay.runs import follow, fresh_recordings
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle import Oracle
 from kinarm.simulator import Simulator
@@ -19,7 +19,7 @@ from kinarm.viewer.live_server import LiveServer
 @pytest.fixture
 def no_waiting(monkeypatch):
     waited = []
-    monkeypatch.setattr(live.time, "sleep", waited.append)
+    monkeypatch.setattr(runs.time, "sleep", waited.append)
     return waited
 
 
@@ -64,8 +64,8 @@ def test_following_takes_its_time_and_hands_out_what_is_over(left, no_waiting, p
             seen.append(recording)
             assert len(no_waiting) == len(seen) * 65 + len(seen) - 1
     assert seen == recordings
-    slowed = live.SLOWDOWN * left.problem.stepping.time_step
-    assert set(no_waiting) == {slowed, live.REST}
+    slowed = runs.SLOWDOWN * left.problem.stepping.time_step
+    assert set(no_waiting) == {slowed, runs.REST}
 
 
 class EnoughError(Exception):

@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "docs"))
 from browser import open_page
 from helpers.pages import DOCS, ROOT, blocks
 
-from kinarm.evaluation.markdown import markdown_table
+from kinarm.evaluation.report.templating import markdown_table
 
 ENOUGH = 0.85
 """Success of the newcomer's policy."""
