@@ -268,8 +268,3 @@ class EvaluationDocument(Document, frozen=True, kw_only=True):
         if trials.digest != faced.trial_set_hash:
             raise InvalidInputError(f"the trials of {problem} do not match their hash")
         return trials
-
-    def lower_bounds(self, problem: str) -> list[int] | None:
-        """Proven numbers of steps of a problem's first trials, if the evaluation had them."""
-        oracle = self.faced(problem).oracle
-        return oracle.trials.steps_lower_bound if oracle else None

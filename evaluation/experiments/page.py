@@ -41,8 +41,8 @@ def write_all(study: "Study", command: str = "") -> Path:
         If a file cannot be written.
     """
     folder = study.store.folder
-    _write_csv(folder / "runs.csv", study.rows())
-    _write_csv(folder / "curves.csv", table.curve_rows(study))
+    write_csv(folder / "runs.csv", study.rows())
+    write_csv(folder / "curves.csv", table.curve_rows(study))
     if find_spec("pyarrow") is not None:
         _write_parquet(folder / "runs.parquet", study.table())
     drawings = {}
@@ -57,7 +57,7 @@ def write_all(study: "Study", command: str = "") -> Path:
     return page
 
 
-def _write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
+def write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
     """Write one line per row."""
     text = io.StringIO()
     writer = csv.DictWriter(text, list(rows[0]) if rows else ["key"], lineterminator="\n")

@@ -43,14 +43,12 @@ Trial = tuple[Recording, ...]
 class Candidates:
     """Trials to choose from, and how many of them are played by default.
 
-    Without the set that they are of, nothing else can face them. The bounds are the numbers of
-    steps proven necessary in the first trials, as far as they are known.
+    Without the set that they are of, nothing else can face them.
     """
 
     trials: list[Trial]
     played: int
     faced: TrialSet | None = None
-    known_bounds: Sequence[int] | None = None
 
 
 class Chosen(NamedTuple):
@@ -208,8 +206,7 @@ def _evaluated_candidates(
     for row, contestant in chosen:
         runs.append(record(contestant, trials, allow_other_arm=True))
         _check_same(row, runs[-1])
-    known = document.lower_bounds(trials.problem.name)
-    return Candidates(list(zip(*runs, strict=True)), PLAYED, trials, known)
+    return Candidates(list(zip(*runs, strict=True)), PLAYED, trials)
 
 
 def _check_same(row: Result, recordings: Sequence[Recording]) -> None:
@@ -265,13 +262,10 @@ def _with_bounds(
     if candidates.faced is None or not oracle:
         return runs
     numbers = [recording.trial for recording in runs[0]]
-    if candidates.known_bounds is None:  # the oracle solves no more trials than are played
-        solved = oracle_bounds(candidates.faced.chosen(numbers))
-        bounds = dict(zip(numbers, solved.steps_lower_bound.tolist(), strict=True))
-    else:
-        bounds = dict(enumerate(candidates.known_bounds))
+    bounds = oracle_bounds(candidates.faced.chosen(numbers)).steps_lower_bound.tolist()
     return [
-        [replace(each, steps_lower_bound=bounds.get(each.trial)) for each in run] for run in runs
+        [replace(each, steps_lower_bound=n) for each, n in zip(run, bounds, strict=True)]
+        for run in runs
     ]
 
 

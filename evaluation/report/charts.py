@@ -3,8 +3,8 @@
 Maps are of the goal regions from above, to scale, and tell where policies fail.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
-from itertools import pairwise
+from collections.abc import Iterable, Sequence
+from itertools import islice, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -42,16 +42,6 @@ BAR_OFFSET, BAR_LENGTH = 0.02, 0.25
 
 DISTANCE_COLOURS = 6
 """Colours of distances: within the tolerance, and twice the distance from one to the next."""
-
-OUTCOME_WORDS = {"success": "reached", "truncated": "out of steps", "collision": "contact"}
-"""How outcomes are called on the page."""
-
-SYMBOLS = {
-    "success": "m-3,0a3,3 0 1,0 6,0a3,3 0 1,0 -6,0z",
-    "truncated": "m-2.8,-2.8h5.6v5.6h-5.6z",
-    "collision": "m0,-4.2l1.3,2.9l2.9,1.3l-2.9,1.3l-1.3,2.9l-1.3,-2.9l-2.9,-1.3l2.9,-1.3z",
-}
-"""Paths of the markers about their centre, by outcome."""
 
 
 class Chart(NamedTuple):
@@ -180,20 +170,23 @@ def level(distance: float, tolerance: float) -> int:
     return min(int(np.ceil(np.log2(distance / tolerance) - 1e-12)), DISTANCE_COLOURS - 1)
 
 
-def markers(results: ProblemResults, group: Group) -> Iterator[tuple[str, int, str]]:
-    """Path, level of colour and words of the goals of a problem, the worst last, on top."""
-    view, outcomes = View.of(results.goal_regions), worst_outcomes(group)
-    means, reached = group.distances.mean(axis=0), group.success.sum(axis=0)
-    goals = group.members[0].trials.goals
-    for trial in np.argsort(means[:MARKERS], kind="stable").tolist():
-        (x, y, _), distance = goals[trial], means[trial]
-        path = f"M{view.across(y):.1f},{view.down(x):.1f}{SYMBOLS[outcomes[trial]]}"
-        ending = f"{distance:.3f} m, {OUTCOME_WORDS[outcomes[trial]]}"
-        if len(group.members) > 1:
-            seeds = f"{reached[trial]} of {len(group.members)} seeds reached it"
-            ending = f"{seeds}, mean {distance:.3f} m"
-        title = f"trial {trial}, goal ({x:.2f}, {y:.2f}): {ending}"
-        yield path, level(distance, results.tolerance), title
+class Marker(NamedTuple):
+    """The goal of a trial: mean distance [m], outcome and how many training seeds reached it."""
+
+    trial: int
+    goal: list[float]
+    distance: float
+    outcome: str
+    reached: int
+
+
+def markers(group: Group) -> list[Marker]:
+    """Goals of the first trials of a problem, the worst last, on top."""
+    means, reached = group.distances.mean(axis=0).tolist(), group.success.sum(axis=0).tolist()
+    goals = group.members[0].trials.goals.tolist()
+    columns = (range(len(goals)), goals, means, worst_outcomes(group), reached)
+    shown = islice(zip(*columns, strict=True), MARKERS)
+    return sorted((Marker(*each) for each in shown), key=lambda marker: marker.distance)
 
 
 def failure_shares(
@@ -210,10 +203,3 @@ def failure_shares(
     rows = [inside & (places == place) for place in range(SLICES)]
     shares = [float(failed[row].mean()) if row.any() else None for row in rows]
     return list(zip(pairwise(slices.tolist()), shares, strict=True))
-
-
-def level_ranges(results: ProblemResults) -> list[str]:
-    """Ranges of distances [m] that the colours stand for."""
-    bounds = [f"{results.tolerance * 2**step:g}" for step in range(DISTANCE_COLOURS - 1)]
-    between = [f"{low}\N{EN DASH}{high}" for low, high in pairwise(bounds)]
-    return [f"≤ {bounds[0]}", *between, f"> {bounds[-1]}"]

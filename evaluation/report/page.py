@@ -21,9 +21,6 @@ from kinarm.evaluation.table import (
 )
 from kinarm.viewer import replay_page
 
-MOST_CAUSES = 6
-"""Causes of failures that are told of a policy."""
-
 
 def write_report(
     folder: str | Path, document: EvaluationDocument, evaluations: Sequence[Evaluation]
@@ -82,5 +79,4 @@ def report_page(document: EvaluationDocument, evaluations: Sequence[Evaluation])
         success_cell=partial(metric_cell, "success"),
         replaced=REPLACED,
         early_steps=EARLY_STEPS,
-        most_causes=MOST_CAUSES,
     )

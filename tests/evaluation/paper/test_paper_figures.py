@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kinarm.evaluation.paper.figures import density, figure_2, figure_3, learning_curves
+from kinarm.evaluation.paper.page import density, figure_2, figure_3, learning_curves
 
 
 class TestDensity:

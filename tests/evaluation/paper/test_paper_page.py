@@ -1,33 +1,32 @@
 """Tables and files of the reproduction, against sums by hand."""
 
-import csv
-import io
-
 import numpy as np
 import pytest
 
 from kinarm.evaluation.paper.claims import assess
-from kinarm.evaluation.paper.page import median_cell, readings_table, runs_csv
+from kinarm.evaluation.paper.page import claims_document, median_cell, reproduction_page, run_rows
 from kinarm.evaluation.paper.results import LITERAL, Reading
 
 
 def test_a_line_for_each_training(results_of, made_up_run):
     distance = np.array([0.01, 0.05, 0.08, 0.16, 0.30])
     results = results_of(lambda _: made_up_run(distance))
-    rows = list(csv.DictReader(io.StringIO(runs_csv(results))))
+    rows = run_rows(results)
     assert [row["training"] for row in rows] == [run.name for run in results.runs]
     first = rows[0]
     assert first["training"] == "sweep-rate0.05-perturb16-left-seed0"
-    assert [first[f"within_{limit}"] for limit in ("0.05", "0.1", "0.2")] == ["0.4", "0.6", "0.8"]
+    assert [first[f"within_{limit}"] for limit in ("0.05", "0.1", "0.2")] == [0.4, 0.6, 0.8]
     assert (first["mean_distance"], first["median_distance"]) == ("0.1200", "0.0800")
-    assert (first["environment_steps"], first["contact"]) == ("4000", "0.0")
+    assert (first["environment_steps"], first["contact"]) == (4000, 0.0)
 
 
 def test_readings_without_ppo_leave_its_claims_out(results_of, made_up_run):
     results = results_of(lambda _: made_up_run(np.full(200, 0.1)))
     other = Reading(sharing="pair")
     claims = {LITERAL: assess(results), other: assess(results, other)[:4]}
-    header, _, *rows = readings_table(results, claims).splitlines()
+    page = reproduction_page(results, claims, claims_document(results, claims, "", []))
+    _, table = page.split("## Other readings of the paper")
+    header, _, *rows = (line for line in table.splitlines() if line.startswith("|"))
     columns = [[cell.strip() for cell in line.split("|")[1:-1]] for line in (header, *rows)]
     names, literal, shared = columns
     assert names[4:8] == ["`ars-left`", "`ars-right`", "`ars-both`", "`ars-one-bench`"]

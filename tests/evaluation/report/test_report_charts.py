@@ -15,6 +15,7 @@ from kinarm.evaluation.report import charts
 from kinarm.evaluation.report.charts import level
 from kinarm.evaluation.report.groups import group_results
 from kinarm.evaluation.report.page import report_page
+from kinarm.evaluation.report.templating import template_environment
 from kinarm.problem import ReachProblem
 from kinarm.scene import GoalRegion, Obstacle, Scene
 from kinarm.task import ReachTask
@@ -121,6 +122,7 @@ class TestMap:
         group, markers = right.contenders[0], markers_of(drawn_map(page))
         view, goals = charts.View.of(right.goal_regions), right.trials.goals
         outcomes, seen = charts.worst_outcomes(group), set()
+        symbols = template_environment().get_template("parts.html").module.symbols
         assert sorted(markers) == list(range(len(goals)))
         for trial, marker in markers.items():
             across, down = coordinates(marker.get("d"))[0]
@@ -128,7 +130,7 @@ class TestMap:
             assert (x, y) == pytest.approx(goals[trial, :2], abs=PIXEL / charts.SCALE)
             colour = level(group.distances[:, trial].mean(), right.tolerance)
             assert marker.get("class") == f"d{colour}"
-            assert marker.get("d").endswith(charts.SYMBOLS[outcomes[trial]])
+            assert marker.get("d").endswith(symbols[outcomes[trial]])
             seen.add(outcomes[trial])
         assert len(seen) > 1
 
