@@ -227,10 +227,7 @@ def _build_model(description: Description, speeds: tuple[float, ...] | None) -> 
     if model.njoints < 2:
         raise ArmError(f"{name} has no moving joint")
     if speeds is not None:
-        limits = finite_array("velocity_limits", speeds, (model.nv,))
-        if (limits <= 0).any():
-            raise ArmError(f"velocity_limits of {name} must be greater than 0, got {list(speeds)}")
-        model.velocityLimit = limits
+        model.velocityLimit = finite_array("velocity_limits", speeds, (model.nv,))
     for joint, speed in zip(list(model.names)[1:], model.velocityLimit, strict=True):
         if not 0 < speed < 1e10:
             raise ArmError(f"joint {joint!r} of {name} has no velocity limit: velocity={speed}")

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from kinarm._fields import Checked, from_plain, init_fields, read_toml
 from kinarm._files import absolute, is_file, shipped_files
+from kinarm._validation import POSITIVE
 from kinarm.errors import ArmError
 
 PACKAGE = "example-robot-data:"
@@ -76,7 +77,7 @@ class ArmSpecification(Checked):
     held: dict[str, float] | None = field(default=None, hash=False)
     limits: dict[str, tuple[float, float]] | None = field(default=None, hash=False)
     home: tuple[float, ...] | None = None
-    velocity_limits: tuple[float, ...] | None = None
+    velocity_limits: tuple[float, ...] | None = field(default=None, metadata=POSITIVE)
     allowed_contacts: tuple[AllowedContact, ...] | None = None
     digest: str | None = None
 

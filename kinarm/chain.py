@@ -6,8 +6,6 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from kinarm.errors import UnknownNameError
-
 FRAME_KINDS = (pin.FrameType.JOINT, pin.FrameType.BODY, pin.FrameType.FIXED_JOINT)
 """Kinds of frames; of several with one name, the first kind counts."""
 
@@ -90,36 +88,18 @@ class Frame(NamedTuple):
     joint: int
     placement: NDArray[np.float64]
 
-
-class Frames:
-    """Frames of an arm: joints and links by their names, and the tool.
-
-    Attributes
-    ----------
-    tool : Frame
-        Has its origin in the tool point, and the axes of the arm's tool frame.
-    """
-
-    def __init__(self, model: pin.Model, tool_frame: str) -> None:
-        self._named: dict[str, Frame] = {}
-        for frame in [each for kind in FRAME_KINDS for each in model.frames if each.type == kind]:
-            self._named.setdefault(frame.name, _frame(frame))
-        self.tool = _frame(model.frames[model.getFrameId(tool_frame, pin.BODY)])
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the joints and links."""
-        return tuple(self._named)
-
-    def __getitem__(self, name: str | None) -> Frame:
-        """Frame of a name; None is the tool."""
-        if name is not None and name not in self._named:
-            raise UnknownNameError("frame", name, self.names)
-        return self.tool if name is None else self._named[name]
+    @classmethod
+    def of(cls, frame: pin.Frame) -> "Frame":
+        """Take what counts from a frame of Pinocchio."""
+        return cls(int(frame.parentJoint), np.array(frame.placement.homogeneous, order="C"))
 
 
-def _frame(frame: pin.Frame) -> Frame:
-    return Frame(int(frame.parentJoint), np.array(frame.placement.homogeneous, order="C"))
+def find_frames(model: pin.Model) -> dict[str, Frame]:
+    """Frames of joints and links of a Pinocchio model, by name."""
+    found: dict[str, Frame] = {}
+    for frame in [each for kind in FRAME_KINDS for each in model.frames if each.type == kind]:
+        found.setdefault(frame.name, Frame.of(frame))
+    return found
 
 
 class MotionBounds(NamedTuple):

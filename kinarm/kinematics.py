@@ -9,13 +9,14 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import run_rows
 from kinarm._validation import finite_array, one_or_many, whole_number
 from kinarm.arm import Arm
-from kinarm.chain import Frame, Frames
-from kinarm.errors import InvalidInputError
+from kinarm.chain import Frame, find_frames
+from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.inverse import TURN, Search, solve_targets
 from kinarm.kernels.kinematics import move_frame, place_frame
@@ -77,9 +78,15 @@ class Kinematics(ABC):
         """Tell which configurations touch something."""
 
     @cached_property
-    def frames(self) -> Frames:
-        """Frames that `poses` and `jacobians` know; ``frames.names`` lists them."""
-        return Frames(self.arm.model, self.arm.tool_frame)
+    def frames(self) -> dict[str, Frame]:
+        """Frames that `poses` and `jacobians` know, by the names of joints and links."""
+        return find_frames(self.arm.model)
+
+    @cached_property
+    def tool(self) -> Frame:
+        """The frame with its origin in the tool point and the axes of the arm's tool frame."""
+        model = self.arm.model
+        return Frame.of(model.frames[model.getFrameId(self.arm.tool_frame, pin.BODY)])
 
     def poses(self, configurations: ArrayLike, frame: str | None = None) -> Array:
         """Poses of a frame, compiled.
@@ -124,7 +131,10 @@ class Kinematics(ABC):
         """Fill in an array of a shape at each configuration."""
         q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
         filled = np.zeros((len(q), *shape))
-        arrays = (self.arm.chain, *self.frames[frame], q, filled)
+        if frame is not None and frame not in self.frames:
+            raise UnknownNameError("frame", frame, self.frames)
+        placed = self.tool if frame is None else self.frames[frame]
+        arrays = (self.arm.chain, *placed, q, filled)
         run_rows(kernel, len(q), len(q), self.threads, *arrays)
         return filled[0] if one else filled
 
@@ -175,7 +185,7 @@ class Kinematics(ABC):
             by default [rad or m].
         """
         arm = self.arm
-        positions, wanted, axes = _targets(arm, self.frames.tool, targets, directions, tool_axis)
+        positions, wanted, axes = _targets(arm, self.tool, targets, directions, tool_axis)
         start = finite_array("near", arm.home if near is None else near, (arm.n_joints,))
         if ((start < arm.lower) | (start > arm.upper)).any():
             raise InvalidInputError(f"near lies outside the limits: {start.tolist()}")

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from kinarm.episodes import Rollouts
 from kinarm.failed_scenarios import FailedScenarios, StartsAndGoals
+from kinarm.kernels.compiling import Array
 from kinarm.networks import Mirror, Networks
 from kinarm.policies.ars.config import ARSConfig, ARSState
 from kinarm.policies.ars.networks import (
@@ -113,8 +114,8 @@ class Scenarios(NamedTuple):
     All of them, repeated, are those of the episodes in the order sign, direction, episode.
     """
 
-    starts: NDArray[np.float64]
-    goals: NDArray[np.float64]
+    starts: Array
+    goals: Array
     replayed: NDArray[np.bool_]
     copies: int
 
@@ -185,9 +186,7 @@ def policy_normalizer(config: ARSConfig, seen: Normalizer) -> Normalizer:
     return seen if config.normalize else Normalizer.empty(len(seen.mean))
 
 
-def perturbed_policies(
-    theta: NDArray[np.float64], step: NDArray[np.float64], normalizer: Normalizer
-) -> Networks:
+def perturbed_policies(theta: Array, step: Array, normalizer: Normalizer) -> Networks:
     """Policies (theta + step) diag(Sigma)^(-1/2) (x - mu), then those of theta - step.
 
     Parameters
@@ -203,13 +202,13 @@ def perturbed_policies(
     return Networks.linear(maps, 0.0 - shifts)
 
 
-def mean_and_deviation(values: NDArray[np.float64]) -> tuple[float, float]:
+def mean_and_deviation(values: Array) -> tuple[float, float]:
     """Mean and population standard deviation of some numbers, shape (n,), added up in order."""
     mean = float(np.cumsum(values)[-1]) / len(values)
     return mean, math.sqrt(np.cumsum((values - mean) ** 2)[-1] / len(values))
 
 
-def top_directions(returns: NDArray[np.float64], b: int) -> NDArray[np.int64]:
+def top_directions(returns: Array, b: int) -> NDArray[np.int64]:
     """Indices of exactly b directions with the largest max(r+, r-); ties keep their order.
 
     Returns of the positive and of the negative perturbations have the shape (2, N).
@@ -217,12 +216,7 @@ def top_directions(returns: NDArray[np.float64], b: int) -> NDArray[np.int64]:
     return np.argsort(-returns.max(axis=0), kind="stable")[:b]
 
 
-def ars_step(
-    config: ARSConfig,
-    delta: NDArray[np.float64],
-    returns: NDArray[np.float64],
-    step_size: float,
-) -> NDArray[np.float64]:
+def ars_step(config: ARSConfig, delta: Array, returns: Array, step_size: float) -> Array:
     """Update of theta: alpha / (b sigma_R) times the sum of (r+ - r-) delta over the top b.
 
     sigma_R is the population standard deviation of the returns of all perturbations, as the paper
@@ -242,7 +236,7 @@ def ars_step(
         return np.zeros(delta.shape[1:])
     difference = returns[0, top] - returns[1, top]
     weights = step_size / (b * sigma) * difference
-    step: NDArray[np.float64] = (weights[:, None, None] * delta[top]).sum(axis=0)
+    step: Array = (weights[:, None, None] * delta[top]).sum(axis=0)
     return step
 
 

@@ -1,8 +1,8 @@
 """Detours around obstacles: RRT-Connect with shortcuts (Kuffner and LaValle 2000)."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from kinarm.kernels.compiling import Array
 from kinarm.policies.oracle.inverse import steps_between
 from kinarm.simulator import Simulator
 
@@ -16,17 +16,17 @@ SHORTCUTS = 120
 class Tree:
     """Configurations that are connected by contact-free straight motions, from some roots."""
 
-    def __init__(self, roots: NDArray[np.float64]) -> None:
+    def __init__(self, roots: Array) -> None:
         self.nodes = roots.copy()
         self.parents = [-1] * len(roots)
 
-    def add(self, node: NDArray[np.float64], parent: int) -> int:
+    def add(self, node: Array, parent: int) -> int:
         """Append a node and return its index."""
         self.nodes = np.concatenate([self.nodes, node[None]])
         self.parents.append(parent)
         return len(self.parents) - 1
 
-    def path_to_root(self, node: int) -> list[NDArray[np.float64]]:
+    def path_to_root(self, node: int) -> list[Array]:
         """Nodes from a given one to its root."""
         found = []
         while node >= 0:
@@ -36,11 +36,8 @@ class Tree:
 
 
 def find_detour(
-    simulator: Simulator,
-    start: NDArray[np.float64],
-    ends: NDArray[np.float64],
-    rng: np.random.Generator,
-) -> NDArray[np.float64] | None:
+    simulator: Simulator, start: Array, ends: Array, rng: np.random.Generator
+) -> Array | None:
     """Find a contact-free path of straight segments to one of several configurations.
 
     A tree grows from either side, in turns, until they meet. The path has the shape (m, n_joints);
@@ -72,9 +69,7 @@ def find_detour(
     return None
 
 
-def _extend(
-    simulator: Simulator, tree: Tree, sample: NDArray[np.float64], longest: float
-) -> int | None:
+def _extend(simulator: Simulator, tree: Tree, sample: Array, longest: float) -> int | None:
     """Grow a tree from its node nearest to a sample towards it, as far as nothing touches."""
     distances = steps_between(simulator, tree.nodes, sample)
     nearest = int(distances.argmin())
@@ -86,9 +81,7 @@ def _extend(
     return tree.add(on_the_way[free - 1], nearest) if free else None
 
 
-def _straight_way(
-    simulator: Simulator, first: NDArray[np.float64], second: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], int]:
+def _straight_way(simulator: Simulator, first: Array, second: Array) -> tuple[Array, int]:
     """Configurations as far apart as a step tests them, and how many in a row touch nothing."""
     tested_each = simulator.problem.stepping.tested_configurations
     count = max(1, int(np.ceil(tested_each * steps_between(simulator, first, second))))
@@ -98,9 +91,7 @@ def _straight_way(
     return tested, int(touching.argmax()) if touching.any() else count
 
 
-def _shorten(
-    simulator: Simulator, path: NDArray[np.float64], rng: np.random.Generator
-) -> NDArray[np.float64]:
+def _shorten(simulator: Simulator, path: Array, rng: np.random.Generator) -> Array:
     """Replace parts of a path by the straight way where nothing touches."""
     for _ in range(SHORTCUTS):
         if len(path) < 3:

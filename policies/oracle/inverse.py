@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm._parallel import run_rows
 from kinarm._validation import finite_array, whole_number
 from kinarm.errors import InvalidInputError
+from kinarm.kernels.compiling import Array
 from kinarm.policies.oracle.kernels.projection import damped_least_squares, layout
 from kinarm.randomness import low_discrepancy_points
 from kinarm.simulator import Simulator
@@ -21,7 +22,7 @@ RESERVE = 1e-6
 class Solutions(NamedTuple):
     """Configurations at a goal where nothing touches, shape (m, n_joints), and whose goal it is."""
 
-    configurations: NDArray[np.float64]
+    configurations: Array
     owner: NDArray[np.int64]
 
 
@@ -32,7 +33,7 @@ def inverse_kinematics(
     *,
     samples: int = 1024,
     separation: float = 0.2,
-) -> NDArray[np.float64]:
+) -> Array:
     """Find the distinct contact-free configurations that reach a goal within the horizon.
 
     Evenly spread configurations and the current one are moved into the ball about the goal by
@@ -74,11 +75,11 @@ def inverse_kinematics(
 
 def solve_within(
     simulator: Simulator,
-    starts: NDArray[np.float64],
-    goals: NDArray[np.float64],
+    starts: Array,
+    goals: Array,
     steps: NDArray[np.int64],
-    tolerances: NDArray[np.float64],
-    guesses: NDArray[np.float64],
+    tolerances: Array,
+    guesses: Array,
     samples: int,
 ) -> Solutions:
     """Find contact-free configurations close to goals that are at most some steps away.
@@ -122,12 +123,12 @@ def solve_within(
 
 def project(
     simulator: Simulator,
-    configurations: NDArray[np.float64],
+    configurations: Array,
     owner: NDArray[np.int64],
-    box: tuple[NDArray[np.float64], NDArray[np.float64]],
-    goals: NDArray[np.float64],
-    radius: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    box: tuple[Array, Array],
+    goals: Array,
+    radius: Array,
+) -> tuple[Array, Array]:
     """Move configurations towards goals by damped least squares; contact is ignored.
 
     Returns where they ended [rad or m], and the distances from tool to goal [m].
@@ -154,9 +155,7 @@ def project(
     return ended, distances
 
 
-def step_box(
-    simulator: Simulator, starts: NDArray[np.float64], steps: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def step_box(simulator: Simulator, starts: Array, steps: NDArray[np.int64]) -> tuple[Array, Array]:
     """Corners of what the joints can reach from starts in some steps.
 
     Parameters
@@ -180,9 +179,7 @@ def step_box(
     return lower, upper
 
 
-def steps_between(
-    simulator: Simulator, first: NDArray[np.float64], second: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def steps_between(simulator: Simulator, first: Array, second: Array) -> Array:
     """Steps that the straight motion between configurations takes, before rounding up.
 
     The slowest joint decides: the largest of |dq_i| / (rate_i dt) over the actuated joints.
@@ -199,5 +196,5 @@ def steps_between(
     ndarray, shape (...)
     """
     moved = np.abs(second - first)[..., : simulator.n_actions] / simulator.step_limit
-    steps: NDArray[np.float64] = moved.max(axis=-1)
+    steps: Array = moved.max(axis=-1)
     return steps

@@ -5,6 +5,7 @@ import hashlib
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm.kernels.compiling import Array
 from kinarm.policies.oracle.detour import find_detour
 from kinarm.policies.oracle.inverse import (
     Solutions,
@@ -49,9 +50,7 @@ class MotionSearch:
         motion leads there; the horizon + 1 where there is none.
     """
 
-    def __init__(
-        self, simulator: Simulator, starts: NDArray[np.float64], goals: NDArray[np.float64]
-    ) -> None:
+    def __init__(self, simulator: Simulator, starts: Array, goals: Array) -> None:
         n = len(starts)
         self.simulator, self.starts, self.goals = simulator, starts, goals
         self.witnesses = starts.copy()
@@ -103,7 +102,7 @@ class MotionSearch:
                     if actions is not None:
                         self._replay(np.array([row]), actions[None])
 
-    def try_approach(self, rows: NDArray[np.int64], distances: NDArray[np.float64]) -> None:
+    def try_approach(self, rows: NDArray[np.int64], distances: Array) -> None:
         """Look for motions that end as close to goals as may be possible, which none reaches."""
         for nearer in APPROACHES:
             due = np.isinf(self.costs[rows])
@@ -115,11 +114,7 @@ class MotionSearch:
             self._try_vias(rows, steps, solutions, np.flatnonzero(np.isinf(self.costs[rows])))
 
     def _try_straight(
-        self,
-        rows: NDArray[np.int64],
-        steps: NDArray[np.int64],
-        tolerances: NDArray[np.float64],
-        samples: int,
+        self, rows: NDArray[np.int64], steps: NDArray[np.int64], tolerances: Array, samples: int
     ) -> Solutions:
         """Try straight motions to configurations close to the goals; owners count in ``rows``."""
         starts, goals, guesses = self.starts[rows], self.goals[rows], self.witnesses[rows]
@@ -155,7 +150,7 @@ class MotionSearch:
         vias[:, :moved] = lower + spread[:, :-1] * (upper - lower)
         self._replay(rows[owner], two_segments(self.simulator, starts, vias, ends, turn, total))
 
-    def _replay(self, trials: NDArray[np.int64], actions: NDArray[np.float64]) -> None:
+    def _replay(self, trials: NDArray[np.int64], actions: Array) -> None:
         """Run motions in the simulator, and keep the best of each trial if it is a better one."""
         outcome = self.simulator.rollout_actions(actions, self.starts[trials], self.goals[trials])
         missed = np.where(outcome.collision, np.inf, MISS_COST + outcome.distance)
@@ -169,12 +164,12 @@ class MotionSearch:
 
 def two_segments(
     simulator: Simulator,
-    starts: NDArray[np.float64],
-    vias: NDArray[np.float64],
-    ends: NDArray[np.float64],
+    starts: Array,
+    vias: Array,
+    ends: Array,
     turn: NDArray[np.int64],
     steps: NDArray[np.int64],
-) -> NDArray[np.float64]:
+) -> Array:
     """Actions that move straight to one configuration, then straight to another, then rest.
 
     Shape (m, horizon, n_actions).
@@ -194,15 +189,13 @@ def two_segments(
     second = (ends - vias)[:, moved] / (after[:, None] * simulator.step_limit)
     step = np.arange(simulator.task.horizon)[None, :, None]
     turning, ending = turn[:, None, None], steps[:, None, None]
-    actions: NDArray[np.float64] = np.where(
+    actions: Array = np.where(
         step < turning, first[:, None], np.where(step < ending, second[:, None], 0.0)
     )
     return actions
 
 
-def along_path(
-    simulator: Simulator, path: NDArray[np.float64], *, through_corners: bool
-) -> NDArray[np.float64] | None:
+def along_path(simulator: Simulator, path: Array, *, through_corners: bool) -> Array | None:
     """Actions that follow a path of straight segments at full speed, then rest.
 
     Shape (horizon, n_actions); None if the horizon is too short.

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm._validation import finite_array, one_or_many
 from kinarm.episodes import Rollouts
+from kinarm.kernels.compiling import Array
 from kinarm.policies.oracle.bounding import Prover
 from kinarm.policies.oracle.inverse import step_box
 from kinarm.policies.oracle.motion_search import MotionSearch
@@ -101,9 +102,7 @@ class Oracle:
                 on_progress(min(first + LOT, len(q)), len(q))
         return OracleSolutions.concatenated(parts)
 
-    def _solve_lot(
-        self, starts: NDArray[np.float64], goals: NDArray[np.float64]
-    ) -> OracleSolutions:
+    def _solve_lot(self, starts: Array, goals: Array) -> OracleSolutions:
         """From trials to bounds, motions and their replay."""
         horizon, n = self.simulator.task.horizon, len(starts)
         search = MotionSearch(self.simulator, starts, goals)
@@ -149,9 +148,7 @@ class Oracle:
         shut = blocked[beyond > horizon]
         steps_bounds[shut], complete[shut] = horizon + 1, True
 
-    def _approach(
-        self, search: MotionSearch, steps_bounds: NDArray[np.int64]
-    ) -> NDArray[np.float64]:
+    def _approach(self, search: MotionSearch, steps_bounds: NDArray[np.int64]) -> Array:
         """Prove, and seek, how close motions come to the goals that none reaches."""
         task, missed = self.simulator.task, np.flatnonzero(~search.reached)
         starts, goals = search.starts[missed], search.goals[missed]
@@ -168,7 +165,7 @@ class Oracle:
         self,
         replay: Rollouts,
         steps_bounds: NDArray[np.int64],
-        distance_bounds: NDArray[np.float64],
+        distance_bounds: Array,
         has_solution: NDArray[np.bool_],
     ) -> NDArray[np.str_]:
         """Say, per trial, why no motion reaches the goal."""

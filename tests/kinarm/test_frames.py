@@ -19,8 +19,8 @@ def test_all_frames_equal_pinocchio(any_simulator):
     world, arm = any_simulator.world, any_simulator.arm
     q = random_configurations(any_simulator, 1, 40)
     kinds = {frame.name: frame.type for frame in reversed(arm.model.frames)}
-    assert set(arm.joint_names) < set(world.frames.names)
-    for name in world.frames.names:
+    assert set(arm.joint_names) < set(world.frames)
+    for name in world.frames:
         poses, jacobians = world.poses(q, name), world.jacobians(q, name)
         for row, each in enumerate(q):
             pose, jacobian = pinocchio_frame(arm, name, kinds[name], each)
