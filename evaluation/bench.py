@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from kinarm._archive import CACHE_VARIABLE
+from kinarm._files import CACHE_VARIABLE
 from kinarm._parallel import available_threads
 from kinarm.envs import ReachEnv, ReachVectorEnv
 from kinarm.errors import WorkerError

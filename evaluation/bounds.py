@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm import SEMANTICS
-from kinarm._archive import cache_folder, load_archive, save_archive
-from kinarm._files import check_folder
+from kinarm._files import cache_folder, check_folder, load_archive, save_archive
 from kinarm.errors import InvalidInputError, OutputError
 from kinarm.evaluation.schemas import Count, Document, Share
 from kinarm.evaluation.statistics import Estimate

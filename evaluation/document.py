@@ -1,11 +1,12 @@
 """The document of an evaluation: everything about it, to keep and to face the same trials again."""
 
+import json
 from pathlib import Path
 from typing import Any, Literal
 
 import msgspec
 
-from kinarm._archive import load_json
+from kinarm._files import reading
 from kinarm._validation import finite_array
 from kinarm.episodes import Outcome
 from kinarm.errors import InvalidInputError, UnknownNameError
@@ -223,7 +224,8 @@ class EvaluationDocument(Document, frozen=True, kw_only=True):
     @classmethod
     def load(cls, path: str | Path) -> "EvaluationDocument":
         """Read a document; one that is damaged or of another version is refused."""
-        content = load_json(path, "evaluation", InvalidInputError)
+        with reading(repr(str(path)), "evaluation", InvalidInputError):
+            content = json.loads(Path(path).read_bytes())
         try:
             return msgspec.convert(content, cls)
         except (msgspec.ValidationError, RecursionError) as error:

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from kinarm._archive import cached_arrays
+from kinarm._files import cached_arrays
 from kinarm.arm import Arm
 from kinarm.chain import Chain, point_speed
 from kinarm.errors import ArmError

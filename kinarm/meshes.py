@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import HalfspaceIntersection
 
-from kinarm._archive import Arrays, cached_arrays
-from kinarm._files import absolute, first_line, is_file
+from kinarm._files import Arrays, absolute, cached_arrays, first_line, is_file
 from kinarm.errors import ArmError
 from kinarm.urdf_tree import FARTHEST, parse_xml
 

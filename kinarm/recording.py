@@ -9,7 +9,7 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm._archive import load_archive, reading, save_archive
+from kinarm._files import load_archive, reading, save_archive
 from kinarm._validation import finite_array, whole_number
 from kinarm.episodes import Outcome, Rollouts
 from kinarm.errors import InvalidInputError, RecordingFileError, StartInContactError

@@ -9,8 +9,8 @@ from typing import IO, Any, NamedTuple, TypeVar, get_args, get_origin, get_type_
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm._archive import Arrays, load_archive, reading, save_archive
 from kinarm._fields import from_plain, to_plain
+from kinarm._files import Arrays, load_archive, reading, save_archive
 from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import TrainingState, find_learner

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm._archive import Archive, load_archive, reading, save_archive
+from kinarm._files import Archive, load_archive, reading, save_archive
 from kinarm._validation import finite_array
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError
@@ -275,7 +275,7 @@ def policy_content(policy: Policy) -> Archive:
 def policy_of_content(content: Archive, where: str) -> Policy:
     """Rebuild what `policy_content` returned and the file ``where`` holds.
 
-    Errors are those of what is missing, or cannot be used: for `kinarm._archive.reading`.
+    Errors are those of what is missing, or cannot be used: for `kinarm._files.reading`.
     """
     header, arrays = content
     if header["observation"] != observation_layout():

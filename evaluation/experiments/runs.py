@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm._archive import Archive, load_archive, reading, save_archive
+from kinarm._files import Archive, load_archive, reading, save_archive
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.experiments.curve import Clock, Curve, CurvePoint, CurveSoFar
 from kinarm.evaluation.experiments.plan import BoundTask, Run

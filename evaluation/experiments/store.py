@@ -9,7 +9,6 @@ from typing import Any
 
 import tomli_w
 
-from kinarm._archive import load_json
 from kinarm._fields import from_plain, init_fields, to_plain
 from kinarm._files import check_folder, only_writer, write_atomically, write_text
 from kinarm.errors import InvalidInputError, KinarmError, PolicyFileError
@@ -143,9 +142,8 @@ class Store:
         return self._record("failed", task.key).get("error")
 
     def _record(self, kind: str, key: str) -> dict[str, Any]:
-        path = self.folder / kind / f"{key}.json"
-        with suppress(InvalidInputError):
-            record = load_json(path, "record", InvalidInputError)
+        with suppress(OSError, ValueError, RecursionError):
+            record = json.loads((self.folder / kind / f"{key}.json").read_bytes())
             return record if isinstance(record, dict) else {}
         return {}
 

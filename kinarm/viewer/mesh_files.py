@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm._archive import cached_arrays
-from kinarm._files import first_line
+from kinarm._files import cached_arrays, first_line
 from kinarm.errors import ArmError, MissingExtraError
 from kinarm.meshes import mesh_content
 from kinarm.urdf_tree import FARTHEST

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from kinarm._archive import reading
+from kinarm._files import reading
 from kinarm.errors import InvalidInputError, MissingExtraError, PolicyFileError
 from kinarm.policies.conversion.layers import Piece, module_pieces, policy_of_pieces
 from kinarm.policies.conversion.sb3_inputs import (

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from gymnasium.spaces import Box, Dict
 
-from kinarm._archive import reading
+from kinarm._files import reading
 from kinarm.envs.environment import Interface
 from kinarm.envs.goal import GoalInterface
 from kinarm.errors import InvalidInputError, PolicyFileError

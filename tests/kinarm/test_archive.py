@@ -8,7 +8,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from kinarm._archive import cache_folder, cached_arrays, load_archive, save_archive
+from kinarm._files import cache_folder, cached_arrays, load_archive, save_archive
 from kinarm.errors import PolicyFileError
 
 ARRAYS = {
