@@ -22,7 +22,7 @@ from kinarm.evaluation.outcomes import Holding
 from kinarm.evaluation.trials import TrialSet, trial_generator
 from kinarm.networks import Networks
 from kinarm.observation import observation_size
-from kinarm.policies.conversion.sb3_inputs import find_vec_normalize
+from kinarm.policies.conversion.sb3 import find_vec_normalize
 from kinarm.policies.library import policy_files
 from kinarm.policies.policy import Policy
 from kinarm.problem import ProblemLike, ReachProblem

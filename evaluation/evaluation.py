@@ -32,7 +32,7 @@ from kinarm.evaluation.outcomes import Holding, Outcomes, failure_causes
 from kinarm.evaluation.selection import check_names, group_names
 from kinarm.evaluation.statistics import Estimate, estimate_metrics
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.oracle.solution import OracleSolutions
+from kinarm.policies.oracle.oracle import OracleSolutions
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.problem import ProblemLike, ReachProblem

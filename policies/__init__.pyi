@@ -1,5 +1,5 @@
-from .ars.config import ARSConfig as ARSConfig
-from .ars.config import ARSState as ARSState
+from .ars import ARSConfig as ARSConfig
+from .ars import ARSState as ARSState
 from .checkpoint import Checkpoint as Checkpoint
 from .checkpoint import load_checkpoint as load_checkpoint
 from .checkpoint import save_checkpoint as save_checkpoint
@@ -21,8 +21,8 @@ from .oracle import OracleSolutions as OracleSolutions
 from .oracle import inverse_kinematics as inverse_kinematics
 from .policy import Layer as Layer
 from .policy import Policy as Policy
-from .ppo.config import PPOConfig as PPOConfig
-from .ppo.state import PPOState as PPOState
+from .ppo import PPOConfig as PPOConfig
+from .ppo import PPOState as PPOState
 from .provenance import Provenance as Provenance
 from .recipes import recipe as recipe
 from .sb3.environment import sb3_vec_env as sb3_vec_env

@@ -158,13 +158,13 @@ GROUP = "kinarm.learners"
 _SHIPPED = {
     "ars": "kinarm.policies.ars:LEARNER",
     "ppo": "kinarm.policies.ppo:LEARNER",
-    "a2c": "kinarm.policies.sb3.learners:A2C",
-    "ddpg": "kinarm.policies.sb3.learners:DDPG",
-    "sac": "kinarm.policies.sb3.learners:SAC",
-    "sb3-ppo": "kinarm.policies.sb3.learners:PPO",
-    "td3": "kinarm.policies.sb3.learners:TD3",
-    "tqc": "kinarm.policies.sb3.learners:TQC",
-    "trpo": "kinarm.policies.sb3.learners:TRPO",
+    "a2c": "kinarm.policies.sb3:A2C",
+    "ddpg": "kinarm.policies.sb3:DDPG",
+    "sac": "kinarm.policies.sb3:SAC",
+    "sb3-ppo": "kinarm.policies.sb3:PPO",
+    "td3": "kinarm.policies.sb3:TD3",
+    "tqc": "kinarm.policies.sb3:TQC",
+    "trpo": "kinarm.policies.sb3:TRPO",
 }
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +18,7 @@ from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.networks import ACTIVATIONS, Activation, Mirror, Networks, checked_activations
 from kinarm.networks import Layer as Layer
-from kinarm.observation import observation_layout
-from kinarm.policies.goal_observation import flat_observation
+from kinarm.observation import OBSERVATION, observation_layout, observation_size, part_slices
 from kinarm.policies.normalizer import fold_normalizer, input_scale
 from kinarm.policies.provenance import Provenance
 from kinarm.problem import ProblemLike, ReachProblem
@@ -257,6 +256,12 @@ class Policy:
             return policy_of_content(content, repr(str(path)))
 
 
+def layer_widths(problem: ReachProblem, hidden: Sequence[int] = ()) -> tuple[int, ...]:
+    """Widths of a policy's layers for a problem, from the observation to the action."""
+    arm = problem.load_arm()
+    return (observation_size(arm.n_joints), *hidden, arm.n_actuated)
+
+
 def policy_content(policy: Policy) -> Archive:
     """A policy as files hold it: `policy_of_content` makes it again."""
     header = {
@@ -294,3 +299,34 @@ def policy_of_content(content: Archive, where: str) -> Policy:
         activations=tuple(header["activations"]),
         mirror=Mirror(*(arrays[name] for name in signs)) if mirrored else None,
     )
+
+
+GOAL_KEYS = ("observation", "achieved_goal", "desired_goal")
+"""Entries of a dictionary observation; the achieved goal is the tool point."""
+
+
+def flat_observation(given: Mapping[str, ArrayLike], n_observations: int) -> NDArray[np.float64]:
+    """Put a dictionary observation, of one arm or of several, together as policies take it.
+
+    It has an ``observation`` of shape (..., n_own), ``achieved_goal`` and ``desired_goal`` of shape
+    (..., 3) [m]; anything else is refused. The flat one has the shape (..., n_observations).
+    """
+    if set(given) != set(GOAL_KEYS):
+        raise InvalidInputError(
+            f"a dictionary observation has the keys {', '.join(GOAL_KEYS)}, got "
+            f"{', '.join(map(str, given))}"
+        )
+    places = part_slices(next(n for n in count(1) if observation_size(n) >= n_observations))
+    own = [places[part.name] for part in OBSERVATION if not part.of_goal]
+    entries = np.concatenate([np.arange(place.start, place.stop) for place in own])
+    batch = np.shape(given["desired_goal"])[:-1]
+    rows = (None,) * len(batch)
+    goal, tool = (
+        finite_array(name, given[name], (*rows, 3)) for name in ("desired_goal", "achieved_goal")
+    )
+    rest = finite_array("observation", given["observation"], (*rows, len(entries)))
+    flat = np.empty((*batch, n_observations))
+    flat[..., places["goal"]] = goal
+    flat[..., places["goal_minus_tool"]] = goal - tool
+    flat[..., entries] = rest
+    return flat

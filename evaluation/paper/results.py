@@ -13,7 +13,7 @@ from kinarm.evaluation.experiments.plan import Run
 from kinarm.evaluation.experiments.runs import TrainedRun
 from kinarm.evaluation.experiments.study import Study
 from kinarm.evaluation.trials import TrialSet, trial_set
-from kinarm.policies.ars.config import Sharing
+from kinarm.policies.ars import Sharing
 from kinarm.problem import PROBLEMS
 
 PURPOSES = ("sweep", "ars", "ppo")

@@ -1,8 +1,145 @@
-"""Augmented Random Search, for the registry of learners."""
+"""Augmented Random Search: its settings, the state of a training, and itself as a learner."""
 
-from kinarm.policies.ars.config import ARSConfig, ARSState
-from kinarm.policies.learners import imported
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm._fields import OPTIONAL
+from kinarm.errors import InvalidInputError
+from kinarm.failed_scenarios import LARGEST_REPLAY, FailedScenarios
+from kinarm.policies.config import (
+    MANY,
+    POSITIVE,
+    SHARE,
+    WIDTHS,
+    Schedule,
+    TrainingConfig,
+    scheduled,
+)
+from kinarm.policies.learners import TrainingState, imported
+from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.recipes import shipped_learner
+
+Sharing = Literal["none", "pair", "iteration"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ARSConfig(TrainingConfig):
+    """Settings of a training; the defaults are the paper's Table 1, that is, ARS V2-t.
+
+    Parameters
+    ----------
+    problem, reward, seed, recipe, iterations
+        See `TrainingConfig`.
+    step_size : float
+        Learning rate alpha.
+    step_size_schedule : {"constant", "linear"}
+        Whether alpha stays or falls linearly to zero.
+    noise : float
+        Standard deviation nu of the perturbations.
+    directions : int
+        Perturbations N per iteration, each tried with both signs.
+    top_directions : int
+        Perturbations b that enter the update, those with the best returns; b = N is V1 or V2.
+    symmetric : bool
+        Whether the policy treats mirror images alike, if arm and obstacles are their own mirror
+        image; it then learns from goals on the right and from mirror images of those on the left.
+    net_arch : tuple of int
+        Widths of hidden layers with tanh; the policy is linear if there are none.
+    normalize : bool
+        Whether observations are normalised (V2) or not (BRS, V1).
+    scale_by_deviation : bool
+        Whether the step is divided by the standard deviation of the returns (ARS) or not (BRS).
+    sharing : {"none", "pair", "iteration"}
+        Which policies face the same starts and goals: none (every episode draws its own), the two
+        signs of a perturbation, or all perturbations of an iteration.
+    episodes : int
+        Episodes whose mean return judges a perturbed policy.
+    replay_share : float
+        Probability that a scenario is replayed, after at least half of the policies failed in it;
+        see `kinarm.failed_scenarios`.
+    replay_size : int
+        Failed scenarios that are kept.
+    initial_policy : str, optional
+        Name or file of a policy that the training begins with; it must have the same layers, and
+        may be for another problem or arm.
+    """
+
+    iterations: int = 800
+    step_size: float = field(default=0.02, metadata=POSITIVE)
+    step_size_schedule: Schedule = "constant"
+    noise: float = field(default=0.03, metadata=POSITIVE)
+    directions: int = field(default=24, metadata=MANY)
+    top_directions: int = 12
+    symmetric: bool = False
+    net_arch: tuple[int, ...] = field(default=(), metadata=WIDTHS)
+    normalize: bool = True
+    scale_by_deviation: bool = True
+    sharing: Sharing = "none"
+    episodes: int = field(default=1, metadata=MANY)
+    replay_share: float = field(default=0.0, metadata={**SHARE, **OPTIONAL})
+    replay_size: int = field(default=512, metadata={"at_most": LARGEST_REPLAY, **OPTIONAL})
+    initial_policy: str | None = field(default=None, metadata=OPTIONAL)
+
+    learner = "ars"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.top_directions > self.directions:
+            limit, given = self.directions, self.top_directions
+            raise InvalidInputError(
+                f"top_directions must be at most directions ({limit}), got {given}"
+            )
+
+    @property
+    def can_extend(self) -> bool:
+        """Whether a training with more iterations begins just as this one goes."""
+        return self.step_size_schedule == "constant"
+
+    def step_size_at(self, iteration: int) -> float:
+        """Learning rate of an iteration."""
+        return scheduled(self.step_size, self.step_size_schedule, iteration / self.iterations)
+
+
+_PROBE: np.random.BitGenerator = np.random.PCG64(0)
+"""Refuses what is no state of a generator."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ARSState(TrainingState):
+    """Everything that the next iteration depends on.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (n_actions, n_observations) or (1, n_parameters)
+        Parameters of a linear policy, or of a network as `kinarm.Networks` keeps them.
+    normalizer : Normalizer
+        Statistics mu and Sigma of the observations.
+    generator : dict
+        State of the random generator.
+    failed : FailedScenarios
+        What may be replayed.
+    """
+
+    theta: NDArray[np.float64]
+    normalizer: Normalizer
+    generator: dict[str, Any]
+    failed: FailedScenarios
+
+    def __post_init__(self) -> None:
+        widths = {self.normalizer.mean.shape, self.normalizer.squares.shape}
+        if len(self.theta) > 1:
+            widths.add(self.theta.shape[1:])
+        if len(widths) > 1 or self.theta.ndim != 2:
+            raise InvalidInputError(
+                f"theta of shape {self.theta.shape} needs as many statistics, "
+                f"got {self.normalizer.mean.shape} and {self.normalizer.squares.shape}"
+            )
+        self.failed.check()
+        _PROBE.state = self.generator
+
 
 LEARNER = shipped_learner(
     "ars",

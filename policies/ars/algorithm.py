@@ -11,7 +11,7 @@ from kinarm.episodes import Rollouts
 from kinarm.failed_scenarios import FailedScenarios, StartsAndGoals
 from kinarm.kernels.compiling import Array
 from kinarm.networks import Mirror, Networks
-from kinarm.policies.ars.config import ARSConfig, ARSState
+from kinarm.policies.ars import ARSConfig, ARSState
 from kinarm.policies.ars.networks import (
     first_deviations,
     initial_network,
@@ -24,7 +24,7 @@ from kinarm.policies.learners import CurvePoint
 from kinarm.policies.library import starting_policy, statistics
 from kinarm.policies.mirror import problem_mirror
 from kinarm.policies.normalizer import Normalizer, input_scale
-from kinarm.policies.policy import Layer, Policy
+from kinarm.policies.policy import Layer, Policy, layer_widths
 from kinarm.policies.provenance import Provenance
 from kinarm.randomness import Stream, stream_generator
 from kinarm.simulator import Simulator
@@ -39,22 +39,22 @@ class ARSTraining:
     def __init__(self, config: ARSConfig, threads: int | None = None) -> None:
         self.config, self.simulator = config, config.simulator(threads)
         self.mirror = problem_mirror(config.problem) if config.symmetric else None
+        self._widths = layer_widths(config.problem, config.net_arch)
         self._rng = stream_generator(Stream.ARS, config.seed)
 
     def initial_state(self) -> ARSState:
         """State before the first iteration: mu = 0, Sigma = I, and theta = 0 if it is linear."""
-        n_actions, n_observations = self.simulator.n_actions, self.simulator.n_observations
+        n_observations, *_, n_actions = self._widths
         rng = stream_generator(Stream.ARS, self.config.seed)
         normalizer = Normalizer.empty(n_observations)
-        widths = (n_observations, *self.config.net_arch, n_actions)
         if self.config.initial_policy is not None:
-            policy = starting_policy(self.config.initial_policy, widths)
+            policy = starting_policy(self.config.initial_policy, self._widths)
             theta = parameters_of(policy)
             if self.config.normalize:
                 normalizer = statistics(policy)
         elif self.config.net_arch:
             deviations = first_deviations(self.simulator.arm.n_joints)
-            theta = initial_network(rng, deviations, widths[1:])
+            theta = initial_network(rng, deviations, self._widths[1:])
         else:
             theta = np.zeros((n_actions, n_observations))
         return ARSState(
@@ -78,8 +78,7 @@ class ARSTraining:
         scenarios = draw_shared(config, simulator, rng, state.failed, self.mirror)
         seen = policy_normalizer(config, normalizer)
         if config.net_arch:
-            widths = (simulator.n_observations, *config.net_arch, simulator.n_actions)
-            policies = perturbed_networks(theta, config.noise * delta, seen, widths)
+            policies = perturbed_networks(theta, config.noise * delta, seen, self._widths)
         else:
             policies = perturbed_policies(theta, config.noise * delta, seen)
         rollouts = simulator.rollout(
@@ -245,8 +244,7 @@ def trained_policy(config: ARSConfig, state: ARSState) -> Policy:
     normalizer = policy_normalizer(config, state.normalizer)
     layers: tuple[Layer, ...] = (Layer(state.theta, np.zeros(len(state.theta))),)
     if config.net_arch:
-        n_actions = config.problem.load_arm().n_actuated
-        layers = network_layers(state.theta, (len(normalizer.mean), *config.net_arch, n_actions))
+        layers = network_layers(state.theta, layer_widths(config.problem, config.net_arch))
     return Policy(
         mean=normalizer.mean,
         std=normalizer.std,

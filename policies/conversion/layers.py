@@ -4,7 +4,7 @@ Affine maps, clips and activation functions, one after the other, are joined int
 a function after it.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -24,6 +24,12 @@ CONVERTED = (
     "Flatten, Identity, and Dropout after eval()"
 )
 """Modules that can be converted, for messages."""
+
+UNLIMITED = 2.0**20
+"""Stands for no limit where only some entries have one; scaling by it rounds nothing."""
+
+WHOLE = ""
+"""Key of an observation that is no dictionary."""
 
 
 class Clip(NamedTuple):
@@ -151,3 +157,32 @@ def module_pieces(module: Any) -> Iterator[Piece]:
         return  # it drops nothing
     elif kind not in (nn.Flatten, nn.Identity):
         raise InvalidInputError(f"cannot convert {module!r}; what can be converted: {CONVERTED}")
+
+
+def normalization(statistics: Any, sizes: Mapping[str, int]) -> Iterator[Piece]:
+    """The map by ``VecNormalize``: (x - mean) / sqrt(var + epsilon), and a clip.
+
+    It has the statistics of some parts of the inputs, whose sizes are given in their order.
+
+    Raises
+    ------
+    InvalidInputError
+        If the statistics are of other observations.
+    """
+    if statistics is None or not statistics.norm_obs:
+        return
+    known = statistics.obs_rms
+    known = known if isinstance(known, dict) else {WHOLE: known}
+    if not all(each.mean.shape == (sizes.get(key),) for key, each in known.items()):
+        raise InvalidInputError("VecNormalize has statistics of other observations than the model")
+    n, end = sum(sizes.values()), 0
+    scale, shift, limit = np.ones(n), np.zeros(n), np.full(n, UNLIMITED)
+    for key, size in sizes.items():
+        place, end = slice(end, end + size), end + size
+        if key in known:
+            scale[place] = 1 / np.sqrt(known[key].var + statistics.epsilon)
+            shift[place] = -known[key].mean * scale[place]
+            limit[place] = statistics.clip_obs
+    yield Layer(np.diag(scale), shift)
+    if np.isfinite(statistics.clip_obs):
+        yield Clip(-limit, limit)

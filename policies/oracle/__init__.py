@@ -1,5 +1,8 @@
 """The oracle: what any policy could reach at best, proven and found."""
 
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+from kinarm.policies.oracle.inverse import inverse_kinematics as inverse_kinematics
+from kinarm.policies.oracle.oracle import ORACLE_SEMANTICS as ORACLE_SEMANTICS
+from kinarm.policies.oracle.oracle import Oracle as Oracle
+from kinarm.policies.oracle.oracle import OracleSolution as OracleSolution
+from kinarm.policies.oracle.oracle import OracleSolutions as OracleSolutions
+from kinarm.policies.oracle.oracle import Progress as Progress

@@ -10,8 +10,7 @@ from kinarm._parallel import run_rows
 from kinarm.chain import MotionBounds
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.records import recorded
-from kinarm.policies.oracle.kernels.approach import search
-from kinarm.policies.oracle.kernels.boxes import WAITING, Boxes, layout
+from kinarm.policies.oracle.kernels.approach import WAITING, Boxes, layout, search
 from kinarm.simulator import Simulator
 
 BUDGET = 100_000

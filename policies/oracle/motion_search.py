@@ -1,4 +1,7 @@
-"""Search for the motions that reach goals in the fewest steps, as tables of actions."""
+"""Search for the motions that reach goals in the fewest steps, as tables of actions.
+
+Detours around obstacles are planned by RRT-Connect with shortcuts (Kuffner and LaValle 2000).
+"""
 
 import hashlib
 
@@ -6,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import Array
-from kinarm.policies.oracle.detour import find_detour
 from kinarm.policies.oracle.inverse import (
     Solutions,
     inverse_kinematics,
@@ -223,3 +225,111 @@ def along_path(simulator: Simulator, path: Array, *, through_corners: bool) -> A
     actions = np.zeros((simulator.task.horizon, simulator.n_actions))
     actions[:n_steps] = np.diff(visited, axis=0) / simulator.step_limit
     return actions
+
+
+EXTENSIONS, LONGEST_EXTENSION = 1500, 6.0
+"""Samples before the search is given up, and how far a tree grows towards one [steps]."""
+
+SHORTCUTS = 120
+"""Pairs of points of a path between which the straight way is tried."""
+
+
+class Tree:
+    """Configurations that are connected by contact-free straight motions, from some roots."""
+
+    def __init__(self, roots: Array) -> None:
+        self.nodes = roots.copy()
+        self.parents = [-1] * len(roots)
+
+    def add(self, node: Array, parent: int) -> int:
+        """Append a node and return its index."""
+        self.nodes = np.concatenate([self.nodes, node[None]])
+        self.parents.append(parent)
+        return len(self.parents) - 1
+
+    def path_to_root(self, node: int) -> list[Array]:
+        """Nodes from a given one to its root."""
+        found = []
+        while node >= 0:
+            found.append(self.nodes[node])
+            node = self.parents[node]
+        return found
+
+
+def find_detour(
+    simulator: Simulator,
+    start: Array,
+    ends: Array,
+    rng: np.random.Generator,
+) -> Array | None:
+    """Find a contact-free path of straight segments to one of several configurations.
+
+    A tree grows from either side, in turns, until they meet. The path has the shape (m, n_joints);
+    None if none was found.
+
+    Parameters
+    ----------
+    simulator, rng
+        Arm and scene, and what draws samples and shortcuts.
+    start, ends : ndarray, shape (n_joints,) and (k, n_joints)
+        Where the path begins and may end, without contact [rad or m].
+    """
+    moved, n = slice(simulator.n_actions), simulator.n_actions
+    lower, upper = simulator.arm.lower[moved], simulator.arm.upper[moved]
+    growing, other = Tree(start[None]), Tree(ends)
+    from_start = True
+    for _ in range(EXTENSIONS):
+        sample = start.copy()
+        sample[moved] = rng.uniform(lower, upper, n)
+        grown = _extend(simulator, growing, sample, LONGEST_EXTENSION)
+        if grown is not None:
+            node = growing.nodes[grown]
+            met = _extend(simulator, other, node, np.inf)
+            if met is not None and steps_between(simulator, other.nodes[met], node) < 1e-9:
+                near, far = growing.path_to_root(grown)[::-1], other.path_to_root(met)[1:]
+                path = np.array(near + far)
+                return _shorten(simulator, path if from_start else path[::-1], rng)
+        growing, other, from_start = other, growing, not from_start
+    return None
+
+
+def _extend(simulator: Simulator, tree: Tree, sample: Array, longest: float) -> int | None:
+    """Grow a tree from its node nearest to a sample towards it, as far as nothing touches."""
+    distances = steps_between(simulator, tree.nodes, sample)
+    nearest = int(distances.argmin())
+    if distances[nearest] < 1e-9:
+        return nearest
+    origin = tree.nodes[nearest]
+    towards = origin + min(1.0, longest / distances[nearest]) * (sample - origin)
+    on_the_way, free = _straight_way(simulator, origin, towards)
+    return tree.add(on_the_way[free - 1], nearest) if free else None
+
+
+def _straight_way(simulator: Simulator, first: Array, second: Array) -> tuple[Array, int]:
+    """Configurations as far apart as a step tests them, and how many in a row touch nothing."""
+    tested_each = simulator.problem.stepping.tested_configurations
+    count = max(1, int(np.ceil(tested_each * steps_between(simulator, first, second))))
+    tested = first + np.arange(1, count + 1)[:, None] / count * (second - first)
+    tested[-1] = second
+    _, touching = simulator.world.screen(tested)
+    return tested, int(touching.argmax()) if touching.any() else count
+
+
+def _shorten(simulator: Simulator, path: Array, rng: np.random.Generator) -> Array:
+    """Replace parts of a path by the straight way where nothing touches."""
+    for _ in range(SHORTCUTS):
+        if len(path) < 3:
+            break
+        lengths = steps_between(simulator, path[:-1], path[1:])
+        arrival = np.concatenate([[0.0], np.cumsum(lengths)])
+        a, b = np.sort(rng.uniform(0.0, arrival[-1], 2))
+        first, second = (
+            np.array([np.interp(time, arrival, axis) for axis in path.T]) for time in (a, b)
+        )
+        if steps_between(simulator, first, second) > b - a - 1e-6:
+            continue
+        tested, free = _straight_way(simulator, first, second)
+        if free == len(tested):
+            before, after = path[arrival < a], path[arrival > b]
+            path = np.concatenate([before, first[None], second[None], after])
+    return path

@@ -16,7 +16,8 @@ need not be the fastest one, and that none was found proves nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,7 +28,6 @@ from kinarm.kernels.compiling import Array
 from kinarm.policies.oracle.bounding import Prover
 from kinarm.policies.oracle.inverse import step_box
 from kinarm.policies.oracle.motion_search import MotionSearch
-from kinarm.policies.oracle.solution import OracleSolution, OracleSolutions
 from kinarm.problem import ProblemLike
 from kinarm.simulator import Simulator
 
@@ -177,3 +177,101 @@ class Oracle:
             away = f"{distance_bounds[row]:.3f} m away or more within {horizon} steps"
             reasons[row] = f"out of reach: proven to stay {away}"
         return np.array(np.where(replay.success, "", reasons), dtype=np.str_)
+
+
+@dataclass(frozen=True, eq=False)
+class OracleSolution:
+    """Bounds and motion of one trial.
+
+    Attributes
+    ----------
+    reachable : bool
+        Whether a motion was found that reaches the goal in the simulator.
+    steps : int
+        Steps of the motion; the horizon if it does not reach the goal.
+    steps_lower_bound : int
+        Proven: no motion reaches the goal in fewer steps. The horizon + 1 if none does within the
+        horizon.
+    proof_complete : bool
+        Whether some configuration at the goal, not proven to touch anything, is that many steps
+        away, or the motion takes as many, or the goal is proven to be out of reach. Else the budget
+        of the proof ran out. Contact on the way is no part of it, so ``steps`` may be more.
+    final_distance : float
+        Distance from the tool to the goal at the end of the motion [m].
+    distance_lower_bound : float
+        Proven: no motion within the horizon ends closer to the goal [m]. Zero if one reaches it.
+    path : ndarray, shape (steps + 1, n_joints)
+        Configurations of the motion, as the simulator went through them [rad or m].
+    actions : ndarray, shape (steps, n_actions)
+        Actions of the motion.
+    reason : str or None
+        Why no motion reaches the goal; None if one does.
+    """
+
+    reachable: bool
+    steps: int
+    steps_lower_bound: int
+    proof_complete: bool
+    final_distance: float
+    distance_lower_bound: float
+    path: NDArray[np.float64]
+    actions: NDArray[np.float64]
+    reason: str | None
+
+
+NUMBERS = [item.name for item in fields(OracleSolution)][:6]
+
+
+@dataclass(frozen=True, eq=False)
+class OracleSolutions:
+    """Bounds and motions of n trials; indexing gives an `OracleSolution`.
+
+    Arrays of shape (n,) hold what is said there; the others are
+
+    Attributes
+    ----------
+    actions : ndarray, shape (n, horizon, n_actions)
+        Actions of the motions, zero after their end.
+    paths : ndarray, shape (n, horizon + 1, n_joints)
+        Configurations of the motions, NaN after their end [rad or m].
+    reasons : ndarray of str, shape (n,)
+        Why no motion reaches the goal; empty if one does.
+    """
+
+    reachable: NDArray[np.bool_]
+    proof_complete: NDArray[np.bool_]
+    steps: NDArray[np.int64]
+    steps_lower_bound: NDArray[np.int64]
+    final_distance: NDArray[np.float64]
+    distance_lower_bound: NDArray[np.float64]
+    actions: NDArray[np.float64]
+    paths: NDArray[np.float64]
+    reasons: NDArray[np.str_]
+
+    def __post_init__(self) -> None:
+        for array in vars(self).values():
+            array.flags.writeable = False
+
+    def __len__(self) -> int:
+        return len(self.steps)
+
+    def __repr__(self) -> str:
+        return f"OracleSolutions({len(self)} trials, {int(self.reachable.sum())} reached)"
+
+    def __iter__(self) -> Iterator[OracleSolution]:
+        return (self[index] for index in range(len(self)))
+
+    def __getitem__(self, index: int) -> OracleSolution:
+        steps, known = int(self.steps[index]), vars(self)
+        return OracleSolution(
+            **{name: known[name][index].item() for name in NUMBERS},
+            path=self.paths[index, : steps + 1],
+            actions=self.actions[index, :steps],
+            reason=str(self.reasons[index]) or None,
+        )
+
+    @classmethod
+    def concatenated(cls, parts: list[OracleSolutions]) -> OracleSolutions:
+        """Join the solutions of several sets of trials."""
+        lots = [vars(part) for part in parts]
+        return cls(**{name: np.concatenate([lot[name] for lot in lots]) for name in lots[0]})

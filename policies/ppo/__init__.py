@@ -1,9 +1,310 @@
-"""Proximal Policy Optimization, for the registry of learners."""
+"""Proximal Policy Optimization: its settings, the state of a training, and itself as a learner."""
 
-from kinarm.policies.learners import imported
-from kinarm.policies.ppo.config import PPOConfig
-from kinarm.policies.ppo.state import PPOState
+import math
+from dataclasses import dataclass, field
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm._fields import OPTIONAL
+from kinarm.errors import InvalidInputError
+from kinarm.failed_scenarios import LARGEST_REPLAY, FailedScenarios
+from kinarm.policies.config import (
+    MANY,
+    NOT_NEGATIVE,
+    POSITIVE,
+    SHARE,
+    WIDTHS,
+    Schedule,
+    TrainingConfig,
+)
+from kinarm.policies.learners import TrainingState, imported
+from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.recipes import shipped_learner
+from kinarm.problem import ReachProblem
+
+SETTLED = 0.9
+"""Share of a training after which noise and tolerance have their final values."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PPOConfig(TrainingConfig):
+    """Settings of a training of 1.2 million environment steps, as in the paper.
+
+    The paper gives no other settings. Names and defaults are those of Stable-Baselines3, with two
+    exceptions for speed: 16 environments fill the rollouts of 2000 steps, and minibatches are
+    larger.
+
+    Parameters
+    ----------
+    problem, reward, seed, recipe
+        See `TrainingConfig`.
+    iterations : int
+        Rollouts, each followed by an update.
+    n_envs : int
+        Arms that are simulated at once.
+    n_steps : int
+        Steps of each arm between two updates.
+    batch_size : int
+        Environment steps per gradient step.
+    n_epochs : int
+        How often an update uses each environment step.
+    net_arch : tuple of int
+        Widths of the hidden layers of the actor and of the critic.
+    learning_rate : float
+        Step size of Adam.
+    learning_rate_schedule : {"constant", "linear"}
+        Whether the learning rate stays or falls linearly to zero.
+    gamma : float
+        Discount per step.
+    gae_lambda : float
+        Decay of generalised advantage estimation.
+    clip_range : float
+        How far the probability ratio may leave 1.
+    ent_coef : float
+        Weight of the entropy in the loss.
+    vf_coef : float
+        Weight of the critic's loss.
+    max_grad_norm : float
+        Largest norm of a gradient; longer ones are clipped to it.
+    log_std_init : float
+        Logarithm of the standard deviation of the actions at the beginning.
+    final_log_std : float, optional
+        Logarithm of the standard deviation of the actions at the end, to which it changes
+        linearly. Without it, PPO learns the standard deviation.
+    training_tolerance : float, optional
+        Distance at which an episode of the training counts as a success [m]. It is the task's
+        tolerance if it is not given.
+    initial_tolerance : float, optional
+        Training tolerance until start spread and discount have reached their final values; then
+        it changes geometrically to the final tolerance [m].
+    stop_at_goal : bool
+        Whether success in the training takes two steps in a row within the training tolerance, so
+        that the hand does not only pass the goal. At the last step, one is enough.
+    symmetric : bool
+        Whether the policy treats mirror images alike, if arm and obstacles are their own mirror
+        image; it then learns from goals on the right and from mirror images of those on the left.
+    initial_start_spread : float
+        Spread of the start configurations at the beginning of the training, as a share of the
+        task's.
+    initial_gamma : float, optional
+        Discount per step at the beginning of the training; ``gamma`` if it is not given.
+    initial_penalty : float
+        Share of the penalty for contact that counts at the beginning of the training; it grows
+        linearly to the whole penalty at the end.
+    widening : float
+        Share of the training in which spread and discount change linearly to their final values.
+    replay_share : float
+        Probability that an episode begins where an earlier one failed; see
+        `kinarm.failed_scenarios`.
+    replay_size : int
+        Failed scenarios that are kept.
+    replay_log_std : float, optional
+        Smallest logarithm of the standard deviation of the actions in replayed episodes; with
+        less noise, a policy never succeeds where it always fails. Without it, replayed episodes
+        have the noise of the others.
+    replay_noise_steps : int, optional
+        Steps at the beginning of a replayed episode in which it has that noise; all of them, if
+        it is not given.
+    initial_policy : str, optional
+        Name or file of a policy that the training begins with; it must have the same layers, and
+        may be for another problem or arm.
+    demonstrations : int
+        Trials that the oracle solves before the training; the actor imitates its motions.
+    """
+
+    iterations: int = 600
+    n_envs: int = field(default=16, metadata=MANY)
+    n_steps: int = field(default=125, metadata=MANY)
+    batch_size: int = 500
+    n_epochs: int = 10
+    net_arch: tuple[int, ...] = field(default=(64, 64), metadata=WIDTHS)
+    learning_rate: float = field(default=3e-4, metadata=POSITIVE)
+    learning_rate_schedule: Schedule = "constant"
+    gamma: float = field(default=0.99, metadata=SHARE)
+    gae_lambda: float = field(default=0.95, metadata=SHARE)
+    clip_range: float = field(default=0.2, metadata=POSITIVE)
+    ent_coef: float = field(default=0.0, metadata=NOT_NEGATIVE)
+    vf_coef: float = field(default=0.5, metadata=NOT_NEGATIVE)
+    max_grad_norm: float = field(default=0.5, metadata=POSITIVE)
+    log_std_init: float = 0.0
+    final_log_std: float | None = field(default=None, metadata=OPTIONAL)
+    training_tolerance: float | None = field(default=None, metadata=POSITIVE)
+    initial_tolerance: float | None = field(default=None, metadata={**POSITIVE, **OPTIONAL})
+    stop_at_goal: bool = field(default=False, metadata=OPTIONAL)
+    symmetric: bool = False
+    initial_start_spread: float = field(default=1.0, metadata=SHARE)
+    initial_gamma: float | None = field(default=None, metadata=SHARE)
+    initial_penalty: float = field(default=1.0, metadata=SHARE)
+    widening: float = field(default=0.0, metadata=SHARE)
+    replay_share: float = field(default=0.0, metadata={**SHARE, **OPTIONAL})
+    replay_size: int = field(default=8192, metadata={"at_most": LARGEST_REPLAY, **OPTIONAL})
+    replay_log_std: float | None = field(default=None, metadata=OPTIONAL)
+    replay_noise_steps: int | None = field(default=None, metadata={**MANY, **OPTIONAL})
+    initial_policy: str | None = field(default=None, metadata=OPTIONAL)
+    demonstrations: int = field(default=0, metadata={"at_least": 0, **MANY, **OPTIONAL})
+
+    learner = "ppo"
+
+    DEFAULTS: ClassVar = {
+        "final_log_std": "none, it is learnt",
+        "training_tolerance": "the task's",
+        "initial_tolerance": "the training tolerance",
+        "initial_gamma": "gamma",
+        "replay_log_std": "none, noise as in others",
+        "replay_noise_steps": "all",
+    }
+    """Meaning of leaving an option out whose field has no value by default."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.net_arch:
+            raise InvalidInputError("net_arch must name at least one layer")
+        if self.replay_log_std is not None and not self.replay_share:
+            raise InvalidInputError("replay_log_std needs a replay_share above 0")
+        if self.replay_noise_steps is not None and self.replay_log_std is None:
+            raise InvalidInputError("replay_noise_steps needs a replay_log_std")
+        if self.batch_size == 1 or self.steps_per_iteration % self.batch_size:
+            raise InvalidInputError(
+                f"batch_size must be above 1 and divide the {self.steps_per_iteration} steps of a "
+                f"rollout, got {self.batch_size}"
+            )
+
+    @property
+    def steps_per_iteration(self) -> int:
+        """Environment steps of a rollout."""
+        return self.n_envs * self.n_steps
+
+    @property
+    def environment_steps(self) -> int:
+        """Environment steps of the whole training."""
+        return self.iterations * self.steps_per_iteration
+
+    @property
+    def training_problem(self) -> ReachProblem:
+        """The problem with the reward and tolerance of these settings, which is trained on."""
+        return self.problem.replace(reward=self.reward, tolerance=self.training_tolerance)
+
+    @property
+    def can_extend(self) -> bool:
+        """Whether a training with more iterations begins just as this one goes."""
+        settled = self.widening == 0 and self.initial_penalty == 1
+        unset = self.final_log_std is None and self.initial_tolerance is None
+        return self.learning_rate_schedule == "constant" and settled and unset
+
+    def start_spread_at(self, done: float) -> float:
+        """Spread of the start configurations after this share of the training."""
+        return self.problem.task.start_spread * self._widened(self.initial_start_spread, 1.0, done)
+
+    def gamma_at(self, done: float) -> float:
+        """Discount per step after this share of the training."""
+        if self.initial_gamma is None:
+            return self.gamma
+        return self._widened(self.initial_gamma, self.gamma, done)
+
+    def log_std_at(self, done: float) -> float | None:
+        """Logarithm of the deviation of actions after this share of the training, if it is set."""
+        if self.final_log_std is None:
+            return None
+        settled = min(1.0, done / SETTLED)
+        return (1 - settled) * self.log_std_init + settled * self.final_log_std
+
+    def tolerance_at(self, done: float) -> float:
+        """Distance that counts as a success after this share of the training [m]."""
+        own, initial = self.training_tolerance, self.initial_tolerance
+        final = self.problem.task.tolerance if own is None else own
+        if initial is None or done >= SETTLED:
+            return final
+        if done <= self.widening:
+            return initial
+        fallen = (done - self.widening) / (SETTLED - self.widening)
+        # Rounded, for powers differ between C libraries in the last bits.
+        return round(initial * math.pow(final / initial, fallen), 9)
+
+    def penalty_at(self, done: float) -> float:
+        """Share of the penalty for contact that counts after this share of the training."""
+        return self.initial_penalty + (1 - self.initial_penalty) * done
+
+    def _widened(self, initial: float, final: float, done: float) -> float:
+        """A value between an initial and a final one, after this share of the training."""
+        if done >= self.widening:
+            return final
+        grown = done / self.widening
+        return (1 - grown) * initial + grown * final
+
+
+class EpisodeStates(NamedTuple):
+    """The state of running episodes; everything else follows from it.
+
+    Attributes
+    ----------
+    q, start : ndarray, shape (n, n_joints)
+        Configurations, and those in which they began [rad or m].
+    goal : ndarray, shape (n, 3)
+        Goal positions [m].
+    steps, total : ndarray, shape (n,)
+        Steps taken, and sums of rewards so far.
+    replayed : ndarray of bool, shape (n,)
+        Whether they began where an earlier one had failed.
+    """
+
+    q: NDArray[np.float64]
+    goal: NDArray[np.float64]
+    steps: NDArray[np.int64]
+    total: NDArray[np.float64]
+    start: NDArray[np.float64]
+    replayed: NDArray[np.bool_]
+
+    @classmethod
+    def begun(cls, starts: NDArray[np.float64], goals: NDArray[np.float64]) -> "EpisodeStates":
+        """Of new episodes."""
+        n = len(starts)
+        counts = np.zeros(n, dtype=np.int64)
+        return cls(starts, goals, counts, np.zeros(n), starts, np.zeros(n, dtype=bool))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PPOState(TrainingState):
+    """Everything that the next iteration depends on.
+
+    Parameters
+    ----------
+    parameters : ndarray of float32, shape (n_parameters,)
+        Parameters of actor and critic, in the order of the policy of Stable-Baselines3.
+    first_moment, second_moment : ndarray of float32, shape (n_parameters,)
+        Adam's running means of the gradients and of their squares.
+    normalizer : Normalizer
+        Statistics by which observations are normalised.
+    episodes : EpisodeStates
+        The episodes that are under way.
+    failed : FailedScenarios
+        What may be replayed.
+    simulator_time : float
+        Time spent in the simulator so far [s].
+    curve : tuple of CurvePoint
+        One point per finished iteration.
+    """
+
+    parameters: NDArray[np.float32]
+    first_moment: NDArray[np.float32]
+    second_moment: NDArray[np.float32]
+    normalizer: Normalizer
+    episodes: EpisodeStates
+    failed: FailedScenarios
+    simulator_time: float = 0.0
+
+    def __post_init__(self) -> None:
+        vectors = (self.parameters, self.first_moment, self.second_moment)
+        statistics = (self.normalizer.mean, self.normalizer.squares)
+        for arrays in (vectors, statistics):
+            if len({array.shape for array in arrays}) > 1 or arrays[0].ndim != 1:
+                shapes = ", ".join(str(array.shape) for array in arrays)
+                raise InvalidInputError(f"parts of the state have the shapes {shapes}")
+        if len({len(array) for array in self.episodes}) > 1:
+            raise InvalidInputError("parts of the episodes' states are not as many")
+        self.failed.check()
+
 
 LEARNER = shipped_learner(
     "ppo",

@@ -1,7 +1,6 @@
-"""The arms of a training: what its learner sees of them, and how their episodes begin and end."""
+"""The arms of a training: how their episodes begin and end, and rollouts of the actor in them."""
 
 import time
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,22 +9,10 @@ from kinarm.failed_scenarios import StartsAndGoals
 from kinarm.kernels.reward import COLLISION, SUCCESS
 from kinarm.policies.mirror import problem_mirror
 from kinarm.policies.normalizer import input_scale
-from kinarm.policies.ppo.config import PPOConfig
+from kinarm.policies.ppo import EpisodeStates, PPOConfig, PPOState
 from kinarm.policies.ppo.kernels.tiles import Numbers
-from kinarm.policies.ppo.state import EpisodeStates, PPOState
-
-
-class Step(NamedTuple):
-    """Outcome of a step of all arms: rewards, which episodes ended, shape (n_envs,) each.
-
-    Episodes that ended are replaced. For those that the time limit cut short, there are their rows,
-    shape (n,), and their last observations, shape (n, n_observations).
-    """
-
-    rewards: Numbers
-    ended: NDArray[np.bool_]
-    cut_short: NDArray[np.int64]
-    finals: Numbers
+from kinarm.policies.ppo.kernels.update import Experience, choose
+from kinarm.policies.ppo.networks import ActorCritic
 
 
 class TrainingArms:
@@ -46,6 +33,9 @@ class TrainingArms:
         What may be replayed.
     returns, successes : list of ndarray
         Of the episodes that ended since `restore`, but for those that replayed a failed scenario.
+    cut_short, finals : list of ndarray
+        Of each step since `restore`, the rows of the episodes that the time limit cut short, shape
+        (n,), and their last observations, shape (n, n_observations).
     time : float
         Time that steps took since `restore` [s].
     """
@@ -87,6 +77,8 @@ class TrainingArms:
         self.failed, self.time = state.failed, 0.0
         self.returns: list[NDArray[np.float64]] = []
         self.successes: list[NDArray[np.bool_]] = []
+        self.cut_short: list[NDArray[np.int64]] = []
+        self.finals: list[Numbers] = []
 
     def states(self) -> EpisodeStates:
         """Copy what the running episodes depend on."""
@@ -106,8 +98,11 @@ class TrainingArms:
         steps = self.config.replay_noise_steps
         return self._replayed if steps is None else self._replayed & (self.episodes.steps < steps)
 
-    def step(self, actions: Numbers) -> Step:
-        """Move all arms by actions, shape (n_envs, n_actions), and renew episodes that end."""
+    def step(self, actions: Numbers) -> tuple[Numbers, NDArray[np.bool_]]:
+        """Move all arms by actions, shape (n_envs, n_actions), and renew episodes that end.
+
+        Returned are the rewards, and which episodes ended, shape (n_envs,) each.
+        """
         began, episodes, task = time.perf_counter(), self.episodes, self.simulator.task
         passes = np.zeros(len(episodes.steps), dtype=bool)
         if self.config.stop_at_goal:
@@ -121,15 +116,15 @@ class TrainingArms:
         rewards = result.reward - remitted
         self._total += rewards
         ended = result.truncated | (result.terminated & ~passes)
-        cut_short = np.flatnonzero(result.truncated & ~result.terminated)
-        finals = self._normalized(episodes.observation[cut_short])
+        self.cut_short.append(np.flatnonzero(result.truncated & ~result.terminated))
+        self.finals.append(self._normalized(episodes.observation[self.cut_short[-1]]))
         if ended.any():
             counted = ended & ~self._replayed
             self.returns.append(self._total[counted])
             self.successes.append(result.success[counted])
             self._renew(ended.nonzero()[0], ended & ~result.success)
         self.time += time.perf_counter() - began
-        return Step(rewards.astype(np.float32), ended, cut_short, finals)
+        return rewards.astype(np.float32), ended
 
     def _renew(self, rows: NDArray[np.int64], missed: NDArray[np.bool_]) -> None:
         """Replace episodes; those that missed the goal may be replayed."""
@@ -148,3 +143,76 @@ class TrainingArms:
         episodes.q[rows] = self._start[rows]
         self.simulator.begin(episodes, rows)
         self._total[rows] = 0.0
+
+
+def collect(
+    networks: ActorCritic,
+    arms: TrainingArms,
+    rng: np.random.Generator,
+    *,
+    gamma: float,
+    threads: int,
+) -> Experience:
+    """Step the arms, and judge their steps at the end, all at once.
+
+    An episode that the time limit ended would have gone on: its last reward gets the value of its
+    last observation.
+
+    Parameters
+    ----------
+    networks : ActorCritic
+        Choose and judge actions.
+    arms : TrainingArms
+        What is stepped.
+    rng : numpy.random.Generator
+        Draws the noise of actions.
+    gamma : float
+        Discount per step.
+    threads : int
+        Threads that find values.
+    """
+    config, log_std = arms.config, networks.log_std
+    least = -np.inf if config.replay_log_std is None else config.replay_log_std
+    shape = (config.n_steps, config.n_envs)
+    observations = np.empty((*shape, arms.simulator.n_observations), dtype=np.float32)
+    actions = np.empty((*shape, len(log_std)), dtype=np.float32)
+    scales, densities, rewards, going_on = (np.ones(shape, dtype=np.float32) for _ in range(4))
+    for step in range(config.n_steps):
+        observations[step] = seen = arms.observe()
+        noise = rng.standard_normal(actions[step].shape).astype(np.float32)
+        outcome = actions[step], scales[step], densities[step]
+        choose(networks.means(seen), log_std, noise, arms.replaying(), least, *outcome)
+        rewards[step], ended = arms.step(np.clip(actions[step], -1.0, 1.0))
+        going_on[step] = ~ended
+    steps = np.repeat(np.arange(config.n_steps), [len(rows) for rows in arms.cut_short])
+    flat = observations.reshape(-1, observations.shape[-1])
+    values = networks.values(np.concatenate([flat, arms.observe(), *arms.finals]), threads)
+    end = len(flat) + config.n_envs
+    rewards[steps, np.concatenate(arms.cut_short)] += np.float32(gamma) * values[end:]
+    values = values[:end].reshape(-1, config.n_envs)
+    advantages = estimate_advantages(rewards, values, going_on, gamma, config.gae_lambda)
+    parts = (observations, actions, scales, densities, advantages, advantages + values[:-1])
+    # Arm after arm, as Stable-Baselines3 has them.
+    return Experience(*(part.swapaxes(0, 1).reshape(-1, *part.shape[2:]) for part in parts))
+
+
+def estimate_advantages(
+    rewards: Numbers, values: Numbers, going_on: Numbers, gamma: float, gae_lambda: float
+) -> Numbers:
+    """Generalised advantage estimation (Schulman et al. 2016).
+
+    Parameters
+    ----------
+    rewards, going_on : ndarray of float32, shape (n_steps, n_envs)
+        ``going_on`` is 0 where an episode ended in the step, else 1.
+    values : ndarray of float32, shape (n_steps + 1, n_envs)
+        Values of the observations before each step and after the last one.
+    gamma, gae_lambda : float
+        Discount per step, and decay of the estimate.
+    """
+    advantages = np.empty_like(rewards)
+    later = np.zeros_like(rewards[0])
+    for step in reversed(range(len(rewards))):
+        delta = rewards[step] + gamma * values[step + 1] * going_on[step] - values[step]
+        advantages[step] = later = delta + gamma * gae_lambda * going_on[step] * later
+    return advantages

@@ -16,13 +16,11 @@ from kinarm.failed_scenarios import FailedScenarios
 from kinarm.policies.learners import CurvePoint
 from kinarm.policies.library import starting_policy, statistics
 from kinarm.policies.normalizer import Normalizer
-from kinarm.policies.ppo.arms import TrainingArms
-from kinarm.policies.ppo.config import PPOConfig
-from kinarm.policies.ppo.imitation import demonstrate, imitate
+from kinarm.policies.policy import layer_widths
+from kinarm.policies.ppo import EpisodeStates, PPOConfig, PPOState
+from kinarm.policies.ppo.arms import TrainingArms, collect
 from kinarm.policies.ppo.networks import ActorCritic, initial_parameters, split_parameters
-from kinarm.policies.ppo.rollout import collect
-from kinarm.policies.ppo.state import EpisodeStates, PPOState
-from kinarm.policies.ppo.update import logged, update
+from kinarm.policies.ppo.update import demonstrate, imitate, logged, update
 from kinarm.randomness import Stream, stream_generator
 
 IMITATING = "learning from the oracle's motions first"
@@ -65,9 +63,8 @@ class PPOTraining:
         if threads is None:
             threads = available_threads()
         self.threads = whole_number("threads", threads, 1)
-        simulator = self.arms.simulator
-        self._widths = (simulator.n_observations, config.net_arch, simulator.n_actions)
-        self.networks = ActorCritic(*self._widths)
+        self._widths = layer_widths(config.problem, config.net_arch)
+        self.networks = ActorCritic(self._widths)
         self._writer: Any = None
         if tensorboard is not None:
             try:
@@ -82,13 +79,12 @@ class PPOTraining:
         rng, scenarios = seed_iteration(config.seed, 0)
         seen = arms.simulator.world.observe(*arms.sample(scenarios, NORMALIZED_OVER))
         starts, goals = arms.sample(scenarios, config.n_envs, config.start_spread_at(0.0))
-        parameters = initial_parameters(rng, *self._widths, config.log_std_init)
+        parameters = initial_parameters(rng, self._widths, config.log_std_init)
         normalizer = Normalizer.of(seen)
         if config.initial_policy is not None:
-            n_observations, hidden, n_actions = self._widths
-            policy = starting_policy(config.initial_policy, (n_observations, *hidden, n_actions))
+            policy = starting_policy(config.initial_policy, self._widths)
             normalizer = statistics(policy)
-            actor = split_parameters(parameters, *self._widths).actor
+            actor = split_parameters(parameters, self._widths).actor
             for layer, (weights, bias) in zip(policy.layers, actor, strict=True):
                 weights[:], bias[:] = layer
         state = PPOState(

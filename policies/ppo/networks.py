@@ -9,14 +9,11 @@ from numpy.typing import NDArray
 
 from kinarm._parallel import run_rows
 from kinarm.errors import InvalidInputError
-from kinarm.observation import observation_size
 from kinarm.policies.mirror import problem_mirror
-from kinarm.policies.policy import Layer, Policy
-from kinarm.policies.ppo.config import PPOConfig
-from kinarm.policies.ppo.kernels.layers import BLOCK, Network, padded
+from kinarm.policies.policy import Layer, Policy, layer_widths
+from kinarm.policies.ppo import PPOConfig, PPOState
+from kinarm.policies.ppo.kernels.layers import BLOCK, Network, evaluate, padded, transpose
 from kinarm.policies.ppo.kernels.tiles import Numbers
-from kinarm.policies.ppo.kernels.update import evaluate, transpose
-from kinarm.policies.ppo.state import PPOState
 from kinarm.policies.provenance import Provenance
 
 STEPS_A_ROW = 8
@@ -38,20 +35,21 @@ class Parameters(NamedTuple):
     critic: list[Affine]
 
 
-def _layer_widths(
-    n_observations: int, net_arch: Sequence[int], n_actions: int
-) -> list[tuple[int, int]]:
+def _shapes(widths: Sequence[int]) -> list[tuple[int, int]]:
     """Inputs and outputs of all layers, in the order of Stable-Baselines3.
 
     These are the hidden layers of actor and critic, then the last ones.
     """
-    hidden = list(pairwise((n_observations, *net_arch)))
-    return [*hidden, *hidden, (net_arch[-1], n_actions), (net_arch[-1], 1)]
+    *hidden, last = pairwise(widths)
+    return [*hidden, *hidden, last, (widths[-2], 1)]
 
 
-def split_parameters(
-    vector: Vector, n_observations: int, net_arch: Sequence[int], n_actions: int
-) -> Parameters:
+def _count(widths: Sequence[int]) -> int:
+    """Number of all parameters."""
+    return widths[-1] + sum((n_in + 1) * n_out for n_in, n_out in _shapes(widths))
+
+
+def split_parameters(vector: Vector, widths: Sequence[int]) -> Parameters:
     """Take a vector apart, whose parts are then views of it.
 
     The standard deviations come first; of every layer, the weights.
@@ -60,28 +58,24 @@ def split_parameters(
     ----------
     vector : ndarray, shape (n_parameters,)
         All parameters.
-    n_observations, net_arch, n_actions
-        Widths of the input, of the hidden layers, and of the actor's output.
+    widths : sequence of int
+        Widths of the actor's layers, from the observation to the action.
     """
-    widths = _layer_widths(n_observations, net_arch, n_actions)
-    sizes = [n_actions, *(size for n_in, n_out in widths for size in (n_in * n_out, n_out))]
+    shapes = _shapes(widths)
+    sizes = [widths[-1], *(size for n_in, n_out in shapes for size in (n_in * n_out, n_out))]
     if len(vector) != sum(sizes):
         raise InvalidInputError(f"expected a state of {sum(sizes)} parameters, got {len(vector)}")
     log_std, *parts = np.split(vector, np.cumsum(sizes)[:-1])
     layers = [
         (weights.reshape(n_out, n_in), bias)
-        for (n_in, n_out), weights, bias in zip(widths, parts[::2], parts[1::2], strict=True)
+        for (n_in, n_out), weights, bias in zip(shapes, parts[::2], parts[1::2], strict=True)
     ]
-    count = len(net_arch)
+    count = len(widths) - 2
     return Parameters(log_std, [*layers[:count], layers[-2]], [*layers[count:-2], layers[-1]])
 
 
 def initial_parameters(
-    rng: np.random.Generator,
-    n_observations: int,
-    net_arch: Sequence[int],
-    n_actions: int,
-    log_std: float,
+    rng: np.random.Generator, widths: Sequence[int], log_std: float
 ) -> NDArray[np.float32]:
     """Draw parameters as Stable-Baselines3 does: orthogonal weights, and biases of zero.
 
@@ -89,14 +83,13 @@ def initial_parameters(
     ----------
     rng : numpy.random.Generator
         Draws the weights.
-    n_observations, net_arch, n_actions
+    widths
         As for `split_parameters`.
     log_std : float
         Logarithm of the standard deviation of the actions.
     """
-    widths = _layer_widths(n_observations, net_arch, n_actions)
-    vector = np.zeros(n_actions + sum((n_in + 1) * n_out for n_in, n_out in widths))
-    parts = split_parameters(vector, n_observations, net_arch, n_actions)
+    vector = np.zeros(_count(widths))
+    parts = split_parameters(vector, widths)
     parts.log_std[:] = log_std
     for layers, gain in ((parts.actor, ACTOR_GAIN), (parts.critic, CRITIC_GAIN)):
         for weights, _ in layers:
@@ -126,7 +119,7 @@ class ActorCritic:
 
     Parameters
     ----------
-    n_observations, net_arch, n_actions
+    widths
         As for `split_parameters`.
 
     Attributes
@@ -140,11 +133,10 @@ class ActorCritic:
         Logarithms of the standard deviations of the actions.
     """
 
-    def __init__(self, n_observations: int, net_arch: Sequence[int], n_actions: int) -> None:
-        widths = _layer_widths(n_observations, net_arch, n_actions)
-        self.n_parameters = n_actions + sum((n_in + 1) * n_out for n_in, n_out in widths)
+    def __init__(self, widths: Sequence[int]) -> None:
+        self.n_parameters, n_actions = _count(widths), widths[-1]
         every = np.arange(self.n_parameters)
-        numbers = split_parameters(every, n_observations, net_arch, n_actions)
+        numbers = split_parameters(every, widths)
         self._places = np.zeros_like(every)
         tables, end, turned = [], 0, 0
         for layers in (numbers.actor, numbers.critic):
@@ -205,12 +197,12 @@ class ActorCritic:
 
 def actor_policy(config: PPOConfig, state: PPOState) -> Policy:
     """Freeze the actor of a state into a policy, which takes its mean action."""
-    arm, parameters = config.problem.load_arm(), state.parameters.astype(np.float64)
-    widths = (observation_size(arm.n_joints), config.net_arch, arm.n_actuated)
+    parameters = state.parameters.astype(np.float64)
+    actor = split_parameters(parameters, layer_widths(config.problem, config.net_arch)).actor
     return Policy(
         mean=state.normalizer.mean,
         std=state.normalizer.std,
-        layers=tuple(Layer(*affine) for affine in split_parameters(parameters, *widths).actor),
+        layers=tuple(Layer(*affine) for affine in actor),
         provenance=Provenance.of("ppo", config, state.environment_steps),
         mirror=problem_mirror(config.problem) if config.symmetric else None,
     )

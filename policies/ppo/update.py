@@ -1,4 +1,9 @@
-"""An update of actor and critic: some epochs of steps of Adam, each by a minibatch."""
+"""An update of actor and critic: some epochs of steps of Adam, each by a minibatch.
+
+Before a training, an actor may imitate the oracle. Reinforcement spends most of its steps on
+finding the goals at all, and the oracle's motions show where they are. Imitation alone reaches far
+fewer goals than what follows: it never sees where its own errors lead.
+"""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -7,13 +12,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._parallel import SHARED_STEPS, run_together
+from kinarm.errors import InvalidInputError
+from kinarm.failed_scenarios import StartsAndGoals
 from kinarm.policies.config import scheduled
 from kinarm.policies.learners import CurvePoint
-from kinarm.policies.ppo.config import PPOConfig
-from kinarm.policies.ppo.kernels.loss import HALF_LOG_2_PI, LOSSES, Experience, Objective
+from kinarm.policies.normalizer import Normalizer, input_scale
+from kinarm.policies.ppo import PPOConfig
 from kinarm.policies.ppo.kernels.tiles import Numbers
-from kinarm.policies.ppo.kernels.update import Descent, add_gradients, descend, standardisation
+from kinarm.policies.ppo.kernels.update import (
+    HALF_LOG_2_PI,
+    LOSSES,
+    Descent,
+    Experience,
+    Objective,
+    add_gradients,
+    descend,
+    standardisation,
+)
 from kinarm.policies.ppo.networks import ActorCritic
+from kinarm.simulator import Simulator
 
 PARTS = 8
 """Parts of a minibatch whose gradients are found independently of each other."""
@@ -136,3 +153,95 @@ def run_parts(kernel: Callable[..., None], threads: int, *arrays: Any) -> None:
         return 0
 
     run_together(work, SHARED_STEPS, min(threads, PARTS), lambda _: None)
+
+
+EPOCHS = 30
+"""How often imitation uses each step of the motions."""
+
+BATCH_SIZE = 512
+"""Steps per gradient step."""
+
+LEARNING_RATE = 1e-3
+"""Step size of Adam at the beginning; it falls linearly to zero."""
+
+
+class Demonstrations(NamedTuple):
+    """Steps of motions of the oracle: what was seen and done, one row a step."""
+
+    observations: NDArray[np.float64]
+    actions: NDArray[np.float64]
+
+
+def demonstrate(
+    simulator: Simulator, scenarios: StartsAndGoals, threads: int | None = None
+) -> Demonstrations:
+    """Let the oracle solve scenarios; those that it does not solve are left out.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        What the oracle solves them in.
+    scenarios : tuple of ndarray, shapes (n, n_joints) and (n, 3)
+        Starts [rad or m] and goals [m].
+    threads : int, optional
+        As for `kinarm.policies.Oracle`.
+    """
+    from kinarm.policies.oracle import Oracle
+
+    found = Oracle(simulator.problem, threads=threads).solve_batch(*scenarios)
+    solved = [each for each in zip(found, scenarios[1], strict=True) if each[0].reachable]
+    if not solved:
+        raise InvalidInputError("the oracle finds no motion that could be imitated")
+    paths = np.concatenate([solution.path[:-1] for solution, _ in solved])
+    goals = np.concatenate([np.tile(goal, (solution.steps, 1)) for solution, goal in solved])
+    actions = np.concatenate([solution.actions for solution, _ in solved])
+    return Demonstrations(simulator.world.observe(paths, goals), actions)
+
+
+def imitate(
+    networks: ActorCritic,
+    demonstrations: Demonstrations,
+    normalizer: Normalizer,
+    rng: np.random.Generator,
+    threads: int,
+) -> list[float]:
+    """Change the actor so that its means come close to the actions; the critic stays as it is.
+
+    Parameters
+    ----------
+    networks : ActorCritic
+        Networks, of which the actor is changed.
+    demonstrations, normalizer
+        What is imitated, and how observations are normalised.
+    rng : numpy.random.Generator
+        Draws minibatches.
+    threads : int
+        Threads to use; the result does not depend on them.
+
+    Returns
+    -------
+    list of float
+        Mean squared error of the actions in each epoch.
+    """
+    seen = (demonstrations.observations - normalizer.mean) * input_scale(normalizer.std)
+    shown = seen.astype(np.float32), demonstrations.actions.astype(np.float32)
+    n_actions = demonstrations.actions.shape[1]
+    experience = Experience(*shown, *np.empty((4, 0), dtype=np.float32))
+    nets = (networks.actor, networks.critic)
+    gradients = np.empty((PARTS, len(networks.weights)), dtype=np.float32)
+    moments = np.zeros_like(networks.weights), np.zeros_like(networks.weights)
+    losses, errors = np.empty((PARTS, LOSSES)), []
+    batches = max(1, len(seen) // BATCH_SIZE)
+    for epoch in range(EPOCHS):
+        total = 0.0
+        for number, chosen in enumerate(np.array_split(rng.permutation(len(seen)), batches)):
+            objective = Objective(0.0, 0.0, 0.0, 1.0 / (len(chosen) * n_actions), imitating=True)
+            arrays = (experience, chosen, objective, (0.0, 1.0), gradients, losses)
+            run_parts(add_gradients, threads, *nets, *arrays)
+            done = (epoch * batches + number) / (EPOCHS * batches)
+            descent = Descent(LEARNING_RATE * (1 - done), 0.9, 0.999, 1e-8, 1e9)
+            steps = epoch * batches + number + 1
+            descend(*nets, *moments, gradients, descent, steps)
+            total += losses[:, 0].sum()
+        errors.append(total / demonstrations.actions.size)
+    return errors

@@ -1,1 +1,131 @@
-"""kinarm for users of Stable-Baselines3 and rl-zoo3."""
+"""Algorithms of Stable-Baselines3 and sb3-contrib, for the registry of learners."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.policies.config import MANY, NOT_NEGATIVE, POSITIVE, Schedule, TrainingConfig
+from kinarm.policies.learners import Learner, TrainingState, imported
+from kinarm.policies.recipes import shipped_learner
+
+ALGORITHMS = {
+    "a2c": "stable_baselines3:A2C",
+    "ddpg": "stable_baselines3:DDPG",
+    "sac": "stable_baselines3:SAC",
+    "sb3-ppo": "stable_baselines3:PPO",
+    "td3": "stable_baselines3:TD3",
+    "tqc": "sb3_contrib:TQC",
+    "trpo": "sb3_contrib:TRPO",
+}
+"""Class of each algorithm, by the name of the learner."""
+
+
+def hyperparameters_of(text: str) -> dict[str, Any]:
+    """Hyperparameters of a text such as ``"gamma = 0.9, policy_kwargs.net_arch = [64, 64]"``."""
+    try:
+        return dict(tomllib.loads(f"given = {{ {text} }}")["given"])
+    except tomllib.TOMLDecodeError as error:
+        raise InvalidInputError(
+            f"must be as in TOML, such as 'gamma = 0.9, tau = 0.01', got {text!r}"
+        ) from error
+
+
+@dataclass(frozen=True, kw_only=True)
+class SB3Config(TrainingConfig):
+    """Settings of a training with an algorithm of Stable-Baselines3 or sb3-contrib.
+
+    Parameters
+    ----------
+    problem, reward, seed, recipe
+        See `TrainingConfig`.
+    algorithm : str
+        The algorithm, by the name of the learner.
+    iterations : int
+        Steps of all arms.
+    n_envs : int
+        Arms that are simulated at once.
+    training_tolerance : float, optional
+        Distance at which an episode of the training counts as a success [m]. It is the task's
+        tolerance if it is not given.
+    hindsight : bool
+        Whether it learns from the goal-conditioned environment with hindsight replay.
+    normalize : bool
+        Whether observations are normalised by their running statistics.
+    action_noise : float
+        Standard deviation of noise that is added to the actions in training.
+    learning_rate_schedule : {"constant", "linear"}
+        Whether the learning rate stays or falls linearly to zero.
+    hyperparameters : dict
+        Arguments of the algorithm's class, as in TOML; the library's defaults stand for the
+        others.
+    """
+
+    algorithm: str
+    iterations: int = 120_000
+    n_envs: int = field(default=1, metadata=MANY)
+    training_tolerance: float | None = field(default=None, metadata=POSITIVE)
+    hindsight: bool = False
+    normalize: bool = False
+    action_noise: float = field(default=0.0, metadata=NOT_NEGATIVE)
+    learning_rate_schedule: Schedule = "constant"
+    hyperparameters: dict[str, Any] = field(
+        default_factory=dict, metadata={"parse": hyperparameters_of, "metavar": "SETTINGS"}
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.algorithm not in ALGORITHMS:
+            raise UnknownNameError("algorithm", self.algorithm, ALGORITHMS)
+        if self.learning_rate_schedule == "linear" and "learning_rate" not in self.hyperparameters:
+            raise InvalidInputError(
+                "learning_rate_schedule linear needs hyperparameters.learning_rate to start from"
+            )
+
+    @property
+    def learner(self) -> str:
+        """Name by which the learner is found."""
+        return self.algorithm
+
+    def changed(self, changes: Mapping[str, Any]) -> TrainingConfig:
+        """Replace fields; of reward and hyperparameters, what the mapping names."""
+        given = dict(changes)
+        if isinstance(given.get("hyperparameters"), Mapping):
+            given["hyperparameters"] = {**self.hyperparameters, **given["hyperparameters"]}
+        return super().changed(given)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SB3State(TrainingState):
+    """How far a training is; everything else follows from repeating it up to there.
+
+    The training itself, where it is there already, is not in checkpoints.
+    """
+
+    training: Any = field(default=None, repr=False, metadata={"unsaved": True})
+
+
+def _learner(name: str, title: str) -> Learner[SB3Config, SB3State]:
+    """A learner by the name and title of its algorithm."""
+    package = ALGORITHMS[name].partition(":")[0]
+    contrib = package == "sb3_contrib"
+    return shipped_learner(
+        name,
+        SB3Config,
+        title=f"{title} of {'sb3-contrib' if contrib else 'Stable-Baselines3'}",
+        state=SB3State,
+        begin=imported("kinarm.policies.sb3.training", "SB3Training"),
+        policy=imported("kinarm.policies.sb3.training", "trained_policy"),
+        packages=("torch", "stable_baselines3", *([package] if contrib else [])),
+        extra="zoo" if contrib else "sb3",
+    )
+
+
+A2C = _learner("a2c", "Advantage Actor-Critic")
+DDPG = _learner("ddpg", "Deep Deterministic Policy Gradient")
+PPO = _learner("sb3-ppo", "Proximal Policy Optimization")
+SAC = _learner("sac", "Soft Actor-Critic")
+TD3 = _learner("td3", "Twin Delayed DDPG")
+TQC = _learner("tqc", "Truncated Quantile Critics")
+TRPO = _learner("trpo", "Trust Region Policy Optimization")

@@ -24,8 +24,8 @@ from kinarm.errors import InvalidInputError
 from kinarm.policies.learners import CurvePoint
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import Provenance
+from kinarm.policies.sb3 import ALGORITHMS, SB3Config, SB3State
 from kinarm.policies.sb3.environment import sb3_vec_env
-from kinarm.policies.sb3.learners import ALGORITHMS, SB3Config, SB3State
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm

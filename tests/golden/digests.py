@@ -21,7 +21,7 @@ from kinarm import SEMANTICS
 from kinarm._fields import to_plain
 from kinarm.episodes import Rollouts
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.ars.config import ARSState
+from kinarm.policies.ars import ARSState
 from kinarm.policies.learners import train_policy
 from kinarm.policies.library import load_policy
 from kinarm.policies.oracle import ORACLE_SEMANTICS, Oracle
@@ -129,7 +129,7 @@ def ars_digests() -> dict[str, str]:
 
 def ppo_digests() -> dict[str, str]:
     """Three iterations of PPO."""
-    from kinarm.policies.ppo.state import PPOState
+    from kinarm.policies.ppo import PPOState
 
     found = {}
     again = {"replay_share": 0.5}

@@ -10,11 +10,12 @@ from scipy import stats
 from kinarm.kernels.lanes import LANES
 from kinarm.observation import part_slices
 from kinarm.policies import ARSConfig, train_policy
-from kinarm.policies.ars.kernels import logarithm, normal_pairs
 from kinarm.policies.ars.networks import (
     first_deviations,
     initial_network,
+    logarithm,
     network_layers,
+    normal_pairs,
     perturbations,
     perturbed_networks,
 )

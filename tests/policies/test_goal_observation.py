@@ -6,7 +6,7 @@ import pytest
 from kinarm.envs.goal import GoalInterface, ReachGoalEnv
 from kinarm.errors import InvalidInputError
 from kinarm.policies import load_policy
-from kinarm.policies.goal_observation import flat_observation
+from kinarm.policies.policy import flat_observation
 
 
 @pytest.fixture

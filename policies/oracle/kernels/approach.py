@@ -1,32 +1,113 @@
 """How close the tool can come to a goal, and in how few steps: proof by branch and bound.
 
 A box of configurations is excluded when a lower bound of the distance over it exceeds what is asked
-for, and what such a bound excludes of it is cut off (`kinarm.policies.oracle.kernels.box_bound`).
-Nor does a motion end where the arm touches something: on demand a box is excluded, too, if some
-pair of bodies is proven to overlap throughout it (`kinarm.policies.oracle.kernels.overlap`). A box
-that is not excluded is tried where the linear model of the arm comes closest to the goal, and
-halved. Several boxes of a search are examined side by side, in lanes.
+for, and what such a bound excludes of it is cut off. Nor does a motion end where the arm touches
+something: on demand a box is excluded, too, if some pair of bodies is proven to overlap throughout
+it (`kinarm.policies.oracle.kernels.box_proofs`). A box that is not excluded is tried where the
+linear model of the arm comes closest to the goal, and halved. Several boxes of a search are
+examined side by side, in lanes.
 """
 
 import math
+from functools import cache
+from typing import Any
 
 import numpy as np
+from numba import types
 
 from kinarm.chain import Chain, MotionBounds
 from kinarm.contact_shapes import ContactShapes
-from kinarm.kernels.compiling import Array, Vector, lean_kernel
-from kinarm.kernels.kinematics import point_jacobian
-from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits
-from kinarm.kernels.session import put, take
-from kinarm.policies.oracle.kernels.box_bound import (
+from kinarm.kernels.compiling import Array, Vector, inlined, lean_kernel
+from kinarm.kernels.kinematics import POSE, point_jacobian
+from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, lanes
+from kinarm.kernels.records import Fixed, Layout
+from kinarm.kernels.session import ONE, THREE, put, take
+from kinarm.policies.oracle.kernels.box_proofs import (
     closest_step,
     curved_bound,
     joint_bound,
     offset_from_goal,
+    overlaps,
     trim,
 )
-from kinarm.policies.oracle.kernels.boxes import ROUNDING, WAITING, Boxes, halve, within_steps
-from kinarm.policies.oracle.kernels.overlap import overlaps
+
+WAITING = 4096
+"""Boxes that can wait at a time; halving eight until they are too small takes fewer."""
+
+SMALLEST = 1e-6
+"""How far the tool can move in a box that is not halved any more [m]."""
+
+ROUNDING = 1e-9
+"""By how much boxes and distances are enlarged to cover rounding [rad, m]."""
+
+
+Boxes = Any
+"""Record of a `layout`."""
+
+
+@cache
+def layout(n: int, n_joints: int) -> Layout:
+    """Work space of a block of boxes of the first n joints: arrays of lanes, but for ``lever``.
+
+    `kinarm.kernels.lanes.as_numbers` views lanes with one axis more, that of the boxes.
+    """
+    shapes = {
+        # Lower and upper corner [rad or m], and the distance proven of the box [m]: what the stack
+        # holds of it in a row. Half-widths, and which share is left of it.
+        "box": (ONE, 2 * n + 1),
+        "half": (n,),
+        "share": (ONE,),
+        # Centre, and a configuration that may be close to the goal [rad or m]; their poses.
+        **dict.fromkeys(("q", "tried"), (ONE, n_joints)),
+        **dict.fromkeys(("poses", "between"), (n_joints + 1, Fixed(POSE))),
+        # Distances from the goal at the centre and where it is tried [m].
+        "distance": (Fixed(2),),
+        # Jacobians of the tool at the centre, and of a point of the arm [m/rad, or m/m].
+        **dict.fromkeys(("jacobian", "turns"), (THREE, n)),
+        # Vector from the goal to the tool; step, scale, slope, least and bend of `curved_bound`.
+        "model": (Fixed(6), max(n, 3)),
+    }
+    arrays = {name: (lanes, shape) for name, shape in shapes.items()}
+    # How far each joint moves the tool, or what counts as that [m/rad, or m/m].
+    return Layout("Boxes", {**arrays, "lever": (types.float64, (n,))})
+
+
+@inlined
+def within_steps(
+    chain: Chain, start: Array, step_limit: Array, steps: int, lower: Array, upper: Array
+) -> None:
+    """Fill in the corners of what the first joints can reach in some steps."""
+    for i in range(step_limit.shape[0]):
+        reach = steps * step_limit[i] + ROUNDING
+        lower[i] = max(chain.lower[i], start[i] - reach)
+        upper[i] = min(chain.upper[i], start[i] + reach)
+
+
+@inlined
+def halve(stack: Array, row: int, lane: int, boxes: Boxes) -> bool:
+    """Put the halves of a box from a lane into the stack, that with the point tried above.
+
+    It is cut across the joint that can move the tool farthest in it. Returns whether it is large
+    enough.
+    """
+    lever, box = boxes.lever, as_numbers(boxes.box)
+    n = lever.shape[0]
+    widest, farthest = 0, -1.0
+    for i in range(n):
+        moved = lever[i] * (box[0, n + i, lane] - box[0, i, lane])
+        if moved > farthest:
+            widest, farthest = i, moved
+    if farthest < SMALLEST:
+        return False
+    middle = 0.5 * (box[0, widest, lane] + box[0, n + widest, lane])
+    take(boxes.box, 0, lane, stack, row)
+    take(boxes.box, 0, lane, stack, row + 1)
+    # The last box is examined next.
+    near_lower = as_numbers(boxes.tried)[0, widest, lane] <= middle
+    above, below = (row, row + 1) if near_lower else (row + 1, row)
+    stack[above, widest] = middle
+    stack[below, n + widest] = middle
+    return True
 
 
 @lean_kernel

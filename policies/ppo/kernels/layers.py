@@ -9,7 +9,7 @@ import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
-from kinarm.kernels.compiling import helper, inlined
+from kinarm.kernels.compiling import helper, inlined, kernel
 from kinarm.policies.ppo.kernels.tiles import LANES, ROWS, Matrix, Numbers, multiply
 
 BLOCK = 64
@@ -156,3 +156,43 @@ def widest(layers: NDArray[np.int64]) -> int:
     for layer in range(layers.shape[0]):
         found = max(found, padded(layers[layer, N_IN]))
     return found
+
+
+@kernel
+def evaluate(
+    first: int, last: int, network: Network, observations: Numbers, outputs: Numbers
+) -> None:
+    """Evaluate a network.
+
+    Parameters
+    ----------
+    first, last : int
+        Range of the rows.
+    observations, outputs : ndarray of float32, shape (n, n_observations) and (n, n_out)
+        What it is given, and where its values go.
+    """
+    layers = network.layers
+    work = np.zeros(work_length(layers), dtype=np.float32)
+    end = layers.shape[0] - 1
+    sink, wide_out = layers[end, OUTPUTS], padded(layers[end, N_OUT])
+    for begin in range(first, last, BLOCK):
+        samples = min(BLOCK, last - begin)
+        for s in range(samples):
+            load_sample(observations, begin + s, layers, work, s)
+        forward(network, whole_tiles(samples), work)
+        for s in range(samples):
+            for j in range(outputs.shape[1]):
+                outputs[begin + s, j] = work[sink + s * wide_out + j]
+
+
+@kernel
+def transpose(network: Network) -> None:
+    """Fill in the transposed matrices of a network."""
+    layers = network.layers
+    for layer in range(1, layers.shape[0]):
+        n_in, n_out = layers[layer, N_IN], layers[layer, N_OUT]
+        first, sink = layers[layer, WEIGHTS], layers[layer, TURNED]
+        wide_in, wide_out = padded(n_in), padded(n_out)
+        for j in range(n_out):
+            for i in range(n_in):
+                network.turned[sink + j * wide_in + i] = network.weights[first + i * wide_out + j]

@@ -1,4 +1,4 @@
-"""The kernels that Python calls: actions and values of a rollout, and the steps of an update."""
+"""The kernels that Python calls: actions of a rollout, and the steps of an update."""
 
 import math
 from typing import NamedTuple
@@ -10,29 +10,55 @@ from kinarm.kernels.compiling import inlined, kernel
 from kinarm.kernels.elementary import exponential
 from kinarm.policies.ppo.kernels.layers import (
     BLOCK,
-    N_IN,
-    N_OUT,
     OUTPUTS,
-    TURNED,
-    WEIGHTS,
     Network,
     backward,
     forward,
     load_sample,
     padded,
+    transpose,
     whole_tiles,
     widest,
     work_length,
 )
-from kinarm.policies.ppo.kernels.loss import (
-    Experience,
-    Objective,
-    derive_by_means,
-    derive_by_values,
-    find_precision,
-    log_density,
-)
 from kinarm.policies.ppo.kernels.tiles import LANES, Numbers
+
+HALF_LOG_2_PI = 0.91893853320467274178
+
+MOST = 80.0
+"""Largest logarithm of a ratio of densities whose exponential is finite in single precision."""
+
+LOSSES = 4
+"""Sums over samples that are logged: policy loss, value loss, clipped ratios, divergence."""
+
+
+class Experience(NamedTuple):
+    """Experience of a rollout, one row a step.
+
+    Actions are not clipped. Scales tell by how much wider than usual the noise was with which they
+    were chosen, densities are the logarithms of its probability densities, over the scale.
+    """
+
+    observations: Numbers
+    actions: Numbers
+    scales: Numbers
+    densities: Numbers
+    advantages: Numbers
+    returns: Numbers
+
+
+class Objective(NamedTuple):
+    """Weights of the loss of a minibatch (see `PPOConfig`), and of a sample in its means.
+
+    Imitation has another loss: the squared error of the means of actions, of which no other part of
+    the experience is told.
+    """
+
+    clip_range: float
+    ent_coef: float
+    vf_coef: float
+    share: float
+    imitating: bool = False
 
 
 class Descent(NamedTuple):
@@ -43,33 +69,6 @@ class Descent(NamedTuple):
     second_decay: float
     epsilon: float
     max_norm: float
-
-
-@kernel
-def evaluate(
-    first: int, last: int, network: Network, observations: Numbers, outputs: Numbers
-) -> None:
-    """Evaluate a network.
-
-    Parameters
-    ----------
-    first, last : int
-        Range of the rows.
-    observations, outputs : ndarray of float32, shape (n, n_observations) and (n, n_out)
-        What it is given, and where its values go.
-    """
-    layers = network.layers
-    work = np.zeros(work_length(layers), dtype=np.float32)
-    end = layers.shape[0] - 1
-    sink, wide_out = layers[end, OUTPUTS], padded(layers[end, N_OUT])
-    for begin in range(first, last, BLOCK):
-        samples = min(BLOCK, last - begin)
-        for s in range(samples):
-            load_sample(observations, begin + s, layers, work, s)
-        forward(network, whole_tiles(samples), work)
-        for s in range(samples):
-            for j in range(outputs.shape[1]):
-                outputs[begin + s, j] = work[sink + s * wide_out + j]
 
 
 @kernel
@@ -156,11 +155,15 @@ def add_gradients(
     """
     n_parts, n_weights = gradients.shape
     n_actions = experience.actions.shape[1]
-    log_std = actor.weights[n_weights - padded(n_actions) :]
+    by_log_std = n_weights - padded(n_actions)
+    log_std = actor.weights[by_log_std:]
     precision = np.zeros(n_actions)
     find_precision(log_std, precision)
     work = np.zeros(work_length(actor.layers), dtype=np.float32)
     behind = np.zeros((BLOCK + 1) * widest(actor.layers), dtype=np.float32)
+    mean_sink = actor.layers[actor.layers.shape[0] - 1, OUTPUTS]
+    value_sink = critic.layers[critic.layers.shape[0] - 1, OUTPUTS]
+    lowest, highest = 1.0 - objective.clip_range, 1.0 + objective.clip_range
     for part in range(first, last):
         gradient, loss = gradients[part], losses[part]
         gradient[:] = np.float32(0.0)
@@ -172,76 +175,48 @@ def add_gradients(
             for s in range(samples):
                 load_sample(experience.observations, rows[s], actor.layers, work, s)
             forward(actor, tiled, work)
-            derive_by_means(
-                actor.layers,
-                experience,
-                rows,
-                objective,
-                standard,
-                log_std,
-                precision,
-                work,
-                gradient,
-                loss,
-            )
+            # Replace means of actions by the derivatives of the clipped surrogate by them.
+            for s in range(samples):
+                i, row = rows[s], mean_sink + s * padded(n_actions)
+                if objective.imitating:
+                    for j in range(n_actions):
+                        error = float(work[row + j]) - experience.actions[i, j]
+                        loss[0] += error * error
+                        work[row + j] = 2.0 * objective.share * error
+                    continue
+                density, scale = 0.0, float(experience.scales[i])
+                for j in range(n_actions):
+                    deviation = (float(experience.actions[i, j]) - work[row + j]) / scale
+                    density += log_density(deviation, precision[j], log_std[j])
+                difference = min(max(density - experience.densities[i], -MOST), MOST)
+                ratio = exponential(difference)
+                advantage = (experience.advantages[i] - standard[0]) * standard[1]
+                surrogate = advantage * ratio
+                limited = advantage * min(max(ratio, lowest), highest)
+                loss[0] -= min(surrogate, limited)
+                loss[2] += abs(ratio - 1.0) > objective.clip_range
+                loss[3] += (ratio - 1.0) - difference
+                slope = -surrogate * objective.share if surrogate <= limited else 0.0
+                for j in range(n_actions):
+                    deviation = (float(experience.actions[i, j]) - work[row + j]) / scale
+                    pull = deviation * precision[j]
+                    work[row + j] = slope * pull / scale
+                    gradient[by_log_std + j] += slope * (deviation * pull - 1.0)
             backward(actor, tiled, samples, work, behind, gradient)
+            if objective.imitating:
+                continue
             forward(critic, tiled, work)
-            derive_by_values(critic.layers, experience, rows, objective, work, loss)
+            # Replace values by the derivatives of the squared error by them.
+            for s in range(samples):
+                row = value_sink + s * padded(1)
+                error = float(work[row]) - experience.returns[rows[s]]
+                loss[1] += error * error
+                work[row] = objective.vf_coef * 2.0 * error * objective.share
             backward(critic, tiled, samples, work, behind, gradient)
         # Every part has its share of what does not depend on samples: the entropy.
         for j in range(n_actions):
             share = objective.ent_coef * (end - begin) / len(chosen)
-            gradient[n_weights - padded(n_actions) + j] -= share
-
-
-@kernel
-def add_imitation_gradients(
-    first: int,
-    last: int,
-    actor: Network,
-    observations: Numbers,
-    actions: Numbers,
-    chosen: NDArray[np.int64],
-    gradients: Numbers,
-    losses: NDArray[np.float64],
-) -> None:
-    """Find the gradient of the mean squared error, in parts that do not depend on threads.
-
-    Parameters
-    ----------
-    first, last : int
-        Which parts.
-    actor : Network
-        The actor; other weights in its array get derivatives of zero.
-    observations, actions : ndarray of float32, shape (n, n_observations) and (n, n_actions)
-        What was seen and done.
-    chosen : ndarray of int, shape (batch_size,)
-        Rows of the minibatch.
-    gradients, losses : ndarray, shape (n_parts, n_weights) and (n_parts,)
-        Filled with the derivatives by the weights, and sums of squared errors.
-    """
-    layers, n_parts, n_actions = actor.layers, gradients.shape[0], actions.shape[1]
-    sink, wide = layers[layers.shape[0] - 1, OUTPUTS], padded(n_actions)
-    weight = 2.0 / (len(chosen) * n_actions)
-    work = np.zeros(work_length(layers), dtype=np.float32)
-    behind = np.zeros((BLOCK + 1) * widest(layers), dtype=np.float32)
-    for part in range(first, last):
-        gradient = gradients[part]
-        gradient[:] = np.float32(0.0)
-        losses[part] = 0.0
-        begin, end = part * len(chosen) // n_parts, (part + 1) * len(chosen) // n_parts
-        for start in range(begin, end, BLOCK):
-            rows = chosen[start : min(start + BLOCK, end)]
-            samples, tiled = len(rows), whole_tiles(len(rows))
-            for s in range(samples):
-                load_sample(observations, rows[s], layers, work, s)
-            forward(actor, tiled, work)
-            for s in range(samples):
-                for j in range(n_actions):
-                    error = float(work[sink + s * wide + j]) - actions[rows[s], j]
-                    losses[part] += error * error
-                    work[sink + s * wide + j] = weight * error
-            backward(actor, tiled, samples, work, behind, gradient)
+            gradient[by_log_std + j] -= share
 
 
 @kernel
@@ -302,19 +277,6 @@ def descend(
     transpose(critic)
 
 
-@kernel
-def transpose(network: Network) -> None:
-    """Fill in the transposed matrices of a network."""
-    layers = network.layers
-    for layer in range(1, layers.shape[0]):
-        n_in, n_out = layers[layer, N_IN], layers[layer, N_OUT]
-        first, sink = layers[layer, WEIGHTS], layers[layer, TURNED]
-        wide_in, wide_out = padded(n_in), padded(n_out)
-        for j in range(n_out):
-            for i in range(n_in):
-                network.turned[sink + j * wide_in + i] = network.weights[first + i * wide_out + j]
-
-
 @inlined
 def whole_power(base: float, exponent: int) -> float:
     """Power of a number, by squaring."""
@@ -325,3 +287,16 @@ def whole_power(base: float, exponent: int) -> float:
         base *= base
         exponent //= 2
     return power
+
+
+@inlined
+def find_precision(log_std: Numbers, precision: NDArray[np.float64]) -> None:
+    """Fill in inverse variances."""
+    for j in range(len(precision)):
+        precision[j] = exponential(-2.0 * float(log_std[j]))
+
+
+@inlined
+def log_density(deviation: float, precision: float, log_std: float) -> float:
+    """Logarithm of a normal density."""
+    return -0.5 * deviation * deviation * precision - log_std - HALF_LOG_2_PI

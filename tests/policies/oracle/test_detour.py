@@ -8,9 +8,8 @@ from configurations import depths
 
 from kinarm.arm import Arm
 from kinarm.policies.oracle import motion_search
-from kinarm.policies.oracle.detour import find_detour
 from kinarm.policies.oracle.inverse import steps_between
-from kinarm.policies.oracle.motion_search import MotionSearch, along_path, two_segments
+from kinarm.policies.oracle.motion_search import MotionSearch, along_path, find_detour, two_segments
 from kinarm.problem import PROBLEMS
 from kinarm.scene import PAPER_BENCHES, Obstacle, Scene
 from kinarm.simulator import Simulator

@@ -14,9 +14,9 @@ from stable_baselines3.common.buffers import RolloutBuffer
 from stable_baselines3.common.logger import Logger
 
 from kinarm.policies import PPOConfig, recipe, sb3_vec_env
+from kinarm.policies.ppo.arms import collect, estimate_advantages
 from kinarm.policies.ppo.learner import PPOTraining
 from kinarm.policies.ppo.networks import initial_parameters, orthogonal, split_parameters
-from kinarm.policies.ppo.rollout import collect, estimate_advantages
 from kinarm.policies.ppo.update import logged, update
 from kinarm.problem import PROBLEMS
 from kinarm.task import RewardWeights
@@ -180,7 +180,7 @@ def test_update(config, begun, monkeypatch):
 class TestParameters:
     def test_are_in_the_order_of_the_policy(self):
         state = PPOTraining(AWKWARD).initial_state()
-        parts = split_parameters(state.parameters, 48, AWKWARD.net_arch, 5)
+        parts = split_parameters(state.parameters, (48, *AWKWARD.net_arch, 5))
         policy = twin(AWKWARD, state).policy
         theirs = {name: p.detach().numpy() for name, p in policy.named_parameters()}
         ours = {"log_std": parts.log_std}
@@ -195,10 +195,10 @@ class TestParameters:
 
     def test_are_drawn_as_theirs(self):
         """Singular values of every matrix are those of a model that they initialise."""
-        drawn = initial_parameters(np.random.default_rng(0), 48, AWKWARD.net_arch, 5, 0.0)
+        drawn = initial_parameters(np.random.default_rng(0), (48, *AWKWARD.net_arch, 5), 0.0)
         vector = torch.nn.utils.parameters_to_vector(twin(AWKWARD).policy.parameters())
         theirs, ours = (
-            split_parameters(each, 48, AWKWARD.net_arch, 5)
+            split_parameters(each, (48, *AWKWARD.net_arch, 5))
             for each in (vector.detach().numpy(), drawn)
         )
         for first, second in zip(

@@ -8,8 +8,8 @@ import pytest
 from kinarm.envs import ReachEnv
 from kinarm.failed_scenarios import FailedScenarios
 from kinarm.policies import Normalizer, PPOConfig, PPOState
+from kinarm.policies.ppo import EpisodeStates
 from kinarm.policies.ppo.arms import TrainingArms
-from kinarm.policies.ppo.state import EpisodeStates
 from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
 from kinarm.task import RewardWeights
@@ -83,15 +83,15 @@ def test_equals_single_environments(begun, normalizer, horizon, steps):
         for seen, (_, observation) in zip(arms.observe(), singles, strict=True):
             assert_normalized(normalizer, seen, observation)
         actions = rng.uniform(-1, 1, (NUMBER, 5)).astype(np.float32)
-        step = arms.step(actions)
-        finals = dict(zip(step.cut_short.tolist(), step.finals, strict=True))
+        rewards, ended = arms.step(actions)
+        finals = dict(zip(arms.cut_short[-1].tolist(), arms.finals[-1], strict=True))
         for row, (single, _) in enumerate(singles):
             observation, reward, terminated, truncated, info = single.step(actions[row])
             returns[row] += reward
-            assert step.rewards[row] == np.float32(reward)
-            assert step.ended[row] == (terminated or truncated)
+            assert rewards[row] == np.float32(reward)
+            assert ended[row] == (terminated or truncated)
             assert (row in finals) == truncated
-            if not step.ended[row]:
+            if not ended[row]:
                 singles[row] = single, observation
                 continue
             if truncated:
@@ -149,8 +149,8 @@ class TestMirror:
         np.testing.assert_array_equal(plain.observe()[right], mirrored.observe()[right])
         actions = np.random.default_rng(2).uniform(-1, 1, (30, 5))
         first, second = plain.step(actions), mirrored.step(actions)
-        np.testing.assert_array_equal(first.rewards[right], second.rewards[right])
-        np.testing.assert_array_equal(first.ended[right], second.ended[right])
+        np.testing.assert_array_equal(first[0][right], second[0][right])
+        np.testing.assert_array_equal(first[1][right], second[1][right])
 
 
 def test_tolerance_can_change_between_restored_states(begun):
@@ -181,7 +181,7 @@ class TestReplay:
         rng, ended = np.random.default_rng(6), []
         for _ in range(steps):
             before, replayed = arms.states(), arms.states().replayed
-            over = arms.step(rng.uniform(-1, 1, (40, 5))).ended
+            _, over = arms.step(rng.uniform(-1, 1, (40, 5)))
             for row in np.flatnonzero(over):
                 scenario = (*before.start[row], *before.goal[row])
                 held = arms.failed.goals[-over.sum() :]
@@ -218,7 +218,7 @@ def test_a_share_of_the_penalty(begun):
     rng, touched = np.random.default_rng(3), 0
     for _ in range(30):
         actions = rng.uniform(-1, 1, (60, 5))
-        rewards, milder = whole.step(actions).rewards, mild.step(actions).rewards
+        (rewards, _), (milder, _) = whole.step(actions), mild.step(actions)
         touching = rewards < -0.8
         expected = rewards - 0.75 * REWARD.collision * touching
         np.testing.assert_allclose(milder, expected, rtol=0, atol=1e-6)
@@ -231,7 +231,7 @@ def drive(arms, steps=200):
     rng, history = np.random.default_rng(0), []
     for _ in range(steps):
         before, distances = arms.states(), arms.episodes.distance.copy()
-        rewards, ended, *_ = arms.step(rng.uniform(-0.4, 0.4, (NUMBER, 5)).astype(np.float32))
+        rewards, ended = arms.step(rng.uniform(-0.4, 0.4, (NUMBER, 5)).astype(np.float32))
         history.append((distances, before.steps, rewards, ended))
     return [np.array(column) for column in zip(*history, strict=True)]
 

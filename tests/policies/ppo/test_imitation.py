@@ -9,20 +9,20 @@ from kinarm._console import told_of_activities
 from kinarm.errors import InvalidInputError
 from kinarm.policies import PPOConfig
 from kinarm.policies.normalizer import Normalizer
-from kinarm.policies.ppo.imitation import BATCH_SIZE, Demonstrations, demonstrate, imitate
-from kinarm.policies.ppo.kernels.update import add_imitation_gradients
+from kinarm.policies.ppo.kernels.update import LOSSES, Experience, Objective, add_gradients
 from kinarm.policies.ppo.learner import IMITATING, PPOTraining
 from kinarm.policies.ppo.networks import ActorCritic, actor_policy, initial_parameters
+from kinarm.policies.ppo.update import BATCH_SIZE, Demonstrations, demonstrate, imitate
 from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
 
-WIDTHS = (7, (9, 5), 3)
+WIDTHS = (7, 9, 5, 3)
 RIGHT = PROBLEMS["right"]
 
 
 def made_networks(seed=0):
-    parameters = initial_parameters(np.random.default_rng(seed), *WIDTHS, -1.0)
-    networks = ActorCritic(*WIDTHS)
+    parameters = initial_parameters(np.random.default_rng(seed), WIDTHS, -1.0)
+    networks = ActorCritic(WIDTHS)
     networks.load(parameters)
     return networks, parameters
 
@@ -43,14 +43,15 @@ def test_gradient_is_that_of_the_mean_squared_error():
     networks, parameters = made_networks()
     shown = made_demonstrations(150)
     arrays = [array.astype(np.float32) for array in shown]
+    experience = Experience(*arrays, *np.empty((4, 0), dtype=np.float32))
     chosen = np.random.default_rng(0).permutation(150)[:101]
     found = []
     for parts in (1, 3):
         gradients = np.full((parts, len(networks.weights)), np.nan, dtype=np.float32)
-        losses = np.full(parts, np.nan)
-        add_imitation_gradients(
-            *(0, parts, networks.actor, *arrays, chosen, gradients, losses),
-        )
+        losses = np.full((parts, LOSSES), np.nan)
+        objective = Objective(0.0, 0.0, 0.0, 1 / (101 * WIDTHS[-1]), imitating=True)
+        given = (experience, chosen, objective, (0.0, 1.0), gradients, losses)
+        add_gradients(0, parts, networks.actor, networks.critic, *given)
         found.append(networks.gathered(gradients.sum(axis=0)))
     np.testing.assert_allclose(found[0], found[1], rtol=0, atol=1e-6)
     wanted = shown.actions[chosen]

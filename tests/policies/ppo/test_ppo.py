@@ -16,9 +16,9 @@ from kinarm.policies import (
     train_policy,
 )
 from kinarm.policies.normalizer import input_scale
+from kinarm.policies.ppo.arms import collect as collect_rollout
 from kinarm.policies.ppo.learner import PPOTraining
 from kinarm.policies.ppo.networks import split_parameters
-from kinarm.policies.ppo.rollout import collect as collect_rollout
 from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
 from kinarm.task import RewardWeights
@@ -97,7 +97,7 @@ class TestAdvantages:
             )
             training = PPOTraining(config)
             state = training.initial_state()
-            parts = split_parameters(state.parameters, 48, config.net_arch, 5)
+            parts = split_parameters(state.parameters, (48, *config.net_arch, 5))
             for weights, bias in (parts.actor[-1], parts.critic[-1]):
                 weights[:], bias[:] = 0.0, 0.0
             parts.critic[-1][1][:] = self.VALUE
@@ -218,7 +218,7 @@ def predicted(training, state, observations):
 def test_policy_acts_like_the_actor(trained):
     config, _, states = trained
     training, state = PPOTraining(config), replace(states[-1], parameters=states[-1].parameters * 1)
-    actor = split_parameters(state.parameters, 48, config.net_arch, 5).actor
+    actor = split_parameters(state.parameters, (48, *config.net_arch, 5)).actor
     actor[-1][0][:] *= 100  # so that some actions are clipped
     policy = state_policy(config, state)
     simulator = Simulator(config.problem, threads=1)

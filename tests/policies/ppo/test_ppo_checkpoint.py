@@ -15,7 +15,7 @@ from kinarm.policies import (
     load_checkpoint,
     save_checkpoint,
 )
-from kinarm.policies.ppo.state import EpisodeStates
+from kinarm.policies.ppo import EpisodeStates
 
 CONFIG = PPOConfig(problem="left", net_arch=(9, 8), n_envs=3, n_steps=4, batch_size=6)
 

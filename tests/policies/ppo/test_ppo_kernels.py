@@ -5,15 +5,16 @@ import pytest
 
 from kinarm.errors import InvalidInputError
 from kinarm.kernels.compiling import kernel
-from kinarm.policies.ppo.kernels.layers import BLOCK, hyperbolic_tangent
-from kinarm.policies.ppo.kernels.loss import LOSSES, Experience, Objective
+from kinarm.policies.ppo.kernels.layers import BLOCK, evaluate, hyperbolic_tangent
 from kinarm.policies.ppo.kernels.tiles import Matrix, multiply
 from kinarm.policies.ppo.kernels.update import (
+    LOSSES,
     Descent,
+    Experience,
+    Objective,
     add_gradients,
     choose,
     descend,
-    evaluate,
     standardisation,
 )
 from kinarm.policies.ppo.networks import ActorCritic, split_parameters
@@ -75,14 +76,14 @@ class Reference:
     def __init__(self, arch, seed=0):
         self.rng = np.random.default_rng(seed)
         self.arch = arch
-        self.networks = ActorCritic(N_OBSERVATIONS, arch, N_ACTIONS)
+        self.networks = ActorCritic((N_OBSERVATIONS, *arch, N_ACTIONS))
         self.count = self.networks.n_parameters
         self.vector = 0.3 * numbers(self.rng, self.count)
         self.networks.load(self.vector)
 
     def outputs(self, vector, observations):
         """Means, values and standard deviations."""
-        parts = split_parameters(vector, N_OBSERVATIONS, self.arch, N_ACTIONS)
+        parts = split_parameters(vector, (N_OBSERVATIONS, *self.arch, N_ACTIONS))
         found = []
         for layers in (parts.actor, parts.critic):
             values = observations.astype(float)
@@ -234,4 +235,4 @@ def test_standardisation():
 def test_a_vector_of_another_network_is_refused():
     """By hand: 1 deviation, 24 + 8 in the layers of each, 3 for the action and 3 for the value."""
     with pytest.raises(InvalidInputError, match="expected a state of 71 parameters, got 70"):
-        split_parameters(np.arange(70), 7, (3, 2), 1)
+        split_parameters(np.arange(70), (7, 3, 2, 1))

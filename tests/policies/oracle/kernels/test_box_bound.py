@@ -9,14 +9,14 @@ from proofs import within
 from kinarm.chain import MotionBounds
 from kinarm.kernels.kinematics import POSE, point_jacobian
 from kinarm.kernels.lanes import LANES, as_lanes, select
-from kinarm.policies.oracle.kernels.box_bound import (
+from kinarm.policies.oracle.kernels.box_proofs import (
     closest_step,
     curved_bound,
     joint_bound,
     offset_from_goal,
+    overlaps,
     trim,
 )
-from kinarm.policies.oracle.kernels.overlap import overlaps
 
 
 @njit

@@ -8,7 +8,7 @@ from numba import njit
 
 from kinarm.arm import Arm
 from kinarm.kernels.kinematics import POSE, forward_kinematics
-from kinarm.policies.oracle.kernels.overlap import overlaps
+from kinarm.policies.oracle.kernels.box_proofs import overlaps
 from kinarm.problem import PROBLEMS
 from kinarm.scene import PAPER_BENCHES, Obstacle, Scene
 from kinarm.simulator import Simulator
