@@ -7,9 +7,8 @@ from typing import Any, Literal
 import msgspec
 
 from kinarm._files import reading
-from kinarm._validation import finite_array
 from kinarm.episodes import Outcome
-from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.errors import InvalidInputError, UnknownNameError, finite_array
 from kinarm.evaluation.bounds import Bounds, bounds_document
 from kinarm.evaluation.outcomes import Cause, Pair
 from kinarm.evaluation.schemas import Count, Digest, Document, Share

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from kinarm._files import absolute, check_output, only_writer, write_text
-from kinarm._validation import FROM_ZERO, TRIALS
-from kinarm.errors import InvalidInputError
+from kinarm.errors import FROM_ZERO, TRIALS, InvalidInputError
 from kinarm.problem import problem_names
 from kinarm.problem_options import ProblemOptions, say_choices
 

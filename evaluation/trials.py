@@ -8,7 +8,7 @@ from functools import cache, cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm._validation import MOST_TRIALS, whole_number
+from kinarm.errors import MOST_TRIALS, whole_number
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scenarios import draw_for_each
 from kinarm.simulator import Simulator

@@ -16,8 +16,7 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 import numpy as np
 
 from kinarm._files import first_line
-from kinarm._validation import check_range
-from kinarm.errors import InvalidInputError, KinarmError
+from kinarm.errors import InvalidInputError, KinarmError, check_range
 
 T = TypeVar("T")
 
@@ -124,7 +123,7 @@ class Checked:
 
     When one is built, lists and arrays become tuples, and numbers become Python's, whole where
     whole ones are asked for. What remains wrong is refused, numbers out of range included; see
-    `kinarm._validation.check_range`.
+    `kinarm.errors.check_range`.
     """
 
     def __post_init__(self) -> None:

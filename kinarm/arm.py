@@ -15,10 +15,9 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._files import first_line
-from kinarm._validation import finite_array
 from kinarm.arm_specification import AllowedContact, ArmSpecification
 from kinarm.chain import Chain, link_lengths
-from kinarm.errors import ArmError
+from kinarm.errors import ArmError, finite_array
 from kinarm.meshes import hull_of_mesh
 from kinarm.urdf import Description, read_urdf
 

@@ -5,8 +5,7 @@ from pathlib import Path
 
 from kinarm._fields import Checked, from_plain, init_fields, read_toml
 from kinarm._files import absolute, is_file, shipped_files
-from kinarm._validation import POSITIVE
-from kinarm.errors import ArmError
+from kinarm.errors import POSITIVE, ArmError
 
 PACKAGE = "example-robot-data:"
 """Prefix of sources that lie in the installed package of that name."""

@@ -13,10 +13,15 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import run_rows
-from kinarm._validation import finite_array, one_or_many, whole_number
 from kinarm.arm import Arm
 from kinarm.chain import Frame, find_frames
-from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.errors import (
+    InvalidInputError,
+    UnknownNameError,
+    finite_array,
+    one_or_many,
+    whole_number,
+)
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.inverse import TURN, Search, solve_targets
 from kinarm.kernels.kinematics import move_frame, place_frame

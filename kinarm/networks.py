@@ -10,9 +10,8 @@ from typing import Literal, NamedTuple, Protocol, get_args, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm._validation import finite_array
 from kinarm.episodes import Control
-from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.errors import InvalidInputError, UnknownNameError, finite_array
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.network import LEAK
 from kinarm.observation import GOAL_SIDE

@@ -10,9 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._files import load_archive, reading, save_archive
-from kinarm._validation import finite_array, whole_number
 from kinarm.episodes import Outcome, Rollouts
-from kinarm.errors import InvalidInputError, RecordingFileError, StartInContactError
+from kinarm.errors import (
+    InvalidInputError,
+    RecordingFileError,
+    StartInContactError,
+    finite_array,
+    whole_number,
+)
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.simulator import Simulator
 from kinarm.world import World

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._fields import OPTIONAL, Checked
-from kinarm._validation import NOT_NEGATIVE
-from kinarm.errors import ProblemError, UnknownNameError
+from kinarm.errors import NOT_NEGATIVE, ProblemError, UnknownNameError
 
 Point = tuple[float, float, float]
 

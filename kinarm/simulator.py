@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import run_together
-from kinarm._validation import finite_array
 from kinarm.arm import Arm
 from kinarm.episodes import PAUSED, RUNNING, Control, Episodes, Rollouts, StepResult
-from kinarm.errors import InvalidInputError, StartInContactError
+from kinarm.errors import InvalidInputError, StartInContactError, finite_array
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.rollout import advance, allow_one_step, begin, refuse, results_of_step
 from kinarm.kernels.session import Session

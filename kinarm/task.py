@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._fields import OPTIONAL, Checked
-from kinarm._validation import POSITIVE, SHARE
-from kinarm.errors import ProblemError
+from kinarm.errors import POSITIVE, SHARE, ProblemError
 from kinarm.scene import Scene
 
 LONGEST_HORIZON = 1_000_000

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import available_threads, run_rows
-from kinarm._validation import finite_array, one_or_many, whole_number
 from kinarm.chain import Chain
 from kinarm.clearance import Clearance, flattened, measure_clearance
 from kinarm.collision import Contact, ContactModel
 from kinarm.contact_shapes import PLANE, ContactShapes
 from kinarm.episodes import Control, Episodes, Rules
-from kinarm.errors import ProblemError
+from kinarm.errors import ProblemError, finite_array, one_or_many, whole_number
 from kinarm.kernels.closest import Bodies
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.records import recorded

@@ -5,10 +5,10 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from kinarm._fields import Checked
-from kinarm._validation import FROM_ZERO
-from kinarm._validation import NOT_NEGATIVE as NOT_NEGATIVE
-from kinarm._validation import POSITIVE as POSITIVE
-from kinarm._validation import SHARE as SHARE
+from kinarm.errors import FROM_ZERO
+from kinarm.errors import NOT_NEGATIVE as NOT_NEGATIVE
+from kinarm.errors import POSITIVE as POSITIVE
+from kinarm.errors import SHARE as SHARE
 from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.task import RewardWeights
 

@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._files import Archive, load_archive, reading, save_archive
-from kinarm._validation import finite_array
 from kinarm.arm import Arm
-from kinarm.errors import InvalidInputError, PolicyFileError
+from kinarm.errors import InvalidInputError, PolicyFileError, finite_array
 from kinarm.networks import ACTIVATIONS, Activation, Mirror, Networks, checked_activations
 from kinarm.networks import Layer as Layer
 from kinarm.observation import OBSERVATION, observation_layout, observation_size, part_slices

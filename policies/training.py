@@ -15,8 +15,7 @@ from typing import Any, ClassVar
 from kinarm._console import ProgressLine, told_of_activities
 from kinarm._files import check_output, only_writer, write_text
 from kinarm._interrupts import telling
-from kinarm._validation import FROM_ZERO
-from kinarm.errors import InvalidInputError, KinarmError, PolicyFileError
+from kinarm.errors import FROM_ZERO, InvalidInputError, KinarmError, PolicyFileError
 from kinarm.policies.checkpoint import (
     CHECKPOINT_SECONDS,
     Checkpoint,

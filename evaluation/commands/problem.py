@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, BinaryIO, ClassVar, cast
 from kinarm._command_line import Commands, run_commands
 from kinarm._console import print_table
 from kinarm._files import check_output, write_atomically, write_text
-from kinarm._validation import FROM_ZERO, TRIALS
+from kinarm.errors import FROM_ZERO, TRIALS
 from kinarm.problem import problem_names
 from kinarm.problem_options import ProblemOptions, say_choices
 

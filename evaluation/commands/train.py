@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from kinarm._command_line import add_options, given_options, run_command
 from kinarm._fields import Checked
 from kinarm._parser import CommandParser, Parser
-from kinarm._validation import FROM_ZERO
-from kinarm.errors import InvalidInputError
+from kinarm.errors import FROM_ZERO, InvalidInputError
 from kinarm.policies.learners import Learner, find_learner, learner_names
 from kinarm.policies.training import TrainRequest, curve_path
 

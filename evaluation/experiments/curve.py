@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._fields import Checked
-from kinarm._validation import FROM_ZERO, TRIALS
 from kinarm.episodes import Rollouts
+from kinarm.errors import FROM_ZERO, TRIALS
 from kinarm.evaluation.trials import trial_set
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import TrainingState, state_policy

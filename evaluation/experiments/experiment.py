@@ -8,8 +8,7 @@ from typing import Any
 
 from kinarm._fields import OPTIONAL, Checked, from_plain, read_toml, to_plain
 from kinarm._files import named_file
-from kinarm._validation import FROM_ZERO, whole_number
-from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.errors import FROM_ZERO, InvalidInputError, UnknownNameError, whole_number
 from kinarm.evaluation.experiments.curve import TrialSettings
 from kinarm.evaluation.experiments.variation import (
     SEARCH_CHOICES,

@@ -16,8 +16,7 @@ from kinarm._console import ProgressLine
 from kinarm._files import is_being_written
 from kinarm._interrupts import kept_from_children
 from kinarm._parallel import available_threads
-from kinarm._validation import whole_number
-from kinarm.errors import InvalidInputError, TrainingFailedError
+from kinarm.errors import InvalidInputError, TrainingFailedError, whole_number
 from kinarm.evaluation.experiments.executors import Executor, Failure, LocalExecutor
 from kinarm.evaluation.experiments.experiment import Experiment
 from kinarm.evaluation.experiments.plan import BoundTask, Run, plan

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 from kinarm._command_line import option_name
 from kinarm._console import working
 from kinarm._files import check_output
-from kinarm._validation import FROM_ZERO
-from kinarm.errors import InvalidInputError
+from kinarm.errors import FROM_ZERO, InvalidInputError
 from kinarm.evaluation.request import policy_choices
 from kinarm.problem_options import ProblemOptions, say_choices
 

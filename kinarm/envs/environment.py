@@ -16,10 +16,9 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Box, Space
 from numpy.typing import DTypeLike, NDArray
 
-from kinarm._validation import finite_array
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
 from kinarm.episodes import Episodes, StepResult
-from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.errors import InvalidInputError, UnknownNameError, finite_array
 from kinarm.observation import Ranges, observation_bounds
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scenarios import ScenarioQueues

@@ -6,7 +6,6 @@ import gymnasium
 import numpy as np
 from numpy.typing import DTypeLike
 
-from kinarm._validation import finite_array
 from kinarm.envs.environment import (
     ArmEnvironment,
     Array,
@@ -16,6 +15,7 @@ from kinarm.envs.environment import (
     pick_scenario,
 )
 from kinarm.episodes import COLLISION, RUNNING, SUCCESS, TRUNCATED, Episodes, StepResult
+from kinarm.errors import finite_array
 from kinarm.problem import ProblemLike
 
 FIRST_ROW = np.zeros(1, dtype=np.int64)

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm._validation import whole_number
 from kinarm.episodes import COLLISION, SUCCESS, TRUNCATED, Episodes
-from kinarm.errors import InvalidInputError
+from kinarm.errors import InvalidInputError, whole_number
 from kinarm.observation import part_slices
 from kinarm.simulator import Simulator
 from kinarm.viewer.camera import Camera, CameraLike

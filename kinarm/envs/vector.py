@@ -9,7 +9,6 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import DTypeLike, NDArray
 
-from kinarm._validation import whole_number
 from kinarm.envs.environment import (
     ArmEnvironment,
     Array,
@@ -19,7 +18,7 @@ from kinarm.envs.environment import (
     pick_scenario,
 )
 from kinarm.episodes import RUNNING, Episodes
-from kinarm.errors import InvalidInputError
+from kinarm.errors import InvalidInputError, whole_number
 from kinarm.problem import ProblemLike
 
 

@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm._validation import finite_array
 from kinarm.arm import Arm
-from kinarm.errors import InvalidInputError
+from kinarm.errors import InvalidInputError, finite_array
 from kinarm.problem import ReachProblem
 from kinarm.scene import Scene
 

@@ -19,9 +19,8 @@ import pinocchio as pin
 from meshcat import Visualizer
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm._validation import whole_number
 from kinarm.arm import Arm
-from kinarm.errors import OutputError
+from kinarm.errors import OutputError, whole_number
 from kinarm.problem import ReachProblem
 from kinarm.viewer.camera import stage_scale
 from kinarm.viewer.drawing import (

@@ -6,10 +6,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm._validation import finite_array, whole_number
 from kinarm.arm import Arm
 from kinarm.collision import Contact
-from kinarm.errors import UnknownNameError
+from kinarm.errors import UnknownNameError, finite_array, whole_number
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.recording import OUTCOMES
 from kinarm.viewer.camera import Camera, CameraLike, stage_scale

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import run_rows
-from kinarm._validation import finite_array, whole_number
-from kinarm.errors import InvalidInputError
+from kinarm.errors import InvalidInputError, finite_array, whole_number
 from kinarm.kernels.compiling import Array
 from kinarm.policies.oracle.kernels.projection import damped_least_squares, layout
 from kinarm.randomness import low_discrepancy_points

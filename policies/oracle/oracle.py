@@ -22,8 +22,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm._validation import finite_array, one_or_many
 from kinarm.episodes import Rollouts
+from kinarm.errors import finite_array, one_or_many
 from kinarm.kernels.compiling import Array
 from kinarm.policies.oracle.bounding import Prover
 from kinarm.policies.oracle.inverse import step_box

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from kinarm._console import doing
 from kinarm._parallel import available_threads
-from kinarm._validation import whole_number
-from kinarm.errors import InvalidInputError, MissingExtraError
+from kinarm.errors import InvalidInputError, MissingExtraError, whole_number
 from kinarm.failed_scenarios import FailedScenarios
 from kinarm.policies.learners import CurvePoint
 from kinarm.policies.library import starting_policy, statistics

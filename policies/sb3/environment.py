@@ -8,9 +8,8 @@ from gymnasium.envs.registration import load_env_creator
 from numpy.typing import DTypeLike
 
 from kinarm._files import shipped_files
-from kinarm._validation import whole_number
 from kinarm.envs import ENVIRONMENTS
-from kinarm.errors import UnknownNameError
+from kinarm.errors import UnknownNameError, whole_number
 from kinarm.policies.learners import find_learner
 from kinarm.problem import ProblemLike
 

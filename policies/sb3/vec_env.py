@@ -9,12 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 
-from kinarm._validation import SHARE, check_range, whole_number
 from kinarm.envs.environment import Lifecycle, Observations, one_by_one, pick_scenario
 from kinarm.envs.reach import ReachEnv
 from kinarm.envs.rendering import EnvPictures
 from kinarm.episodes import SUCCESS, Episodes
-from kinarm.errors import InvalidInputError
+from kinarm.errors import SHARE, InvalidInputError, check_range, whole_number
 from kinarm.failed_scenarios import LARGEST_REPLAY, FailedScenarios, StartsAndGoals
 from kinarm.randomness import Stream, stream_generator
 from kinarm.scenarios import ScenarioQueues

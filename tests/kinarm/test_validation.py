@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from kinarm._validation import finite_array, one_or_many
-from kinarm.errors import InvalidInputError
+from kinarm.errors import InvalidInputError, finite_array, one_or_many
 
 
 def test_gives_a_contiguous_float_copy():
