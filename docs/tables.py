@@ -14,10 +14,22 @@ from kinarm.contact_shapes import enclosing_capsule
 from kinarm.envs import ENVIRONMENTS
 from kinarm.evaluation import METRICS
 from kinarm.evaluation.commands import arms, problem
-from kinarm.evaluation.metrics import SYMBOLS
+from kinarm.evaluation.outcomes import HOLDING_STEPS
 from kinarm.evaluation.report.templating import markdown_table
 from kinarm.observation import OBSERVATION, part_slices
 from kinarm.policies import find_learner
+
+SYMBOLS = {
+    "n": "number of trials; of several training seeds, all their trials together",
+    "S, C, T": "sets of the trials that ended as success, in contact (collision) or truncated",
+    "dᵢ": "final distance of trial i [m]",
+    "kᵢ": "steps that trial i took",
+    "bᵢ": "bound of trial i: steps that the oracle proves to be necessary",
+    "aᵢ": "closest approach of trial i, if success does not end it [m]",
+    "eᵢ": f"largest distance after the last {HOLDING_STEPS} steps of that longer trial [m]",
+    "H": "set of these longer trials that touch something",
+}
+"""Meaning of the letters in definitions of metrics."""
 
 
 def numbers(values: np.ndarray) -> str:

@@ -23,18 +23,6 @@ CLOSE = (0.02, 0.01, 0.005)
 HOLDING_WITHIN = 0.01
 """A goal counts as held if the tool stays within this distance to the end [m]."""
 
-SYMBOLS = {
-    "n": "number of trials; of several training seeds, all their trials together",
-    "S, C, T": "sets of the trials that ended as success, in contact (collision) or truncated",
-    "dᵢ": "final distance of trial i [m]",
-    "kᵢ": "steps that trial i took",
-    "bᵢ": "bound of trial i: steps that the oracle proves to be necessary",
-    "aᵢ": "closest approach of trial i, if success does not end it [m]",
-    "eᵢ": f"largest distance after the last {HOLDING_STEPS} steps of that longer trial [m]",
-    "H": "set of these longer trials that touch something",
-}
-"""Meaning of the letters in definitions of metrics."""
-
 ALWAYS = float("inf")
 """Priority of columns that are never left out."""
 
@@ -46,7 +34,7 @@ class Metric:
     Attributes
     ----------
     meaning, definition : str
-        What it is, and its formula in mathematics; ``SYMBOLS`` says what the letters stand for.
+        What it is, and its formula in mathematics, in the letters of the documentation.
     formula : callable
         From `Outcomes` to the figure; None or NaN where there is nothing to tell. For an interval
         it is asked about many resamples at once and works along the last axis.

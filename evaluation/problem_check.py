@@ -8,15 +8,13 @@ from numpy.typing import NDArray
 from kinarm.clearance import ContactStatistics, random_configurations
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.outcomes import Pair
+from kinarm.evaluation.report.templating import template_environment
 from kinarm.evaluation.schemas import Count, Digest, Document
 from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.mirror import mirror_findings
 from kinarm.policies.oracle import Progress
 from kinarm.world import World
-
-OFTEN = 3
-"""Pairs that are named as those that touch most often."""
 
 
 class MissedGoal(Document, frozen=True, kw_only=True):
@@ -84,26 +82,9 @@ class ProblemCheck(Document, frozen=True, kw_only=True):
     contact: Contacts
     mirror: dict[str, str]
 
-    def lines(self) -> dict[str, str]:
-        """The same in words, by what it is about."""
-        goals, starts, contact = self.goals, self.starts, self.contact
-        named = [(f"{one} and {other}", share) for one, other, share in contact.touching]
-        always = [pair for pair, share in named if share == 1]
-        never = sum(share == 0 for _, share in named)
-        often = [f"{pair} {share:.1%}" for pair, share in named if 0 < share < 1]
-        faults = [f"{name} ({reason})" for name, reason in self.mirror.items() if reason]
-        home = " touches ".join(starts.home_contact or ("nothing touches",))
-        return {
-            "goals": f"reached {percent(goals.reached)}, out of reach "
-            f"{percent(goals.out_of_reach)}, undecided {percent(goals.undecided)}; "
-            f"of {goals.trials} trials",
-            "starts": f"free {percent(starts.free)} of {contact.configurations}; at home {home}",
-            "contact": f"{len(named)} pairs are tested; at {contact.configurations} "
-            f"configurations {len(always)} always and {never} never touch",
-            "always": "; ".join(always) or "none",
-            "often": "; ".join(often[:OFTEN]) or "none",
-            "mirror": f"no: {'; '.join(faults)}" if faults else "yes: the problem is its own image",
-        }
+    def __str__(self) -> str:
+        content = {name: getattr(self, name) for name in self.__struct_fields__}
+        return template_environment().get_template("problem_check.txt").render(content).rstrip()
 
 
 def check_problem(
@@ -159,12 +140,6 @@ def _goals(trials: TrialSet, on_progress: Progress | None) -> Goals:
             for trial in np.flatnonzero(~reached).tolist()
         ],
     )
-
-
-def percent(share: Estimate) -> str:
-    """A share and its interval, in per cent."""
-    ends = (share.value or 0.0, *(share.ci95 or (0.0, 1.0)))
-    return "{:.1f} % ({:.1f}..{:.1f})".format(*(100 * end for end in ends))
 
 
 def random_starts(world: World) -> NDArray[np.float64]:

@@ -9,7 +9,6 @@ from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import product
-from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -173,12 +172,11 @@ def _is_shipped(contestant: Contestant) -> bool:
     return contestant.source is not None and is_shipped(contestant.source)
 
 
-def _folder(contestant: Contestant) -> Path | None:
-    """Folder of a policy's file."""
-    return contestant.source and contestant.source.parent
-
-
-SPLIT_BY: tuple[Callable[[Contestant], Hashable], ...] = (_is_shipped, _folder, attrgetter("name"))
+SPLIT_BY: tuple[Callable[[Contestant], Hashable], ...] = (
+    _is_shipped,
+    lambda contestant: contestant.source and contestant.source.parent,
+    lambda contestant: contestant.name,
+)
 
 
 def _with_distinct_seeds(members: list[Contestant], depth: int = 0) -> list[list[Contestant]]:
@@ -205,7 +203,7 @@ def named_apart(contestants: Sequence[Contestant]) -> list[Contestant]:
     count = Counter(contestant.name for contestant in contestants)
     named = []
     for each in contestants:
-        if count[each.name] > 1 and not _is_shipped(each) and (folder := _folder(each)):
-            each = replace(each, name=f"{folder.name}/{each.name}")
+        if count[each.name] > 1 and each.source and not _is_shipped(each):
+            each = replace(each, name=f"{each.source.parent.name}/{each.name}")
         named.append(each)
     return named

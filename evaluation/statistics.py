@@ -242,15 +242,13 @@ def superiority(pairs: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]
     1951), however few seeds there are. Groups have shape (n_measures, n_seeds); infinity stands
     for never.
     """
-    from scipy.stats import norm
-
     below = [
         (first[:, :, None] < second[:, None]) + 0.5 * (first[:, :, None] == second[:, None])
         for first, second in pairs
     ]
     value = float(np.mean([comparisons.mean() for comparisons in below]))
     n = sum(min(first.shape[1], second.shape[1]) for first, second in pairs)
-    z2 = float(norm.ppf((1 + LEVEL) / 2)) ** 2
+    z2 = DEVIATIONS**2
     centre = (value + z2 / (2 * n)) / (1 + z2 / n)
     reach = (z2 * (value * (1 - value) / n + z2 / (4 * n * n))) ** 0.5 / (1 + z2 / n)
     return Estimate(value, (centre - reach, centre + reach))

@@ -105,15 +105,5 @@ class TrialSet:
         return hashlib.sha256(content).hexdigest()[:16]
 
 
-@cache
-def trial_set(problem: ReachProblem, trials: int, seed: int) -> TrialSet:
-    """Trials of a problem, drawn once in a process.
-
-    Parameters
-    ----------
-    problem : ReachProblem
-        The problem.
-    trials, seed : int
-        How many, and the seed of the set; see `TrialSet.draw`.
-    """
-    return TrialSet.draw(problem, trials, seed)
+trial_set = cache(TrialSet.draw)
+"""Trials of a problem, drawn once in a process; see `TrialSet.draw`."""

@@ -28,11 +28,6 @@ examples:
   kinarm-eval --policy my_module:my_policy --problem left   a function of your own
 """
 
-HOLDING_NOTE = (
-    "mm columns, held and closest are from trials that success does not end; contact "
-    "counts as a miss; the oracle aims at 5 mm there"
-)
-
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line."""
@@ -66,39 +61,22 @@ def _report(request: EvaluationRequest, command: str) -> None:
 
 def _footnote(document: "EvaluationDocument") -> str:
     """Notes on what the figures in the table are of."""
+    from kinarm.evaluation.report.templating import template_environment
     from kinarm.evaluation.table import REPLACED, has_star, table_rows
 
     protocol = document.protocol
-    problems = protocol.problems.items()
-    arms = " and ".join(dict.fromkeys(faced.arm for _, faced in problems))
-    lines = [
-        f"{protocol.trials} trials a problem, seed {protocol.seed}, arm {arms}; "
-        "95 % intervals in brackets"
-    ]
-    bounds = {problem: faced.oracle for problem, faced in problems if faced.oracle}
-    if bounds:
-        shares = (
-            f"{name} {100 * each.proof_complete_share:.1f} %" for name, each in bounds.items()
+    rows = (row for name in protocol.problems for row in table_rows(document, name))
+    text = (
+        template_environment()
+        .get_template("footnote.txt")
+        .render(
+            protocol=protocol,
+            results=document.results,
+            starred=any(map(has_star, rows)),
+            replaced=REPLACED,
         )
-        lines.append(
-            "step ratio: steps divided by the number proven necessary, in trials that succeeded; "
-            f"proofs complete: {', '.join(shares)}"
-        )
-        bounded = min(each.bounded for each in bounds.values())
-        if bounded < protocol.trials:
-            lines.append(
-                f"oracle, relative success and step ratio are of the first {bounded} trials of "
-                f"{protocol.trials}; --policy oracle bounds all"
-            )
-    shown = (row for name, _ in problems for row in table_rows(document, name))
-    if any(map(has_star, shown)):
-        lines.append(REPLACED)
-    if protocol.hold:
-        lines.append(HOLDING_NOTE)
-    hashes = (f"{problem} {faced.trial_set_hash}" for problem, faced in problems)
-    lines.append(f"trial sets: {', '.join(hashes)}")
-    lines += dict.fromkeys(row.note for row in document.results if row.note)
-    return "\n".join(lines)
+    )
+    return text.rstrip()
 
 
 if __name__ == "__main__":

@@ -145,8 +145,7 @@ def _check(request: CheckRequest) -> None:
     check, problem = request.run(), request.resolve()
     goals = " and ".join(problem.task.goal_regions)
     print(f"{problem.name}: arm {problem.arm.name}, goals {goals}")
-    for about, line in check.lines().items():
-        print(f"  {about:8} {line}")
+    print(check)
     for path in (request.json, request.picture):
         if path is not None:
             print(f"  written  {path}")

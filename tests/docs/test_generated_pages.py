@@ -6,7 +6,7 @@ from types import ModuleType
 
 import pytest
 
-from kinarm.evaluation.metrics import METRICS, SYMBOLS
+from kinarm.evaluation.metrics import METRICS
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
@@ -38,4 +38,6 @@ def test_every_figure_is_defined(monkeypatch: pytest.MonkeyPatch) -> None:
     tables = module(monkeypatch, "tables")
     table = tables.metrics_table()
     assert [name for name in METRICS if f"| `{name}` |" not in table] == []
-    assert [letter for letter in SYMBOLS if f"| {letter} |" not in tables.symbols_table()] == []
+    assert [
+        letter for letter in tables.SYMBOLS if f"| {letter} |" not in tables.symbols_table()
+    ] == []

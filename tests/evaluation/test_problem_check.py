@@ -1,9 +1,8 @@
-"""Where a checked problem may start, and shares in words."""
+"""Where a checked problem may start."""
 
 import numpy as np
 
-from kinarm.evaluation.problem_check import percent, random_starts
-from kinarm.evaluation.statistics import Estimate
+from kinarm.evaluation.problem_check import random_starts
 from kinarm.problem import PROBLEMS
 from kinarm.world import World
 
@@ -21,7 +20,3 @@ def test_elsewhere_starts_lie_between_home_and_the_limits():
     assert (low >= 0.25 * (arm.lower - arm.home) - 1e-12).all()
     assert (high <= 0.25 * (arm.upper - arm.home) + 1e-12).all()
     assert (high > low).sum() == arm.n_actuated
-
-
-def test_shares_in_words():
-    assert percent(Estimate(0.5, (0.25, 0.75))) == "50.0 % (25.0..75.0)"
