@@ -222,14 +222,14 @@ def _build_model(description: Description, speeds: tuple[float, ...] | None) -> 
     try:
         model = pin.buildModelFromXML(ElementTree.tostring(_robot(description), "unicode"))
     except (ValueError, RuntimeError) as error:
-        raise ArmError(f"{name} is not a readable URDF: {first_line(error)}") from error
+        raise ArmError(f"{name}: not a readable URDF: {first_line(error)}") from error
     if model.njoints < 2:
-        raise ArmError(f"{name} has no moving joint")
+        raise ArmError(f"{name}: no moving joint")
     if speeds is not None:
         model.velocityLimit = finite_array("velocity_limits", speeds, (model.nv,))
     for joint, speed in zip(list(model.names)[1:], model.velocityLimit, strict=True):
         if not 0 < speed < 1e10:
-            raise ArmError(f"joint {joint!r} of {name} has no velocity limit: velocity={speed}")
+            raise ArmError(f"{name}: joint {joint!r} has no velocity limit: velocity={speed}")
     return model
 
 

@@ -275,20 +275,6 @@ def _candidate_pairs(arm: Arm, geometry: pin.GeometryModel, n_shapes: int) -> li
     return pairs + sorted(with_world, key=lambda pair: flat[pair[1]])
 
 
-def _touching(
-    arm: Arm,
-    geometry: pin.GeometryModel,
-    q: NDArray[np.float64],
-    data: pin.Data,
-    geometry_data: pin.GeometryData,
-    pairs: Iterable[int],
-) -> set[int]:
-    """Indices, among those of some pairs, that are in contact at a configuration."""
-    pin.updateGeometryPlacements(arm.model, data, geometry, geometry_data, q)
-    start_anew(geometry_data.collisionRequests[index] for index in pairs)
-    return {index for index in pairs if pin.computeCollision(geometry, geometry_data, index)}
-
-
 def _uninformative_pairs(
     arm: Arm, geometry: pin.GeometryModel, n_shapes: int, names: tuple[str, ...]
 ) -> dict[int, str]:
@@ -299,8 +285,15 @@ def _uninformative_pairs(
     """
     data, geometry_data = arm.model.createData(), make_verdicts_reliable(geometry.createData())
     pairs, objects = list(geometry.collisionPairs), geometry.geometryObjects
+
+    def touching(q: NDArray[np.float64], chosen: Iterable[int]) -> set[int]:
+        """Indices, among those of chosen pairs, that are in contact at a configuration."""
+        pin.updateGeometryPlacements(arm.model, data, geometry, geometry_data, q)
+        start_anew(geometry_data.collisionRequests[index] for index in chosen)
+        return {index for index in chosen if pin.computeCollision(geometry, geometry_data, index)}
+
     within = [index for index, pair in enumerate(pairs) if pair.second < n_shapes]
-    resting = _touching(arm, geometry, arm.home, data, geometry_data, within)
+    resting = touching(arm.home, within)
     mounting = {
         index
         for index, pair in enumerate(pairs)
@@ -310,7 +303,7 @@ def _uninformative_pairs(
     q = arm.home.copy()
     for position in np.linspace(arm.lower[0], arm.upper[0], MOUNT_SAMPLES if mounting else 0):
         q[0] = position
-        now = _touching(arm, geometry, q, data, geometry_data, mounting)
+        now = touching(q, mounting)
         always &= now
         never -= now
     for index in sorted(always):

@@ -73,8 +73,7 @@ def resolve_meshes(robot: ElementTree.Element, path: Path, folders: Collection[s
                 mesh.set("filename", str(found))
             elif use == "collision":
                 raise ArmError(
-                    f"mesh {name!r} of {path.name} is not found; package_dirs names the folders "
-                    "of package:// meshes"
+                    f"mesh {name!r} is not found; package_dirs holds folders of package:// meshes"
                 )
 
 

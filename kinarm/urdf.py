@@ -89,10 +89,18 @@ def read_urdf(specification: ArmSpecification) -> Description:
     chain, and UnknownNameError if a name stands for no arm, joint or link.
     """
     path = _find_urdf(specification.source)
+    try:
+        return _reduced(path, specification)
+    except ArmError as error:
+        raise ArmError(f"{path.name}: {error}") from error
+
+
+def _reduced(path: Path, specification: ArmSpecification) -> Description:
+    """Read a URDF, and keep the chain that carries the tool; errors leave out the file's name."""
     robot = read_robot(path)
-    joints = read_joints(robot, path)
+    joints = read_joints(robot)
     links = [link.get("name", "") for link in robot.findall("link")]
-    tool, notes = _tool_frame(specification.tool_frame, joints, links, path)
+    tool, notes = _tool_frame(specification.tool_frame, joints, links)
     asked, limits = specification.held or {}, specification.limits or {}
     moving = [joint.name for joint in joints.values() if joint.kind in MOVING]
     kept = [joint.name for joint in chain_to(tool, joints) if joint.name not in asked]
@@ -108,8 +116,8 @@ def read_urdf(specification: ArmSpecification) -> Description:
                 raise UnknownNameError(f"{what} of {path.name}:", name, known)
     for name in moving:
         if name in kept:
-            notes += _bounded(joints[name], limits, path)
-    held = _held_positions(joints, moving, kept, asked, path)
+            notes += _bounded(joints[name], limits)
+    held = _held_positions(joints, moving, kept, asked)
     for name, position in held.items():
         _fix(joints[name], position)
     free = [name for name in held if name not in asked]
@@ -121,40 +129,37 @@ def read_urdf(specification: ArmSpecification) -> Description:
     try:
         text = ElementTree.tostring(robot, "unicode")
     except RecursionError:
-        raise ArmError(f"{path.name} is not a readable URDF: it is nested too deeply") from None
+        raise ArmError("not a readable URDF: it is nested too deeply") from None
     return Description(path, text, tool, held, notes)
 
 
 def _tool_frame(
-    asked: str | None, joints: Mapping[str, TreeJoint], links: list[str], path: Path
+    asked: str | None, joints: Mapping[str, TreeJoint], links: list[str]
 ) -> tuple[str, tuple[str, ...]]:
     """The tool frame, and a note if it had to be chosen."""
     if asked is not None or USUAL_TOOL in links:
         chosen = asked or USUAL_TOOL
         if chosen not in links:
             raise ArmError(
-                f"{path.name} has no tool frame {chosen!r}; tool_frame can be one of its links: "
-                + ", ".join(links)
+                f"no tool frame {chosen!r}; tool_frame can be one of the links {', '.join(links)}"
             )
         return chosen, ()
     lengths = [sum(joint.mimics is None for joint in chain_to(link, joints)) for link in links]
     if not links or max(lengths) == 0:
-        raise ArmError(f"{path.name} has no moving joint")
+        raise ArmError("no moving joint")
     longest = [link for link, n in zip(links, lengths, strict=True) if n == max(lengths)]
     parents = {joint.parent for joint in joints.values() if joint.child in longest}
     last = next(link for link in reversed(longest) if link not in parents)
     return last, (f"tool frame: {last!r}, the last link of the longest chain",)
 
 
-def _bounded(
-    joint: TreeJoint, limits: Mapping[str, tuple[float, float]], path: Path
-) -> tuple[str, ...]:
+def _bounded(joint: TreeJoint, limits: Mapping[str, tuple[float, float]]) -> tuple[str, ...]:
     """See that a joint that is kept has limits; return what was chosen."""
     element, name = joint.element, joint.name
     if joint.mimics is not None:
         raise ArmError(
-            f"joint {name!r} of {path.name} mimics {joint.mimics!r} and carries the tool: hold it "
-            "(held), or choose a tool frame before it"
+            f"joint {name!r} mimics {joint.mimics!r} and carries the tool: hold it (held), or "
+            "choose a tool frame before it"
         )
     limit = element.find("limit")
     notes: tuple[str, ...] = ()
@@ -167,13 +172,13 @@ def _bounded(
             limit.set("upper", repr(math.pi))
             notes = (f"joint {name!r} is continuous: its range is taken as -180 to 180 deg",)
     if limit is None:
-        raise ArmError(f"joint {name!r} of {path.name} has no limits")
+        raise ArmError(f"joint {name!r} has no limits")
     if name in limits:
         for end, value in zip(("lower", "upper"), limits[name], strict=True):
             limit.set(end, repr(value))
     lower, upper = (float(limit.attrib[end]) for end in ("lower", "upper"))
     if not -FARTHEST_POSITION <= lower < upper <= FARTHEST_POSITION:
-        raise ArmError(f"joint {name!r} of {path.name} has no usable limits: {lower}..{upper}")
+        raise ArmError(f"joint {name!r} has no usable limits: {lower}..{upper}")
     return notes
 
 
@@ -182,7 +187,6 @@ def _held_positions(
     moving: Collection[str],
     kept: Collection[str],
     asked: Mapping[str, float],
-    path: Path,
 ) -> dict[str, float]:
     """Where the moving joints stay that are not kept."""
     fixed = [joints[name] for name in moving if name not in kept]
@@ -192,16 +196,9 @@ def _held_positions(
         leader, mimic = joint.mimics, joint.element.find("mimic")
         if joint.name in positions or mimic is None:
             continue
-        if leader in kept:
-            raise ArmError(
-                f"joint {joint.name!r} of {path.name} mimics {leader!r}, which moves: hold it "
-                "(held)"
-            )
         if leader not in positions:
-            raise ArmError(
-                f"joint {joint.name!r} of {path.name} mimics {leader!r}, which is no joint that is "
-                "held"
-            )
+            why = "moves: hold it (held)" if leader in kept else "is no joint that is held"
+            raise ArmError(f"joint {joint.name!r} mimics {leader!r}, which {why}")
         factor, offset = (float(mimic.attrib[name]) for name in ("multiplier", "offset"))
         positions[joint.name] = factor * positions[leader] + offset
     return {joint.name: positions[joint.name] for joint in fixed}

@@ -78,17 +78,17 @@ def read_robot(path: Path) -> Element:
     try:
         robot = parse_xml(path.read_bytes())
     except (OSError, ValueError) as error:
-        raise ArmError(f"{path.name} is not a readable URDF: {first_line(error)}") from error
+        raise ArmError(f"not a readable URDF: {first_line(error)}") from error
     if robot.tag != "robot":
-        raise ArmError(f"{path.name} is not a readable URDF: its root is <{robot.tag}>")
+        raise ArmError(f"not a readable URDF: its root is <{robot.tag}>")
     for part in (robot, *robot):
         for element in [each for each in part if each.tag not in NEEDED.get(part.tag, (each.tag,))]:
             part.remove(element)
     for joint in robot.findall("joint"):
-        _check_joint(joint, f"joint {joint.get('name')!r} of {path.name}")
+        _check_joint(joint, f"joint {joint.get('name')!r}")
     for link in robot.findall("link"):
         for collision in link.findall("collision"):
-            _check_shape(collision, f"link {link.get('name')!r} of {path.name}")
+            _check_shape(collision, f"link {link.get('name')!r}")
     return robot
 
 
@@ -137,7 +137,7 @@ def check_numbers(element: Element, where: str) -> None:
         element.set(name, " ".join(repr(x if abs(x) > 1e-300 else 0.0) for x in numbers))
 
 
-def read_joints(robot: Element, path: Path) -> dict[str, TreeJoint]:
+def read_joints(robot: Element) -> dict[str, TreeJoint]:
     """Joints by name; raises ArmError if they and the links are no tree on a fixed base."""
     found: dict[str, TreeJoint] = {}
     links = [link.get("name", "") for link in robot.findall("link")]
@@ -148,40 +148,38 @@ def read_joints(robot: Element, path: Path) -> dict[str, TreeJoint]:
         parent, child = ("" if end is None else end.get("link", "") for end in ends)
         for link in (parent, child):
             if link not in links:
-                raise ArmError(f"joint {name!r} of {path.name} joins {link!r}, which is no link")
+                raise ArmError(f"joint {name!r} joins {link!r}, which is no link")
         if child in carried:
             raise ArmError(
-                f"link {child!r} of {path.name} hangs on two joints, {carried[child]!r} and "
-                f"{name!r}: closed loops are not supported"
+                f"link {child!r} hangs on two joints, {carried[child]!r} and {name!r}: "
+                "closed loops are not supported"
             )
         if kind not in (*MOVING, "fixed"):
             raise ArmError(
-                f"joint {name!r} of {path.name} is {kind}: the base must be fixed, and joints "
-                f"{', '.join(MOVING)} or fixed"
+                f"joint {name!r} is {kind}: the base must be fixed, and joints {', '.join(MOVING)} "
+                "or fixed"
             )
         carried[child] = name
         found[name] = TreeJoint(element, name, kind, parent, child)
-    _check_tree(found, links, carried, path)
+    _check_tree(found, links, carried)
     return found
 
 
 def _check_tree(
-    joints: Mapping[str, TreeJoint], links: list[str], carried: Mapping[str, str], path: Path
+    joints: Mapping[str, TreeJoint], links: list[str], carried: Mapping[str, str]
 ) -> None:
     """Refuse names that are missing or not unique, and links that do not hang on the base."""
     for what, names in (("joint", list(carried.values())), ("link", links)):
         for name, count in Counter(names).items():
             if not name or count > 1:
-                raise ArmError(f"each {what} of {path.name} needs a name of its own, not {name!r}")
+                raise ArmError(f"each {what} needs a name of its own, not {name!r}")
     roots = [link for link in links if link not in carried]
     if len(roots) > 1:
-        raise ArmError(f"{path.name} has links that no joint joins: {', '.join(map(repr, roots))}")
+        raise ArmError(f"no joint joins the links {', '.join(map(repr, roots))}")
     try:
         TopologicalSorter({joint.child: [joint.parent] for joint in joints.values()}).prepare()
     except CycleError:
-        raise ArmError(
-            f"the links of {path.name} form a loop: closed loops are not supported"
-        ) from None
+        raise ArmError("the links form a loop: closed loops are not supported") from None
 
 
 def chain_to(link: str, joints: Mapping[str, TreeJoint]) -> list[TreeJoint]:
