@@ -54,8 +54,8 @@ def _explain(typed: Sequence[str]) -> None:
     )
     shell = parser.parse_args(typed).print_completion
     if shell is not None:
-        for module, _ in COMMANDS.values():
-            words = [sys.executable, "-m", module, "--print-completion", shell]
+        for name in COMMANDS:
+            words = [sys.executable, "-m", "kinarm", name, "--print-completion", shell]
             subprocess.run(words, check=True)
 
 

@@ -112,7 +112,3 @@ def main(arguments: Sequence[str] | None = None) -> None:
     typed = sys.argv[1:] if arguments is None else arguments
     summary = "List arms, and describe one."
     run_commands("kinarm-arms", summary, COMMANDS, typed or ["list"], epilog=EPILOG)
-
-
-if __name__ == "__main__":
-    main()

@@ -142,7 +142,3 @@ def _millions(training: dict[str, Any]) -> str:
 
 def _rates(timing: dict[str, float]) -> list[str]:
     return [f"{timing[name]:,.0f} steps/s" for name in ("median", "best")]
-
-
-if __name__ == "__main__":
-    main()

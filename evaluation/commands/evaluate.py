@@ -77,7 +77,3 @@ def _footnote(document: "EvaluationDocument") -> str:
         )
     )
     return text.rstrip()
-
-
-if __name__ == "__main__":
-    main()

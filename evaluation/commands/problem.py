@@ -163,7 +163,3 @@ def main(arguments: Sequence[str] | None = None) -> None:
     typed = sys.argv[1:] if arguments is None else arguments
     summary = "List, show and check problems."
     run_commands("kinarm-problem", summary, COMMANDS, typed or ["list"], epilog=EPILOG)
-
-
-if __name__ == "__main__":
-    main()

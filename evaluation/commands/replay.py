@@ -25,7 +25,3 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _report(request: ReplayRequest, _: str) -> None:
     request.run(lambda line: print(line, flush=True))
-
-
-if __name__ == "__main__":
-    main()

@@ -109,7 +109,3 @@ def _report(request: ReproductionRequest, command: str) -> None:
     print(f"written: {request.folder / 'REPRODUCTION.md'}, with tables and figures beside it")
     if request.quick:
         print("next: kinarm-reproduce trains everything to the end and judges the claims")
-
-
-if __name__ == "__main__":
-    main()

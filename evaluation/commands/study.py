@@ -244,7 +244,3 @@ def _status(request: StatusRequest, command: str) -> None:  # noqa: ARG001
     from kinarm.evaluation.experiments.study import Study
 
     print("\n".join(Study.load(request.folder).status()))
-
-
-if __name__ == "__main__":
-    main()

@@ -214,7 +214,3 @@ def _train_seeds(request: SeedsRequest) -> None:
         if last is not None:
             said = f"return {last.mean_return:+.3f}, success {100 * last.success:.0f} %"
         sys.stdout.write(f"seed {seed}: {said}; written: {out}\n")
-
-
-if __name__ == "__main__":
-    main()

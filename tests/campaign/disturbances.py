@@ -14,7 +14,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
-from importlib.metadata import entry_points
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -57,8 +56,7 @@ SHORT = TRAIN.replace("3000", "3")
 @contextmanager
 def started(command: str, folder: Path, size: int = -1) -> Iterator[subprocess.Popen[bytes]]:
     """A command in a session of its own, whose files have at most so many bytes; none is left."""
-    scripts = {each.name: each.module for each in entry_points(group="console_scripts")}
-    program, *arguments = command.split()
+    program, *arguments = command.removeprefix("kinarm-").split()
 
     def prepare() -> None:
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -69,7 +67,7 @@ def started(command: str, folder: Path, size: int = -1) -> Iterator[subprocess.P
     (folder / "study.toml").write_bytes(STUDY)
     (folder / "tmp").mkdir(exist_ok=True)
     with subprocess.Popen(
-        [sys.executable, "-m", scripts[program], *arguments],
+        [sys.executable, "-m", "kinarm", program, *arguments],
         cwd=folder,
         env={**os.environ, "TMPDIR": str(folder / "tmp"), "COLUMNS": "100"},
         stdin=subprocess.DEVNULL,

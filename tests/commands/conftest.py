@@ -46,7 +46,8 @@ def command() -> Callable[..., list[str]]:
     """Spell a command line out for a process of its own."""
 
     def spell(program: str, *arguments: object) -> list[str]:
-        return [sys.executable, "-m", MODULES[program], *map(str, arguments)]
+        name = program.removeprefix("kinarm-")
+        return [sys.executable, "-m", "kinarm", name, *map(str, arguments)]
 
     return spell
 

@@ -66,7 +66,7 @@ class TestModule:
         made = 'import gymnasium\ngymnasium.make("kinarm/ReachRight-v0")\nact = len\n'
         (tmp_path / "making.py").write_text(made)
         words = ["--policy", "making:act", "--problem", "right", "--trials", "1", "--no-oracle"]
-        program = [sys.executable, "-m", "kinarm.evaluation.commands.evaluate", *words]
+        program = [sys.executable, "-m", "kinarm", "eval", *words]
         done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, check=False)
         assert "cannot import" not in done.stderr, done.stderr
 

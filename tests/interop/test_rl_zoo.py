@@ -43,7 +43,7 @@ def run(line, folder, *others):
     """Run a command line in a process of its own, with further arguments; returns its output."""
     program, *words = shlex.split(line)
     if program == "kinarm-eval":
-        words = ["-m", "kinarm.evaluation.commands.evaluate", *words]
+        words = ["-m", "kinarm", "eval", *words]
     done = subprocess.run(
         [sys.executable, *words, *map(str, others)],
         cwd=folder,

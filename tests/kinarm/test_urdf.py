@@ -222,8 +222,8 @@ class TestRefusals:
             (LINKS + fixed("x", "link_0", "a"), "no joint joins the links .*'b'"),
             (LINKS + fixed("x", "link_0", "a") + fixed("y", "link_1", "a"), "'a'.*hangs on two"),
             (LINKS + fixed("joint_1", "link_0", "a"), "a name of its own, not 'joint_1'"),
-            ('<link name="link_0"/>', "each link of .* name of its own, not 'link_0'"),
-            (fixed("x", "link_0", "nobody"), "joint 'x' .* joins 'nobody', which is no link"),
+            ('<link name="link_0"/>', "each link needs a name of its own, not 'link_0'"),
+            (fixed("x", "link_0", "nobody"), "joint 'x' joins 'nobody', which is no link"),
             (LINKS + fixed("x", "link_0", "a", "screw"), "joint 'x' .*is screw"),
             (LINKS + fixed("x", "link_0", "a", "floating"), "'x'.*the base must be fixed"),
             (gripper(leader="nobody"), "mimics 'nobody', which is no joint"),
@@ -258,7 +258,7 @@ class TestRefusals:
     @pytest.mark.parametrize("shape", ['<box size="1 1 -1"/>', "<cone/>", "<sphere/>", ""])
     def test_shapes(self, make_joint, make_collision, write_robot, shape, capfd):
         path = write_robot([make_joint()], {1: make_collision(shape)})
-        with pytest.raises(ArmError, match="made.urdf: link 'link_1'"):
+        with pytest.raises(ArmError, match="made.urdf: .*link 'link_1'"):
             Arm.load(path)
         assert capfd.readouterr() == ("", "")
 

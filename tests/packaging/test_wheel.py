@@ -121,7 +121,7 @@ def test_it_works_from_where_it_was_installed_as_the_clone_does(target, tmp_path
 
 def test_commands_work_from_elsewhere(target, tmp_path):
     options = ("--policy", "zero", "--problem", "left", "--trials", "2", "--out", "results")
-    command = (sys.executable, "-m", "kinarm.evaluation.commands.evaluate", *options)
+    command = (sys.executable, "-m", "kinarm", "eval", *options)
     call(*command, cwd=tmp_path, env=environment(target))
     assert (tmp_path / "results" / "evaluation.json").is_file()
 
