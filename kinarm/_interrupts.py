@@ -6,8 +6,6 @@ another error of it, and `was_interrupted` knows of it in any case. Once the com
 are ignored. Processes that only import kinarm keep their own ways.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import signal
@@ -75,7 +73,7 @@ def was_interrupted(error: BaseException) -> bool:
 
 
 @contextmanager
-def telling(what_is_left: Callable[[], str]) -> Iterator[None]:
+def telling(what_is_left: "Callable[[], str]") -> "Iterator[None]":
     """Do what can be interrupted; if it is, ``what_is_left`` gives the line that is printed."""
     try:
         yield
@@ -86,7 +84,7 @@ def telling(what_is_left: Callable[[], str]) -> Iterator[None]:
 
 
 @contextmanager
-def kept_from_children() -> Iterator[None]:
+def kept_from_children() -> "Iterator[None]":
     """Processes that are started here never see what a terminal sends to all of its processes."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGHUP))
     try:

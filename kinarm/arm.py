@@ -1,7 +1,5 @@
 """Robot arms: a Pinocchio model with tool, limits and collision shapes."""
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -56,7 +54,7 @@ class Arm:
     home: NDArray[np.float64]
     allowed_contacts: tuple[AllowedContact, ...]
     chain: Chain
-    unplaced: Arm | None = None
+    unplaced: "Arm | None" = None
 
     def __post_init__(self) -> None:
         for array in (*self.chain, self.home):
@@ -67,7 +65,7 @@ class Arm:
         return type(self), tuple(getattr(self, item.name) for item in fields(self))
 
     @classmethod
-    def load(cls, arm: ArmSpecification | str | Path = DEFAULT_ARM, **changes: Any) -> Arm:
+    def load(cls, arm: ArmSpecification | str | Path = DEFAULT_ARM, **changes: Any) -> "Arm":
         """Load an arm by name, or any supported arm from a URDF or an arm file.
 
         Parameters
@@ -123,7 +121,7 @@ class Arm:
         """Frame whose origin is the tool point."""
         return self.description.tool_frame
 
-    def placed(self, position: ArrayLike, rotation: ArrayLike) -> Arm:
+    def placed(self, position: ArrayLike, rotation: ArrayLike) -> "Arm":
         """The same arm with its base elsewhere.
 
         Parameters

@@ -1,7 +1,5 @@
 """How far an arm is from touching, and how often it touches at random configurations."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -136,7 +134,7 @@ class ContactStatistics:
     touching: NDArray[np.bool_]
 
     @classmethod
-    def sample(cls, model: ContactModel, count: int = SAMPLES) -> ContactStatistics:
+    def sample(cls, model: ContactModel, count: int = SAMPLES) -> "ContactStatistics":
         """Ask Coal for every pair, at so many `random_configurations`."""
         q = random_configurations(model, count)
         data = model.arm.model.createData()

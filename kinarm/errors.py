@@ -14,8 +14,6 @@ Command lines turn any of them into one line on standard error and exit status 2
 two, which are failures of a run.
 """
 
-from __future__ import annotations
-
 import copyreg
 import math
 from collections.abc import Iterable, Mapping

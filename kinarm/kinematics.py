@@ -1,7 +1,5 @@
 """Kinematics of an arm: poses, Jacobians, and configurations that bring the tool to targets."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ It shares no kernel with `kinarm.simulator` and asks Coal about every tested con
 and ``kinarm-bench`` hold the compiled rollouts against it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """The simulator: a problem, stepped in batches of episodes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from copy import copy
@@ -104,7 +102,7 @@ class Simulator:
         """Largest move of each actuated joint in a step, shape (n_actions,) [rad or m]."""
         return self.world.rules.step_limit.copy()
 
-    def with_tolerance(self, tolerance: float) -> Simulator:
+    def with_tolerance(self, tolerance: float) -> "Simulator":
         """Another simulator of the same world, for other episodes, with another tolerance [m]."""
         other = copy(self)
         other.world = self.world.with_tolerance(tolerance)

@@ -1,7 +1,5 @@
 """The world of a problem: arm and scene, and what can be asked about configurations in it."""
 
-from __future__ import annotations
-
 from copy import copy
 from functools import cached_property
 from typing import Any
@@ -82,7 +80,7 @@ class World(Kinematics):
     def __repr__(self) -> str:
         return f"World({self.problem!r})"
 
-    def with_tolerance(self, tolerance: float) -> World:
+    def with_tolerance(self, tolerance: float) -> "World":
         """The same world with another tolerance [m]; it shares all that was built."""
         other = copy(self)
         other.problem = self.problem.replace(tolerance=tolerance)

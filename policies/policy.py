@@ -1,7 +1,5 @@
 """One class for every trained policy: a normaliser, dense layers and a clip; and its file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -163,7 +161,7 @@ class Policy:
     @classmethod
     def from_sb3(
         cls, model: Any, problem: ProblemLike | None = None, vec_normalize: Any = None
-    ) -> Policy:
+    ) -> "Policy":
         """Convert a model of Stable-Baselines3 or sb3-contrib: its deterministic actions.
 
         The model computes in float32, the policy with the same numbers in float64; their actions
@@ -203,7 +201,7 @@ class Policy:
         name: str = "torch",
         environment_steps: int = 0,
         seed: int | None = None,
-    ) -> Policy:
+    ) -> "Policy":
         """Convert a feed-forward network of PyTorch, which maps observations to actions.
 
         Parameters
@@ -241,7 +239,7 @@ class Policy:
         save_archive(path, "policy", FORMAT_VERSION, content.arrays, content.header, compress=True)
 
     @classmethod
-    def load(cls, path: str | Path) -> Policy:
+    def load(cls, path: str | Path) -> "Policy":
         """Read a policy that `save` wrote.
 
         Raises

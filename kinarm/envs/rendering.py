@@ -1,7 +1,5 @@
 """Pictures of the arms of an environment, and a live page that follows them."""
 
-from __future__ import annotations
-
 import math
 import webbrowser
 from typing import TYPE_CHECKING, Any
@@ -149,7 +147,7 @@ class EnvPictures:
             pictures.append(render(q, goal, trace=trace, outcome=outcome, contact=contact))
         return Pictures(pictures)
 
-    def _live_stage(self) -> LiveStage:
+    def _live_stage(self) -> "LiveStage":
         if self._stage is None:
             from kinarm.viewer.live_server import LiveServer, LiveStage
 

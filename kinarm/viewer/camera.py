@@ -1,7 +1,5 @@
 """Where pictures are taken from."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -40,7 +38,7 @@ class Camera(NamedTuple):
     field_of_view: float = FIELD_OF_VIEW
 
     @classmethod
-    def of_replays(cls, problem: ReachProblem, arm: Arm | None = None) -> Camera:
+    def of_replays(cls, problem: ReachProblem, arm: Arm | None = None) -> "Camera":
         """Stand where the replay page does: behind the arm, on the side of most goals.
 
         The problem's arm is loaded if it is not given.
@@ -54,7 +52,7 @@ class Camera(NamedTuple):
         return cls(tuple(eye.tolist()), tuple(target.tolist()))
 
     @classmethod
-    def checked(cls, camera: CameraLike) -> Camera:
+    def checked(cls, camera: "CameraLike") -> "Camera":
         """Make a camera of a mapping of its attributes or a sequence of their values.
 
         Raises

@@ -1,7 +1,5 @@
 """Mesh files of robot descriptions as painted, simplified triangles; read once, then cached."""
 
-from __future__ import annotations
-
 import json
 import logging
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The looks of an arm: an industrial one if its dimensions fit, else its own shapes."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator
 from functools import lru_cache

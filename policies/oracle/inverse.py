@@ -1,7 +1,5 @@
 """Inverse kinematics: configurations that bring the tool to a goal without contact."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -14,8 +14,6 @@ Found, by search, and replayed in the simulator: a motion that reaches the goal 
 need not be the fastest one, and that none was found proves nothing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
 
@@ -64,14 +62,14 @@ class Oracle:
     def __repr__(self) -> str:
         return f"Oracle({self.simulator.problem!r})"
 
-    def solve(self, start: ArrayLike, goal: ArrayLike) -> OracleSolution:
+    def solve(self, start: ArrayLike, goal: ArrayLike) -> "OracleSolution":
         """Solve one trial; see `solve_batch`."""
         q = finite_array("start", start, (self.simulator.arm.n_joints,))
         return self.solve_batch(q[None], finite_array("goal", goal, (3,))[None])[0]
 
     def solve_batch(
         self, starts: ArrayLike, goals: ArrayLike, *, on_progress: Progress | None = None
-    ) -> OracleSolutions:
+    ) -> "OracleSolutions":
         """Solve many trials.
 
         Parameters
@@ -102,7 +100,7 @@ class Oracle:
                 on_progress(min(first + LOT, len(q)), len(q))
         return OracleSolutions.concatenated(parts)
 
-    def _solve_lot(self, starts: Array, goals: Array) -> OracleSolutions:
+    def _solve_lot(self, starts: Array, goals: Array) -> "OracleSolutions":
         """From trials to bounds, motions and their replay."""
         horizon, n = self.simulator.task.horizon, len(starts)
         search = MotionSearch(self.simulator, starts, goals)
@@ -271,7 +269,7 @@ class OracleSolutions:
         )
 
     @classmethod
-    def concatenated(cls, parts: list[OracleSolutions]) -> OracleSolutions:
+    def concatenated(cls, parts: "list[OracleSolutions]") -> "OracleSolutions":
         """Join the solutions of several sets of trials."""
         lots = [vars(part) for part in parts]
         return cls(**{name: np.concatenate([lot[name] for lot in lots]) for name in lots[0]})
