@@ -9,7 +9,7 @@ from kinarm._command_line import run_request
 from kinarm._console import open_console, print_table
 from kinarm._interrupts import GOES_ON, telling
 from kinarm._parallel import available_threads
-from kinarm.evaluation.commands.study import RunningOptions
+from kinarm.evaluation.commands.study import BOUNDING, RunningOptions
 
 if TYPE_CHECKING:
     from kinarm.evaluation.experiments.executors import Executor
@@ -85,9 +85,7 @@ class ReproductionRequest(RunningOptions):
         with telling(lambda: GOES_ON):
             chosen = executor or self.executor(self.folder, threads)
             study.run(threads=threads, executor=chosen)
-            with open_console(stderr=True).status(
-                "bounding what could be reached, drawing figures"
-            ):
+            with open_console(stderr=True).status(BOUNDING):
                 return write_all(study, command or repr(self))
 
 

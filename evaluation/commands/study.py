@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from kinarm._command_line import run_request
-from kinarm._console import print_table
+from kinarm._console import open_console, print_table
 from kinarm._fields import Checked
 from kinarm._interrupts import GOES_ON, telling
 from kinarm._parallel import available_threads
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from kinarm.evaluation.experiments.study import Study
 
 PROG = "kinarm-study"
+
+BOUNDING = "bounding what could be reached, drawing figures"
 
 EPILOG = """
 An experiment is a file that names learners, recipes, problems and seeds, and the fields that vary:
@@ -196,7 +198,8 @@ class StudyRequest(RunningOptions):
             except TrainingFailedError as error:
                 failed = error
             if len(study):
-                write_all(study, command or repr(self))
+                with open_console(stderr=True).status(BOUNDING):
+                    write_all(study, command or repr(self))
             if failed:
                 raise failed
         return study

@@ -126,6 +126,14 @@ class Clock:
     processor_points: tuple[float, ...] = ()
 
 
+@dataclass(frozen=True)
+class Made(Clock):
+    """How a training was made: also the versions of packages, and the commit of kinarm's source."""
+
+    versions: dict[str, str] = field(default_factory=dict)
+    commit: str = ""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CurveSoFar:
     """A learning curve, as it is kept beside the state of its training.

@@ -3,6 +3,7 @@
 import os
 import pickle
 import queue
+import sys
 import threading
 import time
 import traceback
@@ -10,6 +11,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from kinarm._files import first_line
@@ -55,7 +57,12 @@ class Executor(Protocol):
 
 
 def attempt(work: Callable[[Any], Any], task: bytes) -> Any:
-    """Do the work for a pickled task; what goes wrong is returned as a `Failure`."""
+    """Do the work for a pickled task; what goes wrong is returned as a `Failure`.
+
+    The learner of a task may be in a module of the current directory.
+    """
+    if str(Path.cwd()) not in sys.path:
+        sys.path.append(str(Path.cwd()))
     try:
         return work(pickle.loads(task))
     except Exception as error:  # whatever it is, other tasks go on

@@ -2,10 +2,8 @@
 
 import hashlib
 import json
-import pickle
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from dataclasses import fields as dataclass_fields
 from functools import cached_property
 from itertools import product
 from typing import Any
@@ -18,7 +16,6 @@ from kinarm.evaluation.experiments.experiment import MOST_TRAININGS, Entry, Expe
 from kinarm.evaluation.experiments.variation import combinations
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import Learner, find_learner
-from kinarm.policies.oracle import ORACLE_SEMANTICS
 from kinarm.policies.recipes import recipe
 from kinarm.problem import ReachProblem
 
@@ -53,10 +50,6 @@ class Run:
     choices: Mapping[str, Any] = field(default_factory=dict)
     entry: Entry = field(default_factory=Entry)
     plain: Mapping[str, Any] | None = None
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        fields = {item.name: getattr(self, item.name) for item in dataclass_fields(self)}
-        return _unpacked, (self.learner, pickle.dumps(fields))
 
     @cached_property
     def settings(self) -> dict[str, Any]:
@@ -93,35 +86,9 @@ class Run:
         return f"{made}, {chosen}" if chosen else made
 
 
-def _unpacked(learner: str, fields: bytes) -> Run:
-    """A run in another process, which first finds its learner."""
-    find_learner(learner)
-    return Run(**pickle.loads(fields))
-
-
 def hash_of(entries: Any) -> str:
     """Hash of what JSON can hold."""
     return hashlib.sha256(json.dumps(entries, sort_keys=True).encode()).hexdigest()[:20]
-
-
-@dataclass(frozen=True)
-class BoundTask:
-    """Trials of a problem, its arm pinned, whose bounds are to be found."""
-
-    problem: ReachProblem
-    trials: TrialSettings
-
-    @property
-    def name(self) -> str:
-        """Its name in a line."""
-        return f"oracle {self.problem.name}"
-
-    @cached_property
-    def key(self) -> str:
-        """Hash of trials and oracle; the name of the file of the bounds."""
-        protocol = (self.trials.count, self.trials.seed)
-        described = f"{self.problem.digest} {protocol} {SEMANTICS} {ORACLE_SEMANTICS}"
-        return hashlib.sha256(described.encode()).hexdigest()[:20]
 
 
 def plan(

@@ -19,16 +19,15 @@ from numpy.typing import NDArray
 from kinarm._files import Archive, load_archive, reading, save_archive
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.experiments.curve import Clock, Curve, CurvePoint, CurveSoFar
-from kinarm.evaluation.experiments.plan import BoundTask, Run
+from kinarm.evaluation.experiments.plan import Run
 from kinarm.evaluation.trials import trial_set
 from kinarm.policies.checkpoint import CHECKPOINT_SECONDS, rebuilt, save_checkpoint
 from kinarm.policies.learners import CurvePoint as IterationPoint
 from kinarm.policies.learners import find_learner, state_policy, training_states
-from kinarm.policies.oracle import Oracle
 from kinarm.policies.policy import Policy, policy_content, policy_of_content
 
-RUN_ARCHIVE, BOUNDS_ARCHIVE = ("study run", 1), ("study bounds", 1)
-"""Kinds and versions of the files."""
+ARCHIVE = ("study run", 1)
+"""Kind and version of the files."""
 
 STATE, POLICY, OUTCOMES = "state", "policy.", "outcomes."
 """Beginnings of the names of arrays; states are in files of version 1.0.0."""
@@ -58,21 +57,6 @@ class TrialOutcomes(NamedTuple):
     returns: NDArray[np.float64]
     success: NDArray[np.bool_]
     collision: NDArray[np.bool_]
-
-
-class TrialBounds(NamedTuple):
-    """Bounds on any policy in every trial; arrays of shape (n_trials,).
-
-    Attributes
-    ----------
-    reachable : ndarray of bool
-        Whether the oracle found a motion to the goal.
-    steps_lower_bound : ndarray of int
-        Steps that are proven necessary.
-    """
-
-    reachable: NDArray[np.bool_]
-    steps_lower_bound: NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -129,59 +113,41 @@ class Task(NamedTuple):
 
     Attributes
     ----------
-    work : Run or BoundTask
-        A training, or trials whose bounds are to be found.
+    run : Run
+        The training.
     start : Start or None
         Where the training goes on; None for its beginning.
     checkpoint : Path or None
         Where it saves how far it is; None if its files are not those of the driver.
     """
 
-    work: Run | BoundTask
+    run: Run
     start: Start | None = None
     checkpoint: Path | None = None
 
 
 class TaskResult(NamedTuple):
-    """Result of a task, as it comes back from a worker.
+    """Result of a training, as it comes back from a worker.
 
     Attributes
     ----------
     content, end : bytes
-        What the file of the run or of the bounds holds, and that from which a longer training can
-        go on; nothing if none can.
+        What the file of the run holds, and that from which a longer one can go on; nothing if
+        none can.
     clock, iterations : Clock and tuple
-        How long a training took, and its iterations as its learner tells of them.
+        How long it took, and its iterations as its learner tells of them.
     """
 
     content: bytes
-    end: bytes = b""
-    clock: Clock = Clock()
-    iterations: tuple[IterationPoint, ...] = ()
-
-
-def carry_out(task: Task, threads: int = 1, logs: Path | None = None) -> TaskResult:
-    """Train and evaluate, or find bounds; threads and logs are as for `train`."""
-    if isinstance(task.work, BoundTask):
-        bounds = find_bounds(task.work, threads)
-        return TaskResult(_content(BOUNDS_ARCHIVE, bounds._asdict(), {}))
-    return train(task.work, threads, start=task.start, checkpoint=task.checkpoint, logs=logs)
-
-
-def find_bounds(task: BoundTask, threads: int) -> TrialBounds:
-    """The bounds of some trials."""
-    trials = trial_set(task.problem, task.trials.count, task.trials.seed)
-    oracle = Oracle(trials.simulator.problem, threads=threads)
-    solutions = oracle.solve_batch(trials.starts, trials.goals)
-    return TrialBounds(solutions.reachable, solutions.steps_lower_bound)
+    end: bytes
+    clock: Clock
+    iterations: tuple[IterationPoint, ...]
 
 
 def train(
-    run: Run,
+    task: Task,
     threads: int = 1,
     *,
-    start: Start | None = None,
-    checkpoint: Path | None = None,
     on_point: Callable[[CurvePoint], object] | None = None,
     logs: Path | None = None,
 ) -> TaskResult:
@@ -189,15 +155,14 @@ def train(
 
     Parameters
     ----------
-    run, threads : Run and int
+    task, threads : Task and int
         The training, and on how many threads.
-    start, checkpoint
-        As of a `Task`.
     on_point : callable, optional
         Is told every point of the learning curve.
     logs : Path, optional
         Folder of the logs for TensorBoard, a folder in it for each seed.
     """
+    run, start, checkpoint = task
     config, learner = run.config, find_learner(run.learner)
     options: dict[str, Any] = {"threads": threads} if "threads" in learner.options else {}
     if logs is not None and "tensorboard" in learner.options:
@@ -242,38 +207,24 @@ def _run_content(run: Run, end: Start) -> bytes:
         "last": CurvePoint.of(end.state, rollouts)._asdict(),
         "policy": {**content.header, "provenance": made},
     }
-    return _content(RUN_ARCHIVE, arrays, header)
-
-
-def _content(
-    archive: tuple[str, int], arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]
-) -> bytes:
     file = io.BytesIO()
-    save_archive(file, *archive, arrays, header, compress=True)
+    save_archive(file, *ARCHIVE, arrays, header, compress=True)
     return file.getvalue()
 
 
 @contextmanager
-def _content_of(
-    path: Path, archive: tuple[str, int], run: Run | None = None, *, unless: tuple[str, ...] = ()
-) -> Iterator[Archive]:
-    """Header and arrays of a file, which may have to be that of a training."""
-    content = load_archive(path, *archive, InvalidInputError, unless=unless)
-    with reading(repr(str(path)), archive[0], InvalidInputError):
-        if run is not None and content.header["settings"] != run.settings:
+def _content_of(path: Path, run: Run, unless: tuple[str, ...]) -> Iterator[Archive]:
+    """Header and arrays of the file of a training, without arrays whose names begin so."""
+    content = load_archive(path, *ARCHIVE, InvalidInputError, unless=unless)
+    with reading(repr(str(path)), ARCHIVE[0], InvalidInputError):
+        if content.header["settings"] != run.settings:
             raise InvalidInputError(f"{str(path)!r} is of another training")
         yield content
 
 
-def load_bounds(path: Path) -> TrialBounds:
-    """Read the file of bounds."""
-    with _content_of(path, BOUNDS_ARCHIVE) as (_, arrays):
-        return TrialBounds(**arrays)
-
-
 def load_policy(path: Path, run: Run) -> Policy:
     """Read the policy of a finished training."""
-    with _content_of(path, RUN_ARCHIVE, run, unless=(STATE, OUTCOMES)) as (header, arrays):
+    with _content_of(path, run, (STATE, OUTCOMES)) as (header, arrays):
         archive = Archive(header["policy"], _parts(arrays, POLICY))
         return policy_of_content(archive, repr(str(path)))
 
@@ -288,7 +239,7 @@ def load_run(path: Path, run: Run, clock: Clock) -> TrainedRun:
     clock : Clock
         How long the training took.
     """
-    with _content_of(path, RUN_ARCHIVE, run, unless=(STATE, POLICY)) as (header, arrays):
+    with _content_of(path, run, (STATE, POLICY)) as (header, arrays):
         return TrainedRun(
             curve=rebuilt(tuple[CurvePoint, ...], "curve", arrays),
             last=CurvePoint(**header["last"]),

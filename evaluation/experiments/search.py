@@ -15,7 +15,7 @@ from kinarm.evaluation.experiments.curve import CurvePoint
 from kinarm.evaluation.experiments.executors import LocalExecutor
 from kinarm.evaluation.experiments.experiment import Experiment
 from kinarm.evaluation.experiments.plan import Run, plan
-from kinarm.evaluation.experiments.runs import train
+from kinarm.evaluation.experiments.runs import Task, train
 from kinarm.evaluation.experiments.store import Store
 from kinarm.evaluation.experiments.variation import SEARCH_CHOICES
 from kinarm.policies.config import TrainingConfig
@@ -141,7 +141,7 @@ def _mean_success(experiment: Experiment, store: Store, trial: Any, threads: int
 
     for number, run in enumerate(plan(experiment, [choices])):
         if not store.load([run]):
-            store.save(run, train(run, threads, on_point=on_point if number == 0 else None))
+            store.save(run, train(Task(run), threads, on_point=on_point if number == 0 else None))
         shares.append(float(store.load([run])[run].outcomes.success.mean()))
     return float(np.mean(shares))
 

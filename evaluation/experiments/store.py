@@ -1,36 +1,29 @@
 """The folder of an experiment."""
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import tomli_w
 
-from kinarm._fields import from_plain, init_fields, to_plain
+from kinarm._archive import load_json
+from kinarm._fields import from_plain, to_plain
 from kinarm._files import check_folder, only_writer, write_atomically, write_text
 from kinarm.errors import InvalidInputError, KinarmError, PolicyFileError
-from kinarm.evaluation.experiments.curve import Clock, CurveSoFar
+from kinarm.evaluation.experiments.curve import CurveSoFar, Made
 from kinarm.evaluation.experiments.executors import Failure
 from kinarm.evaluation.experiments.experiment import Experiment
-from kinarm.evaluation.experiments.plan import BoundTask, Run
-from kinarm.evaluation.experiments.runs import (
-    Start,
-    TaskResult,
-    TrainedRun,
-    TrialBounds,
-    load_bounds,
-    load_run,
-)
+from kinarm.evaluation.experiments.plan import Run
+from kinarm.evaluation.experiments.runs import Start, TaskResult, TrainedRun, load_run
 from kinarm.policies.checkpoint import load_beside, load_checkpoint, load_progress
 from kinarm.policies.provenance import package_versions, source_commit
 
 SPECIFICATION = "study.toml"
 """File of the experiment in its folder."""
 
-FOLDERS = ("runs", "made", "failed", "bounds", "checkpoints", "ends")
+FOLDERS = ("runs", "made", "failed", "checkpoints", "ends")
 
 
 @dataclass(frozen=True)
@@ -40,16 +33,15 @@ class Store:
     Every finished training is one file under the hash of its settings, ``runs/KEY.npz``, and there
     is no other state: what has no such file is still to be done. How long it took, which no two
     machines agree on, lies apart in ``made/KEY.json``; why a training failed, until it succeeds, in
-    ``failed/KEY.json``; how far it is in ``checkpoints/KEY.npz``; from where longer ones can go on
-    in ``ends``; and what the oracle knows about trials in ``bounds/KEY.npz``. A file that is
-    damaged counts as missing.
+    ``failed/KEY.json``; how far it is in ``checkpoints/KEY.npz``; and from where longer ones can go
+    on in ``ends``. A file that is damaged counts as missing.
     """
 
     folder: Path
 
-    def path(self, kind: str, task: Run | BoundTask) -> Path:
-        """Where something is kept of a training or of bounds, in one of the folders."""
-        key = task.end_key if kind == "ends" and isinstance(task, Run) else task.key
+    def path(self, kind: str, run: Run) -> Path:
+        """Where something is kept of a training, in one of the folders."""
+        key = run.end_key if kind == "ends" else run.key
         suffix = ".json" if kind in ("made", "failed") else ".npz"
         return self.folder / kind / f"{key}{suffix}"
 
@@ -77,29 +69,27 @@ class Store:
             write_text(marker, tomli_w.dumps(experiment.to_json()))
             yield self
 
-    def save(self, task: Run | BoundTask, result: TaskResult | Failure) -> None:
-        """Keep what a training or bounds came to, or why they failed."""
-        failure, kind = self.path("failed", task), "bounds"
+    def save(self, run: Run, result: TaskResult | Failure) -> None:
+        """Keep what a training came to, or why it failed."""
+        failure = self.path("failed", run)
         if isinstance(result, Failure):
-            entries: dict[str, Any] = {"name": task.name, **result._asdict()}
+            entries = {"name": run.name, **result._asdict()}
             write_text(failure, json.dumps(entries, indent=1) + "\n")
             return
-        if isinstance(task, Run):
-            kind, made = "runs", {"versions": package_versions(), "commit": source_commit()}
-            entries = {**to_plain(result.clock), **made}
-            write_text(self.path("made", task), json.dumps(entries) + "\n")
-            if result.end:
-                write_atomically(self.path("ends", task), lambda file: file.write(result.end))
-        write_atomically(self.path(kind, task), lambda file: file.write(result.content))
+        made = Made(**vars(result.clock), versions=package_versions(), commit=source_commit())
+        write_text(self.path("made", run), json.dumps(to_plain(made)) + "\n")
+        if result.end:
+            write_atomically(self.path("ends", run), lambda file: file.write(result.end))
+        write_atomically(self.path("runs", run), lambda file: file.write(result.content))
         failure.unlink(missing_ok=True)
-        self.path("checkpoints", task).unlink(missing_ok=True)
+        self.path("checkpoints", run).unlink(missing_ok=True)
 
     def load(self, runs: Iterable[Run]) -> dict[Run, TrainedRun]:
         """Read those of the trainings that are finished."""
         found = {}
         for run in runs:
             with suppress(InvalidInputError):
-                found[run] = load_run(self.path("runs", run), run, self._clock(run.key))
+                found[run] = load_run(self.path("runs", run), run, self.made(run))
         return found
 
     def start(self, run: Run) -> Start | None:
@@ -124,20 +114,14 @@ class Store:
                     found.append(done / iterations)
         return found
 
-    def made(self, run: Run) -> Mapping[str, Any]:
-        """How a training was made: times [s], versions and commit; empty if unknown."""
-        return self._record("made", run.key)
-
-    def _clock(self, key: str) -> Clock:
-        """How long a training took; nothing if unknown."""
-        made = self._record("made", key)
+    def made(self, run: Run) -> Made:
+        """How a training was made; nothing of it if unknown."""
         with suppress(InvalidInputError):
-            return from_plain(
-                Clock, {k: made[k] for k in init_fields(Clock) if k in made}, "record"
-            )
-        return Clock()
+            record = load_json(self.path("made", run), "record", InvalidInputError)
+            return from_plain(Made, record, "record")
+        return Made()
 
-    def failure(self, task: Run | BoundTask) -> str | None:
+    def failure(self, run: Run) -> str | None:
         """Why a training failed, in a line; None if it did not."""
         return self._record("failed", task.key).get("error")
 
@@ -151,4 +135,6 @@ class Store:
         """Read bounds; None if they are not known."""
         with suppress(InvalidInputError):
             return load_bounds(self.path("bounds", task))
+        with suppress(InvalidInputError, KeyError, TypeError):
+            return str(load_json(self.path("failed", run), "record", InvalidInputError)["error"])
         return None

@@ -16,24 +16,21 @@ from kinarm._console import ProgressLine
 from kinarm._files import is_being_written
 from kinarm._interrupts import kept_from_children
 from kinarm._parallel import available_threads
+from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError, TrainingFailedError, whole_number
+from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.experiments.executors import Executor, Failure, LocalExecutor
 from kinarm.evaluation.experiments.experiment import Experiment
-from kinarm.evaluation.experiments.plan import BoundTask, Run, plan
-from kinarm.evaluation.experiments.runs import (
-    Task,
-    TaskResult,
-    TrainedRun,
-    TrialBounds,
-    carry_out,
-    load_policy,
-)
+from kinarm.evaluation.experiments.plan import Run, plan
+from kinarm.evaluation.experiments.runs import Task, TaskResult, TrainedRun, load_policy, train
 from kinarm.evaluation.experiments.search import carry_out_search, searched_runs
 from kinarm.evaluation.experiments.store import SPECIFICATION, Store
 from kinarm.evaluation.experiments.table import Group, figures_of, identity, shorter, shown
 from kinarm.evaluation.outcomes import Outcomes
+from kinarm.evaluation.trials import trial_set
 from kinarm.policies.checkpoint import CHECKPOINT_SECONDS
 from kinarm.policies.learners import find_learner
+from kinarm.policies.oracle import OracleSolutions
 from kinarm.policies.policy import Policy
 
 
@@ -146,13 +143,13 @@ class Study:
             self.refresh()
             where = executor or LocalExecutor(jobs, threads)
             tasks = self._tasks(where.shares_files)
-            work = partial(carry_out, threads=threads, logs=logs)
+            work = partial(train, threads=threads, logs=logs)
             with self._progress(len(tasks)) as show:
                 for number, ((done, *_), result) in enumerate(where.map(work, tasks), start=1):
                     store.save(done, result)
                     if isinstance(result, Failure):
                         failures[done.name] = result.error
-                    elif isinstance(done, Run):
+                    else:
                         on_trained(done, result)
                     show(number, done.name)
         self.refresh()
@@ -188,13 +185,9 @@ class Study:
                 thread.join()
 
     def _tasks(self, with_checkpoints: bool) -> list[Task]:
-        """The missing tasks: first the bounds, then the trainings seed by seed.
-
-        Trainings that several entries share are trained once.
-        """
-        tasks = [Task(each) for each in self.bound_tasks if each.problem.digest not in self.bounds]
-        missing = {run.key: run for run in self.missing}.values()
-        for run in missing:
+        """The missing trainings, seed by seed; those that several entries share come once."""
+        tasks = []
+        for run in {run.key: run for run in self.missing}.values():
             path = self.store.path("checkpoints", run) if with_checkpoints else None
             tasks.append(Task(run, self.store.start(run), path))
         return tasks
@@ -230,18 +223,14 @@ class Study:
         return tuple(run for run in self.runs if run not in self.finished)
 
     @cached_property
-    def bounds(self) -> Mapping[str, TrialBounds]:
-        """Bounds of the trials, as far as they are known, by the problem's hash."""
-        found = {task.problem.digest: self.store.bounds(task) for task in self.bound_tasks}
-        return {digest: bounds for digest, bounds in found.items() if bounds is not None}
-
-    @property
-    def bound_tasks(self) -> tuple[BoundTask, ...]:
-        """The trials whose bounds belong to the experiment."""
-        if not self.experiment.bounds:
-            return ()
-        problems = {run.config.problem.digest: run.config.problem for run in self.runs}
-        return tuple(BoundTask(each, self.experiment.trials) for each in problems.values())
+    def bounds(self) -> Mapping[str, OracleSolutions]:
+        """Bounds of the trials that finished trainings faced, by the problem's hash."""
+        trials, wanted = self.experiment.trials, self.finished if self.experiment.bounds else ()
+        problems = {run.config.problem.digest: run.config.problem for run in wanted}
+        return {
+            digest: oracle_bounds(trial_set(problem, trials.count, trials.seed))
+            for digest, problem in problems.items()
+        }
 
     @property
     def failures(self) -> Mapping[Run, str]:
@@ -259,8 +248,8 @@ class Study:
         """
         policy = load_policy(self.store.path("runs", run), run)
         made = self.store.made(run)
-        known = {name: made[name] for name in ("versions", "commit") if name in made}
-        return replace(policy, provenance=replace(policy.provenance, **known))
+        origin = replace(policy.provenance, versions=made.versions, commit=made.commit)
+        return replace(policy, provenance=origin)
 
     def groups(self) -> tuple[Group, ...]:
         """The finished trainings, those with the same settings but for the seed together."""

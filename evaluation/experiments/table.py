@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from kinarm.evaluation.experiments.experiment import Entry
 from kinarm.evaluation.experiments.plan import Run
-from kinarm.evaluation.experiments.runs import TrainedRun, TrialBounds
+from kinarm.evaluation.experiments.runs import TrainedRun
 from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.outcomes import Outcomes
 from kinarm.evaluation.statistics import Estimate, share_over_seeds, wilson_interval
 from kinarm.policies.config import TrainingConfig
+from kinarm.policies.oracle import OracleSolutions
 
 if TYPE_CHECKING:
     from kinarm.evaluation.experiments.study import Study
@@ -38,7 +39,7 @@ class Group:
         What they belong to, settings of the first of them, and what of these varies, by field.
     runs : tuple of TrainedRun
         The trainings by seed.
-    bounds : TrialBounds or None
+    bounds : OracleSolutions or None
         What the oracle knows about their trials.
     """
 
@@ -47,7 +48,7 @@ class Group:
     config: TrainingConfig
     choices: Mapping[str, Any]
     runs: tuple[TrainedRun, ...]
-    bounds: TrialBounds | None
+    bounds: OracleSolutions | None
 
     @cached_property
     def hits(self) -> NDArray[np.bool_]:

@@ -181,12 +181,7 @@ LOADERS: dict[str, Loader] = {
         lambda path: repr(Study(path, path.parent / "out")),
         "file.toml",
     ),
-    **{
-        f"{folder} of a study": Loader(
-            partial(samples.study_file, folder), damage, _study, f"{folder}/{samples.KEYS[folder]}"
-        )
-        for folder, damage in (("made", damaged_json), ("bounds", damaged_archive))
-    },
+    "made of a study": Loader(samples.study_record, damaged_json, _study, f"made/{samples.MADE}"),
     "urdf": Loader(
         lambda: [*[samples.SMALL_URDF] * 7, samples.urdf()], damaged_xml, _arm, "file.urdf", _cube
     ),

@@ -121,20 +121,15 @@ SMALL_STUDY = {
     "trials": {"count": 5},
     "fixed": {"iterations": 1, "directions": 2, "top_directions": 1},
 }
-_PLANNED = Study(SMALL_STUDY, Path())
-_RUN, _BOUNDS = _PLANNED.runs[0], _PLANNED.bound_tasks[0]
-KEYS = {
-    "made": _PLANNED.store.path("made", _RUN).name,
-    "bounds": _PLANNED.store.path("bounds", _BOUNDS).name,
-}
-"""Names of the files of a study whose one training is finished, by their folder."""
+MADE = Study(SMALL_STUDY, Path()).store.path("made", Study(SMALL_STUDY, Path()).runs[0]).name
+"""Name of the file that tells how the one training of this study was made."""
 
 
-def study_file(folder: str) -> list[bytes]:
-    """One of these files."""
+def study_record() -> list[bytes]:
+    """This file."""
     with TemporaryDirectory() as name:
         Study(SMALL_STUDY, name).run(jobs=1)
-        return [(Path(name) / folder / KEYS[folder]).read_bytes()]
+        return [(Path(name) / "made" / MADE).read_bytes()]
 
 
 SMALL_URDF = b"""<?xml version="1.0" encoding="utf-8"?>

@@ -59,7 +59,7 @@ def test_failures(run, file, tmp_path, monkeypatch):
     def fail(*_, **__):
         raise ValueError("of all things")
 
-    monkeypatch.setattr("kinarm.evaluation.experiments.runs.train", fail)
+    monkeypatch.setattr("kinarm.evaluation.experiments.study.train", fail)
     answer = run("kinarm-study", file, "--out", tmp_path / "it", "--jobs", 1)
     assert answer.status == 1
     assert "6 of 6 trainings failed: ars paper* right seed 0, step_size 0.02: of" in answer.err

@@ -134,14 +134,12 @@ def test_a_policy_in_the_way(run, tmp_path):
 
 
 def test_a_seed_that_fails_is_named(run, tmp_path, monkeypatch):
-    train = experiments.train
-
-    def fail(run, *given, **options):
-        if run.config.seed == 1:
+    def fail(task, *given, **options):
+        if task.run.config.seed == 1:
             raise ValueError("of all things")
-        return train(run, *given, **options)
+        return experiments.train(task, *given, **options)
 
-    monkeypatch.setattr(experiments, "train", fail)
+    monkeypatch.setattr("kinarm.evaluation.experiments.study.train", fail)
     arguments = ("ars", "--problem", "right", "--iterations", 9, *SMALL, "--seeds", 2)
     answer = run("kinarm-train", *arguments, "--jobs", 1, "--out", tmp_path)
     assert answer.status == 1

@@ -15,9 +15,8 @@ SMALL = {
 
 
 def contents(folder):
-    """All files of the trainings and bounds of a study, by name."""
-    paths = [*folder.glob("runs/*"), *folder.glob("bounds/*")]
-    return {str(path.relative_to(folder)): path.read_bytes() for path in paths}
+    """All files of the trainings of a study, by name."""
+    return {path.name: path.read_bytes() for path in folder.glob("runs/*")}
 
 
 class Counting:

@@ -13,6 +13,7 @@ from small_studies import SMALL, Counting, contents
 from kinarm.errors import InvalidInputError, OutputError, TrainingFailedError
 from kinarm.evaluation import evaluate, oracle_bounds
 from kinarm.evaluation.experiments import runs as training
+from kinarm.evaluation.experiments import study as studies
 from kinarm.evaluation.experiments.clusters import RayExecutor, SlurmExecutor
 from kinarm.evaluation.experiments.executors import LocalExecutor
 from kinarm.evaluation.experiments.study import Study
@@ -93,11 +94,11 @@ class TestGoingOn:
     def test_a_damaged_file_is_made_anew(self, small):
         study = small().run(jobs=1)
         before = contents(study.store.folder)
-        for path in (study.store.path("runs", study.runs[1]), *study.store.folder.glob("bounds/*")):
-            path.write_bytes(path.read_bytes()[:200])
+        path = study.store.path("runs", study.runs[1])
+        path.write_bytes(path.read_bytes()[:200])
         executor = Counting()
         study.run(executor=executor)
-        assert len(executor.tasks) == 2
+        assert len(executor.tasks) == 1
         assert contents(study.store.folder) == before
 
     def test_more_seeds_and_values(self, small):
@@ -121,7 +122,7 @@ class TestGoingOn:
             )
             assert went_on == at_once
             times = study.store.made(run)
-            assert len(times["points"]) == len(study.finished[run].curve)
+            assert len(times.points) == len(study.finished[run].curve)
 
     def test_but_not_if_the_schedule_depends_on_them(self, small):
         changes = {"step_size_schedule": "linear"}
@@ -204,21 +205,20 @@ def test_each_write_fails_in_turn(small, monkeypatch, error):
         assert list(study.store.folder.rglob("*.part")) == []
         if len(calls) < failing_at:
             break
-    assert failures == len(calls) == 1 + 1 + 2 * 3  # the experiment, the bounds, two trainings
+    assert failures == len(calls) == 1 + 2 * 3  # the experiment, two trainings
 
 
 class TestFailures:
     @pytest.fixture
     def failing(self, monkeypatch):
         """Trainings with the step size 0.2 fail."""
-        train = training.train
 
-        def sometimes(run, threads, **options):
-            if run.config.step_size == 0.2:
+        def sometimes(task, threads, **options):
+            if task.run.config.step_size == 0.2:
                 raise ZeroDivisionError("much too fast\nindeed")
-            return train(run, threads, **options)
+            return training.train(task, threads, **options)
 
-        monkeypatch.setattr(training, "train", sometimes)
+        monkeypatch.setattr(studies, "train", sometimes)
 
     def test_others_go_on(self, small, failing, monkeypatch, finished):
         study = small()
@@ -236,18 +236,6 @@ class TestFailures:
         study.run(jobs=1)
         assert study.failures == {}
         assert contents(study.store.folder) == contents(finished.store.folder)
-
-    def test_bounds_that_cannot_be_found(self, small, monkeypatch):
-        def fail(*_):
-            raise MemoryError
-
-        monkeypatch.setattr(training, "find_bounds", fail)
-        study = small(seeds=1)
-        with pytest.raises(TrainingFailedError, match="oracle right: MemoryError"):
-            study.run(executor=Counting())
-        assert len(study) == 2
-        assert study.bounds == {}
-        assert np.isnan(study.table()["relative_success"]).all()
 
 
 class TestStatus:
