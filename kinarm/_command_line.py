@@ -265,9 +265,8 @@ def run_request(
     prog: str,
     kind: type[Request],
     report: Callable[[Request, str], None],
-    arguments: Sequence[str] | None,
+    arguments: Sequence[str] | None = None,
     *,
-    epilog: str = "",
     skip: Collection[str] = (),
 ) -> NoReturn:
     """Run a command line all of whose options are the fields of one request; see `run_command`.
@@ -280,11 +279,11 @@ def run_request(
         Runs a request and prints what it came to; its second argument is the command as typed.
     arguments : sequence of str, optional
         What is typed after the name; by default that of this process.
-    epilog, skip
-        What help ends with, and fields that are no options.
+    skip
+        Fields that are no options.
     """
     typed = sys.argv[1:] if arguments is None else arguments
-    parser = Parser(prog=prog, description=_first_line(kind), epilog=epilog)
+    parser = Parser(prog=prog, description=_first_line(kind))
     add_options(parser, kind, skip=skip)
     command = " ".join([prog, *map(shlex.quote, typed)])
     run_command(
@@ -296,11 +295,9 @@ def run_commands(
     prog: str,
     description: str,
     commands: Commands,
-    arguments: Sequence[str] | None,
-    *,
-    epilog: str = "",
+    arguments: Sequence[str] | None = None,
 ) -> NoReturn:
-    """Run a command line whose first word is one of several commands; see `run_command`.
+    """Run a command line whose first word is one of several commands, the first by default.
 
     Parameters
     ----------
@@ -309,7 +306,7 @@ def run_commands(
     commands : mapping
         See `Commands`.
     """
-    parser = Parser(prog=prog, description=description, epilog=epilog)
+    parser = Parser(prog=prog, description=description)
     parsers = parser.add_subparsers(
         title="commands",
         dest="command",
@@ -322,7 +319,8 @@ def run_commands(
         add_options(parsers.add_parser(name, help=said, description=said), kind)
 
     def run() -> None:
-        options = parser.parse_args(arguments)
+        typed = sys.argv[1:] if arguments is None else arguments
+        options = parser.parse_args(typed or [next(iter(commands))])
         kind, report = commands[options.command]
         report(kind(**given_options(options, kind)))
 

@@ -11,6 +11,7 @@ from difflib import get_close_matches
 from typing import Any, ClassVar, NoReturn
 
 from kinarm import __version__
+from kinarm._files import shipped_files
 from kinarm.errors import one_line
 
 EXAMPLE = re.compile(r"(?m)^  (\S.*?) {2,}(\S.*)$")
@@ -32,11 +33,16 @@ FUNCTIONS: dict[str, Callable[[Iterable[str], str], str]] = {
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser that reports bad usage in one line and exits with status 2."""
+    """An argument parser that reports bad usage in one line and exits with status 2.
+
+    What its help ends with is a text of ``data/help`` that is called like the command, if any.
+    """
 
     completable: ClassVar[bool] = True
 
     def __init__(self, **options: Any) -> None:
+        if epilog := shipped_files("help", ".txt").get(options.get("prog", "")):
+            options["epilog"] = epilog.read_text()
         super().__init__(formatter_class=HelpFormatter, add_help=False, **options)
         self._optionals.title = "general"
         self.add_argument("-h", "--help", action="help", help="Show this help and exit")

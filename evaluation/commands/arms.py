@@ -1,9 +1,9 @@
 """``kinarm-arms``: the arms that kinarm knows, and a description of one."""
 
 import sys
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import cast
 
@@ -11,14 +11,6 @@ from kinarm._command_line import Commands, run_commands
 from kinarm._console import print_table
 from kinarm._files import check_output
 from kinarm.arm_specification import PACKAGE, ArmFile, arm_names
-
-EPILOG = """
-examples:
-  kinarm-arms                                           the arms that kinarm knows
-  kinarm-arms show ur5                                  joints, shapes, and pairs that are tested
-  kinarm-arms show ur5 --out ur5.html                   a page to move its joints on
-  kinarm-arms show my.urdf --tool-frame flange --package-dir .   an arm of your own
-"""
 
 HEADINGS = (
     *("arm", "title", "joints", "actuated", "reach [m]", "speeds [deg/s]", "pairs"),
@@ -112,3 +104,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     typed = sys.argv[1:] if arguments is None else arguments
     summary = "List arms, and describe one."
     run_commands("kinarm-arms", summary, COMMANDS, typed or ["list"], epilog=EPILOG)
+main = partial(run_commands, "kinarm-arms", "List arms, and describe one.", COMMANDS)
+"""Run the command line."""
+
+if __name__ == "__main__":
+    main()

@@ -1,8 +1,9 @@
 """``kinarm-bench``: how fast everything is on this machine."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -11,12 +12,6 @@ from kinarm._console import open_console
 from kinarm._fields import Checked
 from kinarm._files import check_folder, only_writer, write_text
 from kinarm.evaluation.report.templating import markdown_table
-
-EPILOG = """
-examples:
-  kinarm-bench                              a table, in a minute or two
-  kinarm-bench --ppo --out speed            with a training by PPO, and files
-"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,11 +60,6 @@ class BenchmarkRequest(Checked):
             write_text(self.out / "speed.json", json.dumps(document, indent=1) + "\n")
             write_text(self.out / "SPEED.md", speed_page(document))
         return document
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line."""
-    run_request("kinarm-bench", BenchmarkRequest, _report, arguments, epilog=EPILOG)
 
 
 def _report(request: BenchmarkRequest, command: str) -> None:
@@ -142,3 +132,10 @@ def _millions(training: dict[str, Any]) -> str:
 
 def _rates(timing: dict[str, float]) -> list[str]:
     return [f"{timing[name]:,.0f} steps/s" for name in ("median", "best")]
+
+
+main = partial(run_request, "kinarm-bench", BenchmarkRequest, _report)
+"""Run the command line."""
+
+if __name__ == "__main__":
+    main()

@@ -1,7 +1,7 @@
 """``kinarm-eval``: evaluate policies on random reaching trials, beside an oracle."""
 
 import json
-from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 from kinarm._command_line import run_request
@@ -27,12 +27,10 @@ examples:
   kinarm-eval --policy model.zip --problem right         a model of Stable-Baselines3
   kinarm-eval --policy my_module:my_policy --problem left   a function of your own
 """
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line."""
-    skip = ("problem",)
-    run_request("kinarm-eval", EvaluationRequest, _report, arguments, epilog=EPILOG, skip=skip)
+HOLDING_NOTE = (
+    "mm columns, held and closest are from trials that success does not end; contact "
+    "counts as a miss; the oracle aims at 5 mm there"
+)
 
 
 def _report(request: EvaluationRequest, command: str) -> None:
@@ -77,3 +75,29 @@ def _footnote(document: "EvaluationDocument") -> str:
         )
     )
     return text.rstrip()
+        lines.append(
+            "step ratio: steps divided by the number proven necessary, in trials that succeeded; "
+            f"proofs complete: {', '.join(shares)}"
+        )
+        bounded = min(each.bounded for each in bounds.values())
+        if bounded < protocol.trials:
+            lines.append(
+                f"oracle, relative success and step ratio are of the first {bounded} trials of "
+                f"{protocol.trials}; --policy oracle bounds all"
+            )
+    shown = (row for name, _ in problems for row in table_rows(document, name))
+    if any(map(has_star, shown)):
+        lines.append(REPLACED)
+    if protocol.hold:
+        lines.append(HOLDING_NOTE)
+    hashes = (f"{problem} {faced.trial_set_hash}" for problem, faced in problems)
+    lines.append(f"trial sets: {', '.join(hashes)}")
+    lines += dict.fromkeys(row.note for row in document.results if row.note)
+    return "\n".join(lines)
+
+
+main = partial(run_request, "kinarm-eval", EvaluationRequest, _report, skip=("problem",))
+"""Run the command line."""
+
+if __name__ == "__main__":
+    main()

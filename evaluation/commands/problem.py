@@ -1,9 +1,8 @@
 """``kinarm-problem``: list, show and check problems."""
 
 import json
-import sys
-from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, ClassVar, cast
 
@@ -17,14 +16,6 @@ from kinarm.problem_options import ProblemOptions, say_choices
 if TYPE_CHECKING:
     from kinarm.evaluation.problem_check import ProblemCheck
     from kinarm.problem import ReachProblem
-
-EPILOG = """
-examples:
-  kinarm-problem                                          the problems that ship
-  kinarm-problem show shelf-panda > mine.toml             a file to start from
-  kinarm-problem show --arm ur5 --scene ring > mine.toml  parts put together
-  kinarm-problem check mine.toml --picture mine.png       what can be reached, and what touches
-"""
 
 HEADINGS = ("problem", "arm", "obstacles", "goals", "step [s]", "tolerance [m]")
 EXPENDABLE = ("obstacles", "step [s]", "tolerance [m]")
@@ -163,3 +154,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     typed = sys.argv[1:] if arguments is None else arguments
     summary = "List, show and check problems."
     run_commands("kinarm-problem", summary, COMMANDS, typed or ["list"], epilog=EPILOG)
+main = partial(run_commands, "kinarm-problem", "List, show and check problems.", COMMANDS)
+"""Run the command line."""
+
+if __name__ == "__main__":
+    main()

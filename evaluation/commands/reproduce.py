@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
@@ -15,15 +16,6 @@ if TYPE_CHECKING:
     from kinarm.evaluation.experiments.executors import Executor
     from kinarm.evaluation.experiments.experiment import Experiment
     from kinarm.evaluation.paper.claims import Claim
-
-EPILOG = """
-An interrupted reproduction goes on where it stopped, by the same command.
-
-examples:
-  kinarm-reproduce                  the whole paper, into the folder reproduction
-  kinarm-reproduce --quick          a smoke run of a minute, which judges no claim
-  kinarm-reproduce --no-ppo         Augmented Random Search alone, a few minutes
-"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,11 +81,6 @@ class ReproductionRequest(RunningOptions):
                 return write_all(study, command or repr(self))
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line."""
-    run_request("kinarm-reproduce", ReproductionRequest, _report, arguments, epilog=EPILOG)
-
-
 def _report(request: ReproductionRequest, command: str) -> None:
     """Run a request, and print its verdicts, if it has any."""
     from kinarm.evaluation.experiments.plan import plan
@@ -107,3 +94,10 @@ def _report(request: ReproductionRequest, command: str) -> None:
     print(f"written: {request.folder / 'REPRODUCTION.md'}, with tables and figures beside it")
     if request.quick:
         print("next: kinarm-reproduce trains everything to the end and judges the claims")
+
+
+main = partial(run_request, "kinarm-reproduce", ReproductionRequest, _report)
+"""Run the command line."""
+
+if __name__ == "__main__":
+    main()

@@ -21,38 +21,6 @@ PROG = "kinarm-study"
 
 BOUNDING = "bounding what could be reached, drawing figures"
 
-EPILOG = """
-An experiment is a file that names learners, recipes, problems and seeds, and the fields that vary:
-
-  learner = "ars"
-  recipe = "tuned"
-  problems = ["right", "both"]
-  seeds = 4
-
-  [trials]
-  count = 1000
-
-  [fixed]
-  iterations = 2000
-
-  [grid]
-  step_size = [0.01, 0.02, 0.05]
-  "problem.task.start_spread" = [0.2, 1.0]
-
-The same command goes on with what is missing, whatever stopped it. More seeds, values or iterations
-extend an experiment: nothing is trained twice.
-
-examples:
-  kinarm-study learners                    an experiment that ships with kinarm: learners compared
-  kinarm-study learners --only ars-tuned sac --problems right --seeds 1
-                                           a part of it
-  kinarm-study steps.toml                  into the folder steps
-  kinarm-study steps.toml --jobs 1         one training at a time
-  kinarm-study steps.toml --ray auto       on the Ray cluster that this machine is part of
-  kinarm-study steps.toml --no-train       write what is finished so far
-  kinarm-study status steps                how far it is
-"""
-
 
 @dataclass(frozen=True, kw_only=True)
 class RunningOptions(Checked):
@@ -223,7 +191,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     typed = sys.argv[1:] if arguments is None else arguments
     if typed[:1] == ["status"]:
         run_request(f"{PROG} status", StatusRequest, _status, typed[1:])
-    run_request(PROG, StudyRequest, _carry_out, typed, epilog=EPILOG)
+    run_request(PROG, StudyRequest, _carry_out, typed)
 
 
 def _carry_out(request: StudyRequest, command: str) -> None:

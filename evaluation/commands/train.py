@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from kinarm._command_line import add_options, given_options, run_command
 from kinarm._fields import Checked
+from kinarm._files import shipped_files
+from kinarm._options import add_options, given_options
 from kinarm._parser import CommandParser, Parser
 from kinarm.errors import FROM_ZERO, InvalidInputError
 from kinarm.policies.learners import Learner, find_learner, learner_names
@@ -23,31 +25,6 @@ PROG = "kinarm-train"
 
 CIRCUMSTANCES = ("problem", "seed", "recipe", "algorithm")
 """Settings that a `TrainRequest` has fields of its own for, or that the learner determines."""
-
-LEARNERS_EPILOG = """
-kinarm-train LEARNER --help lists recipes and options.
-
-examples:
-  kinarm-train ars --recipe tuned --out right.npz           one policy
-  kinarm-train ars --recipe tuned --seeds 5 --out right     five, in the folder right
-  kinarm-train ppo --recipe tuned --problem both --out both.npz   both benches, with PPO
-  kinarm-train my_module:LEARNER --out mine.npz             a learner of your own
-"""
-
-EPILOG = """
-{recipes}
-examples:
-  kinarm-train {name} --recipe {recipe} --out right.npz
-      one policy, for the problem right
-  kinarm-train {name} --recipe {recipe} --seeds 5 --out right
-      five policies, with the seeds 0 to 4, in the folder right
-  kinarm-train {name} --recipe {recipe} --seeds 5 --out right --resume
-      go on after an interruption; finished seeds stay as they are
-  kinarm-train {name} --recipe {recipe} --problem my.toml --out my.npz
-      a problem of your own
-  kinarm-train {name} --recipe {recipe} --iterations {half} --out short.npz
-      half as long, for the problem right
-"""
 
 SETTINGS = "settings of the learner (defaults of the recipe {})"
 
@@ -125,7 +102,7 @@ class SeedsRequest(Checked):
 
 def build_parser(named: str | None = None) -> Parser:
     """The options of the command, of all learners or of the one that is named."""
-    parser = Parser(prog=PROG, description="Train a policy.", epilog=LEARNERS_EPILOG)
+    parser = Parser(prog=PROG, description="Train a policy.")
     learners = parser.add_subparsers(
         title="learners",
         dest="learner",
@@ -161,11 +138,15 @@ def _epilog(name: str, learner: Learner[Any, Any]) -> str:
     """Recipes of a learner, and examples with the one to try first."""
     recipe = "tuned" if "tuned" in learner.recipes else learner.first_recipe
     lines = (f"  {each:<8} {summary}\n" for each, summary in learner.summaries.items())
-    return EPILOG.format(
-        name=name,
-        recipes="recipes:\n" + "".join(lines) if learner.summaries else "",
-        recipe=recipe,
-        half=learner.recipes[recipe].iterations // 2,
+    return (
+        shipped_files("help", ".txt")["learner"]
+        .read_text()
+        .format(
+            name=name,
+            recipes="recipes:\n" + "".join(lines) if learner.summaries else "",
+            recipe=recipe,
+            half=learner.recipes[recipe].iterations // 2,
+        )
     )
 
 

@@ -1,0 +1,1 @@
+"""What helps of commands end with, by the name of the command."""
