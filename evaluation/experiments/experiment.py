@@ -10,15 +10,6 @@ from kinarm._fields import OPTIONAL, Checked, from_plain, read_toml, to_plain
 from kinarm._files import named_file
 from kinarm.errors import FROM_ZERO, InvalidInputError, UnknownNameError, whole_number
 from kinarm.evaluation.experiments.curve import TrialSettings
-from kinarm.evaluation.experiments.variation import (
-    SEARCH_CHOICES,
-    check_tables,
-    combinations,
-    draw,
-    prepared,
-    ranges_of,
-)
-from kinarm.randomness import Stream, stream_generator
 
 MOST_TRAININGS = 100_000
 TRAININGS = {"at_most": MOST_TRAININGS}
@@ -26,6 +17,19 @@ TRAININGS = {"at_most": MOST_TRAININGS}
 
 SEVERAL = ("learners", "recipes", "problems")
 """Entries of a file that are lists; a text stands for a list of one."""
+
+
+RANGE = ("low", "high", "log")
+
+TABLES = ("fixed", "grid", "random", "search")
+"""Entries of a file that name fields of settings."""
+
+SEARCH_CHOICES = {
+    "sampler": {"tpe": "TPESampler", "random": "RandomSampler", "cmaes": "CmaEsSampler"},
+    "pruner": {"median": "MedianPruner", "none": "NopPruner", "hyperband": "HyperbandPruner"},
+}
+"""Choices of a search beside count and seed, and Optuna's names of them; the first of each is the
+default."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,6 +75,9 @@ class Entry(Checked):
             name = f"{self.learner}-{recipe}" if recipe else self.learner
             object.__setattr__(self, "name", name)
         check_tables(fixed=self.fixed, grid=self.grid)
+        whole_number("seeds", self.seeds, 0, MOST_TRAININGS)
+        whole_number("first_seed", self.first_seed or 0, 0)
+        _check_tables(fixed=self.fixed, grid=self.grid)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,7 +137,7 @@ class Experiment(Checked):
             _check_distinct(name, getattr(self, name))
         _check_distinct("entries", [entry.name for entry in self.entries])
         random, search = ranges_of(self.random), self.searched
-        check_tables(fixed=self.fixed, grid=self.grid, random=random, search=search)
+        _check_tables(fixed=self.fixed, grid=self.grid, random=random, search=search)
         for table in ("random", "search"):
             if entries := getattr(self, table):
                 whole_number(f"{table}.count", entries.get("count", 0), 1, MOST_TRAININGS)
@@ -171,15 +178,6 @@ class Experiment(Checked):
         """Lists and ranges that are searched, by field."""
         return ranges_of(self.search)
 
-    def choices(self) -> Iterator[dict[str, Any]]:
-        """Every combination of the values that vary, by field."""
-        for of_grid in combinations(self.grid):
-            for number in range(self.random.get("count", 1)):
-                # A larger number of draws keeps the first ones.
-                rng = stream_generator(Stream.STUDY, self.random.get("seed", 0), number)
-                ranges = ranges_of(self.random).items()
-                yield {**of_grid, **{key: draw(entry, rng.random()) for key, entry in ranges}}
-
     def to_json(self) -> dict[str, Any]:
         """As a dictionary that TOML and JSON can hold."""
         entries: dict[str, Any] = to_plain(self)
@@ -195,10 +193,10 @@ class Experiment(Checked):
             If an entry is missing, unknown or wrong; in one line that names source, key and what
             is expected.
         """
-        made = prepared(entries, SEVERAL)
+        made = _prepared(entries, SEVERAL)
         if isinstance(made.get("entries"), list):
             made["entries"] = [
-                prepared(each, ("problems",)) if isinstance(each, Mapping) else each
+                _prepared(each, ("problems",)) if isinstance(each, Mapping) else each
                 for each in made["entries"]
             ]
         return from_plain(cls, made, where)
@@ -267,3 +265,64 @@ class Experiment(Checked):
 def _check_distinct(name: str, values: Sequence[str]) -> None:
     if len(set(values)) < len(values):
         raise InvalidInputError(f"{name} names the same twice: {', '.join(values)}")
+
+
+def _check_tables(**tables: Mapping[str, Any]) -> None:
+    """Refuse fields that stand in two tables, and values that nothing can be made of."""
+    given: dict[str, str] = {}
+    for table, entries in tables.items():
+        for key, entry in entries.items():
+            if key in given:
+                raise InvalidInputError(f"{key!r} stands in {given[key]} and in {table}")
+            given[key] = table
+            if table != "fixed":
+                _check_values(f"{table}.{key}", entry, ranges=table != "grid")
+
+
+def _check_values(where: str, entry: Any, *, ranges: bool) -> None:
+    """Refuse what is neither a list of values nor, where there may be one, a range."""
+    if isinstance(entry, list | tuple) or not ranges:
+        if not isinstance(entry, list | tuple) or not entry:
+            raise InvalidInputError(f"{where} must be a list of at least one value, got {entry!r}")
+        return
+    given = entry if isinstance(entry, Mapping) else {}
+    low: Any = given.get("low")
+    high: Any = given.get("high")
+    numbers = {type(low), type(high)} <= {int, float} and not set(given) - set(RANGE)
+    if not (numbers and low < high and (low > 0 or not given.get("log"))):
+        raise InvalidInputError(
+            f"{where} must be a list of values, or a table with low below high and perhaps "
+            f"log = true, with which low is above 0, got {entry!r}"
+        )
+
+
+def ranges_of(entries: Mapping[str, Any]) -> dict[str, Any]:
+    """Lists and ranges that are drawn or searched, by field."""
+    said = ("count", "seed", *SEARCH_CHOICES)
+    return {key: entry for key, entry in entries.items() if key not in said}
+
+
+def _prepared(entries: Mapping[str, Any], several: Iterable[str]) -> dict[str, Any]:
+    """Entries of a file, with lists for texts, and with paths for tables within tables."""
+    made = dict(entries)
+    for name in several:
+        single = name.removesuffix("s")
+        if single in made and name not in made:
+            made[name] = made.pop(single)
+        if isinstance(made.get(name), str):
+            made[name] = [made[name]]
+    for table in TABLES:
+        if isinstance(made.get(table), Mapping):
+            made[table] = dict(_flattened(made[table], table in ("random", "search")))
+    return made
+
+
+def _flattened(
+    entries: Mapping[str, Any], ranges: bool, path: str = ""
+) -> Iterator[tuple[str, Any]]:
+    """Entries of tables within tables by their paths; tables that are ranges may stay whole."""
+    for key, entry in entries.items():
+        if isinstance(entry, Mapping) and not (ranges and set(entry) & set(RANGE)):
+            yield from _flattened(entry, ranges, f"{path}{key}.")
+        else:
+            yield f"{path}{key}", entry

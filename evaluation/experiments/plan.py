@@ -8,21 +8,26 @@ from functools import cached_property
 from itertools import product
 from typing import Any
 
+import numpy as np
+
 from kinarm import SEMANTICS
 from kinarm._fields import from_plain, init_fields, to_plain
 from kinarm.errors import InvalidInputError, KinarmError, UnknownNameError
 from kinarm.evaluation.experiments.curve import TrialSettings
-from kinarm.evaluation.experiments.experiment import MOST_TRAININGS, Entry, Experiment
-from kinarm.evaluation.experiments.variation import combinations
+from kinarm.evaluation.experiments.experiment import MOST_TRAININGS, Entry, Experiment, ranges_of
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import Learner, find_learner
 from kinarm.policies.recipes import recipe
 from kinarm.problem import ReachProblem
+from kinarm.randomness import Stream, stream_generator
 
 Learners = Mapping[str, Learner[Any, Any]]
 
 CHOSEN = {"seed", "recipe"}
 """Settings that the experiment chooses."""
+
+DIGITS = 6
+"""Significant digits of numbers that are drawn: more could differ between machines."""
 
 PROBLEM = "problem."
 """Beginning of the path of a field of the problem."""
@@ -113,7 +118,7 @@ def plan(
     learners = {each.name: each for each in map(find_learner, names)}
     for key in experiment.searched:
         _concerned(key, learners)
-    varied = list(experiment.choices()) if choices is None else choices
+    varied = list(drawn_choices(experiment)) if choices is None else choices
     each = [
         (entry, config, to_plain(config), chosen, entry.seeds or experiment.seeds)
         for entry in experiment.all_entries
@@ -140,6 +145,38 @@ def plan(
     return tuple(found.values())
 
 
+def drawn_choices(experiment: Experiment) -> Iterator[dict[str, Any]]:
+    """Every combination of the values that vary, by field."""
+    random = experiment.random
+    for of_grid in _combinations(experiment.grid):
+        for number in range(random.get("count", 1)):
+            # A larger number of draws keeps the first ones.
+            rng = stream_generator(Stream.STUDY, random.get("seed", 0), number)
+            drawn = {key: _draw(entry, rng.random()) for key, entry in ranges_of(random).items()}
+            yield {**of_grid, **drawn}
+
+
+def _draw(entry: Any, uniform: float) -> Any:
+    """Value of a list or a range that a number from [0, 1) chooses; whole between whole numbers."""
+    if isinstance(entry, list | tuple):
+        return entry[int(uniform * len(entry))]
+    low, high = entry["low"], entry["high"]
+    whole = isinstance(low, int) and isinstance(high, int)
+    if entry.get("log"):
+        value = float(low * np.exp(uniform * np.log(high / low)))
+    else:
+        value = low + uniform * (high - low + whole)
+    if whole:
+        return min(int(value), high)
+    return float(f"{value:.{DIGITS}g}")
+
+
+def _combinations(grid: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """Every combination of the values in lists, by field."""
+    for values in product(*grid.values()):
+        yield dict(zip(grid, values, strict=True))
+
+
 def _settings(
     experiment: Experiment, entry: Entry, learners: Learners, varied: Sequence[Mapping[str, Any]]
 ) -> Iterator[tuple[TrainingConfig, dict[str, Any]]]:
@@ -151,7 +188,7 @@ def _settings(
         **_concerning(entry.fixed, learner.name, alone),
     }
     distinct = {}
-    for shared, own in product(varied, combinations(entry.grid)):
+    for shared, own in product(varied, _combinations(entry.grid)):
         choices = _concerning(shared, learner.name, learners)
         choices |= _concerning(own, learner.name, alone)
         distinct[repr(sorted(choices.items()))] = choices

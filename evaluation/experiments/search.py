@@ -13,11 +13,10 @@ from kinarm._files import first_line, write_text
 from kinarm.errors import MissingExtraError
 from kinarm.evaluation.experiments.curve import CurvePoint
 from kinarm.evaluation.experiments.executors import LocalExecutor
-from kinarm.evaluation.experiments.experiment import Experiment
+from kinarm.evaluation.experiments.experiment import SEARCH_CHOICES, Experiment
 from kinarm.evaluation.experiments.plan import Run, plan
 from kinarm.evaluation.experiments.runs import Task, train
 from kinarm.evaluation.experiments.store import Store
-from kinarm.evaluation.experiments.variation import SEARCH_CHOICES
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.recipes import PER_TRAINING
 

@@ -7,7 +7,7 @@ import pytest
 
 from kinarm.errors import InvalidInputError, KinarmError
 from kinarm.evaluation.experiments.experiment import Experiment
-from kinarm.evaluation.experiments.plan import changed_problem, plan
+from kinarm.evaluation.experiments.plan import changed_problem, drawn_choices, plan
 from kinarm.policies.recipes import recipe
 from kinarm.problem import PROBLEMS, ReachProblem
 
@@ -69,25 +69,25 @@ class TestFile:
 
 class TestChoices:
     def test_every_value_with_every_other(self, experiment):
-        choices = list(experiment.choices())
+        choices = list(drawn_choices(experiment))
         assert len(choices) == 2 * 2 * 4
         grid = {(c["step_size"], c["problem.task.start_spread"]) for c in choices}
         assert grid == {(0.01, 0.2), (0.01, 1.0), (0.05, 0.2), (0.05, 1.0)}
 
     def test_draws_are_the_same_for_every_value_of_the_grid(self, experiment):
-        choices = list(experiment.choices())
+        choices = list(drawn_choices(experiment))
         assert [c["noise"] for c in choices[:4]] == [c["noise"] for c in choices[4:8]]
 
     def test_more_draws_begin_with_the_same_ones(self):
         entries = {"noise": {"low": 0.0, "high": 1.0}, "seed": 3}
-        few, many = (list(made(random={"count": n, **entries}).choices()) for n in (3, 20))
+        few, many = (list(drawn_choices(made(random={"count": n, **entries}))) for n in (3, 20))
         assert many[:3] == few
         assert len({c["noise"] for c in many}) == 20
 
     def test_draws_fill_their_range(self):
         ranges = {"low": 1, "high": 3}, {"low": 0.001, "high": 10.0, "log": True}
         entries = {"count": 400, "episodes": ranges[0], "noise": ranges[1], "size": ["a", "b"]}
-        drawn = list(made(random=entries).choices())
+        drawn = list(drawn_choices(made(random=entries)))
         assert {c["episodes"] for c in drawn} == {1, 2, 3}
         assert {c["size"] for c in drawn} == {"a", "b"}
         logs = sorted(math.log10(c["noise"]) for c in drawn)
