@@ -92,7 +92,6 @@ class RayExecutor:
     address: str
     jobs: int | None = None
     threads: int = 1
-    shares_files = False
 
     def map(
         self, work: Callable[[Any], Any], tasks: Sequence[Any]
@@ -177,7 +176,6 @@ class SlurmExecutor:
     partition: str | None = None
     at_once: int = 256
     cluster: str = "slurm"
-    shares_files = True
 
     def map(
         self, work: Callable[[Any], Any], tasks: Sequence[Any]

@@ -37,10 +37,6 @@ class Failure(NamedTuple):
 class Executor(Protocol):
     """Where tasks are carried out."""
 
-    @property
-    def shares_files(self) -> bool:
-        """Whether workers write to the same files as this process."""
-
     def map(
         self, work: Callable[[Any], Any], tasks: Sequence[Any]
     ) -> Iterator[tuple[Any, Any | Failure]]:
@@ -93,7 +89,6 @@ class LocalExecutor:
 
     jobs: int
     threads: int = 1
-    shares_files = True
 
     def map(
         self, work: Callable[[Any], Any], tasks: Sequence[Any]

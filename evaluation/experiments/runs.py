@@ -118,7 +118,7 @@ class Task(NamedTuple):
     start : Start or None
         Where the training goes on; None for its beginning.
     checkpoint : Path or None
-        Where it saves how far it is; None if its files are not those of the driver.
+        Where it saves how far it is, if there is such a folder where it is carried out.
     """
 
     run: Run
@@ -172,12 +172,13 @@ def train(
     state = next(states)
     if start is None:
         curve.update(state)
+    place = checkpoint if checkpoint is not None and checkpoint.parent.is_dir() else None
     saved = time.monotonic()
     for state in states:
         if curve.update(state) and on_point is not None:
             on_point(curve.points[-1])
-        if checkpoint is not None and time.monotonic() - saved > CHECKPOINT_SECONDS:
-            save_checkpoint(checkpoint, config, state, curve.so_far())
+        if place is not None and time.monotonic() - saved > CHECKPOINT_SECONDS:
+            save_checkpoint(place, config, state, curve.so_far())
             saved = time.monotonic()
     so_far, end = curve.so_far(), io.BytesIO()
     if run.can_extend:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._console import ProgressLine
-from kinarm._files import is_being_written
+from kinarm._files import absolute, is_being_written
 from kinarm._interrupts import kept_from_children
 from kinarm._parallel import available_threads
 from kinarm._validation import whole_number
@@ -136,46 +136,49 @@ class Study:
         jobs = available_threads() if jobs is None else whole_number("jobs", jobs, 1)
         for entry in self.experiment.all_entries:
             find_learner(entry.learner).check_installed()
-        failures = {}
+        failures: dict[str, str] = {}
         with self.store.writing(self.experiment) as store:
             if self.experiment.search:
                 carry_out_search(self.experiment, store.folder, jobs, threads)
             self.refresh()
             where = executor or LocalExecutor(jobs, threads)
-            tasks = self._tasks(where.shares_files)
-            work = partial(train, threads=threads, logs=logs)
-            with self._progress(len(tasks)) as show:
-                for number, ((done, *_), result) in enumerate(where.map(work, tasks), start=1):
-                    store.save(done, result)
+            # Trainings that several entries share come once.
+            missing = {run.key: run for run in self.missing}.values()
+            tasks = [
+                Task(run, store.start(run), absolute(store.path("checkpoints", run)))
+                for run in missing
+            ]
+            work, done = partial(train, threads=threads, logs=logs), list[str]()
+            with self._progress(len(tasks), done) as show:
+                for (run, *_), result in where.map(work, tasks):
+                    store.save(run, result)
                     if isinstance(result, Failure):
-                        failures[done.name] = result.error
+                        failures[run.name] = result.error
                     else:
-                        on_trained(done, result)
-                    show(number, done.name)
+                        on_trained(run, result)
+                    done.append(run.name)
+                    show()
         self.refresh()
         if failures:
             raise TrainingFailedError(failures, len(self.runs))
         return self
 
     @contextmanager
-    def _progress(self, total: int) -> Iterator[Callable[..., None]]:
-        """Show how many tasks are finished, what was last, and meanwhile how far others are."""
-        finished: tuple[int, tuple[str, ...]] = (0, ())
+    def _progress(self, total: int, done: list[str]) -> Iterator[Callable[[], None]]:
+        """Show how many trainings are done, which was last, and meanwhile how far others are."""
         over = Event()
 
-        def show(number: int, *names: str) -> None:
-            nonlocal finished
-            finished = number, names
+        def show() -> None:
             shares = self.store.shares(self.runs)
             under_way = [f"{len(shares)} under way {100 * np.mean(shares):.0f} %"] if shares else []
-            line.update(number + sum(shares), [*under_way, *names])
+            line.update(len(done) + sum(shares), [*under_way, *done[-1:]])
 
         def show_again() -> None:
             while not over.wait(CHECKPOINT_SECONDS):
-                show(finished[0], *finished[1])
+                show()
 
         with ProgressLine("trainings", total, "finished") as line:
-            show(0)
+            show()
             with kept_from_children():  # such a thread gets no request to end, either
                 (thread := Thread(target=show_again, daemon=True)).start()
             try:
@@ -183,14 +186,6 @@ class Study:
             finally:
                 over.set()
                 thread.join()
-
-    def _tasks(self, with_checkpoints: bool) -> list[Task]:
-        """The missing trainings, seed by seed; those that several entries share come once."""
-        tasks = []
-        for run in {run.key: run for run in self.missing}.values():
-            path = self.store.path("checkpoints", run) if with_checkpoints else None
-            tasks.append(Task(run, self.store.start(run), path))
-        return tasks
 
     def refresh(self) -> None:
         """Read the folder again."""

@@ -22,8 +22,6 @@ def contents(folder):
 class Counting:
     """An executor that carries out at most so many tasks in this process."""
 
-    shares_files = True
-
     def __init__(self, limit=1000):
         self.tasks, self._limit = [], limit
 
