@@ -11,7 +11,8 @@ from kinarm._command_line import run_request
 from kinarm._console import open_console
 from kinarm._fields import Checked
 from kinarm._files import check_folder, only_writer, write_text
-from kinarm.evaluation.report.templating import markdown_table
+from kinarm.evaluation.markdown import markdown_table
+from kinarm.evaluation.report.templating import markdown_table, template_environment
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,15 +86,9 @@ Row = tuple[str, ...]
 
 def speed_page(document: dict[str, Any]) -> str:
     """``SPEED.md``: everything that was measured, in one table."""
-    threads, architecture = document["machine"]["threads"], document["machine"]["architecture"]
     table = ((*row, *[""] * (len(HEADER) - len(row))) for row in rows(document) if row)
-    versions = ", ".join(f"{name} {version}" for name, version in document["versions"].items())
-    return (
-        "# Measured\n\n"
-        f"Made by `{document['command']}` on {threads} threads of a machine of type "
-        f"{architecture}, with the policy `{document['policy']}`; medians of "
-        f"{document['repetitions']} repetitions.\n\n{markdown_table(HEADER, table)}\n{versions}.\n"
-    )
+    template = template_environment().get_template("speed.md")
+    return template.render(document, table=markdown_table(HEADER, table))
 
 
 def rows(document: dict[str, Any]) -> Iterator[Row]:

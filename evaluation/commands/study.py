@@ -196,11 +196,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _carry_out(request: StudyRequest, command: str) -> None:
     """Run a request, and print the best settings."""
-    from kinarm.evaluation.experiments.table import group_row, headings
+    from kinarm.evaluation.experiments.table import COLUMNS, group_row
 
     study = request.run(command=command)
     if len(study):
-        print_table(headings(), [group_row(group) for group in study.best(SHOWN)])
+        headings = [heading for heading, _ in COLUMNS]
+        print_table(headings, [group_row(group) for group in study.best(SHOWN)])
         print(f"written: {request.folder / 'index.html'}, with tables and figures beside it")
     else:
         print("no training is finished")

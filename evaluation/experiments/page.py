@@ -116,7 +116,7 @@ def _page(name: str, study: "Study", document: dict[str, Any], drawings: Mapping
         experiment=experiment,
         trials=experiment.trials,
         best=best.items(),
-        headings=table.headings(),
+        headings=[heading for heading, _ in table.COLUMNS],
         rows=[table.group_row(group) for group in groups],
         rows_in_order=[table.group_row(group) for group in study.groups()],
         figures=[(name, TITLES[name], d[d.index("<svg") :]) for name, d in drawings.items()],

@@ -33,10 +33,6 @@ STATE, POLICY, OUTCOMES = "state", "policy.", "outcomes."
 """Beginnings of the names of arrays; states are in files of version 1.0.0."""
 
 
-TimedPoint = tuple[CurvePoint, float, float]
-"""A point of a learning curve with wall time and processor time [s]; NaN if unknown."""
-
-
 class TrialOutcomes(NamedTuple):
     """How the trained policy did in every trial; arrays of shape (n_trials,).
 
@@ -87,8 +83,8 @@ class TrainedRun:
     clock: Clock = field(default_factory=Clock)
 
     @property
-    def timed_curve(self) -> list[TimedPoint]:
-        """Points of the learning curve, the end included, with wall and processor times [s]."""
+    def timed_curve(self) -> list[tuple[CurvePoint, float, float]]:
+        """Points of the learning curve and its end, with wall and processor times [s], or NaN."""
         clock, unknown = self.clock, (math.nan,) * len(self.curve)
         columns = [
             times if len(times) == len(self.curve) else unknown

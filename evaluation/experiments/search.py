@@ -26,9 +26,6 @@ if TYPE_CHECKING:
 JOURNAL, RECIPE = "search.journal", "best.toml"
 """Files of a search in the folder of its study."""
 
-STUDY = "kinarm"
-"""Name of the search in its journal."""
-
 
 def open_search(experiment: Experiment, folder: Path, draws: int = 0) -> "optuna.study.Study":
     """Open the search of the experiment in a folder, or begin it.
@@ -56,7 +53,7 @@ def open_search(experiment: Experiment, folder: Path, draws: int = 0) -> "optuna
         for kind, module in (("sampler", optuna.samplers), ("pruner", optuna.pruners))
     )
     return optuna.create_study(
-        study_name=STUDY,
+        study_name="kinarm",
         storage=JournalStorage(JournalFileBackend(str(folder / JOURNAL))),
         sampler=sampler(seed=seed, **liar),
         pruner=pruner(),

@@ -202,11 +202,6 @@ COLUMNS = (
 """Columns of a group; minutes are processor time without the trials of the policies."""
 
 
-def headings() -> tuple[str, ...]:
-    """Of the table of groups."""
-    return tuple(column.heading for column in COLUMNS)
-
-
 def group_row(group: Group) -> tuple[str, ...]:
     """The row of a group."""
     return tuple(column.text(group) for column in COLUMNS)
