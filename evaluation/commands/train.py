@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from kinarm._command_line import add_options, given_options, run_command
 from kinarm._fields import Checked
 from kinarm._files import shipped_files
-from kinarm._options import add_options, given_options
 from kinarm._parser import CommandParser, Parser
 from kinarm.errors import FROM_ZERO, InvalidInputError
 from kinarm.policies.learners import Learner, find_learner, learner_names

@@ -74,9 +74,6 @@ class Entry(Checked):
             recipe = Path(self.recipe).stem if self.recipe.endswith(".toml") else self.recipe
             name = f"{self.learner}-{recipe}" if recipe else self.learner
             object.__setattr__(self, "name", name)
-        check_tables(fixed=self.fixed, grid=self.grid)
-        whole_number("seeds", self.seeds, 0, MOST_TRAININGS)
-        whole_number("first_seed", self.first_seed or 0, 0)
         _check_tables(fixed=self.fixed, grid=self.grid)
 
 
