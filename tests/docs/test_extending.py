@@ -140,18 +140,19 @@ def test_a_registered_learner_resumes_exactly(
 ) -> None:
     command = "kinarm-train toy --iterations 12 --out {}.npz"
     run(command.format("whole"))
-    keep = training.CheckpointKeeper.update
+    states = training.training_states
 
-    def interrupted(keeper: training.CheckpointKeeper, state: learners.TrainingState) -> None:
-        keep(keeper, state)
-        if state.iteration == 5:
-            raise KeyboardInterrupt
+    def interrupted(*given: object, **options: object) -> Iterator[learners.TrainingState]:
+        for state in states(*given, **options):
+            if state.iteration == 6:
+                raise KeyboardInterrupt
+            yield state
 
-    monkeypatch.setattr(training.CheckpointKeeper, "update", interrupted)
+    monkeypatch.setattr(training, "training_states", interrupted)
     with pytest.raises(SystemExit) as end:
         train.main(shlex.split(command.format("halves"))[1:])
     assert end.value.code == 130
-    monkeypatch.setattr(training.CheckpointKeeper, "update", keep)
+    monkeypatch.setattr(training, "training_states", states)
     run(f"{command.format('halves')} --resume")
     whole, halves = (load_policy(folder / f"{name}.npz") for name in ("whole", "halves"))
     np.testing.assert_array_equal(whole.layers[0].weights, halves.layers[0].weights)
