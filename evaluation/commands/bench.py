@@ -11,7 +11,6 @@ from kinarm._command_line import run_request
 from kinarm._console import open_console
 from kinarm._fields import Checked
 from kinarm._files import check_folder, only_writer, write_text
-from kinarm.evaluation.markdown import markdown_table
 from kinarm.evaluation.report.templating import markdown_table, template_environment
 
 

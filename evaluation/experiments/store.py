@@ -5,10 +5,10 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import tomli_w
 
-from kinarm._archive import load_json
 from kinarm._fields import from_plain, to_plain
 from kinarm._files import check_folder, only_writer, write_atomically, write_text
 from kinarm.errors import InvalidInputError, KinarmError, PolicyFileError
@@ -117,24 +117,15 @@ class Store:
     def made(self, run: Run) -> Made:
         """How a training was made; nothing of it if unknown."""
         with suppress(InvalidInputError):
-            record = load_json(self.path("made", run), "record", InvalidInputError)
-            return from_plain(Made, record, "record")
+            return from_plain(Made, self._record("made", run), "record")
         return Made()
 
     def failure(self, run: Run) -> str | None:
         """Why a training failed, in a line; None if it did not."""
-        return self._record("failed", task.key).get("error")
+        return self._record("failed", run).get("error")
 
-    def _record(self, kind: str, key: str) -> dict[str, Any]:
+    def _record(self, kind: str, run: Run) -> dict[str, Any]:
         with suppress(OSError, ValueError, RecursionError):
-            record = json.loads((self.folder / kind / f"{key}.json").read_bytes())
+            record = json.loads(self.path(kind, run).read_bytes())
             return record if isinstance(record, dict) else {}
         return {}
-
-    def bounds(self, task: BoundTask) -> TrialBounds | None:
-        """Read bounds; None if they are not known."""
-        with suppress(InvalidInputError):
-            return load_bounds(self.path("bounds", task))
-        with suppress(InvalidInputError, KeyError, TypeError):
-            return str(load_json(self.path("failed", run), "record", InvalidInputError)["error"])
-        return None
