@@ -162,7 +162,7 @@ class StudyRequest(RunningOptions):
             try:
                 if self.train:
                     where = executor or self.executor(self.folder, self.threads)
-                    study.run(threads=self.threads, executor=where)
+                    study.run(jobs=self.jobs, threads=self.threads, executor=where)
             except TrainingFailedError as error:
                 failed = error
             if len(study):
