@@ -16,7 +16,6 @@ from kinarm._console import ProgressLine
 from kinarm._files import absolute, is_being_written
 from kinarm._interrupts import kept_from_children
 from kinarm._parallel import available_threads
-from kinarm._validation import whole_number
 from kinarm.errors import InvalidInputError, TrainingFailedError, whole_number
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.experiments.executors import Executor, Failure, LocalExecutor
