@@ -99,13 +99,5 @@ def _show(request: ShowRequest) -> None:
 COMMANDS: Commands = {"list": (ListRequest, _list), "show": (ShowRequest, _show)}
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line."""
-    typed = sys.argv[1:] if arguments is None else arguments
-    summary = "List arms, and describe one."
-    run_commands("kinarm-arms", summary, COMMANDS, typed or ["list"], epilog=EPILOG)
 main = partial(run_commands, "kinarm-arms", "List arms, and describe one.", COMMANDS)
 """Run the command line."""
-
-if __name__ == "__main__":
-    main()

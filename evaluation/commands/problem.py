@@ -149,13 +149,5 @@ COMMANDS: Commands = {
 }
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line."""
-    typed = sys.argv[1:] if arguments is None else arguments
-    summary = "List, show and check problems."
-    run_commands("kinarm-problem", summary, COMMANDS, typed or ["list"], epilog=EPILOG)
 main = partial(run_commands, "kinarm-problem", "List, show and check problems.", COMMANDS)
 """Run the command line."""
-
-if __name__ == "__main__":
-    main()

@@ -12,6 +12,3 @@ def _report(request: ReplayRequest, _: str) -> None:
 
 main = partial(run_request, "kinarm-replay", ReplayRequest, _report)
 """Run the command line."""
-
-if __name__ == "__main__":
-    main()
