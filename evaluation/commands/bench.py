@@ -80,6 +80,3 @@ def _report(request: BenchmarkRequest, command: str) -> None:
 
 main = partial(run_request, "kinarm-bench", BenchmarkRequest, _report)
 """Run the command line."""
-
-if __name__ == "__main__":
-    main()

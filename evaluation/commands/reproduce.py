@@ -98,6 +98,3 @@ def _report(request: ReproductionRequest, command: str) -> None:
 
 main = partial(run_request, "kinarm-reproduce", ReproductionRequest, _report)
 """Run the command line."""
-
-if __name__ == "__main__":
-    main()
