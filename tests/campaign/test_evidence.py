@@ -14,7 +14,7 @@ from .engines import MARGIN, SecondEngine
 @pytest.mark.parametrize(
     ("kind", "name", "size", "counted"),
     [
-        ("steps", "paper", 10_000, ("steps", "steps of the reference")),
+        ("steps", "paper", 4000, ("steps", "steps of the reference")),
         ("contact", "post-paper", 3000, ("configurations", "steps refused")),
         ("floors", "both", 960, ("trials", "successes")),
     ],

@@ -36,6 +36,7 @@ def test_every_shipped_policy_is_ranked(recorded):
     assert (recorded["trials"], recorded["seed"]) == (SCRIPT["TRIALS"], SCRIPT["SEED"])
 
 
+@pytest.mark.slow
 def test_the_best_are_measured_again(recorded):
     best = {problem: best_policy(problem) for problem in recorded["success"]}
     assert recorded["best"] == best
