@@ -90,6 +90,9 @@ class ARSTraining:
         returns = rollouts.returns.reshape(2, N, config.episodes).mean(axis=2)
         theta = theta + ars_step(config, delta, returns, config.step_size_at(state.iteration))
         normalizer = normalizer.updated(rollouts.moments, rollouts.steps)
+        failed = state.failed
+        if config.replay_share:
+            failed = failed.followed_by(*scenarios.missed(rollouts), config.replay_size)
         mean_return, std_return, success = scenarios.outcome_of_new(rollouts)
         point = CurvePoint(
             mean_return=mean_return,
@@ -102,7 +105,7 @@ class ARSTraining:
             theta=theta,
             normalizer=normalizer,
             generator=dict(rng.bit_generator.state),
-            failed=failed_after(config, state.failed, scenarios, rollouts),
+            failed=failed,
             curve=(*state.curve, point),
         )
 
@@ -130,6 +133,12 @@ class Scenarios(NamedTuple):
             return math.nan, math.nan, math.nan
         returns, success = rollouts.returns[new], rollouts.success[new]
         return *mean_and_deviation(returns), int(np.count_nonzero(success)) / len(success)
+
+    def missed(self, rollouts: Rollouts) -> StartsAndGoals:
+        """Those that at least half of the policies that faced them failed."""
+        reached = np.count_nonzero(rollouts.success.reshape(self.copies, -1), axis=0)
+        missed = 2 * reached <= self.copies
+        return self.starts[missed], self.goals[missed]
 
 
 def draw_shared(
@@ -159,25 +168,6 @@ def draw_shared(
     count = 2 * config.directions * config.episodes // copies
     (starts, goals), replayed = failed.mixed(config.replay_share, rng, count, draw)
     return Scenarios(starts, goals, replayed, copies)
-
-
-def failed_after(
-    config: ARSConfig, failed: FailedScenarios, scenarios: Scenarios, rollouts: Rollouts
-) -> FailedScenarios:
-    """Add the scenarios that at least half of the policies that faced them failed.
-
-    Parameters
-    ----------
-    config, failed
-        Settings, and the failed scenarios before the iteration.
-    scenarios, rollouts
-        What its policies faced, and how they did.
-    """
-    if not config.replay_share:
-        return failed
-    reached = np.count_nonzero(rollouts.success.reshape(scenarios.copies, -1), axis=0)
-    missed = 2 * reached <= scenarios.copies
-    return failed.followed_by(scenarios.starts[missed], scenarios.goals[missed], config.replay_size)
 
 
 def policy_normalizer(config: ARSConfig, seen: Normalizer) -> Normalizer:

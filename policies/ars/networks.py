@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 from itertools import chain, pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kinarm.errors import InvalidInputError
 from kinarm.kernels.compiling import Array, inlined, kernel
@@ -19,13 +18,11 @@ from kinarm.observation import part_slices
 from kinarm.policies.normalizer import Normalizer, fold_normalizer
 from kinarm.policies.policy import Layer, Policy
 
-Numbers = NDArray[np.float64]
-
 DEVIATION = 1.5
 """Standard deviation of what a unit of the first layer adds up to, for normalised observations."""
 
 
-def perturbations(rng: np.random.Generator, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def perturbations(rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
     """Draw independent standard normal numbers, the same bits on every machine.
 
     Those of NumPy's generator depend on the C library's logarithm.
@@ -38,20 +35,18 @@ def perturbations(rng: np.random.Generator, shape: tuple[int, ...]) -> NDArray[n
     return numbers[:, :half].reshape(-1)[:count].reshape(shape)
 
 
-def first_deviations(n_joints: int) -> Numbers:
+def first_deviations(n_joints: int) -> Array:
     """Standard deviations of the first layer's initial weights, shape (n_observations,).
 
     All parts of the observation have the same say: else the few entries of the goal would drown.
     """
     parts = list(part_slices(n_joints).values())
     sizes = np.array([part.stop - part.start for part in parts])
-    deviations: Numbers = np.repeat(DEVIATION / np.sqrt(len(parts) * sizes), sizes)
+    deviations: Array = np.repeat(DEVIATION / np.sqrt(len(parts) * sizes), sizes)
     return deviations
 
 
-def initial_network(
-    rng: np.random.Generator, deviations: Numbers, widths: Sequence[int]
-) -> Numbers:
+def initial_network(rng: np.random.Generator, deviations: Array, widths: Sequence[int]) -> Array:
     """Draw a network that does nothing yet: its last layer and its biases are zero.
 
     Parameters
@@ -77,7 +72,7 @@ def initial_network(
 
 
 def perturbed_networks(
-    theta: Numbers, step: Numbers, normalizer: Normalizer, widths: Sequence[int]
+    theta: Array, step: Array, normalizer: Normalizer, widths: Sequence[int]
 ) -> Networks:
     """Networks theta + step of normalised observations, then those of theta - step.
 
@@ -97,7 +92,7 @@ def perturbed_networks(
     return Networks(np.array(widths), np.concatenate([first, folded[1], rest], axis=1))
 
 
-def network_layers(theta: Numbers, widths: Sequence[int]) -> tuple[Layer, ...]:
+def network_layers(theta: Array, widths: Sequence[int]) -> tuple[Layer, ...]:
     """Layers of the network with these parameters, shape (1, n_parameters).
 
     The widths are those from the observation to the action.
@@ -105,7 +100,7 @@ def network_layers(theta: Numbers, widths: Sequence[int]) -> tuple[Layer, ...]:
     return tuple(Layer(weights[0], bias[0]) for weights, bias in _layers(theta, widths))
 
 
-def _layers(parameters: Numbers, widths: Sequence[int]) -> Iterator[tuple[Numbers, Numbers]]:
+def _layers(parameters: Array, widths: Sequence[int]) -> Iterator[tuple[Array, Array]]:
     """Weights, shape (n, n_out, n_in), and biases, shape (n, n_out), of each layer."""
     start = 0
     for n_in, n_out in pairwise(widths):
@@ -114,7 +109,7 @@ def _layers(parameters: Numbers, widths: Sequence[int]) -> Iterator[tuple[Number
         yield weights.transpose(0, 2, 1), parameters[:, start - n_out : start]
 
 
-def parameters_of(policy: Policy) -> Numbers:
+def parameters_of(policy: Policy) -> Array:
     """Parameters of a policy as a training has them: a linear one has no bias."""
     if len(policy.layers) > 1:
         parts = chain(*((weights.T.ravel(), bias) for weights, bias in policy.layers))

@@ -1,6 +1,5 @@
 """Proven bounds of the steps to goals, and of the distances from them, for batches of trials."""
 
-from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -19,8 +18,6 @@ BUDGET = 100_000
 RESOLUTION = 1e-3
 """By how much a proven distance may fall short of the smallest possible one [m]."""
 
-Search = Callable[..., tuple[bool, int, float, float]]
-
 
 class Prover:
     """Proves bounds for the arm and scene of a simulator.
@@ -34,7 +31,7 @@ class Prover:
         chain, shapes, _ = simulator.world.records
         bounds = MotionBounds.of(simulator.arm.chain, simulator.n_actions)
         self._simulator = simulator
-        self._search: Search = partial(search, chain, recorded(bounds), shapes)
+        self._search = partial(search, chain, recorded(bounds), shapes)
 
     def bound_steps(
         self,

@@ -146,7 +146,9 @@ class ActorCritic:
         self.weights = np.zeros(end + padded(n_actions), dtype=np.float32)
         self.log_std = self.weights[end : end + n_actions]
         matrices = np.zeros(turned, dtype=np.float32)
-        self.actor, self.critic = (Network(table, self.weights, matrices) for table in tables)
+        *inputs, outputs = map(padded, widths)
+        given = (self.weights, matrices, BLOCK * (sum(inputs) + outputs), max(inputs))
+        self.actor, self.critic = (Network(table, *given) for table in tables)
 
     def _place(
         self, layers: list[Affine], first: int, turned: int

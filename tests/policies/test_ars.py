@@ -15,7 +15,6 @@ from kinarm.policies.ars.algorithm import (
     Scenarios,
     ars_step,
     draw_shared,
-    failed_after,
     perturbed_policies,
     top_directions,
 )
@@ -216,12 +215,10 @@ class TestScenarios:
     def test_what_at_least_half_of_the_policies_miss_counts_as_failed(self):
         starts, goals = np.arange(12.0).reshape(2, 6), np.arange(6.0).reshape(2, 3)
         scenarios = Scenarios(starts, goals, np.zeros(2, dtype=bool), copies=4)
-        config = replace(TINY, replay_share=0.5)
         for reached, kept in (((2, 3), [0]), ((3, 4), []), ((0, 1), [0, 1])):
             success = np.arange(4)[:, None] < reached
             rollouts = SimpleNamespace(success=success.reshape(-1))
-            failed = failed_after(config, FailedScenarios.none(6), scenarios, rollouts)
-            np.testing.assert_array_equal(failed.goals, goals[kept])
+            np.testing.assert_array_equal(scenarios.missed(rollouts)[1], goals[kept])
 
     def test_the_curve_leaves_replayed_ones_out(self):
         scenarios = Scenarios(np.zeros((3, 6)), np.zeros((3, 3)), np.array([0, 1, 0], bool), 2)

@@ -26,12 +26,15 @@ class Network(NamedTuple):
 
     ``layers`` holds per layer its widths, and where its weights begin in ``weights`` (inputs x
     outputs, then the bias) and, transposed, in ``turned``, and its inputs and outputs in a work
-    space. Rows of matrices and of values are padded with zeros to whole vectors.
+    space. Rows of matrices and of values are padded with zeros to whole vectors. ``work`` is
+    the length of the work space, at least, and ``widest`` the largest padded width of a layer.
     """
 
     layers: NDArray[np.int64]
     weights: Numbers
     turned: Numbers
+    work: int
+    widest: int
 
 
 @register_jitable
@@ -142,22 +145,6 @@ def whole_tiles(samples: int) -> int:
     return (samples + ROWS - 1) // ROWS * ROWS
 
 
-@inlined
-def work_length(layers: NDArray[np.int64]) -> int:
-    """Length of the work space of a network."""
-    end = layers.shape[0] - 1
-    return int(layers[end, OUTPUTS]) + BLOCK * padded(layers[end, N_OUT])
-
-
-@inlined
-def widest(layers: NDArray[np.int64]) -> int:
-    """Width of the widest layer, padded."""
-    found = 0
-    for layer in range(layers.shape[0]):
-        found = max(found, padded(layers[layer, N_IN]))
-    return found
-
-
 @kernel
 def evaluate(
     first: int, last: int, network: Network, observations: Numbers, outputs: Numbers
@@ -172,7 +159,7 @@ def evaluate(
         What it is given, and where its values go.
     """
     layers = network.layers
-    work = np.zeros(work_length(layers), dtype=np.float32)
+    work = np.zeros(network.work, dtype=np.float32)
     end = layers.shape[0] - 1
     sink, wide_out = layers[end, OUTPUTS], padded(layers[end, N_OUT])
     for begin in range(first, last, BLOCK):

@@ -18,8 +18,6 @@ from kinarm.policies.ppo.kernels.layers import (
     padded,
     transpose,
     whole_tiles,
-    widest,
-    work_length,
 )
 from kinarm.policies.ppo.kernels.tiles import LANES, Numbers
 
@@ -159,8 +157,8 @@ def add_gradients(
     log_std = actor.weights[by_log_std:]
     precision = np.zeros(n_actions)
     find_precision(log_std, precision)
-    work = np.zeros(work_length(actor.layers), dtype=np.float32)
-    behind = np.zeros((BLOCK + 1) * widest(actor.layers), dtype=np.float32)
+    work = np.zeros(actor.work, dtype=np.float32)
+    behind = np.zeros((BLOCK + 1) * actor.widest, dtype=np.float32)
     mean_sink = actor.layers[actor.layers.shape[0] - 1, OUTPUTS]
     value_sink = critic.layers[critic.layers.shape[0] - 1, OUTPUTS]
     lowest, highest = 1.0 - objective.clip_range, 1.0 + objective.clip_range
