@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from kinarm.clearance import random_configurations
 from kinarm.errors import InvalidInputError
+from kinarm.kernels.compiling import Array
 from kinarm.networks import Mirror
 from kinarm.observation import observation_signs
 from kinarm.problem import ReachProblem
@@ -45,9 +46,7 @@ def find_mirror(world: World) -> Mirror:
     return mirror
 
 
-def _beyond_limits(
-    axes: NDArray[np.float64], lower: NDArray[np.float64], upper: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def _beyond_limits(axes: Array, lower: Array, upper: Array) -> NDArray[np.bool_]:
     """Joints whose limits are not their own mirror image, given the signs of the reflection."""
     apart = np.abs(np.sort([axes * lower, axes * upper], axis=0) - [lower, upper])
     uneven: NDArray[np.bool_] = apart.max(axis=0) > ACCURACY
@@ -87,7 +86,7 @@ def mirror_findings(world: World) -> dict[str, str]:
     return found
 
 
-def _axis_signs(world: World) -> NDArray[np.float64]:
+def _axis_signs(world: World) -> Array:
     """Signs that the reflection gives to the joints, shape (n_joints,)."""
     model, chain = world.arm.model, world.arm.chain
     data = model.createData()

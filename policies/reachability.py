@@ -7,15 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.clearance import ContactStatistics, random_configurations
+from kinarm.kernels.compiling import Array
 from kinarm.world import World
 
 GOALS, MANY = 100, 0.1
 """Goals that are looked at, and the share of them that may lack a configuration without a line."""
 
 
-def find_reachable(
-    world: World, goals: NDArray[np.float64], configurations: int = 50_000
-) -> NDArray[np.bool_]:
+def find_reachable(world: World, goals: Array, configurations: int = 50_000) -> NDArray[np.bool_]:
     """Find out for which goals there is a configuration that touches nothing.
 
     One of many random configurations may bring the tool within the tolerance; for the goals that
