@@ -10,7 +10,7 @@ from kinarm.kernels.reward import COLLISION, SUCCESS
 from kinarm.policies.mirror import problem_mirror
 from kinarm.policies.normalizer import input_scale
 from kinarm.policies.ppo import EpisodeStates, PPOConfig, PPOState
-from kinarm.policies.ppo.kernels.tiles import Numbers
+from kinarm.policies.ppo.kernels.layers import Numbers
 from kinarm.policies.ppo.kernels.update import Experience, choose
 from kinarm.policies.ppo.networks import ActorCritic
 

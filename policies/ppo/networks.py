@@ -12,8 +12,7 @@ from kinarm.errors import InvalidInputError
 from kinarm.policies.mirror import problem_mirror
 from kinarm.policies.policy import Layer, Policy, layer_widths
 from kinarm.policies.ppo import PPOConfig, PPOState
-from kinarm.policies.ppo.kernels.layers import BLOCK, Network, evaluate, padded, transpose
-from kinarm.policies.ppo.kernels.tiles import Numbers
+from kinarm.policies.ppo.kernels.layers import BLOCK, Network, Numbers, evaluate, padded, transpose
 from kinarm.policies.provenance import Provenance
 
 STEPS_A_ROW = 8

@@ -5,7 +5,6 @@ finding the goals at all, and the oracle's motions show where they are. Imitatio
 fewer goals than what follows: it never sees where its own errors lead.
 """
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +17,7 @@ from kinarm.policies.config import scheduled
 from kinarm.policies.learners import CurvePoint
 from kinarm.policies.normalizer import Normalizer, input_scale
 from kinarm.policies.ppo import PPOConfig
-from kinarm.policies.ppo.kernels.tiles import Numbers
+from kinarm.policies.ppo.kernels.layers import Numbers
 from kinarm.policies.ppo.kernels.update import (
     HALF_LOG_2_PI,
     LOSSES,
@@ -91,7 +90,7 @@ def update(
             standard = standardisation(chosen, experience.advantages)
             arrays = (experience, chosen, objective, standard, gradients, losses)
             nets = (networks.actor, networks.critic)
-            run_parts(add_gradients, threads, *nets, *arrays)
+            find_gradients(threads, *nets, *arrays)
             records.append((*losses.sum(axis=0) * objective.share, networks.log_std.mean()))
             descend(*nets, *moments, gradients, descent, steps_before + len(records))
     return UpdateRecords(*np.array(records).T)
@@ -127,29 +126,27 @@ def logged(
     }
 
 
-def run_parts(kernel: Callable[..., None], threads: int, *arrays: Any) -> None:
-    """Call ``kernel(part, part + 1, *arrays)`` for each of `PARTS` parts, on several threads.
+def find_gradients(threads: int, *given: Any) -> None:
+    """Call ``add_gradients(part, part + 1, *given)`` for each of `PARTS` parts, on several threads.
 
     The calling thread works, too, and never waits for one that has not begun: where processors
     are busy with something else, it does all by itself.
 
     Parameters
     ----------
-    kernel : callable
-        Releases the GIL, and treats parts independently.
     threads : int
         Threads at most.
-    *arrays
+    *given
         Passed on to the kernel.
     """
     if threads == 1:
-        kernel(0, PARTS, *arrays)
+        add_gradients(0, PARTS, *given)
         return
     parts = iter(range(PARTS))  # whose next number only one thread gets: it holds the GIL
 
     def work(*_: object) -> int:
         for part in parts:
-            kernel(part, part + 1, *arrays)
+            add_gradients(part, part + 1, *given)
         return 0
 
     run_together(work, SHARED_STEPS, min(threads, PARTS), lambda _: None)
@@ -204,7 +201,7 @@ def imitate(
     normalizer: Normalizer,
     rng: np.random.Generator,
     threads: int,
-) -> list[float]:
+) -> None:
     """Change the actor so that its means come close to the actions; the critic stays as it is.
 
     Parameters
@@ -217,11 +214,6 @@ def imitate(
         Draws minibatches.
     threads : int
         Threads to use; the result does not depend on them.
-
-    Returns
-    -------
-    list of float
-        Mean squared error of the actions in each epoch.
     """
     seen = (demonstrations.observations - normalizer.mean) * input_scale(normalizer.std)
     shown = seen.astype(np.float32), demonstrations.actions.astype(np.float32)
@@ -230,18 +222,14 @@ def imitate(
     nets = (networks.actor, networks.critic)
     gradients = np.empty((PARTS, len(networks.weights)), dtype=np.float32)
     moments = np.zeros_like(networks.weights), np.zeros_like(networks.weights)
-    losses, errors = np.empty((PARTS, LOSSES)), []
+    losses = np.empty((PARTS, LOSSES))
     batches = max(1, len(seen) // BATCH_SIZE)
     for epoch in range(EPOCHS):
-        total = 0.0
         for number, chosen in enumerate(np.array_split(rng.permutation(len(seen)), batches)):
             objective = Objective(0.0, 0.0, 0.0, 1.0 / (len(chosen) * n_actions), imitating=True)
             arrays = (experience, chosen, objective, (0.0, 1.0), gradients, losses)
-            run_parts(add_gradients, threads, *nets, *arrays)
+            find_gradients(threads, *nets, *arrays)
             done = (epoch * batches + number) / (EPOCHS * batches)
             descent = Descent(LEARNING_RATE * (1 - done), 0.9, 0.999, 1e-8, 1e9)
             steps = epoch * batches + number + 1
             descend(*nets, *moments, gradients, descent, steps)
-            total += losses[:, 0].sum()
-        errors.append(total / demonstrations.actions.size)
-    return errors

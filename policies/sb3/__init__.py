@@ -11,15 +11,15 @@ from kinarm.policies.learners import Learner, TrainingState, imported
 from kinarm.policies.recipes import shipped_learner
 
 ALGORITHMS = {
-    "a2c": "stable_baselines3:A2C",
-    "ddpg": "stable_baselines3:DDPG",
-    "sac": "stable_baselines3:SAC",
-    "sb3-ppo": "stable_baselines3:PPO",
-    "td3": "stable_baselines3:TD3",
-    "tqc": "sb3_contrib:TQC",
-    "trpo": "sb3_contrib:TRPO",
+    "a2c": ("stable_baselines3", "A2C", "Advantage Actor-Critic"),
+    "ddpg": ("stable_baselines3", "DDPG", "Deep Deterministic Policy Gradient"),
+    "sac": ("stable_baselines3", "SAC", "Soft Actor-Critic"),
+    "sb3-ppo": ("stable_baselines3", "PPO", "Proximal Policy Optimization"),
+    "td3": ("stable_baselines3", "TD3", "Twin Delayed DDPG"),
+    "tqc": ("sb3_contrib", "TQC", "Truncated Quantile Critics"),
+    "trpo": ("sb3_contrib", "TRPO", "Trust Region Policy Optimization"),
 }
-"""Class of each algorithm, by the name of the learner."""
+"""Package, class and title of each algorithm, by the name of the learner."""
 
 
 def hyperparameters_of(text: str) -> dict[str, Any]:
@@ -106,9 +106,9 @@ class SB3State(TrainingState):
     training: Any = field(default=None, repr=False, metadata={"unsaved": True})
 
 
-def _learner(name: str, title: str) -> Learner[SB3Config, SB3State]:
-    """A learner by the name and title of its algorithm."""
-    package = ALGORITHMS[name].partition(":")[0]
+def _learner(name: str) -> Learner[SB3Config, SB3State]:
+    """The learner of an algorithm."""
+    package, _, title = ALGORITHMS[name]
     contrib = package == "sb3_contrib"
     return shipped_learner(
         name,
@@ -122,10 +122,4 @@ def _learner(name: str, title: str) -> Learner[SB3Config, SB3State]:
     )
 
 
-A2C = _learner("a2c", "Advantage Actor-Critic")
-DDPG = _learner("ddpg", "Deep Deterministic Policy Gradient")
-PPO = _learner("sb3-ppo", "Proximal Policy Optimization")
-SAC = _learner("sac", "Soft Actor-Critic")
-TD3 = _learner("td3", "Twin Delayed DDPG")
-TQC = _learner("tqc", "Truncated Quantile Critics")
-TRPO = _learner("trpo", "Trust Region Policy Optimization")
+A2C, DDPG, SAC, PPO, TD3, TQC, TRPO = map(_learner, ALGORITHMS)

@@ -185,7 +185,7 @@ def sb3_model(config: SB3Config) -> "BaseAlgorithm":
         given["action_noise"] = NormalActionNoise(zero, zero + config.action_noise)
     if config.learning_rate_schedule == "linear":
         given["learning_rate"] = LinearSchedule(given["learning_rate"], 0.0, 1.0)
-    module, _, name = ALGORITHMS[config.algorithm].partition(":")
+    module, name, _ = ALGORITHMS[config.algorithm]
     algorithm = getattr(import_module(module), name)
     try:
         model: BaseAlgorithm = algorithm(env=env, seed=config.seed, device="cpu", **given)

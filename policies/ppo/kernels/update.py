@@ -10,8 +10,10 @@ from kinarm.kernels.compiling import inlined, kernel
 from kinarm.kernels.elementary import exponential
 from kinarm.policies.ppo.kernels.layers import (
     BLOCK,
+    LANES,
     OUTPUTS,
     Network,
+    Numbers,
     backward,
     forward,
     load_sample,
@@ -19,7 +21,6 @@ from kinarm.policies.ppo.kernels.layers import (
     transpose,
     whole_tiles,
 )
-from kinarm.policies.ppo.kernels.tiles import LANES, Numbers
 
 HALF_LOG_2_PI = 0.91893853320467274178
 

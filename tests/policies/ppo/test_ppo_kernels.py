@@ -5,8 +5,7 @@ import pytest
 
 from kinarm.errors import InvalidInputError
 from kinarm.kernels.compiling import kernel
-from kinarm.policies.ppo.kernels.layers import BLOCK, evaluate, hyperbolic_tangent
-from kinarm.policies.ppo.kernels.tiles import Matrix, multiply
+from kinarm.policies.ppo.kernels.layers import BLOCK, Matrix, evaluate, hyperbolic_tangent, multiply
 from kinarm.policies.ppo.kernels.update import (
     LOSSES,
     Descent,
