@@ -88,8 +88,11 @@ class TrainingConfig(Checked):
         return Simulator(self.training_problem, threads=threads)
 
     def changed(self, changes: Mapping[str, Any]) -> "TrainingConfig":
-        """Replace fields; a mapping for the reward replaces the weights that it names."""
+        """Replace fields; a mapping replaces weights of the reward, or entries, that it names."""
         given = dict(changes)
+        for name, value in changes.items():
+            if isinstance(value, Mapping) and isinstance(own := getattr(self, name), Mapping):
+                given[name] = {**own, **value}
         if isinstance(given.get("reward"), Mapping):
             problem = self.training_problem.replace(reward=given["reward"])
             given["reward"] = problem.task.reward

@@ -1,7 +1,6 @@
 """Algorithms of Stable-Baselines3 and sb3-contrib, for the registry of learners."""
 
 import tomllib
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -87,13 +86,6 @@ class SB3Config(TrainingConfig):
     def learner(self) -> str:
         """Name by which the learner is found."""
         return self.algorithm
-
-    def changed(self, changes: Mapping[str, Any]) -> TrainingConfig:
-        """Replace fields; of reward and hyperparameters, what the mapping names."""
-        given = dict(changes)
-        if isinstance(given.get("hyperparameters"), Mapping):
-            given["hyperparameters"] = {**self.hyperparameters, **given["hyperparameters"]}
-        return super().changed(given)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
