@@ -106,7 +106,7 @@ def test_an_actor_learns_what_it_is_shown_and_the_critic_nothing():
     seen = ((shown.observations - normalizer.mean) / normalizer.std).astype(np.float32)
     before, _ = made_networks()
     errors = [np.mean((each.means(seen) - shown.actions) ** 2) for each in (before, networks)]
-    assert errors[1] < 0.1 * errors[0]
+    assert errors[1] < 0.25 * errors[0]
     np.testing.assert_array_equal(networks.values(seen, 1), before.values(seen, 1))
 
 
