@@ -1,29 +1,22 @@
-"""Charts and maps of a problem: what they show and where; templates draw it.
+"""Charts and maps of a problem: what they show; templates draw it.
 
 Maps are of the goal regions from above, to scale, and tell where policies fail.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from itertools import islice, pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from kinarm.evaluation.figures import BIN_WIDTH
 from kinarm.evaluation.metrics import LIMITS
 from kinarm.evaluation.report.groups import Group, ProblemResults
-from kinarm.evaluation.statistics import share_over_seeds
+from kinarm.evaluation.statistics import Estimate, share_over_seeds
 from kinarm.scene import GoalRegion, Obstacle
 
-WIDTH, LEFT, RIGHT, ABOVE, BELOW = 460, 46, 12, 14, 44
-"""Width of a chart, and its margins, of which histograms have none above [units of the page]."""
-
-PROFILE_HEIGHT, POINTS = 330, 121
-"""Height of a profile, and the distances at which it is drawn beside those of the table."""
-
-ROW_HEIGHT = 0.76
-"""Of the tallest bar of a histogram, of the height of its row."""
+POINTS = 121
+"""Distances at which a profile is drawn beside those of the table."""
 
 SCALE = 200
 """Units of the SVG to a metre."""
@@ -44,82 +37,30 @@ DISTANCE_COLOURS = 6
 """Colours of distances: within the tolerance, and twice the distance from one to the next."""
 
 
-class Chart(NamedTuple):
-    """What a template draws of a problem, in units of the page.
+def profiles(results: ProblemResults) -> tuple[list[float], list[list[Estimate]]]:
+    """Profiles of a problem, the oracle's as well.
 
-    Ticks are places with their words, across and upwards; shapes are paths of each policy, with
-    their classes and words.
+    Returns
+    -------
+    limits, shares : list of float, list of list of Estimate
+        Distances [m], ascending, and the share of trials of each group within each of them.
     """
-
-    height: float
-    across: Sequence[tuple[float, str]]
-    upwards: Sequence[tuple[float, str]]
-    tolerance: float
-    shapes: Sequence[tuple[Group, str, str, str]]
-
-
-def profile_chart(results: ProblemResults) -> Chart:
-    """Profiles of a problem with their 95 % bands, the oracle's as well; the best is on top."""
-    limits = profile_limits(results)
-    low, high = (float(end) for end in np.log10(limits[[0, -1]]))
-
-    def x(distances: ArrayLike) -> NDArray[np.float64]:
-        return LEFT + (np.log10(distances) - low) / (high - low) * (WIDTH - RIGHT - LEFT)
-
-    def y(shares: ArrayLike) -> NDArray[np.float64]:
-        return PROFILE_HEIGHT - BELOW - np.multiply(shares, PROFILE_HEIGHT - BELOW - ABOVE)
-
-    shapes, there, back = [], x(limits), x(limits[::-1])
-    for group in reversed(results.groups):
-        shares = [share_over_seeds(group.distances <= limit) for limit in limits]
-        rates, least, most = np.array([(share.value, *(share.ci95 or ())) for share in shares]).T
-        band = f"{_path(there, y(most))}L{_path(back, y(least[::-1]))[1:]}z"
-        shapes += [(group, "band", band, group.name)]
-        shapes += [(group, "line", _path(there, y(rates)), group.name)]
-    ticks = np.outer(10.0 ** np.arange(np.floor(low), high + 1), (1, 2, 5)).ravel()
-    inside = ticks[(ticks > 0.999 * limits[0]) & (ticks < 1.001 * limits[-1])]
-    across = [(float(x(tick)), f"{tick:g}") for tick in inside]
-    upwards = [(float(y(share)), f"{100 * share:g} %") for share in (0, 0.25, 0.5, 0.75, 1)]
-    return Chart(PROFILE_HEIGHT, across, upwards, float(x(results.tolerance)), shapes)
-
-
-def profile_limits(results: ProblemResults) -> NDArray[np.float64]:
-    """Distances at which the profiles of a problem are drawn [m], ascending."""
     furthest = max(float(group.distances.max()) for group in results.groups)
     low, high = results.tolerance / 5, max(furthest, 2 * results.tolerance)
     named = [limit for limit in (results.tolerance, *LIMITS) if low <= limit <= high]
-    return np.unique(np.concatenate([np.geomspace(low, high, POINTS), named]))
+    limits = np.unique(np.concatenate([np.geomspace(low, high, POINTS), named])).tolist()
+    return limits, [
+        [share_over_seeds(group.distances <= limit) for limit in limits] for group in results.groups
+    ]
 
 
-def histogram_chart(results: ProblemResults) -> Chart:
-    """Histograms of a problem below each other, all on the same scales.
-
-    The height of a bar is the square root of its share, so that rare failures can be seen.
-    """
-    rows = len(results.groups)
-    height = max(48, 270 // rows)  # rows share that of a profile, as long as it is enough
+def histograms(results: ProblemResults) -> tuple[list[float], list[list[float]]]:
+    """Edges of the bins of final distances [m], and the shares of trials of each group in them."""
     furthest = max(float(group.distances.max()) for group in results.groups)
     edges = np.arange(0.0, furthest + 2 * BIN_WIDTH, BIN_WIDTH)
-    unit = (WIDTH - LEFT - RIGHT) / edges[-1]
-    spacing = 0.2 if edges[-1] < 2 else 0.5 * np.ceil(edges[-1] / 5)
-    shapes, upwards = [], []
-    for row, group in zip(range(rows, 0, -1), reversed(results.groups), strict=True):
-        shares = np.histogram(group.distances, edges)[0] / group.distances.size
-        upwards.append((row * height, f"{100 * shares[0]:.1f} %"))
-        for low, share in zip(edges, shares, strict=False):
-            if share:
-                left, up = LEFT + unit * low, height * ROW_HEIGHT * np.sqrt(share)
-                bar = f"M{left:.1f},{row * height}h{0.95 * BIN_WIDTH * unit:.1f}v{-up:.1f}"
-                title = f"{low:.2f} to {low + BIN_WIDTH:.2f} m: {100 * share:.2f} % of trials"
-                shapes.append((group, "bars", f"{bar}H{left:.1f}z", title))
-    across = [(LEFT + unit * d, f"{d:g}") for d in np.arange(0, edges[-1], spacing).tolist()]
-    tolerance = LEFT + unit * results.tolerance
-    return Chart(rows * height + BELOW, across, upwards, tolerance, shapes)
-
-
-def _path(xs: NDArray[np.float64], ys: NDArray[np.float64]) -> str:
-    """A path through points; a tenth of a unit is what no eye can tell apart."""
-    return "M" + "L".join(f"{x:.1f},{y:.1f}" for x, y in zip(xs, ys, strict=True))
+    counts = [np.histogram(group.distances, edges)[0] for group in results.groups]
+    sizes = [group.distances.size for group in results.groups]
+    return edges.tolist(), [(n / size).tolist() for n, size in zip(counts, sizes, strict=True)]
 
 
 class View(NamedTuple):

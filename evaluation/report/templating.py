@@ -1,5 +1,6 @@
 """Templates of all pages and cards, and tables in Markdown."""
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,7 @@ def template_environment(**settings: Any) -> "Environment":
         **settings,
     )
     environment.filters.update(
+        log10=math.log10,
         tenth=lambda length: f"{length:.1f}".removesuffix(".0"),
         percent=lambda share: f"{100 * share:.1f} %",
         dashes=lambda text: text.replace("..", "\N{EN DASH}"),
