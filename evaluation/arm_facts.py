@@ -5,12 +5,13 @@ from itertools import combinations
 
 import coal
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from kinarm.arm import Arm
 from kinarm.arm_specification import ArmFile
 from kinarm.clearance import SAMPLES, ContactStatistics
 from kinarm.collision import ContactModel
+from kinarm.evaluation.report.templating import template_environment
 from kinarm.scene import Scene
 
 
@@ -39,38 +40,21 @@ def untested_pairs(contact: ContactModel) -> Iterator[tuple[str, str, str]]:
         yield one, other, reason
 
 
-def arm_facts(arm: Arm) -> dict[str, list[str]]:
+def arm_facts(arm: Arm) -> str:
     """All of it, as lines under headings."""
-    contact = contact_on_bare_ground(arm)
-    statistics = ContactStatistics.sample(contact)
-    file = ArmFile.of(arm.specification.source)
-    tool = ", ".join(f"{number:.4g}" for number in arm.tool_position(arm.home))
-    about = [] if file is None else [file.title, file.licence, file.origin, file.notes]
-    shapes = zip(contact.body_names, arm.geometry.geometryObjects, strict=False)
-    return {
-        arm.name: [line for line in (*about, *arm.description.notes) if line],
-        "joints": [_joint(arm, index) for index in range(arm.n_joints)],
-        "held": [f"{name} at {position:g}" for name, position in arm.description.held.items()],
-        "tool": [f"{arm.tool_frame}, at home at ({tool}) m; reach at most {arm.reach:.2f} m"],
-        "collision shapes": [f"{body}: {_shape(each.geometry)}" for body, each in shapes],
-        f"pairs that are tested ({len(statistics.pairs)}), and how often they touch": [
-            f"{' and '.join(pair)}: {_frequency(share)}"
-            for pair, share in statistics.shares.items()
-        ],
-        "pairs that are left out": [
-            f"{one} and {other}: {reason}" for one, other, reason in untested_pairs(contact)
-        ],
-    }
-
-
-def _joint(arm: Arm, index: int) -> str:
-    """Limits and speed of a joint."""
-    prismatic = bool(arm.chain.prismatic[index])
-    unit = "m" if prismatic else "deg"
-    limits = _span(np.array([arm.lower[index], arm.upper[index]]), prismatic)
-    speed = _span(arm.velocity_limits[index : index + 1], prismatic)
-    use = "" if index < arm.n_actuated else "; not actuated, stays at home"
-    return f"{arm.joint_names[index]}: {limits} {unit}, {speed} {unit}/s{use}"
+    contact, file = contact_on_bare_ground(arm), ArmFile.of(arm.specification.source)
+    shapes = (_shape(each.geometry) for each in arm.geometry.geometryObjects)
+    environment = template_environment()
+    environment.filters["span"] = _span
+    text = environment.get_template("arm.txt").render(
+        arm=arm,
+        about=[] if file is None else [file.title, file.licence, file.origin, file.notes],
+        shapes=zip(contact.body_names, shapes, strict=False),
+        statistics=ContactStatistics.sample(contact),
+        untested=untested_pairs(contact),
+        samples=SAMPLES,
+    )
+    return text.rstrip()
 
 
 def _shape(shape: coal.CollisionGeometry) -> str:
@@ -80,13 +64,7 @@ def _shape(shape: coal.CollisionGeometry) -> str:
     return type(shape).__name__.lower()
 
 
-def _span(values: NDArray[np.float64], prismatic: bool) -> str:
+def _span(values: ArrayLike, prismatic: bool) -> str:
     """Positions or speeds as people read them: metres, or degrees; equal ones once."""
     shown = np.round(values, 2) if prismatic else np.round(np.rad2deg(values))
     return " to ".join(dict.fromkeys(f"{value:g}" for value in shown))
-
-
-def _frequency(share: float) -> str:
-    """How often a pair touches."""
-    often = {0.0: "at none", 1.0: "at all"}.get(share, f"at {share:.1%}")
-    return f"{often} of {SAMPLES} random configurations"

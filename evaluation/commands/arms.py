@@ -86,9 +86,7 @@ def _show(request: ShowRequest) -> None:
     if request.out is not None:
         check_output(request.out, overwrite=request.overwrite, suffix=".html")
     arm = Arm.load(request.arm, tool_frame=request.tool_frame, package_dirs=request.package_dirs)
-    for heading, lines in arm_facts(arm).items():
-        if lines:
-            print(heading, *(f"  {line}" for line in lines), sep="\n")
+    print(arm_facts(arm))
     if request.out is not None:
         from kinarm.viewer import arm_page
 
