@@ -13,7 +13,7 @@ from kinarm.evaluation.figures import BIN_WIDTH
 from kinarm.evaluation.metrics import LIMITS
 from kinarm.evaluation.report.groups import Group, ProblemResults
 from kinarm.evaluation.statistics import Estimate, share_over_seeds
-from kinarm.scene import GoalRegion, Obstacle
+from kinarm.scene import GoalRegion
 
 POINTS = 121
 """Distances at which a profile is drawn beside those of the table."""
@@ -29,9 +29,6 @@ MARKERS = 1000
 
 SLICES = 10
 """Of a region, along x, whose failures are counted."""
-
-BAR_OFFSET, BAR_LENGTH = 0.02, 0.25
-"""Where the bars of failures begin beside the region, and the length of 100 % [m]."""
 
 DISTANCE_COLOURS = 6
 """Colours of distances: within the tolerance, and twice the distance from one to the next."""
@@ -76,24 +73,6 @@ class View(NamedTuple):
         corners += [corner[:2] for region in regions for corner in (region.lower, region.upper)]
         low, high = np.min(corners, axis=0) - MAP_MARGIN, np.max(corners, axis=0) + MAP_MARGIN
         return cls((float(low[0]), float(high[0])), (float(low[1]), float(high[1])))
-
-    def shows(self, box: Obstacle | GoalRegion) -> bool:
-        """Whether some of a box is in view."""
-        return all(box.lower[k] < high and low < box.upper[k] for k, (low, high) in enumerate(self))
-
-    def across(self, y: float) -> float:
-        """Where a y [m] lies in the SVG, from the left."""
-        return (self.y[1] - y) * SCALE
-
-    def down(self, x: float) -> float:
-        """Where an x [m] lies in the SVG, from the top."""
-        return (self.x[1] - x) * SCALE
-
-    def failure_bars(self, region: GoalRegion) -> tuple[float, float]:
-        """Where bars beside a region begin, and how far 100 % reaches, towards the arm."""
-        right, left = region.lower[1], region.upper[1]
-        inner, inward = (right, 1) if right + left > 0 else (left, -1)
-        return self.across(inner - inward * BAR_OFFSET), inward * BAR_LENGTH * SCALE
 
 
 def worst_outcomes(group: Group) -> list[str]:
