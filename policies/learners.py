@@ -241,23 +241,18 @@ def training_states(
     config, state, **options
         See `train_policy`.
     """
-    training = begin_training(config, **options)
+    learner = find_learner(config.learner)
+    learner.check_installed()
+    for option in options:
+        if option not in learner.options:
+            raise InvalidInputError(f"{learner.name} has no option {option!r}")
+    training = learner.begin(config, **options)
     if state is None:
         state = training.initial_state()
     yield state
     while state.iteration < config.iterations:
         state = training.iterate(state)
         yield state
-
-
-def begin_training(config: TrainingConfig, **options: Any) -> Training[Any]:
-    """Prepare a training, and refuse what cannot be trained; see `train_policy`."""
-    learner = find_learner(config.learner)
-    learner.check_installed()
-    for option in options:
-        if option not in learner.options:
-            raise InvalidInputError(f"{learner.name} has no option {option!r}")
-    return learner.begin(config, **options)
 
 
 def state_policy(config: TrainingConfig, state: TrainingState) -> "Policy":

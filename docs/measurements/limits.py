@@ -25,7 +25,7 @@ from kinarm.evaluation.report.templating import markdown_table
 from kinarm.kernels.compiling import Array, kernel
 from kinarm.kernels.lanes import LANES, as_lanes
 from kinarm.policies import Policy, load_policy, recipe
-from kinarm.policies.learners import begin_training
+from kinarm.policies.learners import find_learner
 from kinarm.problem import ReachProblem
 from kinarm.simulator import Simulator
 
@@ -133,7 +133,7 @@ def _iterations(learner: str, name: str, problem: ReachProblem) -> Callable[[], 
     few = 1 if learner == "ppo" else PROFILED_ITERATIONS
     config = recipe(learner, name, problem=problem)
     config = replace(config, iterations=max(config.iterations, 2 * few))
-    training = begin_training(config, **({"threads": 1} if learner == "ars" else {}))
+    training = find_learner(learner).begin(config, **({"threads": 1} if learner == "ars" else {}))
     state = training.iterate(training.initial_state())
 
     def run() -> None:

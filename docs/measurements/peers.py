@@ -24,7 +24,7 @@ from kinarm.evaluation.bench import VECTOR_ENVS
 from kinarm.evaluation.report.templating import markdown_table
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies import Policy, load_policy, recipe, train_policy
-from kinarm.policies.learners import begin_training, state_policy
+from kinarm.policies.learners import find_learner, state_policy
 from kinarm.policies.sb3.environment import sb3_vec_env
 from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
@@ -205,7 +205,7 @@ def compare_ars(policy: Policy, _: int) -> Iterator[Comparison]:
     """One training each of sb3-contrib's ARS and kinarm's; rates are steps in training."""
     config = recipe("ars", "tuned", problem=policy.problem)
     trials = TrialSet.draw(config.problem, TRIALS, 0)
-    training = begin_training(config, threads=1)
+    training = find_learner("ars").begin(config, threads=1)
     state = training.iterate(training.initial_state())  # compiles
 
     def iterate() -> int:

@@ -317,10 +317,7 @@ class Study:
         rows = self.rows()
         columns = {name: _column([row[name] for row in rows]) for name in (rows[0] if rows else ())}
         kinds = [(name, column.dtype) for name, column in columns.items()]
-        table = np.empty(len(rows), dtype=kinds)
-        for name, column in columns.items():
-            table[name] = column
-        return table
+        return np.array([*zip(*columns.values(), strict=True)], dtype=kinds)
 
 
 def _column(values: Sequence[Any]) -> NDArray[Any]:

@@ -12,7 +12,7 @@ from kinarm._files import shipped_files
 from kinarm.arm import Arm
 from kinarm.evaluation import EvaluationRequest, Study, TrialSet
 from kinarm.policies import load_policy, recipe, save_checkpoint
-from kinarm.policies.learners import begin_training
+from kinarm.policies.learners import training_states
 from kinarm.recording import record_rollouts, save_recordings
 from tests.conftest import CUBE_CORNERS, CUBE_FACES, write_obj, write_stl
 
@@ -38,7 +38,7 @@ def checkpoints() -> list[bytes]:
     found = []
     for learner in ("ars", "ppo"):
         config = recipe(learner, "paper", iterations=3)
-        state = begin_training(config).initial_state()
+        state = next(training_states(config))
         found.append(written(lambda path, c=config, s=state: save_checkpoint(path, c, s)))
     return found
 

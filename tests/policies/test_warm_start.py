@@ -7,7 +7,7 @@ import pytest
 
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.policies import ARSConfig, PPOConfig, load_policy, state_policy, train_policy
-from kinarm.policies.learners import begin_training
+from kinarm.policies.learners import training_states
 from kinarm.policies.policy import Layer
 from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
@@ -15,7 +15,7 @@ from kinarm.simulator import Simulator
 
 def first_policy(config):
     """What a training takes for its policy before the first iteration."""
-    return state_policy(config, begin_training(config).initial_state())
+    return state_policy(config, next(training_states(config)))
 
 
 @pytest.fixture
@@ -82,7 +82,7 @@ def test_others_are_refused(tmp_path, network_file):
 def test_statistics_are_taken_where_they_are_used():
     policy = "ars-tuned-both-seed1"
     states = [
-        begin_training(ARSConfig(initial_policy=policy, normalize=normalize)).initial_state()
+        next(training_states(ARSConfig(initial_policy=policy, normalize=normalize)))
         for normalize in (True, False)
     ]
     assert [state.normalizer.count > 0 for state in states] == [True, False]
