@@ -13,7 +13,7 @@ trainings, judged on the same trials beside the oracle.
 import tempfile
 
 from kinarm.evaluation import Study
-from kinarm.evaluation.experiments.figures import beside_bound, effects, learning_curves
+from kinarm.evaluation.experiments.page import beside_bound, effects, learning_curves
 
 study = Study(
     {

@@ -3,24 +3,33 @@
 import csv
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import tomli_w
 from numpy.typing import NDArray
 
 from kinarm._files import write_atomically, write_text
 from kinarm.evaluation.experiments import table
-from kinarm.evaluation.experiments.figures import draw_all
-from kinarm.evaluation.figures import save_figure
+from kinarm.evaluation.experiments.plan import Run
+from kinarm.evaluation.experiments.table import Group, identity, shorter, shown
+from kinarm.evaluation.figures import COLOURS, DASHES, panels_figure, save_figure
 from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.report.templating import markdown_table, template_environment
+from kinarm.evaluation.statistics import Estimate, share_over_seeds
 from kinarm.policies.provenance import package_versions, source_commit
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from kinarm.evaluation.experiments.study import Study
+
+LINES, BARS = 8, 24
+"""How many groups of trainings a figure shows of a problem, the best ones."""
 
 TITLES = {
     "learning_curves": "Learning curves",
@@ -64,7 +73,7 @@ def write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
     writer.writeheader()
     for row in rows:
         lists = [name for name, each in row.items() if isinstance(each, list | tuple)]
-        writer.writerow({**row, **{name: table.shown(row[name]) for name in lists}})
+        writer.writerow({**row, **{name: shown(row[name]) for name in lists}})
     write_text(path, text.getvalue())
 
 
@@ -107,7 +116,7 @@ def _page(name: str, study: "Study", document: dict[str, Any], drawings: Mapping
     """
     environment = template_environment(autoescape=name.endswith(".html"))
     experiment, groups = study.experiment, study.best(len(study))
-    best: dict[str, table.Group] = {}
+    best: dict[str, Group] = {}
     for group in groups:
         best.setdefault(group.config.problem.name, group)
     return environment.get_template(name).render(
@@ -128,3 +137,166 @@ def _page(name: str, study: "Study", document: dict[str, Any], drawings: Mapping
         meanings=[(METRICS[name].heading or name, METRICS[name].meaning) for name in table.FIGURES],
         markdown_table=markdown_table,
     )
+
+
+def draw_all(study: "Study") -> dict[str, "Figure"]:
+    """All figures that a study has something for, by name."""
+    figures = {draw.__name__: draw(study) for draw in (learning_curves, effects, beside_bound)}
+    return {name: figure for name, figure in figures.items() if figure is not None}
+
+
+def _by_problem(study: "Study") -> dict[str, list[Group]]:
+    """Groups of each problem, best first."""
+    found: dict[str, list[Group]] = {}
+    for group in sorted(study.groups(), key=lambda each: -(each.success.value or 0)):
+        found.setdefault(group.config.problem.name, []).append(group)
+    return found
+
+
+def learning_curves(study: "Study") -> "Figure | None":
+    """Success in the course of the training, against environment steps and against wall time.
+
+    A row per problem; lines are means over the training seeds, bands reach from the worst of them
+    to the best. Dotted is what the oracle reaches. None if nobody looked during the trainings.
+    """
+    from matplotlib.ticker import NullFormatter
+
+    problems = {}
+    for name, groups in _by_problem(study).items():
+        if looked := [group for group in groups if any(run.curve for run in group.runs)]:
+            problems[name] = looked[:LINES]
+    if not problems:
+        return None
+    size = 10.0, 1.2 + 3.2 * len(problems)
+    figure, panels = panels_figure(size, len(problems), 2, sharey=True)
+    for (problem, groups), row in zip(problems.items(), panels, strict=True):
+        for number, group in enumerate(groups):
+            _draw_curves(row, group, number)
+        for axes in row:
+            axes.axhline(groups[0].reachable, color="#444444", linestyle=":", lw=1)
+            axes.set(ylim=(0, 1.02), title=problem, xscale="log")
+            axes.xaxis.set_minor_formatter(NullFormatter())
+        row[0].set_ylabel("share of trials with success")
+        row[0].legend(frameon=False, fontsize=8, loc="upper left")
+    panels[-1, 0].set_xlabel("environment steps")
+    panels[-1, 1].set_xlabel("wall time of the training [s]")
+    return figure
+
+
+def _draw_curves(panels: "Sequence[Axes]", group: Group, number: int) -> None:
+    """Draw the mean over the seeds and the band of them, against steps and against seconds."""
+    seeds = [
+        np.array([(point.environment_steps, seconds, point.success) for point, seconds, _ in curve])
+        for curve in (run.timed_curve for run in group.runs)
+    ]
+    colour, dash = COLOURS[number % len(COLOURS)], DASHES[number // len(COLOURS) % len(DASHES)]
+    for column, axes in enumerate(panels):
+        curves = [(seed[:, column], seed[:, 2]) for seed in seeds]
+        curves = [(x, y) for x, y in curves if np.isfinite(x).all() and x[-1] > 0]
+        if curves:
+            first = max(max(x[0] for x, _ in curves), 1e-3)
+            places = np.geomspace(first, max(first, min(x[-1] for x, _ in curves)), 200)
+            heights = np.array([np.interp(places, x, y) for x, y in curves])
+            low, high = heights.min(axis=0), heights.max(axis=0)
+            axes.fill_between(places, low, high, color=colour, alpha=0.15, lw=0)
+            mean = heights.mean(axis=0)
+            axes.plot(places, mean, color=colour, linestyle=dash, lw=2, label=group.label)
+
+
+def effects(study: "Study") -> "Figure | None":
+    """Success by the value of each field that varies, a panel per field.
+
+    What is shown of a value is the mean over everything else that varies, with its 95 % interval
+    over seeds and trials; fields that were drawn from a range are shown training by training.
+    None if nothing varies.
+    """
+    fields = {name: runs for name, runs in _by_value(study).items() if len(runs) > 1}
+    if not fields:
+        return None
+    columns = min(3, len(fields))
+    rows = -(-len(fields) // columns)
+    size = 0.6 + 3.6 * columns, 0.4 + 3.0 * rows
+    figure, panels = panels_figure(size, rows, columns, sharey=True)
+    for (field, runs), axes in zip(fields.items(), panels.flat, strict=False):
+        _draw_effect(axes, study, field, runs)
+    for axes in list(panels.flat)[len(fields) :]:
+        axes.set_visible(False)
+    for row in panels:
+        row[0].set_ylabel("share of trials with success")
+    return figure
+
+
+ByValue = dict[str, tuple[Any, list[Run]]]
+"""Values of a field by what is shown of them, and the finished trainings that have them."""
+
+
+def _by_value(study: "Study") -> dict[str, ByValue]:
+    """Fields that can vary, by name."""
+    found: dict[str, ByValue] = {}
+    for run in study.finished:
+        varying = {**identity(run), **run.choices}
+        del varying["seed"]
+        for field, value in varying.items():
+            found.setdefault(field, {}).setdefault(shown(value), (value, []))[1].append(run)
+    return found
+
+
+def _draw_effect(axes: "Axes", study: "Study", field: str, runs: ByValue) -> None:
+    """Draw the success of each value of a field."""
+    values = [value for value, _ in runs.values()]
+    numeric = all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
+    places = values if numeric else [*range(len(values))]
+    if numeric and min(places) > 0 and max(places) / min(places) >= 10:
+        axes.set_xscale("log")
+    drawn = numeric and field in (*study.experiment.random, *study.experiment.search)
+    for place, (_, same) in zip(places, runs.values(), strict=True):
+        if drawn:
+            shares = [study.finished[run].outcomes.success.mean() for run in same]
+            axes.plot([place] * len(same), shares, "o", color=COLOURS[0], alpha=0.5, ms=4)
+        else:
+            mean = _mean_success(study, same)
+            value, bars = mean.value or 0.0, _whiskers(mean)
+            axes.errorbar(place, value, yerr=bars, fmt="o", color=COLOURS[0], capsize=3)
+    if not drawn and (not numeric or len(runs) <= 6):
+        axes.set_xticks(places, [*runs], rotation=0 if numeric else 20)
+        axes.minorticks_off()
+    axes.margins(x=0.2)
+    axes.set(title=shorter(field), ylim=(0, 1.02))
+
+
+def _mean_success(study: "Study", runs: Sequence[Run]) -> Estimate:
+    """Mean success over everything but the seed, and its interval over seeds and trials."""
+    by_seed: dict[int, list[NDArray[np.float64]]] = {}
+    for run in runs:
+        hits = study.finished[run].outcomes.success.astype(np.float64)
+        by_seed.setdefault(run.config.seed, []).append(hits)
+    return share_over_seeds(np.array([np.mean(each, axis=0) for each in by_seed.values()]))
+
+
+def _whiskers(estimate: Estimate) -> list[list[float]]:
+    """Lengths of the interval below and above the value."""
+    value = float(estimate.value or 0.0)
+    low, high = estimate.ci95 or (value, value)
+    return [[max(value - low, 0.0)], [max(high - value, 0.0)]]
+
+
+def beside_bound(study: "Study") -> "Figure | None":
+    """Success of each group with its 95 % interval, beside what the oracle reaches."""
+    problems = {name: groups[:BARS] for name, groups in _by_problem(study).items()}
+    if not problems:
+        return None
+    heights = [0.6 + 0.28 * len(groups) for groups in problems.values()]
+    size = 8.0, 0.6 + sum(heights)
+    figure, panels = panels_figure(size, len(problems), 1, height_ratios=heights)
+    for (problem, groups), axes in zip(problems.items(), panels.flat, strict=True):
+        for row, group in enumerate(groups):
+            share = float(group.success.value or 0)
+            axes.barh(row, share, height=0.62, color=COLOURS[0], alpha=0.35)
+            whiskers = _whiskers(group.success)
+            axes.errorbar(share, row, xerr=whiskers, fmt="|", color=COLOURS[0], capsize=3)
+        axes.axvline(groups[0].reachable, color="#444444", linestyle=":", lw=1.2)
+        axes.set_yticks(range(len(groups)), [group.label for group in groups], fontsize=8)
+        axes.invert_yaxis()
+        axes.set(xlim=(0, 1.02), title=problem)
+    panels[-1, 0].set_xlabel("share of trials with success; dotted: what the oracle reaches")
+    return figure

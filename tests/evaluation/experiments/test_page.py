@@ -8,8 +8,13 @@ import pytest
 from small_studies import SMALL
 
 from kinarm.evaluation.experiments import page
-from kinarm.evaluation.experiments.figures import beside_bound, draw_all, effects, learning_curves
-from kinarm.evaluation.experiments.page import write_all
+from kinarm.evaluation.experiments.page import (
+    beside_bound,
+    draw_all,
+    effects,
+    learning_curves,
+    write_all,
+)
 from kinarm.evaluation.experiments.study import Study
 from kinarm.evaluation.experiments.table import group_row
 
