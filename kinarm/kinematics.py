@@ -188,11 +188,11 @@ class Kinematics(ABC):
             by default [rad or m].
         """
         arm = self.arm
-        positions, wanted, axes = _targets(arm, self.tool, targets, directions, tool_axis)
+        positions, wanted, axes = self._targets(targets, directions, tool_axis)
         start = finite_array("near", arm.home if near is None else near, (arm.n_joints,))
         if ((start < arm.lower) | (start > arm.upper)).any():
             raise InvalidInputError(f"near lies outside the limits: {start.tolist()}")
-        search = _search(arm, axes, start, joints, separation)
+        search = self._search(axes, start, joints, separation)
         configurations, owner = self._solutions(search, positions, wanted, most)
         if free:
             kept = ~self.in_contact(configurations)
@@ -218,66 +218,60 @@ class Kinematics(ABC):
         owner = np.repeat(np.arange(len(positions)), counts)
         return np.concatenate([np.empty((0, n_joints)), *found]), owner
 
-
-def _search(
-    arm: Arm, axes: Array, near: Array, joints: int | None, separation: float | None
-) -> Search:
-    """Check what is looked for, and complete it; see `Kinematics.inverse_kinematics`."""
-    moved = _moved(arm, axes) if joints is None else joints
-    moved = whole_number("joints", moved, 1, arm.n_joints)
-    isolated = moved <= {0: 3, 1: 5, 3: 6}[len(axes)]
-    if separation is None:
-        separation = ISOLATED_SEPARATION if isolated else CONTINUUM_SEPARATION
-    if not separation > 0:
-        raise InvalidInputError(f"separation must be greater than 0, got {separation}")
-    return Search(
-        tool=arm.chain.tool,
-        axes=axes,
-        scale=1.0 / arm.reach,
-        near=near,
-        seeds=low_discrepancy_points(SEEDS, moved),
-        least=LEAST_SEEDS if isolated else 0,
-        separation=float(separation),
-    )
-
-
-def _targets(
-    arm: Arm,
-    tool: Frame,
-    targets: ArrayLike,
-    directions: ArrayLike | None,
-    tool_axis: ArrayLike | None,
-) -> tuple[Array, Array, Array]:
-    """Positions (n, 3), directions of the tool's axes (n, n_axes, 3), and these axes (n_axes, 3).
-
-    The axes are those of the last joint frame.
-    """
-    if np.shape(targets)[-2:] == (4, 4):
-        if directions is not None or tool_axis is not None:
-            raise InvalidInputError("a pose is wanted: directions and tool_axis do not apply")
-        poses, _ = one_or_many("targets", targets, (4, 4))
-        _check_poses(poses)
-        columns = np.ascontiguousarray(poses[:, :3, :3].transpose(0, 2, 1))
-        axes = np.ascontiguousarray(tool.placement[:3, :3].T)
-        return np.ascontiguousarray(poses[:, :3, 3]), columns, axes
-    positions, _ = one_or_many("targets", targets, (3,))
-    if directions is None:
-        if tool_axis is not None:
-            raise InvalidInputError("tool_axis applies only with directions")
-        return positions, np.empty((len(positions), 0, 3)), np.empty((0, 3))
-    along, _ = one_or_many("directions", directions, (3,))
-    if len(along) not in (1, len(positions)):
-        raise InvalidInputError(
-            f"directions must be one or as many as targets: {len(along)} for {len(positions)}"
+    def _search(
+        self, axes: Array, near: Array, joints: int | None, separation: float | None
+    ) -> Search:
+        """Check what is looked for, and complete it; see `Kinematics.inverse_kinematics`."""
+        moved = _moved(self.arm, axes) if joints is None else joints
+        moved = whole_number("joints", moved, 1, self.arm.n_joints)
+        isolated = moved <= {0: 3, 1: 5, 3: 6}[len(axes)]
+        if separation is None:
+            separation = ISOLATED_SEPARATION if isolated else CONTINUUM_SEPARATION
+        if not separation > 0:
+            raise InvalidInputError(f"separation must be greater than 0, got {separation}")
+        return Search(
+            tool=self.arm.chain.tool,
+            axes=axes,
+            scale=1.0 / self.arm.reach,
+            near=near,
+            seeds=low_discrepancy_points(SEEDS, moved),
+            least=LEAST_SEEDS if isolated else 0,
+            separation=float(separation),
         )
-    along = np.broadcast_to(_units("directions", along), positions.shape)
-    if tool_axis is None:
-        axis = _approach(arm)
-    else:
-        given = _units("tool_axis", finite_array("tool_axis", tool_axis, (3,))[None])
-        axis = (tool.placement[:3, :3] * given).sum(axis=1)
-    # Copied, they can be written to like the others: kernels are not compiled once more for them.
-    return positions, np.array(along[:, None], order="C"), np.array(axis[None])
+
+    def _targets(
+        self, targets: ArrayLike, directions: ArrayLike | None, tool_axis: ArrayLike | None
+    ) -> tuple[Array, Array, Array]:
+        """Positions (n, 3), directions of axes of the tool (n, n_axes, 3), and these (n_axes, 3).
+
+        The axes are those of the last joint frame.
+        """
+        if np.shape(targets)[-2:] == (4, 4):
+            if directions is not None or tool_axis is not None:
+                raise InvalidInputError("a pose is wanted: directions and tool_axis do not apply")
+            poses, _ = one_or_many("targets", targets, (4, 4))
+            _check_poses(poses)
+            columns = np.ascontiguousarray(poses[:, :3, :3].transpose(0, 2, 1))
+            axes = np.ascontiguousarray(self.tool.placement[:3, :3].T)
+            return np.ascontiguousarray(poses[:, :3, 3]), columns, axes
+        positions, _ = one_or_many("targets", targets, (3,))
+        if directions is None:
+            if tool_axis is not None:
+                raise InvalidInputError("tool_axis applies only with directions")
+            return positions, np.empty((len(positions), 0, 3)), np.empty((0, 3))
+        along, _ = one_or_many("directions", directions, (3,))
+        if len(along) not in (1, len(positions)):
+            raise InvalidInputError(
+                f"directions must be one or as many as targets: {len(along)} for {len(positions)}"
+            )
+        along = np.broadcast_to(_units("directions", along), positions.shape)
+        if tool_axis is None:
+            axis = _approach(self.arm)
+        else:
+            given = _units("tool_axis", finite_array("tool_axis", tool_axis, (3,))[None])
+            axis = (self.tool.placement[:3, :3] * given).sum(axis=1)
+        # Copied, they can be written to like the others: kernels need not be compiled once more.
+        return positions, np.array(along[:, None], order="C"), np.array(axis[None])
 
 
 def _check_poses(poses: Array) -> None:

@@ -197,15 +197,6 @@ def part_slices(n_joints: int) -> dict[str, slice]:
     }
 
 
-def observation_table(n_joints: int) -> list[tuple[str, ...]]:
-    """Indices, meaning and unit of each part in the observation of an arm, for people."""
-    places = part_slices(n_joints).values()
-    return [
-        (f"{place.start}-{place.stop - 1}", part.meaning, part.unit)
-        for part, place in zip(OBSERVATION, places, strict=True)
-    ]
-
-
 def _compose(parts: Sequence[Part]) -> Any:
     """Join the formulas of parts into one kernel, which Numba inlines."""
     write, length, per_joint = parts[0].write, len(parts[0].signs), parts[0].per_joint
