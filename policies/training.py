@@ -196,8 +196,8 @@ def say_findings(config: TrainingConfig) -> None:
     That is many goals out of reach, but of the paper's problems, which are known; or that
     ``symmetric`` has no effect: a user set it then.
     """
+    from kinarm.clearance import reach_warning
     from kinarm.policies.mirror import missing_mirror
-    from kinarm.policies.reachability import reach_warning
     from kinarm.problem import PROBLEMS
     from kinarm.world import World
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from kinarm.clearance import find_reachable, reach_warning
 from kinarm.errors import ProblemError
 from kinarm.policies.oracle import Oracle
-from kinarm.policies.reachability import find_reachable, reach_warning
 from kinarm.problem import PROBLEMS
 from kinarm.scene import GoalRegion, Obstacle, Scene
 from kinarm.world import World
