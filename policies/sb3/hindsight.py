@@ -1,14 +1,12 @@
 """Hindsight replay for goals whose reaching ends an episode."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3 import HerReplayBuffer
-
-if TYPE_CHECKING:
-    from stable_baselines3.common.type_aliases import DictReplayBufferSamples
-    from stable_baselines3.common.vec_env import VecNormalize
+from stable_baselines3.common.type_aliases import DictReplayBufferSamples
+from stable_baselines3.common.vec_env import VecNormalize
 
 Indices = NDArray[np.int64]
 Goals = NDArray[np.floating[Any]]
@@ -41,8 +39,8 @@ class HindsightReplayBuffer(HerReplayBuffer):
         return np.asarray(answer, dtype=np.float32)
 
     def _get_virtual_samples(
-        self, batch_indices: Indices, env_indices: Indices, env: "VecNormalize | None" = None
-    ) -> "DictReplayBufferSamples":
+        self, batch_indices: Indices, env_indices: Indices, env: VecNormalize | None = None
+    ) -> DictReplayBufferSamples:
         """Transitions with substituted goals, which end where these are reached."""
         samples = super()._get_virtual_samples(batch_indices, env_indices, env)
         besides = self._normalize_reward(self._besides.reshape(-1, 1), env)

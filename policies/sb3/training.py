@@ -13,10 +13,14 @@ from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import replace
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import torch
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.noise import NormalActionNoise
+from stable_baselines3.common.utils import LinearSchedule
+from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from kinarm._console import doing
 from kinarm._files import first_line
@@ -26,9 +30,7 @@ from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import Provenance
 from kinarm.policies.sb3 import ALGORITHMS, SB3Config, SB3State
 from kinarm.policies.sb3.environment import sb3_vec_env
-
-if TYPE_CHECKING:
-    from stable_baselines3.common.base_class import BaseAlgorithm
+from kinarm.policies.sb3.hindsight import HindsightReplayBuffer
 
 REPEATING = "repeating what was done before"
 """Told while a training repeats its beginning."""
@@ -56,7 +58,7 @@ class SteppedLearning:
     In the last step it does all that is left to do.
     """
 
-    def __init__(self, model: "BaseAlgorithm", steps: int) -> None:
+    def __init__(self, model: BaseAlgorithm, steps: int) -> None:
         self.model = model
         self.taken, self._steps = 0, steps
         self._may_go_on, self._has_stopped = threading.Semaphore(0), threading.Semaphore(0)
@@ -130,7 +132,7 @@ class SB3Training:
         )
         return SB3State(curve=(*state.curve, point), training=self)
 
-    def model(self, iteration: int) -> "BaseAlgorithm":
+    def model(self, iteration: int) -> BaseAlgorithm:
         """The algorithm after an iteration, repeated unless it is just there."""
         if self._done == iteration:
             return self._learning.model
@@ -161,12 +163,8 @@ def trained_policy(config: SB3Config, state: SB3State) -> Policy:
     return replace(policy, provenance=made)
 
 
-def sb3_model(config: SB3Config) -> "BaseAlgorithm":
+def sb3_model(config: SB3Config) -> BaseAlgorithm:
     """Build the algorithm, with its environment."""
-    from stable_baselines3.common.noise import NormalActionNoise
-    from stable_baselines3.common.utils import LinearSchedule
-    from stable_baselines3.common.vec_env import VecEnv, VecNormalize
-
     problem = config.training_problem.replace(tolerance=config.training_tolerance)
     kind = "sparse" if config.hindsight else None
     env: VecEnv = sb3_vec_env(problem, config.n_envs, reward_type=kind, threads=1)
@@ -177,8 +175,6 @@ def sb3_model(config: SB3Config) -> "BaseAlgorithm":
         **deepcopy(config.hyperparameters),  # which the algorithm changes
     }
     if config.hindsight:
-        from kinarm.policies.sb3.hindsight import HindsightReplayBuffer
-
         given["replay_buffer_class"] = HindsightReplayBuffer
     if config.action_noise:
         zero = np.zeros(env.action_space.shape or ())

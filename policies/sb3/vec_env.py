@@ -1,13 +1,12 @@
 """The native batch as a vectorised environment of Stable-Baselines3."""
 
 import time
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env.base_vec_env import VecEnv, VecEnvIndices, VecEnvStepReturn
 
 from kinarm.envs.environment import Lifecycle, Observations, one_by_one, pick_scenario
 from kinarm.envs.reach import ReachEnv
@@ -18,10 +17,6 @@ from kinarm.failed_scenarios import LARGEST_REPLAY, FailedScenarios, StartsAndGo
 from kinarm.randomness import Stream, stream_generator
 from kinarm.scenarios import ScenarioQueues
 from kinarm.simulator import Simulator
-
-StepReturn = tuple[Observations, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]
-Indices = int | Iterable[int] | None
-"""Arms by number; None stands for all."""
 
 
 class SB3VecEnv(Lifecycle, VecEnv):
@@ -146,7 +141,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
         """Take note of the actions, shape (num_envs, n_actions), for `step_wait`."""
         self._actions = actions
 
-    def step_wait(self) -> StepReturn:
+    def step_wait(self) -> VecEnvStepReturn:
         """Move every arm for one time step; observations are of new episodes where one ended."""
         episodes = self.episodes
         result = self.simulator.step(episodes, self._actions)
@@ -212,12 +207,12 @@ class SB3VecEnv(Lifecycle, VecEnv):
         self._pictures.close()
         self.closed = True
 
-    def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
         """Value of an attribute of the environment or of its interface, repeated for every arm."""
         owner = self if hasattr(self, attr_name) else self.interface
         return [getattr(owner, attr_name) for _ in self._get_indices(indices)]
 
-    def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
+    def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
         """Set an attribute of the environment, which all arms share.
 
         Parameters
@@ -232,7 +227,11 @@ class SB3VecEnv(Lifecycle, VecEnv):
         setattr(self, attr_name, value)
 
     def env_method(
-        self, method_name: str, *method_args: Any, indices: Indices = None, **method_kwargs: Any
+        self,
+        method_name: str,
+        *method_args: Any,
+        indices: VecEnvIndices = None,
+        **method_kwargs: Any,
     ) -> list[Any]:
         """The answer of a method of the interface, repeated for every arm.
 
@@ -244,6 +243,6 @@ class SB3VecEnv(Lifecycle, VecEnv):
         result = getattr(self.interface, method_name)(*method_args, **method_kwargs)
         return [result for _ in self._get_indices(indices)]
 
-    def env_is_wrapped(self, wrapper_class: type, indices: Indices = None) -> list[bool]:
+    def env_is_wrapped(self, wrapper_class: type, indices: VecEnvIndices = None) -> list[bool]:
         """True for ``Monitor``, whose infos this environment writes; False for other wrappers."""
         return [issubclass(Monitor, wrapper_class) for _ in self._get_indices(indices)]
