@@ -17,7 +17,8 @@ from kinarm.policies.learners import TrainingState, find_learner
 
 T = TypeVar("T")
 
-FORMAT_VERSION = 2
+ARCHIVE = ("checkpoint", 2)
+"""Kind and version of the files."""
 
 CHECKPOINT_SECONDS = 5.0
 """How often a training saves how far it is [s]."""
@@ -56,7 +57,7 @@ def save_checkpoint(
     arrays = arrays_of("state", state)
     if beside is not None:
         arrays |= arrays_of("beside", beside)
-    save_archive(path, "checkpoint", FORMAT_VERSION, arrays, header)
+    save_archive(path, *ARCHIVE, arrays, header)
 
 
 def load_checkpoint(path: str | Path) -> Checkpoint:
@@ -67,7 +68,7 @@ def load_checkpoint(path: str | Path) -> Checkpoint:
     PolicyFileError
         If the file is missing, truncated or not a checkpoint, or if the arm has changed since.
     """
-    header, arrays = load_archive(path, "checkpoint", FORMAT_VERSION, PolicyFileError)
+    header, arrays = load_archive(path, *ARCHIVE, PolicyFileError)
     name = repr(str(path))
     with reading(name, "checkpoint", PolicyFileError):
         learner = find_learner(header["learner"])
@@ -83,20 +84,17 @@ def load_checkpoint(path: str | Path) -> Checkpoint:
 
 def load_beside(path: Path, kind: type[T]) -> T:
     """Read what a checkpoint holds beside the state, which is of some type."""
-    _, arrays = load_archive(
-        path, "checkpoint", FORMAT_VERSION, PolicyFileError, unless=("state.",)
-    )
+    _, arrays = load_archive(path, *ARCHIVE, PolicyFileError, unless=("state.",))
     with reading(repr(str(path)), "checkpoint", PolicyFileError):
         value: T = rebuilt(kind, "beside", arrays)
         return value
 
 
-def load_progress(path: Path) -> tuple[int, int]:
-    """Read how many iterations of a training are done, and how many there are."""
-    every = ("state.", "beside.")
-    header, _ = load_archive(path, "checkpoint", FORMAT_VERSION, PolicyFileError, unless=every)
+def load_share(path: Path) -> float:
+    """Read which share of the iterations of a training is done."""
+    header, _ = load_archive(path, *ARCHIVE, PolicyFileError, unless=("state.", "beside."))
     with reading(repr(str(path)), "checkpoint", PolicyFileError):
-        return int(header["iteration"]), int(header["config"]["iterations"])
+        return float(header["iteration"] / header["config"]["iterations"])
 
 
 def arrays_of(name: str, value: Any) -> dict[str, NDArray[Any]]:

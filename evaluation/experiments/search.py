@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -126,12 +127,10 @@ def _mean_success(experiment: Experiment, store: Store, trial: Any, threads: int
     import optuna
 
     choices = {key: _suggest(trial, key, entry) for key, entry in experiment.searched.items()}
-    shares, points = [], 0
+    shares, numbers = [], count()
 
     def on_point(point: CurvePoint) -> None:
-        nonlocal points
-        trial.report(point.success, points)
-        points += 1
+        trial.report(point.success, next(numbers))
         if trial.should_prune():
             raise optuna.TrialPruned
 

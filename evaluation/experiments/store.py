@@ -17,7 +17,7 @@ from kinarm.evaluation.experiments.executors import Failure
 from kinarm.evaluation.experiments.experiment import Experiment
 from kinarm.evaluation.experiments.plan import Run
 from kinarm.evaluation.experiments.runs import Start, TaskResult, TrainedRun, load_run
-from kinarm.policies.checkpoint import load_beside, load_checkpoint, load_progress
+from kinarm.policies.checkpoint import load_beside, load_checkpoint, load_share
 from kinarm.policies.provenance import package_versions, source_commit
 
 SPECIFICATION = "study.toml"
@@ -110,8 +110,7 @@ class Store:
         for path in self.folder.glob("checkpoints/*.npz"):
             if path.stem in keys:
                 with suppress(PolicyFileError):
-                    done, iterations = load_progress(path)
-                    found.append(done / iterations)
+                    found.append(load_share(path))
         return found
 
     def made(self, run: Run) -> Made:
