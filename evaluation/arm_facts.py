@@ -5,7 +5,7 @@ from itertools import combinations
 
 import coal
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 
 from kinarm.arm import Arm
 from kinarm.arm_specification import ArmFile
@@ -64,7 +64,7 @@ def _shape(shape: coal.CollisionGeometry) -> str:
     return type(shape).__name__.lower()
 
 
-def _span(values: ArrayLike, prismatic: bool) -> str:
+def _span(values: NDArray[np.float64] | list[float], prismatic: bool) -> str:
     """Positions or speeds as people read them: metres, or degrees; equal ones once."""
     shown = np.round(values, 2) if prismatic else np.round(np.rad2deg(values))
     return " to ".join(dict.fromkeys(f"{value:g}" for value in shown))
