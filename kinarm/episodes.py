@@ -1,6 +1,7 @@
 """Rules, actions and episodes as arrays for the compiled kernels, and what episodes come to."""
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -19,18 +20,6 @@ LINEAR, TANH, RELU, HARDTANH, ELU, LEAKY_RELU, SILU = range(7)
 
 Outcome = Literal["success", "collision", "truncated"]
 """How an episode ends: at the goal, in contact, or at the horizon."""
-
-KEPT = {
-    "goals": "goal",
-    "steps": "steps",
-    "distance": "distance",
-    "returns": "total",
-    "configurations": "q",
-    "targets": "target",
-    "moments": "moments",
-    "paths": "path",
-}
-"""Arrays of `kinarm.episodes.Episodes` that are kept as they are, by their names in `Rollouts`."""
 
 
 class Rules(NamedTuple):
@@ -247,14 +236,19 @@ class Rollouts:
         copy : bool
             Copy their arrays, which may then serve others.
         """
+        kept = partial(np.array, copy=copy or None)
         rollouts = cls(
             starts=starts,
+            goals=kept(episodes.goal),
             success=episodes.status == SUCCESS,
             collision=episodes.status == COLLISION,
-            **{
-                name: np.array(getattr(episodes, field), copy=copy or None)
-                for name, field in KEPT.items()
-            },
+            steps=kept(episodes.steps),
+            distance=kept(episodes.distance),
+            returns=kept(episodes.total),
+            configurations=kept(episodes.q),
+            targets=kept(episodes.target),
+            moments=kept(episodes.moments),
+            paths=kept(episodes.path),
         )
         for array in vars(rollouts).values():
             array.flags.writeable = False

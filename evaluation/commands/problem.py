@@ -7,15 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, ClassVar, cast
 
 from kinarm._command_line import Commands, run_commands
-from kinarm._console import print_table
+from kinarm._console import print_table, working
 from kinarm._files import check_output, write_atomically, write_text
 from kinarm.errors import FROM_ZERO, TRIALS
-from kinarm.problem import problem_names
+from kinarm.problem import ReachProblem, problem_names
 from kinarm.problem_options import ProblemOptions, say_choices
 
 if TYPE_CHECKING:
     from kinarm.evaluation.problem_check import ProblemCheck
-    from kinarm.problem import ReachProblem
 
 HEADINGS = ("problem", "arm", "obstacles", "goals", "step [s]", "tolerance [m]")
 EXPENDABLE = ("obstacles", "step [s]", "tolerance [m]")
@@ -79,7 +78,6 @@ class CheckRequest(ShowRequest):
 
     def run(self) -> "ProblemCheck":
         """Check the problem, and write the outputs."""
-        from kinarm._console import working
         from kinarm.evaluation.problem_check import check_problem
         from kinarm.world import World
 
@@ -102,7 +100,7 @@ class CheckRequest(ShowRequest):
         return check
 
 
-def write_picture(path: Path, problem: "ReachProblem") -> None:
+def write_picture(path: Path, problem: ReachProblem) -> None:
     """Write a picture of the arm at home, and a goal in the middle of a region."""
     from matplotlib.image import imsave
 
@@ -117,8 +115,6 @@ def write_picture(path: Path, problem: "ReachProblem") -> None:
 
 def rows() -> list[tuple[str, ...]]:
     """A row for each problem that ships, under `HEADINGS`."""
-    from kinarm.problem import ReachProblem
-
     return [
         (
             problem.name,
