@@ -1,10 +1,8 @@
 """Kinematics of an arm: poses, Jacobians, and configurations that bring the tool to targets."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -22,7 +20,7 @@ from kinarm.errors import (
 )
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.inverse import TURN, Search, solve_targets
-from kinarm.kernels.kinematics import move_frame, place_frame
+from kinarm.kernels.kinematics import follow_frame
 from kinarm.randomness import low_discrepancy_points
 
 ISOLATED_SEPARATION, CONTINUUM_SEPARATION = 1e-3, 0.2
@@ -106,7 +104,7 @@ class Kinematics(ABC):
         ndarray, shape (4, 4) or (n, 4, 4)
             Homogeneous transforms from the frame to the world [m].
         """
-        return self._of_frame(place_frame, configurations, frame, (4, 4))
+        return self._of_frame(configurations, frame, (4, 4))
 
     def jacobians(self, configurations: ArrayLike, frame: str | None = None) -> Array:
         """Jacobians of a frame: how it moves per unit speed of each joint, compiled.
@@ -122,14 +120,10 @@ class Kinematics(ABC):
             Velocity of the frame's origin, then angular velocity, along the world's axes
             [m/rad and rad/rad; m/m and 0 of a joint that slides].
         """
-        return self._of_frame(move_frame, configurations, frame, (6, self.arm.n_joints))
+        return self._of_frame(configurations, frame, (6, self.arm.n_joints))
 
     def _of_frame(
-        self,
-        kernel: Callable[..., Any],
-        configurations: ArrayLike,
-        frame: str | None,
-        shape: tuple[int, int],
+        self, configurations: ArrayLike, frame: str | None, shape: tuple[int, int]
     ) -> Array:
         """Fill in an array of a shape at each configuration."""
         q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
@@ -138,7 +132,7 @@ class Kinematics(ABC):
             raise UnknownNameError("frame", frame, self.frames)
         placed = self.tool if frame is None else self.frames[frame]
         arrays = (self.arm.chain, *placed, q, filled)
-        run_rows(kernel, len(q), len(q), self.threads, *arrays)
+        run_rows(follow_frame, len(q), len(q), self.threads, *arrays)
         return filled[0] if one else filled
 
     def inverse_kinematics(

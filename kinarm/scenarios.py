@@ -102,9 +102,8 @@ def _draw(rngs: Sequence[np.random.Generator], counts: Sequence[int], width: int
 class ScenarioQueues:
     """Starts and goals of the successive episodes of many arms, drawn for all of them at a time.
 
-    Those of an arm are what `draw_scenarios` draws with its generator, a few at a
-    time. There is room for twice as many as are drawn: once an arm has none left, all that have
-    room get some.
+    Those of an arm are what `draw_scenarios` draws with its generator, a few at a time. There is
+    room for twice as many as are drawn: once an arm has none left, all that have room get some.
     """
 
     def __init__(self, world: World, n_arms: int) -> None:

@@ -71,7 +71,15 @@ class Interface:
     tells_terms = True
 
     def __init__(self, simulator: Simulator, dtype: DTypeLike = np.float64) -> None:
-        self.simulator, self._dtype = simulator, checked_dtype(dtype)
+        try:
+            name = np.dtype(dtype).name
+        except TypeError:
+            name = str(dtype)
+        if name not in DTYPES:
+            raise InvalidInputError(
+                f"observation_dtype must be one of {list(DTYPES)}, got {dtype!r}"
+            )
+        self.simulator, self._dtype = simulator, np.dtype(name)
         self.action_space = Box(-1.0, 1.0, (simulator.n_actions,), dtype=np.float32)
         rate = round(1 / simulator.problem.stepping.time_step)
         self.metadata = {"render_modes": list(RENDER_MODES), "render_fps": max(rate, 1)}
@@ -95,17 +103,6 @@ def one_by_one(observations: Observations, count: int) -> list[Any]:
     if isinstance(observations, dict):
         return [{key: part[k] for key, part in observations.items()} for k in range(count)]
     return list(observations)
-
-
-def checked_dtype(dtype: DTypeLike) -> np.dtype[Any]:
-    """A type that observations can have, or an error."""
-    try:
-        name = np.dtype(dtype).name
-    except TypeError:
-        name = str(dtype)
-    if name not in DTYPES:
-        raise InvalidInputError(f"observation_dtype must be one of {list(DTYPES)}, got {dtype!r}")
-    return np.dtype(name)
 
 
 def state_bounds(simulator: Simulator) -> tuple[Array, Array]:
@@ -174,8 +171,29 @@ class ArmEnvironment(Lifecycle):
         self.interface = self._make_interface(simulator, dtype)
         self.metadata = self.interface.metadata
         self._told = ("distance", *(TERM_KEYS if self.interface.tells_terms else ()))
-        self._queues = ScenarioQueues(simulator.world, num_envs)
+        self._queues, self._n_arms = ScenarioQueues(simulator.world, num_envs), num_envs
         self._pictures = EnvPictures(simulator, render_mode, num_envs, **picture)
+
+    def _begin(self, rows: NDArray[np.int64], options: Mapping[str, Any] | None = None) -> Episodes:
+        """Begin episodes of some arms; options may set ``start`` and ``goal`` of all of them."""
+        n_joints = self.simulator.arm.n_joints
+        fixed = fixed_scenario(options, n_joints)
+        if "start" in fixed:  # refuse what no episode can start at
+            self.simulator.reset(fixed["start"][None], np.zeros((1, 3)))
+        if self._episodes is None:
+            q, goals = np.empty((self._n_arms, n_joints)), np.empty((self._n_arms, 3))
+        else:
+            q, goals = self._episodes.q, self._episodes.goal
+        self._queues.put(rows, q, goals)
+        if fixed:
+            q[rows] = fixed.get("start", q[rows])
+            goals[rows] = fixed.get("goal", goals[rows])
+        if self._episodes is None:
+            self._episodes = self.simulator.reset(q, goals)
+        else:
+            self.simulator.begin(self._episodes, rows)
+        self._pictures.begin(rows, self._episodes)
+        return self._episodes
 
     def _find_contacts(self, episodes: Episodes, result: StepResult) -> None:
         """Fill in the numbers of the first contacts of a step that are not known yet.
@@ -232,26 +250,13 @@ def make_simulator(
         ) from error
 
 
-def pick_scenario(
-    options: Mapping[str, Any] | None, start: Array, goal: Array
-) -> tuple[Array, Array]:
-    """Replace a start and a goal by those that the options of a reset set.
-
-    Parameters
-    ----------
-    options : mapping, optional
-        May hold ``start`` and ``goal``.
-    start, goal : ndarray, shape (n_joints,) and (3,)
-        Configuration [rad or m] and position [m] that were drawn.
-    """
-    given = dict(options or {})
-    unknown = set(given) - {"start", "goal"}
+def fixed_scenario(options: Mapping[str, Any] | None, n_joints: int) -> dict[str, Array]:
+    """The ``start`` [rad or m] and the ``goal`` [m] that the options of a reset set, if they do."""
+    given, shapes = dict(options or {}), {"start": (n_joints,), "goal": (3,)}
+    unknown = set(given) - set(shapes)
     if unknown:
         raise InvalidInputError(f"unknown reset options {sorted(unknown)}; available: start, goal")
-    return (
-        finite_array("start", given.get("start", start), start.shape),
-        finite_array("goal", given.get("goal", goal), goal.shape),
-    )
+    return {name: finite_array(name, value, shapes[name]) for name, value in given.items()}
 
 
 def portable_spec(spec: EnvSpec, simulator: Simulator) -> EnvSpec:

@@ -12,7 +12,6 @@ from kinarm.envs.environment import (
     Observations,
     make_simulator,
     one_by_one,
-    pick_scenario,
 )
 from kinarm.episodes import COLLISION, RUNNING, SUCCESS, TRUNCATED, Episodes, StepResult
 from kinarm.errors import finite_array
@@ -107,17 +106,8 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
         super().reset(seed=seed)
         if self._episodes is None or seed is not None:
             self._queues.seed(0, self.np_random)
-        if self._episodes is None or options:
-            drawn = np.empty((1, self.simulator.arm.n_joints)), np.empty((1, 3))
-            self._queues.put(FIRST_ROW, *drawn)
-            start, goal = pick_scenario(options, drawn[0][0], drawn[1][0])
-            self._episodes = self.simulator.reset([start], [goal])
-        else:
-            self._queues.put(FIRST_ROW, self._episodes.q, self._episodes.goal)
-            self.simulator.begin(self._episodes, FIRST_ROW)
-        self._pictures.begin(FIRST_ROW, self._episodes)
-        distance = self._episodes.distance.item()
-        return self._observation(self._episodes), {"distance": distance}
+        episode = self._begin(FIRST_ROW, options)
+        return self._observation(episode), {"distance": episode.distance.item()}
 
     def step(self, action: Array) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
         """Move for one time step."""

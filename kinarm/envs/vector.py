@@ -15,7 +15,6 @@ from kinarm.envs.environment import (
     Observations,
     make_simulator,
     one_by_one,
-    pick_scenario,
 )
 from kinarm.episodes import RUNNING, Episodes
 from kinarm.errors import InvalidInputError, whole_number
@@ -106,31 +105,15 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
         chosen = dict(options or {})
         rows = self._masked_rows(chosen.pop("reset_mask", None))
         seeds = self._seeds(seed)
-        start, goal = pick_scenario(chosen, self.simulator.arm.home, np.zeros(3))
-        if "start" in chosen:
-            self.simulator.reset(start[None], goal[None])  # refuses what no episode can start at
         for row in rows.tolist():
             if seeds[row] is not None:
                 self._queues.seed(row, np.random.default_rng(seeds[row]))
-        if self._episodes is None:
-            places = np.empty((self.num_envs, len(start))), np.empty((self.num_envs, 3))
-        else:
-            places = self._episodes.q, self._episodes.goal
-        self._queues.put(rows, *places)
-        if "start" in chosen:
-            places[0][rows] = start
-        if "goal" in chosen:
-            places[1][rows] = goal
-        if self._episodes is None:
-            self._episodes = self.simulator.reset(*places)
-        else:
-            self.simulator.begin(self._episodes, rows)
-        self._pictures.begin(rows, self._episodes)
+        episodes = self._begin(rows, chosen)
         distance = np.zeros(self.num_envs)
-        distance[rows] = self._episodes.distance[rows]
+        distance[rows] = episodes.distance[rows]
         mask = np.zeros(self.num_envs, dtype=bool)
         mask[rows] = True
-        shown = self.interface.observe(self._episodes.observation)
+        shown = self.interface.observe(episodes.observation)
         return shown, {"distance": distance, "_distance": mask}
 
     def step(
@@ -197,9 +180,7 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
 
     def _renew(self, episodes: Episodes, rows: NDArray[np.int64], infos: dict[str, Any]) -> None:
         """Begin new episodes and report their distance."""
-        self._queues.put(rows, episodes.q, episodes.goal)
-        self.simulator.begin(episodes, rows)
-        self._pictures.begin(rows, episodes)
+        self._begin(rows)
         infos["distance"][rows] = episodes.distance[rows]
         infos["_distance"] = infos["_distance"].copy()  # which is no longer that of the others
         infos["_distance"][rows] = True

@@ -109,16 +109,16 @@ def between(
     second: int,
     poses: Array,
     simplex: Array,
-    tried: Array,
     points: Array,
 ) -> float:
     """Distance of two bodies, and where they are closest; minus infinity if polytopes overlap.
 
-    ``simplex``, shape (4, 3), and ``tried``, shape (CORNERS_TRIED, 9), are work space.
+    ``simplex``, shape (4, 9), is work space: differences of corners, and the corners that they are
+    of.
     """
     size, norm, x, y, z = 0, math.inf, 0.0, 0.0, 1.0
     # Walk towards the difference of two points of the bodies that is closest to the origin.
-    for number in range(CORNERS_TRIED):
+    for _ in range(CORNERS_TRIED):
         low = lowest_in_world(bodies, first, poses, x, y, z)
         high = lowest_in_world(bodies, second, poses, -x, -y, -z)
         a, b = corner_at(bodies, first, low, poses), corner_at(bodies, second, high, poses)
@@ -126,9 +126,8 @@ def between(
         if norm - (x * wx + y * wy + z * wz) / norm <= PRECISION:
             break
         simplex[size, 0], simplex[size, 1], simplex[size, 2] = wx, wy, wz
-        tried[number, 0], tried[number, 1], tried[number, 2] = wx, wy, wz
         for k in range(3):
-            tried[number, 3 + k], tried[number, 6 + k] = a[k], b[k]
+            simplex[size, 3 + k], simplex[size, 6 + k] = a[k], b[k]
         size, x, y, z = shrink(simplex, size + 1)
         shorter = math.sqrt(x * x + y * y + z * z)
         if shorter < OVERLAPPING:
@@ -146,16 +145,9 @@ def between(
     for k in range(3):
         points[0, k], points[1, k] = 0.0, 0.0
     for i in range(size):
-        number = 0
-        while (
-            tried[number, 0] != simplex[i, 0]
-            or tried[number, 1] != simplex[i, 1]
-            or tried[number, 2] != simplex[i, 2]
-        ):
-            number += 1
         for k in range(3):
-            points[0, k] += weights[i] * tried[number, 3 + k]
-            points[1, k] += weights[i] * tried[number, 6 + k]
+            points[0, k] += weights[i] * simplex[i, 3 + k]
+            points[1, k] += weights[i] * simplex[i, 6 + k]
     # Shift them from the polytopes to the surfaces of the rounded bodies.
     inner, outer = bodies.rounding[first] / norm, bodies.rounding[second] / norm
     for k in range(3):
@@ -192,7 +184,7 @@ def closest_pairs(
         Where the two points go at which its bodies are closest [m].
     """
     poses = np.zeros((configurations.shape[1] + 1, POSE))
-    simplex, tried, found = np.empty((4, 3)), np.empty((CORNERS_TRIED, 9)), np.empty((2, 3))
+    simplex, found = np.empty((4, 9)), np.empty((2, 3))
     n_pairs = bodies.pairs.shape[0]
     known = np.empty(n_pairs, dtype=np.bool_)
     for row in range(first, last):
@@ -213,7 +205,7 @@ def closest_pairs(
             if bodies.flat[other]:
                 distance = above_plane(bodies, one, other, poses, found)
             else:
-                distance = between(bodies, one, other, poses, simplex, tried, found)
+                distance = between(bodies, one, other, poses, simplex, found)
             known[pair], bounds[row, pair] = True, distance
             if distance < shortest:
                 shortest = distance

@@ -145,6 +145,7 @@ def is_beyond(simplex: Array, i: int, j: int, k: int, other: int) -> bool:
 def shrink(simplex: Array, size: int) -> tuple[int, float, float, float]:
     """Drop the corners that the closest point does not depend on; return how many stay, and it.
 
+    What a row of the simplex holds after its corner stays with that.
     A tetrahedron that holds the origin stays as it is.
     """
     a, b, c, d = 1.0, 0.0, 0.0, 0.0
@@ -178,8 +179,8 @@ def shrink(simplex: Array, size: int) -> tuple[int, float, float, float]:
             x += weight * simplex[corner, 0]
             y += weight * simplex[corner, 1]
             z += weight * simplex[corner, 2]
-            for axis in range(3):
-                simplex[kept, axis] = simplex[corner, axis]
+            for column in range(simplex.shape[1]):
+                simplex[kept, column] = simplex[corner, column]
             kept += 1
     return kept, x, y, z
 

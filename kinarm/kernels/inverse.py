@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, Vector, helper, inlined, kernel
 from kinarm.kernels.elementary import nearest_whole
-from kinarm.kernels.kinematics import POSE, place, point_jacobian, rotated, to_world
+from kinarm.kernels.kinematics import POSE, forward_kinematics, point_jacobian, rotated, to_world
 from kinarm.kernels.lanes import LANES, any_lane, as_lanes, as_numbers, lane_bits, select
 
 PRECISION = 1e-10
@@ -243,7 +243,7 @@ def solve_targets(
             if n_moving == 0:
                 break
             # Errors of position and orientation, and the Jacobian by which they change.
-            place(chain, q, poses)
+            forward_kinematics(chain, q, 0, poses)
             point = to_world(poses, n_joints, tool[0], tool[1], tool[2])
             point_jacobian(chain, poses, point, jacobian)
             squared = 0.0 * point[0]

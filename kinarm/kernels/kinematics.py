@@ -63,12 +63,6 @@ def forward_kinematics(chain: Chain, configurations: Array, row: int, poses: Arr
 
 
 @inlined
-def place(chain: Chain, configurations: Array, poses: Array) -> None:
-    """Fill in the world poses at the first row of the configurations; see `forward_kinematics`."""
-    forward_kinematics(chain, configurations, 0, poses)
-
-
-@inlined
 def to_world(poses: Array, frame: int, x: float, y: float, z: float) -> Vector:
     """Map a point of a joint frame to the world."""
     return (
@@ -124,16 +118,16 @@ def point_jacobian(chain: Chain, poses: Array, point: Vector, jacobian: Array) -
 
 
 @kernel
-def place_frame(
+def follow_frame(
     first: int,
     last: int,
     chain: Chain,
     joint: int,
     placement: Array,
     configurations: Array,
-    transforms: Array,
+    filled: Array,
 ) -> None:
-    """Write where a frame is at some rows of the configurations.
+    """Write where a frame is at some rows of the configurations, or how it moves.
 
     Parameters
     ----------
@@ -143,43 +137,21 @@ def place_frame(
         The joint that carries the frame, 0 is the world, and where it is in that one's frame [m].
     configurations : ndarray, shape (n, n_joints)
         Joint positions [rad or m].
-    transforms : ndarray, shape (n, 4, 4)
-        Where its poses in the world go [m].
-    """
-    poses = np.zeros((configurations.shape[1] + 1, POSE))
-    for row in range(first, last):
-        forward_kinematics(chain, configurations, row, poses)
-        for k in range(3):
-            x, y, z = placement[0, k], placement[1, k], placement[2, k]
-            x, y, z = rotated(poses, joint, x, y, z)
-            transforms[row, 0, k], transforms[row, 1, k], transforms[row, 2, k] = x, y, z
-            transforms[row, 3, k] = 0.0
-        x, y, z = to_world(poses, joint, placement[0, 3], placement[1, 3], placement[2, 3])
-        transforms[row, 0, 3], transforms[row, 1, 3], transforms[row, 2, 3] = x, y, z
-        transforms[row, 3, 3] = 1.0
-
-
-@kernel
-def move_frame(
-    first: int,
-    last: int,
-    chain: Chain,
-    joint: int,
-    placement: Array,
-    configurations: Array,
-    jacobians: Array,
-) -> None:
-    """Write how a frame moves at some rows of the configurations.
-
-    Parameters
-    ----------
-    first, last, chain, joint, placement, configurations
-        As for `place_frame`.
-    jacobians : ndarray, shape (n, 6, n_joints)
-        Where its Jacobians go; columns of the joints beyond the frame are left as they are.
+    filled : ndarray, shape (n, 4, 4) or (n, 6, n_joints)
+        Where its poses in the world go [m]; or its Jacobians, of which columns of the joints beyond
+        the frame are left as they are.
     """
     poses = np.zeros((configurations.shape[1] + 1, POSE))
     for row in range(first, last):
         forward_kinematics(chain, configurations, row, poses)
         point = to_world(poses, joint, placement[0, 3], placement[1, 3], placement[2, 3])
-        point_jacobian(chain, poses, point, jacobians[row, :, :joint])
+        if filled.shape[1] == 6:
+            point_jacobian(chain, poses, point, filled[row, :, :joint])
+            continue
+        for k in range(3):
+            x, y, z = placement[0, k], placement[1, k], placement[2, k]
+            x, y, z = rotated(poses, joint, x, y, z)
+            filled[row, 0, k], filled[row, 1, k], filled[row, 2, k] = x, y, z
+            filled[row, 3, k] = 0.0
+        filled[row, 0, 3], filled[row, 1, 3], filled[row, 2, 3] = point
+        filled[row, 3, 3] = 1.0

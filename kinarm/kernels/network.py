@@ -119,7 +119,12 @@ def choose_actions(control: Control, shared: int, row: NDArray[np.int64], block:
     layers, activations, signs = control.layers, control.activations, control.observation_signs
     reflected = block.observation[0, control.side] > 0.0
     if layers.shape[0] == 0:
-        look_up_actions(row, control, block)
+        held, steps = as_numbers(block.action), as_numbers(block.steps)
+        for lane in range(row.shape[0]):
+            if row[lane] >= 0:
+                column = int(steps[0, lane]) if control.actions.shape[1] > 1 else 0
+                for axis in range(held.shape[1]):
+                    held[0, axis, lane] = control.actions[row[lane], column, axis]
     else:
         mirrored = signs.shape[0] > 0
         # Networks with a mirror have learnt goals on the right alone: goals on the left they are
@@ -138,14 +143,3 @@ def choose_actions(control: Control, shared: int, row: NDArray[np.int64], block:
         if signs.shape[0] > 0:
             action = select(reflected, action * control.action_signs[axis], action)
         block.action[0, axis] = action
-
-
-@inlined
-def look_up_actions(row: NDArray[np.int64], control: Control, block: Block) -> None:
-    """Take the actions of a block from the table."""
-    action, steps = as_numbers(block.action), as_numbers(block.steps)
-    for lane in range(row.shape[0]):
-        if row[lane] >= 0:
-            column = int(steps[0, lane]) if control.actions.shape[1] > 1 else 0
-            for axis in range(action.shape[1]):
-                action[0, axis, lane] = control.actions[row[lane], column, axis]

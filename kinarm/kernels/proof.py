@@ -18,7 +18,7 @@ from kinarm.chain import Chain
 from kinarm.contact_shapes import BETWEEN_CAPSULES, GROUND, PLANE, WITH_GROUND, ContactShapes
 from kinarm.kernels.compiling import Array, helper, inlined
 from kinarm.kernels.distance import between_segments, closest_to_box, turned_back
-from kinarm.kernels.kinematics import place
+from kinarm.kernels.kinematics import forward_kinematics
 from kinarm.kernels.lanes import any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.planes import (
     EVERYDAY,
@@ -58,16 +58,6 @@ def twist_step(block: Block) -> None:
 
 
 @inlined
-def bend_of(shapes: ContactShapes, pair: int, block: Block) -> float:
-    """Bend of a pair's heights in a step [m]."""
-    first, last = shapes.planes[pair, 2], shapes.planes[pair, 3]
-    bend = 0.0 * block.q[0, 0]
-    for axis in range(first, last):
-        bend += block.twist[first, axis] * shapes.travel[axis, pair]
-    return bend
-
-
-@inlined
 def prove_step(shapes: ContactShapes, tested: int, poses: Array, block: Block) -> float:
     """Renew the heights of all pairs, and return a bound that shows which steps are free.
 
@@ -102,7 +92,10 @@ def renew_planes(
         bound = block.bound[pair]
         open_here = stale & ~is_apart(bound)
         if any_lane(open_here):
-            bend = bend_of(shapes, pair, block)
+            first, last = shapes.planes[pair, 2], shapes.planes[pair, 3]
+            bend = 0.0 * block.q[0, 0]
+            for axis in range(first, last):
+                bend += block.twist[first, axis] * shapes.travel[axis, pair]
             at_start, at_end = block.height[pair], block.planes[pair, GAP]
             bound = min(at_end, at_start + share * (at_end - at_start)) - 0.125 * bend
             open_here = stale & ~is_apart(bound)
@@ -162,7 +155,7 @@ def prove_alone(
         if unproven != 0 and shapes.planes[pair, 0] != GROUND:
             if not at_start:
                 take(block.q, 0, lane, alone.q, 0)
-                place(chain, alone.q, alone.before)
+                forward_kinematics(chain, alone.q, 0, alone.before)
                 at_start = True
             take(block.planes, pair, lane, plane, 0)
             after = separate(shapes, pair, alone.after, alone.relative, alone.simplex, plane)
@@ -209,22 +202,7 @@ def place_between(k: int, tested: int, lane: int, chain: Chain, block: Block, al
     for joint in range(block.q.shape[1]):
         start, end = q[0, joint, lane], target[0, joint, lane]
         alone.q[0, joint] = start + k / tested * (end - start)
-    place(chain, alone.q, alone.before)
-
-
-@inlined
-def propose_planes(shapes: ContactShapes, poses: Array, block: Block) -> float:
-    """Give all pairs a first plane, and return the least height above one.
-
-    Takes the poses of the configurations.
-    """
-    least = 0.0 * block.q[0, 0] + 1.0
-    for pair in range(shapes.planes.shape[0]):
-        propose(shapes, pair, poses, block.planes, pair)
-        height = height_above(shapes, pair, EVERYDAY, poses, block.planes, pair)
-        block.planes[pair, GAP] = height
-        least = min(least, height)
-    return least
+    forward_kinematics(chain, alone.q, 0, alone.before)
 
 
 @helper
@@ -251,8 +229,17 @@ def prove_configuration(
 def prove_configurations(
     shapes: ContactShapes, touched: int, filled: int, block: Block, alone: Alone
 ) -> int:
-    """Bits of the arms that are proven free of contact; ``touched`` are those that are not."""
-    free = lane_bits(is_apart(propose_planes(shapes, block.after, block)))
+    """Bits of the arms that are proven free of contact; ``touched`` are those that are not.
+
+    Takes the poses ``after``, and gives all pairs a first plane.
+    """
+    least = 0.0 * block.q[0, 0] + 1.0
+    for pair in range(shapes.planes.shape[0]):
+        propose(shapes, pair, block.after, block.planes, pair)
+        height = height_above(shapes, pair, EVERYDAY, block.after, block.planes, pair)
+        block.planes[pair, GAP] = height
+        least = min(least, height)
+    free = lane_bits(is_apart(least))
     for lane in range(filled):
         open_here = (free | touched) >> lane & 1 == 0
         if open_here and prove_configuration(lane, shapes, block.after, block, alone):
@@ -321,7 +308,7 @@ def first_contact(
         k += 1
     if k == tested:
         take(block.target, 0, lane, alone.q, 0)
-        place(chain, alone.q, alone.before)
+        forward_kinematics(chain, alone.q, 0, alone.before)
     else:
         place_between(k, tested, lane, chain, block, alone)
     for pair in range(shapes.pairs.shape[0]):

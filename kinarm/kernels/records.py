@@ -212,13 +212,8 @@ def _field_type(_: Any, record: RecordType, name: str) -> types.Type | None:
     return record.fields.get(name)
 
 
-infer_getattr(
-    type(
-        "RecordAttribute",
-        (AttributeTemplate,),
-        {"key": RecordType, "generic_resolve": _field_type},
-    )
-)
+_resolved = {"key": RecordType, "generic_resolve": _field_type}
+infer_getattr(type("RecordAttribute", (AttributeTemplate,), _resolved))
 
 
 @lower_getattr_generic(RecordType)

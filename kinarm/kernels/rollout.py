@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Episodes, Rules
 from kinarm.kernels.compiling import Array, inlined, lean_kernel
-from kinarm.kernels.kinematics import place
+from kinarm.kernels.kinematics import forward_kinematics
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.network import choose_actions, shared_policy
 from kinarm.kernels.planes import GAP
@@ -54,7 +54,7 @@ def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]
             e = rows[start + min(lane, filled - 1)]
             put(q, e, block.q, 0, lane)
             put(episodes.goal, e, block.goal, 0, lane)
-        place(chain, block.q, block.after)
+        forward_kinematics(chain, block.q, 0, block.after)
         free = prove_configurations(shapes, 0, filled, block, alone)
         block.distance[0] = observe(chain.tool, block.after, block.goal, 0, block.observation)
         # Store all that an episode begins with.
@@ -121,11 +121,11 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
             block.target[0, axis] = select(fresh, moved, block.target[0, axis])
         # Prove the steps free of contact: all together, then by new planes, then one by one.
         before, poses = poses, before
-        place(chain, block.target, poses)
+        forward_kinematics(chain, block.target, 0, poses)
         unproven = ~is_apart(prove_step(shapes, rules.tested, poses, block)) & fresh
         if any_lane(unproven):
             if changed:
-                place(chain, block.q, before)
+                forward_kinematics(chain, block.q, 0, before)
             least = renew_planes(shapes, rules.tested, unproven, before, poses, block)
             unproven = unproven & ~is_apart(least)
         if any_lane(unproven):

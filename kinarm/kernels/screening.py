@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from kinarm.chain import Chain
 from kinarm.contact_shapes import ContactShapes
 from kinarm.kernels.compiling import Array, kernel, lean_kernel
-from kinarm.kernels.kinematics import place, to_world
+from kinarm.kernels.kinematics import forward_kinematics, to_world
 from kinarm.kernels.lanes import LANES, lane_bits
 from kinarm.kernels.proof import MARGIN, deepest_overlap, prove_configurations
 from kinarm.kernels.session import Alone, Block, put, take
@@ -140,7 +140,7 @@ def screen(
         filled = min(last - start, LANES)
         for lane in range(LANES):
             put(configurations, start + min(lane, filled - 1), block.q, 0, lane)
-        place(chain, block.q, block.after)
+        forward_kinematics(chain, block.q, 0, block.after)
         touched = lane_bits(deepest_overlap(shapes, block.after) > MARGIN)
         apart = prove_configurations(shapes, touched, filled, block, alone)
         x, y, z = to_world(block.after, n_joints, tool[0], tool[1], tool[2])

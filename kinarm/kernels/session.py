@@ -9,7 +9,6 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.contact_shapes import PLANE, ContactShapes
@@ -226,7 +225,8 @@ class Session(Record):
             As for `kinarm.World.episodes`, and the networks.
         """
         episodes = self.episodes
-        parts = [*zip(_arrays(self.control), _arrays(control), strict=True)]
+        pairs = zip(self.control, control, strict=True)
+        parts: list[Any] = [pair for pair in pairs if isinstance(pair[0], np.ndarray)]
         collected = 0 if shift is None else len(starts)
         if (
             episodes.q.shape != starts.shape
@@ -241,11 +241,6 @@ class Session(Record):
         if shift is not None:
             episodes.shift[:], episodes.moments[:] = shift, 0.0
         return True
-
-
-def _arrays(control: Control) -> list[NDArray[Any]]:
-    """All that differs from one control to another."""
-    return [part for part in control if isinstance(part, np.ndarray)]
 
 
 @instruction

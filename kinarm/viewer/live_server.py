@@ -45,10 +45,10 @@ FILES = {
 """Type, package and name of what a page consists of, by address; the scene is no file."""
 
 
-class LiveServer:
+class LiveServer(ThreadingTCPServer):
     """Serves a scene to browsers on this machine while it is drawn; use it in a ``with`` block.
 
-    Its threads end with the process, however that ends.
+    Each visitor is answered by a thread, which ends with the process, however that ends.
 
     Parameters
     ----------
@@ -66,13 +66,23 @@ class LiveServer:
         If no port is free.
     """
 
+    allow_reuse_address = daemon_threads = True
+
     def __init__(self, port: int = PORT) -> None:
-        self._scene, self.ids = LiveScene(), count()
-        self._server = _listening_server(whole_number("port", port, 0, LAST_PORT))
-        self._server.scene = self._scene
-        self.port: int = self._server.server_address[1]
-        self.window = Visualizer(window=self)
-        threading.Thread(target=self._server.serve_forever, args=(0.05,), daemon=True).start()
+        self.scene, self.ids, self.window = LiveScene(), count(), Visualizer(window=self)
+        first = whole_number("port", port, 0, LAST_PORT)
+        for candidate in range(first, min(first + PORTS_TRIED, LAST_PORT) + 1):
+            try:
+                super().__init__((HOST, candidate), _Visit)
+            except OSError as error:
+                reason = error.strerror
+                if error.errno != errno.EADDRINUSE:
+                    break
+            else:
+                self.port: int = self.server_address[1]
+                threading.Thread(target=self.serve_forever, args=(0.05,), daemon=True).start()
+                return
+        raise OutputError(f"cannot serve on port {first}: {reason}")
 
     @property
     def address(self) -> str:
@@ -81,19 +91,21 @@ class LiveServer:
 
     def send(self, command: Any) -> None:
         """Pass a drawing command on; Meshcat calls this."""
-        self._scene.add(command.lower())
+        self.scene.add(command.lower())
 
     def close(self) -> None:
         """Stop serving."""
-        self._scene.close()
-        self._server.shutdown()
-        self._server.server_close()
-
-    def __enter__(self) -> "LiveServer":
-        return self
+        self.scene.close()
+        self.shutdown()
+        self.server_close()
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Connections that break are no news to a user."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
 
 
 class LiveScene:
@@ -145,22 +157,10 @@ class LiveScene:
             yield from news
 
 
-class _Server(ThreadingTCPServer):
-    """Answers each visitor in a thread of its own."""
-
-    allow_reuse_address = daemon_threads = True
-    scene: LiveScene
-
-    def handle_error(self, request: Any, client_address: Any) -> None:
-        """Connections that break are no news to a user."""
-        if not isinstance(sys.exception(), OSError):
-            super().handle_error(request, client_address)
-
-
 class _Visit(BaseHTTPRequestHandler):
     """Answers a visitor with a file of the page, or with the scene as a stream without end."""
 
-    server: _Server
+    server: LiveServer
 
     def do_GET(self) -> None:
         """Answer."""
@@ -179,18 +179,6 @@ class _Visit(BaseHTTPRequestHandler):
 
     def log_message(self, *_: Any) -> None:
         """Say nothing about requests."""
-
-
-def _listening_server(port: int) -> _Server:
-    """Listen on a port, or on the next free one."""
-    for candidate in range(port, min(port + PORTS_TRIED, LAST_PORT) + 1):
-        try:
-            return _Server((HOST, candidate), _Visit)
-        except OSError as error:
-            reason = error.strerror
-            if error.errno != errno.EADDRINUSE:
-                break
-    raise OutputError(f"cannot serve on port {port}: {reason}")
 
 
 class LiveStage:

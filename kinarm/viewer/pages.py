@@ -270,16 +270,17 @@ def _trial_data(runs: Sequence[Recording]) -> dict[str, Any]:
         "horizon": problem.task.horizon,
         "timeStep": problem.stepping.time_step,
         "floor": first.steps_lower_bound,
-        "runs": [_run_data(run) for run in runs],
+        "runs": [
+            {
+                **{name: getattr(run, name) for name in ("policy", "outcome", "contact")},
+                "contactPoint": None if run.contact_point is None else run.contact_point.tolist(),
+                "refused": None if run.refused is None else run.refused.tolist(),
+                "states": run.states.tolist(),
+                "distances": run.distances.tolist(),
+            }
+            for run in runs
+        ],
     }
-
-
-def _run_data(run: Recording) -> dict[str, Any]:
-    """A recording, as JSON."""
-    data = {name: getattr(run, name) for name in ("policy", "outcome", "contact")}
-    arrays = {"contactPoint": run.contact_point, "refused": run.refused}
-    arrays |= {"states": run.states, "distances": run.distances}
-    return data | {name: None if a is None else a.tolist() for name, a in arrays.items()}
 
 
 class ArmPage(HtmlPage):

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv, VecEnvIndices, VecEnvStepReturn
 
-from kinarm.envs.environment import Lifecycle, Observations, one_by_one, pick_scenario
+from kinarm.envs.environment import Lifecycle, Observations, fixed_scenario, one_by_one
 from kinarm.envs.reach import ReachEnv
 from kinarm.envs.rendering import EnvPictures
 from kinarm.episodes import SUCCESS, Episodes
@@ -110,7 +110,9 @@ class SB3VecEnv(Lifecycle, VecEnv):
             self._failed = self._restored
         starts, goals = self._draw(np.arange(self.num_envs))
         for row, options in enumerate(self._options):
-            starts[row], goals[row] = pick_scenario(options, starts[row], goals[row])
+            fixed = fixed_scenario(options, starts.shape[1])
+            starts[row] = fixed.get("start", starts[row])
+            goals[row] = fixed.get("goal", goals[row])
         self._reset_seeds()
         self._reset_options()
         self._episodes = episodes = self.simulator.reset(starts, goals)

@@ -29,8 +29,7 @@ from kinarm.policies.conversion.sb3 import load_vec_normalize, sb3_model
 from kinarm.policies.learners import state_policy
 from kinarm.problem import ReachProblem, find_scene, find_task
 from kinarm.recording import load_recordings
-from kinarm.viewer.mesh_files import read_mesh_file
-from kinarm.viewer.visual_shapes import visual_parts
+from kinarm.viewer.visual_shapes import read_mesh_file, visual_parts
 
 from . import samples
 from .damage import (

@@ -11,11 +11,17 @@ from known_arms import EACH_ARM, INSTALLED
 
 from kinarm.arm import Arm
 from kinarm.errors import ArmError, MissingExtraError
-from kinarm.viewer import arm_page, mesh_files
-from kinarm.viewer.mesh_files import TOLERANCE, original_colour, read_mesh_file
+from kinarm.viewer import arm_page, visual_shapes
 from kinarm.viewer.meshes import Mesh, box
 from kinarm.viewer.parts import packed_colour, shape_finish
-from kinarm.viewer.visual_shapes import arm_parts, collision_parts, visual_parts
+from kinarm.viewer.visual_shapes import (
+    TOLERANCE,
+    arm_parts,
+    collision_parts,
+    original_colour,
+    read_mesh_file,
+    visual_parts,
+)
 
 trimesh = pytest.importorskip("trimesh", reason="pip install 'kinarm[robots]'")
 
@@ -199,12 +205,12 @@ class TestColours:
 class TestWithoutTheExtra:
     def test_collision_shapes_are_shown_and_it_is_said(self, simulators, monkeypatch, caplog):
         def missing(name):
-            raise mesh_files.metadata.PackageNotFoundError(name)
+            raise visual_shapes.metadata.PackageNotFoundError(name)
 
-        monkeypatch.setattr(mesh_files.metadata, "version", missing)
-        mesh_files._versions.cache_clear()
+        monkeypatch.setattr(visual_shapes.metadata, "version", missing)
+        visual_shapes._versions.cache_clear()
         with pytest.raises(MissingExtraError):
-            mesh_files._versions()
+            visual_shapes._versions()
         arm = Arm.load(simulators["mesh"].arm.specification)
         path = next(iter(simulators["mesh"].arm.urdf_path.parent.glob("*.stl")))
         monkeypatch.setattr(

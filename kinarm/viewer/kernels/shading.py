@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import Array, Vector, inlined, kernel
-from kinarm.viewer.kernels.lighting import Lights, Materials, light_up, sunlit, unit
 from kinarm.viewer.kernels.rasterising import Eye, Surfaces, edge
+from kinarm.viewer.lighting import Lights, Materials, light_up, sunlit, unit
 from kinarm.viewer.parts import FLOOR_RADIUS, GRID_RADIUS, GRID_STEP, channels, to_srgb
 
 FLOOR = 0

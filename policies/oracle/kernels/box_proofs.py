@@ -25,7 +25,7 @@ from kinarm.chain import Chain, MotionBounds
 from kinarm.contact_shapes import BETWEEN_CAPSULES, WITH_BOX, ContactShapes
 from kinarm.kernels.compiling import Array, Vector, helper, inlined
 from kinarm.kernels.distance import between_segments, closest_to_box, turned_back
-from kinarm.kernels.kinematics import place, point_jacobian, to_world
+from kinarm.kernels.kinematics import forward_kinematics, point_jacobian, to_world
 from kinarm.kernels.lanes import any_lane, select
 from kinarm.kernels.planes import axis_in_world
 from kinarm.kernels.proof import MARGIN, is_exact
@@ -41,7 +41,7 @@ NEGLIGIBLE = 1e-12
 def offset_from_goal(chain: Chain, q: Array, goal: Vector, poses: Array, offset: Array) -> float:
     """Fill in poses and the vector from the goal to the tool; return its length [m]."""
     tool = chain.tool
-    place(chain, q, poses)
+    forward_kinematics(chain, q, 0, poses)
     x, y, z = to_world(poses, q.shape[1], tool[0], tool[1], tool[2])
     x, y, z = x - goal[0], y - goal[1], z - goal[2]
     offset[0], offset[1], offset[2] = x, y, z

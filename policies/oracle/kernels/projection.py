@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, Vector, inlined, lean_kernel
 from kinarm.kernels.inverse import take_out_blocked, take_step
-from kinarm.kernels.kinematics import POSE, place, point_jacobian, to_world
+from kinarm.kernels.kinematics import POSE, forward_kinematics, point_jacobian, to_world
 from kinarm.kernels.lanes import LANES, as_numbers, lane_bits, lanes, select
 from kinarm.kernels.records import Fixed, Layout
 from kinarm.kernels.session import ONE, THREE, put, take
@@ -124,7 +124,7 @@ def damped_least_squares(
         if n_moving == 0:
             return
         # Measure the distance to the goal, and take out what has come close enough.
-        place(chain, moving.q, poses)
+        forward_kinematics(chain, moving.q, 0, poses)
         point = to_world(poses, n_joints, tool[0], tool[1], tool[2])
         x, y, z = aim[0] - point[0], aim[1] - point[1], aim[2] - point[2]
         distance = math.sqrt(x * x + y * y + z * z)
